@@ -80,7 +80,7 @@ def compare(name: str, folder: Path, full: bool) -> list[Row]:
     return rows
 
 
-HEAD = """# Published and computed
+HEAD = """# Comparison with published results
 
 Written by `python -m comparisons`, which runs every scene at its published size and draws the
 pictures; `python -m comparisons SCENE ...` does some of them again. Differences are relative to the

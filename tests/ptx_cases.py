@@ -14,10 +14,10 @@ from karamelo_py.compiler.fields import field
 from karamelo_py.kernels import nodes
 from karamelo_py.kernels.contact import stay_node, touch_node
 from karamelo_py.kernels.hooks import CompiledHook
-from karamelo_py.kernels.loss import Lost, Rubbed
+from karamelo_py.kernels.loss import EnergyLoss, FrictionalHeat
 from karamelo_py.kernels.nodes import KeepLoss
 from karamelo_py.language import registry
-from karamelo_py.language.docstrings import sections
+from karamelo_py.language.help import sections_of
 
 REASON = "needs numba-cuda and NVIDIA's compiler libraries: pip install 'karamelo-py[gpu]'"
 pathfinder = pytest.importorskip("cuda.pathfinder", reason=REASON)
@@ -68,7 +68,7 @@ def warm(script: str, *numbers: float) -> str:
 
 def example_of(family: str, name: str) -> str:
     """The words of `method` in the manual of a style."""
-    text = sections(registry.find(family, name).__doc__)[1]["Example"]
+    text = sections_of(registry.find(family, name).__doc__)[1]["Example"]
     return re.search(r"^method\((.*)\)$", text, re.MULTILINE)[1]
 
 
@@ -140,7 +140,7 @@ def examples(family: str, ID: str) -> dict[str, str]:
     """Commands that make every style of a family, under one name."""
     found = {}
     for name in registry.names(family):
-        text = sections(registry.find(family, name).__doc__)[1]["Example"]
+        text = sections_of(registry.find(family, name).__doc__)[1]["Example"]
         lines = re.findall(rf"^{family}\(\w+(,.*)$", text, re.MULTILINE)
         assert lines, name
         for k, rest in enumerate(lines):
@@ -193,7 +193,7 @@ def test_loss(kinematics):
     script = scene(kinematics, "ulmpm", "linear", "", "TPIC", "usl")
     gas = "\n".join(LAWS["eos ideal-gas 0"]).replace(STRENGTH, "strength(s, fluid, 0)")
     script = re.sub(r"^material\(.*$", gas, script, flags=re.MULTILINE)
-    assert field(setup_of(script)[0].nodes.fields, Lost) is not None
+    assert field(setup_of(script)[0].nodes.fields, EnergyLoss) is not None
     visits_stay_in_registers(script)
 
 
@@ -208,7 +208,7 @@ def test_contact(kinematics):
     script = script.replace("set_dt", f"{other}\n{rubs}")
     visits_stay_in_registers(script)
     s, _ = setup_of(script)
-    assert field(s.nodes.fields, Rubbed) is not None
+    assert field(s.nodes.fields, FrictionalHeat) is not None
     touched = compiled(touch_node, s.contact, s.kin, s.grids, s.nodes, s.control, 0)
     assert in_registers(touched)
     assert in_registers(compiled(stay_node, s.contact, s.kin, s.nodes, 1, 0))
@@ -221,7 +221,7 @@ def test_nodes(kinematics):
     script = scene(kinematics, "ulmpm", "linear", "", "XPIC", "usl")
     script = script.replace("region(", "anti_volumetric_locking(true)\nregion(")
     setup, _ = setup_of(script)
-    lost = Lost(np.zeros((len(setup.nodes.sums), 2)))  # of gases
+    lost = EnergyLoss(np.zeros((len(setup.nodes.sums), 2)))  # of gases
     setup = setup._replace(nodes=setup.nodes._replace(fields=(*setup.nodes.fields, lost)))
     tasks = [kind for kind in vars(nodes).values() if hasattr(kind, "goes_through")]
     assert KeepLoss in tasks

@@ -1,30 +1,33 @@
 """The exact state at the end of a script: every bit of what the points carry."""
 
+import io
 from collections.abc import Iterable
 from pathlib import Path
 from tempfile import mkdtemp
 
 import numpy as np
-from crews import together
+from comms import together
 
 from karamelo_py.app.together import share
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
-from karamelo_py.run.mpi.crew import Crew
+from karamelo_py.run.mpi.comm import MpiComm
 from karamelo_py.scene.hub import Hub
 
 
 def final_hub(
     script: Path,
     threads: int | None = None,
-    crew: Crew | None = None,
+    comm: MpiComm | None = None,
     folder: Path | None = None,
 ) -> Hub:
-    """The hub after a script has run, where a crew is given as one of its ranks."""
-    hub = Hub(Console(quiet=True))
+    """The hub after a script has run, where a comm is given as one of its ranks."""
+    # Of several processes the first alone says something.
+    silent = None if comm is None or comm.leads else io.StringIO()
+    hub = Hub(Console(quiet=True, err=silent))
     hub.settings.threads = threads
-    if crew is not None:
-        share(hub, crew)
+    if comm is not None:
+        share(hub, comm)
     # Others write logs at the same time.
     hub.folder = folder or Path(mkdtemp(dir=Path(script).parent))
     hub.interpreter = Interpreter(hub)
@@ -46,7 +49,7 @@ def final_state(
     """The state of the hub after a script has run; files are kept in `folder`, if any."""
     if ranks == 1:
         return state_of(final_hub(script, threads, folder=folder))
-    return together(ranks, lambda crew: state_of(final_hub(script, threads, crew, folder)))[0]
+    return together(ranks, lambda comm: state_of(final_hub(script, threads, comm, folder)))[0]
 
 
 def state_of(hub: Hub) -> dict[str, np.ndarray]:
@@ -58,7 +61,8 @@ def state_of(hub: Hub) -> dict[str, np.ndarray]:
         "time": np.array([hub.update.time, hub.update.step]),
     }
     arrays["mass"] = hub.simulation.mass
-    arrays["nodal mass"] = hub.simulation.setup.nodes.sums[:, 0].sum()
+    nodes = hub.fields.node("mass")
+    arrays["nodal mass"] = nodes.sum()
     arrays |= {"-".join(k.__name__ for k in kind): a.T for kind, a in state.laws.items()}
     arrays |= {kind.__name__: a.T for kind, a in state.fields.items()}
     return arrays

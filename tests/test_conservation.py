@@ -195,7 +195,7 @@ def test_xpic_of_the_first_order_is_pic(state_interpreted, scheme):
     ("order", "loss"), [(1, 4.08e-2), (2, 2.77e-3), (3, 6.56e-4), (5, 1.91e-4), (10, 4.0e-5)]
 )
 def test_what_xpic_takes_of_the_angular_momentum_in_a_step(run_interpreted, order, loss):
-    """The table of docs/methods.md: a disk with four cells in the radius, linear functions.
+    """docs/method-measurements.md: a disk with four cells in the radius, linear functions.
 
     That it falls with the order, and that order 1 is PIC's 1 - sum m |v_pic| r / L, is exact; the
     numbers are the program's own, for the table.

@@ -1,5 +1,7 @@
 """What is known to fail is told before the first step, with its cure."""
 
+import ast
+import re
 from textwrap import dedent
 
 import pytest
@@ -298,7 +300,7 @@ def _checked(**words: object) -> Hub:
 def test_runs_that_are_over_count_from_the_last_fix():
     """200 time units of drift through 100 cells, of which the last run is a hundredth."""
     hub = _checked(**QUIET | {"u": "0.5, 0", "more": "scheme(musl)"})
-    told = hub.update.foreseen
+    told = hub.update.warned_of
     hub.values.set("time", 198.0)
     assert not told
     warn(hub, hub.simulation, 2.0, halves=False)
@@ -307,6 +309,32 @@ def test_runs_that_are_over_count_from_the_last_fix():
     hub.interpreter.run_text("fix(new, body_force, all, 0, 0)")
     warn(hub, hub.simulation, 2.0, halves=False)
     assert not told
+
+
+def test_rules_that_ask_for_concrete_styles_stand_beside_these():
+    """Above points/ and styles/ nothing looks for the class of a part."""
+    package, found = INPUTS.parent / "karamelo_py", []
+    for path in (p for room in ABOVE for p in (package / room).rglob("*.py")):
+        tree = ast.parse(path.read_text("utf-8"))
+        concrete = {
+            alias.asname or alias.name
+            for node in ast.walk(tree)
+            if isinstance(node, ast.ImportFrom) and PART.match(node.module or "")
+            for alias in node.names
+        }
+        asked = (n.args[1] for n in ast.walk(tree) if isinstance(n, ast.Call) and is_query(n))
+        names = {n.id for one in asked for n in ast.walk(one) if isinstance(n, ast.Name)}
+        found += [f"{path.name}: {name}" for name in names & concrete]
+    assert not found
+
+
+ABOVE = ("run", "app", "commands", "scene", "output")
+PART = re.compile(r"karamelo_py\.(styles|schemes|points\.(basis|transfers|laws))\.")
+
+
+def is_query(call: ast.Call) -> bool:
+    """Tell whether a call is one of isinstance or issubclass."""
+    return isinstance(call.func, ast.Name) and call.func.id in ("isinstance", "issubclass")
 
 
 STEEL = "linear, {rho}, {E}, 0.3"

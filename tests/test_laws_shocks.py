@@ -61,7 +61,8 @@ BAR = """
 def test_speed_of_a_strong_shock(run_interpreted, method, least, most):
     """A copper bar hits a wall at 4 km/s: the front goes at c0 + (S - 1) v from the wall (exact).
 
-    On 50 cells; docs/methods.md has 200. The front is known to a point, a per cent of its way.
+    On 50 cells; docs/method-measurements.md has 200. The front is known to a point, a per cent of
+    its way.
     """
     time = 1e-4
     result = run_interpreted(BAR.format(method=method, time=time))

@@ -147,12 +147,12 @@ def test_bench(tmp_path):
 
 
 NOBODY = """
-from karamelo_py.run.mpi import ranks
+from karamelo_py.run.mpi.whole import Whole
 from karamelo_py.run.tiles import tiles
 tiles.DIRECT_UP_TO = 0
 def gathers(*_, **__):
     raise MemoryError("of the whole scene")
-ranks.Ranks.gather = gathers
+Whole.gather = gathers
 """
 
 
@@ -335,13 +335,13 @@ import os
 import signal
 import time
 if os.environ.get("OMPI_COMM_WORLD_RANK") == "1":
-    from karamelo_py.run.mpi import crew
-    def meet(self, word, patience=crew.inf, *, before=crew.Crew.meet):
-        if word == crew.WELL:
+    from karamelo_py.run.mpi import comm
+    def agree(self, word, patience=comm.inf, *, before=comm.MpiComm.agree):
+        if word == comm.WELL:
             time.sleep(2)  # the first has done all
             os.kill(os.getpid(), signal.SIGKILL)
         return before(self, word, patience)
-    crew.Crew.meet = meet
+    comm.MpiComm.agree = agree
 """
 
 
@@ -373,8 +373,8 @@ BREAKS = """
 import json
 import os
 import re
-from karamelo_py.run.mpi import ranks
-from karamelo_py.run.mpi import partition as shares
+from karamelo_py.run import simulation
+from karamelo_py.run.mpi import partition
 from karamelo_py.run.tiles import tiles
 from karamelo_py.styles.computes import linear_momentum
 tiles.DIRECT_UP_TO = 0
@@ -389,8 +389,8 @@ if os.environ.get("OMPI_COMM_WORLD_RANK") == "1":
 @pytest.mark.parametrize(
     "function",
     [
-        pytest.param("ranks.Ranks._advance", marks=FULL),
-        "shares.SharedTiles.give",
+        pytest.param("simulation.Simulation._advance", marks=FULL),
+        "partition.SharedTiles.give",
         "linear_momentum.LinearMomentum.terms",
     ],
 )
@@ -559,18 +559,18 @@ def test_one_rank_is_no_other_run(tmp_path, run_interpreted):
 
 COUNTS = """
 from karamelo_py.run.tiles import tiles
-from karamelo_py.run.mpi.crew import Crew
+from karamelo_py.run.mpi.comm import MpiComm
 tiles.DIRECT_UP_TO, tiles.TILES = 0, {2: 2}
-linked, start = Crew.linked, Crew.start
+connect, start = MpiComm.connect, MpiComm.start
 def counting(self, given, taken):
-    return sum(array.nbytes for _, array in given), linked(self, given, taken)
+    return sum(array.nbytes for _, array in given), connect(self, given, taken)
 def starting(self, link):
     with open(f"passed.{self.rank}", "a") as file:
         print(link[0], file=file)
     start(self, link[1])
-Crew.linked, Crew.start = counting, starting
-Crew.finish = lambda self, link, finish=Crew.finish: finish(self, link[1])
-Crew.unlink = lambda self, link, unlink=Crew.unlink: unlink(self, link[1])
+MpiComm.connect, MpiComm.start = counting, starting
+MpiComm.finish = lambda self, link, finish=MpiComm.finish: finish(self, link[1])
+MpiComm.disconnect = lambda self, link, free=MpiComm.disconnect: free(self, link[1])
 """
 
 

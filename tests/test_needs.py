@@ -23,7 +23,7 @@ from karamelo_py.kernels.step import advance
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.run.advice.report import bytes_per_point
-from karamelo_py.run.advice.savings import savings
+from karamelo_py.run.advice.suggestions import suggestions
 from karamelo_py.run.lower.sizes import node_fields, point_fields
 from karamelo_py.run.timestep import own_weight_of_drift
 from karamelo_py.scene.hub import Hub
@@ -133,7 +133,7 @@ IN_KERNEL = {
     "Insulated", "NoContact", "NoHooks", "FixedFrame", "Alone",
     # what is done at points and nodes in the two visits of musl: four points at once, or eight
     "OldWeights", "PresentWeights", "Strain", "Move", "MassMomentum", "MomentumAgain",
-    "InternalForce", "Update", "MomentumToVelocity", "Eights", "Fours",
+    "InternalForce", "NodalUpdate", "MomentumToVelocity", "EightLanes", "FourLanes",
     "PointByPoint", "Stencil",
 }  # fmt: skip
 
@@ -249,10 +249,10 @@ def advice(lowered):
         weight = own_weight_of_drift(hub)
         clock = SimpleNamespace(spacing=limit, rate=1, heat_limit=inf, weight=weight)
         control = SimpleNamespace(clock=[clock])
-        found = savings(
+        found = suggestions(
             hub, SimpleNamespace(dt=dt, limit=limit, control=control, fastest=lambda: 0.0)
         )
-        return "\n".join(f"{saving.cost} / {saving.instead}" for saving in found)
+        return "\n".join(f"{suggestion.reason} / {suggestion.cure}" for suggestion in found)
 
     return say
 

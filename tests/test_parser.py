@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from karamelo_py.language.interpreter import Interpreter
-from karamelo_py.script import parser
+from karamelo_py.script import grammar, parser
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.parser import parse, parse_text
-from karamelo_py.script.syntax import Assignment, Call, Evaluation
+from karamelo_py.script.syntax import Assignment, CommandCall, Evaluation
 from karamelo_py.script.values import Values
 
 PAPER = """\
@@ -58,7 +58,7 @@ def number(text):
 def arguments(text):
     """The arguments of the one call in `text`, as written."""
     (call,) = parse(text)
-    assert isinstance(call, Call)
+    assert isinstance(call, CommandCall)
     return [raw.code.strip() for raw in call.arguments]
 
 
@@ -98,7 +98,7 @@ def test_line_ends_tabs_and_a_missing_last_one_mean_nothing(end):
     text = end.join(["\ta\t=\t1 # ü", "", "# only a comment", "f(a)"])
     a, f = parse(text)
     assert isinstance(a, Assignment)
-    assert isinstance(f, Call)
+    assert isinstance(f, CommandCall)
     assert (a.place.line, a.place.column) == (1, 2)
     assert f.place.line == 4
 
@@ -232,7 +232,7 @@ def test_garbage_raises_script_errors_with_a_place_and_nothing_else(text):
         assert "in.garbage:" in error.render()
         return
     for statement in statements:
-        if isinstance(statement, Call):
+        if isinstance(statement, CommandCall):
             for raw in statement.arguments:
                 try:
                     parse_text(raw.code)
@@ -279,7 +279,7 @@ def test_a_parser_on_disk_is_read_and_never_a_reason_to_stop(tmp_path, monkeypat
     """It makes the same of a script, and of a mistake; a file that is no use is written anew."""
 
     def parsed() -> tuple:
-        parser._lark.cache_clear()
+        grammar.parser_of.cache_clear()
         parser._tree.cache_clear()
         with pytest.raises(ScriptError) as mistake:
             parse("a = 2^(3\n")
@@ -310,4 +310,4 @@ def test_a_parser_on_disk_is_read_and_never_a_reason_to_stop(tmp_path, monkeypat
         assert min(file.stat().st_size for file in kept) > 5000
     if state == "kept":
         assert [file.read_bytes() for file in files] == whole  # only read
-    parser._lark.cache_clear()
+    grammar.parser_of.cache_clear()

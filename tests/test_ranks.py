@@ -20,7 +20,7 @@ from test_restart import ways
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.run.mpi.bisection import bisected
-from karamelo_py.run.mpi.load import Work
+from karamelo_py.run.mpi.load import Load
 from karamelo_py.run.mpi.partition import SharedTiles, work_of
 from karamelo_py.run.mpi.plan import bytes_of_node, plan
 from karamelo_py.run.tiles import tiles
@@ -444,7 +444,7 @@ def test_costs_are_measured(monkeypatch):
     """Ten steps of 3 points at 100 ns, 10 at 50 ns and 4 nodes at 10 ns, and a pause."""
     now = 0
     monkeypatch.setattr("time.perf_counter_ns", lambda: now)
-    work = Work(2)
+    work = Load(2)
     for _ in range(10):
         work.resume(0)
         for taken in (300, 500):
@@ -458,5 +458,5 @@ def test_costs_are_measured(monkeypatch):
     now += 10**9
     work.note()
     work.done([3, 10, 4], 10)
-    work.learn(SimpleNamespace(added=lambda numbers: numbers))
+    work.learn(SimpleNamespace(allreduce=lambda numbers: numbers))
     assert work.costs.tolist() == [100, 50, 10]

@@ -221,14 +221,14 @@ def test_the_time_that_remains_grows_as_the_runs_do():
     """Times 2^-6 N^3 of two kinds, one twice as slow: the guess for N = 64 is right to a third."""
     cases = [{"N": str(n), "basis": b} for n in (8, 16, 32) for b in ("fast", "slow")]
     times = [float(c["N"]) ** 3 / 64 * (2 if c["basis"] == "slow" else 1) for c in cases]
-    guess = study.growth(cases, times)
+    guess = study.guessed_time(cases, times)
     assert guess({"N": "64", "basis": "slow"}) == pytest.approx(64**3 / 32, rel=0.33)
 
 
 def test_variables_that_are_0_in_some_runs_have_a_time_as_well():
     """0 has no logarithm, and counts as a word; 2 takes eight times as long as 1."""
     cases = [{"cure": c, "n": n} for c in ("0", "1") for n in ("1", "2")]
-    guess = study.growth(cases, [1.0, 8.0, 1.0, 8.0])
+    guess = study.guessed_time(cases, [1.0, 8.0, 1.0, 8.0])
     assert guess({"cure": "0", "n": "2"}) > 3 * guess({"cure": "1", "n": "1"})
 
 

@@ -11,7 +11,9 @@ from scenes import SCHEMES, block
 from selection import covering, parameters
 
 from karamelo_py.app.cli import main
+from karamelo_py.app.studies import keeping, stability
 from karamelo_py.kernels.arrays import new_control
+from karamelo_py.kernels.growth import WITHIN
 from karamelo_py.kernels.watch import LOOKS, judge
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
@@ -77,6 +79,17 @@ def test_growth_at_the_start_is_seen():
     assert driven.grown == pytest.approx(0.2 / 2)  # the energy that loads brought is in it
 
 
+@pytest.mark.parametrize(("gain", "tells"), [(0.05, False), (-0.5, False), (0.5, True)])
+def test_growth_is_one_thing_in_a_run_and_in_logs(gain, tells):
+    """Energy that swings by a fifth, and goes to 1 + gain in the middle of a run."""
+    looks = np.arange(10 * LOOKS)
+    energy = (1 + gain * (looks > looks[-1] / 2)) * (1 + 0.2 * (-1.0) ** looks)
+    clock, _ = watched(energy)
+    assert (clock.grown > WITHIN) == tells
+    assert (keeping.judge(looks, energy)[0] == "gains") == tells
+    assert (stability.growth(energy) > 1 + WITHIN) == tells
+
+
 def test_a_short_run_is_told(run_interpreted):
     """Four cells across, a disk of boxes that turns by 9/s gains with usf, by a fifth in 144 steps.
 
@@ -121,7 +134,7 @@ def test_energy_that_is_no_number_ends_the_run(tmp_path, monkeypatch):
     metal = "eos(e, linear, 2, 100)\nstrength(s, plastic, 40, 1)\n"
     metal += "material(rubber, eos-strength, e, s)"
     hub.interpreter.run_text(re.sub("material.*", metal, scene) + "run(5)\n", "in.scene")
-    hub.simulation.stepped.blocks[0].points.state[-2, 7] = np.nan
+    hub.simulation.setup.blocks[0].points.state[-2, 7] = np.nan
     with pytest.raises(
         ScriptError, match=r"energy is no number any more; the first point .* point 8"
     ):

@@ -6,6 +6,7 @@ answers with one JSON line.
 """
 
 import contextlib
+import functools
 import gc
 import io
 import json
@@ -15,39 +16,40 @@ import traceback
 import warnings
 from pathlib import Path
 
+# Up to Python 3.11 a cached property is of one thread at a time: processes as threads meet in some.
+functools.RLock = contextlib.nullcontext
+
 
 def save_state(request: dict) -> int:
     """Run a script and save its final state or columns; a failure is told, not raised."""
     import numpy as np
-    from crews import learn_at_random, together
+    from comms import learn_at_random, together
     from states import final_columns, final_hub, final_state
 
     from karamelo_py.run.access import nodes_by_number as by_number
     from karamelo_py.run.access import points_by_id as by_id
     from karamelo_py.run.checkpoint import part_state as storing
-    from karamelo_py.run.mpi import load as work
-    from karamelo_py.run.mpi import partition as shares
-    from karamelo_py.run.mpi import ranks
-    from karamelo_py.run.mpi import subdomain as part
+    from karamelo_py.run.mpi import load, partition, subdomain
+    from karamelo_py.run.mpi.whole import Whole
     from karamelo_py.run.tiles import tiles
     from karamelo_py.script.errors import ScriptError
-    from karamelo_py.styles.dumps import hdf5, look
+    from karamelo_py.styles.dumps import hdf5
 
     script, columns = request["arguments"][0], request["columns"]
-    usual = tiles.DIRECT_UP_TO, tiles.TILES, ranks.Ranks.gather
-    part.LEARN_EVERY, shares.IMBALANCE, work.Work.learn = 2, 1.0, learn_at_random
+    usual = tiles.DIRECT_UP_TO, tiles.TILES, Whole.gather
+    subdomain.LEARN_EVERY, partition.IMBALANCE, load.Load.learn = 2, 1.0, learn_at_random
     if request["fails"]:  # no process may need the whole scene to say why
-        ranks.Ranks.gather = None
+        Whole.gather = None
     if request["boxes"]:
         tiles.DIRECT_UP_TO, tiles.TILES = 0, {1: 4, 2: 2, 3: 2}
     # One process has all points in a piece, several a few; files of HDF5 are the same then, too.
     piece = 16 if request["ranks"] > 1 else 1 << 17
-    by_id.PIECE = by_number.PIECE = storing.PIECE = ranks.PIECE = piece
-    ranks.SAMPLES, hdf5.PIECE, look.MARKS = 8, 16, 16
+    by_id.PIECE = by_number.PIECE = storing.PIECE = piece
+    hdf5.PIECE = 16
     try:
         folder = request["out"] and Path(request["out"])
         if request["fails"]:
-            together(request["ranks"], lambda crew: final_hub(script, crew=crew, folder=folder))
+            together(request["ranks"], lambda comm: final_hub(script, comm=comm, folder=folder))
             return 0
         if columns:
             arrays = final_columns(script, columns)
@@ -61,7 +63,7 @@ def save_state(request: dict) -> int:
         traceback.print_exc()
         return 1
     finally:
-        tiles.DIRECT_UP_TO, tiles.TILES, ranks.Ranks.gather = usual
+        tiles.DIRECT_UP_TO, tiles.TILES, Whole.gather = usual
     return 0
 
 

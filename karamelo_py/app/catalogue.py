@@ -22,12 +22,12 @@ _WIDEST = 88  # running text is hard to read in longer lines
 
 
 def families() -> list[str]:
-    """Families of styles: commands first, then by name."""
+    """List families of styles: commands first, then by name."""
     return sorted(registry.families(), key=lambda family: (family != COMMAND, family))
 
 
 def help_of(family: str, name: str) -> Help:
-    """What there is to say about a command or style.
+    """Gather the help about a command or style.
 
     Raises
     ------
@@ -139,7 +139,7 @@ def _family(word: str) -> str:
 
 
 def _singular(word: str) -> str:
-    """The family that a word means: fixes, Fix and fix are the same."""
+    """Find the family that a word means: fixes, Fix and fix are the same."""
     word = word.lower()
     return next((family for family in families() if word in (family, _plural(family))), word)
 
@@ -160,7 +160,7 @@ def _unknown(what: str, name: str, known: Iterable[str]) -> ScriptError:
 
 
 def _summary(family: str, name: str) -> tuple[str, bool]:
-    """One line about a style, and whether it is broken."""
+    """Write one line about a style, and whether it is broken."""
     try:
         target = registry.find(family, name)
     except ScriptError as error:
@@ -198,7 +198,7 @@ def _explain(family: str, name: str) -> int:
 
 
 def _arguments(word: str) -> dict[str, Parameter]:
-    """Arguments of this name, or that may be this word, by the command or style they belong to."""
+    """Find arguments of this name, or that may be this word, by their command or style."""
     found = {}
     for family in families():
         for name in registry.names(family):
@@ -212,7 +212,7 @@ def _arguments(word: str) -> dict[str, Parameter]:
 
 
 def _explain_argument(word: str, found: dict[str, Parameter]) -> int:
-    """What is said of an argument where most is said of it, and where else there is one."""
+    """Explain an argument where most is said of it, and list where else there is one."""
     page = _Page()
     owner, parameter = max(found.items(), key=lambda item: len(item[1].description))
     page.line(word, "bold")
@@ -243,11 +243,11 @@ class _Page:
         self._width = min(self._rich.width if self._terminal else _WIDEST, _WIDEST)
 
     def line(self, text: str = "", style: str = "") -> None:
-        """A line as it is."""
+        """Write a line as it is."""
         self._rich.print(text, style=style if self._terminal else "", soft_wrap=True)
 
     def heading(self, text: str) -> None:
-        """A part of a page."""
+        """Write a part of a page."""
         self.line()
         self.line(text, "bold")
 
@@ -261,7 +261,7 @@ class _Page:
                 self.line(margin + line)
 
     def row(self, name: str, origin: str, summary: str, broken: bool) -> None:
-        """A line of a list; cut where a terminal ends."""
+        """Write a line of a list; cut where a terminal ends."""
         from rich.text import Text
 
         text = Text.assemble("  ", (name, "cyan"), "  ", (origin, "dim"), "  ")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import gc
 import re
 import sys
 import traceback
@@ -23,9 +24,8 @@ from karamelo_py.app.options import (
     positive,
     threads_option,
 )
-from karamelo_py.app.starting import begun
 from karamelo_py.app.together import Outcome, has_terminal, keep_to_oneself, share, together
-from karamelo_py.run.mpi.crew import Crew, launched
+from karamelo_py.run.mpi.comm import MpiComm, launched
 from karamelo_py.script.errors import FAILURES, ScriptError, nearest, render_message
 
 if TYPE_CHECKING:  # which takes most of the time that the program needs to begin
@@ -71,7 +71,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def outcome_of(act: Callable[[], int], *, debugging: bool = False) -> Outcome:
-    """How something ends, with what is left to be said."""
+    """Run something and tell how it ends."""
     try:
         return Outcome(act())
     except KeyboardInterrupt:
@@ -88,7 +88,7 @@ def outcome_of(act: Callable[[], int], *, debugging: bool = False) -> Outcome:
 
 
 def _rendered(error: BaseException) -> str:
-    """What the user is told; no traceback, also where the fault is ours or of a plug-in."""
+    """Write an exception for the user: no traceback, also where the fault is not the user's."""
     if isinstance(error, ScriptError):
         return error.render()
     if isinstance(error, MemoryError):
@@ -158,8 +158,15 @@ def _dispatch(arguments: list[str]) -> int:
     return options.act(options)
 
 
+def begun() -> None:
+    """Let Python look for cycles again, among what is new: the program itself stays to its end."""
+    if not gc.isenabled():
+        gc.freeze()
+        gc.enable()
+
+
 def _one_file(arguments: list[str]) -> list[str]:
-    """The last of the files behind -restart where a shell has put all that match a pattern.
+    """Take the last of the files behind -restart where a shell has put all that match a pattern.
 
     Raises
     ------
@@ -190,7 +197,7 @@ def _numbers(name: str) -> list[int]:
 
 
 def _surplus(words: list[str], command: str, parser: CommandLine) -> ScriptError:
-    """The error for words that a command line has no use for."""
+    """Make the error for words that a command line has no use for."""
     option = next((word.partition("=")[0] for word in words if word.startswith("-")), None)
     if option == "--ranks":
         return ScriptError(
@@ -216,7 +223,7 @@ class CommandLine(argparse.ArgumentParser):
         super().__init__(**(usual | options))
 
     def options(self) -> list[str]:
-        """All words that begin an option."""
+        """List all words that begin an option."""
         return [word for action in self._actions for word in action.option_strings]
 
     def error(self, message: str) -> NoReturn:
@@ -231,7 +238,7 @@ class CommandLine(argparse.ArgumentParser):
 
 
 def _parser(command: str) -> tuple[CommandLine, Any]:
-    """The command line and its subparsers; what only `command` needs is there only for it."""
+    """Make the command line and its subparsers; what only `command` needs is there only for it."""
     parser = CommandLine(
         prog="karamelo-py",
         usage=USAGE,
@@ -300,7 +307,7 @@ def _run(options: argparse.Namespace) -> int:
         debugging = options.debug
         return together(
             options.ranks,
-            lambda crew: _carry_out(options, script, crew),
+            lambda comm: _carry_out(options, script, comm),
             lambda act: outcome_of(act, debugging=debugging),
         )
     if (options.ranks or 1) > 1:
@@ -308,7 +315,7 @@ def _run(options: argparse.Namespace) -> int:
     return _carry_out(options, script)
 
 
-def _carry_out(options: argparse.Namespace, script: str, crew: Crew | None = None) -> int:
+def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = None) -> int:
     """Carry out a script; returns the exit status."""
     with leaving_at_once():
         from karamelo_py.language.interpreter import Interpreter
@@ -319,8 +326,8 @@ def _carry_out(options: argparse.Namespace, script: str, crew: Crew | None = Non
     hub = Hub(Console(quiet=options.quiet, terminal=has_terminal()))
     hub.settings.threads = options.threads
     hub.settings.ranks = options.ranks or launched()[0]
-    if crew is not None:
-        share(hub, crew)
+    if comm is not None:
+        share(hub, comm)
     hub.settings.debug = options.debug
     hub.settings.trusts = options.trust_geometries
     hub.checking = options.checking
@@ -349,7 +356,7 @@ def _carry_out(options: argparse.Namespace, script: str, crew: Crew | None = Non
 
 
 def _tell_of_no_run(hub: Hub, script: str) -> None:
-    """A script of calculations needs no run; one that makes a scene may have forgotten it.
+    """Tell of a script without a run: one that makes a scene may have forgotten it.
 
     Raises
     ------

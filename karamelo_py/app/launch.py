@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from karamelo_py.app.leaving import SIGNALLED
-from karamelo_py.run.mpi.crew import ENDING, INSTALL, heeding
+from karamelo_py.run.mpi.comm import ENDING, INSTALL, handled_signals
 from karamelo_py.script.errors import ScriptError, render_message
 
 # Where the launcher of this program waits for the processes to report.
@@ -107,7 +107,7 @@ class Launcher:
 
     def run(self) -> int:
         """Start them and see them end; returns the exit status."""
-        with socket.socket(socket.AF_UNIX) as self.door, heeding(self._pass_on):
+        with socket.socket(socket.AF_UNIX) as self.door, handled_signals(self._pass_on):
             self.door.bind(self.name)
             self.door.listen(self.ranks)
             environment = {**OPEN_MPI, **PAGES, **os.environ, SOCKET: self.name}
@@ -246,7 +246,7 @@ class Launcher:
         return "\n".join([render_message("error", text), self._words()]).rstrip()
 
     def _words(self) -> str:
-        """What mpiexec said, and libraries of C through it."""
+        """Read what mpiexec said, and libraries of C through it."""
         self.said.seek(0)
         return self.said.read().decode(errors="replace").strip()
 
@@ -256,7 +256,7 @@ class Launcher:
 
 
 def _received(link: socket.socket) -> bytes:
-    """What has come; the link is closed where its other end is."""
+    """Read what has come; the link is closed where its other end is."""
     found = b""
     with suppress(OSError):
         while part := link.recv(1 << 16):

@@ -11,7 +11,7 @@ from karamelo_py.script.terms import number_of
 
 
 def read_rows(path: Path) -> list[dict[str, float]]:
-    """The rows of a log, by column; words, such as what limits the step, are NaN.
+    """Read the rows of a log, by column; words, such as what limits the step, are NaN.
 
     A line that begins with # names the columns anew; one that a killed run has left half is passed
     over.
@@ -44,7 +44,7 @@ def read_rows(path: Path) -> list[dict[str, float]]:
 
 
 def read_log(folder: Path, name: str = "log.mpm") -> dict[str, np.ndarray]:
-    """The columns of a log in a folder, those of no log where it cannot be read.
+    """Read the columns of a log in a folder, those of no log where it cannot be read.
 
     Where they change between runs, all rows of a column.
     """

@@ -40,7 +40,7 @@ def add_variables(parser: argparse.ArgumentParser, text: str) -> None:
 
 
 def threads_option(text: str) -> int | None:
-    """The value of --threads: a number, or None for auto."""
+    """Read the value of --threads: a number, or None for auto."""
     if text == "auto":
         return None
     if not text.isdecimal() or int(text) < 1:
@@ -49,14 +49,14 @@ def threads_option(text: str) -> int | None:
 
 
 def positive(text: str) -> int:
-    """A whole number of at least 1."""
+    """Read a whole number of at least 1."""
     if not text.isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"'{text}' is not a whole number of at least 1")
     return int(text)
 
 
 def above_zero(text: str) -> float:
-    """A number above 0."""
+    """Read a number above 0."""
     try:
         value = float(text)
     except ValueError:

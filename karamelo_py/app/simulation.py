@@ -15,17 +15,23 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 
+from karamelo_py.app.interface import (
+    Quiet,
+    SimulationError,
+    as_script_text,
+    as_simulation_error,
+    refuse_copies,
+    threads_of,
+)
 from karamelo_py.app.options import make_folder
-from karamelo_py.app.shown import Picture, Table
-from karamelo_py.app.told import Quiet, SimulationError, refuse_copies, said, threads_of, told
+from karamelo_py.app.shown import Columns, ShownPicture
 from karamelo_py.language import registry, signature
 from karamelo_py.language.interpreter import Interpreter
-from karamelo_py.language.meanings import shown
 from karamelo_py.output.console import Console
 from karamelo_py.run.runner import Interrupted
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Pause, Quit, ScriptError, nearest
-from karamelo_py.script.expressions import Expression
+from karamelo_py.script.expressions import Expression, shown
 from karamelo_py.script.parser import parse, parse_text
 
 SCRIPT = "the name of a script, or its text: statements, as in name = 1"
@@ -98,11 +104,11 @@ class Simulation:
         hub.output.writes = out is not None
         self._numbers = itertools.count(1)
         self._name = "a scene"
-        with told():
+        with as_simulation_error():
             hub.settings.threads = threads_of(threads)
             if out is not None:
                 hub.folder = self._claimed(out)
-            presets = {name: said(value) for name, value in variables.items()}
+            presets = {name: as_script_text(value) for name, value in variables.items()}
             self._interpreter = Interpreter(hub, presets)
             if script is not None:
                 self._read(script)
@@ -161,10 +167,10 @@ class Simulation:
 
     @contextmanager
     def _carried_out(self) -> Iterator[None]:
-        """Runs are made at once, and end as the user wants."""
+        """Make runs at once, and end them as the user wants."""
         pausing, self.hub.pausing = self.hub.pausing, False
         try:
-            with told():
+            with as_simulation_error():
                 yield
         except Quit:
             pass
@@ -174,8 +180,8 @@ class Simulation:
             self.hub.pausing = pausing
 
     def evaluate(self, expression: str) -> float | str:
-        """The present value of an expression of the language."""
-        with told():
+        """Compute the present value of an expression of the language."""
+        with as_simulation_error():
             raw, node = parse_text(expression, "evaluate")
             found = self._interpreter.evaluate(node, raw)
             if isinstance(found, Expression):
@@ -202,19 +208,19 @@ class Simulation:
         return [*super().__dir__(), *registry.names("command")]
 
     def _word(self, value: Any) -> str:
-        """What a script would say for `value`."""
+        """Write a value as a script would."""
         if callable(value) and not isinstance(value, type):
             name = f"{getattr(value, '__name__', 'function').strip('<>')}_{next(self._numbers)}"
             self.hub.functions[name] = value
             return name
-        return said(value)
+        return as_script_text(value)
 
     # -- time -------------------------------------------------------------------------------------
 
     def run(self, steps: int | None = None) -> None:
         """Take a number of steps; without one, carry out the rest of the script, with its runs."""
         if steps is not None:
-            self._do(f"run({said(steps)})", "Simulation.run")
+            self._do(f"run({as_script_text(steps)})", "Simulation.run")
             return
         if not self._interpreter.waits:
             raise SimulationError(
@@ -241,19 +247,19 @@ class Simulation:
     # -- what there is to see ---------------------------------------------------------------------
 
     @property
-    def points(self) -> Table:
+    def points(self) -> Columns:
         """Columns of the points by name (x, vy, s11, seq ...): arrays (n,) in the order of ids."""
         fields = self.hub.fields
-        return Table(fields.particle_names, told()(fields.particle))
+        return Columns(fields.particle_names, as_simulation_error()(fields.particle))
 
     @property
-    def nodes(self) -> Table:
+    def nodes(self) -> Columns:
         """Columns of the nodes by name (x, vx, mass ...): arrays (n,)."""
         fields = self.hub.fields
-        return Table(fields.node_names, told()(fields.node))
+        return Columns(fields.node_names, as_simulation_error()(fields.node))
 
     @property
-    def log(self) -> Table:
+    def log(self) -> Columns:
         """Columns of the log by name: arrays with a number for each line.
 
         Where the columns have changed, those of the last lines that have the same.
@@ -261,18 +267,18 @@ class Simulation:
         rows = self.hub.output.log.rows
         names = rows[-1][0] if rows else []
         last = np.array([numbers for at, numbers in rows if at == names])
-        return Table(lambda: list(names), lambda name: last[:, names.index(name)])
+        return Columns(lambda: list(names), lambda name: last[:, names.index(name)])
 
     @property
-    def values(self) -> Table:
-        """What fixes and computes publish, now: numbers by name."""
+    def values(self) -> Columns:
+        """Values that fixes and computes publish, now: numbers by name."""
 
         def read(name: str) -> float:
             if self.hub.solids and self.hub.update.method is not None:
                 self.hub.refresh_values()
             return self.hub.values.get(name)
 
-        return Table(self.hub.values.names, told()(read))
+        return Columns(self.hub.values.names, as_simulation_error()(read))
 
     @property
     def variables(self) -> dict[str, Any]:
@@ -281,7 +287,7 @@ class Simulation:
         return {n: v if isinstance(v, (float, str)) else shown(v) for n, v in found.items()}
 
     def show(self, field: str | None = None, width: float = 6, height: float = 4.5, **look: Any):
-        """A picture of the points, coloured by a column (or by solid), which a notebook shows.
+        """Draw a picture of the points, coloured by a column (or by solid), which a notebook shows.
 
         Parameters
         ----------
@@ -294,7 +300,7 @@ class Simulation:
         """
         from karamelo_py.styles.dumps.pyplot import PyPlot
 
-        with told():
+        with as_simulation_error():
             given = [] if field is None else [field]
             words = ["1", "shown.png", *(self._word(v) for v in (width, height, *given))]
             words += [f"{key}={self._word(value)}" for key, value in look.items()]
@@ -303,7 +309,7 @@ class Simulation:
             dump = signature.call(PyPlot, self.hub, arguments, "dump pyplot")
             file = io.BytesIO()
             dump.draw(file)
-        return Picture(file.getvalue())
+        return ShownPicture(file.getvalue())
 
     def close(self) -> None:
         """Close its files; a further run would begin the log anew."""

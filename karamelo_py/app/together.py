@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple, TextIO
 
 from karamelo_py.app.launch import SOCKET
 from karamelo_py.app.leaving import INTERRUPTED
-from karamelo_py.run.mpi.crew import FAILED, WELL, Crew, launched
+from karamelo_py.run.mpi.comm import FAILED, WELL, MpiComm, launched
 from karamelo_py.script.errors import ScriptError
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ PATIENCE, LONGER = 2.0, 6.0
 
 
 class Outcome(NamedTuple):
-    """How a command line ended."""
+    """The end of a command line."""
 
     status: int
     text: str = ""  # what is left to be said
@@ -106,7 +106,9 @@ def has_terminal() -> bool | None:
 
 
 def together(
-    asked: int | None, run: Callable[[Crew], int], outcome: Callable[[Callable[[], int]], Outcome]
+    asked: int | None,
+    run: Callable[[MpiComm], int],
+    outcome: Callable[[Callable[[], int]], Outcome],
 ) -> int:
     """Carry out `run` as one of all processes; returns the exit status.
 
@@ -120,12 +122,12 @@ def together(
         Calls a function, and makes a message of what it raises.
     """
     size, rank = launched()
-    crew: Crew | None = None
+    comm: MpiComm | None = None
 
     def act() -> int:
-        nonlocal crew
-        crew = join(asked, fail)
-        return run(crew)
+        nonlocal comm
+        comm = join(asked, fail)
+        return run(comm)
 
     def fail(error: BaseException) -> None:
         def again() -> int:
@@ -140,26 +142,26 @@ def together(
             link.report(status, _signed(text, rank, size) if tells and rank else "")
         sys.stdout.flush()
         if not stays:
-            crew.abandon(status)
+            comm.abort(status)
         # mpiexec would have its own say about a status, and the launcher knows it.
-        return 0 if link.socket is not None and crew is not None else status
+        return 0 if link.socket is not None and comm is not None else status
 
     status, text = outcome(act)
-    if crew is None:
+    if comm is None:
         end(status, text, tells=rank == 0, stays=True)
         if status == INTERRUPTED:  # while others join: they would be waited for at the end
             os._exit(status)
         return status
-    if crew.parted:
+    if comm.parted:
         return end(status, text, tells=True, stays=True)
     patience = inf
     if not status and rank == 0:
         link.tell_of_end()
     if status:
         patience = LONGER if rank else PATIENCE
-        if status == INTERRUPTED or crew.amid:
+        if status == INTERRUPTED or comm.failed_within:
             patience = 0.0
-    words = crew.meet(FAILED if status else WELL, patience)
+    words = comm.agree(FAILED if status else WELL, patience)
     alone = words is None
     return end(status, text, tells=alone or rank == int(words.argmin()), stays=not alone)
 
@@ -176,8 +178,8 @@ def _signed(text: str, rank: int, size: int) -> str:
     return f"{text}\nin process {rank + 1} of {size}" if text else ""
 
 
-def join(asked: int | None, ends: Callable[[BaseException], None]) -> Crew:
-    """Join the processes that mpiexec has started; `ends` as of `Crew`.
+def join(asked: int | None, ends: Callable[[BaseException], None]) -> MpiComm:
+    """Join the processes that mpiexec has started; `ends` as of `MpiComm`.
 
     Raises
     ------
@@ -190,19 +192,18 @@ def join(asked: int | None, ends: Callable[[BaseException], None]) -> Crew:
             f"--ranks {asked}: mpiexec has started {size} processes",
             expected="one of the two: mpiexec -n N, or --ranks N",
         )
-    crew = Crew(ends)
-    if crew.size != size:
+    comm = MpiComm(ends)
+    if comm.size != size:
         raise ScriptError(
-            f"{size} processes were started, and mpi4py sees {crew.size} of them",
+            f"{size} processes were started, and mpi4py sees {comm.size} of them",
             expected="the mpiexec of the MPI that mpi4py has found; with Slurm, srun --mpi=pmix",
         )
-    return crew
+    return comm
 
 
-def share(hub: Hub, crew: Crew) -> None:
-    """Let a scene be stepped by all processes of the crew; the first writes. One needs no other."""
-    if crew.size > 1:
-        hub.settings.crew, hub.settings.engine = crew, "ranks"
-    if not crew.leads:
+def share(hub: Hub, comm: MpiComm) -> None:
+    """Let all processes step a scene together, of which the first writes. One needs no other."""
+    if comm.size > 1:
+        hub.settings.comm = comm
+    if not comm.leads:
         hub.output.writes = False
-        hub.output.log.rows = []

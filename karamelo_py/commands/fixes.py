@@ -1,11 +1,13 @@
 """Commands that define what acts and what is measured: fix, compute."""
 
+from typing import Any
+
 from karamelo_py.language import registry, signature
 from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument
 from karamelo_py.language.unknown import MEANINGS
-from karamelo_py.scene.guests import check_fix
 from karamelo_py.scene.hub import Catalogue, Hub
+from karamelo_py.scene.plugins import check_fix
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import SEEDS
 from karamelo_py.script.other_programs import instead
@@ -31,20 +33,7 @@ def fix(hub: Hub, ID: str, style: StyleOf("fix"), *arguments: Argument) -> None:
     --------
     delete_fix, group, compute
     """
-    _refuse_wrong_order("fix", ID, style, arguments)
-    target = registry.called("fix", ID, style)
-    _refuse_shared_id(ID, target, "compute", hub.computes)
-    _check_names(hub, "fix", ID, target)
-    new = signature.call(target, hub, list(arguments), f"fix {style}")
-    new.style = style
-    if ID in hub.fixes:
-        hub.warn(
-            f"fix '{ID}' replaces the one of line {hub.fixes[ID].place.line}",
-            hint="fixes that act at the same time need IDs of their own",
-        )
-    hub.fixes.add(ID, new, replace=True)
-    hub.values.publish_vector(ID, new.published)
-    _warn_if_empty(hub, "fix", ID, new)
+    new = _define(hub, hub.fixes, hub.computes, ID, style, arguments)
     check_fix(hub, new)
     new.defined()
 
@@ -88,15 +77,7 @@ def compute(hub: Hub, ID: str, style: StyleOf("compute"), *arguments: Argument) 
     --------
     delete_compute, log_modify, fix
     """
-    _refuse_wrong_order("compute", ID, style, arguments)
-    target = registry.called("compute", ID, style)
-    _refuse_shared_id(ID, target, "fix", hub.fixes)
-    _check_names(hub, "compute", ID, target)
-    new = signature.call(target, hub, list(arguments), f"compute {style}")
-    new.style = style
-    hub.computes.add(ID, new)
-    hub.values.publish_vector(ID, new.published)
-    _warn_if_empty(hub, "compute", ID, new)
+    _define(hub, hub.computes, hub.fixes, ID, style, arguments)
 
 
 def delete_compute(hub: Hub, ID: str) -> None:
@@ -118,6 +99,36 @@ def delete_compute(hub: Hub, ID: str) -> None:
     hub.computes.remove(ID)
 
 
+def _define(
+    hub: Hub, own: Catalogue, others: Catalogue, ID: str, style: str, arguments: tuple
+) -> Any:
+    """Make a fix or a compute, and publish its values."""
+    kind = own.kind
+    _refuse_wrong_order(kind, ID, style, arguments)
+    target = registry.called(kind, ID, style)
+    if ID in others and set(others[ID].published) & set(target.published):
+        raise ScriptError(
+            f"'{ID}' is a {others.kind} already (line {others[ID].place.line})",
+            argument="ID",
+            expected=f"another ID: {ID}_x and the like would mean two things",
+        )
+    _check_names(hub, kind, ID, target)
+    new = signature.call(target, hub, list(arguments), f"{kind} {style}")
+    new.style = style
+    replaces = own is hub.fixes
+    if replaces and ID in own:
+        hub.warn(
+            f"fix '{ID}' replaces the one of line {own[ID].place.line}",
+            hint="fixes that act at the same time need IDs of their own",
+        )
+    own.add(ID, new, replace=replaces)
+    hub.values.publish_vector(ID, new.published)
+    group = getattr(new, "group", None)
+    if group is not None and not group.all and len(group) == 0:
+        hub.warn(f"{kind} '{ID}' acts on the empty group '{group.id}': it will do nothing")
+    return new
+
+
 def _refuse_wrong_order(kind: str, ID: str, style: str, arguments: tuple[Argument, ...]) -> None:
     """Tell of a style behind the group, as in LAMMPS."""
     if registry.knows(kind, style) or registry.knows(kind, ID):
@@ -131,16 +142,6 @@ def _refuse_wrong_order(kind: str, ID: str, style: str, arguments: tuple[Argumen
         )
     if third and instead(kind, third):
         registry.find(kind, third)  # says what to write in its place
-
-
-def _refuse_shared_id(ID: str, style: type, other: str, catalogue: Catalogue) -> None:
-    """A fix and a compute of one ID must not publish values of the same names."""
-    if ID in catalogue and set(catalogue[ID].published) & set(style.published):
-        raise ScriptError(
-            f"'{ID}' is a {other} already (line {catalogue[ID].place.line})",
-            argument="ID",
-            expected=f"another ID: {ID}_x and the like would mean two things",
-        )
 
 
 def _check_names(hub: Hub, kind: str, ID: str, style: type) -> None:
@@ -161,9 +162,3 @@ def _check_names(hub: Hub, kind: str, ID: str, style: type) -> None:
                 "formulas will use the variable",
                 hint=f"choose another ID, such as {ID}_1",
             )
-
-
-def _warn_if_empty(hub: Hub, kind: str, ID: str, item: object) -> None:
-    group = getattr(item, "group", None)
-    if group is not None and not group.all and len(group) == 0:
-        hub.warn(f"{kind} '{ID}' acts on the empty group '{group.id}': it will do nothing")

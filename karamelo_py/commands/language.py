@@ -2,11 +2,10 @@
 
 import math
 
-from karamelo_py.language.meanings import shown
 from karamelo_py.language.signature import Argument
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Quit
-from karamelo_py.script.expressions import POINT_SEEDS, SEEDS, Expression
+from karamelo_py.script.expressions import POINT_SEEDS, SEEDS, Expression, shown
 
 
 def print_(hub: Hub, first: Argument, *more: Argument) -> None:

@@ -8,8 +8,8 @@ from typing import Any, Literal
 from karamelo_py.language import registry, signature
 from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument, Parameter
-from karamelo_py.scene.guests import check_part
 from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.plugins import check_part
 from karamelo_py.script.errors import ScriptError, meant
 
 
@@ -317,7 +317,7 @@ class _Call:
         return words
 
     def _unknown(self, argument: Argument, slots: list[tuple[str, Parameter]]) -> ScriptError:
-        """What is wrong with an option that nothing asks for."""
+        """Return the error for an option that nothing takes."""
         word = argument.word()
         if self._is_number(argument):
             asking = {p.name: self.names[f] for f, p in slots if not p.kind.words}

@@ -17,7 +17,7 @@ class EveryOrNever(Every):
 
     @classmethod
     def from_script(cls, hub: Hub, argument: Argument) -> int | ByTime:
-        """What the argument says."""
+        """Return the interval of an argument; 0 for never."""
         return 0 if argument.text == "0" else super().from_script(hub, argument)
 
 

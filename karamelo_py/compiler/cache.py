@@ -230,7 +230,17 @@ class KernelCache(_Cache):
 
 
 # What chooses code by type, and what is in every kernel.
-_MAKERS = "compile", "loops", "trace", "walk", "terms", "texts", "flow", "lowering", "values"
+_MAKERS = (
+    "compile",
+    "loops",
+    "trace",
+    "statements",
+    "expressions",
+    "source",
+    "flow",
+    "lowering",
+    "values",
+)
 _BESIDE = [Path(__file__).with_name(f"{name}.py") for name in (*_MAKERS, "fields")]
 WHOLE_FILES = [inlining.__file__, held.__file__, *WHOLE, *_BESIDE]
 

@@ -21,48 +21,31 @@ SPELLED = "<spelled>"  # the file of functions that are written at compile time
 
 
 class Unknown(Exception):
-    """Something that a kernel depends on cannot be put into a hash."""
+    """Tell that something a kernel depends on cannot be put into a hash."""
 
 
 # --- implementations of point functions that are in a kernel -----------------------------------
 
 
 class Choice(NamedTuple):
-    """That a kernel asked a point function for these classes of tags, all by name."""
+    """Record that a kernel asked a point function for these classes of tags, all by name."""
 
     point_function: str
     classes: tuple[str, ...]
 
 
 point_functions: dict[str, list[Callable]] = {}
-_serves: WeakKeyDictionary[Callable, list[Callable]] = WeakKeyDictionary()
+choosers: dict[Callable, list[Callable]] = {}  # of what kernels choose by type
 
 
 def name_of(thing: Any) -> str:
-    """``module:qualified name`` of a function or class."""
+    """Name a function or class as ``module:qualified name``."""
     return f"{thing.__module__}:{thing.__qualname__}"
 
 
 def declare_point_function(dispatch: Callable) -> None:
     """Make a point function known by its name; it has ``find(classes)`` and ``tags``."""
     point_functions.setdefault(name_of(dispatch), []).append(dispatch)
-
-
-def serves(implementation: Callable, dispatch: Callable) -> None:
-    """Note that a point function may choose `implementation`."""
-    function = getattr(implementation, "py_func", implementation)
-    _serves.setdefault(function, []).append(dispatch)
-
-
-_asked: list[set[tuple[Callable, tuple]]] = []  # of the choosers at work, innermost last
-_answers: WeakKeyDictionary[Callable, set[tuple[Callable, tuple]]] = WeakKeyDictionary()
-
-
-def asks(dispatch: Callable, classes: tuple) -> None:
-    """Note that whether `dispatch` is defined for `classes` was asked, maybe by a chooser."""
-    if _asked:
-        _asked[-1].add((dispatch, classes))
-    note([(dispatch, classes)])
 
 
 # Of the functions that are made, innermost last: what was asked of point functions, and the code
@@ -78,7 +61,7 @@ def note(parts: Iterable[tuple[Callable, tuple] | python.CodeType]) -> None:
 
 @contextmanager
 def parts_noted() -> Iterator[set[tuple[Callable, tuple] | python.CodeType]]:
-    """The set of what is noted meanwhile."""
+    """Collect what is noted meanwhile."""
     _noted.append(set())
     try:
         yield _noted[-1]
@@ -86,30 +69,13 @@ def parts_noted() -> Iterator[set[tuple[Callable, tuple] | python.CodeType]]:
         _noted.pop()
 
 
-def noting(chooser: Callable) -> Callable:
-    """The same chooser of code by type; what it asks is noted with the function that it chooses."""
-
-    @functools.wraps(chooser)
-    def choose(*arguments: Any) -> Callable | None:
-        _asked.append(set())
-        try:
-            chosen = chooser(*arguments)
-        finally:
-            asked = _asked.pop()
-        if asked and chosen is not None:
-            _answers.setdefault(getattr(chosen, "py_func", chosen), set()).update(asked)
-        return chosen
-
-    return choose
-
-
 def tag_class(numba_type: Any) -> Any:
-    """The Python class that a Numba type stands for, as far as point functions select by it."""
+    """Find the class of a tag, by which point functions select, from its Numba type."""
     return getattr(numba_type, "instance_class", None)
 
 
 def found_by_name(name: str) -> Any:
-    """What `name_of` called so; Unknown if nothing is, or something else."""
+    """Find what `name_of` called so."""
     module, _, path = name.partition(":")
     try:
         return functools.reduce(getattr, path.split("."), sys.modules[module])
@@ -127,7 +93,7 @@ def class_name(tag: type | None) -> str:
 
 
 class Contents(NamedTuple):
-    """What is in compiled code: choices, and the Python functions that it was made of."""
+    """List what is in compiled code: choices, and the Python functions that it was made of."""
 
     choices: frozenset[Choice]
     codes: frozenset[python.CodeType]
@@ -138,14 +104,14 @@ _unfit: WeakKeyDictionary[Any, bool] = WeakKeyDictionary()
 
 
 class _Watch(event.Listener):
-    """Notes which implementation each piece of compiled code is."""
+    """Note what each piece of compiled code consists of."""
 
     def on_start(self, event: Any) -> None:
-        """What is chosen while it is compiled is noted."""
+        """Begin to note what is chosen."""
         _noted.append(set())
 
     def on_end(self, event: Any) -> None:
-        """A function was compiled, or failed to."""
+        """Keep what was noted of a function, if it was compiled."""
         noted = _noted.pop()
         dispatcher, arguments = event.data["dispatcher"], tuple(event.data["args"])
         compiled = dispatcher.overloads.get(arguments)
@@ -154,7 +120,7 @@ class _Watch(event.Listener):
         function = dispatcher.py_func
         run = {part for part in noted if isinstance(part, python.CodeType)}
         try:
-            choices = frozenset(_own_choices(function, arguments, noted - run))
+            choices = frozenset(map(_choice, noted - run))
         except Unknown:
             _unfit[compiled.library] = True
             return
@@ -168,16 +134,13 @@ class _Watch(event.Listener):
 event.register("numba:compile", _Watch())
 
 
-def _own_choices(function: Callable, arguments: tuple, noted: set) -> Iterable[Choice]:
-    for dispatch in _serves.get(function, ()):
-        classes = tuple(tag_class(a) for a in arguments[: dispatch.tags])
-        yield Choice(name_of(dispatch), tuple(class_name(c) for c in classes))
-    for dispatch, classes in (*_answers.get(function, ()), *noted):
-        yield Choice(name_of(dispatch), tuple(class_name(c) for c in classes))
+def _choice(part: tuple[Callable, tuple]) -> Choice:
+    dispatch, classes = part
+    return Choice(name_of(dispatch), tuple(class_name(c) for c in classes))
 
 
 def contents(library: Any) -> Contents:
-    """What is in the code of a compiled function, and of all that it calls."""
+    """List what is in the code of a compiled function, and of all that it calls."""
     choices: set[Choice] = set()
     codes: set[python.CodeType] = set()
     ahead, seen = [library], set()

@@ -1,95 +1,63 @@
 """How the package compiles: kernels, and point functions that are chosen by type."""
 
-import functools
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numba
 from numba import config
-from numba.extending import intrinsic, overload
+from numba.extending import intrinsic
 
 from karamelo_py.compiler.choices import (
     SPELLED,
-    asks,
+    choosers,
     declare_point_function,
-    noting,
-    serves,
+    note,
     tag_class,
 )
-from karamelo_py.compiler.trace import forget, roll, run_for_kernel, traced
-from karamelo_py.compiler.values import OF_REALS, at_work
-
-# Point functions must melt into the loops that call them, however large they get.
-_INLINED = {"forceinline": True, "no_cfunc_wrapper": True}
+from karamelo_py.compiler.trace import INSTEAD, Undefined, forget, run_for_kernel, traced
+from karamelo_py.compiler.values import OF_REALS, at_work, now
 
 
 def by_type(function: Callable) -> Callable:
     """Decorate the chooser of what `function` is in a kernel, from the types of its arguments."""
 
-    def choose(chooser: Callable) -> Callable:
+    def register(chooser: Callable) -> Callable:
         traced(function, chooser)
-        overload(function, _INLINED, strict=False)(noting(chooser))
         return chooser
 
-    return choose
+    return register
 
 
-def of_numbers(function: Callable) -> Callable:
-    """The same for a chooser that knows nothing of lanes: they have choosers of their own."""
+def implements(function: Callable, *numbers: type) -> Callable:
+    """Decorate what `function` is in a kernel: for these types of numbers, or for all others.
 
-    def choose(chooser: Callable) -> Callable:
-        @functools.wraps(chooser)
-        def guarded(*arguments: Any) -> Callable | None:
-            return None if lanes_of(arguments) else chooser(*arguments)
-
-        by_type(function)(guarded)
-        return chooser
-
-    return choose
-
-
-def shared(function: Callable | None = None, *, unless: Callable | None = None) -> Callable:
-    """Mark a helper of point functions: kernels may call it. It may ask what its arguments are.
-
-    For types of which ``unless(*types)`` holds, it is something else (:func:`by_type`).
+    A type of numbers is a NamedTuple with operators (:func:`~.algebra.number_type`), or lanes. It
+    is looked for in tuples, too. What is decorated is traced, or code written by hand.
     """
-    if function is None:
-        return lambda f: shared(f, unless=unless)
 
-    def choose(*arguments: Any) -> Callable | None:
-        return None if unless is not None and unless(*arguments) else function
+    def register(made: Callable) -> Callable:
+        for one in numbers:
+            if "implements" not in vars(one):
+                one.implements = {}
+            one.implements[function] = made
+        if function not in choosers or not numbers:
+            traced(function, lambda *_: None if numbers else made, last=not numbers)
+        return made
 
-    by_type(function)(choose)
-    return function
-
-
-def looping(function: Callable) -> Callable:
-    """Mark a helper with a loop that is left to the compiler to unroll."""
-    roll(function)
-    return shared(function)
+    return register
 
 
-class Undefined(TypeError):
-    """A point function is not defined for classes that need it."""
-
-    def __init__(self, function: str, classes: tuple):
-        names = ", ".join(getattr(c, "__name__", str(c)) for c in classes)
-        super().__init__(f"{function} is not defined for ({names})")
-        self.classes = classes
-
-
-def one_by_one(function: Callable, count: int) -> Callable:
-    """A function of `count` arguments, some in lanes, that does `function` for each lane."""
-    names = "".join(f"a{k}, " for k in range(count))
-    return define(names, f"return call(function, ({names}))", function=function, call=in_each_lane)
+def shared(function: Callable) -> Callable:
+    """Mark a helper of point functions: kernels may call it. It may ask what its arguments are."""
+    return implements(function)(function)
 
 
 def in_each_lane(function: Callable, arguments: tuple) -> Any:
-    """What a function of numbers gives for each lane among its arguments."""
+    """Do a function of numbers for each lane among its arguments."""
     raise TypeError("only compiled kernels know lanes")
 
 
-def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Callable], Callable]:
+def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Callable], Any]:
     """Declare a pure function of one point, selected by the classes of its first `tags` arguments.
 
     The decorated function gives name, parameters and docstring. Implementations are added with
@@ -98,7 +66,7 @@ def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Calla
     its own in the same way. With ``otherwise`` what the decorated function does is for all others.
 
     Point functions serve one point or several at once (:mod:`karamelo_py.compiler.lanes`). Those
-    that a class names in ``one_by_one``, since they branch, are called for one point after another.
+    that a class names in ``scalarised``, since they branch, are called for one point after another.
     """
 
     def declare(stub: Callable) -> Callable:
@@ -139,10 +107,8 @@ def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Calla
         def choose(*arguments: Any) -> Callable | None:
             classes = tuple(tag_class(a) for a in arguments[:tags])
             found = find(classes)
-            apart = any(stub.__name__ in getattr(tag, "one_by_one", ()) for tag in classes)
-            if apart and lanes_of(arguments):
-                return one_by_one(dispatch, len(arguments))
-            return found
+            apart = any(stub.__name__ in getattr(tag, "scalarised", ()) for tag in classes)
+            return _scalarised(dispatch) if apart and lanes_of(arguments) else found
 
         by_type(dispatch)(choose)
 
@@ -151,7 +117,6 @@ def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Calla
                 table[classes] = implementation
                 memo.clear()
                 forget()
-                serves(implementation, dispatch)
                 return implementation
 
             return register
@@ -160,11 +125,9 @@ def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Calla
         dispatch.find = find
         declare_point_function(dispatch)
         dispatch.on = on
-        if fallback is not None:
-            serves(fallback, dispatch)
 
         def defined(*classes: type) -> bool:
-            asks(dispatch, classes)
+            note([(dispatch, classes)])
             return classes in table
 
         dispatch.defined = defined
@@ -173,26 +136,33 @@ def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Calla
     return declare
 
 
-def real(value: float, like: Any) -> Any:
-    """`value` in the number type of `like`.
+def _scalarised(function: Callable) -> Callable:
+    """Make a function of arguments, some in lanes, that does `function` for each lane."""
+    return lambda *arguments: in_each_lane(function, arguments)
 
-    In a kernel, a bare Python number next to a single-precision one makes the result double;
-    every literal in a point function therefore passes through here (it costs nothing at run time).
+
+def real(value: float, like: Any) -> Any:
+    """Give `value` the number type of `like`.
+
+    Literals take the type of what they meet; this is for what meets nothing yet.
     """
     return type(like)(value)
 
 
 def lanes_of(numba_type: Any) -> int:
-    """How many lanes a Numba type has (:mod:`karamelo_py.compiler.lanes`); 0 for numbers.
+    """Count the lanes of a Numba type, or of a value (:mod:`karamelo_py.compiler.lanes`).
 
-    Of tuples, those of what is in them.
+    It is 0 for numbers; of tuples, those of what is in them.
     """
     if isinstance(numba_type, tuple | numba.types.BaseTuple):
         return max(map(lanes_of, numba_type), default=0)
     return getattr(numba_type, "width", 0)
 
 
-@of_numbers(real)
+INSTEAD[lanes_of] = lambda thing: lanes_of(now().kind_of(thing))
+
+
+@by_type(real)
 def _real(value, like):
     if like is numba.types.float32:
         return lambda value, like: numba.float32(value)
@@ -200,22 +170,23 @@ def _real(value, like):
 
 
 def round_off(like: Any) -> Any:
-    """The relative error of one operation, in the number type of `like`."""
+    """Give the relative error of one operation, in the number type of `like`."""
     return type(like)(_ROUND_OFF.get(type(like).__name__, 2.0**-52))
 
 
 _ROUND_OFF = {"float32": 2.0**-23}
 
 
-@of_numbers(round_off)
+@by_type(round_off)
 def _round_off(like):
     if like is numba.types.float32:
         return lambda like: numba.float32(2.0**-23)
     return lambda like: numba.float64(2.0**-52)
 
 
+@shared
 def fma(a: float, b: float, c: float) -> float:
-    """a b + c with one rounding, where compiled: always so, whatever surrounds it."""
+    """Add a b to c with one rounding, where compiled: always so, whatever surrounds it."""
     return a * b + c
 
 
@@ -227,52 +198,36 @@ def _fused(typing_context, a, b, c):
     return a(a, b, c), codegen
 
 
-@of_numbers(fma)
+@by_type(fma)
 def _fma(a, b, c):
-    if a == b == c and isinstance(a, numba.types.Float):
-        return lambda a, b, c: _fused(a, b, c)
-    return lambda a, b, c: a * b + c
+    return _fused if a == b == c and isinstance(a, numba.types.Float) else None
 
 
-def choose(condition: bool, a: float, b: float) -> float:
-    """`a` where `condition` holds, else `b`; both are computed, and nothing is branched over."""
+@shared
+def where(condition: bool, a: float, b: float) -> float:
+    """Choose `a` where `condition` holds, else `b`; both are computed, and nothing branches."""
     return a if condition else b
 
 
-@by_type(choose)
-def _choose(condition, a, b):
-    return None if lanes_of(condition) else _one_of
+OF_REALS |= {fma, where}
 
 
-def _one_of(condition: bool, a: float, b: float) -> float:
-    return a if condition else b
-
-
-OF_REALS |= {fma, choose}
-
-
-def in_all(condition: bool) -> bool:
-    """Whether a condition holds in all lanes; it itself where there are none."""
+@shared
+def all_lanes(condition: bool) -> bool:
+    """Tell whether a condition holds in all lanes; it itself where there are none."""
     return condition
 
 
-of_numbers(in_all)(lambda condition: lambda condition: condition)
-
-
-def in_any(condition: bool) -> bool:
-    """Whether a condition holds in any lane; it itself where there are none."""
+@shared
+def any_lane(condition: bool) -> bool:
+    """Tell whether a condition holds in any lane; it itself where there are none."""
     return condition
 
 
-of_numbers(in_any)(lambda condition: lambda condition: condition)
-
-
+@shared
 def of_present(p: int, value: float) -> float:
-    """`value`, and 0 in the lanes of a group of points that have no point."""
+    """Give `value`, and 0 in the lanes of a group of points that have no point."""
     return value
-
-
-of_numbers(of_present)(lambda p, value: lambda p, value: value)
 
 
 class Weighted(NamedTuple):
@@ -282,21 +237,17 @@ class Weighted(NamedTuple):
     weights: tuple[float, ...]
 
 
+@shared
 def prefetch(array: Any, at: tuple) -> None:
     """Have the memory bring what a loop over groups of points reads soon behind an item."""
 
 
-of_numbers(prefetch)(lambda array, at: lambda array, at: None)
-
-
+@shared
 def prefetch_records(array: Any, i: Any) -> None:
     """Have the memory bring the records some nodes behind those of number `i`, in lanes."""
 
 
-of_numbers(prefetch_records)(lambda array, i: lambda array, i: None)
-
-
-@shared(unless=lambda *kinds: lanes_of(kinds))
+@shared
 def accumulate(array: Any, i: int | Weighted, first: int, values: tuple) -> None:
     """array[i, first + k] += values[k], lane after lane."""
     if isinstance(i, Weighted):
@@ -307,59 +258,49 @@ def accumulate(array: Any, i: int | Weighted, first: int, values: tuple) -> None
             array[i, first + k] += value
 
 
+@shared
 def largest(a: float) -> float:
-    """The largest of the lanes; a number itself."""
+    """Find the largest of the lanes; a number itself."""
     return a
 
 
-of_numbers(largest)(lambda a: lambda a: a)
-
-
+@shared
 def added(total: float, value: float) -> float:
-    """`total` + `value`, which may be in lanes: one after another, as numbers would be added."""
+    """Add to `total` a value that may be in lanes: one after another, as numbers would be added."""
     return total + value
 
 
-of_numbers(added)(lambda total, value: lambda total, value: total + value)
-
-
-def first_failing(condition: bool) -> int:
-    """The first lane in which a condition does not hold; 0 where there are none."""
+@shared
+def first_false_lane(condition: bool) -> int:
+    """Find the first lane in which a condition does not hold; 0 where there are none."""
     return 0
 
 
-of_numbers(first_failing)(lambda condition: lambda condition: 0)
-
-
+@shared
 def is_one(number: int) -> bool:
-    """Whether all lanes have the same number."""
+    """Tell whether all lanes have the same number."""
     return True
 
 
-of_numbers(is_one)(lambda number: lambda number: True)
-
-
+@shared
 def first_lane(number: int) -> int:
-    """The number of the first lane; a number itself."""
+    """Give the number of the first lane; a number itself."""
     return number
 
 
-of_numbers(first_lane)(lambda number: lambda number: number)
-
-
 def index(i: int) -> int:
-    """`i` as an array index that is known not to be negative.
+    """Give `i` as an array index that is known not to be negative.
 
     Saves Numba's test for indices counted from the end at every access (a tenth of a sweep).
     """
     return i
 
 
-of_numbers(index)(lambda i: lambda i: numba.uint64(i))
+implements(index)(lambda i: numba.uint64(i))
 
 
 def beside(first: int, steps: int) -> int:
-    """`first` + `steps` as the number of a node: an array index, as `index` makes it.
+    """Give `first` + `steps` as the number of a node: an array index, as `index` makes it.
 
     Of lanes it keeps the two apart: what is `steps` from the first node of each is found from the
     places of these.
@@ -367,7 +308,7 @@ def beside(first: int, steps: int) -> int:
     return first + steps
 
 
-of_numbers(beside)(lambda first, steps: lambda first, steps: numba.uint64(first + steps))
+implements(beside)(lambda first, steps: numba.uint64(first + steps))
 
 
 def over_blocks(per_block: Callable) -> Callable:

@@ -7,14 +7,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from karamelo_py.compiler.values import HeldValue, Untraceable, Value, counting, emit
+from karamelo_py.compiler.values import HeldValue, Untraceable, Value, counting, emit, words
 
 _PLAIN = (bool, int, float, str, np.generic, type(None))
 _DROPPED = object()
+IN_A_LOOP = " from turn to turn of a loop"
 
 
-class Way(NamedTuple):
-    """The end of a way: its last block, what names stand for, what was read."""
+class Edge(NamedTuple):
+    """Say where a way ends: its last block, what names stand for, what was read."""
 
     block: Any
     names: dict[str, Any]
@@ -22,46 +23,46 @@ class Way(NamedTuple):
 
 
 class Range(NamedTuple):
-    """A range whose bounds only a run knows."""
+    """Keep a range whose bounds only a run knows."""
 
     bounds: tuple
 
 
 class Counter(NamedTuple):
-    """How a loop over a range counts."""
+    """Count the turns of a loop over a range."""
 
     start: Value
     goes_on: Callable[[Value], Value]
     after: Callable[[Value], Value]
 
 
-class _Leaf(NamedTuple):
-    """A number or pointer that depends on the way: what it is on each."""
+class Phi(NamedTuple):
+    """Merge a number or pointer that depends on the way from what it is on each."""
 
     made: Value | HeldValue
     on: list
 
 
-class Head(NamedTuple):
-    """Where a loop begins."""
+class LoopHeader(NamedTuple):
+    """Begin a loop: its block, and what changes from turn to turn."""
 
     block: Any
-    leaves: list[_Leaf]
+    phis: list[Phi]
     names: dict[str, Any]
 
 
 def is_value(thing: Any) -> bool:
-    """Whether only a run knows it."""
+    """Tell whether only a run knows a thing."""
     return isinstance(thing, Value)
 
 
 def is_real(thing: Any) -> bool:
-    """Whether it is a real number that only a run knows."""
+    """Tell whether a thing is a real number that only a run knows."""
     return isinstance(thing, Value) and isinstance(thing._kind, types.Float)
 
 
 def is_literal(thing: Any) -> bool:
-    """Whether it is a number without a precision of its own."""
+    """Tell whether a thing is a number without a precision of its own."""
     return type(thing) in (int, float)
 
 
@@ -73,14 +74,14 @@ def _is_same(a: Any, b: Any) -> bool:
 
 
 class Grows(Untraceable):
-    """A literal, carried from turn to turn of a loop, becomes a number of a type of its own."""
+    """Tell that a number becomes one of another type from turn to turn of a loop."""
 
     def __init__(self, place: int, kind: types.Type):
         self.place, self.kind = place, kind
 
 
 class Flow:
-    """Writes the ways of one call of a function.
+    """Write the ways of one call of a function.
 
     Without a builder nothing is written, and only types are found.
     """
@@ -93,73 +94,72 @@ class Flow:
     def _block(self) -> Any:
         return self.builder and self.builder.append_basic_block("way")
 
-    def way(self, names: dict[str, Any]) -> Way:
-        """The way that ends here."""
-        return Way(self.builder and self.builder.block, names, self.lowering.read)
+    def edge(self, names: dict[str, Any]) -> Edge:
+        """End a way here."""
+        return Edge(self.builder and self.builder.block, names, self.lowering.read)
 
-    def part(self, condition: Value) -> tuple[Way, Way]:
-        """Two ways begin: of a condition that holds, and of one that does not."""
+    def part(self, condition: Value) -> tuple[Edge, Edge]:
+        """Begin two ways: of a condition that holds, and of one that does not."""
         truth = emit(bool, condition)
         blocks = self._block(), self._block()
         if self.builder:
             self.builder.cbranch(truth._value, *blocks)
-        return tuple(Way(block, {}, dict(self.lowering.read)) for block in blocks)
+        return tuple(Edge(block, {}, dict(self.lowering.read)) for block in blocks)
 
-    def start(self, way: Way) -> None:
-        """Go on at the beginning of a way."""
+    def start(self, edge: Edge) -> None:
+        """Go on at the beginning of an edge."""
         if self.builder:
-            self.builder.position_at_end(way.block)
-        self.lowering.read = way.read
+            self.builder.position_at_end(edge.block)
+        self.lowering.read = edge.read
 
-    def meet(self, ways: list[Way]) -> dict[str, Any]:
+    def meet(self, edges: list[Edge]) -> dict[str, Any]:
         """Go on where ways meet; what names stand for there. Some stand for nothing any more."""
-        first = ways[0]
-        if len(ways) == 1:
+        first = edges[0]
+        if len(edges) == 1:
             self.start(first)
             return first.names
-        leaves: list[_Leaf] = []
+        phis: list[Phi] = []
         names: dict[str, Any] = {}
         for name, thing in first.names.items():
-            if all(name in way.names for way in ways):
-                found = self._merged([thing, *(way.names[name] for way in ways[1:])], leaves)
+            if all(name in edge.names for edge in edges):
+                found = self._merged([thing, *(edge.names[name] for edge in edges[1:])], phis)
                 if found is not _DROPPED:
                     names[name] = found
         block = self._block()
-        for k, way in enumerate(ways):
-            self.start(way)
-            self._enter(block, leaves, [leaf.on[k] for leaf in leaves])
+        for k, edge in enumerate(edges):
+            self.start(edge)
+            self._enter(block, phis, [phi.on[k] for phi in phis])
         everywhere = {
             key: value
             for key, value in first.read.items()
-            if all(way.read.get(key) is value for way in ways)
+            if all(edge.read.get(key) is value for edge in edges)
         }
-        self.start(Way(block, names, everywhere))
+        self.start(Edge(block, names, everywhere))
         return names
 
-    def _enter(self, block: Any, leaves: list[_Leaf], values: list) -> None:
-        """Go from here into a block where `leaves` get `values`."""
+    def _enter(self, block: Any, phis: list[Phi], values: list) -> None:
+        """Go from here into a block where `phis` get `values`."""
         if not self.builder:
             return
         lowered = [
-            self.lowering.lowered(v, leaf.made._kind)
-            for v, leaf in zip(values, leaves, strict=True)
+            self.lowering.lowered(v, phi.made._kind) for v, phi in zip(values, phis, strict=True)
         ]
         here = self.builder.block
         self.builder.branch(block)
-        for leaf, value in zip(leaves, lowered, strict=True):
-            if leaf.made._value is None:
+        for phi, value in zip(phis, lowered, strict=True):
+            if phi.made._value is None:
                 with self.builder.goto_block(block):
-                    leaf.made._value = self.builder.phi(value.type)
-            leaf.made._value.add_incoming(value, here)
+                    phi.made._value = self.builder.phi(value.type)
+            phi.made._value.add_incoming(value, here)
 
-    def _merged(self, things: list, leaves: list[_Leaf]) -> Any:
+    def _merged(self, things: list, phis: list[Phi]) -> Any:
         first = things[0]
         if all(_is_same(first, thing) for thing in things[1:]):
             return first
         if all(isinstance(t, tuple) and type(t) is type(first) for t in things):
             if len({len(t) for t in things}) > 1:
                 return _DROPPED
-            items = [self._merged(list(item), leaves) for item in zip(*things, strict=True)]
+            items = [self._merged(list(item), phis) for item in zip(*things, strict=True)]
             if any(item is _DROPPED for item in items):
                 return _DROPPED
             return type(first)(*items) if hasattr(first, "_fields") else tuple(items)
@@ -179,53 +179,58 @@ class Flow:
         if kind is None or isinstance(kind, types.Optional | types.UnicodeType):
             return _DROPPED
         made = (HeldValue if isinstance(first, HeldValue) else Value)(kind, None)
-        leaves.append(_Leaf(made, things))
+        phis.append(Phi(made, things))
         return made
+
+    def fail(self, kind: type, arguments: tuple) -> None:
+        """Let the kernel raise an exception."""
+        if self.builder:
+            self.lowering.context.call_conv.return_user_exc(self.builder, kind, arguments)
 
     # --- loops
 
     def loop(
         self, names: dict[str, Any], changed: frozenset[str], grown: dict[int, types.Type]
-    ) -> tuple[Head, dict[str, Any]]:
-        """A loop begins, in which names stand for something else each time: what they stand for.
+    ) -> tuple[LoopHeader, dict[str, Any]]:
+        """Begin a loop; find what names stand for that change from turn to turn.
 
         `grown` are the types that literals among these get, by their places.
         """
-        leaves: list[_Leaf] = []
+        phis: list[Phi] = []
         self.grown = grown
         inside = dict(names)
         for name in sorted(changed & names.keys()):
-            inside[name] = self._carried(names[name], leaves)
+            inside[name] = self._carried(names[name], phis)
         block = self._block()
-        self._enter(block, leaves, [leaf.on[0] for leaf in leaves])
+        self._enter(block, phis, [phi.on[0] for phi in phis])
         carried = {name: inside[name] for name in sorted(changed & names.keys())}
-        self.start(Way(block, {}, dict(self.lowering.read)))
-        return Head(block, leaves, carried), inside
+        self.start(Edge(block, {}, dict(self.lowering.read)))
+        return LoopHeader(block, phis, carried), inside
 
-    def _carried(self, thing: Any, leaves: list[_Leaf]) -> Any:
+    def _carried(self, thing: Any, phis: list[Phi]) -> Any:
         if isinstance(thing, tuple):
-            items = [self._carried(item, leaves) for item in thing]
+            items = [self._carried(item, phis) for item in thing]
             return type(thing)(*items) if hasattr(thing, "_fields") else tuple(items)
         if thing is None or not isinstance(thing, (Value, HeldValue, *_PLAIN)):
             return thing
         kind = types.unliteral(self.lowering.kind_of(thing))
-        kind = self.grown.get(len(leaves), kind)
+        kind = self.grown.get(len(phis), kind)
         made = (HeldValue if isinstance(thing, HeldValue) else Value)(kind, None)
-        leaves.append(_Leaf(made, [thing]))
+        phis.append(Phi(made, [thing]))
         return made
 
-    def close(self, head: Head, names: dict[str, Any]) -> None:
-        """Back to where a loop begins."""
+    def close(self, head: LoopHeader, names: dict[str, Any]) -> None:
+        """Go back to where a loop begins."""
         values: list = []
-        self.began = [leaf.on[0] for leaf in head.leaves]
+        self.began = [phi.on[0] for phi in head.phis]
         for name, before in head.names.items():
             if name not in names:
-                raise Untraceable
-            self._again(before, names[name], values)
-        self._enter(head.block, head.leaves, values)
+                raise Untraceable(f"'{name}' is not known on all ways through a loop")
+            self._close_phi(before, names[name], values)
+        self._enter(head.block, head.phis, values)
 
-    def _again(self, before: Any, after: Any, values: list) -> None:
-        """What the leaves of `before` become, in their order."""
+    def _close_phi(self, before: Any, after: Any, values: list) -> None:
+        """Collect what the phis of `before` become, in their order."""
         if isinstance(before, Value | HeldValue):
             kind = types.unliteral(self.lowering.kind_of(after))
             if (
@@ -234,59 +239,66 @@ class Flow:
                 and isinstance(getattr(kind, "scalar", kind), types.Float)
             ):
                 raise Grows(len(values), kind)
-            if kind != before._kind and (
-                self.lowering.typing.unify_types(kind, before._kind) != before._kind
-            ):
-                raise Untraceable  # of another type from then on
+            both = self.lowering.typing.unify_types(kind, before._kind)
+            if both != before._kind:
+                if isinstance(both, types.Integer):
+                    raise Grows(len(values), both)
+                raise Untraceable(f"{words(before._kind)} becomes {words(kind)}{IN_A_LOOP}")
             values.append(after)
         elif isinstance(before, tuple):
             if type(before) is not type(after) or len(before) != len(after):
-                raise Untraceable
+                raise Untraceable(f"a tuple becomes a tuple of another kind{IN_A_LOOP}")
             for one, other in zip(before, after, strict=True):
-                self._again(one, other, values)
+                self._close_phi(one, other, values)
         elif not _is_same(before, after):
-            raise Untraceable
+            raise Untraceable(f"{before!r} becomes something else{IN_A_LOOP}")
 
     def counted(self, bounds: tuple) -> Counter:
-        """How a loop over a range counts."""
+        """Count the turns of a loop over a range."""
         lowering, builder = self.lowering, self.builder
         kinds = tuple(types.unliteral(lowering.kind_of(bound)) for bound in bounds)
         typed = lowering.typing.resolve_value_type(range)
         kind = lowering.typing.resolve_function_type(typed, kinds, {}).return_type.dtype
         start, stop, step = {1: (0, *bounds, 1), 2: (*bounds, 1)}.get(len(bounds), bounds)
-        if not isinstance(step, int) or step == 0:
-            raise Untraceable
-        lowered = [builder and lowering.lowered(bound, kind) for bound in (start, stop)]
+        known = step if isinstance(step, int) else None
+        if known == 0:
+            raise ValueError("the step of a range is 0")
+        start, stop, step = (
+            Value(kind, builder and lowering.lowered(bound, kind)) for bound in (start, stop, step)
+        )
 
         def goes_on(counter: Value) -> Value:
+            if known is None:
+                up = emit(operator.and_, step > 0, counter < stop)
+                return emit(operator.or_, up, emit(operator.and_, step < 0, counter > stop))
             compare = builder and (builder.icmp_signed if kind.signed else builder.icmp_unsigned)
-            holds = builder and compare("<" if step > 0 else ">", counter._value, lowered[1])
-            return Value(types.boolean, holds)
+            sign = "<" if known > 0 else ">"
+            return Value(types.boolean, builder and compare(sign, counter._value, stop._value))
 
         def after(counter: Value) -> Value:
-            one = builder and counter._value.type(step)
-            return Value(kind, builder and builder.add(counter._value, one, flags=("nsw",)))
+            added = builder and builder.add(counter._value, step._value, flags=("nsw",))
+            return Value(kind, added)
 
-        return Counter(Value(kind, lowered[0]), goes_on, after)
+        return Counter(start, goes_on, after)
 
     # --- what Python does otherwise where a value is met
 
     def negate(self, thing: Any) -> Any:
-        """Whether it does not hold."""
+        """Compile `not`."""
         return emit(operator.not_, thing) if is_value(thing) else not thing
 
     def both(self, a: Any, b: Any) -> Any:
-        """Whether two comparisons hold."""
+        """Compile the question whether two comparisons hold."""
         return emit(operator.and_, a, b) if is_value(a) and is_value(b) else a and b
 
     def item(self, things: Any, place: Any) -> Any:
-        """An item of an array or of a tuple."""
+        """Compile an item of an array or of a tuple."""
         if isinstance(things, tuple) and is_value(place):
             return emit(operator.getitem, things, place)
         return things[place]
 
     def call(self, function: Callable, arguments: list, keywords: dict) -> Any:
-        """What a function gives."""
+        """Compile a call."""
         if function is len and is_value(arguments[0]):
             return emit(len, arguments[0])
         if function is counting and any(map(is_value, arguments)):

@@ -7,17 +7,18 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
+from numba.core.errors import TypingError
 from numba.core.typing.templates import fold_arguments
 
 from karamelo_py.compiler.held import _Held, item_of
-from karamelo_py.compiler.values import Emitted, HeldValue, Untraceable, Value, writing
+from karamelo_py.compiler.values import Emitted, HeldValue, Untraceable, Value, words, writing
 
 MOST_OPERATIONS = 10_000  # of one formula; beyond, a loop is better left to the compiler
 LONGEST = 1000  # range that is gone through
 
 
 class Lowering:
-    """Where code goes to: to a builder, or nowhere while only types are asked for.
+    """Write code with a builder, or none while only types are asked for.
 
     Parameters
     ----------
@@ -44,7 +45,7 @@ class Lowering:
         self.read: dict[tuple, Any] = {}
 
     def wrapped(self, kind: types.Type, value: Any) -> Any:
-        """What point functions see of a value."""
+        """Wrap a value as point functions see it."""
         if isinstance(kind, types.Literal):
             return kind.literal_value
         if isinstance(kind, types.NoneType):
@@ -68,7 +69,7 @@ class Lowering:
         return Value(kind, value)
 
     def kind_of(self, thing: Any) -> types.Type:
-        """The Numba type of what point functions see; whole numbers keep their value in it."""
+        """Find the Numba type of what point functions see; whole numbers keep their value in it."""
         if isinstance(thing, Value | HeldValue):
             return thing._kind
         if isinstance(thing, int):
@@ -82,11 +83,11 @@ class Lowering:
         if isinstance(thing, Emitted):
             thing = thing.seen
         elif not isinstance(thing, float | np.generic | type | None):
-            raise Untraceable  # nothing that `lowered` knows
+            raise Untraceable(f"{thing!r} is nothing that a kernel knows")
         return self.typing.resolve_value_type(thing)
 
     def lowered(self, thing: Any, wanted: types.Type) -> Any:
-        """Code that gives what point functions see, in the type `wanted`."""
+        """Write code that gives what point functions see, in the type `wanted`."""
         kind = self.kind_of(thing)
         if isinstance(thing, Value | HeldValue):
             return self.context.cast(self.builder, thing._value, kind, wanted)
@@ -104,24 +105,24 @@ class Lowering:
         return self.context.get_dummy_value()
 
     def constant(self, array: np.ndarray) -> Value:
-        """An array that is part of the code."""
+        """Make an array part of the code."""
         kind = self.typing.resolve_value_type(array)
         return Value(
             kind, self.builder and self.context.get_constant_generic(self.builder, kind, array)
         )
 
     def call(self, function: Callable, arguments: tuple) -> Any:
-        """What `function` gives for these arguments."""
+        """Write a call of `function`."""
         self.operations += 1
         if self.operations > MOST_OPERATIONS:
-            raise Untraceable
+            raise Untraceable(f"it has more than {MOST_OPERATIONS} operations: take a loop")
         kinds = tuple(map(self.kind_of, arguments))
         if hasattr(function, "py_func"):
             kinds = tuple(map(types.unliteral, kinds))
         resolved = _resolved(self.typing, function, kinds)
         called = resolved.called
         if any(isinstance(kind, types.Omitted) for kind in called.args):
-            raise Untraceable
+            raise Untraceable(f"an argument of {name_of(function)} is left out")
         if self.builder is None:
             return self.wrapped(called.return_type, None)
         if called.pysig is not None:  # with *arguments in a tuple
@@ -131,7 +132,7 @@ class Lowering:
         return self.wrapped(called.return_type, made(self.builder, values))
 
     def in_type_of(self, thing: Any, like: Any) -> Any:
-        """A whole number as a real one of the type of `like`."""
+        """Make a whole number a real one of the type of `like`."""
         if hasattr(thing._kind, "width"):
             return self.call(self.converted, (thing, like))
         kind = getattr(like._kind, "scalar", like._kind)
@@ -139,13 +140,11 @@ class Lowering:
         return Value(kind, value)
 
     def call_bound(self, method: Value, arguments: tuple) -> Any:
-        """What a method of a number or an array gives."""
+        """Write a call of a method of a number or an array."""
         if not isinstance(method._kind, types.BoundFunction):
-            raise Untraceable
+            raise Untraceable(f"{words(method._kind)} cannot be called")
         kinds = tuple(map(self.kind_of, arguments))
-        called = self.typing.resolve_function_type(method._kind, kinds, {})
-        if called is None:
-            raise Untraceable
+        called = _typed(self.typing, method._kind, kinds, str(method._kind))
         if self.builder is None:
             return self.wrapped(called.return_type, None)
         values = [self.lowered(a, k) for a, k in zip(arguments, called.args, strict=True)]
@@ -153,10 +152,10 @@ class Lowering:
         return self.wrapped(called.return_type, made(self.builder, [method._value, *values]))
 
     def attribute(self, thing: Value, name: str) -> Any:
-        """An attribute of an array or a record."""
+        """Read an attribute of an array or a record."""
         kind = self.typing.resolve_getattr(thing._kind, name)
         if kind is None:
-            raise Untraceable
+            raise AttributeError(f"{words(thing._kind)} has no attribute '{name}'")
         if self.builder is None or isinstance(kind, types.BoundFunction):  # of what it is bound to
             return self.wrapped(kind, thing._value)
         read = self.context.get_getattr(thing._kind, name)
@@ -167,13 +166,13 @@ class Lowering:
         """Set an attribute of a record."""
         called = self.typing.resolve_setattr(thing._kind, name, self.kind_of(value))
         if called is None:
-            raise Untraceable
+            raise AttributeError(f"{words(thing._kind)} has no attribute '{name}' of that type")
         if self.builder is not None:
             write = self.context.get_setattr(name, called)
             write(self.builder, (thing._value, self.lowered(value, called.args[1])))
 
     def item(self, held: HeldValue, k: int) -> Any:
-        """An item of a held tuple."""
+        """Read an item of a held tuple."""
         key = id(held), k
         if key not in self.read:
             value = self.builder and item_of(self.context, self.builder, held._kind, held._value, k)
@@ -181,7 +180,7 @@ class Lowering:
         return self.read[key][0]
 
     def function(self, name: str, run: Callable, kinds: tuple, result: types.Type) -> ir.Function:
-        """A function of its own in the module that is written, which does what `run` does."""
+        """Write what `run` does as a function of its own in the module."""
         module = self.builder.module
         if name in module.globals:
             return module.globals[name]
@@ -230,7 +229,7 @@ class _Resolved:
         self.typed, self.called, self._made = typed, called, None
 
     def made(self, context: Any) -> Callable:
-        """What makes code of it; Numba looks for that in all its registries, often twice."""
+        """Find what makes code of it; Numba looks for that in all its registries, often twice."""
         if self._made is None:
             self._made = context.get_function(self.typed, self.called)
         return self._made
@@ -245,12 +244,27 @@ def numbers_of(kinds: tuple) -> tuple[int, ...]:
 
 
 def _resolved(typing: Any, function: Callable, kinds: tuple) -> _Resolved:
-    """What Numba knows of a function for arguments of these types, for the target of `typing`."""
+    """Look up what Numba knows of a function for arguments of these types."""
     key = typing, function, numbers_of(kinds)
     if key not in resolutions:
         typed = typing.resolve_value_type(function)
-        called = typing.resolve_function_type(typed, kinds, {})
-        if called is None:
-            raise Untraceable
-        resolutions[key] = _Resolved(typed, called)
+        resolutions[key] = _Resolved(typed, _typed(typing, typed, kinds, name_of(function)))
     return resolutions[key]
+
+
+def _typed(typing: Any, typed: types.Type, kinds: tuple, name: str) -> Any:
+    """Find the signature of a function for arguments of these types."""
+    try:
+        called = typing.resolve_function_type(typed, kinds, {})
+    except TypingError as error:
+        if "raised a specific error" in str(error):
+            raise
+        called = None
+    if called is None:
+        raise Untraceable(f"{name} is not defined for ({', '.join(map(words, kinds))})")
+    return called
+
+
+def name_of(function: Callable) -> str:
+    """Name a function in a text."""
+    return getattr(function, "__name__", str(function))

@@ -12,7 +12,7 @@ _GENERATED = {*vars(namedtuple("_", ())), "__orig_bases__", "__annotations__", "
 
 @functools.cache
 def _functions_of(one: type) -> frozenset[str]:
-    """The names of what a class of tuples does with its numbers by functions of its own."""
+    """List the names of the functions that a class of tuples has of its own."""
     if not getattr(one, "_fields", ()) or getattr(one, "is_followed", False):
         return frozenset()
     own = {name: value for base in one.__mro__[:-2] for name, value in vars(base).items()}
@@ -30,9 +30,11 @@ def _names_in(code: python.CodeType) -> set[str]:
 
 
 def refuse_methods(codes: Iterable[python.CodeType], classes: set[type]) -> None:
-    """Methods of tuples would run as they are, and nothing would follow them."""
+    """Refuse methods of tuples: they would run as they are, and nothing would follow them."""
     functions = frozenset().union(*map(_functions_of, classes))
-    if any(name.startswith("__") for name in functions):
-        raise Untraceable
-    if functions and not functions.isdisjoint(set().union(*map(_names_in, codes))):
-        raise Untraceable
+    named = functions & set().union(*map(_names_in, codes))
+    for name in sorted(name for name in functions if name.startswith("__") or name in named):
+        raise Untraceable(
+            f"'{name}' is a method of a class of tuples, which kernels cannot call: "
+            "write a function, or mark the class with `algebra`"
+        )

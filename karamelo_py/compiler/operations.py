@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from karamelo_py.compiler.compile import by_type
+from karamelo_py.compiler.compile import implements
 from karamelo_py.compiler.loops import subkernel
 
 # fmt: off
@@ -217,9 +217,7 @@ def of_one(op, a):
         return float(IN_NUMPY[op](a))
 
 
-@by_type(of_one)
-def _of_one(op, a):
-    return lambda op, a: function_of(op, a)
+implements(of_one)(function_of)
 
 
 def of_two(op, a, b):
@@ -228,6 +226,4 @@ def of_two(op, a, b):
         return float(IN_NUMPY[op](np.float64(a), b))
 
 
-@by_type(of_two)
-def _of_two(op, a, b):
-    return lambda op, a, b: operation_of(op, a, b)
+implements(of_two)(operation_of)

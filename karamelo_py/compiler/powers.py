@@ -14,7 +14,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from karamelo_py.compiler.compile import by_type, choose, define, fma, in_all, real, shared
+from karamelo_py.compiler.compile import all_lanes, by_type, fma, implements, real, shared, where
 from karamelo_py.compiler.lanes.registers import Lanes, element, vector_of
 from karamelo_py.compiler.values import OF_REALS
 
@@ -106,87 +106,67 @@ def _scaled(typing_context, x, n):
     return x(x, x), codegen
 
 
-def _series(x: str, coefficients: list[float]) -> list[str]:
-    """Lines that sum up a polynomial of `x`, and of `xx`, its square, in two chains."""
-    lines = []
-    for name, chain in (("even", coefficients[::2]), ("odd", coefficients[1::2])):
-        lines.append(f"{name} = real({chain[-1]!r}, {x})")
-        lines += [f"{name} = fma({name}, {x}{x}, real({c!r}, {x}))" for c in chain[-2::-1]]
-    return [*lines, f"total = fma(odd, {x}, even)"]
+@shared
+def _series(x, square, coefficients):
+    """Sum up a polynomial of `x`, whose `square` is known, in two chains."""
+    chains = []
+    for chain in (coefficients[::2], coefficients[1::2]):
+        total = real(chain[-1], x)
+        for c in chain[-2::-1]:
+            total = fma(total, square, real(c, x))
+        chains.append(total)
+    return fma(chains[1], x, chains[0])
 
 
-_NAMES = {"real": real, "fma": fma, "choose": choose, "inf": inf, "nan": nan}
 _LN_2, _REST = math.log(2), 2.3190468138462996e-17  # what the first leaves of ln 2
-
-# ln m = 2 artanh s with s = (m - 1) / (m + 1), up to 0.172
-_logarithm = define(
-    "x",
-    "m, e = taken_apart(x)",
-    "s = (m - real(1, m)) / (m + real(1, m))",
-    "t = s * s",
-    "tt = t * t",
-    *_series("t", [2 / (2 * k + 3) for k in range(10)]),
-    f"ln = fma(e, real({_LN_2!r}, x), fma(s * t, total, fma(e, real({_REST!r}, x), s + s)))",
-    "return choose(x > 0, ln + (x - x), choose(x == 0, real(-inf, x), real(nan, x)))",
-    taken_apart=_taken_apart,
-    **_NAMES,
-)
-# e^x = 2^n e^r with |r| up to ln 2 / 2; beyond these limits it is 0 or infinite
-_exponential = define(
-    "x, most, far",
-    "most, far = real(most, x), real(far, x)",
-    "x = min(max(x, -most), most)",
-    f"n = (x * real({1 / _LN_2!r}, x) + far) - far",  # the whole number next to it
-    f"r = fma(-n, real({_REST!r}, x), fma(-n, real({_LN_2!r}, x), x))",
-    "rr = r * r",
-    *_series("r", [1 / factorial(k) for k in range(14)]),
-    "return scaled(total, n)",
-    scaled=_scaled,
-    **_NAMES,
-)
+_ARTANH = tuple(2 / (2 * k + 3) for k in range(10))
+_EXPONENTIAL = tuple(1 / factorial(k) for k in range(14))
+_NEAR_ONE = tuple((-1) ** k / (k + 3) for k in range(11))
 
 
-# ln (1 + r) = r + r^2 (-1/2 + r / 3 - ...): no division, and no step that waits for one.
-_near_one = define(
-    "x",
-    "r = x - real(1, x)",
-    "near = abs(r) <= real(1 / 16, x)",
-    "rr = r * r",
-    *_series("r", [(-1) ** k / (k + 3) for k in range(11)]),
-    "ln = fma(rr, fma(r, total, real(-0.5, x)), r)",
-    "if in_all(near): return ln",
-    "return choose(near, ln, logarithm(x))",
-    logarithm=logarithm,
-    in_all=in_all,
-    **_NAMES,
-)
+@implements(logarithm)
+def _logarithm(x):
+    """ln m = 2 artanh s with s = (m - 1) / (m + 1), up to 0.172."""
+    m, e = _taken_apart(x)
+    s = (m - 1) / (m + 1)
+    t = s * s
+    total = _series(t, t * t, _ARTANH)
+    ln = fma(e, _LN_2, fma(s * t, total, fma(e, _REST, s + s)))
+    return where(x > 0, ln + (x - x), where(x == 0, -inf, real(nan, x)))
 
 
-@by_type(logarithm)
-def _choose_logarithm(x):
-    return _logarithm
-
-
-@by_type(logarithm_near_one)
-def _choose_near_one(x):
-    return _near_one
+@implements(logarithm_near_one)
+def _logarithm_near_one(x):
+    """ln (1 + r) = r + r^2 (-1/2 + r / 3 - ...): no division, and no step that waits for one."""
+    r = x - 1
+    near = abs(r) <= 1 / 16
+    square = r * r
+    ln = fma(square, fma(r, _series(r, square, _NEAR_ONE), -0.5), r)
+    if all_lanes(near):
+        return ln
+    return where(near, ln, logarithm(x))
 
 
 @by_type(exponential)
-def _choose_exponential(x):
+def _exponential(x):
     # So far from 0 that the next number is 1 away; all targets know how to add, but not to round.
     most, far = (1000, 1.5 * 2**52) if _bits(x)[3] == 1023 else (130, 1.5 * 2**23)
-    return lambda x: _exponential(x, most, far)
 
+    def exponential(x):
+        """e^x = 2^n e^r with |r| up to ln 2 / 2; beyond `most` it is 0 or infinite."""
+        x = min(max(x, -most), most)
+        n = (x * (1 / _LN_2) + far) - far  # the whole number next to it
+        r = fma(-n, _REST, fma(-n, _LN_2, x))
+        return _scaled(_series(r, r * r, _EXPONENTIAL), n)
 
-shared(_exponential)
+    return exponential
 
 
 @shared
 def _of_zero(x, y):
-    return choose(y == 0, real(1, x), choose(y < 0, real(inf, x), real(0, x)))
+    return where(y == 0, real(1, x), where(y < 0, real(inf, x), real(0, x)))
 
 
-@by_type(power)
-def _choose_power(x, y):
-    return lambda x, y: choose(x == 0, _of_zero(x, y), exponential(y * logarithm(x)))
+@implements(power)
+def _power(x, y):
+    return where(x == 0, _of_zero(x, y), exponential(y * logarithm(x)))

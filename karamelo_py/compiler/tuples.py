@@ -4,7 +4,7 @@ Comprehensions, which Numba does not know of tuples: kernels run them (`compiler
 are of lists, which Python makes in two thirds of the time where all is interpreted.
 """
 
-from karamelo_py.compiler.compile import Weighted, choose, fma, lanes_of, shared
+from karamelo_py.compiler.compile import Weighted, fma, shared, where
 
 
 @shared
@@ -73,7 +73,7 @@ def put_at(array, i, first, values):
         array[i, first + k] = value
 
 
-@shared(unless=lambda array, i, first, like: lanes_of(i))
+@shared
 def row(array, i, first, like):
     """(array[i, first], ..., array[i, first + len(like) - 1])."""
     if isinstance(i, Weighted):
@@ -112,7 +112,7 @@ def add_row(a, first, b):
 
     def sum_at(k, x):
         for j in range(min(len(b), k + 1)):
-            x = choose(first == k - j, a[k] + b[j], x)
+            x = where(first == k - j, a[k] + b[j], x)
         return x
 
     return tuple([sum_at(k, x) for k, x in enumerate(a)])

@@ -20,38 +20,66 @@ from karamelo_py.compiler.held import _Held
 
 
 class Untraceable(BaseException):
-    """A function asks for what only a run can know; no function may catch that."""
+    """Say why a function cannot become code of a kernel; no function may catch that."""
 
 
-class Asks(Untraceable):
-    """The same, of a function that may be walked through (:mod:`karamelo_py.compiler.walk`)."""
+class DataDependentBranch(Untraceable):
+    """Say the same of a function that may be compiled from its text (`compiler/statements.py`)."""
+
+
+def words(kind: types.Type) -> str:
+    """Name a type as a user would."""
+    if isinstance(kind, types.BaseTuple):
+        return getattr(getattr(kind, "instance_class", None), "__name__", "a tuple")
+    if hasattr(kind, "width"):
+        return f"numbers in lanes ({kind})"
+    for one, name in _WORDS:
+        if isinstance(kind, one):
+            return name
+    return str(kind)
+
+
+_WORDS = (
+    (types.Boolean | types.BooleanLiteral, "a truth value"),
+    (types.Integer, "a whole number"),
+    (types.Float, "a number"),
+    (types.Array, "an array"),
+    (types.NoneType, "None"),
+    (types.UnicodeType | types.StringLiteral, "a text"),
+)
 
 
 class Globals(dict):
-    """The globals of a module, as functions that are run for kernels see them."""
+    """Show the globals of a module to functions that are run for kernels."""
 
     def __init__(self, true: dict, seen: Callable[[Any], Any]):
         super().__init__()
         self.true, self.seen = true, seen
 
     def __getitem__(self, name: str) -> Any:
+        if name not in self.true and not hasattr(builtins, name):
+            raise NameError(f"name '{name}' is not defined")
         return self.seen(self.true[name] if name in self.true else getattr(builtins, name))
 
 
-asking: set = set()  # code of functions that ask
+branching: set = set()  # code of functions that ask for what only a run knows
 
 
-def _ask(frame: python.FrameType) -> None:
+def _branch(frame: python.FrameType, what: str) -> None:
     code = frame.f_code
     if type(frame.f_globals) is not Globals or code.co_name.startswith("<"):
-        raise Untraceable
-    asking.add(code)
-    raise Asks
+        raise Untraceable(what)
+    branching.add(code)
+    raise DataDependentBranch(what)
 
 
-def ask(*arguments: Any) -> Any:
-    """The function at work asks for what only a run knows."""
-    _ask(sys._getframe(1))
+def _only_at_run_time(use: str) -> Callable:
+    """Make the method of values that stands for a `use` that needs to know what they are."""
+
+    def ask(*arguments: Any) -> Any:
+        _branch(sys._getframe(1), f"{use} is only known when the kernel runs")
+
+    return ask
 
 
 # --- where code goes to -------------------------------------------------------------------------
@@ -60,13 +88,13 @@ _lowerings: list = []  # at work, innermost last
 
 
 def now() -> Any:
-    """What writes down now (:mod:`karamelo_py.compiler.lowering`)."""
+    """Return what writes code now (:mod:`karamelo_py.compiler.lowering`)."""
     return _lowerings[-1]
 
 
 @contextmanager
 def writing(lowering: Any) -> Iterator[None]:
-    """Within this, operations become code of `lowering`."""
+    """Let operations become code of `lowering` meanwhile."""
     _lowerings.append(lowering)
     try:
         yield
@@ -75,19 +103,19 @@ def writing(lowering: Any) -> Iterator[None]:
 
 
 def at_work() -> bool:
-    """Whether functions are run for a kernel now."""
+    """Tell whether functions are run for a kernel now."""
     return bool(_lowerings)
 
 
 def _real_kind(thing: Any) -> Any:
-    """The number type of a real number or of lanes of these; None of all else."""
+    """Find the number type of a real number or of lanes of these; None of all else."""
     kind = thing._kind if isinstance(thing, Value) else None
     kind = getattr(kind, "scalar", kind)
     return kind if isinstance(kind, types.Float) else None
 
 
 def alike(arguments: tuple) -> tuple:
-    """Literals, and numbers of things, as numbers of the type of the real numbers beside them.
+    """Give literals, and whole numbers, the type of the real numbers beside them.
 
     A literal has no precision of its own: `2 * x` is single where x is.
     """
@@ -112,7 +140,7 @@ def _in_type_of(like: Any, kind: Any, thing: Any) -> Any:
 
 
 def emit(function: Callable, *arguments: Any) -> Any:
-    """What `function` gives for these arguments: code of Numba's, or of what was chosen by type."""
+    """Write a call: of code of Numba's, or of what was chosen by type."""
     return now().call(function, arguments)
 
 
@@ -120,7 +148,7 @@ def emit(function: Callable, *arguments: Any) -> Any:
 
 
 class Value:
-    """A number, lanes or an array of the function that is compiled."""
+    """Stand for a number, lanes or an array of the function that is compiled."""
 
     __slots__ = ("_kind", "_value")
     __array_ufunc__ = None  # NumPy's numbers leave operations to this
@@ -148,12 +176,15 @@ class Value:
     def __setitem__(self, place: Any, value: Any) -> None:
         emit(operator.setitem, self, _place(place), value)
 
-    __bool__ = __int__ = __index__ = __float__ = __iter__ = __len__ = __contains__ = ask
-    __hash__ = __str__ = __repr__ = __format__ = ask
+    __bool__ = _only_at_run_time("a condition in an expression within an expression")
+    __int__ = __index__ = __float__ = _only_at_run_time("a number that has to be written")
+    __iter__ = __len__ = __contains__ = _only_at_run_time("what is gone through or counted")
+    __hash__ = _only_at_run_time("a key")
+    __str__ = __repr__ = __format__ = _only_at_run_time("a number in a text")
 
 
 def _place(place: Any) -> Any:
-    """What stands in the brackets of an array."""
+    """Write what stands in the brackets of an array."""
     if isinstance(place, tuple):
         return tuple(map(_place, place))
     if isinstance(place, slice):
@@ -167,7 +198,7 @@ _BITS = ("and_", "or_", "xor", "lshift", "rshift")
 
 
 def _operated(operation: Callable, a: Any, b: Any) -> Any:
-    """What an operator gives; of tensors and the like, what these make of it."""
+    """Write an operation; of tensors and the like, leave it to these."""
     if isinstance(a if isinstance(b, Value) else b, tuple):
         return NotImplemented
     if operation is operator.pow and type(b) is int and 1 < b <= 4 and _real_kind(a):
@@ -179,7 +210,7 @@ def _operated(operation: Callable, a: Any, b: Any) -> Any:
 def _in_place(operation: Callable) -> Callable:
     def apply(a: Value, b: Any) -> Any:
         if isinstance(a._kind, types.Array):  # it would change
-            raise Untraceable
+            raise Untraceable("an array as a whole is changed: change its items")
         return _operated(operation, a, b)
 
     return apply
@@ -205,7 +236,7 @@ _operators()
 
 
 class HeldValue:
-    """A held tuple: its items are read when they are asked for, once on each way."""
+    """Stand for a held tuple: its items are read when they are asked for, once on each way."""
 
     __slots__ = ("_kind", "_value")
 
@@ -217,7 +248,7 @@ class HeldValue:
 
     def __getitem__(self, k: int) -> Any:
         if isinstance(k, Value):
-            raise Untraceable
+            raise Untraceable("the number of an item of a tuple is only known when the kernel runs")
         if isinstance(k, slice):
             return tuple(self[i] for i in range(*k.indices(len(self))))
         return now().item(self, range(len(self))[k])
@@ -231,28 +262,31 @@ class HeldValue:
             return self[fields.index(name)]
         found = getattr(self._kind.instance_class, name)
         if callable(found) or isinstance(found, property):
-            raise Untraceable
+            raise Untraceable(f"'{name}' is a method of a tuple with arrays")
         return found
 
-    __eq__ = __ne__ = __hash__ = __contains__ = __add__ = __radd__ = ask
+    __eq__ = __ne__ = __hash__ = __contains__ = _only_at_run_time("a tuple with arrays")
+    __add__ = __radd__ = __eq__
 
 
-derivatives: dict = {}  # of functions, for numbers with derivatives (`karamelo_py.points.dual`)
-
-
-def has_derivatives(arguments: tuple) -> bool:
-    """Whether one of the arguments is such a number."""
-    kind = derivatives.get("class")
-    return kind is not None and any(isinstance(a, kind) for a in arguments)
+def implemented(function: Callable, arguments: tuple) -> Callable | None:
+    """Find what a function is for a type of numbers that are tuples, if there is one among them."""
+    for a in arguments:
+        if isinstance(a, tuple):
+            table = getattr(type(a), "implements", None)
+            made = implemented(function, a) if table is None else table.get(function)
+            if made is not None:
+                return made
+    return None
 
 
 def is_literal(thing: Any) -> bool:
-    """Whether a number stands in the text, so that it is known."""
+    """Tell whether a number stands in the text, so that it is known."""
     return type(thing) in (int, float)
 
 
 class Emitted:
-    """A function that compiled code has a version of its own of."""
+    """Call a function that compiled code has a version of its own of."""
 
     def __init__(self, function: Callable):
         self.seen = function
@@ -260,8 +294,9 @@ class Emitted:
     def __call__(self, *arguments: Any) -> Any:
         if self.counts(arguments):
             return self.seen(*arguments)
-        if self.seen in derivatives and has_derivatives(arguments):
-            return now().seen(derivatives[self.seen])(*arguments)
+        made = implemented(self.seen, arguments)
+        if made is not None:
+            return now().seen(made)(*arguments)
         if self.seen in OF_REALS:
             if all(type(a) in (int, float) for a in arguments):
                 return self.seen(*arguments)  # known already
@@ -269,7 +304,7 @@ class Emitted:
         return emit(self.seen, *arguments)
 
     def counts(self, arguments: tuple) -> bool:
-        """Whether it is about whole numbers that are known, as lengths of loops are."""
+        """Tell whether all arguments are whole numbers that are known, as lengths of loops are."""
         return self.seen in OF_WHOLE and all(isinstance(a, int) for a in arguments)
 
 
@@ -282,13 +317,13 @@ LONG = 8  # range that is gone through where it need not be
 
 
 def counting(*bounds: int) -> range:
-    """`range`, in functions that are run."""
+    """Count as `range` does, in functions that are run."""
     frame = sys._getframe(1)
     if any(isinstance(bound, Value) for bound in bounds):
-        _ask(frame)
+        _branch(frame, "the end of a range")
     made = range(*bounds)
     if len(made) > LONGEST:
-        raise Untraceable
+        raise Untraceable(f"a range of more than {LONGEST} numbers in a comprehension: take a loop")
     if len(made) > LONG and type(frame.f_globals) is Globals and frame.f_code.co_name[0] != "<":
-        _ask(frame)
+        _branch(frame, "a long range")
     return made

@@ -1,4 +1,4 @@
-"""What points give to nodes as N_I times an affine field: mass, momentum, and the force of MLS.
+"""Scatter and gather of quantities that are affine around a point: mass, momentum, force of MLS.
 
 In lanes such a quantity is brought into the order of the nodes' records once a point, not once a
 node: half of the work of a scatter, in space two thirds.
@@ -6,14 +6,14 @@ node: half of the work of a scatter, in space two thirds.
 
 from karamelo_py.compiler.compile import point_function, real, shared
 from karamelo_py.compiler.fields import field
-from karamelo_py.compiler.lanes import Eights, Fours
+from karamelo_py.compiler.lanes import EightLanes, FourLanes
 from karamelo_py.compiler.lanes.records import accumulate_affine
 from karamelo_py.kernels import p2g
-from karamelo_py.kernels.arrays import MASS, of_force
+from karamelo_py.kernels.arrays import MASS, Tag, of_force
 from karamelo_py.kernels.averaging import NodalStress
 from karamelo_py.kernels.g2p import Move, update_at
-from karamelo_py.kernels.loss import Lost
-from karamelo_py.kernels.visit import for_tags
+from karamelo_py.kernels.loss import EnergyLoss
+from karamelo_py.kernels.visit import Work, for_tags
 from karamelo_py.points.basis import entry, reach, support
 from karamelo_py.points.basis.product import inverse_spread, spacing
 from karamelo_py.points.kinematics import dimension, from_columns, zero_vector
@@ -31,7 +31,7 @@ def affine_part(quantity, w, stencil, load):
 
 @shared
 def _lacks(w, kinds):
-    """Whether the nodes have none of these fields."""
+    """Return True if the nodes have none of these fields."""
     return not any(field(w.nodes.fields, kind) is not None for kind in kinds)
 
 
@@ -61,7 +61,10 @@ def _momentum(w, stencil, mass, v, moment):
 def _affine_part_mass_momentum(quantity, w, stencil, load):
     mass, v, moment, _, _ = load
     given = _momentum(w, stencil, mass, v, moment)
-    if not (len(given) and _lacks(w, (Lost, p2g.Led, p2g.Centre, p2g.Normal, p2g.SeenMass))):
+    if not (
+        len(given)
+        and _lacks(w, (EnergyLoss, p2g.RigidSums, p2g.Centre, p2g.Normal, p2g.SquaredMass))
+    ):
         return ()
     momentum, growths = given
     return w.nodes.sums, MASS, (mass, *momentum), tuple([(mass - mass, *g) for g in growths])
@@ -96,8 +99,8 @@ def joined(width, kin, parts):
     return parts
 
 
-@joined.on(Fours)
-@joined.on(Eights)
+@joined.on(FourLanes)
+@joined.on(EightLanes)
 def _joined_eights(width, kin, parts):
     if len(parts) != 2 or of_force(kin) != 4:
         return parts
@@ -127,8 +130,8 @@ def gathered_by_arms(w):
 
 
 @point_function(otherwise=True)
-def gathered_at_once(task, w, stencil, total):
-    """What a gather sums up over all nodes of a stencil; () where that goes node by node."""
+def gathered_at_once(task: Tag, w: Work, stencil: tuple, total: tuple) -> tuple:
+    """Return the total of a gather over all nodes of a stencil; () where that goes node by node."""
     return ()
 
 

@@ -6,7 +6,7 @@ every scene has are declared by their owners (:mod:`karamelo_py.compiler.fields`
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -14,7 +14,15 @@ from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.fields import name_of
 from karamelo_py.compiler.tuples import row
 from karamelo_py.kernels.totals import LIMBS, Alone
+from karamelo_py.points.grid import Grid
 from karamelo_py.points.kinematics import dimension, vector
+
+# A NamedTuple, often empty, whose class selects the implementation of point functions.
+Tag: TypeAlias = Any
+# A double or single, lanes of these, or a number with slopes.
+Number: TypeAlias = Any
+# A number of a point or node, or of those in lanes.
+Index: TypeAlias = Any
 
 
 class Nodes(NamedTuple):
@@ -64,7 +72,7 @@ VELOCITY_WIDTH = {1: 1, 2: 2, 3: 4}
 
 
 class Points(NamedTuple):
-    """What the points of one constitutive law carry, in the order of the tiles.
+    """Arrays of the points of one constitutive law, in the order of the tiles.
 
     A place is a position (d numbers), followed by what the basis keeps of the shape of a point's
     domain where weights follow the motion.
@@ -110,7 +118,7 @@ def arrays_of(points: Points) -> Iterator[tuple[str, np.ndarray]]:
 def made_of(points: Points, found: Iterable[np.ndarray]) -> Points:
     """Points of the kind of `points` with such arrays as `arrays_of` has given."""
     arrays = iter(found)
-    own = {
+    own: dict[str, Any] = {
         name: None if array is None else next(arrays)
         for name, array in points._asdict().items()
         if name != "fields"
@@ -144,7 +152,7 @@ CLEAR, TAKE, ADD = range(3)  # last column of Buffers.parts
 
 
 class Buffers(NamedTuple):
-    """What points give to nodes: a dense box of nodes for each tile of points, one after another.
+    """Sums of the tiles of points: a dense box of nodes for each, one after another.
 
     A tile of nodes sums the boxes that reach it, in one order, and leaves zeros in them. Its parts
     are ranges of nodes in up to three directions: what each box has in common with it; before them
@@ -164,7 +172,7 @@ class Buffers(NamedTuple):
 
 
 class Places(NamedTuple):
-    """Where the points of a block are during a sweep: arrays (w, n) of places."""
+    """Places of the points of a block during a sweep: arrays (w, n)."""
 
     where: np.ndarray  # that the weights of the gather belong to
     x: np.ndarray  # before
@@ -210,7 +218,7 @@ HELD = np.dtype([("slot", np.int64), ("force", np.float64)])  # 1 + slot of the 
 
 
 class Apart(NamedTuple):
-    """What each of so many threads, A, has of its own where hooks act on nodes."""
+    """Arrays of each of A threads for hooks on nodes."""
 
     chosen: np.ndarray  # (A, BLOCK): see Hooks
     scratch: np.ndarray  # (A, 8 + depth, BLOCK)
@@ -233,7 +241,7 @@ class Hooks(NamedTuple):
     scratch: np.ndarray  # (8 + depth, BLOCK): x y z x0 y0 z0, value, value before, stack
     held: np.ndarray  # (N, d) HELD, where hooks hold nodes in common; else (0, d)
     loads: np.ndarray  # (N, d) of this step, where hooks bring forces; else (0, d)
-    mode: NamedTuple  # one thread, or several
+    mode: Tag  # one thread, or several
     apart: Apart
 
 
@@ -330,7 +338,7 @@ TIME, TIMESTEP, DT = 0, 1, 2  # the first of the published values
 
 
 class Control(NamedTuple):
-    """What the compiled loop reads and writes beside the fields."""
+    """Clock, published values and totals: the arrays of the compiled loop beside the fields."""
 
     values: np.ndarray  # published values: TIME, TIMESTEP, DT come first
     clock: np.ndarray  # (1,) CLOCK
@@ -339,7 +347,7 @@ class Control(NamedTuple):
     digits: np.ndarray  # (LIMBS,) scratch
     answer: np.ndarray  # rounded totals, and what processes agree on
     firsts: np.ndarray  # (S,) int64: id of the first point of each solid
-    ranks: NamedTuple  # whether there are other processes
+    ranks: Tag  # whether there are other processes
 
 
 def new_control(values: np.ndarray, firsts: Sequence[int] = (), d: int = 0) -> Control:
@@ -355,17 +363,17 @@ def new_control(values: np.ndarray, firsts: Sequence[int] = (), d: int = 0) -> C
 class Setup(NamedTuple):
     """Everything a step needs; its type decides what is compiled."""
 
-    frame: NamedTuple  # whether weights belong to present or reference positions
-    kin: NamedTuple  # kinematics tag
-    basis: NamedTuple
-    transfer: NamedTuple
-    averaging: NamedTuple  # whether changes of volume are averaged (F-bar)
-    contact: NamedTuple  # how solids with fields of their own touch
-    heat: NamedTuple  # whether heat flows between points, and the nodes it flows through
-    grids: NamedTuple  # points.grid.Grid with an array (g,) for each number
+    frame: Tag  # whether weights belong to present or reference positions
+    kin: Tag  # kinematics tag
+    basis: Tag
+    transfer: Tag
+    averaging: Tag  # whether changes of volume are averaged (F-bar)
+    contact: Tag  # how solids with fields of their own touch
+    heat: Tag  # whether heat flows between points, and the nodes it flows through
+    grids: Grid  # with an array (g,) for each number
     nodes: Nodes
     buffers: Buffers
-    blocks: tuple  # of Block, one for each constitutive law
+    blocks: tuple[Block, ...]  # one for each constitutive law
     spans: np.ndarray  # (1 + rows, 2) int64: their number, then ranges of node numbers in use
     ranges: np.ndarray  # (S + rows, 2) int64: which of the rows that follow each share of the nodes
     #                     has; then the ranges of node numbers in use, share after share

@@ -57,7 +57,7 @@ class FBar(NamedTuple):
 
 @point_function(otherwise=True)
 def no_ratio(averaging, like):
-    """What the gather of the averaged ratio of volumes starts from; empty where there is none."""
+    """Return the start of the gather of the averaged volume ratio; () where none is averaged."""
     return ()
 
 

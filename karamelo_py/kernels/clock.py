@@ -1,21 +1,22 @@
-"""How long steps are, and what ends one."""
+"""The size of steps, and the end of a step."""
 
 from math import inf
+from typing import Any
 
 from karamelo_py.compiler.compile import real, shared
 from karamelo_py.compiler.loops import entered
-from karamelo_py.kernels.arrays import DT, MASS, TIME, TIMESTEP
+from karamelo_py.kernels.arrays import DT, MASS, TIME, TIMESTEP, Control, Number, Setup, Tag
 from karamelo_py.points.kinematics import vector
 
 
 @shared
-def step_size(s):
+def step_size(s: Setup) -> Number:
     """dt of the present step, in the precision of the run: how long points move."""
     return real(s.control.values[DT], s.nodes.sums[0, MASS])
 
 
 @shared
-def last_step_size(s):
+def last_step_size(s: Setup) -> Number:
     """dt of the step before, which the velocity at the start of this one belongs to.
 
     Before the first step there was none: the state at the start has its strain already. It takes
@@ -26,8 +27,8 @@ def last_step_size(s):
 
 
 @shared
-def kick(s):
-    """How long forces act in this step.
+def kick(s: Setup) -> Number:
+    """Return the time for which forces act in this step.
 
     Places belong to the ends of steps, velocities to their middles: forces lead from the middle of
     one step to that of the next.
@@ -36,7 +37,7 @@ def kick(s):
 
 
 @shared
-def common_velocity(kin, clock, like):
+def common_velocity(kin: Tag, clock: Any, like: Number) -> tuple:
     """The velocity that speeds are measured from, in the number type of `like`."""
     return vector(kin, [real(clock.common[0, k], like) for k in range(kin.dimension)])
 
@@ -52,7 +53,7 @@ STRIDE = 0.65
 
 
 @entered
-def choose_dt(control):
+def choose_dt(control: Control) -> None:
     """dt of the next step, from the rate of the fastest point or as fixed; shortened at the end.
 
     The last two steps are shortened alike. Where velocities are mapped or prescribed, a step takes
@@ -85,7 +86,7 @@ def choose_dt(control):
 
 
 @entered
-def finish(control):
+def finish(control: Control) -> None:
     """End of a step: the points are where they moved to, time goes on, the next dt is chosen."""
     clock = control.clock[0]
     clock.now = 1 - clock.now

@@ -27,7 +27,7 @@ from karamelo_py.compiler.loops import entered, subkernel
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels import contact_pairs
 from karamelo_py.kernels.arrays import DT, MASS, TIMESTEP, of_change, of_momentum
-from karamelo_py.kernels.loss import Rubbed, warm_node
+from karamelo_py.kernels.loss import FrictionalHeat, warm_node
 from karamelo_py.kernels.p2g import Centre, Normal
 from karamelo_py.kernels.rows import touch, touch_velocity
 from karamelo_py.kernels.totals import add_to, counts, publish
@@ -126,7 +126,7 @@ class Touched(NamedTuple):
 
 @point_function()
 def _belongs(which, contact, d, nodes, n, m, b):
-    """Whether the bodies at `n` and `m`, the latter of field `b`, are such a pair."""
+    """Return True if the bodies at `n` and `m`, the latter of field `b`, are such a pair."""
 
 
 @_belongs.on(Approaching)
@@ -192,8 +192,8 @@ def _touch_pair(contact, d, nodes, control, i, j, place, share, where):
     if rub > 0:
         heat = contact_pairs.work_of_friction(contact, d, nodes, pair, push / size, across, rub)
         share = contact.warmth[a, b]
-        warm_node(field(nodes.fields, Rubbed), pair.n, share * heat * pair.per_a)
-        warm_node(field(nodes.fields, Rubbed), pair.m, (1.0 - share) * heat * pair.per_b)
+        warm_node(field(nodes.fields, FrictionalHeat), pair.n, share * heat * pair.per_a)
+        warm_node(field(nodes.fields, FrictionalHeat), pair.m, (1.0 - share) * heat * pair.per_b)
     for k in range(d):
         impulse = push * contact_pairs.outward_of(nodes, pair, k) / size
         if rub > 0:
@@ -331,7 +331,7 @@ def stay_node(contact, kin, nodes, step, n):
 
 @entered
 def _stay_nodes(contact, kin, nodes, spans, step):
-    """Where contact acted in `step`, keep the velocity that deforms from opening or closing it.
+    """Keep the velocity that deforms from opening or closing contact that acted in `step`.
 
     Where that velocity is mapped apart from v*, the surfaces would seem to move in it although they
     are pressed together, and stress would do work on nothing: a collision of bars then quadruples

@@ -18,7 +18,7 @@ class Where(NamedTuple):
     dt: float
 
 
-class Pair(NamedTuple):
+class NodePair(NamedTuple):
     """Two bodies at a place: a node of each, mass and share in the common normal."""
 
     n: int
@@ -31,7 +31,7 @@ class Pair(NamedTuple):
 
 @subkernel
 def immovable(contact, n, k):
-    """Whether contact cannot move a node in direction k."""
+    """Return True if contact cannot move a node in direction k."""
     return contact.prescribed[n, k] != 0 or contact.rigid[n // contact.stride]
 
 
@@ -65,7 +65,7 @@ def _shares(contact, d, nodes, n, m):
 def pair_of(contact, d, nodes, n, m):
     per_a, per_b = 1.0 / nodes.sums[n, MASS], 1.0 / nodes.sums[m, MASS]
     share_a, share_b = _shares(contact, d, nodes, n, m)
-    return Pair(n, m, per_a, per_b, share_a, share_b)
+    return NodePair(n, m, per_a, per_b, share_a, share_b)
 
 
 @subkernel
@@ -93,7 +93,7 @@ def _left(contact, nodes, pair, k, push):
 
 @subkernel
 def approach_left(contact, d, nodes, pair, push, size):
-    """What is left of the approach by which a gap closes, over the length of m grad N.
+    """Return the rest of the approach velocity after `push`, over the length of m grad N.
 
     Friction does not act on it: bodies that are still apart come together freely.
     """
@@ -121,7 +121,7 @@ def length_of(d, nodes, pair):
 
 @subkernel
 def _reach(contact, d, nodes, pair, n, where, side):
-    """How far the body at node `n` of a pair reaches from there, along the normal out of it.
+    """Return the distance from node `n` to the surface of its body, along the normal out of it.
 
     `side` is 1 for the first body of the pair and -1 for the second.
     """
@@ -139,7 +139,7 @@ def _reach(contact, d, nodes, pair, n, where, side):
 
 @subkernel
 def excess_of(contact, d, nodes, pair, where):
-    """How much faster two bodies approach than would close the gap between them in a step."""
+    """Return the excess of the approach velocity over the one that closes the gap in a step."""
     size = length_of(d, nodes, pair)
     if not size > 0:
         return 0.0
@@ -182,7 +182,7 @@ def friction_of(contact, d, nodes, pair, friction, push, size, across, share):
 
 @subkernel
 def work_of_friction(contact, d, nodes, pair, push, across, rub):
-    """What friction takes of the energy of two bodies: impulse times mean of the sliding speeds."""
+    """Return the energy that friction dissipates: impulse times mean of the sliding speeds."""
     work = 0.0
     for k in range(d):
         slide = slide_of(contact, nodes, pair, k, push, across)

@@ -1,53 +1,39 @@
-"""What is gathered and given at the corners of domains, each in the place of a node.
+"""Gather from and scatter to the corners of domains, each in the place of a node.
 
 The functions of CPDI are sums over corners, N_I = sum_c w_c N_I^lin(x_c). What takes the weight or
 the gradient of a node once, as a factor, is therefore done with the few corners: a corner shows
 what the nodes around it have, and shares out among them what it is given.
 """
 
-from karamelo_py.compiler.compile import point_function, shared
+from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.fields import field
 from karamelo_py.kernels import g2p, p2g
-from karamelo_py.kernels.loss import Lost
+from karamelo_py.kernels.loss import EnergyLoss
 from karamelo_py.points.basis import carried, support
 from karamelo_py.points.basis.cpdi.block import InBlock
 from karamelo_py.points.basis.cpdi.corners import AtCorners
 from karamelo_py.points.transfers import add_moment, gradient_weight, nodal_momentum
 
 
-@point_function(otherwise=True)
+@shared
 def by_corners(part, w):
-    """Whether a task or quantity takes the weight or the gradient of a node once, as a factor."""
-    return False
+    """Tell whether a task or quantity takes the weight or gradient of a node once, as a factor.
 
-
-def _always(part, w):
-    return True
-
-
-def _without_moments(part, w):
-    """Moments are of the velocities and places of nodes."""
+    Those that do say so by `not_at_corners`: with what in the visit they do not. Moments are of the
+    velocities and places of nodes.
+    """
+    unless = getattr(type(part), "not_at_corners", None)
+    if unless is None:
+        return False
     asked = add_moment, nodal_momentum, gradient_weight
-    return not any(function.defined(type(w.transfer)) for function in asked)
-
-
-for _part in (g2p.AverageStress, g2p.SeriesTerm, p2g.Volumes, p2g.SeriesBack):
-    by_corners.on(_part)(_always)
-for _part in (
-    g2p.Move, g2p.Strain, g2p.StrainOfLastStep, g2p.SecondStrain, g2p.StrainInMove, g2p.TrialStrain,
-    g2p.TrialStrainOfLastStep, p2g.InternalForce, p2g.AveragedForce, p2g.MomentumAgain,
-):  # fmt: skip
-    by_corners.on(_part)(_without_moments)
-
-
-@by_corners.on(p2g.MassMomentum)
-def _by_corners_mass_momentum(part, w):
-    return _without_moments(part, w) and field(w.nodes.fields, Lost) is None
+    moments = any(function.defined(type(w.transfer)) for function in asked)
+    loss = field(w.nodes.fields, EnergyLoss) is not None
+    return not ("moments" in unless and moments) and not ("loss" in unless and loss)
 
 
 @shared
 def all_by_corners(parts, w):
-    """Whether all tasks or quantities of a visit do."""
+    """Return True if all tasks or quantities of a visit go by corners."""
     return all(by_corners(part, w) for part in parts)
 
 
@@ -66,7 +52,7 @@ def in_block(w):
 
 @shared
 def shows_corners(tasks, w):
-    """Whether the velocities of the corners themselves are asked for."""
+    """Return True if the visit needs the velocities of the corners themselves."""
     return carried(w.basis, w.kin) > 0 and any(isinstance(task, g2p.Move) for task in tasks)
 
 

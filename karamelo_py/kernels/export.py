@@ -1,4 +1,4 @@
-"""What follows from the state of the points, for output: stress, strain, volume, stored energy."""
+"""Output quantities from the state of the points: stress, strain, volume, stored energy."""
 
 from karamelo_py.compiler.compile import index
 from karamelo_py.compiler.fields import load, store

@@ -7,12 +7,13 @@ through.
 from math import inf, sqrt
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import choose, fma, in_all, point_function, real, shared
+from karamelo_py.compiler.compile import all_lanes, fma, point_function, real, shared, where
 from karamelo_py.compiler.fields import field, increase, load_vector, store, store_from
 from karamelo_py.compiler.tuples import row
 from karamelo_py.kernels import averaging, visit
-from karamelo_py.kernels.arrays import of_change, vector_at
-from karamelo_py.kernels.loss import Rubbed, in_company, reflect, warm, warm_by_friction
+from karamelo_py.kernels.arrays import Index, Nodes, Number, Tag, of_change, vector_at
+from karamelo_py.kernels.loss import FrictionalHeat, in_company, reflect, warm, warm_by_friction
+from karamelo_py.kernels.visit import Work
 from karamelo_py.points import frames, transfers
 from karamelo_py.points.basis import carried, carrier, carry, deformed, entry, extent
 from karamelo_py.points.basis.cpdi.corners import AtCorners
@@ -33,6 +34,7 @@ class Move(NamedTuple):
     """Gather v* and its change; settle velocity and new position."""
 
     in_lanes = True
+    not_at_corners = ("moments",)
     says = "g2p, move"
     reads = ("x", "v")
     writes = ("x moved", "v", "moment", "bounces")
@@ -42,6 +44,7 @@ class Strain(NamedTuple):
     """Gather the gradient of the nodal velocity; settle the state of the law."""
 
     in_lanes = True
+    not_at_corners = ("moments",)
     says = "stress"
     reads = ("x", "v", "state", "material", "deformation gradient", "volume ratio")
     writes = ("state", "deformation gradient")
@@ -51,6 +54,7 @@ class StrainOfLastStep(NamedTuple):
     """The same by the velocity that has led here, at the places that it has led to."""
 
     in_lanes = True
+    not_at_corners = ("moments",)
     says = "stress"
     reads = Strain.reads
     writes = Strain.writes
@@ -60,6 +64,7 @@ class SecondStrain(NamedTuple):
     """The same for the second of two strain increments of a step."""
 
     in_lanes = True
+    not_at_corners = ("moments",)
     says = "second half of the stress"
     reads = Strain.reads
     writes = Strain.writes
@@ -69,6 +74,7 @@ class StrainInMove(NamedTuple):
     """`Strain` in one visit with `Move`, behind it: what v* gave already is not gathered again."""
 
     in_lanes = True
+    not_at_corners = ("moments",)
     says = "stress"
     reads = Strain.reads
     writes = Strain.writes
@@ -82,6 +88,7 @@ class TrialStrain(NamedTuple):
     """Gather the gradient; settle only by what factor it would change the volume (F-bar)."""
 
     in_lanes = True
+    not_at_corners = ("moments",)
     says = "trial volume"
     reads = Strain.reads
     writes = ("volume ratio",)
@@ -91,15 +98,17 @@ class TrialStrainOfLastStep(NamedTuple):
     """The same of `StrainOfLastStep`."""
 
     in_lanes = True
+    not_at_corners = ("moments",)
     says = "trial volume"
     reads = Strain.reads
     writes = TrialStrain.writes
 
 
-class AverageStress(NamedTuple):
+class SetMeanStress(NamedTuple):
     """Gather the averaged mean stress of F-bar."""
 
     in_lanes = True
+    not_at_corners = ()
     says = "averaged mean stress"
     reads = ("x",)
     writes = ("averaged stress",)
@@ -111,6 +120,7 @@ class SeriesTerm(NamedTuple):
     k: int
 
     in_lanes = True
+    not_at_corners = ()
     says = "term of the series to the points"
     reads = ("x",)
     writes = ("term of series",)
@@ -120,8 +130,8 @@ class SeriesTerm(NamedTuple):
 
 
 @point_function()
-def empty(task, w, x):
-    """What a gather sums up, before the first node."""
+def empty(task: Tag, w: Work, x: tuple) -> tuple:
+    """Return the totals of a gather before the first node: zeros."""
 
 
 @empty.on(Move)
@@ -148,7 +158,7 @@ def _empty_trial_strain_of_last_step(task, w, x):
     return zero(w.kin, x[0])
 
 
-@empty.on(AverageStress)
+@empty.on(SetMeanStress)
 def _empty_average_stress(task, w, x):
     return real(0, x[0])
 
@@ -170,7 +180,7 @@ def _records_of_strain_of_last_step(task, nodes):
 
 
 @point_function()
-def gathered(task, w, stencil, k, total):
+def gathered(task: Tag, w: Work, stencil: tuple, k: int, total: tuple) -> tuple:
     """`total` with the part of the k-th node of the stencil."""
 
 
@@ -188,13 +198,13 @@ def _gathered_move(task, w, stencil, k, total):
 
 
 @shared
-def moves_corners(basis, kin):
-    """Whether what is gathered is corners of domains that go with the velocity there."""
+def moves_corners(basis: Tag, kin: Tag) -> bool:
+    """Return True for a gather at corners of domains that move with the velocity there."""
     return isinstance(basis, AtCorners) and carried(basis.basis, kin) > 0
 
 
 @shared
-def update_at(kin, nodes, i, like):
+def update_at(kin: Tag, nodes: Nodes, i: Index, like: Number) -> tuple:
     """v* and v* - v of a node: one record in the plane, two in space."""
     if kin.dimension == 2:
         both = row(nodes.update, i, 0, (*like, *like))
@@ -234,7 +244,7 @@ def _gathered_trial_strain_of_last_step(task, w, stencil, k, total):
     return _gradient(w, stencil, k, total)
 
 
-@gathered.on(AverageStress)
+@gathered.on(SetMeanStress)
 def _gathered_average_stress(task, w, stencil, k, total):
     i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
     return fma(weight, row(field(w.nodes.fields, averaging.NodalStress), i, 0, (total,))[0], total)
@@ -250,7 +260,16 @@ def _gathered_series_term(task, w, stencil, k, total):
 
 
 @point_function()
-def settled(task, w, stencil, p, dt, total, totals, fastest):
+def settled(
+    task: Tag,
+    w: Work,
+    stencil: tuple,
+    p: Index,
+    dt: Number,
+    total: tuple,
+    totals: tuple,
+    fastest: Number,
+) -> tuple:
     """Store what follows from `total`; return how far the point moved in cells, and its rate.
 
     The rate, c + max |v_i - common_i|, bounds the stable step; what is returned is the larger of it
@@ -308,7 +327,7 @@ def _keep_ratio(w, p, dt, dl):
     field(w.points.fields, averaging.VolumeRatio)[0, p] = det(I + dl)
 
 
-@settled.on(AverageStress)
+@settled.on(SetMeanStress)
 def _settled_average_stress(task, w, stencil, p, dt, total, totals, fastest):
     field(w.points.fields, averaging.AveragedStress)[0, p] = total
     return real(0, dt), fastest
@@ -345,7 +364,7 @@ def _move(w, stencil, p, dt, total):
     displacing = transfers.displacing_velocity(w.transfer, v, v_pic, j)
     step = vector(w.kin, dt * constrained_velocity(law, v, displacing))
     y = x + step
-    warm_by_friction(field(w.nodes.fields, Rubbed), w, stencil, p, v[0])
+    warm_by_friction(field(w.nodes.fields, FrictionalHeat), w, stencil, p, v[0])
     warm(w, stencil, p, v_pic - dv)
     moment = in_company(w, stencil, p, moment)
     y, v, moment, hits = reflected(w.grid, w.kin, y, v, moment)
@@ -368,7 +387,7 @@ def _move(w, stencil, p, dt, total):
             new = carry(w.basis, w.kin, new, before, corner, dt * u)
         store(w.places.y, p, new)
         moved += further_reach(w.basis, w.kin, w.grid, before, new)
-    return choose(inside(w.grid, w.kin, y), moved, inf)
+    return where(inside(w.grid, w.kin, y), moved, inf)
 
 
 @shared
@@ -393,17 +412,17 @@ def _strain(w, x, p, dt, dl, ratio, fastest):
         after = deformed(w.basis, w.kin, before, growth)
         store_from(w.places.y, p, w.kin.dimension, after)
         grown = grown + further_reach(w.basis, w.kin, w.grid, before, after)
-    if not in_all(j > 0):
-        return choose(j > 0, grown, inf), fastest
+    if not all_lanes(j > 0):
+        return where(j > 0, grown, inf), fastest
     # The speed of waves is only asked of the few points that may be faster than all before them.
     shorter = frames.inverse_stretch_squared(w.frame, w.kin, now, dt)
     most = wave_speed_bound(law, w.kin, state) * shorter
     speed = (load_vector(w.kin, w.points.v, p) - w.common).largest()
     slack = fastest - speed
-    if in_all((slack >= 0) & (most <= slack * slack)):  # so written, NaN is noticed too
+    if all_lanes((slack >= 0) & (most <= slack * slack)):  # so written, NaN is noticed too
         return grown, fastest
     rate = sqrt(wave_speed_squared(law, w.kin, state) * shorter) + speed
-    return grown, choose(fastest > rate, fastest, rate)
+    return grown, where(fastest > rate, fastest, rate)
 
 
 @shared

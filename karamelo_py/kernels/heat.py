@@ -13,12 +13,12 @@ from typing import NamedTuple
 
 from karamelo_py.compiler.compile import (
     accumulate,
-    choose,
     fma,
     of_present,
     real,
     round_off,
     shared,
+    where,
 )
 from karamelo_py.compiler.fields import Field, StepField, field, load, load_vector, store, vector
 from karamelo_py.kernels.arrays import MASS, Buffers, Nodes, of_force
@@ -54,8 +54,8 @@ class Supply(StepField):
     columns = ("gamma",)
 
 
-class Share(StepField):
-    """Share of the change of the nodes' temperature that a point takes."""
+class TemperatureShare(StepField):
+    """TemperatureShare of the change of the nodes' temperature that a point takes."""
 
 
 class HeatGradient(Field):
@@ -74,7 +74,15 @@ class Conducting(NamedTuple):
     nodes: Nodes
     buffers: Buffers
 
-    point_fields = (Temperature, Capacity, Conductance, Volume, Supply, Share, HeatGradient)
+    point_fields = (
+        Temperature,
+        Capacity,
+        Conductance,
+        Volume,
+        Supply,
+        TemperatureShare,
+        HeatGradient,
+    )
 
 
 class HeatContent(NamedTuple):
@@ -117,7 +125,15 @@ class Warming(NamedTuple):
 
     in_lanes = True
     says = "temperature"
-    reads = ("x", "state", "material", "temperature", "capacity", "conductance", "share")
+    reads = (
+        "x",
+        "state",
+        "material",
+        "temperature",
+        "capacity",
+        "conductance",
+        "temperature share",
+    )
     writes = ("state",)
 
 
@@ -150,7 +166,7 @@ def _load_of_heat_content(quantity, w, p, like):
     field(fields, Volume)[0, p] = volume
     # Fixes may supply heat, and reset what share of the change the point takes.
     field(fields, Supply)[0, p] = real(0, like)
-    field(fields, Share)[0, p] = real(1, like)
+    field(fields, TemperatureShare)[0, p] = real(1, like)
     return of_present(p, capacity), of_present(p, conductance), T, _gradient(w, p)
 
 
@@ -239,10 +255,10 @@ def _settled_warming(task, w, stencil, p, dt, total, totals, fastest):
     T = field(fields, Temperature)[0, p]
     capacity = field(fields, Capacity)[0, p]
     some = capacity > 0
-    rate = field(fields, Conductance)[0, p] / choose(some, capacity, real(1, capacity))
+    rate = field(fields, Conductance)[0, p] / where(some, capacity, real(1, capacity))
     hidden = real(4 * dimension(w.kin), dt) * (rate * w.grid.inv_h * w.grid.inv_h) * dt
     change = total[0] + min(hidden, real(1, hidden)) * (total[1] - T)
-    T = choose(some, fma(field(fields, Share)[0, p], change, T), T)
+    T = where(some, fma(field(fields, TemperatureShare)[0, p], change, T), T)
     store(w.points.state, p, laws.with_temperature(law, w.kin, state, T))
     # By what factor conduction has become faster than in the undeformed body.
     f = deformation_of(w.frame, w.kin, law, state, w.points, p)

@@ -5,14 +5,14 @@ A law is a NamedTuple of numbers, rows of numbers, or parts that are NamedTuples
 """
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from karamelo_py.points.laws.numbers import Numbers
 
 
-def law_in(law: NamedTuple, real: type) -> NamedTuple:
+def law_in(law: Any, real: type) -> Any:
     """The law with its numbers in the type `real`."""
     return type(law)(*(_in(p, real) for p in law))
 
@@ -23,7 +23,7 @@ def _in(value: Any, real: type) -> Any:
     return np.array(value.values, real) if isinstance(value, Numbers) else real(value)
 
 
-def law_table(laws: Sequence[NamedTuple], real: type) -> NamedTuple:
+def law_table(laws: Sequence[Any], real: type) -> Any:
     """The NamedTuple of `laws` of one kind with an array (m,) for each number, m their count.
 
     Rows of numbers become arrays (m, longest).
@@ -40,7 +40,7 @@ def _table(column: Sequence, real: type) -> Any:
     return np.array(column, real)
 
 
-def law_on(law: NamedTuple, h: float, T0: float | None) -> NamedTuple:
+def law_on(law: Any, h: float, T0: float | None) -> Any:
     """The law with what it has to know of a solid: cell size `h`, initial temperature `T0`.
 
     Laws and parts that need them have fields ``cell_size`` and ``initial_temperature``.
@@ -58,6 +58,6 @@ def law_on(law: NamedTuple, h: float, T0: float | None) -> NamedTuple:
     )
 
 
-def elastic_law(law: NamedTuple) -> NamedTuple:
+def elastic_law(law: Any) -> Any:
     """The law that makes the stress, of one that adds a temperature to it."""
     return getattr(law, "elastic", law)

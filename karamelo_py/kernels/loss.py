@@ -21,7 +21,7 @@ move (not with splines), and that usl strains by dv, which may only cost.
 """
 
 from karamelo_py.compiler import fields
-from karamelo_py.compiler.compile import accumulate, choose, looping, real, round_off, shared
+from karamelo_py.compiler.compile import accumulate, real, round_off, shared, where
 from karamelo_py.kernels.arrays import MASS, of_change, of_momentum, vector_at
 from karamelo_py.kernels.visit import law_of, state_of
 from karamelo_py.points.basis import entry, support
@@ -47,8 +47,8 @@ from karamelo_py.points.transfers.xpic import Reflected, Series
 ALONE = 0.6
 
 
-class Lost(fields.SummedField):
-    """Kinetic energy that points bring to a node; what it did not keep, per mass; and its mass.
+class EnergyLoss(fields.SummedField):
+    """Kinetic energy brought to a node; the part that it dissipates, per mass; and its mass.
 
     A fused step brings the energy and mass of the next step while points take back the loss.
     """
@@ -56,7 +56,7 @@ class Lost(fields.SummedField):
     shape = fields.triple
 
 
-class Rubbed(fields.StepField):
+class FrictionalHeat(fields.StepField):
     """Heat of friction at a node, per mass: of contact between solids and of walls."""
 
 
@@ -76,12 +76,12 @@ def warm_by_friction(rubbed, w, stencil, p, like):
         heat = _heat_of_nodes(rubbed, w, stencil, like)
         capacity = heat_capacity(law, like)
         warms = capacity > 0
-        rise = choose(warms, heat, like - like) / choose(warms, capacity, real(1, like))
+        rise = where(warms, heat, like - like) / where(warms, capacity, real(1, like))
         T = temperature(law, w.kin, state) + rise
         fields.store(w.points.state, p, with_temperature(law, w.kin, state, T))
 
 
-@looping
+@shared
 def _heat_of_nodes(rubbed, w, stencil, like):
     heat = like - like
     for k in range(support(w.basis, w.kin)):
@@ -94,7 +94,7 @@ def _heat_of_nodes(rubbed, w, stencil, like):
 def energy_of(mass, momentum):
     """|momentum|^2 / (2 mass); 0 without mass."""
     least = real(1e-36, mass)
-    return choose(mass > least, 0.5 * momentum.squared() / max(mass, least), mass - mass)
+    return where(mass > least, 0.5 * momentum.squared() / max(mass, least), mass - mass)
 
 
 @shared
@@ -127,7 +127,8 @@ def warm(w, stencil, p, v):
 
     `v` is the velocity of the nodes at the point, before the update.
     """
-    lost, reflected = fields.field(w.nodes.fields, Lost), fields.field(w.points.fields, Reflected)
+    lost = fields.field(w.nodes.fields, EnergyLoss)
+    reflected = fields.field(w.points.fields, Reflected)
     if lost is not None:
         moment = _moment_before(w, stencil, v, zero_moment(w.transfer, w.kin, v[0]))
         moment = in_company(w, stencil, p, moment)
@@ -140,13 +141,13 @@ def warm(w, stencil, p, v):
 
 @shared
 def in_company(w, stencil, p, moment):
-    """What point `p` of a gas keeps of the `moment` of its nodes' velocity: none of it alone.
+    """Return the part of `moment` that point `p` of a gas keeps: none where it is alone.
 
     Nodes that nobody else sees show it what it gave them: its moment would stay for ever, driven by
     its own pressure, and its volume grow without bounds, whatever the room around it. The energy of
     what it does not keep heats it.
     """
-    lost = fields.field(w.nodes.fields, Lost)
+    lost = fields.field(w.nodes.fields, EnergyLoss)
     if lost is None or len(moment) == 0:
         return moment
     mass = w.points.mass[p]
@@ -155,7 +156,7 @@ def in_company(w, stencil, p, moment):
     return max(min(kept, one), mass - mass) * moment
 
 
-@looping
+@shared
 def _own_share(lost, w, stencil, mass):
     """The share of a point of this mass in what its nodes have, by its weights."""
     share = mass - mass
@@ -185,15 +186,15 @@ def reflect(reflected, w, stencil, p, term, k):
         none, half, one = real(0, like), real(0.5, like), real(1, like)
         before = fields.load(reflected, p, (like, *v))
         order = w.transfer.order
-        rest = v._make(choose(k == 0, (*v,), before[1:])) - term
-        gone = choose(k == 0, none, before[0])
-        gone += choose(2 * k >= order - 1, one, none) * _spread(w, stencil, term)
-        gone += choose(2 * k >= order, half, none) * term.squared()
-        gone += choose((order + 1) // 2 == k + 1, half, none) * rest.squared()
+        rest = v._make(where(k == 0, (*v,), before[1:])) - term
+        gone = where(k == 0, none, before[0])
+        gone += where(2 * k >= order - 1, one, none) * _spread(w, stencil, term)
+        gone += where(2 * k >= order, half, none) * term.squared()
+        gone += where((order + 1) // 2 == k + 1, half, none) * rest.squared()
         fields.store(reflected, p, (gone, *rest))
 
 
-@looping
+@shared
 def gathered_term(w, stencil, term):
     """The present term of XPIC's series at a point."""
     for k in range(support(w.basis, w.kin)):
@@ -202,7 +203,7 @@ def gathered_term(w, stencil, term):
     return term
 
 
-@looping
+@shared
 def _spread(w, stencil, term):
     """sum_i N_i |w_i - term|^2 of the present term w of XPIC's series."""
     spread = term[0] - term[0]
@@ -225,9 +226,9 @@ def _before(w, i, like):
     return v - vector_at(w.kin, w.nodes.update, i, of_change(w.kin), like)
 
 
-@looping
+@shared
 def _moment_before(w, stencil, v, moment):
-    """What a point would keep beside its velocity of that of the nodes before the update."""
+    """Gather the moment of the velocity that the nodes had before the update."""
     for k in range(support(w.basis, w.kin)):
         i, weight, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
         g = gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, gradient)
@@ -236,7 +237,7 @@ def _moment_before(w, stencil, v, moment):
     return moment
 
 
-@looping
+@shared
 def _gone(lost, w, stencil, v, moment):
     """Kinetic energy per mass that a point has lost at the nodes and on the way back."""
     gone = v[0] - v[0]

@@ -1,14 +1,23 @@
-"""What is done at the nodes between two visits of the points."""
+"""Tasks at the nodes between two visits of the points."""
 
 from typing import NamedTuple
 
 from karamelo_py.compiler.compile import point_function, real, shared
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.tuples import clear_first
-from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
+from karamelo_py.kernels.arrays import (
+    MASS,
+    Index,
+    Nodes,
+    Number,
+    Tag,
+    of_change,
+    of_force,
+    of_momentum,
+)
 from karamelo_py.kernels.averaging import NodalMean, NodalStress
-from karamelo_py.kernels.loss import Lost, Rubbed, keep_loss
-from karamelo_py.kernels.p2g import SeenMass
+from karamelo_py.kernels.loss import EnergyLoss, FrictionalHeat, keep_loss
+from karamelo_py.kernels.p2g import SquaredMass
 from karamelo_py.points.kinematics import dimension
 from karamelo_py.points.transfers.xpic import Series
 
@@ -38,18 +47,18 @@ class ExtendSeries(NamedTuple):
 
 
 class KeepLoss(NamedTuple):
-    """What a node does not keep of the kinetic energy that it was brought."""
+    """Energy loss of a node: kinetic energy that points brought, less that of the node."""
 
-    goes_through = ("sums", "lost", "lost")
+    goes_through = ("sums", "energy loss", "energy loss")
 
 
-class ClearRubbed(NamedTuple):
+class ClearFrictionalHeat(NamedTuple):
     """Heat of friction starts from zero."""
 
-    goes_through = ("rubbed",)
+    goes_through = ("frictional heat",)
 
 
-class Update(NamedTuple):
+class NodalUpdate(NamedTuple):
     """v* = v + dt f / m from the sums."""
 
     says = "update v*"
@@ -85,12 +94,12 @@ class UpdateToVelocity(NamedTuple):
 
 
 @point_function()
-def at_node(task, kin, nodes, n, dt):
+def at_node(task: Tag, kin: Tag, nodes: Nodes, n: Index, dt: Number) -> None:
     """Do `task` at node `n`. Nodes without mass stay at rest."""
 
 
 @shared
-def per_mass(nodes, n, like):
+def per_mass(nodes: Nodes, n: Index, like: Number) -> Number:
     """One over the mass of a node, 0 where it has none."""
     mass = nodes.sums[n, MASS]
     return real(1, like) / mass if mass > 0 else real(0, like)
@@ -98,15 +107,15 @@ def per_mass(nodes, n, like):
 
 @at_node.on(KeepLoss)
 def _at_node_keep_loss(task, kin, nodes, n, dt):
-    keep_loss(field(nodes.fields, Lost), kin, nodes.sums, n)
+    keep_loss(field(nodes.fields, EnergyLoss), kin, nodes.sums, n)
 
 
-@at_node.on(ClearRubbed)
+@at_node.on(ClearFrictionalHeat)
 def _at_node_clear_rubbed(task, kin, nodes, n, dt):
-    clear_first(field(nodes.fields, Rubbed), n)
+    clear_first(field(nodes.fields, FrictionalHeat), n)
 
 
-@at_node.on(Update)
+@at_node.on(NodalUpdate)
 def _at_node_update(task, kin, nodes, n, dt):
     factor = per_mass(nodes, n, dt)
     for k in range(dimension(kin)):
@@ -144,7 +153,7 @@ def _at_node_update_to_velocity(task, kin, nodes, n, dt):
     # See UpdateToVelocity.light: the change of a light node's velocity enters the gradient by the
     # share of its mass. Points take the whole change: momentum is kept.
     one = real(1, dt)
-    share = unlimited(field(nodes.fields, SeenMass), n, nodes.sums[n, MASS], task.light)
+    share = unlimited(field(nodes.fields, SquaredMass), n, nodes.sums[n, MASS], task.light)
     for k in range(dimension(kin)):
         dv = nodes.update[n, of_change(kin) + k]
         nodes.velocity[n, k] = nodes.update[n, k] - (one - share) * dv

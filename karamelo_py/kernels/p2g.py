@@ -4,10 +4,18 @@ from typing import Any, NamedTuple
 
 from karamelo_py.compiler.compile import accumulate, of_present, point_function, real, shared
 from karamelo_py.compiler.fields import StepField, SummedField, field, load, load_vector, vector
-from karamelo_py.kernels.arrays import MASS, SUMS_WIDTH, VELOCITY_WIDTH, of_force
+from karamelo_py.kernels.arrays import (
+    MASS,
+    SUMS_WIDTH,
+    VELOCITY_WIDTH,
+    Index,
+    Number,
+    Tag,
+    of_force,
+)
 from karamelo_py.kernels.averaging import AveragedStress, FBar, NodalMean, NodalStress, VolumeRatio
-from karamelo_py.kernels.loss import Lost, bring_energy
-from karamelo_py.kernels.visit import deformation_of, for_tags, law_of, records_of, state_of
+from karamelo_py.kernels.loss import EnergyLoss, bring_energy
+from karamelo_py.kernels.visit import Work, deformation_of, for_tags, law_of, records_of, state_of
 from karamelo_py.points.basis import entry, mapped_again
 from karamelo_py.points.frames import Total, force_stress
 from karamelo_py.points.kinematics import I, dimension, nothing
@@ -25,6 +33,7 @@ class MassMomentum(NamedTuple):
     """Scatter mass and momentum."""
 
     in_lanes = True
+    not_at_corners = ("moments", "loss")
     says = "p2g mass and momentum"
     reads = ("x moved", "mass", "v", "moment")
 
@@ -34,10 +43,10 @@ class MassMomentum(NamedTuple):
         d = dimension(kin)
         own = (
             (Normal, 0, d),
-            (SeenMass, 0, 1),
+            (SquaredMass, 0, 1),
             (Centre, 0, d),
-            (Led, 0, of_force(kin)),
-            (Lost, 0, 1),
+            (RigidSums, 0, of_force(kin)),
+            (EnergyLoss, 0, 1),
         )
         return ("sums", 0, of_force(kin)), *own
 
@@ -46,6 +55,7 @@ class InternalForce(NamedTuple):
     """Scatter the internal force, and that of fixes on points."""
 
     in_lanes = True
+    not_at_corners = ("moments",)
     says = "internal force"
     reads = ("mass", "state", "material", "deformation gradient", "force")
 
@@ -59,6 +69,7 @@ class MomentumAgain(NamedTuple):
     """Scatter momentum to the velocity array."""
 
     in_lanes = True
+    not_at_corners = ("moments",)
     says = "momentum to grid"
     reads = ("mass", "v", "moment")
 
@@ -72,6 +83,7 @@ class Volumes(NamedTuple):
     """Scatter volume, after and before the trial increment (F-bar)."""
 
     in_lanes = True
+    not_at_corners = ()
     says = "volumes to grid"
     reads = ("mass", "state", "material", "volume ratio")
 
@@ -85,6 +97,7 @@ class AveragedForce(NamedTuple):
     """Scatter the internal force of the averaged mean stress less that of a point's own (F-bar)."""
 
     in_lanes = True
+    not_at_corners = ("moments",)
     says = "internal force of the averaged mean stress"
     reads = ("mass", "state", "material", "deformation gradient", "averaged stress")
     adds = True  # to a force that is there
@@ -99,6 +112,7 @@ class SeriesBack(NamedTuple):
     """Scatter the term of the series of XPIC, times mass."""
 
     in_lanes = True
+    not_at_corners = ()
     says = "term of the series to the grid"
     reads = ("mass", "term of series")
 
@@ -121,12 +135,12 @@ class Normal(SummedField):
     shape = vector
 
 
-class SeenMass(SummedField):
+class SquaredMass(SummedField):
     """Sum of N m^2 at a node: over that of N m it is the mean mass of the points it sees (USL)."""
 
     @staticmethod
     def needed(basis: Any) -> bool:
-        """Whether a basis makes light nodes that the gradient feels."""
+        """Return True if a basis makes light nodes that the gradient feels."""
         return basis.steep_edge
 
 
@@ -136,8 +150,8 @@ class Centre(SummedField):
     shape = vector
 
 
-class Led(SummedField):
-    """What rigid points give a node: mass, momentum and the force on them, as in `Nodes.sums`."""
+class RigidSums(SummedField):
+    """Sums of the rigid points at a node: mass, momentum, force on them, as in `Nodes.sums`."""
 
     @staticmethod
     def shape(kin):
@@ -146,8 +160,8 @@ class Led(SummedField):
 
 
 @point_function()
-def load_of(quantity, w, p, like):
-    """What a point brings to the nodes."""
+def load_of(quantity: Tag, w: Work, p: Index, like: Number) -> tuple:
+    """Return the load of a point: the numbers that it scatters, before they are weighted."""
 
 
 @records_of.on(MassMomentum)
@@ -161,7 +175,7 @@ def _records_of_momentum_again(quantity, nodes):
 
 
 @point_function()
-def scattered(quantity, w, stencil, k, load):
+def scattered(quantity: Tag, w: Work, stencil: tuple, k: int, load: tuple) -> None:
     """Give the k-th node of the stencil its part."""
 
 
@@ -196,19 +210,21 @@ def led_mass(led, law, mass):
 
 @shared
 def _mass(w, p):
-    return shared_mass(field(w.nodes.fields, Led), law_of(w, p), _own_mass(w, p))
+    return shared_mass(field(w.nodes.fields, RigidSums), law_of(w, p), _own_mass(w, p))
 
 
 @load_of.on(MassMomentum)
 def _load_of_mass_momentum(quantity, w, p, like):
     v = load_vector(w.kin, w.points.v, p)
-    led = led_mass(field(w.nodes.fields, Led), law_of(w, p), _own_mass(w, p))
+    led = led_mass(field(w.nodes.fields, RigidSums), law_of(w, p), _own_mass(w, p))
     x = loaded_for(field(w.nodes.fields, Centre), w.kin, w.places.y, p)
     return _mass(w, p), v, _moment(w, p, like), led, x
 
 
 @shared
-def momentum_part(w, stencil, k, weight, mass, v, moment):
+def momentum_part(
+    w: Work, stencil: tuple, k: int, weight: Number, mass: Number, v: tuple, moment: tuple
+) -> tuple:
     """The momentum that a point gives to the k-th node."""
     return nodal_momentum(w.transfer, w.kin, w.basis, w.grid, stencil, k, weight, mass, v, moment)
 
@@ -219,12 +235,12 @@ def _scattered_mass_momentum(quantity, w, stencil, k, load):
     mass, v, moment, led, x = load
     momentum = momentum_part(w, stencil, k, N, mass, v, moment)
     accumulate(w.nodes.sums, i, MASS, (N * mass, *momentum))
-    bring_energy(field(w.nodes.fields, Lost), i, N * mass, momentum)
-    accumulate_led(field(w.nodes.fields, Led), i, N, led, v)
+    bring_energy(field(w.nodes.fields, EnergyLoss), i, N * mass, momentum)
+    accumulate_led(field(w.nodes.fields, RigidSums), i, N, led, v)
     if len(x):
         accumulate_optional(field(w.nodes.fields, Centre), i, N * mass * x)
     accumulate_optional(field(w.nodes.fields, Normal), i, mass * grad_N.planar())
-    accumulate_optional(field(w.nodes.fields, SeenMass), i, (N * mass * mass,))
+    accumulate_optional(field(w.nodes.fields, SquaredMass), i, (N * mass * mass,))
 
 
 @point_function(otherwise=True)

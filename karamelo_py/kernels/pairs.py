@@ -19,7 +19,7 @@ from karamelo_py.points.laws import initial_state, jacobian, specific_volume
 from karamelo_py.points.pairs import force_between, radius
 
 
-class Bodies(NamedTuple):
+class TwoBodies(NamedTuple):
     """The points of two bodies by id, those of the second (from `first2` on) behind the others."""
 
     x: np.ndarray  # (n, d)
@@ -52,7 +52,7 @@ def cells_for(points: int) -> Cells:
 
 @subkernel
 def _body(id, begin1, end1, begin2, end2):
-    """Which of two bodies the point with an id is of, 0 or 1; -1 where it lies in neither range."""
+    """Return the body of the point with an id, 0 or 1; -1 where it is of neither."""
     if begin1 <= id < end1:
         return 0
     return 1 if begin2 <= id < end2 else -1
@@ -85,7 +85,7 @@ def extend(kin, x, points, laws, begin1, end1, begin2, end2, extents):
 
 @loop
 def pick(kin, x, points, begin1, end1, begin2, end2, low, high, rows):
-    """How many points of a block are of a body and lie between two corners; their rows."""
+    """Find the points of two bodies between two corners; return their number, fill `rows`."""
     points, count = at_hand(points), 0
     for p in range(points.id.size):
         inside = _body(points.id[p], begin1, end1, begin2, end2) >= 0

@@ -8,25 +8,25 @@ from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.loops import entered
 from karamelo_py.compiler.tuples import clear_first
 from karamelo_py.kernels import arrays, p2g, table
+from karamelo_py.kernels.arrays import Number, Setup, Tag
 from karamelo_py.kernels.averaging import FBar
 from karamelo_py.kernels.clock import step_size
-from karamelo_py.kernels.g2p import AverageStress, Move, SeriesTerm
-from karamelo_py.kernels.loss import Lost, Rubbed
-from karamelo_py.kernels.moments import add_work
+from karamelo_py.kernels.g2p import Move, SeriesTerm, SetMeanStress
+from karamelo_py.kernels.hook_loop import add_work
+from karamelo_py.kernels.loss import EnergyLoss, FrictionalHeat
 from karamelo_py.kernels.nodes import (
-    ClearRubbed,
+    ClearFrictionalHeat,
     ExtendSeries,
     KeepLoss,
     MomentumToVelocity,
+    NodalUpdate,
     StartSeries,
     SumsToVelocity,
     TakeMean,
     TakeMeanStress,
-    Update,
     UpdateToVelocity,
 )
-from karamelo_py.kernels.passes import visit_here
-from karamelo_py.kernels.sweep import OldWeights, Visit, sweep_nodes
+from karamelo_py.kernels.sweep import OldWeights, Visit, sweep, sweep_nodes
 from karamelo_py.points.kinematics import Axisymmetric, dimension
 from karamelo_py.points.transfers.xpic import XPIC
 
@@ -36,17 +36,17 @@ class Insulated(NamedTuple):
 
 
 @point_function(otherwise=True)
-def conduct(heat, s, mode, hooks):
+def conduct(heat: Tag, s: Setup, mode: Tag, hooks: Tag) -> None:
     """Let heat flow between points for the length of a step; by default none does."""
 
 
 @point_function(otherwise=True)
-def touch(contact, s):
+def touch(contact: Tag, s: Setup) -> None:
     """Let solids with velocity fields of their own act on each other; by default there are none."""
 
 
 @point_function(otherwise=True)
-def touch_velocity(contact, s, steps):
+def touch_velocity(contact: Tag, s: Setup, steps: int) -> None:
     """See that the velocity that deforms the points agrees with contact, where it is not v*.
 
     `steps` is 1 when v* of this step is known, and 0 before: what touched in the last step counts.
@@ -69,7 +69,7 @@ def _clear_radial(kin, nodes, grids):
 
 
 @point_function(otherwise=True)
-def hold_axis(kin, s):
+def hold_axis(kin: Tag, s: Setup) -> None:
     """Let no node on an axis of symmetry leave it; by default there is none."""
 
 
@@ -81,7 +81,7 @@ def _hold_axis_axisymmetric(kin, s):
 
 
 @point_function(otherwise=True)
-def sum_series(transfer, s, mode):
+def sum_series(transfer: Tag, s: Setup, mode: Tag) -> None:
     """Put the new velocity of XPIC in the place of the change of velocity; others need nothing."""
 
 
@@ -92,13 +92,13 @@ def _sum_series_xpic(transfer, s, mode):
     sweep_nodes(mode, StartSeries(), s.kin, s.nodes, s.ranges, dt)
     for k in range(transfer.order - 1):
         visit = Visit((SeriesTerm(k),), (p2g.SeriesBack(),), OldWeights())
-        visit_here(s, mode, visit, dt, True, True)
+        sweep(s, mode, visit, dt, True, True, False)
         sweep_nodes(mode, ExtendSeries(), s.kin, s.nodes, s.ranges, dt)
     hold_axis(s.kin, s)
 
 
 @point_function(otherwise=True)
-def average_volumes(averaging, s, mode, dt, trial):
+def average_volumes(averaging: Tag, s: Setup, mode: Tag, dt: Number, trial: Tag) -> None:
     """Average the change of volume of the strain to come at the nodes; by default it is not.
 
     `trial` is the task that finds it.
@@ -107,12 +107,13 @@ def average_volumes(averaging, s, mode, dt, trial):
 
 @average_volumes.on(FBar)
 def _average_volumes_f_bar(averaging, s, mode, dt, trial):
-    visit_here(s, mode, Visit((trial,), (p2g.Volumes(),), OldWeights()), dt, True, True)
+    visit = Visit((trial,), (p2g.Volumes(),), OldWeights())
+    sweep(s, mode, visit, dt, True, True, False)
     sweep_nodes(mode, TakeMean(), s.kin, s.nodes, s.ranges, dt)
 
 
 @point_function(otherwise=True)
-def average_stress(averaging, s, mode):
+def average_stress(averaging: Tag, s: Setup, mode: Tag) -> None:
     """Put the averaged mean stress in the place of the points' own; by default each has its own."""
 
 
@@ -120,17 +121,16 @@ def average_stress(averaging, s, mode):
 def _average_stress_f_bar(averaging, s, mode):
     dt = step_size(s)
     sweep_nodes(mode, TakeMeanStress(), s.kin, s.nodes, s.ranges, dt)
-    visit_here(
-        s, mode, Visit((AverageStress(),), (p2g.AveragedForce(),), OldWeights()), dt, True, True
-    )
+    visit = Visit((SetMeanStress(),), (p2g.AveragedForce(),), OldWeights())
+    sweep(s, mode, visit, dt, True, True, False)
 
 
 @shared
-def sum_loss(s, mode):
+def sum_loss(s: Setup, mode: Tag) -> None:
     """At the nodes, what they do not keep of kinetic energy, where it becomes heat."""
-    if field(s.nodes.fields, Rubbed) is not None:
-        sweep_nodes(mode, ClearRubbed(), s.kin, s.nodes, s.ranges, step_size(s))
-    if field(s.nodes.fields, Lost) is not None:
+    if field(s.nodes.fields, FrictionalHeat) is not None:
+        sweep_nodes(mode, ClearFrictionalHeat(), s.kin, s.nodes, s.ranges, step_size(s))
+    if field(s.nodes.fields, EnergyLoss) is not None:
         sweep_nodes(mode, KeepLoss(), s.kin, s.nodes, s.ranges, step_size(s))
 
 
@@ -147,13 +147,13 @@ def light_node(s):
     return UpdateToVelocity(real(masses, s.nodes.sums[0, arrays.MASS]))
 
 
-light_node.goes_through = UpdateToVelocity.goes_through
+light_node.goes_through = UpdateToVelocity.goes_through  # type: ignore[attr-defined]
 
 
-def _call(do: Callable, says: Callable[[Any], str | None]) -> table.Call:
+def _call(do: Any, says: Callable[[Any], str | None]) -> table.SceneTask:
     """A row that does something; `says` tells what in a scene."""
     do.says = says
-    return table.Call(do)
+    return table.SceneTask(do)
 
 
 HEAT = _call(
@@ -168,7 +168,7 @@ LOSS = _call(
     lambda s, mode, hooks: sum_loss(s, mode),
     lambda s: (
         None
-        if field(s.nodes.fields, Lost) is None
+        if field(s.nodes.fields, EnergyLoss) is None
         else "kinetic energy that the nodes do not keep, as heat to the points"
     ),
 )
@@ -199,7 +199,7 @@ SERIES = _call(
 SUMS = table.Scatter((p2g.MassMomentum(), p2g.InternalForce()))
 MASS_AND_MOMENTUM = table.Scatter((p2g.MassMomentum(),))
 # For schemes that strain first.
-VELOCITY_BEFORE = (MASS_AND_MOMENTUM, AXIS, table.Nodes(SumsToVelocity()))
+VELOCITY_BEFORE = (MASS_AND_MOMENTUM, AXIS, table.NodeTask(SumsToVelocity()))
 FORCE = table.Scatter((p2g.InternalForce(),), OldWeights())
 # v* = v + dt f / m, with what the fixes add and prescribe; and heat flows.
 ACCELERATE = (
@@ -208,7 +208,7 @@ ACCELERATE = (
     HEAT,
     table.AtNodes(arrays.POST_PARTICLES_TO_GRID, arrays.ON_SUMS),
     AXIS,
-    table.Nodes(Update()),
+    table.NodeTask(NodalUpdate()),
     table.AtNodes(arrays.POST_UPDATE_GRID_STATE, arrays.ON_UPDATE),
     CONTACT,
     WORK_OF_LOADS,
@@ -222,6 +222,6 @@ MOVE = (
 # The velocity of the moved points, at the nodes once more.
 MOMENTUM_AGAIN = (
     table.Scatter((p2g.MomentumAgain(),), OldWeights()),
-    table.Nodes(MomentumToVelocity()),
+    table.NodeTask(MomentumToVelocity()),
     AXIS,
 )

@@ -10,22 +10,23 @@ from karamelo_py.compiler.items import pick_items, put_items
 from karamelo_py.compiler.loops import loop, subkernel
 from karamelo_py.compiler.threads import by_team, shared_out
 from karamelo_py.compiler.tuples import record
+from karamelo_py.kernels.arrays import Number, Tag, Tiling
 from karamelo_py.kernels.visit import place_at
 from karamelo_py.points.basis import extent
-from karamelo_py.points.grid import cells_along, in_cells
+from karamelo_py.points.grid import Grid, cells_along, in_cells
 from karamelo_py.points.kinematics import dimension
 
 
-class Cut(NamedTuple):
-    """How g grids are cut into T tiles."""
+class TileGrid(NamedTuple):
+    """Division of g grids into T tiles."""
 
     size: np.ndarray  # (d,) cells of a tile
     count: np.ndarray  # (g, d) number of tiles
     first: np.ndarray  # (g + 1,) number of the first
 
 
-class Sight(NamedTuple):
-    """Which nodes points see that may go `reach` cells."""
+class Neighbourhood(NamedTuple):
+    """Neighbourhood of a point: the nodes that it may see before it has gone `reach` cells."""
 
     top: np.ndarray  # (g, d) the last node of each grid
     per_cell: int
@@ -35,8 +36,8 @@ class Sight(NamedTuple):
     offset: float  # of the first node that a point sees now, see points.basis.first_node
 
 
-class Order(NamedTuple):
-    """What is found where n points are sorted by threads, each of which has a part of them."""
+class SortedOrder(NamedTuple):
+    """Order and boxes of n points that threads sort, each of which has a part of them."""
 
     width: int  # of groups of points
     ends: np.ndarray  # (parts, T) the last row takes where the points of each tile end
@@ -49,7 +50,7 @@ class Order(NamedTuple):
 
 
 @shared
-def cell_of(grid, direction, at):
+def cell_of(grid: Grid, direction: int, at: Number) -> int:
     """The cell of a point that lies so many cells from the corner of the grid.
 
     Clamped, since a hook may have put a point anywhere: the next sweep finds it.
@@ -89,7 +90,7 @@ def _find_tiles(kin, grids, tiles, x, of, ends, tile, k):
 
 @subkernel
 def _begin_tiles(found):
-    """Where what each part gives to each tile begins; shares of the tiles, with as many points."""
+    """Set where each part's points begin in each tile; share out the tiles by points."""
     ends, share, points = found.ends, found.share, found.order.size
     parts = ends.shape[0]
     place = shares = 0
@@ -153,7 +154,7 @@ def _order_in_tiles(kin, grids, sight, tiles, x, of, ids, found, k):
         for rest in (False, True):
             for c in range(cells):
                 here = bins[k, 0, c]
-                if bins[k, 1, c] < 0 and (here % found.width != 0) == rest:
+                if bins[k, 1, c] < 0 and (rest or here % found.width == 0):
                     bins[k, 0, c] = bins[k, 1, c] = place
                     place += here
         for q in range(begin, end):
@@ -248,7 +249,18 @@ _sort_by_team = by_team(_sort, "kin, grids, sight, tiles, x, of, ids, found, row
 
 
 @loop
-def sort_points(mode, kin, grids, sight, tiles, x, of, ids, found, rows):
+def sort_points(
+    mode: Tag,
+    kin: Tag,
+    grids: Grid,
+    sight: Neighbourhood,
+    tiles: TileGrid,
+    x: np.ndarray,
+    of: np.ndarray,
+    ids: np.ndarray,
+    found: SortedOrder,
+    rows: tuple,
+) -> None:
     """Sort points at places `x` (w, n) by tile, and within by the first node that they see.
 
     They are on the grids `of` (n,) and have the numbers `ids` (n,). Of all that they carry, these
@@ -259,20 +271,40 @@ def sort_points(mode, kin, grids, sight, tiles, x, of, ids, found, rows):
 
 
 @loop
-def find_tiles(mode, kin, grids, tiles, x, of, ends, tile):
-    """The tile of each of some points at `x` (w, n), of the grids `of` (n,); `ends` is scratch."""
+def find_tiles(
+    mode: Tag,
+    kin: Tag,
+    grids: Grid,
+    tiles: TileGrid,
+    x: np.ndarray,
+    of: np.ndarray,
+    ends: np.ndarray,
+    tile: np.ndarray,
+) -> None:
+    """Find the tile of each point at `x` (w, n), on the grids `of` (n,).
+
+    `tile` (n,) takes them; `ends` (parts, T) is scratch.
+    """
     _find_all_tiles(mode, ends.shape[0], kin, grids, tiles, x, of, ends, tile)
 
 
 @loop
-def find_rows(mode, kin, grids, sight, x, tiling, parts):
-    """What of each row of their boxes the sorted points at `x` (w, n) of each tile may reach."""
+def find_rows(
+    mode: Tag,
+    kin: Tag,
+    grids: Grid,
+    sight: Neighbourhood,
+    x: np.ndarray,
+    tiling: Tiling,
+    parts: int,
+) -> None:
+    """Find the range of each row of a tile's box that its sorted points at `x` (w, n) may reach."""
     _find_all_rows(mode, parts, kin, grids, sight, x, tiling, parts)
 
 
 @loop
-def widest(kin, basis, grids, x, of):
-    """How far from its point a corner of a domain is at most, in cells."""
+def widest(kin: Tag, basis: Tag, grids: Grid, x: np.ndarray, of: np.ndarray) -> float:
+    """Return the largest distance of a corner of a domain from its point, in cells."""
     grids = at_hand(grids)
     far = 0.0
     for p in range(x.shape[1]):

@@ -15,13 +15,13 @@ from karamelo_py.compiler.loops import loop
 from karamelo_py.compiler.threads import by_team
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels import table
-from karamelo_py.kernels.arrays import DT, TIME, NoHooks
+from karamelo_py.kernels.arrays import DT, TIME, NoHooks, Setup, Tag
 from karamelo_py.kernels.clock import common_velocity, finish, kick, last_step_size, step_size
 from karamelo_py.kernels.g2p import STRAINS, TrialStrain, TrialStrainOfLastStep
-from karamelo_py.kernels.moments import at_nodes, at_points
-from karamelo_py.kernels.passes import check_moves, sweep
+from karamelo_py.kernels.hook_loop import at_nodes, at_points
+from karamelo_py.kernels.reports import all_well, check_moves
 from karamelo_py.kernels.rows import average_volumes
-from karamelo_py.kernels.sweep import sweep_nodes
+from karamelo_py.kernels.sweep import sweep, sweep_nodes
 from karamelo_py.kernels.visit import deformation_of
 from karamelo_py.kernels.watch import look, look_at_heat
 from karamelo_py.points.frames import inverse_stretch_squared
@@ -36,12 +36,12 @@ class Staged(NamedTuple):
     """One visit for each stage, so that hooks on points can act in between."""
 
 
-def rows_of(scheme: type, visits: type) -> list[Any]:
+def rows_of(scheme: Any, visits: Any) -> list[Any]:
     """The rows of a step of `scheme`."""
     return table.fused(scheme.rows) if visits is Fused else table.staged(scheme.rows)
 
 
-def _first_rows(scheme: type, visits: type) -> list[Any]:
+def _first_rows(scheme: Any, visits: Any) -> list[Any]:
     """Fused steps expect the sums on the nodes: the scatter of the last visit, alone."""
     if visits is not Fused:
         return []
@@ -54,9 +54,9 @@ def _take(row, s, mode, hooks, more):
         at_points(hooks, row.stage, row.then, s)
     elif isinstance(row, table.AtNodes):
         at_nodes(hooks, row.stage, row.target, s)
-    elif isinstance(row, table.Call):
+    elif isinstance(row, table.SceneTask):
         row.function(s, mode, hooks)
-    elif isinstance(row, table.Nodes):
+    elif isinstance(row, table.NodeTask):
         task = row.task(s) if callable(row.task) else row.task
         sweep_nodes(mode, task, s.kin, s.nodes, s.ranges, kick(s))
     elif isinstance(row, table.Check):
@@ -74,7 +74,8 @@ def _visit(row, s, mode, more):
         trial = TrialStrainOfLastStep() if row.of_last_step else TrialStrain()
         average_volumes(s.averaging, s, mode, dt, trial)
     scatters = more if row.only_if_more else row.scatters
-    return sweep(s, mode, row.visit, dt, row.gathers, scatters, row.moves)
+    sweep(s, mode, row.visit, dt, row.gathers, scatters, row.moves)
+    return all_well(s)
 
 
 def _take_all(rows, s, mode, hooks, more):
@@ -84,10 +85,11 @@ def _take_all(rows, s, mode, hooks, more):
     return True
 
 
-_step_rows, _begin_rows = functools.cache(rows_of), functools.cache(_first_rows)  # interpreted
+_step_rows: Any = functools.cache(rows_of)  # interpreted
+_begin_rows: Any = functools.cache(_first_rows)
 
 
-def step(scheme, visits, mode, s, hooks, more):
+def step(scheme: Tag, visits: Tag, mode: Tag, s: Setup, hooks: Tag, more: bool) -> bool:
     """One step of `scheme`. With `more`, a fused step leaves the next step's sums on the nodes.
 
     Returns whether all points went well.
@@ -101,7 +103,7 @@ def _step(scheme, visits, mode, s, hooks, more):
     return lambda scheme, visits, mode, s, hooks, more: _take_all(rows, s, mode, hooks, more)
 
 
-def begin(scheme, visits, mode, s):
+def begin(scheme: Tag, visits: Tag, mode: Tag, s: Setup) -> bool:
     """Before the first of several steps; returns whether all points are on the grid."""
     return _take_all(_begin_rows(type(scheme), type(visits)), s, mode, NoHooks(), True)
 
@@ -119,7 +121,7 @@ PATIENCE = 50  # steps above the stable limit before a run is stopped
 SMALLEST = 1e-6  # share of the first stable step at which a run is stopped: it would never end
 
 
-def run_steps(scheme, visits, mode, s, hooks, count):
+def run_steps(scheme: Tag, visits: Tag, mode: Tag, s: Setup, hooks: Tag, count: int) -> int:
     """Take up to `count` steps, as far as the end time; say why it stopped.
 
     Returns DONE, STOPPED (a point went wrong), ABOVE_LIMIT (the step is above the stable limit),
@@ -162,7 +164,7 @@ _by_team = by_team(_led, "scheme, visits, s, hooks, count")
 
 
 @loop
-def advance(scheme, visits, mode, s, hooks, count):
+def advance(scheme: Tag, visits: Tag, mode: Tag, s: Setup, hooks: Tag, count: int) -> int:
     """`run_steps`, by a team of threads where there are some."""
     return _by_team(mode, scheme, visits, s, hooks, count)
 
@@ -192,7 +194,7 @@ def measure_blocks(block, s):
 
 
 @shared
-def measure(s):
+def measure(s: Setup) -> None:
     """The rate of the present state, for the first dt."""
     s.control.clock[0].rate = 0.0
     measure_blocks(s)

@@ -1,4 +1,4 @@
-"""What points give to nodes: records of the tiles' buffers, and their sums at the nodes.
+"""Sums at the nodes of the records in the tiles' buffers.
 
 A quantity says in ``fills(kin)`` which columns of the nodes' arrays take it: (array, first column,
 end), the array a name in `Nodes` or the class of a field, which a scene may not have. With
@@ -14,11 +14,11 @@ from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.lanes.records import move_record
 from karamelo_py.compiler.loops import subkernel
 from karamelo_py.compiler.tuples import put_at
-from karamelo_py.kernels.arrays import ADD, CLEAR, Nodes
+from karamelo_py.kernels.arrays import ADD, CLEAR, Buffers, Nodes, Tag
 
 
 def adds(quantity: NamedTuple) -> bool:
-    """Whether a quantity adds to what is at the nodes."""
+    """Return True if a quantity adds to the values at the nodes."""
     return getattr(type(quantity), "adds", False)
 
 
@@ -32,8 +32,8 @@ def columns_of(quantities: tuple, kin: NamedTuple) -> list[tuple[Any, int, int]]
 
 
 @shared
-def given(quantities, kin):
-    """Which arrays of the nodes the quantities give to: 1 the sums, 2 velocities, 4 fields."""
+def given(quantities: tuple, kin: Tag) -> int:
+    """Add up the kinds of arrays that take the quantities: 1 the sums, 2 velocities, 4 fields."""
     names = {name for name, _, _ in columns_of(quantities, kin)}
     fields = any(not isinstance(name, str) for name in names)
     return ("sums" in names) + 2 * ("velocity" in names) + 4 * fields
@@ -61,7 +61,7 @@ def _take_record(quantities, kin, nodes, n, buffers, m, keep):
 
 @shared
 def _clear_record(quantities, kin, nodes, n):
-    """What points give to node `n` starts from zero, but for what they add to."""
+    """Clear the columns of node `n` that take the quantities, but those that they add to."""
     for name, first, end, add in _columns(quantities, kin):
         array = _array(nodes, name)
         if array is not None and not add:
@@ -69,7 +69,7 @@ def _clear_record(quantities, kin, nodes, n):
 
 
 @subkernel
-def sum_share(quantities, kin, nodes, buffers, share):
+def sum_share(quantities: tuple, kin: Tag, nodes: Nodes, buffers: Buffers, share: int) -> None:
     """Sum the quantities at the nodes of a share, tile after tile, box after box."""
     nodes, buffers = at_hand(nodes), at_hand(buffers)
     first, parts = buffers.first, buffers.parts

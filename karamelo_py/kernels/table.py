@@ -10,7 +10,7 @@ A scheme names its rows once, stage by stage, as its class attribute ``rows``. F
 Averaged volumes, XPIC, heat and contact are calls that do nothing in scenes without them.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 from karamelo_py.kernels.g2p import Move, Strain, StrainInMove, StrainOfLastStep
@@ -49,16 +49,16 @@ class Scatter(NamedTuple):
     weights: NamedTuple = PresentWeights()
 
 
-class Nodes(NamedTuple):
+class NodeTask(NamedTuple):
     """A task at every node in use: its tag, or a function of the setup that makes it."""
 
     task: Any
 
 
-class Call(NamedTuple):
+class SceneTask(NamedTuple):
     """A call ``function(s, mode, hooks)`` of what only some scenes have."""
 
-    function: Callable
+    function: Any
 
 
 class Check(NamedTuple):
@@ -94,7 +94,7 @@ def _tasks(gathers: list[Gather]) -> tuple:
 
 
 def _kinds(tags: tuple) -> tuple:
-    """What tells tags apart: tuples without numbers are all equal."""
+    """Return the classes of tags: as tuples, tags without numbers are all equal."""
     return tuple(type(tag) for tag in tags)
 
 
@@ -164,13 +164,13 @@ def staged(rows: Iterable[Any]) -> list[Any]:
 
 
 def says(row: Any, setup: Any) -> str | None:
-    """What a row does, in words; None where it does nothing in this scene."""
+    """Describe a row in words; None where it does nothing in this scene."""
     if isinstance(row, Sweep):
         parts = [tag.says for tag in row.visit.tasks if row.gathers]
         parts += [tag.says for tag in row.visit.quantities if row.scatters]
         return ", ".join(parts) + (" in one visit of the points" if len(parts) > 1 else "")
-    if isinstance(row, Nodes):
+    if isinstance(row, NodeTask):
         return getattr(row.task, "says", None)
-    if isinstance(row, Call):
+    if isinstance(row, SceneTask):
         return row.function.says(setup)
     return None

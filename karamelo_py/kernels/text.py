@@ -44,7 +44,7 @@ POWERS = np.array([_power(k) for k in range(FIRST, 300)])
 MINUS, PLUS, POINT, ZERO, BLANK, NEWLINE, E = b"-+.0 \ne"
 ZEROS = int.from_bytes(b"00000000", "little")
 NAN, INF, NOUGHT = (int.from_bytes(w, "little") for w in (b"nan", b"inf", b"0.000000"))
-BYTEWISE = config.DISABLE_JIT or sys.byteorder != "little"
+BYTEWISE = config.DISABLE_JIT or sys.byteorder != "little"  # type: ignore[attr-defined]
 
 
 def rows(columns: Sequence[np.ndarray]) -> Iterator[bytes]:
@@ -208,7 +208,7 @@ def _eight(n):
 
 @shared
 def _without_zeros(word):
-    """How many of eight digits are left without the zeros at their end."""
+    """Count eight digits without the zeros at their end."""
     kept = 8
     while kept > 0 and word >> 8 * (kept - 1) & 255 == ZERO:
         kept -= 1

@@ -166,7 +166,7 @@ def collect(ranks, control, first, count):
 
 @point_function(otherwise=True)
 def counts(ranks, n):
-    """Whether this process adds what node `n` gives to totals."""
+    """Return True if this process adds the terms of node `n` to totals."""
     return True
 
 

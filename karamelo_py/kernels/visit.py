@@ -1,4 +1,4 @@
-"""What a visit of a point works with, and loops over the tags of what it does.
+"""The arrays and tags of a visit to a point, and loops over its tags.
 
 A visit gathers from the nodes of the point's stencil and settles the point (grid to points,
 :mod:`karamelo_py.kernels.g2p`), then scatters to the nodes (points to grid,
@@ -9,59 +9,63 @@ loop (:mod:`karamelo_py.kernels.sweep`) serves every scheme, fused or stage by s
 from collections.abc import Callable
 from typing import NamedTuple
 
+import numpy as np
+
 from karamelo_py.compiler.compile import index, point_function, prefetch, real, shared
 from karamelo_py.compiler.fields import field, load, load_vector
 from karamelo_py.compiler.tuples import count_in, record
+from karamelo_py.kernels.arrays import Index, Nodes, Number, Places, Points, Tag
 from karamelo_py.points.basis import blank, locate
 from karamelo_py.points.frames import DeformationGradient, Total
+from karamelo_py.points.grid import Grid
 from karamelo_py.points.kinematics import zero
 from karamelo_py.points.laws import deformation, initial_state
 from karamelo_py.points.transfers import Moment, zero_moment
 
 
 class Work(NamedTuple):
-    """What a visit of a point works with; made once a tile."""
+    """Arrays and tags of a visit to a point; made once a tile."""
 
-    frame: NamedTuple
-    kin: NamedTuple
-    basis: NamedTuple
-    grid: NamedTuple
-    transfer: NamedTuple
-    averaging: NamedTuple
-    nodes: NamedTuple
-    points: NamedTuple
-    laws: NamedTuple
-    places: NamedTuple
-    common: tuple  # velocity that speeds are measured from
+    frame: Tag
+    kin: Tag
+    basis: Tag
+    grid: Grid
+    transfer: Tag
+    averaging: Tag
+    nodes: Nodes
+    points: Points
+    laws: NamedTuple  # parameters of the materials, an array (m,) each
+    places: Places
+    common: tuple  # (d,) velocity that speeds are measured from
 
 
 @shared
-def place_at(basis, kin, array, p):
-    """The place of point `p`: its position and the shape of its domain."""
+def place_at(basis: Tag, kin: Tag, array: np.ndarray, p: Index) -> tuple:
+    """Load the place (w,) of point `p`: its position and the shape of its domain."""
     return load(array, p, blank(basis, kin, load_vector(kin, array, p)))
 
 
 @shared
-def law_of(w, p):
-    """The law of point `p`, with the parameters of its material."""
-    return record(w.laws, index(w.points.material[p]))
+def law_of(w: Work, p: Index) -> Tag:
+    """Load the law of point `p`, with the parameters of its material."""
+    return record(w.laws, index(w.points.material[p]))  # type: ignore[arg-type]
 
 
 @shared
-def state_of(w, law, p, like):
-    """The state of the law at point `p`."""
+def state_of(w: Work, law: Tag, p: Index, like: Number) -> tuple:
+    """Load the state (s,) of the law at point `p`."""
     return load(w.points.state, p, initial_state(law, w.kin, like))
 
 
 @shared
-def stored_or_own(f, law, kin, state):
-    """The deformation gradient `f` that was stored, or that of the law's state."""
+def stored_or_own(f: tuple, law: Tag, kin: Tag, state: tuple) -> tuple:
+    """Return the deformation gradient `f` if it is stored, else that of the law's state."""
     return f if len(f) else deformation(law, kin, state)
 
 
 @shared
-def ask_ahead(w, p, like):
-    """Ask the memory for what the next points have, where they keep moments of velocity.
+def ask_ahead(w: Work, p: Index, like: Number) -> None:
+    """Ask the memory for the data of the next points, where they keep moments of velocity.
 
     These are visited once a step, with all they have: in space that is more arrays side by side
     than a processor sees the pattern of.
@@ -74,8 +78,8 @@ def ask_ahead(w, p, like):
 
 
 @shared
-def ask_ahead_of_stretch(w, p, like):
-    """The same of what a stretch of points is settled with, while it gathers."""
+def ask_ahead_of_stretch(w: Work, p: Index, like: Number) -> None:
+    """Ask the memory for the data of the update of a stretch of points, while it gathers."""
     if w.kin.dimension == 3:
         _ask_for_motion(w, p)
         _ask(w.points.state, count_in(initial_state(law_of(w, p), w.kin, like)), p)
@@ -97,8 +101,8 @@ def _ask(array, rows, p):
 
 
 @point_function(otherwise=True)
-def records_of(tag, nodes):
-    """The records that a task gathers from, or a quantity is given to, for `prefetch_records`.
+def records_of(tag: Tag, nodes: Nodes) -> np.ndarray | None:
+    """Return the records that a task gathers from, or that take a quantity, for `prefetch_records`.
 
     None: they are not asked for.
     """
@@ -106,8 +110,8 @@ def records_of(tag, nodes):
 
 
 @point_function(otherwise=True)
-def deformation_of(frame, kin, law, state, points, p):
-    """F of a point where the frame needs it."""
+def deformation_of(frame: Tag, kin: Tag, law: Tag, state: tuple, points: Points, p: Index) -> tuple:
+    """Return the deformation gradient F of a point where the frame needs it, else ()."""
     return ()
 
 
@@ -118,8 +122,8 @@ def _deformation_of_total(frame, kin, law, state, points, p):
 
 
 @point_function(otherwise=True)
-def present_stencil(frame, w, stencil, p):
-    """The stencil of the place after the move; in the total frame it never changes."""
+def present_stencil(frame: Tag, w: Work, stencil: tuple, p: Index) -> tuple:
+    """Return the stencil of the place after the move; in the total frame it never changes."""
     return locate(w.basis, w.kin, w.grid, place_at(w.basis, w.kin, w.places.y, p))
 
 

@@ -5,13 +5,22 @@ to the middles of steps and stresses to their ends, more or less by the scheme: 
 steps in a row give those of one time, to second order. Sums go through the points in the order of
 their tiles, the same on any number of threads.
 
-Growth is measured by the energy that bodies have besides their drift, the motion of their centres
-of mass: large as that may be, from the start or by loads, it cannot hide what vibrates.
+Growth (`karamelo_py.kernels.growth`) is measured by the energy that bodies have besides their
+drift, the motion of their centres of mass: large as that may be, from the start or by loads, it
+cannot hide what vibrates.
 """
 
 from math import inf
 
-from karamelo_py.compiler.compile import added, in_all, index, of_present, over_blocks, real, shared
+from karamelo_py.compiler.compile import (
+    added,
+    all_lanes,
+    index,
+    of_present,
+    over_blocks,
+    real,
+    shared,
+)
 from karamelo_py.compiler.fields import load, load_vector
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import entered, subkernel
@@ -19,8 +28,9 @@ from karamelo_py.compiler.threads import shared_out
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels import totals
 from karamelo_py.kernels.arrays import TIMESTEP, known_to_laws
+from karamelo_py.kernels.growth import growth
+from karamelo_py.kernels.lanes import lanes_of_law, points_at_once, points_from
 from karamelo_py.kernels.searching import first_from
-from karamelo_py.kernels.width import lanes_of_law, points_from, width_of
 from karamelo_py.points.kinematics import dimension, free_from
 from karamelo_py.points.laws import (
     dissipated_energy,
@@ -82,7 +92,7 @@ def _solid_of(firsts, number):
 def _look_at_share(kin, points, laws, tiling, firsts, k):
     """Energies, mass and momentum of the points of each tile of the k-th share, for its report."""
     points, laws, tiling = at_hand(points), at_hand(laws), at_hand(tiling)
-    width = lanes_of_law(laws, points.mass)
+    lanes = lanes_of_law(laws, points.mass)
     for place in range(tiling.share[k], tiling.share[k + 1]):
         t = tiling.order[place]
         start, end = tiling.range[t, 0], tiling.range[t, 1]
@@ -90,8 +100,8 @@ def _look_at_share(kin, points, laws, tiling, firsts, k):
         begin, behind = firsts[solid], _behind(firsts, solid)
         kinetic = stored = 0.0
         total = _nothing(kin)
-        for q in range(start, end, width_of(width)):
-            p = points_from(width, q, end)
+        for q in range(start, end, points_at_once(lanes)):
+            p = points_from(lanes, q, end)
             law = record(laws, index(points.material[p]))
             own = of_present(p, points.mass[p])
             state = load(points.state, p, initial_state(law, kin, own))
@@ -101,7 +111,7 @@ def _look_at_share(kin, points, laws, tiling, firsts, k):
             energy = energy_density(law, kin, state) + dissipated_energy(law, kin, state)
             stored = added(stored, mass * real(specific_volume(law), 0.0) * real(energy, 0.0))
             total = _carried(total, mass, v)
-            if not in_all((points.id[p] >= begin) & (points.id[p] < behind)):
+            if not all_lanes((points.id[p] >= begin) & (points.id[p] < behind)):
                 solid = -1
         tiling.report[t, ENERGIES] = kinetic
         tiling.report[t, ENERGIES + 1] = stored
@@ -230,7 +240,7 @@ def _sum_before(s, mode, step):
 
 @shared
 def unit_of(clock):
-    """What growth of energy is measured by: the most that there was, of a drift no more than so."""
+    """Unit of the growth of energy: the most that there was, of a drift no more than so."""
     return max(clock.largest_own, DRIFTING * clock.largest_energy, clock.energy_floor)
 
 
@@ -266,17 +276,16 @@ def judge(control):
         # The least of a few: where bodies meet a look or two shows what is not there. And kept, so
         # that it does not matter which of the looks is the last before one asks.
         least = min(balance, clock.last_balance, clock.last_but_one)
-        clock.grown = max(clock.grown, (least - clock.first_few) / unit)
+        clock.grown = max(clock.grown, growth(clock.first_few, least, unit))
     clock.sum_of_balance += balance
     if clock.looks % LOOKS == 0:
         mean = clock.sum_of_balance / LOOKS
         clock.sum_of_balance = 0.0
         if clock.looks == LOOKS:
             clock.first_mean = clock.largest_mean = mean
-        growth = (mean - clock.largest_mean) / unit
-        clock.windows = clock.windows + 1 if growth > GROWTH else 0
-        clock.growth = growth
-        clock.grown = max(clock.grown, (mean - clock.first_mean) / unit)
+        clock.growth = growth(clock.largest_mean, mean, unit)
+        clock.windows = clock.windows + 1 if clock.growth > GROWTH else 0
+        clock.grown = max(clock.grown, growth(clock.first_mean, mean, unit))
         clock.largest_mean = max(clock.largest_mean, mean)
     given = abs(clock.first_balance) + clock.supplied
     # So written, NaN is noticed.
@@ -315,7 +324,7 @@ def measure_heat(s):
 
 @shared
 def look_at_heat(s):
-    """Whether all temperatures are between what fixes, sources and the initial state allow."""
+    """Compare all temperatures with what fixes, sources and the initial state allow."""
     clock = s.control.clock[0]
     if clock.watch_heat == 0 or int(s.control.values[TIMESTEP]) % LOOK != 0:
         return True

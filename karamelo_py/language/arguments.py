@@ -55,11 +55,11 @@ class Argument:
 
     @property
     def is_null(self) -> bool:
-        """Whether it is the word NULL."""
+        """Tell if it is the word NULL."""
         return self.text == NULL
 
     def word(self) -> str | None:
-        """The word it is: bare, in quotes, or the content of a text variable; None for arithmetic.
+        """Find the word it is: bare, in quotes, or in a text variable; None for arithmetic.
 
         Words such as ``neo-hookean`` or ``dump.*.gz`` count unless a name in them is known, which
         makes them arithmetic.
@@ -77,7 +77,7 @@ class Argument:
         return None if known else self.text
 
     def words(self, known: Sequence[str] = ()) -> str:
-        """The text it stands for where only a word will do, arithmetic or not.
+        """Find the text it stands for where only a word will do, arithmetic or not.
 
         Raises
         ------
@@ -107,7 +107,7 @@ class Argument:
         return self.text
 
     def value(self, hub: Scene | None) -> Value:
-        """The number, text or formula it stands for.
+        """Find the number, text or formula it stands for.
 
         Raises
         ------
@@ -121,7 +121,7 @@ class Argument:
         return self._interpreter.evaluate(parse_expression(self._raw), self._raw)
 
     def value_with(self, seeds: Sequence[str]) -> Value:
-        """The same, where the names `seeds` stand for what a formula is of, whatever they are else.
+        """Find the value where the names `seeds` are those that a formula depends on.
 
         Raises
         ------
@@ -131,17 +131,17 @@ class Argument:
         return evaluate(parse_expression(self._raw), self._raw, _Seeds(self._interpreter, seeds))
 
     def behind(self, count: int) -> Argument:
-        """What follows the first `count` characters."""
+        """Cut off the first `count` characters."""
         return Argument(
             Raw(self._raw.source, self._raw.start + count, self._raw.end), self._interpreter
         )
 
     def knows(self, name: str) -> bool:
-        """Whether a name means something where the argument stands."""
+        """Tell if a name means something where the argument stands."""
         return self._interpreter.knows(name)
 
     def part(self, text: str) -> Argument:
-        """The last place of `text` in it, as an argument of its own."""
+        """Find the last place of `text` in it, as an argument of its own."""
         source = self._raw.source
         start = source.text.rindex(text, self._raw.start, self._raw.end)
         return Argument(Raw(source, start, start + len(text)), self._interpreter)
@@ -163,7 +163,7 @@ class _Seeds:
         self.seeds = seeds
 
     def name(self, name: str, node: Any, raw: Raw) -> Value:
-        """What a name stands for; one that means nothing is told with those that do here."""
+        """Find the value of a name; the error of an unknown one lists those that are known here."""
         if name in self.seeds:
             return Expression.seed(name)
         try:
@@ -179,21 +179,21 @@ class _Seeds:
             raise
 
     def command(self, node: Any, raw: Raw) -> Value:
-        """The value of a call that is not a function."""
+        """Find the value of a call that is not a function."""
         return self.outer.command(node, raw)
 
     def hides(self, name: str) -> bool:
-        """Whether the script uses the name of a function for something else."""
+        """Tell if the script uses the name of a function for something else."""
         return self.outer.hides(name)
 
 
 def with_gap(arguments: Sequence[Argument]) -> Argument | None:
-    """The first argument that may be two, with a comma forgotten between them."""
+    """Find the first argument that may be two, with a comma forgotten between them."""
     return next((argument for argument in arguments if _GAP.search(argument.text)), None)
 
 
 def look_up(catalogue: Any, argument: Argument):
-    """The part of the scene that `argument` names.
+    """Find the part of the scene that `argument` names.
 
     Raises
     ------

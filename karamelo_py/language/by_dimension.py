@@ -47,12 +47,12 @@ class Forms:
         self.open_ends = open_ends or {}
 
     def line(self, dimension: int) -> str:
-        """The call as it is written in `dimension`."""
+        """Write the call as it is written in `dimension`."""
         names = ", ".join(self.names[dimension])
         return self.pattern.format(dimension=dimension, names=names)
 
     def read(self, hub: Scene, arguments: Sequence[Any], dimension: int) -> dict[str, float | str]:
-        """The values of `arguments` by name, for `dimension`.
+        """Read the values of `arguments` by name, for `dimension`.
 
         Raises
         ------
@@ -97,7 +97,7 @@ class Forms:
         )
 
     def _own_line(self, arguments: Sequence[Any], dimension: int) -> str:
-        """The call in the words of the script: what is missing by its name, no more than needed."""
+        """Write the call in the words of the script, with what is missing by its name."""
         names = self.names[dimension]
         words = [argument.text for argument in arguments][: len(names)]
         line = re.sub(r"\[.*?\]", "", self.pattern)
@@ -135,7 +135,7 @@ class Forms:
 
 
 def number(hub: Scene, argument: Any, name: str, expected: str | None = None) -> float:
-    """The finite, constant number that `argument` stands for.
+    """Find the finite, constant number that `argument` stands for.
 
     A number that is not known before a run has been made is NaN in a rehearsal, and passes.
 
@@ -162,7 +162,7 @@ def number(hub: Scene, argument: Any, name: str, expected: str | None = None) ->
 
 
 def finite(hub: Scene, value: float, name: str, argument: Any | None = None) -> float:
-    """`value`, unless it is NaN or infinite (NaN passes in a rehearsal).
+    """Return `value`, unless it is NaN or infinite (NaN passes in a rehearsal).
 
     Raises
     ------
@@ -179,6 +179,6 @@ def finite(hub: Scene, value: float, name: str, argument: Any | None = None) -> 
 
 
 def place_of(names: Sequence[str], arguments: Sequence[Any], name: str):
-    """Where in the script the argument called `name` stands (None if it was not given)."""
+    """Find the place in the script of the argument called `name` (None if it was not given)."""
     index = list(names).index(name)
     return arguments[index].place if index < len(arguments) else None

@@ -1,15 +1,16 @@
 """Help about commands and styles, from their signatures and docstrings."""
 
 import inspect
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-from karamelo_py.language import docstrings, signature
+from karamelo_py.language import signature
 
 
 @dataclass(frozen=True)
 class Help:
-    """What there is to say about a command or style.
+    """The help about a command or style.
 
     Attributes
     ----------
@@ -38,14 +39,14 @@ class Help:
 
 def describe(target: Callable, name: str) -> Help:
     """Help about a command or style, from its signature and docstring, and those of its bases."""
-    head, sections = docstrings.sections(target.__doc__ or "")
+    head, sections = sections_of(target.__doc__ or "")
     summary, _, text = head.partition("\n\n")
     descriptions: dict[str, str] = {}
     # What a base class describes holds for the styles made from it.
     for owner in reversed(target.__mro__) if inspect.isclass(target) else (target,):
         for doc in (getattr(vars(owner).get("__init__"), "__doc__", None), owner.__doc__):
-            inner = docstrings.sections(doc or "")[1]
-            descriptions |= docstrings.descriptions(inner.pop("Parameters", ""))
+            inner = sections_of(doc or "")[1]
+            descriptions |= _descriptions(inner.pop("Parameters", ""))
             if owner is target:
                 sections = inner | sections
     sections.pop("Parameters", None)
@@ -59,3 +60,21 @@ def describe(target: Callable, name: str) -> Help:
         described,
         sections,
     )
+
+
+def sections_of(doc: str) -> tuple[str, dict[str, str]]:
+    """Split a docstring into its head, and sections by title."""
+    pieces = re.split(r"^([A-Z][A-Za-z ]+)\n-{3,}$", inspect.cleandoc(doc), flags=re.MULTILINE)
+    titles = [title.replace("Examples", "Example") for title in pieces[1::2]]
+    texts = (text.strip("\n") for text in pieces[2::2])
+    return pieces[0].strip(), dict(zip(titles, texts, strict=True))
+
+
+def _descriptions(section: str) -> dict[str, str]:
+    """Read descriptions by name, from a section in NumPy's form."""
+    found: dict[str, str] = {}
+    for block in re.split(r"\n(?=\S)", section):
+        head, _, text = block.partition("\n")
+        for name in filter(str.strip, head.partition(":")[0].split(",")):
+            found[name.strip().lstrip("*")] = inspect.cleandoc(text)
+    return found

@@ -10,14 +10,20 @@ from typing import Any, Protocol, runtime_checkable
 
 from karamelo_py.language import registry, signature
 from karamelo_py.language.further_mistakes import errors_of_text, further_errors
-from karamelo_py.language.meanings import Meanings
 from karamelo_py.language.presets import Presets
 from karamelo_py.language.replay import Record, Replay, spelled
-from karamelo_py.language.unknown import check_name, unknown_call, unknown_statement
-from karamelo_py.script import syntax
+from karamelo_py.language.unknown import (
+    check_name,
+    defined_later,
+    no_value,
+    unknown_call,
+    unknown_name,
+    unknown_statement,
+)
+from karamelo_py.script import evaluation, syntax
 from karamelo_py.script.errors import Pause, Place, Quit, ScriptError
-from karamelo_py.script.expressions import Value
-from karamelo_py.script.functions import FUNCTIONS
+from karamelo_py.script.expressions import SEEDS, Expression, Value
+from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, WORDS
 from karamelo_py.script.parser import parse, parse_expression
 from karamelo_py.script.reading import read_script
 
@@ -41,7 +47,7 @@ class _Frame:
     next: int = 0
 
 
-class Interpreter(Meanings):
+class Interpreter:
     """Runs a script on a hub.
 
     Parameters
@@ -67,7 +73,8 @@ class Interpreter(Meanings):
     """
 
     def __init__(self, hub: Any, presets: Mapping[str, str] | None = None):
-        super().__init__(hub)
+        self.hub = hub
+        self.variables: dict[str, Value] = {}
         hub.interpreter = self
         self.files: list[Path] = []
         self.frames: list[_Frame] = []
@@ -103,12 +110,12 @@ class Interpreter(Meanings):
 
     @property
     def waits(self) -> bool:
-        """Whether a script is in the midst of its statements."""
+        """Tell if a script is in the midst of its statements."""
         return bool(self.frames)
 
     @property
     def has_more(self) -> bool:
-        """Whether statements come behind the present one."""
+        """Tell if statements come behind the present one."""
         return any(frame.next < len(frame.statements) for frame in self.frames)
 
     def include(self, name: str) -> None:
@@ -136,7 +143,7 @@ class Interpreter(Meanings):
         self.frames.pop()
 
     def included(self, name: str, folder: Path) -> Path:
-        """The file that ``include(name)`` means in a script of this folder."""
+        """Find the file that ``include(name)`` means in a script of this folder."""
         path = folder / name
         elsewhere = self._working_folder / name
         return elsewhere if elsewhere.is_file() and not path.is_file() else path
@@ -163,7 +170,7 @@ class Interpreter(Meanings):
             raise
 
     def _copy(self, hub: Any) -> Interpreter:
-        """The same place in the script, on another hub."""
+        """Copy the place in the script, on another hub."""
         other = Interpreter(hub, self.presets)
         other.variables = dict(self.variables)
         other.files = list(self.files)
@@ -229,7 +236,7 @@ class Interpreter(Meanings):
                 raise
 
     def next_statement(self) -> syntax.Statement | None:
-        """The statement that comes next, in whichever file; it counts as carried out."""
+        """Take the statement that comes next, in whichever file; it counts as carried out."""
         while self.frames:
             frame = self.frames[-1]
             if frame.next < len(frame.statements):
@@ -263,7 +270,7 @@ class Interpreter(Meanings):
             ) from None
 
     def _execute_recorded(self, statement: syntax.Statement) -> None:
-        if isinstance(statement, syntax.Call) and registry.knows("command", statement.name):
+        if isinstance(statement, syntax.CommandCall) and registry.knows("command", statement.name):
             command = registry.find("command", statement.name)
             if getattr(command, "may_differ", False):
                 self._execute(statement)
@@ -281,14 +288,14 @@ class Interpreter(Meanings):
             raise replay.other_script("there a run stood here", statement.place)
 
     def _including(self, depth: int) -> list[Place]:
-        """The include statements of the first `depth` scripts in progress, the nearest first."""
+        """List the include statements of the first `depth` scripts, the nearest first."""
         frames = self.frames[:depth]
         return [frame.statements[frame.next - 1].place for frame in reversed(frames)]
 
     def _execute(self, statement: syntax.Statement) -> None:
         if isinstance(statement, syntax.Assignment):
             self._assign(statement)
-        elif isinstance(statement, syntax.Call):
+        elif isinstance(statement, syntax.CommandCall):
             self._call(statement)
         else:
             assert isinstance(statement, syntax.Evaluation)
@@ -298,7 +305,7 @@ class Interpreter(Meanings):
             if isinstance(node, syntax.Name) and not self.means_something(node.name):
                 raise unknown_statement(self, node.name)
             if (
-                isinstance(node, syntax.Binary)
+                isinstance(node, syntax.BinaryOperation)
                 and node.operator == "=="
                 and isinstance(node.left, syntax.Name)
             ):
@@ -349,7 +356,7 @@ class Interpreter(Meanings):
 
     # -- calls ------------------------------------------------------------------------------------
 
-    def _call(self, statement: syntax.Call) -> None:
+    def _call(self, statement: syntax.CommandCall) -> None:
         name = statement.name
         if self.hides(name):
             raise unknown_call(self, name, statement.place, statement=True)
@@ -362,6 +369,65 @@ class Interpreter(Meanings):
             self.evaluate(parse_expression(raw), raw)
         else:
             raise unknown_call(self, name, statement.place, statement=True)
+
+    # -- expressions ------------------------------------------------------------------------------
+
+    def evaluate(self, node: syntax.Node, raw: syntax.Raw) -> Value:
+        """Evaluate an expression now: to a number, a text or a formula."""
+        return evaluation.evaluate(node, raw, self)
+
+    def knows(self, name: str) -> bool:
+        """Tell if a name means something in an expression."""
+        return (
+            name in self.variables or name in SEEDS or name in CONSTANTS or name in self.hub.values
+        )
+
+    def hides(self, name: str) -> bool:
+        """Tell if a variable has the name of a function or command, which it hides then."""
+        return name in self.variables
+
+    def name(self, name: str, node: syntax.Name, raw: syntax.Raw) -> Value:
+        """Find the value of a name in an expression."""
+        if name in SEEDS:
+            return Expression.seed(name)
+        if name in self.variables:
+            return self.variables[name]
+        if name in CONSTANTS:
+            return CONSTANTS[name]
+        if name in self.hub.values:
+            return Expression.seed(name)
+        raise unknown_name(self, name, evaluation.mark(raw, node))
+
+    def means_something(self, name: str) -> bool:
+        """Tell if a name can stand in a script here, be it as a call or further down."""
+        known = self.knows(name) or name in WORDS or name in FUNCTIONS
+        return known or registry.knows("command", name) or bool(defined_later(self, name, None))
+
+    def command(self, node: syntax.FunctionCall, raw: syntax.Raw) -> Value:
+        """Find the value of a call inside an expression that is not a function."""
+        name = node.name
+        begin = raw.start + node.start
+        place = raw.source.place(begin, begin + len(name))
+        if not registry.knows("command", name) or self.hides(name):
+            raise unknown_call(self, name, place, statement=False)
+        target = registry.find("command", name)
+        # What gives no value must not be carried out here, least of all a run.
+        if getattr(target, "__annotations__", {}).get("return", "") in (None, "None"):
+            raise no_value(name, place)
+        arguments = [
+            signature.Argument(syntax.Raw(raw.source, raw.start + o.start, raw.start + o.end), self)
+            for o in node.operands
+        ]
+        try:
+            value = signature.call(target, self.hub, arguments, name)
+        except ScriptError as error:
+            error.place = error.place or place
+            raise
+        if isinstance(value, (bool, int, float)):
+            return float(value)
+        if isinstance(value, (str, Expression)):
+            return value
+        raise no_value(name, place)
 
 
 def _same(a: Path, b: Path) -> bool:

@@ -27,7 +27,7 @@ _LARGEST_INTEGER = 2**53
 
 @dataclass(frozen=True)
 class Constraint:
-    """What a number has to fulfil: `text` says it, `holds` decides."""
+    """A condition on a number: `text` says it, `holds` decides."""
 
     text: str
     holds: Callable[[float], bool]
@@ -38,12 +38,12 @@ NonNegative = Constraint("of at least 0", lambda value: value >= 0)
 
 
 def AtLeast(least: float) -> Constraint:
-    """A number of at least `least`."""
+    """Ask for a number of at least `least`."""
     return Constraint(f"of at least {least:g}", lambda value: value >= least)
 
 
 def In(lo: float, hi: float, open: bool | Literal["lo", "hi", "both"] = False) -> Constraint:
-    """A number between `lo` and `hi`; the ends named by `open` (True: both) are excluded."""
+    """Ask for a number from `lo` to `hi`; ends named by `open` (True: both) are excluded."""
     above = open in (True, "lo", "both")
     below = open in (True, "hi", "both")
 
@@ -72,7 +72,7 @@ class InputFile:
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> Path:
-        """The path of the file."""
+        """Read the path of the file."""
         name = _file_name(argument)
         folders = [getattr(hub, "folder", Path()), Path(), argument._interpreter.folder]
         for folder in folders:
@@ -106,7 +106,7 @@ class OutputFile:
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> Path:
-        """The path of the file."""
+        """Read the path of the file."""
         name = _file_name(argument)
         path = getattr(hub, "folder", Path()) / name
         try:
@@ -157,7 +157,7 @@ class Unfit(Exception):
 
 @dataclass(frozen=True)
 class Kind:
-    """What an argument has to be: said in words, and how to make it from an argument.
+    """The kind of an argument: its words, and the way to make a value of it.
 
     `words` are the only ones that fit, where there are such; `family` is that of styles that it
     names.
@@ -201,7 +201,7 @@ def _to_number(hub: Any, argument: Argument) -> float:
 
 
 def _suggest_numbers(argument: Argument, error: ScriptError) -> None:
-    """Where a name is unknown: mean no other that changes in a run, which is no number here."""
+    """Suggest for an unknown name no other that changes in a run, which is no number here."""
     name = re.fullmatch(r"unknown name '(\w+)'", error.message)
     close = re.fullmatch(r"did you mean '(\w+)'\?", error.hint or "")
     if not (name and close) or close[1] in CONSTANTS or "value" in argument.text:
@@ -245,7 +245,7 @@ class StyleOf:
     script_kind = "a word"
 
     def from_script(self, hub: Any, argument: Argument) -> str:
-        """The name as it stands, or what a text variable of another name holds."""
+        """Read the name as it stands, or what a text variable of another name holds."""
         if registry.knows(self.family, argument.text):
             return argument.text
         joined = "-".join(argument.text.split())
@@ -304,7 +304,7 @@ _SIMPLE = {
 
 
 def kind_of(annotation: Any) -> Kind:
-    """What an annotation asks for.
+    """Find the kind that an annotation asks for.
 
     Raises
     ------
@@ -333,7 +333,7 @@ def kind_of(annotation: Any) -> Kind:
 
 
 def is_raw(kind: Kind) -> bool:
-    """Whether arguments of this kind are left to the callee as they are."""
+    """Tell if arguments of this kind are left to the callee as they are."""
     return kind is _SIMPLE[Argument]
 
 

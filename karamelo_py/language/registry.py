@@ -54,22 +54,22 @@ def _origin(entry: EntryPoint) -> str:
 
 
 def families() -> list[str]:
-    """Names of all families of words for scripts, such as command, fix, region."""
+    """List names of all families of words for scripts, such as command, fix, region."""
     return [family for family in _families() if family != "engine"]
 
 
 def names(family: str) -> list[str]:
-    """Names of all styles of `family`, sorted."""
+    """List names of all styles of `family`, sorted."""
     return sorted(_families().get(family, {}), key=lambda name: (name.lower(), name))
 
 
 def knows(family: str, name: str) -> bool:
-    """Whether `family` has a style of this name (which may still be broken)."""
+    """Tell if `family` has a style of this name (which may still be broken)."""
     return name in _families().get(family, {})
 
 
 def name_of(family: str, style: type) -> str:
-    """What a script calls a class, or the style beside it in its file; else the class's name."""
+    """Find the style's name of a class, or of its file; else the class's own name."""
     for value in (f"{style.__module__}:{style.__qualname__}", f"{style.__module__}:"):
         for name, entries in _families().get(family, {}).items():
             if any(entry.value.startswith(value) for entry in entries):
@@ -78,12 +78,12 @@ def name_of(family: str, style: type) -> str:
 
 
 def origin(family: str, name: str) -> str:
-    """The package that offers a style, with its version."""
+    """Name the package that offers a style, with its version."""
     return " and ".join(_origin(entry) for entry in _entries(family, name))
 
 
 def find(family: str, name: str) -> Any:
-    """The class or function behind a style; imported when it is first asked for.
+    """Find the class or function behind a style; imported when it is first asked for.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def find(family: str, name: str) -> Any:
 
 
 def called(family: str, ID: str, name: str) -> Any:
-    """The same of a statement that has an ID in front of it.
+    """Find the same for a statement that has an ID in front of it.
 
     Raises
     ------

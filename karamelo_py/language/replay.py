@@ -11,12 +11,12 @@ _BLANKS = re.compile(r'"[^"\n]*"|\s+')
 
 
 def spelled(statement: Statement) -> str:
-    """The text of a statement without what means nothing: blanks, comments, line ends."""
+    """Write the text of a statement without what means nothing: blanks, comments, line ends."""
     return _BLANKS.sub(lambda m: m[0] if m[0][0] == '"' else "", statement.raw.code)
 
 
 class Record:
-    """What a script has done so far.
+    """The statements that a script has done so far.
 
     Commands that only say how a run goes on or what it writes (``may_differ``) are not in it.
 
@@ -35,7 +35,7 @@ class Record:
         self.values = dict(values or {})
 
     def note(self, value: float) -> None:
-        """A call of value(...) in the last statement gave `value`."""
+        """Note that a call of value(...) in the last statement gave `value`."""
         self.values.setdefault(len(self.statements) - 1, []).append(value)
 
 
@@ -61,11 +61,11 @@ class Replay:
 
     @property
     def at_end(self) -> bool:
-        """Whether the present statement is the last of the record."""
+        """Tell if the present statement is the last of the record."""
         return self.number == len(self.record.statements) - 1
 
     def next(self, text: str, place: Place | None) -> None:
-        """The next statement is `text`.
+        """Go on to the next statement, which is `text`.
 
         Raises
         ------
@@ -82,7 +82,7 @@ class Replay:
             raise error
 
     def _longer_by(self, before: str, text: str) -> str | None:
-        """How a run that was in progress is given the length that a variable of it now has."""
+        """Give a run that was in progress the length that a variable of it now has."""
         run = self.record.statements[-1]
         name, assigns, value = text.partition("=")
         if not (assigns and name.isidentifier() and before.startswith(f"{name}=") and self.within):
@@ -93,11 +93,11 @@ class Replay:
         return f"leave {before} as it was here, and write {longer} in the place of {run}"
 
     def value(self) -> float:
-        """What the next value(...) of the present statement gave."""
+        """Look up the number that the next value(...) of the present statement gave."""
         return self._values.pop(0) if self._values else nan
 
     def other_script(self, message: str, place: Place | None = None) -> ScriptError:
-        """The error for a script that is not the one that wrote the file."""
+        """Make the error for a script that is not the one that wrote the file."""
         return ScriptError(
             f"{self.file} was written by another script: {message}",
             place=place,

@@ -35,7 +35,7 @@ def check_columns(columns: Sequence[str], known: Sequence[str], *, first: int) -
 
 
 def unknown_column(message: str, name: str, known: Iterable[str], **where: Any) -> ScriptError:
-    """The error for a column that is none of the `known`; `where` it stands."""
+    """Make the error for a column that is none of the `known`; `where` it stands."""
     known = list(known)
     error = unknown(message, name, known, **where)
     quantity = next((q for q, words in _QUANTITIES.items() if name.lower() in words), "")

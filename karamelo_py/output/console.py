@@ -1,4 +1,4 @@
-"""What the user sees on the terminal: banner, log lines, progress, warnings, the table at the end.
+"""Output on the terminal: banner, log lines, progress, warnings, the table at the end.
 
 On a terminal Rich draws a live bar; into a pipe or a file go the same facts as plain lines. Every
 line is flushed.
@@ -68,7 +68,7 @@ class Console:
 
     @property
     def terminal(self) -> bool:
-        """Whether somebody looks at it live."""
+        """Tell if somebody looks at it live."""
         if self._terminal is None:
             isatty = getattr(self.out, "isatty", None)
             self._terminal = bool(isatty and isatty()) and os.environ.get("TERM") != "dumb"
@@ -240,7 +240,7 @@ def _print(stream: TextIO, text: str) -> None:
 
 
 def show(value: Any) -> str:
-    """A value as a table shows it: 1 234 567, 0.333333, text as it is."""
+    """Write a value as a table shows it: 1 234 567, 0.333333, text as it is."""
     if isinstance(value, bool) or value is None:
         return str(value)
     if isinstance(value, int):
@@ -251,7 +251,7 @@ def show(value: Any) -> str:
 
 
 def duration(seconds: float) -> str:
-    """Seconds as people say them: 42 s, 3 min 20 s, 2 h 5 min."""
+    """Write seconds as people say them: 42 s, 3 min 20 s, 2 h 5 min."""
     whole = round(seconds)
     if whole < 60:
         return f"{whole} s"

@@ -73,9 +73,12 @@ class Fields:
             self._cache.clear()
         return simulation
 
-    def pieces(self) -> Iterator["Fields"]:
-        """The fields of all points, so many points at a time, in the order of their ids."""
-        for piece in self._simulation.pieces():
+    def pieces(self, *, to_first: bool = False) -> Iterator["Fields"]:
+        """The fields of all points, so many points at a time, in the order of their ids.
+
+        With `to_first`, of several processes the first alone gets them.
+        """
+        for piece in self._simulation.pieces(to_first=to_first):
             yield Fields(self.hub, piece)
 
     def _cached(self, name: str, make) -> Any:
@@ -187,23 +190,11 @@ class Fields:
         return self._simulation.added_up(part, name, *arguments)
 
     def each(self, part: Any, name: str, *arguments: Any) -> list:
-        """What a method of a part says of fields of some points of its group after others.
+        """List what a method of a part says of fields of some points of its group after others.
 
         Which points are together, and in what order they come, depends on processes and steps.
         """
         return self._simulation.each(part, name, *arguments)
-
-    def counted(self, part: Any, name: str, size: int, *arguments: Any) -> np.ndarray:
-        """How many points of a part's group have each of `size` numbers, which its method says."""
-        return self._simulation.counted_of(part, name, size, *arguments)
-
-    def in_order(self, part: Any, name: str, *arguments: Any) -> Iterator[np.ndarray]:
-        """Rows (k, n) of the points of a part's group in the order of their keys, some at a time.
-
-        Its method says both, keys (n,) and rows, of fields of some of the points. Keys are whole
-        numbers, no two alike. How many come together depends on processes.
-        """
-        return self._simulation.in_order(part, name, *arguments)
 
     def particle_names(self) -> list[str]:
         """Names that `particle` knows."""
@@ -220,7 +211,7 @@ class Fields:
         return {name for law in laws for name in columns_of(law)}
 
     def rate_is_asked_for(self) -> bool:
-        """Whether a dump or a compute has the column ``epdot``, which points keep for it alone."""
+        """Tell whether a dump or a compute has the column ``epdot``, which points keep for it."""
         askers = [*self.hub.dumps.values(), *self.hub.computes.values()]
         return any("epdot" in getattr(asker, "columns", ()) for asker in askers)
 
@@ -276,9 +267,13 @@ class Fields:
                 return _column(array, k)
         return np.zeros(simulation.count)
 
-    def node_pieces(self, names: Sequence[str]) -> Iterator[NodeFields]:
-        """Fields of all nodes, of which `names` are asked for, so many nodes at a time."""
-        for rows in self._simulation.node_pieces([name for name in names if name in BROUGHT]):
+    def node_pieces(self, names: Sequence[str], *, to_first: bool = False) -> Iterator[NodeFields]:
+        """Fields of all nodes, of which `names` are asked for, so many nodes at a time.
+
+        With `to_first`, of several processes the first alone gets them.
+        """
+        brought = [name for name in names if name in BROUGHT]
+        for rows in self._simulation.node_pieces(brought, to_first=to_first):
             yield NodeFields(self.hub, rows)
 
     def mass_at_nodes(self, group: Any) -> np.ndarray:
@@ -288,7 +283,7 @@ class Fields:
 
     @property
     def occupied_nodes(self) -> tuple[int, int]:
-        """How many nodes have mass, and the last of them."""
+        """The number of nodes with mass, and the last of them."""
         self._simulation.show_on_nodes()
         return self._simulation.occupied_nodes()
 
@@ -302,7 +297,7 @@ class Fields:
 
 
 def _of_points(simulation: Any, filler: Callable, *columns: int) -> np.ndarray:
-    """What `filler(laws)(kin, like, points, laws, rows)` says of all points, by id, (N, *columns).
+    """Collect what `filler(laws)(kin, like, points, laws, rows)` says of all points, (N, *columns).
 
     Points are left at 0 where their laws do not have it, and `filler(laws)` is false.
     """

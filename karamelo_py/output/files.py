@@ -4,12 +4,32 @@ import os
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
+from io import BytesIO
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, BinaryIO
 
 from karamelo_py.script.errors import ScriptError
 
 FORMATS = ("png", "pdf", "svg")
+_DISCARDED: ContextVar[Path | None] = ContextVar("discarded", default=None)
+
+
+@contextmanager
+def discarded() -> Iterator[None]:
+    """Within this, files are made and not kept: another process keeps its own."""
+    with TemporaryDirectory() as folder:
+        token = _DISCARDED.set(Path(folder))
+        try:
+            yield
+        finally:
+            _DISCARDED.reset(token)
+
+
+def folder_of_discarded() -> Path | None:
+    """Find where files are made that are not kept, or None where they are."""
+    return _DISCARDED.get()
 
 
 @contextmanager
@@ -21,6 +41,9 @@ def whole(path: Path) -> Iterator[BinaryIO]:
     ScriptError
         If the file cannot be written, with the system's reason.
     """
+    if folder_of_discarded() is not None:
+        yield BytesIO()
+        return
     temporary = path.with_name(f"{path.name}.part")
     with reported(path):
         try:
@@ -63,7 +86,7 @@ def continued(path: Path, start: int, tail: bytes) -> Iterator[BinaryIO]:
 
 
 def picture_format(path: Path) -> str:
-    """The format that the name of a picture asks for.
+    """Read the format that the name of a picture asks for.
 
     Raises
     ------

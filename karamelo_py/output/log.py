@@ -47,7 +47,7 @@ class Log(Rhythmic):
 
     @property
     def path(self) -> Path:
-        """Where it is written."""
+        """The file of the log."""
         return self.hub.folder / self.file
 
     def default(self) -> None:
@@ -93,7 +93,7 @@ class Log(Rhythmic):
         self.hub.console.log_line(_row(cells, self._widths))
 
     def resumed(self) -> None:
-        """Rows behind those that are remembered go, where the file is open."""
+        """Drop rows behind those that are remembered, where the file is open."""
         if self._file is not None:
             self._file.truncate(self._end)
 
@@ -105,6 +105,8 @@ class Log(Rhythmic):
 
     def _go_on(self) -> None:
         """Go on in the file of an earlier run, behind the line that was its last then."""
+        if not self.hub.output.writes:
+            return
         there = self.path.stat().st_size if self.path.is_file() else 0
         if there < self._end:
             self.hub.warn(
@@ -161,7 +163,7 @@ class Log(Rhythmic):
 
 
 def _is_log(path: Path) -> bool:
-    """Whether what is there, if anything, looks like a log: names, then numbers."""
+    """Tell if what is there, if anything, looks like a log: names, then numbers."""
     try:
         with path.open(encoding="utf-8") as file:
             lines = [file.readline(1 << 16) for _ in range(4)]
@@ -204,7 +206,7 @@ def _row(cells: list[str], widths: list[int]) -> str:
 
 
 def begins_anew(path: Path) -> str:
-    """What is said where a run that goes on does not find this file of the one before."""
+    """Write the warning of a run that goes on without this file of the one before."""
     if not path.is_file():
         return f"there is no {path} of the run that is gone on from: it begins anew"
     return f"{path} is not as the run left it that is gone on from: it begins anew"

@@ -12,7 +12,7 @@ from karamelo_py.script.errors import ScriptError
 
 
 def movie_format(path: Path) -> str:
-    """The format that the name of a movie asks for.
+    """Read the format that the name of a movie asks for.
 
     Raises
     ------

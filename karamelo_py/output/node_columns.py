@@ -56,7 +56,7 @@ class NodeFields:
         self.ids = np.arange(rows.first, rows.end)
 
     def node(self, name: str) -> np.ndarray:
-        """A field of the nodes, (n,)."""
+        """Return a field of the nodes, (n,)."""
         arrays = self.rows.arrays
         if name == "mass":
             return arrays["nodes/sums"][:, MASS].astype(float)
@@ -77,14 +77,14 @@ class NodeFields:
         return np.where(self.node("mass") > 0, field, 0.0)
 
     def positions(self) -> np.ndarray:
-        """(n, 3) where they are."""
+        """Return where they are, (n, 3)."""
         found = np.empty((len(self.ids), 3))
         for lattice, own in self.lattices():
             found[own] = lattice.positions(self.ids[own])
         return found
 
     def lattices(self) -> list[tuple[Any, slice]]:
-        """The grids that they belong to, and which of them do."""
+        """List the grids that they belong to, and which of them do."""
         ends = ((one, one.first + one.node_count) for one in self.hub.lattices)
         return [
             (one, slice(*np.searchsorted(self.ids, (one.first, end)).tolist()))
@@ -94,7 +94,7 @@ class NodeFields:
 
 
 def kind_of_grid(nodes: NodeFields) -> np.ndarray:
-    """The number of the grid, from 1."""
+    """Return the number of the grid, from 1."""
     begins = [lattice.first for lattice in nodes.hub.lattices]
     return np.searchsorted(begins, nodes.ids, side="right")
 
@@ -109,7 +109,7 @@ def mask(nodes: NodeFields) -> np.ndarray:
 
 
 def _among(members: np.ndarray, nodes: NodeFields) -> np.ndarray:
-    """Which of the nodes are among ascending numbers."""
+    """Find the nodes that are among ascending numbers."""
     first, end = nodes.rows.first, nodes.rows.end
     return members[slice(*np.searchsorted(members, (first, end)))] - first
 
@@ -133,7 +133,7 @@ def kind_of_node(axis: int, nodes: NodeFields) -> np.ndarray:
 
 
 def load(axis: int, nodes: NodeFields) -> np.ndarray:
-    """What fixes put on nodes, and on points, whose weights bring it to the nodes."""
+    """Add up the loads of fixes on nodes, and on points, whose weights bring them to the nodes."""
     hub, rows = nodes.hub, nodes.rows
     out = rows.brought[f"b{AXES[axis]}"].copy()
     if axis >= hub.domain.dimension:
@@ -171,7 +171,7 @@ LOADS = "post_particles_to_grid"
 
 
 def _volume(simulation: Any, block: Any) -> np.ndarray:
-    s = simulation.stepped
+    s = simulation.setup
     points = known_to_laws(block.points)
     rows = np.zeros((len(points.id), EXPORTED))
     export_state(s.kin, s.nodes.sums[0, MASS], points, block.laws, rows)
@@ -198,7 +198,7 @@ BROUGHT: dict[str, Callable[[Any, Any], np.ndarray | None]] = {
 
 def brought(simulation: Any, name: str) -> np.ndarray:
     """(nodes, 2) sums of N value over the points at hand: whole units of all, and what is left."""
-    s = simulation.stepped
+    s = simulation.setup
     out = np.zeros((len(s.nodes.sums), 2))
     found = [(block, BROUGHT[name](simulation, block)) for block in s.blocks]
     found = [(block, np.ascontiguousarray(of, float)) for block, of in found if of is not None]

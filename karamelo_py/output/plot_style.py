@@ -5,7 +5,7 @@ from typing import Any
 
 
 def blank_figure(width: float, height: float) -> Any:
-    """An empty figure of Matplotlib, in inches, that needs no display."""
+    """Make an empty figure of Matplotlib, in inches, that needs no display."""
     # Matplotlib takes a third of a second to import: only scenes with plots pay it.
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -16,7 +16,7 @@ def blank_figure(width: float, height: float) -> Any:
 
 
 def tick_text(a: float, _: Any = None) -> str:
-    """A number at an axis: 0.02, 500, 3·10^-7."""
+    """Write a number at an axis: 0.02, 500, 3·10^-7."""
     if a == 0 or 1e-3 <= abs(a) < 1e5:
         return f"{a:g}"
     exponent = floor(log10(abs(a)) + 1e-9)
@@ -44,7 +44,7 @@ def real_ticks(axis: Any) -> None:
 
 
 def tidy(axes: Any) -> None:
-    """A light grid, no frame on the far sides, and real numbers at the ticks."""
+    """Draw a light grid, no frame on the far sides, and real numbers at the ticks."""
     real_ticks(axes.xaxis)
     real_ticks(axes.yaxis)
     axes.grid(True, color="0.9", linewidth=0.7)

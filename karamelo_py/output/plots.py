@@ -69,7 +69,7 @@ class Plots:
         self._curves[ID] = curve
 
     def ids(self) -> list[str]:
-        """IDs of the curves."""
+        """List IDs of the curves."""
         return list(self._curves)
 
     def finish(self) -> None:

@@ -1,4 +1,4 @@
-"""What a log line or a plot reads at each output: anything with a name."""
+"""Quantities that a log line or a plot reads at each output: anything with a name."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
 from karamelo_py.script.errors import ScriptError, meant
 from karamelo_py.script.expressions import POINT_SEEDS
-from karamelo_py.script.other_programs import ENERGIES
+from karamelo_py.script.other_programs import table
 
 KEYWORDS = {"step": "Step", "dt": "dt", "time": "Time"}
 LIMIT = "limit"  # the log shows the name of what limits the step
@@ -67,7 +67,7 @@ class Quantity:
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument, words: bool = False) -> Quantity:
-        """The quantity that a script's argument means; errors mark the argument."""
+        """Read the quantity that a script's argument means; errors mark the argument."""
         text = argument.text.strip().strip('"')
         try:
             if text in cls.names(hub) or (words and text == LIMIT):
@@ -79,7 +79,9 @@ class Quantity:
             if error.message == f"unknown name '{text}'":
                 error.expected = "one of " + ", ".join(dict.fromkeys(cls.names(hub)))
                 if not (error.hint or "").startswith("did you mean"):
-                    error.hint = ENERGIES.get(text) or meant(text, KEYWORDS) or error.hint
+                    error.hint = (
+                        table()["energies"].get(text) or meant(text, KEYWORDS) or error.hint
+                    )
                 if text in hub.fields.particle_names():
                     error.hint = (
                         f"{text} differs from point to point: dump(...) writes it, and "
@@ -89,7 +91,7 @@ class Quantity:
 
     @staticmethod
     def names(hub: Scene) -> list[str]:
-        """Every name that can be logged now."""
+        """List every name that can be logged now."""
         return [*KEYWORDS, *_variables(hub), *hub.values.names()]
 
     @property
@@ -98,7 +100,7 @@ class Quantity:
         return KEYWORDS.get(self.name, "".join(self.name.split()))
 
     def read(self) -> float | int | str:
-        """The number now, or the word; of the first that is no number the user is told."""
+        """Read the number now, or the word; of the first that is no number the user is told."""
         if self.is_word:
             return self.hub.simulation.ruling_limit
         number = self._number()
@@ -120,7 +122,7 @@ class Quantity:
         return source
 
     def _source(self) -> Any:
-        """The formula, the content of the variable, or the number behind the name.
+        """Find the formula, the content of the variable, or the number behind the name.
 
         Looked up each time, as the script may set a variable anew between two runs.
         """

@@ -6,7 +6,7 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import Any, Protocol
 
-from karamelo_py.language.faults import told
+from karamelo_py.language.faults import as_script_error
 from karamelo_py.language.scene import Scene
 from karamelo_py.output.log import Log
 from karamelo_py.output.plots import Plots
@@ -49,6 +49,11 @@ class Output:
         self.last: list[Periodic] = []
         # Who writes to a file.
         self.files: dict[Path, str] = {}
+
+    @property
+    def takes_part(self) -> bool:
+        """Tell whether dumps are written, by this process or by the first."""
+        return self.writes or not self.hub.settings.comm.leads
 
     def check_file(self, file: Path) -> None:
         """Refuse to write to `file` if that is the log or a script, or cannot be done.
@@ -104,7 +109,7 @@ class Output:
             self.write(last=True)
 
     def next_step(self, step: int) -> int:
-        """The first step after `step` at which something is due."""
+        """Find the first step after `step` at which something is due."""
         update = self.hub.update
         fixed = update.fixed_dt is not None
         return min(
@@ -138,7 +143,7 @@ class Output:
 
     def write_last(self) -> None:
         """Write what comes after all others alone."""
-        for item in self.last if self.writes else ():
+        for item in self.last if self.takes_part else ():
             if item.last_step != self.hub.update.step:
                 self._do(item, "write")
                 item.last_step = self.hub.update.step
@@ -178,21 +183,24 @@ class Output:
         except ScriptError as error:
             raise _located(error, item) from error.__cause__
 
-    @staticmethod
-    def _do(item: Any, what: str) -> None:
+    def _do(self, item: Any, what: str) -> None:
         """Write or finish; exceptions of a dump say where they come from."""
         style = getattr(item, "style", "")
-        with told(f"dump {style}", what, type(item), item.place) if style else nullcontext():
+        if not self.hub.settings.comm.leads:
+            what = "take_part" if hasattr(item, "take_part") else what
+        place = getattr(item, "place", None)
+        naming = as_script_error(f"dump {style}", what, type(item), place)
+        with naming if style else nullcontext():
             getattr(item, what)()
 
     def _items(self) -> list[Periodic]:
-        if not self.writes:
+        if not self.takes_part:
             return [self.log, *self.plots]
         return [self.log, *self.hub.dumps.values(), *self.plots, *self.last]
 
 
 def _located(error: ScriptError, item: Any) -> ScriptError:
-    """The error of an output, with the place of the command that asked for it."""
+    """Make the error of an output, with the place of the command that asked for it."""
     place = getattr(item, "place", None)
     if error.place is None and place is not None:
         error.place = place
@@ -201,7 +209,7 @@ def _located(error: ScriptError, item: Any) -> ScriptError:
 
 
 def _may_be(path: Path, other: Path) -> bool:
-    """Whether `path`, whose first ``*`` becomes a number, may come to be the file `other`."""
+    """Tell if `path`, whose first ``*`` becomes a number, may come to be the file `other`."""
     if "*" not in str(path):
         try:
             return path.resolve() == other.resolve() or path.samefile(other)

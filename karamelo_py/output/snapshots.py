@@ -33,7 +33,7 @@ class Snapshot(NamedTuple):
 
 
 def read(path: Path) -> Iterator[Snapshot]:
-    """The snapshots in a file, in their order.
+    """Read the snapshots in a file, in their order.
 
     Raises
     ------

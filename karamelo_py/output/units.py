@@ -71,12 +71,12 @@ class Units(NamedTuple):
         return " ".join(self)
 
     def si(self, powers: Powers) -> float:
-        """The unit of a mechanical quantity in SI units."""
+        """Name the unit of a mechanical quantity in SI units."""
         si = LENGTHS[self.length] ** powers.length * MASSES[self.mass] ** powers.mass
         return si * TIMES[self.time] ** powers.time
 
     def name(self, powers: Powers) -> str:
-        """The unit of a quantity: MPa where the set has a name for it, else mm/ms and the like."""
+        """Name the unit of a quantity: MPa where there is such a name, else mm/ms and the like."""
         if powers in NAMED:
             order = log10(self.si(powers))
             if isclose(order, round(order), abs_tol=1e-9) and round(order) in PREFIXES:
@@ -93,12 +93,12 @@ class Units(NamedTuple):
         return f"{above or 1}/{f'({below})' if ' ' in below else below}"
 
     def of_column(self, name: str) -> str:
-        """The unit of a column of a dump, empty where it has none."""
+        """Name the unit of a column of a dump, empty where it has none."""
         powers = (powers for names, powers in COLUMNS.items() if re.fullmatch(names, name))
         return self.name(next(powers, Powers()))
 
     def of_value(self, name: str, parts: Mapping[str, Any]) -> str:
-        """The unit of `name` in the log, which one of `parts` (fixes and computes) may publish."""
+        """Name the unit of `name` in the log, a value perhaps of one of `parts`."""
         for ID, part in parts.items():
             if name in (ID, *(f"{ID}_{end}" for end in part.published)):
                 return self.name(STYLES.get(part.style, Powers()))
@@ -106,5 +106,5 @@ class Units(NamedTuple):
 
 
 def labelled(name: str, unit: str) -> str:
-    """``name [unit]``, or the name where there is no unit."""
+    """Write ``name [unit]``, or the name where there is no unit."""
     return f"{name} [{unit}]" if unit else name

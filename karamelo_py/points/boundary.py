@@ -1,6 +1,6 @@
 """The edge of a grid that reflects points (boundary reflect); other grids let them go."""
 
-from karamelo_py.compiler.compile import choose, point_function, real
+from karamelo_py.compiler.compile import point_function, real, where
 from karamelo_py.compiler.fields import Field, vector
 from karamelo_py.points.grid import Grid, in_cells, pick
 
@@ -37,12 +37,12 @@ def beyond(grid, direction, y):
     """-1 below the lower edge, 1 above the upper one, else 0."""
     a = in_cells(grid, direction, y)
     end = pick(direction, grid.lx, grid.ly, grid.lz)
-    return choose(a < 0, real(-1, y), choose(a > end, real(1, y), real(0, y)))
+    return where(a < 0, real(-1, y), where(a > end, real(1, y), real(0, y)))
 
 
 def turn(grid, direction, y, v):
     """-1 where a point beyond the edge goes further out, else 1."""
-    return choose(beyond(grid, direction, y) * v > 0, real(-1, y), real(1, y))
+    return where(beyond(grid, direction, y) * v > 0, real(-1, y), real(1, y))
 
 
 def mirror(grid, direction, y):
@@ -50,8 +50,8 @@ def mirror(grid, direction, y):
     side = beyond(grid, direction, y)
     lower = pick(direction, grid.x0, grid.y0, grid.z0)
     upper = lower + pick(direction, grid.lx, grid.ly, grid.lz) * grid.h
-    edge = choose(side > 0, real(upper, y), real(lower, y))
-    return choose(abs(side) > 0, edge + (edge - y), y)
+    edge = where(side > 0, real(upper, y), real(lower, y))
+    return where(abs(side) > 0, edge + (edge - y), y)
 
 
 def turned(signs, moment):

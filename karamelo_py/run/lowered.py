@@ -11,32 +11,24 @@ import numpy as np
 from karamelo_py.compiler import fields
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.threads import Serial, Threaded, new_team
-from karamelo_py.kernels.arrays import DT, TIME, TIMESTEP, Setup
+from karamelo_py.kernels.arrays import DT, TIME, TIMESTEP
 from karamelo_py.kernels.clock import step_size
 from karamelo_py.kernels.conduction import show_heat
 from karamelo_py.kernels.nodes import SumsToVelocity
 from karamelo_py.kernels.p2g import Force
-from karamelo_py.kernels.passes import sweep
+from karamelo_py.kernels.reports import all_well
 from karamelo_py.kernels.rows import SUMS
-from karamelo_py.kernels.sweep import Visit, sweep_nodes
+from karamelo_py.kernels.sweep import Visit, sweep, sweep_nodes
 from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.plastic_rate import without_rate
 from karamelo_py.run.access.nodes_by_number import ByNumber
 from karamelo_py.run.access.points_by_id import ById
-from karamelo_py.run.checkpoint.arrays import (
-    Stored,
-    changing,
-    copied,
-    go_back,
-    opened,
-    stored,
-    stored_copies,
-    take_arrays,
-)
+from karamelo_py.run.checkpoint import arrays as checkpoint
+from karamelo_py.run.checkpoint import part_state
 from karamelo_py.run.lower.build import State, chosen, lower, thread_count, warms_by_friction
 from karamelo_py.run.lower.check_plugins import try_parts
 from karamelo_py.run.lower.memory import check_room, no_room
-from karamelo_py.run.tiles.tiles import Tiles
+from karamelo_py.run.mpi.subdomain import Subdomain
 from karamelo_py.scene.hub import Hub
 
 
@@ -69,16 +61,18 @@ class Lowered(ById, ByNumber):
 
     def __init__(self, hub: Hub, previous: Lowered | None = None):
         self.hub = hub
+        self.comm = comm = hub.settings.comm
         self.key = scene_key(hub)
+        self.count = sum(s.count for s in hub.solids.values())
         check_room(hub, copied=previous is None and hub.running is not None)
+        # Processes begin with equal shares of the ids: to sort them hands them over by tiles.
+        ends = (self.count * comm.rank // comm.size, self.count * (comm.rank + 1) // comm.size)
         try:
             state = previous.state() if previous else None
-            self.setup, self.tiles = self._lowered(state)
+            self.setup, self.tiles = lower(hub, state, ids=None if comm.size == 1 else ends)
         except MemoryError as error:
             raise no_room(hub, error) from None
-        self.control = self.setup.control
         try_parts(hub, self.setup)
-        self.count = sum(s.count for s in hub.solids.values())
         self.present = np.ones(self.count, np.bool_)  # by id, False for points that were deleted
         if state is not None:
             self.present[: state.count] = state.present
@@ -86,6 +80,8 @@ class Lowered(ById, ByNumber):
         self._team = new_team(self.threads)
         self.mode = Threaded(self._team.ctypes.data) if self.threads > 1 else Serial()
         self.tiles.mode = self.mode
+        self.subdomain = Subdomain(self) if comm.size > 1 else None
+        self.control = self.setup.control
         self.version = 0  # grows when fields change without a step
         self._measured = -1  # the version whose fastest point is known
         self._watched = -1  # the version whose balance of energy is followed
@@ -95,10 +91,6 @@ class Lowered(ById, ByNumber):
     def contact(self) -> Any:
         """How solids touch."""
         return self.setup.contact
-
-    def _lowered(self, state: State | None) -> tuple[Setup, Tiles]:
-        """The arrays of the whole scene, with the state of points that exist."""
-        return lower(self.hub, state)
 
     def fits(self, hub: Hub) -> bool:
         """Whether the arrays are still those of the scene."""
@@ -128,11 +120,14 @@ class Lowered(ById, ByNumber):
 
     def state(self) -> State:
         """All that a new lowering takes over."""
+        if self.subdomain is not None:
+            self.subdomain.share_contact()
         laws = {}
         for block in self.setup.blocks:
             state = block.points.state
             rows = np.zeros((len(state), self.count), state.dtype)
-            rows[:, block.points.id] = state
+            for ids, own in self._of_all_blocks([(block.points.id, state)]):
+                rows[:, ids] = own
             laws[without_rate(law_kind(block.laws))] = rows
         kept = [kind for kind in self.point_fields if fields.is_kept(kind)]
         return State(
@@ -149,7 +144,7 @@ class Lowered(ById, ByNumber):
 
     def leaving(self) -> np.ndarray:
         """Ids (0-based, ascending) of the points whose new places lie beyond the edge."""
-        s, then = self.stepped, 1 - self.now
+        s, then = self.setup, 1 - self.now
         edges = ((s.grids.x0, s.grids.lx), (s.grids.y0, s.grids.ly), (s.grids.z0, s.grids.lz))
         found = []
         for block in s.blocks:
@@ -163,16 +158,16 @@ class Lowered(ById, ByNumber):
                 beyond |= (a < -slack) | (a > size + slack)
                 finite &= np.isfinite(y)
             found.append(points.id[beyond & finite])
-        return np.sort(np.concatenate(found))
+        return np.sort(np.concatenate(self.comm.allgather(np.concatenate(found))))
 
     def remove(self, ids: np.ndarray) -> None:
         """Take points out of the run; the ids of the others stay."""
         self.present[ids] = False
         blocks = tuple(
             chosen(block, np.flatnonzero(self.present[block.points.id]))
-            for block in self.stepped.blocks
+            for block in self.setup.blocks
         )
-        self.stepped = self.stepped._replace(blocks=blocks)
+        self.setup = self.setup._replace(blocks=blocks)
         self.control.clock[0].drift = np.inf
         self.version += 1
         # The rate of the last step stays: the same whether or not a run begins here.
@@ -204,14 +199,16 @@ class Lowered(ById, ByNumber):
 
     def clear_forces(self) -> None:
         """Points bear no force of fixes, until these say so anew."""
-        for block in self.stepped.blocks:
+        for block in self.setup.blocks:
             force = field(block.points.fields, Force)
             if force is not None:
                 force[:] = 0
 
     def sort(self) -> None:
-        """Sort the points by tile."""
-        self.tiles.sort(self.stepped)
+        """Sort the points by tile; each process hands over those that are in tiles of others."""
+        if self.subdomain is not None:
+            self.setup = self.subdomain.migrate(self.setup)
+        self.tiles.sort(self.setup)
 
     def sort_if_due(self) -> None:
         """Sort the points when one may have left its tile's surroundings, or none is sorted yet."""
@@ -228,10 +225,11 @@ class Lowered(ById, ByNumber):
     def map_to_nodes(self) -> None:
         """Let the nodes show the present state."""
         self.sort_if_due()
-        s = self.stepped
+        s = self.setup
         dt = step_size(s)
         visit = Visit((), SUMS.quantities, SUMS.weights)
         sweep(s, self.mode, visit, dt, False, True, False)
+        all_well(s)
         sweep_nodes(self.mode, SumsToVelocity(), s.kin, s.nodes, s.ranges, dt)
         show_heat(s.heat, s, self.mode)
 
@@ -240,36 +238,51 @@ class Lowered(ById, ByNumber):
 
         The copies of the snapshot `before`, which is lost, are used again where they fit.
         """
-        return copied(self, before or {})
+        found = checkpoint.copied(self, before or {})
+        return found if self.subdomain is None else found | {"owner": self.tiles.owner}
 
     def restore(self, snapshot: dict[str, np.ndarray]) -> None:
         """Return to a snapshot."""
-        go_back(self, snapshot)
+        if self.subdomain is not None:
+            self.tiles.owner = snapshot["owner"]
+        checkpoint.restore(self, snapshot)
         self.version += 1
 
-    def stored(self) -> Iterator[Stored]:
+    def stored(self) -> Iterator[checkpoint.Stored]:
         """What a file to go on from holds, array by array."""
-        return stored(self)
+        if self.subdomain is None:
+            return checkpoint.stored(self)
+        return part_state.stored(self)
 
-    def stored_snapshot(self, snapshot: dict[str, np.ndarray]) -> Iterator[Stored]:
+    def stored_snapshot(self, snapshot: dict[str, np.ndarray]) -> Iterator[checkpoint.Stored]:
         """What such a file holds of a snapshot."""
-        return stored_copies(snapshot)
+        if self.subdomain is None:
+            return checkpoint.in_file(snapshot)
+        return part_state.stored(self, snapshot)
 
     def take_snapshot(self, path: Path) -> dict[str, np.ndarray]:
-        """The snapshot that a file holds."""
-        with opened(path, "good") as found:
+        """The snapshot that a file holds; each process reads its own share."""
+        with checkpoint.opened(path, "good") as found:
+            if self.subdomain is not None:
+                return part_state.own_share(self, found)
             # In the order in which copies are made, and written.
-            names = dict.fromkeys([*(name for name, _ in changing(self)), "values", *found])
-            return {name: found[name][()] for name in names}
+            names = [*(name for name, _ in checkpoint.changing(self)), "values", *found]
+            return {name: found[name][()] for name in dict.fromkeys(names)}
 
     def take_stored(self, path: Path) -> None:
-        """Take the state that a file to go on from holds."""
-        with opened(path) as state:
-            take_arrays(self, {name: array[()] for name, array in state.items()})
+        """Take the state that a file to go on from holds; each process reads its own share."""
+        with checkpoint.opened(path) as state, self.comm.joint():
+            shared = self.subdomain is not None
+            # Nothing of the arrays changes where the file is of another scene.
+            for k, block in enumerate(self.setup.blocks):
+                checkpoint.check_points(block.points, state, f"points/{k}/")
+            self.restore(part_state.own_share(self, state) if shared else state)
+            checkpoint.take_known(self, state)
+            (part_state if shared else checkpoint).take_nodes(self, state)
 
     def wrong_points(self) -> Iterator[tuple[Any, int]]:
         """Block and index of points at hand that the last sweep found wrong, one a tile at most."""
-        for block in self.stepped.blocks:
+        for block in self.setup.blocks:
             tiling = block.tiling
             for t in range(max(int(tiling.count[0]), 1)):
                 if tiling.report[t, 2] > 0:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from typing import Any, ClassVar
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import Any
 
 import numba
 import numpy as np
@@ -15,11 +15,12 @@ from karamelo_py.kernels.hooks import POINT_STAGES
 from karamelo_py.kernels.step import DONE, SORT, Fused, Staged, advance, measure, run_steps
 from karamelo_py.kernels.totals import agree_on_heat
 from karamelo_py.kernels.watch import COARSE, ROUND_OFF, begin_to_look, measure_heat, sum_energies
-from karamelo_py.run.body_motion import Motion, motions
+from karamelo_py.run.body_motion import BodyMotion, motions
 from karamelo_py.run.diagnosis.energy import unknown_heat, unknown_work
 from karamelo_py.run.lower.python_hooks import PythonHooks, sets_initial_state, views_of
 from karamelo_py.run.lowered import Lowered
-from karamelo_py.run.tiles.tiles import in_tiles
+from karamelo_py.run.mpi.whole import PointsMoved, Whole
+from karamelo_py.run.tiles.tiles import DIRECT_UP_TO, in_tiles
 from karamelo_py.run.timestep import (
     common_velocity,
     moves_already,
@@ -46,19 +47,26 @@ class Simulation(Lowered):
         self.beginning: list = []  # fixes of the first step that act in this run
         self.told_of_growth = False  # since the balance of energy is followed
 
-    processes: ClassVar[dict[str, str]] = {}  # what a banner says of those that share the scene
     taken_up = False  # a step goes on whose first moment has been, with other arrays
-    signal = 0  # that another process was sent, which all are to end with
-    follows = False  # another process says what this one does in a run
 
-    @contextmanager
-    def leading(self) -> Iterator[None]:
-        """While a run goes on: other processes, if there are any, follow this one."""
-        yield
+    @property
+    def processes(self) -> dict[str, str]:
+        """What a banner says of those that share the scene."""
+        if self.comm.size == 1:
+            return {}
+        alone = f", one has all points: up to {DIRECT_UP_TO} are not shared out"
+        return {"processes": f"{self.comm.size}{alone if self.tiles.direct else ''}"}
+
+    @cached_property
+    def _whole(self) -> Whole:
+        return Whole(self)
 
     def act(self, function: Callable[[Setup], None], s: Setup) -> None:
         """Call what acts from Python on the arrays of the whole scene."""
-        function(s)
+        if self.subdomain is None:
+            function(s)
+        else:
+            self._whole.act(function)
 
     @property
     def begun(self) -> list[str]:
@@ -165,19 +173,19 @@ class Simulation(Lowered):
 
     def measure(self) -> None:
         """Measure the rate of the fastest point."""
-        measure(self.stepped)
+        measure(self.setup)
         clock = self.control.clock[0]
-        clock.rate = self.most(np.array([clock.rate]))[0]
+        clock.rate = self.comm.allreduce_max(np.array([clock.rate]))[0]
 
     def fastest(self, common: Sequence[float] = (0.0, 0.0, 0.0)) -> float:
         """The largest component of the velocities of all points, less that of a common one."""
-        velocities = (block.points.v for block in self.stepped.blocks)
+        velocities = (block.points.v for block in self.setup.blocks)
         # No copy of them: there may be millions.
         components = ((a, c) for v in velocities if v.size for a, c in zip(v, common, strict=False))
         own = max((max(a.max() - c, c - a.min()) for a, c in components), default=0.0)
-        return float(self.most(np.array([own], float))[0])
+        return float(self.comm.allreduce_max(np.array([own], float))[0])
 
-    def motions(self) -> list[Motion]:
+    def motions(self) -> list[BodyMotion]:
         """How the solids lie and move."""
         return motions(self)
 
@@ -228,23 +236,28 @@ class Simulation(Lowered):
 
     def begin_to_look(self, level: float, anew: bool) -> None:
         """Measure the energies of all points, which the watch over them starts from."""
-        s = self.stepped
+        s = self.setup
         clock = s.control.clock[0]
         strain = COARSE * float(np.finfo(s.nodes.sums.dtype).eps)
         clock.energy_floor = max(ROUND_OFF, strain**2) * self.total("mass") * float(clock.rate) ** 2
         clock.born_with = self.total("born with")
         # Energies are summed by tile.
-        if any(in_tiles(block.tiling) != block.points.mass.size for block in s.blocks):
+        if self._outside_tiles():
             self.sort()
             self.mapped = False
-        begin_to_look(s, self.mode, level, anew)
+        begin_to_look(self.setup, self.mode, level, anew)
+
+    def _outside_tiles(self) -> int:
+        """Count the blocks that have points which were not sorted yet."""
+        blocks = self.setup.blocks
+        own = sum(in_tiles(block.tiling) != block.points.mass.size for block in blocks)
+        return int(self.comm.allreduce(np.array([own]))[0])
 
     def energy(self) -> float:
         """Kinetic, stored and dissipated energy less the work; NaN where nobody watches it."""
-        s = self.stepped
+        s = self.setup
         clock = s.control.clock
-        outside = sum(in_tiles(b.tiling) != b.points.mass.size for b in s.blocks)
-        if self.of_all(np.array([outside]))[0] or not clock[0].watch_energy:
+        if self._outside_tiles() or not clock[0].watch_energy:
             return np.nan
         present = clock.copy()
         sum_energies(s, self.mode)
@@ -254,7 +267,7 @@ class Simulation(Lowered):
 
     def measure_heat(self) -> None:
         """Measure the lowest and highest temperatures of all points."""
-        s = self.stepped
+        s = self.setup
         measure_heat(s)
         agree_on_heat(s.control.ranks, s.control)
 
@@ -264,11 +277,20 @@ class Simulation(Lowered):
         Points that are due to be sorted are sorted before the next step, so that the nodes keep
         showing the last one.
         """
-        target = self.step + count
+        with self.comm.joint():
+            if self.subdomain is None:
+                return self._advance_to(self.step + count)
+            from_python = bool(self._python.by_stage or self._first is not None)
+            self.subdomain.begin(self.hooks, from_python=from_python)
+            status = self._advance_to(self.step + count)
+            self.subdomain.end()
+            return status
+
+    def _advance_to(self, target: int) -> int:
         control = self.control
         while True:
             self.sort_if_due()
-            status = self._advance(target - self.step)
+            status = self._take_steps(target)
             self.mapped = True
             ended = self.step >= target or control.values[TIME] >= control.clock[0].end_time
             if status != SORT:
@@ -276,10 +298,17 @@ class Simulation(Lowered):
             if ended:
                 return DONE
 
+    def _take_steps(self, target: int) -> int:
+        while True:
+            try:
+                return self._advance(target - self.step)
+            except PointsMoved:
+                self.taken_up = True
+
     def _advance(self, count: int) -> int:
         scheme = self.hub.update.scheme
         if self._first is not None:
-            status = run_steps(scheme, Staged(), self.mode, self.stepped, self._first, 1)
+            status = run_steps(scheme, Staged(), self.mode, self.setup, self._first, 1)
             if status in (DONE, SORT):
                 self._begun |= set(self._first_fixes)
                 self._first = None
@@ -287,20 +316,24 @@ class Simulation(Lowered):
                 return SORT  # there is more to do, unless that was all
             return status
         if self._python.by_stage:
-            return run_steps(scheme, Staged(), self.mode, self.stepped, self._python, count)
+            return run_steps(scheme, Staged(), self.mode, self.setup, self._python, count)
         visits = Staged() if self.staged else Fused()
-        return advance(scheme, visits, self.mode, self.stepped, self.hooks, count)
+        return advance(scheme, visits, self.mode, self.setup, self.hooks, count)
 
     def waits(self) -> np.ndarray:
         """Seconds that each process has waited for others in steps so far."""
-        return np.zeros(1)
+        return np.array(self.comm.allgather(self.comm.waited))
 
     def compile(self) -> None:
-        """Have the loop over the steps compiled now: nobody waits for it in the midst of a log."""
+        """Have the loop over the steps compiled now: nobody waits for it in the midst of a log.
+
+        The first process does that, and the others find it on disk.
+        """
         if numba.config.DISABLE_JIT or self._python.by_stage:
             return
         visits = Staged() if self.staged else Fused()
-        advance.compile(self.hub.update.scheme, visits, self.mode, self.stepped, self.hooks, 1)
+        arguments = self.hub.update.scheme, visits, self.mode, self.setup, self.hooks, 1
+        self.comm.in_turn(lambda: advance.compile(*arguments))
 
     def _make_ready(self) -> None:
         """The threads, the hooks of the fixes, and contact, as a run needs them."""
@@ -334,8 +367,16 @@ class Simulation(Lowered):
     def set_initial(self, ID: str) -> None:
         """Let the fix `ID` set the state that a run begins with."""
         fix = self.hub.fixes[ID]
-        for view in views_of(self, fix):
-            fix.hooks()["initial_integrate"](view)
-            if view.moved:
-                self.control.clock[0].drift = np.inf
+
+        def act(_: Setup) -> None:
+            for view in views_of(self, fix):
+                fix.hooks()["initial_integrate"](view)
+                if view.moved:
+                    self.control.clock[0].drift = np.inf
+
+        if fix.point_by_point:
+            act(self.setup)
+        else:
+            self.sort_if_due()  # tiles are gathered, too
+            self.act(act, self.setup)
         self.version += 1

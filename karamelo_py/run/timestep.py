@@ -1,4 +1,4 @@
-"""Which step is taken: the program's own share of the stable step, and what limits that."""
+"""The time step: the program's own share of the stable one, and what limits that."""
 
 from math import inf, sqrt
 from typing import Any
@@ -8,32 +8,32 @@ import numpy as np
 from karamelo_py.kernels.arrays import DT
 from karamelo_py.kernels.clock import STILL, STRIDE
 from karamelo_py.kernels.laws import law_on
-from karamelo_py.points.laws import Absent, can, initial_state, law_kind, wave_speed_squared
+from karamelo_py.points.laws import (
+    Absent,
+    can,
+    constrained_velocity,
+    initial_state,
+    wave_speed_squared,
+)
 from karamelo_py.points.laws.eos import taken_heat
-from karamelo_py.points.laws.rigid import Rigid
 from karamelo_py.points.laws.strengths import shear_modulus
-from karamelo_py.points.laws.strengths.drucker_prager import DruckerPrager
-from karamelo_py.points.laws.strengths.fluid import Viscous
-from karamelo_py.points.laws.strengths.mohr_coulomb import MohrCoulomb
-from karamelo_py.points.laws.strengths.mu_i import MuI
 from karamelo_py.points.transfers import Moment
 from karamelo_py.scene.hub import Hub
 
 USUAL = 0.9
 BOXES = 6.0  # weight of a common drift in the steps of boxes
 LOST = 2.05  # times the stable step, beyond which everything is lost that was tried
-FLOWING = Viscous, MuI, DruckerPrager, MohrCoulomb  # strengths of what has no shape of its own
 LONE = 0.9  # of the stable step of a lone point: one that swells is stiffer
 DAMPED = 0.5  # the least, with one point a cell, where a share of the nodal velocity damps
 
 
 def one_a_cell(solid: Any) -> bool:
-    """Whether a solid has one point in a cell and direction, not two or more."""
+    """Tell whether a solid has one point in a cell and direction, not two or more."""
     return 2 * np.max(solid.half_size) > 0.75 * solid.h
 
 
 def sparse(hub: Hub) -> bool:
-    """Whether a solid has about one point a cell and direction."""
+    """Tell whether a solid has about one point a cell and direction."""
     return any(map(one_a_cell, hub.solids.values()))
 
 
@@ -58,7 +58,7 @@ def keeping_share(hub: Hub) -> float:
 
 
 def _keeps_velocities(hub: Hub) -> bool:
-    """Whether points of FLIP and its kin move through the grid, without moments and usl."""
+    """Tell whether points of FLIP and its kin move through the grid, without moments and usl."""
     update = hub.update
     return (
         update.method.frame.moves
@@ -70,19 +70,19 @@ def _keeps_velocities(hub: Hub) -> bool:
 
 def _deforming(hub: Hub) -> list[Any]:
     laws = [solid.material.law for solid in hub.solids.values()]
-    return [law for law in laws if Rigid not in law_kind(law)]
+    return [law for law in laws if not can(law, constrained_velocity)]
 
 
 def _flows(law: Any) -> bool:
-    """Whether a body of this law has no shape of its own, as liquids and soils."""
+    """Tell whether a body of this law has no shape of its own, as liquids and soils."""
     strength = getattr(law, "strength", None)
     return strength is not None and (
-        isinstance(strength, FLOWING) or not shear_modulus(strength) > 0
+        getattr(strength, "flows", False) or not shear_modulus(strength) > 0
     )
 
 
 def one_body(hub: Hub) -> bool:
-    """Whether all that deforms is one solid, of an elastic law or a metal: nothing that flows."""
+    """Tell whether all that deforms is one solid, of an elastic law or a metal."""
     laws = _deforming(hub)
     return len(laws) == 1 and not any(map(_flows, laws))
 
@@ -106,7 +106,7 @@ def lone_point(hub: Hub) -> float:
 
 
 def bears_drift(hub: Hub) -> bool:
-    """Whether a body that drifts bears the steps of one at rest, and keeps its energy with them.
+    """Tell whether a body that drifts bears the steps of one at rest, and keeps its energy.
 
     With cubic splines next to no energy comes from the places in the cells; usavg feeds none with
     functions that are smooth (50 periods at 0.05 to 0.5 of the speed of waves, in the plane). Disks
@@ -123,7 +123,7 @@ def bears_drift(hub: Hub) -> bool:
 
 
 def own_weight_of_drift(hub: Hub) -> float:
-    """How much of the common velocity of all counts in the step that the program takes of itself.
+    """Weight of the common velocity of all in the step that the program takes of itself.
 
     1 as in the rule of the language, h/(c + |v|). What drifts by boxes (ugimp, cpgimp), two and
     more a cell, gains the more the faster it is: by edges of shaken bars and blocks at 0.05 to 0.5
@@ -203,7 +203,7 @@ def share_of_heat(hub: Hub) -> float:
 
 
 def moves_already(simulation: Any) -> bool:
-    """Whether points are so fast that they are not at rest for a hundred steps."""
+    """Tell whether points are so fast that they are not at rest for a hundred steps."""
     clock = simulation.control.clock[0]
     return 100 * simulation.fastest() * clock.courant * clock.dt_factor > STILL * clock.rate
 
@@ -227,12 +227,12 @@ def _borne(hub: Hub, simulation: Any) -> float:
 
 
 def blows_up(hub: Hub, simulation: Any) -> bool:
-    """Whether the step is so far above the stable one that a run will hardly get anywhere."""
+    """Tell whether the step is so far above the stable one that a run gets nowhere."""
     return simulation.dt > LOST * _borne(hub, simulation)
 
 
 def what_follows(hub: Hub, simulation: Any, step: float) -> str:
-    """What is known of a `step` above the stable one of bodies that move."""
+    """Say what is known of a `step` above the stable one of bodies that move."""
     borne = _borne(hub, simulation)
     if step <= borne:
         return (
@@ -255,7 +255,7 @@ def words_of_own_step(hub: Hub, simulation: Any) -> str:
 
 
 def own_step_instead(hub: Hub, command: str = "") -> str:
-    """What to write in the place of a step that is too large, by the command that asks for it."""
+    """Say what to write in the place of a step that is too large, by the command for it."""
     if command == "set_dt" or (not command and hub.update.fixed_dt is not None):
         return f"set_dt({own_step(hub, hub.simulation):.3g}) or less, or leave set_dt out"
     share = own_step(hub, hub.simulation) / hub.simulation.limit_moving
@@ -263,7 +263,7 @@ def own_step_instead(hub: Hub, command: str = "") -> str:
 
 
 def words_of_share(hub: Hub) -> str:
-    """What the share of the stable step is, and what it means."""
+    """Say what share of the stable step is taken, and what it means."""
     asked, keeping = hub.update.dt_factor, keeping_share(hub)
     if hub.update.fixed_dt is not None:
         share = hub.update.fixed_dt / hub.simulation.limit

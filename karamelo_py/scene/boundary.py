@@ -1,4 +1,4 @@
-"""What becomes of points that reach the edge of the domain (command boundary)."""
+"""Boundary of the domain: points that reach it stop the run, are deleted or reflected."""
 
 from typing import Any
 
@@ -77,7 +77,7 @@ def tell_of_bounces(hub: Scene, simulation: Any) -> None:
 
 
 def counted(hub: Scene, simulation: Any) -> dict[str, int]:
-    """What the end of a run says of it."""
+    """Return counts for the end of a run: deleted points or reflections."""
     if hub.update.boundary == "delete":
         return {"deleted points": int(np.count_nonzero(~simulation.present))}
     if hub.update.boundary == "reflect":

@@ -75,7 +75,7 @@ class Domain:
         return RELATIVE_TOLERANCE * size
 
     def contains(self, x: np.ndarray) -> np.ndarray:
-        """Which of the positions `x` (n, >= dimension) lie in the closed box: (n,) bool."""
+        """Test which positions `x` (n, >= dimension) lie in the closed box: (n,) bool."""
         tolerance = self.tolerance
         inside = np.ones(len(x), dtype=bool)
         for axis in range(self.dimension):

@@ -19,7 +19,7 @@ NOTHING_THERE = "what acts on this group does nothing there"
 
 
 class Group:
-    """What point groups and node groups share.
+    """Base of point groups and node groups.
 
     Attributes
     ----------
@@ -126,11 +126,11 @@ class ParticleGroup(Group):
         return (self._bits.take(ids >> 3, mode="clip") >> (ids & 7) & 1).astype(np.bool_)
 
     def touches(self, solid: Solid) -> bool:
-        """Whether points of a solid are members."""
+        """Return True if points of a solid are members."""
         return any(self.has(ids).any() for ids in _numbers_of(solid))
 
     def bits(self, count: int) -> np.ndarray:
-        """Whether each of `count` points is a member, one bit each, as bytes of whole words."""
+        """Return the membership of `count` points, one bit each, as bytes of whole words."""
         size = -(-count // 64) * 8
         if self.all:
             return np.full(size, 255, np.uint8)

@@ -7,13 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from karamelo_py.language import registry
-from karamelo_py.language.faults import told
+from karamelo_py.language.faults import as_script_error
 from karamelo_py.language.unknown import line_below
 from karamelo_py.output.console import Console
 from karamelo_py.output.fields import Fields
 from karamelo_py.output.schedule import Output
-from karamelo_py.scene.blame import blamed
+from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.lattice import Lattice
+from karamelo_py.scene.plugins import attributed
 from karamelo_py.scene.update import Update
 from karamelo_py.script.errors import Place, ScriptError, meant, render_message
 from karamelo_py.script.values import Values
@@ -84,20 +85,20 @@ PARTS = ("eos", "strength", "damage", "temperature")
 
 
 def _group_of(kind: str, ID: str) -> str:
-    """How to make a group of a region or a solid."""
+    """Word the hint that makes a group of a region or a solid."""
     who = f"{ID}, all" if kind == "region" else f"regionID, solid, {ID}"
     return f"group({ID}, particles, region, {who}) makes a group of a {kind}"
 
 
 class Settings:
-    """What the command line or the script chose about how to compute."""
+    """Settings of the command line or the script: threads, precision, processes."""
 
     def __init__(self) -> None:
         self.threads: int | None = None
         self.precision = "double"
         self.engine = "processor"
         self.ranks = 1  # processes that are asked for
-        self.crew: Any = None  # the processes that share the scene, where there are several
+        self.comm = SerialComm()  # the processes that share the scene
         self.debug = False
         self.trusts = False  # .geo files, which may run programs
 
@@ -191,7 +192,7 @@ class Hub:
 
     @property
     def has_run(self) -> bool:
-        """Whether there is a state that a run has led to, or will have in a rehearsal."""
+        """True once a run has changed the state, or will have in a rehearsal."""
         return bool(self.begun or self.update.step)
 
     @property
@@ -199,7 +200,7 @@ class Hub:
         """The arrays of the scene as it is now, made when first asked for."""
         if self._simulation is None or not self._simulation.fits(self):
             engine = registry.find("engine", self.settings.engine)
-            with blamed(self):
+            with attributed(self):
                 self._simulation = engine(self, self._simulation)
         return self._simulation
 
@@ -228,8 +229,11 @@ class Hub:
         """Let computes and fixes measure the present state."""
         for catalogue in (self.computes, self.fixes):
             for item in catalogue.values():
-                with told(f"{catalogue.kind} {item.style}", "refresh", type(item), item.place):
+                name = f"{catalogue.kind} {item.style}"
+                with as_script_error(name, "refresh", type(item), item.place):
                     item.refresh()
+        # A compute of a plug-in may draw lots: all processes go on with the numbers of the first.
+        self.values.array[:] = self.settings.comm.bcast(self.values.array)
 
     def warn(
         self,
@@ -253,7 +257,7 @@ class Hub:
             self._tell_of_late(other)
 
     def lasting(self) -> list[Any]:
-        """What acts, is written or drawn in runs: fixes, dumps and curves."""
+        """List the parts that act in runs: fixes, dumps and curves."""
         return [*self.fixes.values(), *self.dumps.values(), *self.output.plots]
 
     def _tell_of_late(self, rehearsed: Hub) -> None:

@@ -52,8 +52,8 @@ class Lattice:
     def __init__(
         self,
         dimension: int,
-        lo: Sequence[float],
-        hi: Sequence[float],
+        lo: Sequence[float] | np.ndarray,
+        hi: Sequence[float] | np.ndarray,
         h: float,
         nodes_per_cell: int = 1,
         least_nodes: int = 2,
@@ -147,7 +147,8 @@ class Lattice:
 def table(lattices: Sequence[Lattice], real: type) -> Grid:
     """All lattices as kernels read them: a Grid with an array for each number."""
     rows = [lattice.numbers(real) for lattice in lattices]
-    return Grid(*(np.array(column) for column in zip(*rows, strict=True)))
+    columns: Any = (np.array(column) for column in zip(*rows, strict=True))
+    return Grid(*columns)
 
 
 def numbered(lattices: Sequence[Any]) -> list[Lattice]:

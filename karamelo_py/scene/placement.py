@@ -1,14 +1,14 @@
-"""Where the points of a filled region are put: cell by cell, as many in each as asked for."""
+"""Placement of points in a filled region: cell by cell, the same number in each."""
 
 import itertools
 import math
 from bisect import bisect_right
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.scene.cut import Pieces, cut, join
+from karamelo_py.scene.clipping import Pieces, clip, join
 from karamelo_py.scene.domain import Domain
 from karamelo_py.scene.lattice import Lattice, chunks, positions
 from karamelo_py.scene.region import Region
@@ -43,7 +43,7 @@ class Placement(NamedTuple):
         Parts of the region thinner than that may be missing, see `Pieces.missed`.
     """
 
-    x0: "np.ndarray | Filled"
+    x0: Any  # np.ndarray or Filled
     volume: float | np.ndarray
     half_size: np.ndarray
     lo: np.ndarray
@@ -106,7 +106,7 @@ class Filled:
         return np.where(none, -1, number + self._number[tuple(place.T)])
 
     def middles(self, number: np.ndarray) -> np.ndarray:
-        """Where places with these numbers are, (n, d)."""
+        """Return the positions of places with these numbers, (n, d)."""
         cell, place = np.divmod(number, len(self._places))
         index = np.array(np.unravel_index(cell, self._counts)).T + np.array(self._cells[0])
         return self._corner + (index + 0.5) * self._h + self._places[place]
@@ -274,7 +274,7 @@ def fill(
     for k, (begin, _) in enumerate(x0.chunks):
         x = x0.candidates(k)
         if rule == "cut":
-            left.append(cut(region, x, h / ppc, begin * len(places)))
+            left.append(clip(region, x, h / ppc, begin * len(places)))
         if rule == "cut" and not counted:
             continue
         kept = region.inside(x)
@@ -334,7 +334,7 @@ def _cut_off(
 
 
 def _beyond_closed_sides(x: np.ndarray, lo: np.ndarray, hi: np.ndarray, domain: Domain) -> int:
-    """How many of `x` lie outside the domain across sides where the region is closed."""
+    """Count positions `x` outside the domain across sides where the region is closed."""
     beyond = np.zeros(len(x), dtype=bool)
     within_open = np.ones(len(x), dtype=bool)
     for axis in range(domain.dimension):

@@ -1,4 +1,4 @@
-"""What every region has: an inside, a bounding box, and perhaps an inverted sense."""
+"""Base of regions: an inside, a bounding box, and perhaps an inverted sense."""
 
 from __future__ import annotations
 
@@ -35,10 +35,14 @@ class Region:
     ----------
     unknown : bool
         Whether its place depends on results that a rehearsal does not have (NaN).
+    axis : tuple or None
+        Direction (0, 1, 2) and centre of the axis that a region in space is round about at the
+        same `radius` all along; None of others.
     box_lo, box_hi : ndarray (3,)
         Box around the region, infinite where it is open; 0 in unused directions.
     """
 
+    axis: tuple | None = None
     id: str = ""
     place: Place | None = None
 
@@ -56,7 +60,7 @@ class Region:
         self.exterior = exterior
         dimension = self.domain.dimension
         self.parts = tuple(parts)
-        self.unknown = bool(np.isnan([*lo, *hi]).any()) or any(p.unknown for p in self.parts)
+        self.unknown: bool = bool(np.isnan([*lo, *hi]).any()) or any(p.unknown for p in self.parts)
         self.box_lo = np.zeros(3)
         self.box_hi = np.zeros(3)
         self.box_lo[:dimension] = -np.inf if exterior else lo
@@ -69,7 +73,7 @@ class Region:
 
     @property
     def tolerance(self) -> float:
-        """How far beyond a face a point may lie, by rounding, and still be in."""
+        """Distance beyond a face at which a point still counts as inside, for rounding."""
         return self.domain.tolerance
 
     @property
@@ -83,19 +87,19 @@ class Region:
         return np.clip(self.box_hi, self.domain.lo, self.domain.hi)
 
     def contains(self, x: np.ndarray) -> np.ndarray:
-        """Which positions `x` (n, >= dimension) lie in the shape, faces included: (n,) bool.
+        """Test which positions `x` (n, >= dimension) lie in the shape, faces included: (n,) bool.
 
         `exterior` plays no part here.
         """
         raise NotImplementedError
 
     def inside(self, x: np.ndarray) -> np.ndarray:
-        """Which positions `x` (n, >= dimension) belong to the region: (n,) bool."""
+        """Test which positions `x` (n, >= dimension) belong to the region: (n,) bool."""
         inside = self.contains(x)
         return ~inside if self.exterior else inside
 
     def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
-        """How far in the shape positions `x` (n, >= dimension) lie, below 0 outside: (n,).
+        """Return the depth of positions `x` (n, >= dimension) in the shape, below 0 outside: (n,).
 
         At most the distance from its surface, as far as it is below `reach`; near a plane part of
         the surface a linear function of `x`. `exterior` plays no part here. What follows from
@@ -116,7 +120,7 @@ class Region:
         return np.where(inside, 1, -1) * near.min(axis=1) / math.sqrt(d)
 
     def depth(self, x: np.ndarray, reach: float) -> np.ndarray:
-        """How far in the region positions lie, see `distance`: (n,)."""
+        """Return the depth of positions in the region, see `distance`: (n,)."""
         depth = self.distance(x, reach)
         return -depth if self.exterior else depth
 
@@ -152,12 +156,12 @@ def check_radius(radius: float, place: Place | None) -> None:
 
 
 def within(x: np.ndarray, centre: Sequence[float], axes: Sequence[int], radius: float):
-    """Which positions are at most `radius` from `centre`, measured along `axes` only: (n,) bool."""
+    """Test which positions are at most `radius` from `centre` along `axes` only: (n,) bool."""
     return _square(x, centre, axes) <= radius * radius
 
 
 def below(x: np.ndarray, centre: Sequence[float], axes: Sequence[int], radius: float):
-    """How far positions lie below the surface of such a ball or cylinder: (n,)."""
+    """Return the depth of positions below the surface of a ball or cylinder: (n,)."""
     square = _square(x, centre, axes)
     return radius - np.sqrt(square, out=square)
 

@@ -163,7 +163,7 @@ class Solid:
             )
 
     def described(self) -> str:
-        """Where the points come from, in words, such as ``region 'disk'``."""
+        """Describe the source of the points in words, such as ``region 'disk'``."""
         raise NotImplementedError
 
     def why_empty(self) -> str:
@@ -171,7 +171,7 @@ class Solid:
         raise NotImplementedError
 
     def wanted(self) -> str:
-        """What would give points."""
+        """Describe a source that would give points."""
         raise NotImplementedError
 
     @property
@@ -220,12 +220,12 @@ def solid_with(hub: Scene, number: int) -> Solid:
 
 
 def named(hub: Scene, number: int) -> str:
-    """How to speak of a point."""
+    """Return the name of a point for messages."""
     return f"point {number + 1} of solid '{solid_with(hub, number).id}'"
 
 
 def own_grids(hub: Scene) -> bool:
-    """Whether the method lays a grid of its own for each solid."""
+    """Return True if the method lays a grid of its own for each solid."""
     method = hub.update.method
     return method is not None and method.own_grids
 
@@ -236,6 +236,7 @@ def _cell_size(hub: Scene, domain: Domain, h: float) -> float:
         domain.set_cell_size(h)
     if own_grids(hub):
         return float(h)
+    assert domain.h is not None
     if abs(h - domain.h) > 1e-9 * domain.h:
         raise ScriptError(
             f"cell size {h:g} differs from that of the domain's grid, {domain.h:g}, "
@@ -258,7 +259,7 @@ def warn_of_coinciding(hub: Scene, new: Solid, ID: str) -> None:
 
 
 def coinciding(a: Solid, b: Solid) -> bool:
-    """Whether points of `a` lie where points of `b` are; of many points, a sample is looked at."""
+    """Return True if points of `a` coincide with points of `b`; of many, a sample is tested."""
     if not a.count or not b.count:
         return False
     (low, high), (other_low, other_high) = _box(a), _box(b)

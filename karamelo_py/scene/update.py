@@ -1,4 +1,4 @@
-"""How the scene goes forward: method, scheme, transfer, step size, clock (Karamelo's Update)."""
+"""Time integration of a scene: method, scheme, transfer, step size, clock (Karamelo's Update)."""
 
 from typing import Any, NamedTuple
 
@@ -9,7 +9,7 @@ from karamelo_py.script.values import Values
 
 
 class Update:
-    """What method, scheme, set_dt and dt_factor chose, and the clock.
+    """Choices of method, scheme, set_dt and dt_factor, and the clock.
 
     Attributes
     ----------
@@ -37,19 +37,19 @@ class Update:
         Where the script says so.
     warned_of_bounces
         Whether the user knows that points were reflected.
-    foreseen
+    warned_of
         Names of the failures that the user was warned of.
     moving
         The fixes of the last run, and since when none has come to them.
     """
 
-    remembers = ("warned_of_bounces", "foreseen")
+    remembers = ("warned_of_bounces", "warned_of")
 
     def __init__(self, values: Values):
         self.values = values
         self.method: Any = None
-        self.transfer: NamedTuple | None = None
-        self.scheme: NamedTuple = MUSL()
+        self.transfer: Any = None
+        self.scheme: Any = MUSL()
         self.scheme_place: Place | None = None
         self.thermal = False
         self.anti_locking = False
@@ -59,8 +59,14 @@ class Update:
         self.boundary = "error"
         self.boundary_place: Place | None = None
         self.warned_of_bounces = False
-        self.foreseen: list[str] = []
+        self.warned_of: list[str] = []
         self.moving: tuple[list[Any], float] = ([], 0.0)
+
+    def first_time(self, name: str) -> bool:
+        """Note that the user is warned of something; False where that was so before."""
+        first = name not in self.warned_of
+        self.warned_of += [name] * first
+        return first
 
     @property
     def words(self) -> str:
@@ -88,7 +94,7 @@ class Update:
         """The next step."""
         return self.values.get("dt")
 
-    def transfer_tag(self, real: type) -> NamedTuple:
+    def transfer_tag(self, real: type) -> Any:
         """The transfer with its numbers in the precision of the run."""
         numbers = (real(x) if isinstance(x, float) else x for x in self.transfer)
         return type(self.transfer)(*numbers)

@@ -4,7 +4,8 @@ A view hands out arrays with a row for each node or point of the group. What a h
 by assignment or in place, is written back when it returns; what cannot be changed is read-only.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,8 @@ from karamelo_py.compiler.fields import field, name_of
 from karamelo_py.kernels import arrays
 from karamelo_py.kernels.export import export_velocity_moment, impose_stress
 from karamelo_py.kernels.heat import Supply, Temperature
+from karamelo_py.kernels.hook_loop import corners_that_move
 from karamelo_py.kernels.laws import elastic_law
-from karamelo_py.kernels.moments import corners_that_move
 from karamelo_py.kernels.p2g import Force
 from karamelo_py.points.laws import can, with_stress
 from karamelo_py.points.transfers import Moment
@@ -59,7 +60,7 @@ class NodesView(View):
         return self._simulation.summed(terms[own])
 
     def _part(self, array: np.ndarray, first: int) -> tuple:
-        """Where in an array of the nodes a vector of those of the view lies."""
+        """Return where in an array of the nodes a vector of those of the view lies."""
         return self.index, slice(first, first + self._d)
 
     @Shown
@@ -139,13 +140,14 @@ class PointsView(View):
 
     _fields = ("dt", "kick", "time", "ids", "moved")
 
-    def __init__(self, simulation: Any, group: Any, then: bool):
+    def __init__(self, simulation: Any, ids: np.ndarray, then: bool):
         super().__init__()
         self._simulation = simulation
         self._then = then
         self._take_times(simulation.control)
-        self.ids = simulation.members(group)
+        self.ids = ids
         self.moved = False
+        self._parts: list[tuple] | None = None
         self._declared: dict[type, tuple[np.ndarray, np.ndarray]] = {}
 
     def total(self, terms: Any) -> np.ndarray:
@@ -162,15 +164,29 @@ class PointsView(View):
             found[own] = self._simulation.column(name, block, rows)
         return found
 
+    def _at_hand(self) -> list[tuple]:
+        """List the points of the view: blocks, rows of them, and which of the view these are."""
+        if self._parts is None:
+            place = np.full(self._simulation.count, -1)
+            place[self.ids] = np.arange(len(self.ids))
+            blocks = [(block, place[block.points.id]) for block in self._simulation.setup.blocks]
+            rows = [np.flatnonzero(own >= 0) for _, own in blocks]
+            self._parts = [(b, r, own[r]) for (b, own), r in zip(blocks, rows, strict=True)]
+        return self._parts
+
     def _gather(self, of: Callable) -> np.ndarray:
-        full = self._simulation.by_id(of)
-        return full.T if len(self.ids) == full.shape[-1] else full[..., self.ids].T
+        """Gather a field (n, ...), which a function takes from `Points`."""
+        parts = self._at_hand()
+        first = of(parts[0][0].points)
+        found = np.empty((len(self.ids), *first.shape[:-1]), first.dtype)
+        for block, rows, own in parts:
+            array = of(block.points)
+            found[own] = (array if len(rows) == array.shape[-1] else array[..., rows]).T
+        return found
 
     def _scatter(self, of: Callable, value: np.ndarray) -> None:
-        full = self._simulation.by_id(of)
-        full[..., self.ids] = value.T
-        for block in self._simulation.setup.blocks:
-            of(block.points)[...] = full[..., block.points.id]
+        for block, rows, own in self._at_hand():
+            of(block.points)[..., rows] = value[own].T
 
     def __getitem__(self, kind: type) -> np.ndarray:
         """(n, components) of a field that a fix declares in its ``point_fields``."""
@@ -217,15 +233,14 @@ class PointsView(View):
 
     @position.writer
     def _write_position(self, value: np.ndarray) -> None:
-        s = self._simulation.setup
-        before = self._simulation.by_id(self._place)
+        s, d = self._simulation.setup, self._simulation.kin.dimension
+        before = self._gather(self._place)
         self._scatter(self._place, value)
-        step = self._simulation.by_id(self._place) - before
-        d, corners = s.kin.dimension, corners_that_move(s)
-        for block in s.blocks:
-            if corners:
-                behind = self._places(block.points)[d : d + d * corners]
-                behind += np.tile(step[:, block.points.id], (corners, 1))
+        step = self._gather(self._place) - before
+        corners = corners_that_move(s)
+        for block, rows, own in self._at_hand() if corners else ():
+            behind = self._places(block.points)[d : d + d * corners]
+            behind[:, rows] += np.tile(step[own].T, (corners, 1))
         self.moved = True
 
     @Shown
@@ -250,7 +265,7 @@ class PointsView(View):
             is small beside a cell. It is not called where no point keeps such a thing.
         """
         simulation, slopes = self._simulation, None
-        s, d = simulation.stepped, simulation.kin.dimension
+        s, d = simulation.setup, simulation.kin.dimension
         here = slice(component * d, component * d + d)
         for block, rows, own in self._at_hand():
             points, kept = block.points, field(block.points.fields, Moment)
@@ -268,15 +283,6 @@ class PointsView(View):
                 given = np.zeros_like(shown)
                 export_velocity_moment(s.basis, s.kin, s.grids, grid, where, shown, given)
             kept[here, rows] = given[here]
-
-    def _at_hand(self) -> Iterator[tuple]:
-        """The points of the view: blocks, rows of them, and which of the view these are."""
-        place = np.full(self._simulation.count, -1)
-        place[self.ids] = np.arange(len(self.ids))
-        for block in self._simulation.stepped.blocks:
-            of_block = place[block.points.id]
-            rows = np.flatnonzero(of_block >= 0)
-            yield block, rows, of_block[rows]
 
     @Shown
     def mass(self) -> np.ndarray:
@@ -321,7 +327,7 @@ class PointsView(View):
 
     def set_stress(self, given: dict[str, np.ndarray]) -> None:
         """Set components of the Cauchy stress: ``{"11": (n,) values, ...}`` of rate-form laws."""
-        s = self._simulation.stepped
+        s = self._simulation.setup
         names, like = s.kin.symmetric_names, s.nodes.sums[0, arrays.MASS]
         flags = np.array([name in given for name in names])
         values = np.stack(
@@ -346,25 +352,27 @@ class PieceView(PointsView):
     """Points of a group that are at hand, in the order in which they are stored.
 
     For hooks that look at each point on its own (`Fix.point_by_point`). Positions are read-only.
+    Before the steps (`in_steps` False) they are some of them: others come after them.
     """
 
-    def __init__(self, simulation: Any, parts: list[tuple], then: bool = False):
-        View.__init__(self)
-        self._simulation = simulation
-        self._then = then
-        self._parts = parts or [(simulation.blocks[0], np.empty(0, np.int64))]
-        self._ends = np.cumsum([0, *(len(rows) for _, rows in self._parts)])
-        self._take_times(simulation.control)
-        self.ids = np.concatenate([block.points.id[rows] for block, rows in self._parts])
-        self.moved = False
-        self._declared = {}
+    def __init__(self, simulation: Any, parts: list[tuple], then: bool, *, in_steps: bool):
+        parts = parts or [(simulation.blocks[0], np.empty(0, np.int64))]
+        ids = [block.points.id[rows] for block, rows in parts]
+        super().__init__(simulation, np.concatenate(ids), then)
+        ends = np.cumsum([0, *map(len, ids)]).tolist()
+        self._parts = [
+            (*part, slice(*own)) for part, own in zip(parts, pairwise(ends), strict=True)
+        ]
+        self._in_steps = in_steps
 
-    def _gather(self, of: Callable) -> np.ndarray:
-        return np.concatenate([of(block.points)[..., rows].T for block, rows in self._parts])
-
-    def _scatter(self, of: Callable, value: np.ndarray) -> None:
-        for block, rows, own in self._at_hand():
-            of(block.points)[..., rows] = value[own].T
+    def total(self, terms: Any) -> np.ndarray:
+        """The sum of terms (n,) or (n, k) over all points of the group, rounded once."""
+        if self._in_steps:
+            return super().total(terms)
+        raise ValueError(
+            "points.total(terms) is known in steps alone; before the first, points come in pieces "
+            "where point_by_point is True"
+        )
 
     @Shown
     def position(self) -> np.ndarray:
@@ -375,9 +383,3 @@ class PieceView(PointsView):
     def reference_position(self) -> np.ndarray:
         """(n, d) positions before the first step; read only."""
         return self._simulation.x0_of(self.ids)
-
-    def _at_hand(self) -> Iterator[tuple]:
-        for (block, rows), begin, end in zip(
-            self._parts, self._ends[:-1], self._ends[1:], strict=True
-        ):
-            yield block, rows, slice(begin, end)

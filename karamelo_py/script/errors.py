@@ -1,4 +1,4 @@
-"""What goes wrong in a script, said with its place in the text and a remedy."""
+"""Errors of a script, with their place in the text and a remedy."""
 
 import difflib
 import re
@@ -10,7 +10,7 @@ _WIDEST_LINE = 160
 
 
 class Place(NamedTuple):
-    """Where in a script: `line` and `column` count from 1, `text` is the whole source line."""
+    """A place in a script: `line` and `column` count from 1, `text` is the whole source line."""
 
     file: str
     line: int
@@ -20,7 +20,7 @@ class Place(NamedTuple):
 
 
 class NoItem(KeyError):
-    """What is not there in brackets; its text is the whole message."""
+    """An item that is not there in brackets; its text is the whole message."""
 
     def __str__(self) -> str:
         return self.args[0]
@@ -86,7 +86,7 @@ class ScriptError(Exception):
         return self.message
 
     def render(self) -> str:
-        """The whole message for the user: place, marked line, what was expected, remedy.
+        """Write the whole message for the user: place, marked line, what was expected, remedy.
 
         Further mistakes of the script follow.
         """
@@ -121,7 +121,7 @@ def render_message(
 
 
 def _marked(place: Place) -> list[str]:
-    """The source line and, below it, carets under the marked word."""
+    """Write the source line and, below it, carets under the marked word."""
     text, start = place.text.rstrip(), place.column - 1
     length = max(place.length, 1)
     if len(text) > _WIDEST_LINE:
@@ -146,23 +146,23 @@ def _width(character: str) -> int:
 
 
 def _printable(text: str) -> str:
-    """`text` with control characters replaced: they could garble the terminal."""
+    """Return `text` with control characters replaced: they could garble the terminal."""
     return "".join(c if c == "\t" or c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
 
 
 def meant(name: str, names: Iterable[str]) -> str | None:
-    """``did you mean '...'?`` with the one of `names` most like `name`; None without any."""
+    """Write ``did you mean '...'?`` with the one of `names` most like `name`; None without any."""
     close = nearest(name, names)
     return f"did you mean '{close}'?" if close else None
 
 
 def plural(count: float, noun: str) -> str:
-    """``1 cell``, ``2 cells``."""
+    """Write ``1 cell``, ``2 cells``."""
     return f"{count:g} {noun}" if count == 1 else f"{count:.0f} {noun}s"
 
 
 def unknown(message: str, name: str, known: Iterable[str], **where: Any) -> ScriptError:
-    """The error for a `name` that is none of the `known`, which it lists; `where` it stands."""
+    """Make the error for a `name` that is none of the `known`; `where` it stands."""
     known = list(dict.fromkeys(known))
     expected = f"one of {' '.join(known)}"
     return ScriptError(message, expected=expected, hint=meant(name, known), **where)
@@ -178,7 +178,7 @@ def nearest_few(name: str, names: Iterable[str]) -> list[str]:
 
 
 def nearest(name: str, names: Iterable[str]) -> str | None:
-    """The one of `names` most like `name`, or None when none is alike."""
+    """Find the one of `names` most like `name`, or None when none is alike."""
     names = list(names)
     lowered = name.lower()
     for candidate in names:

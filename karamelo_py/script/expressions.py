@@ -1,4 +1,4 @@
-"""What expressions stand for: numbers, texts, and formulas that are evaluated again and again.
+"""Values of expressions: numbers, texts, and formulas that are evaluated again and again.
 
 An operation on numbers is done at once. As soon as something that changes takes part (a position,
 the time, a published value), the result is a formula, with the numbers folded in.
@@ -15,7 +15,15 @@ from karamelo_py.compiler import formula
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.functions import compute_quietly
 from karamelo_py.script.programs import in_order, program
-from karamelo_py.script.terms import Term, alike, applied, constant, is_short, text_of
+from karamelo_py.script.terms import (
+    Term,
+    alike,
+    applied,
+    constant,
+    is_short,
+    number_text,
+    text_of,
+)
 from karamelo_py.script.values import Values
 
 POINT_SEEDS = ("x", "y", "z", "x0", "y0", "z0")
@@ -47,12 +55,12 @@ class Expression:
 
     @classmethod
     def seed(cls, name: str) -> Expression:
-        """The formula that is nothing but a name."""
+        """Make the formula that is nothing but a name."""
         return cls(Term("name", (), name))
 
     @classmethod
     def from_script(cls, hub: Any, argument: Any) -> Expression:
-        """The expression that a script's argument stands for."""
+        """Read the expression that a script's argument stands for."""
         value = argument.value(hub)
         if isinstance(value, str):
             raise ScriptError(
@@ -61,7 +69,7 @@ class Expression:
         return cls(value)
 
     def minus(self, other: Expression) -> Expression:
-        """The formula of the difference."""
+        """Make the formula of the difference."""
         return Expression(applied("-", self._term, other._term))
 
     @property
@@ -70,7 +78,7 @@ class Expression:
 
     @property
     def is_constant(self) -> bool:
-        """Whether it is one number for ever."""
+        """Tell if it is one number for ever."""
         return not self._term.names
 
     @property
@@ -91,11 +99,11 @@ class Expression:
         return f"Expression({self.text})"
 
     def is_like(self, other: Expression) -> bool:
-        """Whether it is the same number as another everywhere, for all that can be seen."""
+        """Tell if it is the same number as another everywhere, for all that can be seen."""
         return alike(self._term, other._term)
 
     def evaluate(self, values: Values) -> float:
-        """The number it has now.
+        """Compute the number it has now.
 
         Raises
         ------
@@ -111,7 +119,7 @@ class Expression:
         return _evaluate(self._term, values)
 
     def program(self, values: Values) -> formula.Program:
-        """The formula for :func:`karamelo_py.compiler.formula.evaluate`."""
+        """Write the formula for :func:`karamelo_py.compiler.formula.evaluate`."""
 
         def place(name: str) -> tuple[int, int]:
             if name in POINT_SEEDS:
@@ -121,13 +129,13 @@ class Expression:
         return program(self._term, place)
 
     def program_of(self, seeds: Sequence[str], depth: int) -> formula.Program:
-        """The formula of numbers that are not published, for a stack of this depth alone."""
+        """Write the formula of numbers that are not published, for a stack of this depth alone."""
         return program(self._term, lambda name: (formula.POINT, seeds.index(name)), depth=depth)
 
     def evaluate_points(
         self, values: Values, x: np.ndarray, x0: np.ndarray | None = None
     ) -> np.ndarray:
-        """The numbers it has at positions `x`, whose reference positions are `x0`.
+        """Compute the numbers it has at positions `x`, whose reference positions are `x0`.
 
         Parameters
         ----------
@@ -156,6 +164,15 @@ class Expression:
 
 
 Value = float | str | Expression
+
+
+def shown(value: Value) -> str:
+    """Write a value as a script would say it."""
+    if isinstance(value, str):
+        return f'"{value}"'
+    if isinstance(value, Expression):
+        return value.text
+    return number_text(value)
 
 
 def _term(value: float | Expression) -> Term:

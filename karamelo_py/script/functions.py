@@ -19,7 +19,7 @@ TAIL = 1e-10
 
 
 class Signature(NamedTuple):
-    """How many operands a function takes, and how to compute it."""
+    """The number of operands of a function, and the code that computes it."""
 
     least: int
     most: int
@@ -126,7 +126,7 @@ OPERATORS: dict[str, Callable[..., float]] = {
 
 
 def compute(name: str, *numbers: float) -> float:
-    """A function or operator of plain numbers; NaN in, NaN out.
+    """Compute a function or operator of plain numbers; NaN in, NaN out.
 
     Raises
     ------
@@ -142,7 +142,7 @@ def compute(name: str, *numbers: float) -> float:
 
 
 def compute_quietly(name: str, *numbers: float) -> float:
-    """The same as floating-point hardware does it: inf or NaN where there is no result."""
+    """Compute the same as floating-point hardware does: inf or NaN where there is no result."""
     if name == "if":
         return numbers[1] if numbers[0] != 0 else numbers[2]
     try:

@@ -25,7 +25,7 @@ class Mistake(Exception):
         self.hint = hint
 
     def error(self, source: Source, offset: int = 0) -> ScriptError:
-        """The same as an error with a place."""
+        """Make it an error with a place."""
         place = source.place(offset + self.start, offset + self.end)
         return ScriptError(self.message, place=place, expected=self.expected, hint=self.hint)
 
@@ -79,7 +79,7 @@ def check_characters(text: str) -> None:
 
 
 def in_script(text: str) -> Mistake:
-    """What is wrong with the quotes or parentheses of a script."""
+    """Find the mistake in the quotes or parentheses of a script."""
     opened: list[int] = []
     for match in _PUNCTUATION.finditer(text):
         word, start = match[0], match.start()
@@ -98,7 +98,7 @@ def in_script(text: str) -> Mistake:
 
 
 def open_quote(text: str, start: int) -> Mistake:
-    """The quote that begins at `start` has no end."""
+    """Make the mistake of a quote that begins at `start` and has no end."""
     end = text.find("\n", start)
     return Mistake(
         "this quote is not closed",
@@ -110,7 +110,7 @@ def open_quote(text: str, start: int) -> Mistake:
 
 
 def open_parenthesis(text: str, start: int) -> Mistake:
-    """The parenthesis at `start` is not closed."""
+    """Make the mistake of a parenthesis at `start` that is not closed."""
     before = re.search(r"[^\W\d]\w*[ \t]*$", text[:start])
     begin = before.start() if before else start
     what = f"the call of {before[0].rstrip()}" if before else "this parenthesis"

@@ -19,7 +19,7 @@ _MOST_LEVELS = 60
 
 
 def in_order(root: Any) -> list[Any]:
-    """The terms below `root` and itself, each once, operands before what is made of them."""
+    """List the terms below `root` and itself, each once, operands before what is made of them."""
     found: dict[int, Any] = {}
     open_terms = [(root, False)]
     while open_terms:
@@ -35,7 +35,7 @@ def in_order(root: Any) -> list[Any]:
 
 
 def program(root: Any, place: Callable[[str], tuple[int, int]], *, depth: int | None = None) -> Any:
-    """The stack program of a term.
+    """Write the stack program of a term.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ class _Writer:
         return all(self.uniform[operand] for operand in operands)
 
     def _chosen(self) -> set[int]:
-        """The terms that are kept: those with several users, and what the stack cannot hold."""
+        """Choose terms to keep: those with several users, and what the stack cannot hold."""
         kept = set()
         if not self.bare:
             kept = {k for k, (_, below, _) in enumerate(self.terms) if below and self.uses[k] > 1}
@@ -116,7 +116,7 @@ class _Writer:
         return kept
 
     def program(self) -> Any:
-        """The program."""
+        """Write the program."""
         for k in range(len(self.terms)):
             if k in self.kept:
                 self._write(k)

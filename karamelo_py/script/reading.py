@@ -16,13 +16,13 @@ _WRITTEN = (
 
 
 def scripts_in(folder: Path) -> list[str]:
-    """Names of the files in a folder that may be scripts."""
+    """List names of the files in a folder that may be scripts."""
     files = folder.iterdir() if folder.is_dir() else ()
     return sorted(file.name for file in files if file.suffix not in _WRITTEN and file.is_file())
 
 
 def read_script(path: Path) -> str:
-    """The text of a script file.
+    """Read the text of a script file.
 
     Raises
     ------

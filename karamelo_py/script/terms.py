@@ -91,17 +91,13 @@ class Term:
 
 
 def constant(value: float) -> Term:
-    """A number."""
+    """Make a number."""
     return Term("number", (), float(value))
 
 
 def applied(operation: str, *operands: Term) -> Term:
-    """An operation on terms."""
+    """Make an operation on terms."""
     return Term(operation, operands, None)
-
-
-def _rounded(term: Term) -> Term:
-    return applied("round", term)
 
 
 def _quotient(polynomials: tuple[tuple[float, ...], ...], r: Term) -> Term:
@@ -128,7 +124,7 @@ def _inverse_normal(p: Term) -> Term:
 
 
 def alike(one: Term, other: Term) -> bool:
-    """Whether two terms are the same number everywhere: those of + and * may change places."""
+    """Tell if two terms are the same number everywhere: those of + and * may change places."""
     known: dict[tuple, int] = {}
     kinds: dict[int, int] = {}
     for term in (*in_order(one), *in_order(other)):
@@ -144,13 +140,13 @@ def alike(one: Term, other: Term) -> bool:
 
 
 def number_text(value: float) -> str:
-    """A number as a script says it, exactly."""
+    """Write a number as a script says it, exactly."""
     text = repr(float(value))
     return text.removesuffix(".0")
 
 
 def number_of(text: str) -> float | None:
-    """The number that a text is, or None."""
+    """Read the number that a text is, or None."""
     try:
         return float(text)
     except ValueError:
@@ -158,7 +154,7 @@ def number_of(text: str) -> float | None:
 
 
 def is_short(root: Term) -> bool:
-    """Whether a term can be written down, where what is shared is written again and again."""
+    """Tell if a term can be written down, where what is shared is written again and again."""
     levels: dict[int, int] = {}
     sizes: dict[int, int] = {}
     for term in in_order(root):
@@ -168,7 +164,7 @@ def is_short(root: Term) -> bool:
 
 
 def text_of(term: Term) -> str:
-    """A term as a script would write it."""
+    """Write a term as a script would write it."""
     operation, operands = term.operation, term.operands
     if operation == "number":
         return number_text(term.value)
@@ -189,7 +185,7 @@ def text_of(term: Term) -> str:
 
 
 def _bracketed(term: Term, level: int) -> str:
-    """The text of `term`, in parentheses if it binds less than `level`."""
+    """Write the text of `term`, in parentheses if it binds less than `level`."""
     if term.operation == "number":
         own = 7 if math.copysign(1.0, term.value) < 0 else 9
     else:

@@ -59,7 +59,7 @@ class Values:
         self._others[ID] = others
 
     def slot(self, name: str) -> int:
-        """Where in the array `name` is kept.
+        """Find the place of `name` in the array.
 
         Raises
         ------
@@ -69,14 +69,14 @@ class Values:
         return self._slots[name]
 
     def names(self) -> list[str]:
-        """Every published name, in the order of publication."""
+        """List every published name, in the order of publication."""
         return list(self._slots)
 
     def __contains__(self, name: object) -> bool:
         return name in self._slots
 
     def get(self, name: str) -> float:
-        """The present value of `name` (KeyError if it is not published)."""
+        """Read the present value of `name` (KeyError if it is not published)."""
         return float(self.array[self._slots[name]])
 
     def set(self, name: str, value: float) -> None:

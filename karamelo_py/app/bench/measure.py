@@ -1,4 +1,4 @@
-"""How fast a scene runs: its speed, the time of its stages, the bytes it moves, the bandwidth."""
+"""The speed of a scene: time of its stages, bytes that it moves, bandwidth of the memory."""
 
 import statistics
 import time
@@ -41,7 +41,7 @@ class Timed(NamedTuple):
 
 
 class Measured(NamedTuple):
-    """What is measured of a workload.
+    """Measured speed of a workload.
 
     Attributes
     ----------
@@ -92,7 +92,7 @@ class Measured(NamedTuple):
 
     @property
     def told_apart(self) -> bool:
-        """Whether sweeps are long enough to be timed one by one: of few points they are not."""
+        """True if sweeps are long enough to be timed one by one: of few points they are not."""
         return self.swept <= APART
 
     @property
@@ -109,7 +109,7 @@ class Measured(NamedTuple):
 
     @property
     def limit(self) -> str:
-        """What takes at least half of a step, the first of these that does.
+        """The first of these that takes at least half of a step.
 
         ``overhead`` (the rest), ``nodes``, ``memory`` (at least half of the bandwidth of arrays as
         large as the scene), else ``arithmetic``: sweeps over points that wait for instructions,

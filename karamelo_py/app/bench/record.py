@@ -1,4 +1,4 @@
-"""What a run of karamelo-py bench leaves in a file, and how two of them compare."""
+"""Files of karamelo-py bench, and the comparison of two of them."""
 
 import json
 import subprocess
@@ -21,7 +21,7 @@ SAME = {"points": "points", "precision": "precision", "variables": "variables"}
 
 
 def entry(one: Measured, title: str, presets: Mapping[str, str]) -> dict[str, Any]:
-    """What is kept of a workload; speeds in particle-steps/s, times in seconds."""
+    """Return the record of a workload; speeds in particle-steps/s, times in seconds."""
     return {
         "title": title,
         "variables": dict(presets),
@@ -43,7 +43,7 @@ def entry(one: Measured, title: str, presets: Mapping[str, str]) -> dict[str, An
 
 
 def scaled(rows: Sequence[Scaled], title: str, presets: Mapping[str, str]) -> dict[str, Any]:
-    """What is kept of a workload that several processes ran; the speed of one comes first."""
+    """Return the record of a workload that several processes ran; the speed of one comes first."""
     return {
         "title": title,
         "variables": dict(presets),
@@ -54,7 +54,7 @@ def scaled(rows: Sequence[Scaled], title: str, presets: Mapping[str, str]) -> di
 
 
 def head(threads: int, triad: float, seconds: float) -> dict[str, Any]:
-    """What all workloads share: machine, versions, threads, bandwidth (bytes/s)."""
+    """Return the head of a file of records: machine, versions, threads, bandwidth (bytes/s)."""
     return {
         "kind": KIND,
         **surroundings(),
@@ -146,7 +146,7 @@ def comparison(now: Mapping[str, Any], then: Mapping[str, Any]) -> list[str]:
 
 
 def differences(now: Mapping[str, Any], then: Mapping[str, Any]) -> list[str]:
-    """What else differs between two benches, a line each."""
+    """List other differences between two benches, a line each: machine, threads, versions."""
     pairs = [(word, now.get(key), then.get(key)) for key, word in ABOUT.items()]
     pairs.append(("threads", now.get("threads"), then.get("threads")))
     ours, theirs = now.get("versions") or {}, then.get("versions") or {}

@@ -1,7 +1,7 @@
 """Speeds with several processes, and with as many threads: karamelo-py bench --ranks 1,2,4.
 
 Each is measured by processes of its own, started as those of a run. This module is their program,
-too: ``python -m karamelo_py.app.bench.scaling`` with a `Part` in JSON.
+too: ``python -m karamelo_py.app.bench.scaling`` with a `ScalingRun` in JSON.
 """
 
 import json
@@ -25,7 +25,7 @@ from karamelo_py.app.launch import launch
 from karamelo_py.app.together import keep_to_oneself, share, together
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
-from karamelo_py.run.mpi.crew import Crew
+from karamelo_py.run.mpi.comm import MpiComm
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
@@ -40,8 +40,8 @@ HEADING = (
 )
 
 
-class Part(NamedTuple):
-    """What one measurement is to be, and the file for what it finds."""
+class ScalingRun(NamedTuple):
+    """Arguments of one measurement, and the file for its result."""
 
     workload: str
     ranks: int
@@ -52,7 +52,7 @@ class Part(NamedTuple):
 
 
 class Scaled(NamedTuple):
-    """What was measured with some processes of some threads each.
+    """Measured speed with some processes of some threads each.
 
     Attributes
     ----------
@@ -83,12 +83,12 @@ def scaled(
     """Measure a workload with one process, then with several, or as many threads; then grown."""
     counts = sorted({1, *ranks})
     for n in counts:
-        yield _measured(Part(name, n, threads, dict(presets), seconds))
+        yield _measured(ScalingRun(name, n, threads, dict(presets), seconds))
         if n > 1 and n * threads <= available:
-            yield _measured(Part(name, 1, n * threads, dict(presets), seconds))
+            yield _measured(ScalingRun(name, 1, n * threads, dict(presets), seconds))
     for n in counts[1:]:
         larger = dict(presets) | grown(WORKLOADS[name].script, presets, n)
-        yield _measured(Part(name, n, threads, larger, seconds), weak=True)
+        yield _measured(ScalingRun(name, n, threads, larger, seconds), weak=True)
 
 
 def grown(script: str, presets: Mapping[str, str], times: int) -> dict[str, str]:
@@ -101,7 +101,7 @@ def grown(script: str, presets: Mapping[str, str], times: int) -> dict[str, str]
     return {name: repr(value / times ** (1 / d))}
 
 
-def _measured(part: Part, *, weak: bool = False) -> Scaled:
+def _measured(part: ScalingRun, *, weak: bool = False) -> Scaled:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "found.json"
         words = [json.dumps(part._replace(file=str(file)))]
@@ -118,35 +118,32 @@ def _measured(part: Part, *, weak: bool = False) -> Scaled:
     return Scaled(part.ranks, part.threads, weak, **found)
 
 
-def measure(part: Part, crew: Crew | None = None) -> int:
+def measure(part: ScalingRun, comm: MpiComm | None = None) -> int:
     """Measure as one of the processes; the first writes what is found."""
     hub = Hub(Console(quiet=True))
     hub.settings.threads = part.threads
-    if crew is not None:
-        share(hub, crew)
+    if comm is not None:
+        share(hub, comm)
     hub.interpreter = Interpreter(hub, presets=part.presets)
     workload = WORKLOADS[part.workload]
     hub.interpreter.run_text(workload.script, "bench")
     simulation = hub.simulation
-    hub.running = SimpleNamespace(halve=False)
-    if simulation.follows:
-        simulation.follow()
-        return 0
-    with simulation.leading():
-        simulation.begin(inf)
-        simulation.compile()
-        timed_steps(simulation, workload.lead)
-        start = simulation.snapshot()
-        count = step_count(timed_steps(simulation, 5) / 5, part.seconds)
-        found = []
-        for _ in range(REPETITIONS):
-            simulation.restore(start)
-            before, begun = simulation.waits(), time.perf_counter()
-            timed_steps(simulation, count)
-            after = simulation.waits()  # all have finished then
-            taken = time.perf_counter() - begun
-            found.append((taken, (after - before) / taken))
-        taken, waits = min(found, key=lambda one: one[0])
+    hub.running = SimpleNamespace(rollback=None)
+    simulation.begin(inf)
+    simulation.compile()
+    timed_steps(simulation, workload.lead)
+    start = simulation.snapshot()
+    count = simulation.comm.bcast(step_count(timed_steps(simulation, 5) / 5, part.seconds))
+    found = []
+    for _ in range(REPETITIONS):
+        simulation.restore(start)
+        before, begun = simulation.waits(), time.perf_counter()
+        timed_steps(simulation, count)
+        after = simulation.waits()  # all have finished then
+        taken = time.perf_counter() - begun
+        found.append((taken, (after - before) / taken))
+    taken, waits = min(found, key=lambda one: one[0])
+    if simulation.comm.leads:
         least = float(np.min(waits))
         file = {
             "points": simulation.count,
@@ -170,10 +167,10 @@ def line(row: Scaled, one: Scaled) -> str:
 
 def main() -> int:
     """Measure what the command line says, as one of several processes or alone."""
-    part = Part(*json.loads(sys.argv[1]))
+    part = ScalingRun(*json.loads(sys.argv[1]))
     keep_to_oneself()
     if part.ranks > 1:
-        return together(part.ranks, lambda crew: measure(part, crew), outcome_of)
+        return together(part.ranks, lambda comm: measure(part, comm), outcome_of)
     return measure(part)
 
 

@@ -22,7 +22,7 @@ from karamelo_py.app.studies.options import (
     out_file,
     zipped,
 )  # fmt: skip
-from karamelo_py.app.studies.study import Study, shown, terminal
+from karamelo_py.app.studies.study import Study, plain_table, shown, terminal
 from karamelo_py.app.studies.variables import cases, logged
 from karamelo_py.script.errors import ScriptError, plural
 from karamelo_py.script.terms import number_of
@@ -40,7 +40,7 @@ and it is told whether it met the target."""
 
 
 @dataclass
-class Choice:
+class Series:
     """A choice of words and what is known of its runs, coarse ones first."""
 
     values: dict[str, str]
@@ -56,7 +56,7 @@ class Choice:
 class Candidate:
     """A variant that may meet the target."""
 
-    choice: Choice
+    choice: Series
     step: int
     cost: float
     error: float
@@ -81,7 +81,7 @@ class Adviser:
     """
 
     def __init__(
-        self, study: Study, along: tuple[str, list[str]], choices: list[Choice],
+        self, study: Study, along: tuple[str, list[str]], choices: list[Series],
         accuracy: str, cost: str, target: float,
     ):  # fmt: skip
         self.study = study
@@ -90,7 +90,7 @@ class Adviser:
         self.choices = choices
         self.accuracy, self.cost, self.target = accuracy, cost, target
 
-    def go_on(self, choice: Choice) -> None:
+    def go_on(self, choice: Series) -> None:
         """Run the next finer variant of a choice."""
         case = {**choice.values, self.name: self.values[len(choice.rows)]}
         choice.rows += self.study.run([{name: case[name] for name in self.study.names}])
@@ -102,12 +102,12 @@ class Adviser:
                 if self._met(choice) is None:
                     self.go_on(choice)
 
-    def _met(self, choice: Choice) -> int | None:
+    def _met(self, choice: Series) -> int | None:
         """The first of its runs that meets the target."""
         errors = column(choice.rows, self.accuracy)
         return next((k for k, e in enumerate(errors) if e <= self.target), None)
 
-    def candidates(self, choice: Choice, hope: bool = False) -> Iterator[Candidate]:
+    def candidates(self, choice: Series, hope: bool = False) -> Iterator[Candidate]:
         """The cheapest variant of a choice that meets the target, known or expected.
 
         With `hope` by the lower bound of the error.
@@ -195,7 +195,7 @@ def run(options: Any) -> int:
     if any(name in group for group in together):
         raise ScriptError(f"-zip: {name} makes the scene finer", expected="choices in step")
     combined = cases(others, together, options.where) if others else [{}]
-    choices = [Choice(case) for case in combined]
+    choices = [Series(case) for case in combined]
     study = Study(
         launch, out.with_suffix(""), items, jobs, again=options.again, strict=True,
         most=len(choices) * len(values[name]),
@@ -241,13 +241,8 @@ def coarse_first(
 
 def tell(adviser: Adviser) -> None:
     """Print what each choice has shown, and what is expected of it."""
-    from rich.table import Table
-
-    table = Table(box=None, pad_edge=False)
-    table.add_column("choice", style="cyan", no_wrap=True)
     headings = ("runs", f"finest {adviser.name}", adviser.accuracy, "order", "meets it at", "cost")
-    for heading in headings:
-        table.add_column(heading, justify="right", no_wrap=True)
+    table = plain_table(["choice"], headings)
     for choice in adviser.choices:
         errors = column(choice.rows, adviser.accuracy)
         last = choice.rows[-1]
@@ -278,7 +273,7 @@ def advise(adviser: Adviser, best: Candidate, script: Path) -> None:
 
 
 def sureness(adviser: Adviser, best: Candidate) -> str:
-    """How sure a candidate is, in words."""
+    """Say how sure a candidate is."""
     said = f"{adviser.accuracy} {best.error:.3g}, {adviser.cost} {best.cost:.3g}"
     if best.forecast is None:
         return f"sure: it was run ({said})"

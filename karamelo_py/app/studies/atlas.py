@@ -235,7 +235,7 @@ def make(entry: Entry, place: Path, inputs: Path, *, small: bool, again: bool) -
 
 
 def key_of(lines: list[str]) -> str:
-    """What a result belongs to: the commands, the scripts they name, the version."""
+    """Hash what a result belongs to: the commands, the scripts they name, the version."""
     said = [karamelo_py.__version__, *lines]
     for word in {word for line in lines for word in shlex.split(line)}:
         if os.path.isabs(word) and Path(word).is_file():
@@ -254,7 +254,7 @@ def write_page(page: Path, entries: list[Entry], folder: Path, inputs: Path) -> 
     }
     shown = page.parent / "_static" / "atlas"
     parts = [
-        "# Atlas",
+        "# Atlas of accuracy and stability",
         "Written by `karamelo-py atlas`, by the commands that stand below pictures.",
     ]
     group = ""
@@ -274,7 +274,7 @@ def write_page(page: Path, entries: list[Entry], folder: Path, inputs: Path) -> 
 
 
 def part_of_page(entry: Entry, place: Path, shown: Path, inputs: Path) -> str:
-    """What a page says of an entry; its pictures are copied to the folder `shown`."""
+    """Write the part of a page on an entry; copy its pictures to the folder `shown`."""
     parts = [entry.name, entry.text]
     title = re.split(r"[.:](?:\s|$)", " ".join(entry.text.split()))[0] or entry.name
     for path in sorted(path for path in place.iterdir() if path.suffix in PICTURES):
@@ -287,7 +287,7 @@ def part_of_page(entry: Entry, place: Path, shown: Path, inputs: Path) -> str:
 
 
 def made_with(record: Path) -> str:
-    """When an entry was made, with which version, and where."""
+    """Tell when an entry was made, with which version, and where."""
     made = json.loads(record.read_text(encoding="utf-8"))
     version = made.get("versions", {}).get("karamelo-py", karamelo_py.__version__)
     said = [f"karamelo-py {version}", made.get("processor"), made.get("date", "")[:10]]

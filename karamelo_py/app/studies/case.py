@@ -30,8 +30,8 @@ _TOO_MUCH = re.compile(r"memory|times the stable one")
 
 
 @dataclass
-class Outcome:
-    """What became of a case.
+class CaseOutcome:
+    """Outcome of a case.
 
     Attributes
     ----------
@@ -86,7 +86,7 @@ class Refused(ScriptError):
         What became of it.
     """
 
-    def __init__(self, case: Mapping[str, str], outcome: Outcome):
+    def __init__(self, case: Mapping[str, str], outcome: CaseOutcome):
         super().__init__(outcome.reason)
         lines = outcome.complaint.rstrip().splitlines()
         first = next((k for k, line in enumerate(lines) if _ERROR.search(line)), 0)
@@ -104,7 +104,7 @@ class Stop(Exception):
 
 @dataclass
 class Launch:
-    """How the cases of a study are run.
+    """Run the cases of a study.
 
     Attributes
     ----------
@@ -128,14 +128,14 @@ class Launch:
     stop: threading.Event = field(default_factory=threading.Event)
 
     def key(self, case: Mapping[str, str]) -> str:
-        """What a result belongs to: it is used again only for the very same."""
+        """Hash what a result belongs to: it is used again only for the very same."""
         said = [karamelo_py.__version__, *self.texts, str(self.threads), str(self.repeat)]
         said += [f"{name}={value}" for name, value in case.items()]
         said.append(os.environ.get("NUMBA_DISABLE_JIT", "0"))
         return hashlib.sha256("\0".join(said).encode()).hexdigest()
 
-    def kept(self, case: Mapping[str, str], folder: Path) -> Outcome | None:
-        """What became of this case in an earlier study, if the same was run in this folder."""
+    def kept(self, case: Mapping[str, str], folder: Path) -> CaseOutcome | None:
+        """Read the outcome of this case in an earlier study, if the same was run in this folder."""
         try:
             found = json.loads((folder / KEPT).read_text(encoding="utf-8"))
         except (OSError, ValueError):
@@ -148,9 +148,9 @@ class Launch:
         # A run that was given up is tried again when it may take longer.
         if found["status"] == "too long" and (self.limit or 1e300) > found["facts"]["wall_s"]:
             return None
-        return Outcome(found["status"], found["reason"], found["facts"], folder)
+        return CaseOutcome(found["status"], found["reason"], found["facts"], folder)
 
-    def run(self, case: Mapping[str, str], folder: Path) -> Outcome:
+    def run(self, case: Mapping[str, str], folder: Path) -> CaseOutcome:
         """Run a case and keep what became of it."""
         folder.mkdir(parents=True, exist_ok=True)
         (folder / KEPT).unlink(missing_ok=True)
@@ -178,7 +178,7 @@ class Launch:
         write_whole(folder / KEPT, json.dumps(record, indent=1))
         return outcome
 
-    def _once(self, case: Mapping[str, str], folder: Path) -> Outcome:
+    def _once(self, case: Mapping[str, str], folder: Path) -> CaseOutcome:
         command = [sys.executable, "-m", "karamelo_py.app.cli", str(self.script.resolve())]
         for name, value in case.items():
             command += ["-var", name, value]
@@ -200,18 +200,18 @@ class Launch:
         if memory:
             facts["peak_memory_mib"] = memory
         if overdue:
-            return Outcome("too long", f"given up after {self.limit:g} s", facts, folder)
+            return CaseOutcome("too long", f"given up after {self.limit:g} s", facts, folder)
         if process.returncode < 0:
             reason = f"ended by signal {-process.returncode}"
-            return Outcome("killed", reason, facts, folder)
+            return CaseOutcome("killed", reason, facts, folder)
         if process.returncode:
-            outcome = Outcome("failed", "", facts, folder)
+            outcome = CaseOutcome("failed", "", facts, folder)
             outcome.reason = reason_in(outcome.complaint)
             others = _NOT_ITS_OWN, _TOO_MUCH
             if "points" not in facts and not any(each.search(outcome.reason) for each in others):
                 outcome.status = "refused"
             return outcome
-        return Outcome("done", "", facts, folder)
+        return CaseOutcome("done", "", facts, folder)
 
     def _wait(self, process: subprocess.Popen, begun: float) -> tuple[float | None, bool]:
         """Wait for the end; the peak memory in MiB, where known, and whether it was late."""

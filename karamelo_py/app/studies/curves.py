@@ -1,4 +1,4 @@
-"""What a table of runs shows: lines of ever finer runs, their orders, the Pareto front."""
+"""A table of runs as lines of ever finer runs, their orders, and the Pareto front."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -52,12 +52,12 @@ def order(x: Sequence[float], y: Sequence[float]) -> Order:
 
 
 def usable(a: float | None) -> bool:
-    """Whether a number can stand on a logarithmic axis."""
+    """Tell whether a number can stand on a logarithmic axis."""
     return a is not None and 0 < a < inf
 
 
 @dataclass
-class Line:
+class Curve:
     """Runs that differ in one variable only.
 
     Attributes
@@ -84,7 +84,7 @@ class Line:
         return ", ".join(parts) or "all"
 
     def shown(self, along: np.ndarray) -> np.ndarray:
-        """Which members have a place in a diagram of errors over `along`."""
+        """Choose the members that have a place in a diagram of errors over `along`."""
         return np.isfinite(self.error) & (self.error > 0) & np.isfinite(along) & (along > 0)
 
 
@@ -145,11 +145,11 @@ class Family:
         self.lines = self._lines(rows)
         self.without = [row for row in rows if not usable(value(row, accuracy))]
 
-    def _lines(self, rows: Sequence[Mapping[str, str]]) -> list[Line]:
-        found: dict[tuple[str, ...], Line] = {}
+    def _lines(self, rows: Sequence[Mapping[str, str]]) -> list[Curve]:
+        found: dict[tuple[str, ...], Curve] = {}
         for row in rows:
             key = tuple(row[name] for name in self.by)
-            line = found.setdefault(key, Line(dict(zip(self.by, key, strict=True))))
+            line = found.setdefault(key, Curve(dict(zip(self.by, key, strict=True))))
             line.rows.append(row)
         for line in found.values():
             if self.along:
@@ -160,7 +160,7 @@ class Family:
 
     @property
     def error_label(self) -> str:
-        """What the error is, for an axis."""
+        """Name the error for an axis."""
         formula = self.formulas.get(self.accuracy)
         return f"{self.accuracy} = {formula}" if formula else look.label(self.accuracy)
 

@@ -1,4 +1,4 @@
-"""What the next finer runs will show: errors by their order, times by steps and points."""
+"""Forecasts of the next finer runs: errors by their order, times by steps and points."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from karamelo_py.app.studies.curves import column, order, usable
 
 @dataclass(frozen=True)
 class Forecast:
-    """What is expected of a run that has not been made.
+    """Forecast of a run that has not been made.
 
     Attributes
     ----------
@@ -30,7 +30,7 @@ class Forecast:
 def forecast(
     x: float, xs: Sequence[float], rows: Sequence[Mapping[str, Any]], accuracy: str, cost: str
 ) -> Forecast | None:
-    """What the runs at `xs`, coarse ones first, let expect of a run at `x`.
+    """Expect a run at `x` from the runs at `xs`, coarse ones first.
 
     The error goes on with the order between the last two. Its bounds are those of the least and the
     largest order so far, at least a third of the expected order away; an order that has fallen may

@@ -52,7 +52,7 @@ def explore(
 
 
 def unseen(shape: tuple[int, int], stride: int) -> int:
-    """How many cells wide islands and strips may be that no run needs to meet."""
+    """Count the cells across islands and strips that no run needs to meet."""
     return max((b - a - 1 for n in shape for a, b in pairwise(_cuts(n, stride))), default=0)
 
 
@@ -80,7 +80,7 @@ def _filled(known: np.ndarray, stride: int) -> np.ndarray:
 
 
 def _between(plane: np.ndarray, reach: int) -> np.ndarray:
-    """What lies in each row between like cells at most `reach` apart."""
+    """Fill each row between like cells at most `reach` apart."""
     said = np.full(plane.shape, UNKNOWN)
     for line, out in zip(plane, said, strict=True):
         for a, b in _gaps(line):
@@ -108,7 +108,7 @@ def _unproved(known: np.ndarray, found: np.ndarray) -> Iterator[tuple[int, Cell]
 
 
 def _stretches(known: np.ndarray, near: np.ndarray, far: np.ndarray, which: int) -> list[list[int]]:
-    """Where two lines differ and nothing is known of one of them, in a row longer than 1."""
+    """Find stretches longer than 1 where two lines differ and nothing is known of one of them."""
     line = (near, far)[which]
     stretches: list[list[int]] = [[]]
     for i in np.flatnonzero((near != far) & (known == UNKNOWN)):

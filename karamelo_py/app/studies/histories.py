@@ -8,7 +8,7 @@ import numpy as np
 
 from karamelo_py.app.logs import read_log
 from karamelo_py.app.studies import look
-from karamelo_py.app.studies.curves import Line
+from karamelo_py.app.studies.curves import Curve
 from karamelo_py.output.files import savefig
 from karamelo_py.output.plot_style import blank_figure, tidy
 from karamelo_py.script.errors import ScriptError, unknown
@@ -72,7 +72,7 @@ def histories(
         for name in (over, curve):
             if name not in columns:
                 raise unknown(f"{log} has no column '{name}'", name, columns)
-        label = names[k] if k < len(names) else Line({name: row[name] for name in by}).label
+        label = names[k] if k < len(names) else Curve({name: row[name] for name in by}).label
         stopped = row.get("status", "done") != "done"
         kept = forward(columns["Time"], stopped) if "Time" in columns else slice(None)
         found.append(History(columns[over][kept], columns[curve][kept], label, stopped))
@@ -82,7 +82,7 @@ def histories(
 
 
 def forward(time: np.ndarray, stopped: bool) -> np.ndarray:
-    """Which rows (n,) of a log belong to one way forward.
+    """Choose the rows (n,) of a log that belong to one way forward.
 
     A run that was stopped ends with its last good state, which came before; one that went back and
     on with smaller steps has rows of what it gave up.

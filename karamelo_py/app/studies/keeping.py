@@ -1,4 +1,4 @@
-"""Whether a log column, such as an energy, stays what it was: a cell for each run of a study."""
+"""Runs judged by a log column, such as an energy, that should stay: a cell for each."""
 
 import re
 from collections.abc import Container, Mapping, Sequence
@@ -8,9 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.app.logs import read_log
+from karamelo_py.app.studies import stretches
 from karamelo_py.app.studies.curves import missing
+from karamelo_py.kernels.growth import WITHIN
 
-WITHIN = 0.1  # of what it was, which still counts as kept
 SHARE = 0.2  # of the run: means over its first and its last part are compared
 WRONG = ("gains", "breaks")
 OF_PARTS = {"gains": "grows", "damps": "falls"}
@@ -22,7 +23,7 @@ _POINT = re.compile(r"point \d+ of solid '[^']*'")
 
 
 class Kept(NamedTuple):
-    """What became of the column in a run.
+    """Verdict on the column in a run.
 
     Attributes
     ----------
@@ -46,25 +47,25 @@ class Kept(NamedTuple):
 
     @property
     def silent(self) -> bool:
-        """Whether it went wrong and nothing says why."""
+        """Tell whether it went wrong and nothing says why."""
         return self.word in WRONG and not self.warned
 
 
 def judge(x: np.ndarray, y: np.ndarray, within: float = WITHIN) -> tuple[str, float]:
     """The word for a column `y` over `x`, and its mean over the last part over that at first."""
-    span = SHARE * (x[-1] - x[0])
-    first, last = y[x <= x[0] + span].mean(), y[x >= x[-1] - span].mean()
-    ratio = float(last / first) if first else np.nan
-    if not ratio <= 1 + within:  # nor for NaN
+    first, last = stretches.ends(x, y, SHARE)
+    share = stretches.grown(first, last)
+    ratio = last / first if first else np.nan
+    if not share <= within:  # nor for NaN
         return "gains", ratio
-    return ("damps" if ratio < 1 - within else "keeps"), ratio
+    return ("damps" if share < -within else "keeps"), ratio
 
 
 def look_at(
     row: Mapping[str, str], folder: Path, over: str, column: str, within: float,
     parts: Container[str] = (),
 ) -> Kept:  # fmt: skip
-    """What became of a column in a run; a value of one of the computes `parts` is no whole.
+    """Judge a column in a run; a value of one of the computes `parts` is no whole.
 
     Raises
     ------
@@ -104,7 +105,7 @@ def _general(text: str) -> str:
     return _POINT.sub("a point", _OWN.sub("", text))
 
 
-class Table(NamedTuple):
+class Verdicts(NamedTuple):
     """Cells of runs: rows and columns are the values of variables."""
 
     headings: list[str]
@@ -114,7 +115,7 @@ class Table(NamedTuple):
 
 
 def table(rows: Sequence[Mapping[str, str]], kept: Sequence[Kept], by: Sequence[str],
-          variables: Sequence[str]) -> Table:  # fmt: skip
+          variables: Sequence[str]) -> Verdicts:  # fmt: skip
     """Arrange runs: a row for each value of the variables `by`, a column for each of the others.
 
     Variables that go in step with those of the rows are left out.
@@ -145,7 +146,7 @@ def table(rows: Sequence[Mapping[str, str]], kept: Sequence[Kept], by: Sequence[
         if one.silent:
             silent.append(", ".join(f"{name} = {row[name]}" for name in (*by, *across)))
     headings = [", ".join(f"{n} = {v}" for n, v in zip(across, c, strict=True)) for c in columns]
-    return Table(
+    return Verdicts(
         [*by, *(heading or "all" for heading in headings)],
         [[*key, *(cells.get((key, c), "") for c in columns)] for key in dict.fromkeys(keys)],
         notes,
@@ -153,7 +154,7 @@ def table(rows: Sequence[Mapping[str, str]], kept: Sequence[Kept], by: Sequence[
     )
 
 
-def markdown(found: Table) -> str:
+def markdown(found: Verdicts) -> str:
     """The table as Markdown, and below what runs said, by the numbers in brackets."""
     lines = [found.headings, ["---"] * len(found.headings), *found.rows]
     text = "\n".join("| " + " | ".join(line) + " |" for line in lines)

@@ -1,4 +1,4 @@
-"""How charts of studies look: the same colour for the same method everywhere, also in grey."""
+"""Looks of charts: the same colour for the same method everywhere, also in grey."""
 
 import hashlib
 from collections.abc import Sequence

@@ -55,7 +55,7 @@ def add_axes(parser: Any) -> None:
 
 
 def along(options: Any, x: str, y: str) -> tuple[str, str]:
-    """What to write along the axes: as the options say, else `x` and `y`."""
+    """Choose the words along the axes: as the options say, else `x` and `y`."""
     words = split(options.axes or ",")
     if len(words) != 2:
         raise ScriptError(f"-axes {options.axes}", expected="two, such as -axes 'time (s),F (N)'")

@@ -16,8 +16,8 @@ import numpy as np
 
 import karamelo_py
 from karamelo_py.app.logs import read_log
-from karamelo_py.app.studies.case import COLUMNS, Outcome
-from karamelo_py.app.studies.variables import Scope
+from karamelo_py.app.studies.case import COLUMNS, CaseOutcome
+from karamelo_py.app.studies.variables import NamesOfCase
 from karamelo_py.output.files import write_whole
 from karamelo_py.output.quantity import KEYWORDS
 from karamelo_py.script.errors import ScriptError, meant, nearest
@@ -36,7 +36,7 @@ _PART = re.compile(rf"\b([^\W\d]\w*):([^\W\d]\w*)(?::({_NUMBER}))?")
 _NAME = re.compile(r"\b([^\W\d]\w*)\b(?!\s*\()")
 
 
-class Part:
+class Reduction:
     """A number of a log column: its last value, ``max`` and so on, ``when`` it reaches a value."""
 
     def __init__(self, reduction: str, column: str, level: str | None, word: str):
@@ -77,7 +77,7 @@ class Part:
 
 
 class Recorded:
-    """What is recorded of a log: ``err`` (the last value of that column), ``max:err``, ...
+    """Take a number from a log: ``err`` (the last value of that column), ``max:err``, ...
 
     ``off=abs(max:depth/3.28 - 1)`` is a formula of such numbers under a name of its own, in the
     language of scripts; it knows the variables of the study as well.
@@ -86,20 +86,20 @@ class Recorded:
     def __init__(self, word: str):
         name, equals, formula = (part.strip() for part in word.partition("="))
         self.text, self.raw = word, None
-        self.parts: dict[str, Part] = {}
+        self.parts: dict[str, Reduction] = {}
         self.names: list[str] = []
         if not equals:
             self.word = word
             reduction, colon, rest = word.partition(":")
             column, level = (rest.split(":", 1) + [None])[:2] if colon else (word, None)
-            self.parts[""] = Part(reduction if colon else "last", column, level, word)
+            self.parts[""] = Reduction(reduction if colon else "last", column, level, word)
             return
         if not name.isidentifier() or not formula:
             raise ScriptError(f"-record {word}", expected="name=formula, as in off=abs(max:s - 1)")
         self.word = name
 
         def named(match: re.Match) -> str:
-            self.parts[f"part{len(self.parts)}"] = Part(*match.groups(), word)
+            self.parts[f"part{len(self.parts)}"] = Reduction(*match.groups(), word)
             return f"part{len(self.parts) - 1}"
 
         formula = _PART.sub(named, formula)
@@ -118,19 +118,19 @@ class Recorded:
         if self.raw is None:
             return found[""]
         for name in self.names:
-            last = Part("last", name, None, self.text)
+            last = Reduction("last", name, None, self.text)
             found[name] = number_of(case[name]) if name in case else last.of(log)
         if None in found.values():
             return None
         try:
-            value = evaluate(self.node, self.raw, Scope("-record", found))
+            value = evaluate(self.node, self.raw, NamesOfCase("-record", found))
         except ScriptError:  # such as a division by zero, in this run
             return None
         return value if isinstance(value, float) else None
 
     def missing(self, log: Mapping[str, np.ndarray]) -> str:
         """Why there is no number."""
-        plain = [Part("last", name, None, self.text) for name in self.names]
+        plain = [Reduction("last", name, None, self.text) for name in self.names]
         parts = [p for p in [*self.parts.values(), *plain] if p.of(log) is None]
         return parts[0].missing(log) if parts else f"'{self.text}' has no value"
 
@@ -142,7 +142,7 @@ def recorded(
     variables: Container[str] = (),
     option: str = "-record",
 ) -> list[Recorded]:
-    """What -record, or another option, asks for.
+    """Read the numbers that -record, or another option, asks for.
 
     Raises
     ------
@@ -177,7 +177,7 @@ def _apart(text: str) -> list[str]:
 
 
 def row(
-    case: Mapping[str, str], outcome: Outcome, items: Iterable[Recorded], folder: Path
+    case: Mapping[str, str], outcome: CaseOutcome, items: Iterable[Recorded], folder: Path
 ) -> dict[str, Any]:
     """The row of a run; what is not known of it is left empty.
 
@@ -269,7 +269,7 @@ def surroundings() -> dict[str, Any]:
 
 
 def beside(path: Path) -> dict[str, Any]:
-    """What `describe` wrote beside a table, or nothing."""
+    """Read what `describe` wrote beside a table, or nothing."""
     try:
         return json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
     except (OSError, ValueError):

@@ -5,7 +5,7 @@ import textwrap
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from math import ceil, isclose, isfinite, nan, prod
+from math import isclose, isfinite, nan, prod
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from karamelo_py.app.logs import read_log
 from karamelo_py.app.options import above_zero, positive
-from karamelo_py.app.studies import records
+from karamelo_py.app.studies import records, stretches
 from karamelo_py.app.studies.frontier import Cell, explore, unseen
 from karamelo_py.app.studies.options import (
     add_axes,
@@ -42,6 +42,7 @@ with one value is passed on.
 The script logs an energy that should stay about the same, such as Ek + Es."""
 ENERGIES = ("Etot", "E_total", "Ek+Es", "Ek_s+Es_s", "Ek+Es+Ed", "Ek", "Ek_s")
 CLASSES = ("stable", "growing", "failed")
+FIRST = 0.1  # of the rows of a log: energies are means over so many
 FEW = 9  # values of a variable that stand at the axis one by one
 COLOURS = {"stable": "#d9ecf7", "growing": "#f0a53c", "failed": "#7d2a3a"}  # light to dark
 # What the program says of failures, in short.
@@ -65,7 +66,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("-energy", metavar="COLUMN", help="log column that should not grow")
     parser.add_argument(
         "-bound", type=above_zero, default=2.0,
-        help="growing: energy above this times the largest of the first tenth of the log (2)",
+        help="growing: energy above this times that of the first tenth of the log, in the mean (2)",
     )  # fmt: skip
     parser.add_argument("-stride", type=positive, default=6, help="cells between first runs (6)")
     add_axes(parser)
@@ -134,18 +135,12 @@ def energy_column(asked: str | None, headings: Sequence[str] | None, script: Pat
     )
 
 
-def growth(energy: np.ndarray, bound: float) -> float:
-    """The largest energy over the largest of the first tenth of the outputs; inf for NaN."""
-    if not len(energy):
-        return 0.0
-    if not np.isfinite(energy).all():
-        return np.inf
-    scale = np.abs(energy[: max(1, ceil(0.1 * len(energy)))]).max()
-    if scale == 0:
-        # From rest: what is usual stands for the beginning.
-        scale = float(np.median(np.abs(energy)))
-    largest = float(np.abs(energy).max())
-    return largest / scale if scale > 0 else (np.inf if largest > 0 else 0.0)
+def growth(energy: np.ndarray) -> float:
+    """The largest mean of an energy over the mean of its first tenth; infinite for NaN."""
+    first, later = stretches.most(energy, FIRST)
+    if first == 0:
+        return np.inf if later > 0 else 0.0
+    return 1 + stretches.grown(first, later)
 
 
 def in_short(row: Mapping[str, Any]) -> str:
@@ -160,7 +155,7 @@ def in_short(row: Mapping[str, Any]) -> str:
 
 
 def limited_by(folder: Path) -> str:
-    """What limits the first step of a run, by name; nothing where the script says the step."""
+    """Read by name what limits the first step of a run; nothing where the script says the step."""
     try:
         said = (folder / "out.txt").read_text(encoding="utf-8", errors="replace")
     except OSError:
@@ -208,7 +203,7 @@ class Map:
                 raise ScriptError(
                     f"the log has no column '{self.energy}'", expected=", ".join(log) or "a log"
                 )
-            factor = growth(log.get(self.energy, np.empty(0)), self.bound)
+            factor = growth(log.get(self.energy, np.empty(0)))
             kind = "failed" if row["status"] != "done" else "stable"
             if kind == "stable" and factor > self.bound:
                 kind = "growing"

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.app.logs import read_log
-from karamelo_py.app.studies.case import Launch, Outcome, Refused, folder_name
+from karamelo_py.app.studies.case import CaseOutcome, Launch, Refused, folder_name
 from karamelo_py.app.studies.records import Recorded, row
 from karamelo_py.output.console import duration
 from karamelo_py.script.terms import number_of
@@ -146,7 +146,7 @@ class Study:
                 return item
         return None
 
-    def _put(self, case: Mapping[str, str], outcome: Outcome) -> None:
+    def _put(self, case: Mapping[str, str], outcome: CaseOutcome) -> None:
         if self.strict and outcome.status == "refused":
             raise Refused(case, outcome)
         found = row(case, outcome, self.items, self.folder.parent)
@@ -225,7 +225,7 @@ class _Display:
 
     @property
     def progress(self) -> tuple[int, int]:
-        """How many runs there were, and of how many."""
+        """Count the runs that there were, and of how many."""
         most = self.study.most
         return (self.study.ran, most) if most else (self.finished, self.count)
 
@@ -234,7 +234,9 @@ class _Display:
         done = [found for found in self.study.rows.values() if found.get("wall_s")]
         if not self.finished or not done:
             return None
-        predict = growth([{n: f[n] for n in self.names} for f in done], [f["wall_s"] for f in done])
+        predict = guessed_time(
+            [{n: f[n] for n in self.names} for f in done], [f["wall_s"] for f in done]
+        )
         now = time.perf_counter()
         rest = sum(predict(case) for case in queue)
         for case in running:
@@ -243,11 +245,11 @@ class _Display:
 
 
 def kind_of(case: Mapping[str, str]) -> tuple[str, ...]:
-    """What the loops of a case are compiled for, as far as variables tell: words, not numbers."""
+    """Pick what the loops of a case are compiled for, as far as variables tell: its words."""
     return tuple(value for value in case.values() if number_of(value) is None)
 
 
-def growth(
+def guessed_time(
     cases: Sequence[Mapping[str, str]], times: Sequence[float]
 ) -> Callable[[Mapping[str, str]], float]:
     """A guess of the time of a case: a product of powers of its numbers and factors of its words.
@@ -280,12 +282,24 @@ def _term(name: str, value: str) -> tuple[str, Any]:
 
 
 def shown(value: Any) -> str:
-    """A number or a word as a table shows it."""
-    if value is None or value == "":
+    """A number or a word as a table shows it; NaN is none."""
+    if value is None or value == "" or value != value:
         return "–"
     if isinstance(value, float):
         return f"{value:.4g}" if abs(value) < 1e5 or value != round(value) else f"{value:.3e}"
     return str(value)
+
+
+def plain_table(words: Sequence[str], numbers: Sequence[str], title: str | None = None) -> Any:
+    """A table for a terminal, empty, with columns of words and of numbers."""
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False, title=title, title_justify="left")
+    for name in words:
+        table.add_column(name, style="cyan", no_wrap=True)
+    for name in numbers:
+        table.add_column(name, justify="right", no_wrap=True)
+    return table
 
 
 def results_table(
@@ -335,7 +349,7 @@ def default_jobs() -> int:
 
 
 def terminal() -> Any:
-    """Where tables are shown; a file or a pipe is wide enough for whole rows."""
+    """Open the place of tables; a file or a pipe is wide enough for whole rows."""
     from rich.console import Console
 
     return Console() if sys.stdout.isatty() else Console(width=200)

@@ -10,7 +10,7 @@ import numpy as np
 from karamelo_py.app.studies import look
 from karamelo_py.app.studies.curves import missing, require, usable
 from karamelo_py.app.studies.records import value
-from karamelo_py.app.studies.study import shown, terminal
+from karamelo_py.app.studies.study import plain_table, shown, terminal
 from karamelo_py.output.files import savefig
 from karamelo_py.output.plot_style import blank_figure, tidy
 from karamelo_py.script.errors import ScriptError, plural
@@ -92,18 +92,12 @@ def _number(row: Mapping[str, str], column: str) -> float:
 
 def tell(found: Sequence[Pair], values: Sequence[str], accuracy: str, cost: str) -> None:
     """Print the pairs as a table."""
-    from rich.table import Table
-
-    table = Table(box=None, pad_edge=False)
-    table.add_column("", style="cyan", no_wrap=True)
     ratio = f"{values[1]}/{values[0]}"
     headings = [f"{what}, {word}" for what in (accuracy, cost) for word in values]
-    for heading in (*headings, f"{cost}, {ratio}", f"bytes, {ratio}"):
-        table.add_column(heading, justify="right", no_wrap=True)
+    table = plain_table([""], [*headings, f"{cost}, {ratio}", f"bytes, {ratio}"])
     for pair in found:
         numbers = [*pair.error, *pair.cost, pair.cost_ratio, pair.bytes[1] / pair.bytes[0]]
-        cells = [shown(float(f"{a:.3g}")) if np.isfinite(a) else "–" for a in numbers]
-        table.add_row(pair.label, *cells)
+        table.add_row(pair.label, *(shown(float(f"{a:.3g}")) for a in numbers))
     terminal().print(table)
 
 

@@ -8,20 +8,19 @@ from typing import Any
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.core.errors import TypingError
 from numba.extending import intrinsic
 
 from karamelo_py.compiler.compile import (
     added,
-    by_type,
-    define,
-    first_failing,
+    first_false_lane,
     first_lane,
+    implements,
     in_each_lane,
     lanes_of,
     largest,
 )
-from karamelo_py.compiler.lanes.registers import I64, Lanes, element, known, lane, vector_of
+from karamelo_py.compiler.lanes.registers import I64, Lanes, element, lane, vector_of
+from karamelo_py.compiler.values import Untraceable
 
 
 def _of_leaves(kind: Any, change: Callable) -> Any:
@@ -114,9 +113,9 @@ def _lane_by_lane(typing_context, function, unrolled, arguments):
     return result(function, unrolled, arguments), codegen
 
 
-@by_type(in_each_lane)
+@implements(in_each_lane)
 def _in_each_lane(function, arguments):
-    return lambda function, arguments: _lane_by_lane(function, False, arguments)
+    return _lane_by_lane(function, False, arguments)
 
 
 @intrinsic
@@ -163,22 +162,15 @@ def _added_lanes(typing_context, total, a):
     return total(total, a), codegen
 
 
-known(largest, _largest_lane)
-known(added, _added_lanes)
-known(first_failing, _first_false)
-known(first_lane, _first)
+implements(largest, Lanes)(_largest_lane)
+implements(added, Lanes)(_added_lanes)
+implements(first_false_lane, Lanes)(_first_false)
+implements(first_lane, Lanes)(_first)
 
 
 def _each_lane(function: Callable) -> None:
     """Let a function of numbers know lanes: it is called for one after another."""
-
-    @by_type(function)
-    def chosen(*arguments):
-        if not lanes_of(arguments):
-            return None
-        names = ", ".join(f"a{k}" for k in range(len(arguments)))
-        call = f"return call(function, True, ({names},))"
-        return define(names, call, function=function, call=_lane_by_lane)
+    implements(function, Lanes)(lambda *arguments: _lane_by_lane(function, True, arguments))
 
 
 for _function in (
@@ -188,10 +180,12 @@ for _function in (
     _each_lane(_function)
 
 
-@by_type(bool)
-def _branch(value):
-    if lanes_of(value):
-        raise TypingError(
-            "several points are computed at once, which a branch cannot tell apart: take choose, "
-            "in_all or in_any, or name the point function in one_by_one"
-        )
+@intrinsic
+def _branch(typing_context, value):
+    raise Untraceable(
+        "several points are computed at once, which a branch cannot tell apart: take where, "
+        "all_lanes or any_lane, or name the point function in scalarised"
+    )
+
+
+implements(bool, Lanes)(_branch)

@@ -13,6 +13,8 @@ from numba.np.arrayobj import populate_array
 from karamelo_py.compiler.compile import (
     beside,
     by_type,
+    implements,
+    index,
     is_one,
     lanes_of,
     of_present,
@@ -25,7 +27,6 @@ from karamelo_py.compiler.lanes.registers import (
     I64,
     Lanes,
     constant,
-    known,
     lane,
     pack,
     shape,
@@ -37,17 +38,17 @@ from karamelo_py.compiler.lanes.registers import (
 AHEAD = 256  # bytes by which arrays of points are asked of the memory ahead of their use
 
 
-class Group(types.Type):
+class LaneGroup(types.Type):
     """The numbers of up to `width` points that lie one after another."""
 
     def __init__(self, width: int):
         self.width = width
-        super().__init__(name=f"Group({width})")
+        super().__init__(name=f"LaneGroup({width})")
 
 
-@register_model(Group)
+@register_model(LaneGroup)
 class _GroupModel(models.StructModel):
-    def __init__(self, manager: Any, group: Group):
+    def __init__(self, manager: Any, group: LaneGroup):
         super().__init__(manager, group, [("first", types.int64), ("count", types.int64)])
 
 
@@ -65,13 +66,13 @@ class _BesideModel(models.StructModel):
         super().__init__(manager, beside, [("nodes", beside.nodes), ("steps", types.intp)])
 
 
-class Fours(NamedTuple):
+class FourLanes(NamedTuple):
     """Four points at once."""
 
     width = 4
 
 
-class Eights(NamedTuple):
+class EightLanes(NamedTuple):
     """Eight points at once."""
 
     width = 8
@@ -79,13 +80,13 @@ class Eights(NamedTuple):
 
 def lanes_for(bits: int) -> type:
     """How many points are visited at once, of numbers with so many bits; kept sorted for that."""
-    return {64: Fours, 32: Eights}[bits]
+    return {64: FourLanes, 32: EightLanes}[bits]
 
 
 @intrinsic
 def group(typing_context, tag, first, count):
     """The `count` points from `first` on, as many as the tag says at most."""
-    made = Group(tag.instance_class.width)
+    made = LaneGroup(tag.instance_class.width)
 
     def codegen(context, builder, sig, arguments):
         out = cgutils.create_struct_proxy(made)(context, builder)
@@ -152,11 +153,9 @@ def _present(typing_context, p):
     return mask(p), codegen
 
 
-@by_type(of_present)
+@implements(of_present, LaneGroup)
 def _of_present(p, value):
-    if isinstance(p, Group):
-        return lambda p, value: select(_present(p), value, real(0, value))
-    return None
+    return select(_present(p), value, real(0, value))
 
 
 def pointer_to(context, builder, kind, array, indices, last=None):
@@ -306,9 +305,7 @@ def _prefetch(typing_context, array, at):
     return types.void(array, at), codegen
 
 
-@by_type(prefetch)
-def _prefetch_by_type(array, at):
-    return (lambda array, at: _prefetch(array, at)) if isinstance(_last(at), Group) else None
+implements(prefetch, LaneGroup)(_prefetch)
 
 
 @intrinsic
@@ -366,17 +363,17 @@ def _head(at: Any) -> Any:
 
 @by_type(operator.getitem)
 def _get(array, at):
-    if isinstance(array, types.Array) and isinstance(_last(at), Group):
-        return lambda array, at: _load_points(array, at)
+    if isinstance(array, types.Array) and isinstance(_last(at), LaneGroup):
+        return _load_points
     if isinstance(array, types.Array) and isinstance(_head(at), Lanes | Beside):
-        return lambda array, at: _gather(array, at)
+        return _gather
     return None
 
 
 @by_type(operator.setitem)
 def _set(array, at, value):
-    if isinstance(array, types.Array) and isinstance(_last(at), Group):
-        return lambda array, at, value: _store_points(array, at, value)
+    if isinstance(array, types.Array) and isinstance(_last(at), LaneGroup):
+        return _store_points
     return None
 
 
@@ -391,7 +388,7 @@ def _is_one(typing_context, nodes):
     return types.boolean(nodes), codegen
 
 
-known(is_one, _is_one)
+implements(is_one, Lanes)(_is_one)
 
 
 @intrinsic
@@ -406,4 +403,5 @@ def _beside(typing_context, first, steps):
     return made(first, types.intp), codegen
 
 
-known(beside, _beside)
+implements(beside, Lanes)(_beside)
+implements(index, Beside)(lambda i: i)

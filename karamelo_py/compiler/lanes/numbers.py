@@ -12,18 +12,17 @@ from numba.core.typing.templates import AbstractTemplate, infer_global, signatur
 from numba.extending import intrinsic
 
 from karamelo_py.compiler.compile import (
-    by_type,
-    choose,
-    define,
+    all_lanes,
+    any_lane,
     fma,
-    in_all,
-    in_any,
+    implements,
     index,
     lanes_of,
     real,
     round_off,
+    where,
 )
-from karamelo_py.compiler.lanes.registers import I32, Lanes, call_vector, known, splat, vector_of
+from karamelo_py.compiler.lanes.registers import I32, Lanes, call_vector, splat, vector_of
 from karamelo_py.compiler.lowering import Lowering
 
 # --- arithmetic -------------------------------------------------------------------------------
@@ -161,9 +160,9 @@ def _abs_lanes(typing_context, a):
     return a(a), call_vector("fabs", a)
 
 
-known(fma, _fma_lanes)
-known(math.sqrt, _sqrt_lanes)
-known(abs, _abs_lanes)
+implements(fma, Lanes)(_fma_lanes)
+implements(math.sqrt, Lanes)(_sqrt_lanes)
+implements(abs, Lanes)(_abs_lanes)
 
 
 @intrinsic
@@ -182,38 +181,30 @@ def select(typing_context, condition, a, b):
     return lanes(condition, *typed), codegen
 
 
-@by_type(choose)
-def _choose(condition, a, b):
-    if not isinstance(condition, Lanes):
-        return None
-    if not isinstance(a, types.BaseTuple):
-        return lambda condition, a, b: select(condition, a, b)
-    items = "".join(f"choose(condition, a[{k}], b[{k}]), " for k in range(len(a)))
-    return _spelled("condition, a, b", items, a, choose=choose)
+@implements(where, Lanes)
+def _where(condition, a, b):
+    if lanes_of(condition) == 0:  # the same for all
+        return a if condition else b
+    if not isinstance(a, tuple):
+        return select(condition, a, b)
+    items = [where(condition, x, y) for x, y in zip(a, b, strict=True)]
+    return type(a)(*items) if hasattr(a, "_fields") else tuple(items)
 
 
-def _spelled(parameters: str, items: str, like: Any, **names: Any) -> Callable:
-    """A function that returns a tuple of these items, a NamedTuple where `like` is one."""
-    if isinstance(like, types.BaseNamedTuple):
-        return define(parameters, f"return make({items})", make=like.instance_class, **names)
-    return define(parameters, f"return ({items})", **names)
+@implements(max, Lanes)
+def _max(*numbers):
+    best = numbers[0]
+    for one in numbers[1:]:
+        best = select(one > best, one, best)
+    return best
 
 
-def _extreme(function: Callable, sign: str) -> None:
-    """Let min or max of two or more numbers know lanes."""
-
-    @by_type(function)
-    def chosen(*arguments):
-        if not any(isinstance(a, Lanes) for a in arguments):
-            return None
-        names = [f"a{k}" for k in range(len(arguments))]
-        lines = ["best = a0"]
-        lines += [f"best = select({name} {sign} best, {name}, best)" for name in names[1:]]
-        return define(", ".join(names), *lines, "return best", select=select)
-
-
-_extreme(max, ">")
-_extreme(min, "<")
+@implements(min, Lanes)
+def _min(*numbers):
+    best = numbers[0]
+    for one in numbers[1:]:
+        best = select(one < best, one, best)
+    return best
 
 
 def _truth(function: Callable, sign: str, bits_of: int) -> None:
@@ -227,11 +218,11 @@ def _truth(function: Callable, sign: str, bits_of: int) -> None:
 
         return types.boolean(mask), codegen
 
-    known(function, asked)
+    implements(function, Lanes)(asked)
 
 
-_truth(in_all, "==", -1)
-_truth(in_any, "!=", 0)
+_truth(all_lanes, "==", -1)
+_truth(any_lane, "!=", 0)
 
 
 # --- conversions ------------------------------------------------------------------------------
@@ -239,6 +230,8 @@ _truth(in_any, "!=", 0)
 
 @intrinsic
 def _truncated(typing_context, a):
+    if not isinstance(a.scalar, types.Float):
+        return None
     whole = Lanes(types.int32, a.width)  # every processor has that, and cells are no more
 
     def codegen(context, builder, sig, arguments):
@@ -247,11 +240,7 @@ def _truncated(typing_context, a):
     return whole(a), codegen
 
 
-@by_type(int)
-def _int(a):
-    if isinstance(a, Lanes) and isinstance(a.scalar, types.Float):
-        return lambda a: _truncated(a)
-    return None
+implements(int, Lanes)(_truncated)
 
 
 @intrinsic
@@ -286,23 +275,24 @@ def _spread(typing_context, value, like):
     return like(value, like), codegen
 
 
-@by_type(real)
+@implements(real, Lanes)
 def _real(value, like):
-    if isinstance(value, Lanes):
-        return lambda value, like: _converted(value, like)
-    if isinstance(like, Lanes):
-        return lambda value, like: _spread(value, like)
-    return None
+    return _converted(value, like) if lanes_of(value) else _spread(value, like)
 
 
-@by_type(index)
+@implements(index, Lanes)
 def _index(i):
-    return (lambda i: i) if lanes_of(i) else None
+    return i
 
 
-@by_type(round_off)
-def _round_off(like):
-    if isinstance(like, Lanes):
-        error = 2.0**-23 if like.scalar == types.float32 else 2.0**-52
-        return lambda like: real(error, like)
-    return None
+@intrinsic
+def _round_off(typing_context, like):
+    error = 2.0**-23 if like.scalar == types.float32 else 2.0**-52
+
+    def codegen(context, builder, sig, arguments):
+        return splat(builder, context.get_constant(like.scalar, error), like)
+
+    return like(like), codegen
+
+
+implements(round_off, Lanes)(_round_off)

@@ -13,6 +13,7 @@ from karamelo_py.compiler.compile import (
     Weighted,
     accumulate,
     by_type,
+    implements,
     lanes_of,
     prefetch_records,
     tag_class,
@@ -148,9 +149,7 @@ def _prefetch_records(typing_context, array, nodes):
     return types.void(array, nodes), codegen
 
 
-@by_type(prefetch_records)
-def _prefetch_records_by_type(array, i):
-    return (lambda array, i: _prefetch_records(array, i)) if lanes_of(i) else None
+implements(prefetch_records, Lanes, Beside)(_prefetch_records)
 
 
 def _fma(builder: Any, a: Any, b: Any, c: Any) -> Any:
@@ -166,7 +165,7 @@ def _fma(builder: Any, a: Any, b: Any, c: Any) -> Any:
 @by_type(row)
 def _row(array, i, first, like):
     if isinstance(i, Lanes | Beside):
-        return lambda array, i, first, like: _gather_row(array, i, first, like)
+        return _gather_row
     if tag_class(i) is Weighted and lanes_of(i):
         return lambda array, i, first, like: _gather_weighted(array, i.rows, first, i.weights, like)
     return None
@@ -247,13 +246,7 @@ def _move_record(typing_context, array, i, other, j, first, like, keep):
     return signature, codegen
 
 
-by_type(move_record)(
-    lambda *arguments: (
-        lambda array, i, other, j, first, like, keep: _move_record(
-            array, i, other, j, first, like, keep
-        )
-    )
-)
+implements(move_record)(_move_record)
 
 
 def _records(builder: Any, parts: list) -> list:
@@ -272,7 +265,7 @@ def _accumulate(array, i, first, values):
             array, i.rows, first, i.weights, values, ()
         )
     if isinstance(array, types.Array) and (lanes_of(i) or lanes_of(values)):
-        return lambda array, i, first, values: _scatter(array, i, first, values)
+        return _scatter
     return None
 
 
@@ -289,13 +282,6 @@ def accumulate_affine(array, nodes, first, weights, value, slopes):
             for d, slope in enumerate(reversed(slopes)):
                 number = number + (k // width**d % width) * slope[c]
             array[node, first + c] += weight * number
-
-
-@by_type(accumulate_affine)
-def _accumulate_affine_by_type(array, nodes, first, weights, value, slopes):
-    return lambda array, nodes, first, weights, value, slopes: _accumulate_affine(
-        array, nodes, first, weights, value, slopes
-    )
 
 
 @intrinsic
@@ -358,6 +344,9 @@ def _accumulate_affine(typing_context, array, nodes, first, weights, value, slop
 
     made = types.void(array, nodes, types.int64, weights, value, slopes)
     return made, codegen
+
+
+implements(accumulate_affine)(_accumulate_affine)
 
 
 def _records_of(builder: Any, parts: list, lanes: Lanes, count: int) -> list:

@@ -8,8 +8,6 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import models, register_model
 
-from karamelo_py.compiler.compile import by_type, define, lanes_of
-
 I32, I64 = ir.IntType(32), ir.IntType(64)
 
 
@@ -74,17 +72,6 @@ def shape(lanes: Lanes) -> str:
 
 def shuffle(builder: Any, a: Any, b: Any, order: list[int]) -> Any:
     return builder.shuffle_vector(a, b, constant(order))
-
-
-def known(function: Callable, made: Callable) -> None:
-    """Let `function` know lanes: where an argument has some, it is the intrinsic `made`."""
-
-    @by_type(function)
-    def chosen(*arguments):
-        if not lanes_of(arguments):
-            return None
-        names = ", ".join(f"a{k}" for k in range(len(arguments)))
-        return define(names, f"return made({names})", made=made)
 
 
 def call_vector(name: str, lanes: Lanes) -> Callable:

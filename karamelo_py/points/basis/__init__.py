@@ -38,6 +38,9 @@ lone
 bears_drift
     whether bodies that drift keep their energy with the step of bodies at rest, with musl and usf
     too (not, where a class does not say);
+borne
+    how far bodies drift and turn with them and keep their energy (`noise.Borne`; that of functions
+    that are like them, where a class does not say);
 steep_edge
     whether |grad N|^2 / N exceeds 2 / h^2 a direction where a weight vanishes: usl then limits what
     light nodes do to the strain.

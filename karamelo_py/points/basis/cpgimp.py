@@ -5,9 +5,11 @@ from typing import NamedTuple
 
 from karamelo_py.compiler.compile import Weighted, index, real
 from karamelo_py.compiler.powers import power
+from karamelo_py.language.rules import known_failure
 from karamelo_py.points.basis import carried, carrier, carry, deformed, mapped_again
 from karamelo_py.points.basis.product import along, node_number, product, register
 from karamelo_py.points.basis.ugimp import averaged_hats, box
+from karamelo_py.points.basis.wide import wide
 from karamelo_py.points.grid import cells_along
 from karamelo_py.points.kinematics import I, det, planar, tensor
 
@@ -25,6 +27,9 @@ class _Box(NamedTuple):
     steady_moment = True
     steep_edge = True
     in_lanes = True
+
+
+wide(_Box)
 
 
 class CPGIMPDet(_Box):
@@ -54,6 +59,16 @@ class CPGIMPDiagonal(_Box):
     __slots__ = ()
     steady_moment = False  # D of the affine transfers all but vanishes with the box
     shape = ("half_size", "half_size", "deformation")  # half sizes now and at the start, F
+
+
+known_failure(
+    CPGIMPDiagonal,
+    "boxes in a turn",
+    when=lambda basis, scene: scene.turns,
+    reason="bodies will turn by about {scene.turn:.2g} rad, and boxes of the size |F_ii| shrink "
+    "with the cosine of that",
+    cure="the variant stretch in the place of diagonal",
+)
 
 
 class CPGIMPStretch(_Box):

@@ -2,8 +2,10 @@
 
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import choose, in_all, real
+from karamelo_py.compiler.compile import all_lanes, real, where
+from karamelo_py.points.basis.noise import CUBIC
 from karamelo_py.points.basis.product import Along, along, register
+from karamelo_py.points.basis.wide import wide
 from karamelo_py.points.grid import cells_along, in_cells
 
 
@@ -36,6 +38,10 @@ class CubicSpline(NamedTuple):
     # measured again.
     courant_strained_first = 1.0
     bears_drift = True
+    borne = CUBIC
+
+
+wide(CubicSpline)
 
 
 @along.on(CubicSpline)
@@ -65,9 +71,9 @@ def _along_cubic_spline(basis, kin, grid, place, direction):
     )
     line = Along(cell - 1, r, weights, gradients, affine)
     bulk = (cell >= 1) & (cell < last - 1)
-    if in_all(bulk):
+    if all_lanes(bulk):
         return line
-    return choose(bulk, line, at_wall(grid, a, last))
+    return where(bulk, line, at_wall(grid, a, last))
 
 
 def at_wall(grid, a, last):
@@ -80,13 +86,13 @@ def at_wall(grid, a, last):
         gradients = (zero - grid.inv_h, zero + grid.inv_h, zero, zero)
         return Along(first, r, (1 - r, r, zero, zero), gradients, gradients)
     lower = cell == 0
-    n, g, c = beside_wall(grid, choose(lower, a, real(last, a) - a))
-    n = choose(lower, n, (n[2], n[1], n[0]))
-    g = choose(lower, g, (-g[2], -g[1], -g[0]))
-    c = choose(lower, c, (-c[2], -c[1], -c[0]))
+    n, g, c = beside_wall(grid, where(lower, a, real(last, a) - a))
+    n = where(lower, n, (n[2], n[1], n[0]))
+    g = where(lower, g, (-g[2], -g[1], -g[0]))
+    c = where(lower, c, (-c[2], -c[1], -c[0]))
     behind = (cell > 0) & (last > 2)  # they are the last three of the four
     n, g, c = [
-        tuple([choose(behind, *pair) for pair in zip((0, *of), (*of, 0), strict=True)])
+        tuple([where(behind, *pair) for pair in zip((0, *of), (*of, 0), strict=True)])
         for of in (n, g, c)
     ]
     return Along(first, r, n, g, c)

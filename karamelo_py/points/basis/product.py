@@ -8,12 +8,12 @@ from typing import NamedTuple
 
 from karamelo_py.compiler.compile import (
     beside,
-    choose,
     first_lane,
     is_one,
     point_function,
     real,
     shared,
+    where,
 )
 from karamelo_py.points.basis import affine_weight, entry, locate, reach, support
 from karamelo_py.points.kinematics import TAGS, Axisymmetric, gradient, vector
@@ -83,12 +83,12 @@ def evenly(basis, grid, stencil):
 
 def hoop(weight, gradient, inv_r):
     """N / r at an axisymmetric point; at r = 0 its limit, dN/dr (`inv_r` is 0 there)."""
-    return choose(inv_r > 0, weight * inv_r, gradient)
+    return where(inv_r > 0, weight * inv_r, gradient)
 
 
 def inverse_radius(r):
     """1 / r, or 0 on the axis and so close to it that 1 / r would overflow."""
-    return choose(r > 1e-30, 1 / max(r, 1e-30), 0)
+    return where(r > 1e-30, 1 / max(r, 1e-30), 0)
 
 
 def radius(basis, grid, line):

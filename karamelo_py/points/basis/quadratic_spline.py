@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import choose, in_all
+from karamelo_py.compiler.compile import all_lanes, where
 from karamelo_py.points.basis import first_node, product
 from karamelo_py.points.grid import cells_along, in_cells
 
@@ -39,9 +39,9 @@ def _along_quadratic_spline(basis, kin, grid, place, direction):
     weights = (0.5 * left * left, 0.75 - t * t, 0.5 * right * right)
     gradients = (-left * grid.inv_h, -(t + t) * grid.inv_h, right * grid.inv_h)
     line = product.Along(nearest - 1, 1 + t, weights, gradients, ())
-    if in_all(bulk):
+    if all_lanes(bulk):
         return line
-    return choose(bulk, line, at_wall(grid, a, last))
+    return where(bulk, line, at_wall(grid, a, last))
 
 
 def at_wall(grid, a, last):
@@ -50,11 +50,11 @@ def at_wall(grid, a, last):
     first = max(min(cell, last - 2), 0)
     t = a - cell
     second = first < cell  # the cell is that between the last two of the three nodes
-    weights = (choose(second, 0, 1 - t), choose(second, 1 - t, t), choose(second, t, 0))
+    weights = (where(second, 0, 1 - t), where(second, 1 - t, t), where(second, t, 0))
     gradients = (
-        choose(second, 0, -grid.inv_h),
-        choose(second, -grid.inv_h, grid.inv_h),
-        choose(second, grid.inv_h, 0),
+        where(second, 0, -grid.inv_h),
+        where(second, -grid.inv_h, grid.inv_h),
+        where(second, grid.inv_h, 0),
     )
     return product.Along(first, a - first, weights, gradients, ())
 
@@ -69,7 +69,7 @@ def _affine_along_quadratic_spline(basis, grid, line, direction):
     # D = h^2 / 4. For hat functions, N D^-1 (X - x) is the gradient.
     four = 4 * grid.inv_h
     affine = tuple([four * (k - line.r) * weight for k, weight in enumerate(line.weights)])
-    return choose(in_bulk(grid, line, direction), affine, line.gradients)
+    return where(in_bulk(grid, line, direction), affine, line.gradients)
 
 
 @product.inverse_spread.on(QuadraticSpline)

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 from karamelo_py.compiler.compile import real
 from karamelo_py.points.basis.product import Along, along, register
+from karamelo_py.points.basis.wide import wide
 from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.points.kinematics.tensors import total
 
@@ -77,3 +78,4 @@ def _along_ugimp(basis, kin, grid, place, direction):
 
 
 register(UGIMP, 3)
+wide(UGIMP)

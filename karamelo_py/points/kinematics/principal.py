@@ -3,7 +3,7 @@
 from math import sqrt
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import choose, point_function, round_off, shared
+from karamelo_py.compiler.compile import point_function, round_off, shared, where
 from karamelo_py.points.kinematics.tags import Axisymmetric, Line, PlaneStrain, Space
 from karamelo_py.points.kinematics.tensors import SymmetricTensor
 
@@ -42,8 +42,8 @@ def _principal_plane(s):
     mean = 0.5 * (s.xx + s.yy)
     radius = sqrt(apart * apart + s.xy * s.xy)
     turned = radius > 0
-    over = choose(turned, radius, 1)
-    angle = Angle(choose(turned, apart / over, 1), s.xy / over)
+    over = where(turned, radius, 1)
+    angle = Angle(where(turned, apart / over, 1), s.xy / over)
     return (mean + radius, mean - radius, s.zz), angle
 
 
@@ -60,9 +60,9 @@ def _from_principal_plane(s, values, directions):
 @shared
 def jacobi_rotation(a, b, c):
     """Find cosine, sine and tangent of the rotation that makes c vanish in [[a, c], [c, b]]."""
-    cotangent = (b - a) / choose(c == 0, 1, c + c)
+    cotangent = (b - a) / where(c == 0, 1, c + c)
     t = 1 / (abs(cotangent) + sqrt(cotangent * cotangent + 1))
-    t = choose(c == 0, 0, choose(cotangent < 0, -t, t))
+    t = where(c == 0, 0, where(cotangent < 0, -t, t))
     cosine = 1 / sqrt(t * t + 1)
     return cosine, t * cosine, t
 

@@ -12,8 +12,11 @@ has the arguments and returns the law; `checked`, a method, refuses what no anno
 returns the law or a simpler one that means the same.
 
 A law that says ``in_lanes``, as all its parts do, is computed for several points at once: its point
-functions do not branch over numbers of a point, but `choose`; those that do are named in
-``one_by_one``. Points of other laws are visited one by one.
+functions do not branch over numbers of a point, but `where`; those that do are named in
+``scalarised``. Points of other laws are visited one by one.
+
+A law that says ``rebounds`` bears tension and gives back all the work that it was given; of a
+composed law its strength says so.
 
 What dumps and plots can show of a law is declared beside it (`column`).
 """

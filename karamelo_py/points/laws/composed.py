@@ -7,7 +7,7 @@ and damage need more than one of them.
 from math import sqrt
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import choose, point_function
+from karamelo_py.compiler.compile import point_function, where
 from karamelo_py.compiler.tuples import either, only
 from karamelo_py.points.kinematics import von_mises
 from karamelo_py.points.laws import Absent, specific_volume
@@ -67,7 +67,7 @@ def intact_pressure(law, j, m):
 def full_pressure(law, j, m):
     """The pressure in the stress: damage takes of tension, not of compression."""
     p = intact_pressure(law, j, m)
-    return choose(p < 0, p * borne_share(law.damage, m.damage, p), p) + only(m.viscous)
+    return where(p < 0, p * borne_share(law.damage, m.damage, p), p) + only(m.viscous)
 
 
 def sound(law, j, m):
@@ -120,7 +120,7 @@ def broken_further(damage, law, kin, m, strain, s, j, dt):
     p = intact_pressure(law, j, m)
     bound = von_mises(s) + 1e-3 * abs(p)
     known = bound > 0
-    triaxiality = choose(known, -p / choose(known, bound, 1), 0)
+    triaxiality = where(known, -p / where(known, bound, 1), 0)
     return damage_after(damage, m.damage, strain, triaxiality, m.heat, dt)
 
 
@@ -134,7 +134,7 @@ def released(damage, law, kin, j, s, m, broken):
     """Stored energy that an increment of damage sets free."""
     shear = j * shear_energy(law.strength, kin, s)
     tension = intact_pressure(law, j, m) < 0
-    energy = shear + choose(tension, compression_energy(law.eos, j, m.energy), 0)
+    energy = shear + where(tension, compression_energy(law.eos, j, m.energy), 0)
     return (integrity(damage, m.damage) - integrity(damage, broken)) * energy
 
 

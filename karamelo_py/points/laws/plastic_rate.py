@@ -3,7 +3,7 @@
 from math import sqrt
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import choose
+from karamelo_py.compiler.compile import where
 from karamelo_py.points import laws
 from karamelo_py.points.laws.eos_strength import EosStrength
 from karamelo_py.points.laws.further import Further, initial_part, part_after
@@ -43,7 +43,7 @@ def _initial_part_plastic_rate(part, like):
 @part_after.on(PlasticRate)
 def _part_after_plastic_rate(part, memory, law, kin, j, s, memories, dt):
     ep = equivalent_plastic_strain(law.strength, memories.strength)
-    before = choose(memory.ep < 0, ep, memory.ep)
+    before = where(memory.ep < 0, ep, memory.ep)
     change = (ep - before - dt * memory.rate) / part.time
     return RateMemory(max(memory.rate + change, 0), ep)
 

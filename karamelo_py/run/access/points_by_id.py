@@ -11,11 +11,14 @@ import numpy as np
 
 from karamelo_py.compiler import fields
 from karamelo_py.compiler.fields import field
-from karamelo_py.kernels.arrays import Block, Control, Setup
+from karamelo_py.kernels.arrays import Block, Control, Setup, arrays_of
 from karamelo_py.kernels.totals import LIMBS, add_all, add_rows, rounded
 from karamelo_py.output.fields import PIECE, SUMMED, Fields
 from karamelo_py.run.lower.build import chosen
+from karamelo_py.run.mpi.partition import joined
+from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.hub import Hub
+from karamelo_py.script.errors import ScriptError
 
 LAST = 2**62  # behind all numbers of points
 
@@ -32,6 +35,7 @@ class ById:
     """
 
     hub: Hub
+    comm = SerialComm()
     setup: Setup
     control: Control
     first = 0
@@ -41,7 +45,7 @@ class ById:
     @property
     def kin(self) -> NamedTuple:
         """The kinematics."""
-        return self.stepped.kin
+        return self.setup.kin
 
     @property
     def ids(self) -> np.ndarray:
@@ -58,12 +62,16 @@ class ById:
 
         It is zero for points that were deleted.
         """
-        blocks = self.setup.blocks
-        first = field(blocks[0].points)
+        own = [(block.points.id, field(block.points)) for block in self.setup.blocks]
+        first = own[0][1]
         out = np.zeros((*first.shape[:-1], self.count), first.dtype)
-        for block in blocks:
-            out[..., block.points.id - self.first] = field(block.points)
+        for ids, rows in self._of_all_blocks(own):
+            out[..., ids - self.first] = rows
         return out
+
+    def _of_all_blocks(self, own: list[tuple]) -> Iterator[tuple]:
+        """Numbers and rows of the points of blocks, those of all processes."""
+        return (one for of_rank in self.comm.allgather(own) for one in of_rank)
 
     def declared(self, kind: type) -> np.ndarray | None:
         """A declared field (N, components) by id, None where the scene does not have it.
@@ -74,10 +82,9 @@ class ById:
         if all(field(block.points.fields, kind) is None for block in blocks):
             return None
         out = fields.at_points(kind, self.kin, self.count, float).array
-        for block in blocks:
-            array = field(block.points.fields, kind)
-            if array is not None:
-                out[:, block.points.id - self.first] = array
+        found = ((block.points.id, field(block.points.fields, kind)) for block in blocks)
+        for ids, rows in self._of_all_blocks([one for one in found if one[1] is not None]):
+            out[:, ids - self.first] = rows
         return out.T
 
     def members(self, group: Any) -> np.ndarray:
@@ -102,33 +109,24 @@ class ById:
         return self.by_id(lambda points: points.mass)
 
     @property
-    def stepped(self) -> Setup:
-        """The arrays that are worked on."""
-        return self.setup
-
-    @stepped.setter
-    def stepped(self, s: Setup) -> None:
-        self.setup = s
-
-    @property
     def blocks(self) -> tuple[Block, ...]:
         """The kinds of points, with those that are at hand."""
-        return self.stepped.blocks
+        return self.setup.blocks
 
     def total(self, name: str, group: Any = None) -> float:
         """What all points, or those of a group, have together of `SUMMED`; without rounding."""
         limbs = np.zeros((1, LIMBS), np.int64)
-        for block in self.stepped.blocks:
-            values = SUMMED[name](self.stepped, block)
+        for block in self.setup.blocks:
+            values = SUMMED[name](self.setup, block)
             if values is not None and not (group is None or group.all):
                 values = values[group.has(block.points.id)]
             if values is not None:
                 add_all(limbs, 0, values)
-        return rounded(self.of_all(limbs)[0])
+        return rounded(self.comm.allreduce(limbs)[0])
 
     def rows_of(self, group: Any) -> Iterator[tuple[Block, np.ndarray]]:
         """The points of a group that are at hand, so many at a time: a block, and rows of it."""
-        for block in self.stepped.blocks:
+        for block in self.setup.blocks:
             ids = block.points.id
             for first in range(0, len(ids), PIECE):
                 rows = np.arange(first, min(first + PIECE, len(ids)))
@@ -141,7 +139,7 @@ class ById:
         """The points of a group that are at hand, so many at a time, and at last none."""
         for block, rows in self.rows_of(group):
             yield Some(self, block, rows)
-        yield Some(self, self.stepped.blocks[0], np.empty(0, np.int64))
+        yield Some(self, self.setup.blocks[0], np.empty(0, np.int64))
 
     def added_up(self, part: Any, name: str, *arguments: Any) -> np.ndarray:
         """Sums over the points of a part's group of what its method `name` says; no rounding.
@@ -160,7 +158,7 @@ class ById:
                 continue
             for k in range(count):
                 add_all(limbs, k, np.ascontiguousarray(terms[k], float))
-        return np.array([rounded(total) for total in self.of_all(limbs)])
+        return np.array([rounded(total) for total in self.comm.allreduce(limbs)])
 
     def summed(self, terms: np.ndarray) -> np.ndarray:
         """Sums of terms (n,) or (n, k) of what is at hand over all, rounded once."""
@@ -177,34 +175,17 @@ class ById:
 
     def each(self, part: Any, name: str, *arguments: Any) -> list:
         """What a method of a part says of some points of its group after others, where it does."""
-        return list(self._said(part, name, *arguments))
+        own = list(self._said(part, name, *arguments))
+        return [one for of_rank in self.comm.allgather(own) for one in of_rank]
 
     def _said(self, part: Any, name: str, *arguments: Any) -> Iterator[Any]:
         say = getattr(part, name)
         found = (say(Fields(self.hub, some), *arguments) for some in self.some(part.group))
         return (one for one in found if one is not None)
 
-    def counted_of(self, part: Any, name: str, size: int, *arguments: Any) -> np.ndarray:
-        """How many points of a part's group have each of `size` numbers, which its method says."""
-        counts = np.zeros(size, np.int64)
-        for numbers in self._said(part, name, *arguments):
-            counts += np.bincount(numbers, minlength=size)
-        return self.of_all(counts)
-
-    def in_order(self, part: Any, name: str, *arguments: Any) -> Iterator[np.ndarray]:
-        """Rows (k, n) of the points of a part's group in the order of keys that it says, too."""
-        yield self.ordered(part, name, *arguments)[1]
-
-    def ordered(self, part: Any, name: str, *arguments: Any) -> tuple[np.ndarray, np.ndarray]:
-        """The keys (n,) of the points at hand, ascending, and their rows (k, n)."""
-        keys, rows = zip(*self._said(part, name, *arguments), strict=True)
-        of_all = np.concatenate(keys)
-        order = np.argsort(of_all)
-        return of_all[order], np.concatenate(rows, axis=1)[:, order]
-
     def seen(self, say: Callable, *arguments: Any) -> list:
         """What a function says of the points at hand, of each process."""
-        return [say(self, *arguments)]
+        return self.comm.allgather(say(self, *arguments))
 
     def largest(self, of: Callable[[Fields], np.ndarray]) -> tuple[float, int]:
         """The largest number that a function says of all points, and the first point with it."""
@@ -212,24 +193,40 @@ class ById:
         return value, -number
 
     def everyone(self, what: str, thing: Any) -> list:
-        """What each process has, where all ask for the same (in words)."""
-        return [thing]
+        """What each process has, where all ask for the same (in words).
+
+        Raises
+        ------
+        ScriptError
+            If a function in Python asks on one process for what it does not on another.
+        """
+        asked, found = zip(*self.comm.allgather((what, thing)), strict=True)
+        if other := next((one for one in asked if one != asked[0]), None):
+            raise ScriptError(
+                f"a function in Python comes to {asked[0]} on one process, and to {other} on "
+                "another",
+                hint="points.total(terms) and nodes.total(terms) have to be asked for by all "
+                "processes, those without points too",
+            )
+        return list(found)
 
     def at_first(self, make: Callable[[list], list], thing: Any) -> Any:
         """What the first process makes of what each has: for each its own."""
-        return make([thing])[0]
+        found = self.comm.gather(thing)
+        return self.comm.scatter(None if found is None else make(found))
 
     def counts(self) -> list[int]:
         """How many points each block has."""
-        return [len(block.points.id) for block in self.stepped.blocks]
+        own = [len(block.points.id) for block in self.setup.blocks]
+        return self.comm.allreduce(np.array(own)).tolist()
 
     def of_all(self, numbers: np.ndarray) -> np.ndarray:
         """Sums over all processes that have some of the points."""
-        return numbers
+        return self.comm.allreduce(numbers)
 
     def most(self, numbers: np.ndarray) -> np.ndarray:
         """The largest of each number of all processes."""
-        return numbers
+        return self.comm.allreduce_max(numbers)
 
     @cached_property
     def solid_of(self) -> np.ndarray:
@@ -287,12 +284,22 @@ class ById:
         for first in range(0, self.count, PIECE):
             yield first, min(first + PIECE, self.count)
 
-    def pieces(self) -> Iterator[ById]:
-        """All points, so many at a time."""
-        s = self.setup
-        ordered = list(map(Ordered, s.blocks))
+    def pieces(self, *, to_first: bool = False) -> Iterator[ById]:
+        """All points, so many at a time; `to_first`, of several processes the first gets them."""
+        s, ordered = self.setup, list(map(Ordered, self.setup.blocks))
+        gather = self.comm.gather if to_first else self.comm.allgather
         for first, end in self.ranges():
-            yield Piece(self, first, end, s, (one.between(first, end) for one in ordered))
+            blocks = [one.between(first, end) for one in ordered]
+            if self.comm.size > 1:
+                own = [[array for _, array in arrays_of(block.points)] for block in blocks]
+                found = gather(own)
+                if found is None:
+                    continue
+                blocks = [
+                    block._replace(points=joined(block.points, parts))
+                    for block, parts in zip(blocks, zip(*found, strict=True), strict=True)
+                ]
+            yield Piece(self, first, end, s, blocks)
 
 
 def _largest(points: ById, of: Callable[[Fields], np.ndarray]) -> tuple[float, int]:
@@ -325,7 +332,7 @@ class Some(ById):
 
     def __init__(self, whole: ById, block: Block, rows: np.ndarray):
         self.hub, self.control, self.kin = whole.hub, whole.control, whole.kin
-        self._stepped, self._block, self._rows = whole.stepped, block, rows
+        self._stepped, self._block, self._rows = whole.setup, block, rows
         self.ids, self.count = block.points.id[rows], len(rows)
         self.present = np.ones(self.count, np.bool_)
 

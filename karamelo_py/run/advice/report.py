@@ -10,15 +10,15 @@ from karamelo_py.kernels.table import says
 from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.plastic_rate import without_rate
 from karamelo_py.run.advice.known_failures import refuse_endless_speeds
-from karamelo_py.run.advice.savings import savings
+from karamelo_py.run.advice.suggestions import suggestions
 from karamelo_py.run.diagnosis.energy import not_watched, unknown_work
 from karamelo_py.run.lower.sizes import memory_of, node_fields, nodes_in_use, point_fields
 from karamelo_py.run.mpi.plan import told
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.timestep import ruling_limit, words_of_share
+from karamelo_py.scene import machine_memory
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
-from karamelo_py.scene.room import free_bytes
 
 
 def report(hub: Hub, end_time: float = inf) -> None:
@@ -61,8 +61,9 @@ def report(hub: Hub, end_time: float = inf) -> None:
     memory = memory_of(simulation, s, tiles.box_bytes(s))
     say(f"memory         {_size(sum(memory))} in a run, of which")
     say(f"               {_size(memory.copied)} are a copy of the last good state")
-    if (free := free_bytes()) is not None:
-        say(f"               {_size(free)} are free on this machine, beside what check has taken")
+    if (there := machine_memory.machine_memory()) is not None:
+        free = _size(there.free)
+        say(f"               {free} are free on this machine, beside what check has taken")
     if hub.settings.ranks > 1:
         say("")
         for line in told(simulation, hub.settings.ranks):
@@ -71,13 +72,13 @@ def report(hub: Hub, end_time: float = inf) -> None:
     say(f"stages of a step, {'one by one' if simulation.staged else 'fused'}")
     for stage in stages(hub, simulation):
         say(f"  {stage}")
-    found = savings(hub, simulation)
+    found = suggestions(hub, simulation)
     if found:
         say("")
         say("could be left out")
-    for saving in found:
-        say(f"  {saving.cost}")
-        say(f"    instead: {saving.instead}")
+    for suggestion in found:
+        say(f"  {suggestion.reason}")
+        say(f"    instead: {suggestion.cure}")
 
 
 def _size(count: float) -> str:

@@ -20,19 +20,16 @@ UNITS = (
 
 def warn_about_rest(hub: Hub, simulation: Any, duration: float) -> None:
     """Say so, once, where nothing can move in a run of `duration`."""
-    told = hub.update.foreseen
-    if REST in told or duration < LOOK * simulation.dt or not _rests(hub, simulation):
-        return
-    told.append(REST)
-    hub.warn(
-        "nothing moves in this run: no point has a velocity or a stress, and no fix a load",
-        hint="fix(ID, initial_velocity_particles, ...), fix(ID, body_force, ...) or another load, "
-        "in front of it",
-    )
+    if duration >= LOOK * simulation.dt and _rests(hub, simulation) and hub.update.first_time(REST):
+        hub.warn(
+            "nothing moves in this run: no point has a velocity or a stress, and no fix a load",
+            hint="fix(ID, initial_velocity_particles, ...), fix(ID, body_force, ...) or another "
+            "load, in front of it",
+        )
 
 
 def _rests(hub: Hub, simulation: Any) -> bool:
-    """Whether nothing can move, as far as the parts of this program go: others may do anything."""
+    """Tell whether nothing can move, by the parts of this program: others may do anything."""
     laws = [solid.material.law for solid in hub.solids.values()]
     update = hub.update
     parts = [type(p) for p in (update.method, update.method.basis, update.transfer, update.scheme)]
@@ -45,7 +42,7 @@ def _rests(hub: Hub, simulation: Any) -> bool:
 
 
 def _zero(fix: Any) -> bool:
-    """Whether a fix holds what it acts on at zero: walls, loads that are none."""
+    """Tell whether a fix holds what it acts on at zero: walls, loads that are none."""
     formulas = getattr(fix, "formulas", ())
     return bool(formulas) and all(
         formula is None or (formula.is_constant and formula.constant == 0) for formula in formulas
@@ -76,7 +73,7 @@ def warn_about_length(hub: Hub, simulation: Any, end_time: float) -> None:
 
 
 def mixed_units(hub: Hub, simulation: Any) -> str:
-    """What is said where a step does not fit the numbers of a scene by any means."""
+    """Doubt the units where a step does not fit the numbers of a scene by any means."""
     return (
         f"waves move at {fastest_wave(simulation):.3g} through cells of {hub.domain.h:g}. The "
         "units of densities, moduli, lengths and times may be mixed"

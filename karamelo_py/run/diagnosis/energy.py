@@ -1,45 +1,39 @@
-"""Whether a scene's energy can be watched, and what a gain of energy comes from."""
+"""The watch over a scene's energy: what it cannot see, and where a gain comes from."""
 
 from typing import Any
 
 import numpy as np
 
+from karamelo_py.kernels import growth
 from karamelo_py.kernels.hooks import HEAT_STAGES, CompiledHook
 from karamelo_py.kernels.watch import BORNE, FEW, unit_of
 from karamelo_py.language import registry
 from karamelo_py.output.fields import Fields
 from karamelo_py.points.laws import can, constrained_velocity
-from karamelo_py.points.laws.linear import FixedFrame, LinearElastic
 from karamelo_py.points.laws.temperatures import initial_heat
 from karamelo_py.run import timestep
-from karamelo_py.run.advice.facts import Foreseen
-from karamelo_py.run.advice.noise import noises
+from karamelo_py.run.advice.facts import SceneFacts
 from karamelo_py.run.lower.build import warms_by_friction
 from karamelo_py.scene.hub import Hub
-from karamelo_py.styles.fixes.pairs import PairContact
-from karamelo_py.styles.fixes.velocity_particles import VelocityParticles
 
 TOLD = 2  # windows of growth one after another, of which a run tells
 WHOLE = "more points a cell, a finer grid, cpgimp or ulcpdi, or method tlmpm"
-IN_ALL = 0.1  # of the largest energy: growth since the start that it tells of, too
 
 
 def not_watched(why: str) -> str:
-    """How to say that energy is not watched."""
+    """Say that energy is not watched."""
     return f"is not watched: nobody adds up the work of {why}"
 
 
 def unknown_work(hub: Hub) -> str:
-    """What does work that nobody adds up; empty where energy can be watched.
+    """Name what does work that nobody adds up; empty where energy can be watched.
 
     Compiled hooks on nodes and points have their work added up by the loops. Fixes in Python say
     by `Fix.conserves` that they bring none.
     """
     for fix in hub.fixes.values():
         acts = any(not isinstance(hook, CompiledHook) for hook in fix.hooks().values())
-        # What leads points against their forces does work that no sum at nodes knows.
-        leads = isinstance(fix, VelocityParticles)
-        if leads or (acts and not fix.first_step_only and not fix.conserves):
+        if fix.leads_points or (acts and not fix.first_step_only and not fix.conserves):
             return f"fix {fix.style} '{fix.id}'"
     for solid in hub.solids.values():
         if can(solid.material.law, constrained_velocity):
@@ -50,7 +44,7 @@ def unknown_work(hub: Hub) -> str:
 
 
 def unknown_heat(hub: Hub) -> bool:
-    """Whether a fix in Python may bring heat, or friction does."""
+    """Look for a fix in Python that may bring heat, or for friction that does."""
     return warms_by_friction(hub) or any(
         name in HEAT_STAGES and not isinstance(hook, CompiledHook)
         for fix in hub.fixes.values()
@@ -59,7 +53,7 @@ def unknown_heat(hub: Hub) -> bool:
 
 
 def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
-    """What is known to feed energy in such a scene, the most likely first, and its cure."""
+    """Name what is known to feed energy in such a scene, the most likely first, and its cure."""
     update, method = hub.update, hub.update.method
     transfer = registry.name_of("transfer", type(update.transfer))
     scheme = registry.name_of("scheme", type(update.scheme))
@@ -84,8 +78,9 @@ def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
         )
     if moves and jumps and update.transfer.inverts_spread:
         return f"{transfer} with {functions} in the updated frame", f"FLIP, or {smooth}"
-    if moves and jumps and transfer == "TPIC":
-        return "TPIC with linear functions grows where a body moves through the grid", smooth
+    gradients = SceneFacts(hub, simulation, simulation.time).moments
+    if jumps and gradients and not hasattr(update.transfer, "alpha"):
+        return f"{transfer} with linear functions grows where a body moves through the grid", smooth
     if update.anti_locking and moves:
         return "averaged volumes (F-bar) in the updated frame", "leave anti_volumetric_locking out"
     if keeping < timestep.USUAL and share > keeping * (1 + 1e-9):
@@ -100,18 +95,10 @@ def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
             "points that are further apart than a cell (numerical fracture)",
             WHOLE,
         )
-    if hub.fixes and any(isinstance(fix, PairContact) for fix in hub.fixes.values()):
-        return "contact between points", "a smaller step, or method ulmpm/contacts"
-    if _strained_by_rates(simulation):
-        return (
-            "material linear at large strain: it adds up stress by rates, and gives back another "
-            "work than it took",
-            "material neo-hookean, which stores what it is given",
-        )
-    told = noises(Foreseen(hub, simulation, simulation.time))
-    fed = max(told, key=lambda noise: noise.share, default=None)
+    said = SceneFacts(hub, simulation, simulation.time).advice("gain")
+    fed = max(said, key=lambda one: one.share, default=None)
     if fed is not None and fed.share > 0:
-        return fed.cause, fed.words[2]
+        return fed.reason, fed.cure
     if moves and jumps:
         return f"points that go from cell to cell: the gradients of {functions} jump", smooth
     if share > 0.3 and (hub.update.fixed_dt or hub.update.dt_factor):
@@ -120,7 +107,7 @@ def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
 
 
 def _time_across(simulation: Any) -> float:
-    """What waves take across a cell in bodies that nothing has deformed: later they may be softer.
+    """Time of waves across a cell in bodies that nothing has deformed: later they may be softer.
 
     Infinite where all are rigid.
     """
@@ -135,33 +122,19 @@ def _step_of(hub: Hub, simulation: Any, share: float) -> str:
     return f"dt_factor({share:g})"
 
 
-def _strained_by_rates(simulation: Any) -> bool:
-    """Whether a law in rate form bears stresses of a quarter of its shear modulus."""
-    rates = LinearElastic | FixedFrame
-    softest = min(
-        (float(np.min(b.laws.G)) for b in simulation.blocks if isinstance(b.laws, rates)),
-        default=np.inf,
-    )
-    return simulation.largest(_stress)[0] > 0.25 * softest
-
-
-def _stress(points: Fields) -> np.ndarray:
-    return points.particle("seq")
-
-
 def swelling(points: Fields) -> np.ndarray:
     """(n,) volumes over those before the first step."""
     return points.particle("volume") / points.reference_volume
 
 
 def has_grown(simulation: Any) -> bool:
-    """Whether energy has come from nowhere, as far as looks at it tell."""
+    """Judge, by looks at it, that energy has come from nowhere."""
     clock = simulation.control.clock[0]
-    return bool(clock.watch_energy and (clock.windows >= TOLD or clock.grown > IN_ALL))
+    return bool(clock.watch_energy and (clock.windows >= TOLD or clock.grown > growth.WITHIN))
 
 
-def growth(hub: Hub, simulation: Any) -> tuple[str, str] | None:
-    """What to say where energy comes from nowhere, and its cure."""
+def words_of_growth(hub: Hub, simulation: Any) -> tuple[str, str] | None:
+    """Describe a gain of energy from nowhere, with its cure; None where there is none."""
     clock = simulation.control.clock[0]
     if not has_grown(simulation):
         return None
@@ -180,7 +153,7 @@ def growth(hub: Hub, simulation: Any) -> tuple[str, str] | None:
 
 
 def grown_little(simulation: Any) -> bool:
-    """Whether the present state is a good one, as far as its energy and its last step tell."""
+    """Judge the present state a good one, as far as its energy and its last step tell."""
     clock = simulation.control.clock[0]
     swings = clock.watch_heat and clock.last_dt > BORNE * clock.heat_limit
     if swings or has_grown(simulation):
@@ -189,17 +162,23 @@ def grown_little(simulation: Any) -> bool:
         return True
     # The last look, too: noise that grows by half in a hundred steps is there in the state already.
     before = clock.first_mean if clock.looks >= FEW else clock.first_balance
-    return bool(clock.balance - before < IN_ALL * unit_of(clock))
+    return bool(growth.keeps(before, clock.balance, unit_of(clock)))
+
+
+def growth_since(simulation: Any, before: float) -> float:
+    """Growth of the energy now since one that it had `before`; NaN where nobody watches it."""
+    unit = max(abs(before), float(simulation.control.clock[0].energy_floor), 1e-300)
+    return growth.growth(before, simulation.energy(), unit)
 
 
 def change_of_energy(simulation: Any) -> dict[str, str]:
-    """What the end of a run says of its energy, which the columns of a log have at two times."""
+    """Describe the change of energy for the end of a run; columns of a log have it at two times."""
     clock = simulation.control.clock[0]
     if not clock.watch_energy or clock.looks <= FEW:
         return {}
     mean = (clock.balance + clock.last_balance + clock.last_but_one) / FEW
     # Not from `first_few`, which `forget_growth` changes.
-    share = 100 * (mean - clock.first_balance) / unit_of(clock)
+    share = 100 * growth.growth(clock.first_balance, mean, unit_of(clock))
     words = "since the start (kinetic + stored + dissipated - work, at one time)"
     return {"energy": f"{share:+.2f} % {words}"}
 

@@ -1,21 +1,23 @@
-"""What went wrong in a run: found, explained, and the last good state written."""
+"""Troubles of a run: found, explained, and the last good state written."""
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple, NoReturn
 
 import numpy as np
 
 from karamelo_py.compiler.tuples import record
+from karamelo_py.kernels import growth
 from karamelo_py.kernels.step import ABOVE_LIMIT, DONE, GAINED, HEATED, SHRUNK, STOPPED
 from karamelo_py.kernels.watch import GROWTH, LOOK, unit_of
 from karamelo_py.output.fields import Fields
 from karamelo_py.points.basis import carried, extent
-from karamelo_py.run.advice.steps import step_was_told
+from karamelo_py.run.advice.large_steps import step_was_told
 from karamelo_py.run.checkpoint import restart_file
-from karamelo_py.run.checkpoint.rollback import Mark, Marks
+from karamelo_py.run.checkpoint.parts import OUTPUTS, PartStates
+from karamelo_py.run.checkpoint.rollback import RollbackPoint
 from karamelo_py.run.diagnosis import energy
 from karamelo_py.run.diagnosis.nonfinite import culprit
 from karamelo_py.run.simulation import Simulation
@@ -34,32 +36,27 @@ LOOSE = 1.5  # cells: points of an unstrained solid are at most one apart
 APART = "no other point of it within a cell"
 
 
+class OthersWait(Exception):
+    """This process cannot write a file, and others go on to give it what belongs there."""
+
+
 class Trouble(NamedTuple):
-    """What went wrong, what can be done, and the line of the script at fault where one is known."""
+    """Trouble of a run, what can be done, and the line of the script at fault, if known."""
 
     message: str
     hint: str
     place: Place | None = None
 
 
-class TooLarge(NamedTuple):
+class StepTooLarge(NamedTuple):
     """A step above the stable limit of the start of a run: nothing behind that is a good state."""
 
     smaller: str  # what to write instead, by that limit
     at_hand: bool  # whether the last good state is that of the start
 
 
-class Good(NamedTuple):
-    """What is known of the last good state."""
-
-    snapshot: dict
-    step: int
-    marks: Marks  # what parts remembered at that step and later ones
-    too_large: TooLarge | None = None
-
-
 def trouble(hub: Hub, simulation: Simulation, status: int) -> Trouble:
-    """What went wrong in a step, and what can be done."""
+    """Find what went wrong in a step, and what can be done."""
     if status == ABOVE_LIMIT:
         return Trouble(*_above_limit(hub, simulation), hub.update.dt_place)
     if status == SHRUNK:
@@ -81,36 +78,42 @@ def stop(
     hub: Hub,
     simulation: Simulation,
     status: int,
-    good: Good,
+    good: RollbackPoint,
+    start: StepTooLarge | None,
     place: Place | None,
 ) -> NoReturn:
     """Return to the last good state, write it, and raise what the user should know.
 
     Where energy has grown before, that is the last state in which it had not; log and dumps end
-    with the last state that has no trouble of its own. Of a step that was too large from the start
-    on it is the state of the start.
+    with the last state that has no trouble of its own. Where the step was too large from the
+    `start` on it is the state of the start.
     """
     message, hint, at_fault = trouble(hub, simulation, status)
-    keep = _keep_good if good.too_large is None else _keep_start
-    hint += keep(hub, simulation, status, good)
+    with suppress(OthersWait):
+        if start is None:
+            hint += _keep_good(hub, simulation, status, good)
+        else:
+            hint += _keep_start(hub, simulation, status, good, start)
     error = ScriptError(message, place=at_fault or place, hint=hint)
     error.complete = at_fault is not None
     raise error
 
 
-def _keep_start(hub: Hub, simulation: Simulation, status: int, good: Good) -> str:
+def _keep_start(
+    hub: Hub, simulation: Simulation, status: int, good: RollbackPoint, start: StepTooLarge
+) -> str:
     """Write the state that the run began with, end the outputs, and say how to begin anew."""
-    step, path, too_large = simulation.step, None, good.too_large
-    simulation.restore(good.snapshot)
-    if too_large.at_hand:
-        with good.marks.at(good.step):
+    step, path = simulation.step, None
+    simulation.restore(good.arrays)
+    if start.at_hand:
+        with good.remembered():
             path = _write_last_good(hub)
     back = step - simulation.step - (status in (GAINED, HEATED))
     if back <= FAR:
         if back > 0:
             simulation.advance(back)
         _end_outputs(hub)
-    words = f". Begin anew with {too_large.smaller}"
+    words = f". Begin anew with {start.smaller}"
     if path is None:
         return words
     name = os.path.relpath(path)
@@ -120,30 +123,27 @@ def _keep_start(hub: Hub, simulation: Simulation, status: int, good: Good) -> st
     )
 
 
-def _keep_good(hub: Hub, simulation: Simulation, status: int, good: Good) -> str:
+def _keep_good(hub: Hub, simulation: Simulation, status: int, good: RollbackPoint) -> str:
     """Return to the last good state, write it, end the outputs, and say how to go on from it."""
-    step, present = simulation.step, Mark.of_outputs(hub)
+    step, present = simulation.step, PartStates.of(hub, OUTPUTS)
     grown = not energy.grown_little(simulation)
     if grown:
-        _go_back(simulation, good, step)
+        _return_before_growth(simulation, good, step)
     else:
-        simulation.restore(good.snapshot)
-        good.marks.give(good.step)
+        good.return_to(simulation)
         if status not in (GAINED, HEATED, STOPPED):
             # What nodes have depends on how many steps ran at once: here always on as many.
-            good.marks.again(simulation.advance, step)
+            good.again(simulation.advance, step)
     path = _write_last_good(hub) if grown else None
     if status not in (GAINED, HEATED) and step > simulation.step:
         before = simulation.energy()
-        good.marks.again(simulation.advance, step)
-        if path is None and simulation.energy() - before > energy.IN_ALL * max(
-            abs(before), float(simulation.control.clock[0].energy_floor)
-        ):
+        good.again(simulation.advance, step)
+        if path is None and energy.growth_since(simulation, before) > growth.WITHIN:
             # The watch looks at means of a hundred steps, and has not seen it yet.
             grown = True
-            _go_back(simulation, good, step)
+            _return_before_growth(simulation, good, step)
             path = _write_last_good(hub)
-            good.marks.again(simulation.advance, step)
+            good.again(simulation.advance, step)
     path = path or _write_last_good(hub)
     if simulation.step < step:
         present.give(hub)  # their files stay as they are, with later rows
@@ -155,30 +155,26 @@ def _keep_good(hub: Hub, simulation: Simulation, status: int, good: Good) -> str
     return f". {which} is in {name}; {GOES_ON.format(name)}"
 
 
-def _go_back(simulation: Simulation, good: Good, end: int) -> None:
+def _return_before_growth(simulation: Simulation, good: RollbackPoint, end: int) -> None:
     """Return to the last state before step `end` whose energy has not grown since the good one.
 
     These steps are taken once more, from one look at the energy to the next.
     """
-    snapshot, kept, marks = good.snapshot, good.step, good.marks
-    simulation.restore(snapshot)
-    marks.give(kept)
+    good.return_to(simulation)
     clock = simulation.control.clock[0]
     before = float(clock.balance)
     while clock.watch_energy and simulation.step + LOOK < end:
         look = simulation.step + LOOK - (simulation.step - 1) % LOOK
-        healthy = marks.again(simulation.advance, look) == DONE
+        healthy = good.again(simulation.advance, look) == DONE
         if not (healthy and energy.grown_little(simulation)):
             break
         if clock.balance - before < GROWTH * unit_of(clock):
-            snapshot, kept = simulation.snapshot(snapshot), look
-            marks.note(always=True)
-    simulation.restore(snapshot)
-    marks.give(kept)
+            good.move(simulation)
+    good.return_to(simulation)
 
 
 def only_leave(hub: Hub, simulation: Simulation, snapshot: dict) -> bool:
-    """Whether a step went wrong because points leave the domain, with no more energy than before.
+    """Tell whether a step went wrong since points leave the domain, at no more energy.
 
     No smaller step keeps these. Where nobody watches energy, who knows.
     """
@@ -190,9 +186,8 @@ def only_leave(hub: Hub, simulation: Simulation, snapshot: dict) -> bool:
     before, steps = simulation.energy(), step - simulation.step
     if steps:
         simulation.advance(steps)
-    gain = simulation.energy() - before
-    floor = float(simulation.control.clock[0].energy_floor)
-    healthy = gain <= energy.IN_ALL * max(abs(before), floor) and not simulation.above_limit()
+    kept = energy.growth_since(simulation, before) <= growth.WITHIN
+    healthy = kept and not simulation.above_limit()
     simulation.advance(1)  # which goes wrong again, for others to look at
     return healthy
 
@@ -298,7 +293,7 @@ def _first_wrong(simulation: Simulation) -> Wrong | None:
 
 
 def _wrong_point(hub: Hub, simulation: Simulation) -> tuple:
-    """What is wrong with the first point that went wrong, and what can be done."""
+    """Find what is wrong with the first point that went wrong, and what can be done."""
     wrong = [one for one in simulation.seen(_first_wrong) if one is not None]
     if not wrong and hub.update.thermal:
         return no_number(
@@ -362,13 +357,13 @@ def _wrong_point(hub: Hub, simulation: Simulation) -> tuple:
 
 
 def _loose(simulation: Simulation, number: int, x: np.ndarray, reach: float) -> bool:
-    """Whether a point has a solid of others, none of which is near."""
+    """Tell whether a point has a solid of others, none of which is near."""
     others, near = np.sum(simulation.seen(_others, number, x, reach), axis=0)
     return others > 0 and near == 0
 
 
 def _others(simulation: Simulation, number: int, x: np.ndarray, reach: float) -> tuple[int, int]:
-    """How many other points of the solid of a point are at hand, and how many are near it."""
+    """Count the other points of the solid of a point, at hand and near it."""
     solid, others, near = solid_with(simulation.hub, number), 0, 0
     for some in simulation.some(None):
         own = (some.solid_of == solid.index) & (some.ids != number)
@@ -378,15 +373,15 @@ def _others(simulation: Simulation, number: int, x: np.ndarray, reach: float) ->
 
 
 def _is_tangled(simulation: Simulation, place: np.ndarray, grid: int) -> bool:
-    """Whether the domain of a point, whose corners move, is folded over."""
-    s = simulation.stepped
+    """Tell whether the domain of a point, whose corners move, is folded over."""
+    s = simulation.setup
     if not s.frame.moves or carried(s.basis, s.kin) == 0:
         return False
     return not np.isfinite(extent(s.basis, s.kin, record(s.grids, grid), tuple(place.tolist())))
 
 
 def _smaller_step(hub: Hub, simulation: Simulation) -> str:
-    """How to take a smaller step, and whether the present one is too large for sure.
+    """Say how to take a smaller step, and that the present one is too large where it is.
 
     One that was so from the start on has ruined the state, and its limit with it.
     """
@@ -411,8 +406,9 @@ def _write_last_good(hub: Hub) -> Path | None:
     """Write the present state to a file to go on from; a file of somebody else is left alone."""
     written: list[Path] = []
     path = restart_file.path_of(hub, Path(LAST_GOOD))
-    if hub.output.writes and (not path.exists() or restart_file.is_restart(path)):
-        with _told(hub):
+    may_be = hub.settings.comm.bcast(not path.exists() or restart_file.is_restart(path))
+    if hub.output.takes_part and may_be:
+        with _as_warnings(hub):
             written.append(restart_file.write(hub, Path(LAST_GOOD), within=True))
             # The files of restart(...) would hold the same once more.
             for item in hub.output.last:
@@ -421,14 +417,17 @@ def _write_last_good(hub: Hub) -> Path | None:
 
 
 def _end_outputs(hub: Hub) -> None:
-    with _told(hub):
+    with _as_warnings(hub):
         hub.output.write(last=True)
 
 
 @contextmanager
-def _told(hub: Hub) -> Iterator[None]:
-    """What prevents writing is told as a warning: another error is on its way."""
+def _as_warnings(hub: Hub) -> Iterator[None]:
+    """Warn of what prevents writing: another error is on its way."""
     try:
         yield
     except ScriptError as error:
         hub.warn(error.message, hint=error.hint, place=error.place)
+        if hub.settings.comm.size > 1:
+            hub.settings.comm.failed_within = True
+            raise OthersWait from None

@@ -1,4 +1,4 @@
-"""Which fix has a formula that gives no number, where a run has broken off."""
+"""The fix with a formula that gives no number, where a run has broken off."""
 
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -67,7 +67,7 @@ def _formulas(value: Any) -> Iterator[Expression]:
 
 
 def _readable(formula: Expression, values: Values) -> bool:
-    """Whether all that a formula reads, beside positions, is there and is a number."""
+    """Tell whether all that a formula reads, beside positions, is there and is a number."""
     read = formula.names.difference(POINT_SEEDS)
     return all(name in values and np.isfinite(values.get(name)) for name in read)
 

@@ -38,8 +38,8 @@ class Unreachable(Exception):
     """No strain was found that gives the prescribed stress."""
 
 
-class Motion(NamedTuple):
-    """What a whole path does to the point, and the stress at its ends."""
+class Loading(NamedTuple):
+    """Load on the point along a whole path, and the stress at its ends."""
 
     strain: np.ndarray  # (6,) change of strain, 0 where the stress is prescribed
     turn: float
@@ -96,7 +96,7 @@ class Point:
             With what went wrong and in which increment.
         """
         prescribed = np.array([k for k, name in enumerate(COMPONENTS) if name in path.stress], int)
-        motion = Motion(
+        motion = Loading(
             strain=path.strain_at_end(self.strain, self.free) - self.strain,
             turn=path.turn,
             shear=tuple(COMPONENTS.index(name) for name in path.shear),
@@ -117,7 +117,13 @@ class Point:
             observe()
 
     def _go(
-        self, motion: Motion, duration: float, a: float, b: float, rate: np.ndarray, divisions: int
+        self,
+        motion: Loading,
+        duration: float,
+        a: float,
+        b: float,
+        rate: np.ndarray,
+        divisions: int,
     ) -> np.ndarray:
         """Go from the part `a` of a motion to the part `b`, in halves where it must be."""
         try:
@@ -130,7 +136,9 @@ class Point:
             return self._go(motion, duration, middle, b, rate, divisions - 1)
         return found / (b - a)
 
-    def _solve(self, motion: Motion, dt: float, a: float, b: float, rate: np.ndarray) -> np.ndarray:
+    def _solve(
+        self, motion: Loading, dt: float, a: float, b: float, rate: np.ndarray
+    ) -> np.ndarray:
         """One increment: Newton's iteration for the strains whose stress is prescribed."""
         prescribed, target = motion.prescribed, motion.begin + b * (motion.end - motion.begin)
         increment = (b - a) * motion.strain
@@ -209,7 +217,7 @@ class Point:
         volume = laws.specific_volume(self.law) * laws.jacobian(self.law, self.kin, self.state)
         return laws.wave_speed_squared(self.law, self.kin, self.state) / volume
 
-    def _strained(self, increment: np.ndarray, motion: Motion) -> np.ndarray:
+    def _strained(self, increment: np.ndarray, motion: Loading) -> np.ndarray:
         """(3, 3) dt grad v of a strain increment: pure, or simple where the motion says so."""
         full = np.diag(increment[:3])
         for k, (i, j) in SHEARS.items():

@@ -28,7 +28,7 @@ from karamelo_py.kernels.arrays import (
 from karamelo_py.kernels.averaging import NodalMean
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.laws import elastic_law, law_in, law_on, law_table
-from karamelo_py.kernels.loss import Lost, Rubbed
+from karamelo_py.kernels.loss import EnergyLoss, FrictionalHeat
 from karamelo_py.kernels.rows import Insulated
 from karamelo_py.language.scene import Scene
 from karamelo_py.points.basis import carried, deformed
@@ -48,10 +48,12 @@ from karamelo_py.points.laws.eos import taken_heat
 from karamelo_py.points.laws.plastic_rate import with_rate, without_rate
 from karamelo_py.points.laws.temperatures import initial_heat
 from karamelo_py.points.transfers import Moment, lost_shares
+from karamelo_py.run.mpi.partition import SharedTiles
 from karamelo_py.run.tiles.buffers import no_nodes
 from karamelo_py.run.tiles.tiles import Tiles
 from karamelo_py.run.timestep import sparse
 from karamelo_py.scene import boundary
+from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import table
 from karamelo_py.scene.solid import Solid
@@ -129,8 +131,8 @@ def thread_count(hub: Hub, points: int) -> int:
             hub.console.warn(render_message("warning", said))
         return max(1, min(hub.settings.threads, available))
     usable = min(available, os.cpu_count() or 1)
-    if (crew := hub.settings.crew) is not None:
-        usable, points = max(1, usable // crew.beside), points // crew.size
+    comm = hub.settings.comm
+    usable, points = max(1, usable // comm.beside), points // comm.size
     return usable if points > SERIAL_UP_TO else 1
 
 
@@ -166,12 +168,17 @@ def check_heat(hub: Hub) -> None:
 
 
 def lower(
-    hub: Hub, previous: State | None = None, *, ids: tuple[int, int] | None = None
+    hub: Hub,
+    previous: State | None = None,
+    *,
+    ids: tuple[int, int] | None = None,
+    comm: SerialComm | None = None,
 ) -> tuple[Setup, Tiles]:
     """Make the arrays of a run from the scene, taking over the state of points that exist.
 
-    With `ids`, from and to before, only with those points.
+    With `ids`, from and to before, only with those points; tiles are those of a process of `comm`.
     """
+    comm = comm or hub.settings.comm
     check_scene(hub)
     method = hub.update.method
     real = PRECISIONS[hub.settings.precision]
@@ -180,7 +187,11 @@ def lower(
     transfer = hub.update.transfer_tag(real)
     basis = type(method.basis)(*(real(x) for x in method.basis))
     count = sum(solid.count for solid in hub.solids.values())
-    tiles = Tiles(lattices, basis, count, sparse(hub))
+    if comm.size == 1:
+        tiles = Tiles(lattices, basis, count, sparse(hub))
+    else:
+        one_place = method.fields_per_solid
+        tiles = SharedTiles(comm, lattices, basis, count, sparse(hub), one_place=one_place)
     contact = method.contact_between(hub, lattices)
     if previous is not None:
         method.resume(contact, previous.contact)
@@ -209,9 +220,9 @@ def lower(
         if getattr(kind, "needed", lambda basis: True)(basis)
     ]
     if returns_loss(hub):
-        kinds.append(Lost)
+        kinds.append(EnergyLoss)
     if warms_by_friction(hub):
-        kinds.append(Rubbed)
+        kinds.append(FrictionalHeat)
     at_nodes = lower_nodes(kinds, kin, count, real)
     setup = Setup(
         frame=method.frame,

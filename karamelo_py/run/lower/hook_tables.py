@@ -11,7 +11,7 @@ from karamelo_py.kernels import arrays
 from karamelo_py.kernels.hooks import STAGES, CompiledHook
 from karamelo_py.kernels.totals import LIMBS
 from karamelo_py.kernels.walls import FRICTION
-from karamelo_py.language.faults import told
+from karamelo_py.language.faults import as_script_error
 from karamelo_py.run.tiles.distinct import distinct
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.expressions import FIRST, POINT_SEEDS
@@ -22,7 +22,7 @@ NO_PROGRAM = (-1, -1, -1, -1)
 def lower_hooks(
     hub: Hub, fixes: list, mode: Any = None, threads: int = 1
 ) -> arrays.Hooks | arrays.NoHooks:
-    """Tables of the compiled hooks of `fixes`, in their order; by one thread, or several."""
+    """Make the tables of the compiled hooks of fixes, in their order; by one thread, or several."""
     dimension = hub.domain.dimension
     count = sum(s.count for s in hub.solids.values())
     builder = _Builder(hub, count)
@@ -51,7 +51,7 @@ def lower_hooks(
 
 
 def _apart(threads: int, values: int) -> arrays.Apart:
-    """Room for what threads have of their own, with space between the values of two."""
+    """Make room for what threads have of their own, with space between the values of two."""
     return arrays.Apart(
         chosen=np.zeros((threads, BLOCK), np.int64),
         scratch=np.zeros((threads, STACK + ROWS, BLOCK)),
@@ -84,7 +84,7 @@ class _Builder:
             # Components lie one after another, from x on; a total without direction stands alone.
             first = "x" if "x" in fix.published else fix.published[0]
             slot = self.hub.values.slot(f"{fix.id}_{first}")
-        with told(f"fix {fix.style}", moment, hook.function, fix.place):
+        with as_script_error(f"fix {fix.style}", moment, hook.function, fix.place):
             address = address_of(hook.function, hook.signature)
         uses = (
             int(hook.uses_before),
@@ -105,7 +105,7 @@ class _Builder:
             self.loaded_nodes = fix.group.total()
 
     def shared_nodes(self) -> int:
-        """The number of nodes, where hooks hold some of them in common; else 0."""
+        """Count the nodes, where hooks hold some of them in common; else 0."""
         fixes = self.holding
         if len(fixes) < 2:
             return 0
@@ -129,6 +129,10 @@ class _Builder:
     def _program(self, formula: Any) -> tuple:
         if formula is None:
             return NO_PROGRAM
+        if formula.is_constant:  # without code: the number
+            first = sum(len(p) for p in self.constants)
+            self.constants.append(np.array([formula.constant]))
+            return 0, 0, first, first + 1
         program = formula.program(self.hub.values)
         ranges = []
         for pieces, piece in ((self.code, program.code), (self.constants, program.constants)):

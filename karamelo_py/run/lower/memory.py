@@ -4,6 +4,7 @@ What is compared is the least that a run has to hold: of what would run nothing 
 """
 
 import gc
+from math import ceil
 
 import numpy as np
 
@@ -11,10 +12,11 @@ from karamelo_py.kernels.arrays import SUMS_WIDTH, UPDATE_WIDTH, VELOCITY_WIDTH,
 from karamelo_py.run.lower.build import PRECISIONS, check_scene, lower_points, part_of, point_kinds
 from karamelo_py.run.lower.sizes import point_fields
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.room import TooLarge, machine_memory, on_machine, share_of_machine
+from karamelo_py.scene.machine_memory import machine_memory, on_machine, share_of_machine
 from karamelo_py.scene.solid import Solid, own_grids
 from karamelo_py.script.errors import ScriptError, plural
 
+GIB = 2**30
 FEW = 100_000  # points; so many have room everywhere
 
 
@@ -37,7 +39,7 @@ def check_room(hub: Hub, *, copied: bool) -> None:
     if count <= FEW or (there := machine_memory(on_machine(hub))) is None:
         return
     check_scene(hub)
-    crew, share = hub.settings.crew, share_of_machine(hub)
+    comm, share = hub.settings.comm, share_of_machine(hub)
     need = share * least_bytes(hub, PRECISIONS[hub.settings.precision], copied)
     if need > there.free:
         # Scenes of before, which point to themselves, stay until someone looks.
@@ -45,23 +47,45 @@ def check_room(hub: Hub, *, copied: bool) -> None:
         there = machine_memory(on_machine(hub)) or there
     if need <= there.free:
         return
-    found = TooLarge(
-        plural(count, "point"),
-        need,
-        hub.domain.dimension,
-        _largest(hub).place,
-        f" for {crew.on_machine} of {crew.size} processes" if share < 1 else "",
-        share * least_bytes(hub, np.float32, copied) if hub.settings.precision == "double" else 0.0,
+    place, beside = _largest(hub).place, ""
+    if share < 1:
+        beside = f" for {comm.on_machine} of {comm.size} processes"
+    message = (
+        f"the scene has {plural(count, 'point')}, which take at least {in_words(need)} of memory"
+        f"{beside}; this machine has "
     )
-    if need > there.whole:
-        raise found.error(there)
-    hub.warn(found.warning(there), place=found.place, hint=found.ways(there.free))
+    if need <= there.whole:  # who may have it the system knows alone
+        message += f"{in_words(there.free)} free: it may not fit"
+        hub.warn(message, place=place, hint=_ways(hub, need, there.free, copied))
+        return
+    hint = _ways(hub, need, there.whole, copied)
+    error = ScriptError(f"{message}{in_words(there.whole)} in all", place=place, hint=hint)
+    error.command = "solid"
+    raise error
+
+
+def in_words(count: float) -> str:
+    """Write a number of bytes."""
+    size = count / GIB
+    return f"{size:.0f} GiB" if size >= 100 else f"{size:.3g} GiB"
+
+
+def _ways(hub: Hub, need: float, there: float, copied: bool) -> str:
+    """Write what would bring the need down to what is `there`."""
+    # Bytes go with that power of the number of cells along a side; two digits, rounded up.
+    larger = ceil(10 * (need / max(there, 1.0)) ** (1 / hub.domain.dimension)) / 10
+    ways = [f"cells {max(larger, 1.1):g} times as large, or fewer points per cell"]
+    single = share_of_machine(hub) * least_bytes(hub, np.float32, copied)
+    if hub.settings.precision == "double" and single < there:
+        ways.append(f"precision(single), which needs at least {in_words(single)}")
+    ways.append("processes on several machines (mpiexec), which share the points out")
+    return "; ".join(ways)
 
 
 def least_bytes(hub: Hub, real: type, copied: bool) -> float:
-    """The least that points, their copy, and the nodes of the cells that they fill take together.
+    """Count the bytes that points, their copy, and the nodes of the cells that they fill take.
 
-    Boxes of tiles, groups and what the program itself takes come on top.
+    It is the least: boxes of tiles, groups and what the program itself takes come on top.
     """
     kin = hub.update.method.kinematics(hub)
     kinds = point_kinds(hub, real)
@@ -82,18 +106,18 @@ def least_bytes(hub: Hub, real: type, copied: bool) -> float:
 
 
 def _largest(hub: Hub) -> Solid:
-    """The solid with most points."""
+    """Find the solid with most points."""
     return max(hub.solids.values(), key=lambda solid: solid.count)
 
 
 def _cells(solid: Solid) -> float:
-    """How many cells a solid fills at least."""
+    """Count the cells that a solid fills at least."""
     ppc = getattr(solid, "ppc", 0)
     return solid.count / ppc**solid.domain.dimension if ppc else 0.0
 
 
 def no_room(hub: Hub, error: MemoryError) -> ScriptError:
-    """The error for a scene whose arrays the system does not give, whoever would use them."""
+    """Make the error for a scene whose arrays the system does not give, whoever would use them."""
     nodes = sum(lattice.node_count for lattice in hub.lattices)
     count = sum(solid.count for solid in hub.solids.values())
     of_grid = nodes > count

@@ -1,4 +1,4 @@
-"""What kernels ask of the other processes that share a scene (karamelo_py.kernels.ranks)."""
+"""Functions that kernels call for other processes (:mod:`karamelo_py.kernels.ranks`)."""
 
 from collections.abc import Callable
 from typing import Any, ClassVar
@@ -8,58 +8,55 @@ import numpy as np
 from karamelo_py.compiler.addresses import address_of_python
 from karamelo_py.compiler.formula import GLOBAL, UNIFORM
 from karamelo_py.kernels import ranks
-from karamelo_py.kernels.arrays import DT, Control
+from karamelo_py.kernels.arrays import DT
 from karamelo_py.kernels.totals import WORK, rounded
-from karamelo_py.run.mpi.crew import Crew
-from karamelo_py.run.mpi.load import Work
+from karamelo_py.run.mpi.load import Load
 
 
-class Answers:
-    """Gives them.
+class Callbacks:
+    """Functions that kernels call where they need other processes.
 
     Attributes
     ----------
     address
         Of the function that kernels call.
-    part
-        The points of this process.
     at_once
         Whether what fixes publish is added up in each step.
     due
         Otherwise: which of these values are, when the last is over.
     """
 
-    part: Any
     at_once = False
 
-    def __init__(self, crew: Crew, control: Control, work: Work):
-        self.crew, self.control, self.work = crew, control, work
+    def __init__(self, simulation: Any, load: Load):
+        self.simulation, self.comm, self.load = simulation, simulation.comm, load
+        self.control = simulation.setup.control
         self.due: set[int] = set()
         self.address = address_of_python(self.answer, ranks.CALL)
 
     def answer(self, what: int, a: int, b: int) -> int:
-        """What kernels ask of the other processes (karamelo_py.kernels.ranks)."""
+        """Do what kernels ask for."""
         try:
-            self.work.note()
+            self.load.note()
             found = self._answers[what](self, a, b) or 0
             if what == ranks.NEXT:
-                self.work.next_block()
+                self.load.next_block()
             else:
-                self.work.resume(0 if what in {ranks.SWEEP, ranks.GIVE} else None)
+                self.load.resume(0 if what in {ranks.SWEEP, ranks.GIVE} else None)
             return found
         except BaseException as error:
             # Nothing can be raised through a kernel, and the others wait.
-            self.crew.fail(error)
+            self.comm.fail(error)
             raise
 
     def _go_on(self, *_: int) -> None:
-        """Only the time is taken."""
+        """Take the time alone."""
 
     def _give(self, number: int, what: int) -> None:
-        self.part.tiles.give(self.part.setup, number, what)
+        self.simulation.tiles.give(self.simulation.setup, number, what)
 
     def _take(self, *_: int) -> None:
-        self.part.tiles.take()
+        self.simulation.tiles.take()
 
     def _totals(self, first: int, count: int) -> None:
         rows = slice(first, first + count)
@@ -67,25 +64,27 @@ class Answers:
             self.due.update(range(first, first + count))
             self.control.answer[:count] = self.control.values[rows]
             return
-        of_all = self.crew.added(self.control.totals[rows])
+        of_all = self.comm.allreduce(self.control.totals[rows])
         for k in range(count):
             self.control.answer[k] = rounded(of_all[k])
 
     def publish(self) -> None:
-        """Values of the last step become those of all: their totals are kept until the next."""
+        """Add up the values of the last step over all: their totals are kept until the next."""
         rows, values = sorted(self.due), self.control.values
         self.due.clear()
         if rows:
-            for row, total in zip(rows, self.crew.added(self.control.totals[rows]), strict=True):
+            for row, total in zip(
+                rows, self.comm.allreduce(self.control.totals[rows]), strict=True
+            ):
                 values[row] = rounded(total)
-            for of, to in getattr(self.part.setup.contact, "copies", ()):
+            for of, to in getattr(self.simulation.setup.contact, "copies", ()):
                 values[to : to + 3] = values[of : of + 3]
 
     def _largest(self, count: int, _: int) -> None:
-        self.crew.largest(self.control.answer[:count])
+        self.comm.allreduce_max(self.control.answer[:count])
 
     def _number(self, number: int, _: int) -> int:
-        return int(self.crew.added(np.array([number]))[0])
+        return int(self.comm.allreduce(np.array([number]))[0])
 
     _answers: ClassVar[dict[int, Callable]] = {
         ranks.SWEEP: _go_on, ranks.NEXT: _go_on, ranks.GIVE: _give, ranks.TAKE: _take,
@@ -94,6 +93,6 @@ class Answers:
 
 
 def reads_totals(hooks: Any) -> bool:
-    """Whether formulas read within steps what fixes publish."""
+    """Tell whether formulas read within steps what fixes publish."""
     code = getattr(hooks, "code", np.empty((0, 2), np.int64))
     return bool(((code[:, 0] % UNIFORM == GLOBAL) & (code[:, 1] > DT)).any())

@@ -1,13 +1,13 @@
-"""What points and nodes cost a process, measured while it takes steps."""
+"""The cost of points and nodes at a process, measured while it takes steps."""
 
 import time
 
 import numpy as np
 
-from karamelo_py.run.mpi.crew import Crew
+from karamelo_py.scene.comm import SerialComm
 
 
-class Work:
+class Load:
     """Time in sweeps over the points of each block, and in all else that is no waiting.
 
     Attributes
@@ -24,7 +24,7 @@ class Work:
         self._since: int | None = None
 
     def pause(self) -> None:
-        """What is done until the next sweep is not counted."""
+        """Do not count the time until the next sweep."""
         self._since = None
 
     def note(self) -> None:
@@ -33,21 +33,21 @@ class Work:
             self._spent[0, self._at] += time.perf_counter_ns() - self._since
 
     def resume(self, block: int | None = None) -> None:
-        """What comes is a sweep over the points of a block, or something else."""
+        """Begin to count the time of a sweep over the points of a block, or of something else."""
         self._at = self._rest if block is None else block
         self._since = time.perf_counter_ns()
 
     def next_block(self) -> None:
-        """The sweep goes on with the next block, from the last with the first."""
+        """Go on with the next block, from the last with the first."""
         self.resume((self._at + 1) % self._rest)
 
     def done(self, counts: list[int], steps: int) -> None:
         """Take note of so many steps with these numbers of points, and of nodes."""
         self._spent[1] += np.array(counts) * steps
 
-    def learn(self, crew: Crew) -> None:
+    def learn(self, comm: SerialComm) -> None:
         """Find the costs from what all have spent; later times count more."""
-        seconds, done = crew.added(self._spent)
+        seconds, done = comm.allreduce(self._spent)
         self._spent //= 2
         if (seconds[:-1] > 0).all() and (done > 0).all():
             self.costs = seconds / done

@@ -6,7 +6,7 @@ from karamelo_py.compiler.fields import some_points
 from karamelo_py.kernels.arrays import Block, Setup, Tiling, arrays_of
 from karamelo_py.run.mpi.partition import occupied
 from karamelo_py.run.tiles.boxes import between
-from karamelo_py.run.tiles.tiles import one_after_another, shares_of
+from karamelo_py.run.tiles.tiles import in_use, one_after_another, shares_of
 
 ROWS = ("number", "range", "grid", "box", "rows")  # of a tiling
 
@@ -39,6 +39,12 @@ def share_of_tiling(
     rows["count"] = np.array([len(which), *tiling.count[1:]])
     rows["share"] = shares_of(rows["range"], int(tiling.count[1]), len(tiling.share))
     return points, {f"tiling/{k}/{name}": array for name, array in rows.items()}
+
+
+def tilings_in_use(s: Setup) -> list[dict[str, np.ndarray]]:
+    """List the tiles of each block by name, as far as they are in use."""
+    tilings = [block.tiling for block in s.blocks]
+    return [{name: getattr(one, name)[:rows] for name, rows in in_use(one)} for one in tilings]
 
 
 def stripped(found: dict[str, np.ndarray], stem: str) -> dict[str, np.ndarray]:

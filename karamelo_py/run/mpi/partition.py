@@ -12,11 +12,11 @@ import numpy as np
 from karamelo_py.compiler.fields import length_of_rows, rows_of_points
 from karamelo_py.kernels.arrays import Block, Points, Setup, Tiling, arrays_of, made_of
 from karamelo_py.run.mpi.bisection import bisected
-from karamelo_py.run.mpi.crew import Crew
 from karamelo_py.run.tiles.boxes import Boxes, Reached, between, extents, ragged, rows_of, steps_of
 from karamelo_py.run.tiles.buffers import buffers_of, chosen_of, give_up
 from karamelo_py.run.tiles.distinct import distinct
 from karamelo_py.run.tiles.tiles import SHARES, Tiles, one_after_another, shares_of
+from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.lattice import Lattice
 
 IMBALANCE = 1.1  # largest share of the work over that after a new cut: above it tiles are cut anew
@@ -46,7 +46,7 @@ class SharedTiles(Tiles):
 
     Parameters
     ----------
-    crew
+    comm
         The processes.
     one_place
         Whether a node has others at its place, in grids that are alike: bodies in contact.
@@ -54,7 +54,7 @@ class SharedTiles(Tiles):
 
     def __init__(
         self,
-        crew: Crew,
+        comm: SerialComm,
         lattices: Sequence[Lattice],
         basis: Any,
         points: int,
@@ -63,7 +63,7 @@ class SharedTiles(Tiles):
         one_place: bool,
     ):
         super().__init__(lattices, basis, points, sparse)
-        self.crew = crew
+        self.comm = comm
         self.one_place = one_place
         self._places = np.concatenate(
             [
@@ -88,14 +88,14 @@ class SharedTiles(Tiles):
         """Cut the tiles into parts of nearly as much work each."""
         if not self.direct:
             rows = ROWS if self.long else 1
-            self.owner = bisected(self._places, work, self.crew.size, rows)
+            self.owner = bisected(self._places, work, self.comm.size, rows)
 
     def balance(self, work: np.ndarray) -> bool:
         """Cut the tiles anew where that is worth it; `work` (tiles,) is of the own points."""
-        before, work = self.owner, self.crew.added(work)
+        before, work = self.owner, self.comm.allreduce(work)
 
         def largest() -> float:
-            return np.bincount(self.owner, work, self.crew.size).max()
+            return np.bincount(self.owner, work, self.comm.size).max()
 
         now = largest()
         self.share_out(work)
@@ -114,8 +114,8 @@ class SharedTiles(Tiles):
 
     def partners(self, going: np.ndarray) -> list[int]:
         """Others that this process has something for, or that have for it; how much, by rank."""
-        going[self.crew.rank] = 0
-        return np.flatnonzero(going + self.crew.swapped(going)).tolist()
+        going[self.comm.rank] = 0
+        return np.flatnonzero(going + self.comm.alltoall(going)).tolist()
 
     def migrate(self, s: Setup, costs: np.ndarray) -> Setup:
         """Hand over the points that have gone to the tiles of others."""
@@ -124,8 +124,8 @@ class SharedTiles(Tiles):
         loads = self.loads(s.blocks)
         loads[:-1] = [np.bincount(of, minlength=self.count) for of in tiles]
         self.balance(work_of(loads, costs))
-        own, me = [self.owner[of] for of in tiles], self.crew.rank
-        others = self.partners(sum(np.bincount(to, minlength=self.crew.size) for to in own))
+        own, me = [self.owner[of] for of in tiles], self.comm.rank
+        others = self.partners(sum(np.bincount(to, minlength=self.comm.size) for to in own))
 
         def parts(rank: int) -> list[list[np.ndarray]]:
             return [
@@ -134,7 +134,7 @@ class SharedTiles(Tiles):
                 for block, to in zip(s.blocks, own, strict=True)
             ]
 
-        come = list(self.crew.traded({rank: parts(rank) for rank in others}).values())
+        come = list(self.comm.exchange({rank: parts(rank) for rank in others}).values())
         if not come:
             return s
         found = zip(s.blocks, own, *come, strict=True)
@@ -175,14 +175,14 @@ class SharedTiles(Tiles):
         return made_of(points, arrays)
 
     def _reach(self, s: Setup, block: Block, x: np.ndarray) -> float:
-        return float(self.crew.largest(np.array([super()._reach(s, block, x)]))[0])
+        return float(self.comm.allreduce_max(np.array([super()._reach(s, block, x)]))[0])
 
     # --- nodes ------------------------------------------------------------------------------------
 
     def _boxes(self, s: Setup) -> Boxes:
         own = self.own_boxes(s)
-        found = self.crew.traded(self.near(own, self.crew.everyone(self.hull(own))))
-        of_all = {self.crew.rank: own, **dict(sorted(found.items()))}
+        found = self.comm.exchange(self.near(own, self.comm.allgather(self.hull(own))))
+        of_all = {self.comm.rank: own, **dict(sorted(found.items()))}
         self._of = np.repeat(list(of_all), [len(boxes.grid) for boxes in of_all.values()])
         return Boxes(*(np.concatenate(same) for same in zip(*of_all.values(), strict=True)))
 
@@ -191,7 +191,7 @@ class SharedTiles(Tiles):
 
     def lay_out(self, s: Setup) -> None:
         for _, link in self._links.values():
-            self.crew.unlink(link)
+            self.comm.disconnect(link)
         self._links.clear()
         super().lay_out(s)
 
@@ -234,10 +234,10 @@ class SharedTiles(Tiles):
         """Those of own boxes that may reach tiles of nodes of others with these hulls, by rank."""
         grid, low, high = self._around(boxes)
         d, of_all = self.dimension, np.array(hulls)
-        own = of_all[self.crew.rank]
+        own = of_all[self.comm.rank]
         # Both or neither of two see that they meet.
         meet = _meet(own[:, :d], -own[:, d:], of_all).any(axis=1)
-        meet[self.crew.rank] = False
+        meet[self.comm.rank] = False
         found = {}
         for rank in np.flatnonzero(meet).tolist():
             chosen = _meet(low, high, of_all[rank][grid])
@@ -257,7 +257,7 @@ class SharedTiles(Tiles):
         """What own boxes reach, and what of others' is at nodes in use here, as more boxes."""
         _, reached = super()._reached(boxes)
         of, place = self._of[reached.box], self._place(reached.tile)
-        me = self.crew.rank
+        me = self.comm.rank
         self._needs = {
             int(rank): _needs(place[here], reached.begin[here], reached.end[here])
             for rank in distinct(of)
@@ -309,7 +309,7 @@ class SharedTiles(Tiles):
         self.foreign[self._marked] = 0
         found = [self._marked[:0]]
         for rank, needs in self._needs.items():
-            if rank < self.crew.rank:
+            if rank < self.comm.rank:
                 which, low, high = needs.among(self._place(tiles), begin, end)
                 found.append(between(*rows_of(self._parts(grid[which], low, high, 0, 0))))
         self._marked = np.concatenate(found)
@@ -331,16 +331,17 @@ class SharedTiles(Tiles):
         """Begin to pass on what the own tiles give to nodes of others, and theirs to own ones."""
         link = self._links.get((number, what))
         if link is None:
-            link = self._link(chosen_of(buffers_of(s)[number].nodes, what))
+            of = next(one for one in buffers_of(s) if one.number == number)
+            link = self._link(chosen_of(of.nodes, what))
             self._links[number, what] = link
         packed, self._under_way = link
         for array, rows, room in packed:
             np.take(array, rows, axis=0, out=room, mode="clip")
-        self.crew.start(self._under_way)
+        self.comm.start(self._under_way)
 
     def take(self) -> None:
         """Wait for what others give."""
-        self.crew.finish(self._under_way)
+        self.comm.finish(self._under_way)
 
     def _link(self, arrays: list[np.ndarray]) -> tuple[list, Any]:
         """What is packed of these arrays of the buffers, and the requests that pass it on."""
@@ -351,7 +352,7 @@ class SharedTiles(Tiles):
                 packed.append((array, rows, room))
                 given.append((rank, room))
             taken += [(rank, array[rows]) for rank, rows in self._taken.items()]
-        return packed, self.crew.linked(given, taken)
+        return packed, self.comm.connect(given, taken)
 
 
 def work_of(loads: np.ndarray, costs: np.ndarray) -> np.ndarray:

@@ -9,14 +9,14 @@ from karamelo_py.kernels.step import Fused, Staged, step
 from karamelo_py.kernels.sums import given
 from karamelo_py.kernels.sweep import sum_buffers, sweep_nodes, sweep_points
 from karamelo_py.run.lower.sizes import memory_of
-from karamelo_py.run.mpi.crew import Crew
 from karamelo_py.run.mpi.partition import SharedTiles, occupied
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.tiles.boxes import Boxes, numbers
 from karamelo_py.run.tiles.buffers import buffers_of, chosen_of, no_nodes, summed
 from karamelo_py.run.tiles.tiles import SHARES
 from karamelo_py.run.timestep import sparse
-from karamelo_py.styles.fixes.pairs import SENT, PairContact
+from karamelo_py.scene.comm import SerialComm
+from karamelo_py.styles.fixes.pairs import SENT
 
 MAY_CHANGE = 1.25  # largest share of the points over the mean that is no waste yet
 
@@ -68,17 +68,17 @@ def _sum_buffers_sums(mode, quantities, s, due):
         mode.found.append((given(quantities, s.kin), s.nodes))
 
 
-class _Pretended(Crew):
+class _Pretended(SerialComm):
     """One of several processes that are not there."""
 
     def __init__(self, rank: int, size: int, others: list[tuple[SharedTiles, Boxes]] | None = None):
         self.rank, self.size, self.others = rank, size, others
 
-    def everyone(self, hull: Any) -> list:
+    def allgather(self, hull: Any) -> list:
         self.hulls = [tiles.hull(boxes) for tiles, boxes in self.others]
         return self.hulls
 
-    def traded(self, things: dict[int, Any]) -> dict[int, Any]:
+    def exchange(self, things: dict[int, Any]) -> dict[int, Any]:
         parts = {rank: self.others[rank] for rank in things}
         return {r: tiles.near(own, self.hulls)[self.rank] for r, (tiles, own) in parts.items()}
 
@@ -104,9 +104,9 @@ def plan(simulation: Simulation, ranks: int) -> list[Share]:
     lattices, one_place = method.lattices(hub), method.fields_per_solid
     per_node = bytes_of_node(simulation)
 
-    def tiles_of(crew: Crew) -> SharedTiles:
+    def tiles_of(comm: SerialComm) -> SharedTiles:
         return SharedTiles(
-            crew, lattices, s.basis, simulation.count, sparse(simulation.hub), one_place=one_place
+            comm, lattices, s.basis, simulation.count, sparse(simulation.hub), one_place=one_place
         )
 
     of_all = [tiles_of(_Pretended(rank, ranks)) for rank in range(ranks)]
@@ -114,7 +114,7 @@ def plan(simulation: Simulation, ranks: int) -> list[Share]:
     parts = [_part(s, of_all[0].owner == rank) for rank in range(ranks)]
     boxes = [(tiles, tiles.own_boxes(part)) for tiles, part in zip(of_all, parts, strict=True)]
     for tiles in of_all:
-        tiles.crew.others = boxes
+        tiles.comm.others = boxes
     return [
         _share(simulation, part, tiles, per_node) for part, tiles in zip(parts, of_all, strict=True)
     ]
@@ -182,7 +182,7 @@ def told(simulation: Simulation, ranks: int) -> list[str]:
             f"gives back {moved >> 20} MiB, and has the memory of a single one"
         )
     for fix in simulation.hub.fixes.values():
-        if isinstance(fix, PairContact):
+        if hasattr(fix, "sent"):
             lines.append(
                 f"  fix {fix.style} '{fix.id}' has the first process look at all points that may "
                 f"touch ({fix.sent(simulation)} now), and needs {SENT} bytes there for each"

@@ -1,242 +1,129 @@
-"""What one of several processes has of a scene: its points, and the nodes that they reach."""
+"""The share of one of several processes in a scene: its work, and points on their way to others."""
 
 from typing import Any
 
 import numpy as np
 
-from karamelo_py.compiler.fields import records
-from karamelo_py.kernels.arrays import TIMESTEP, Block, Nodes, Setup, arrays_of
-from karamelo_py.kernels.heat import Conducting
+from karamelo_py.kernels.arrays import TIMESTEP, Block, Setup
 from karamelo_py.kernels.ranks import Linked
-from karamelo_py.kernels.totals import WORK
-from karamelo_py.run.access.points_by_id import Ordered
-from karamelo_py.run.checkpoint.arrays import (
-    copied,
-    go_back,
-    of_nodes,
-    remembered_at,
-    take_points,
-    take_tiling,
-)
-from karamelo_py.run.checkpoint.part_state import points_of_tiles
-from karamelo_py.run.mpi.callbacks import Answers
-from karamelo_py.run.mpi.crew import Crew
-from karamelo_py.run.mpi.load import Work
+from karamelo_py.run.checkpoint.arrays import remembered_at, take_points, take_tiling
+from karamelo_py.run.mpi.callbacks import Callbacks, reads_totals
+from karamelo_py.run.mpi.load import Load
 from karamelo_py.run.mpi.pack import by_tile, join_tilings, share_of, stripped
 from karamelo_py.run.mpi.partition import SharedTiles, nodes_of, occupied, work_of
 from karamelo_py.run.tiles.boxes import numbers
-from karamelo_py.run.tiles.buffers import no_nodes
-from karamelo_py.run.tiles.tiles import in_use
-from karamelo_py.run.timestep import sparse
-from karamelo_py.scene.hub import Hub
 
 LEARN_EVERY = 100  # steps from output to output, after which it is seen how work is shared
 
 
-class Part:
-    """The arrays of this process: as much of a simulation as its state asks for.
+class Subdomain:
+    """The tiles of this process, and what it passes on of its points.
 
     Attributes
     ----------
-    setup, tiles, hub
-        As of a simulation; of the points there are those in own tiles.
-    work
-        What points and nodes cost here.
-    answers
-        What kernels ask for.
-    kept
-        Copies of a state that can be returned to.
+    load
+        Measured cost of points and nodes.
+    callbacks
+        Functions that kernels call.
     """
 
-    def __init__(self, crew: Crew, hub: Hub, s: Setup, count: int):
-        self.crew, self.hub = crew, hub
-        method = hub.update.method
-        one_place = method.fields_per_solid
-        self.tiles = tiles = SharedTiles(
-            crew, method.lattices(hub), s.basis, count, sparse(hub), one_place=one_place
-        )
-        nodes, heat = _like(s.nodes), s.heat
-        buffers = tiles.empty_buffers(nodes, len(s.blocks))
-        if isinstance(heat, Conducting):
-            at_nodes = _like(heat.nodes)
-            heat = Conducting(at_nodes, tiles.empty_buffers(at_nodes, len(s.blocks)))
-        self.work = Work(len(s.blocks))
-        self.answers = Answers(crew, s.control, self.work)
-        self.answers.part = self
-        control = s.control._replace(ranks=Linked(self.answers.address, tiles.foreign))
-        self.setup = s._replace(
-            blocks=tuple(block._replace(tiling=tiles.empty_tiling()) for block in s.blocks),
-            nodes=nodes, heat=heat, buffers=buffers, **no_nodes(), control=control,
-        )  # fmt: skip
-        self.kept: dict[str, np.ndarray] = {}
-        self._ordered: list[Ordered] = []  # points by id, while pieces of all are looked at
-        self._counted_at = self._learned_at = self.step
-
-    @property
-    def step(self) -> int:
-        """Number of steps taken."""
-        return int(self.setup.control.values[TIMESTEP])
+    def __init__(self, simulation: Any):
+        self.simulation, self.comm = simulation, simulation.comm
+        self.tiles: SharedTiles = simulation.tiles
+        s = simulation.setup
+        self.load = Load(len(s.blocks))
+        self.callbacks = Callbacks(simulation, self.load)
+        linked = Linked(self.callbacks.address, self.tiles.foreign)
+        simulation.setup = s._replace(control=s.control._replace(ranks=linked))
+        self._counted_at = self._learned_at = int(s.control.values[TIMESTEP])
 
     # --- points -----------------------------------------------------------------------------------
 
-    def fill(self, blocks: tuple[Block, ...]) -> None:
-        """Hand over these points to whose tiles they are in, and take those of others."""
-        own = zip(self.setup.blocks, blocks, strict=True)
-        made = tuple(mine._replace(points=block.points) for mine, block in own)
-        self.setup = self.tiles.migrate(self.setup._replace(blocks=made), self.work.costs)
-        self.tiles.sort(self.setup)
-
-    def sort(self) -> None:
-        """Sort the points by tile, and hand over those that have left the own ones."""
-        self.tell_what_touched()
+    def migrate(self, s: Setup) -> Setup:
+        """Hand over the points that have left the own tiles; they are to be sorted then."""
+        self.share_contact()
         self.account()
-        self.setup = self.tiles.migrate(self.setup, self.learn())
-        self.tiles.sort(self.setup)
-
-    def share_of(self, s: Setup, rank: int) -> dict[str, np.ndarray]:
-        """The points and tiles that a process is to have of those in `s`, by name."""
-        return share_of(s, self.tiles.owner == rank)
+        return self.tiles.migrate(s, self.learn())
 
     def put(self, found: dict[str, np.ndarray]) -> None:
-        """Let the part have these points and tiles."""
-        s, tiles = self.setup, self.tiles
+        """Take these points and tiles in the place of the own ones."""
+        simulation = self.simulation
         blocks = tuple(
             Block(
                 take_points(block.points, found, f"points/{k}/"),
                 block.laws,
                 take_tiling(block.tiling, found, f"tiling/{k}/"),
             )
-            for k, block in enumerate(s.blocks)
+            for k, block in enumerate(simulation.setup.blocks)
         )
-        self.setup = s._replace(blocks=blocks)
-        tiles.lay_out(self.setup)
+        simulation.setup = simulation.setup._replace(blocks=blocks)
+        self.tiles.lay_out(simulation.setup)
 
-    def memory(self) -> list[np.ndarray]:
-        """What contact remembers of every node."""
-        nodes = len(self.tiles.foreign)
-        return remembered_at(self, np.array([[0, nodes]]))
+    def contact_memory(self) -> list[np.ndarray]:
+        """List what contact remembers of every node."""
+        return remembered_at(self.simulation, np.array([[0, len(self.tiles.foreign)]]))
 
-    def tell_what_touched(self) -> None:
-        """All learn where contact acted in the last step: other nodes come to be in use."""
-        memory = self.memory()
-        if memory:
-            own = self.counted()
-            own = own[
-                np.any([(np.abs(one[own]) == self.step).any(axis=1) for one in memory], axis=0)
-            ]
-            for nodes, *rows in self.crew.everyone((own, *(one[own] for one in memory))):
-                for one, found in zip(memory, rows, strict=True):
-                    one[nodes] = found
+    def share_contact(self) -> None:
+        """Tell all where contact acted in the last step: other nodes come to be in use."""
+        memory = self.contact_memory()
+        if not memory:
+            return
+        own, step = self.counted(), self.simulation.step
+        own = own[np.any([(np.abs(one[own]) == step).any(axis=1) for one in memory], axis=0)]
+        for nodes, *rows in self.comm.allgather((own, *(one[own] for one in memory))):
+            for one, found in zip(memory, rows, strict=True):
+                one[nodes] = found
 
     def counted(self) -> np.ndarray:
-        """The numbers of the nodes in use here that no other process counts."""
-        nodes = numbers(self.setup.spans)
+        """Number the nodes in use here that no other process counts."""
+        nodes = numbers(self.simulation.setup.spans)
         return nodes[self.tiles.foreign[nodes] == 0]
-
-    def tilings(self) -> list[dict[str, np.ndarray]]:
-        """The tiles of each block."""
-        tilings = [block.tiling for block in self.setup.blocks]
-        return [{name: getattr(one, name)[:rows] for name, rows in in_use(one)} for one in tilings]
-
-    def shown(self) -> dict:
-        """Tiles and nodes that no other process shows, and how many points there are."""
-        s, own = self.setup, self.counted()
-        return {
-            "counts": [block.points.mass.size for block in s.blocks],
-            "tiling": [
-                tiling | {"report": block.tiling.report[: block.tiling.count[0]]}
-                for tiling, block in zip(self.tilings(), s.blocks, strict=True)
-            ],
-            "nodes": own,
-            "at nodes": [array[own] for _, array in of_nodes(s)],
-            "memory": [array[own] for array in self.memory()],
-        }
-
-    def tell_of_tiles(self) -> dict:
-        """Tiles, the boxes of nodes that they reach, and work done."""
-        work, reached = self.setup.control.totals[WORK].copy(), self.tiles.reached_by(self.setup)
-        return {"tiling": self.tilings(), "reached": reached, "work": work}
-
-    def give_tiles(self, k: int, first: int, end: int) -> dict[str, Any]:
-        """Points of the k-th block in tiles with numbers from `first` to before `end`."""
-        arrays = [array for _, array in arrays_of(self.setup.blocks[k].points)]
-        return points_of_tiles(self.tilings()[k], arrays, first, end)
-
-    def tell_of_kept(self) -> dict:
-        """Tiles and work of the state that was kept, and where contact acted last."""
-        kept, blocks = self.kept, range(len(self.setup.blocks))
-        tilings = [stripped(kept, f"tiling/{k}/") for k in blocks]
-        return {"tiling": tilings, "work": kept["work"], "touched": stripped(kept, "touched/")}
-
-    def give_kept(self, k: int, first: int, end: int) -> dict[str, Any]:
-        """Points that were kept, as `give_tiles` gives those of now."""
-        kept = self.kept
-        names = [name for name, _ in arrays_of(self.setup.blocks[k].points)]
-        arrays = [kept[f"points/{k}/{name}"] for name in names]
-        return points_of_tiles(stripped(kept, f"tiling/{k}/"), arrays, first, end)
-
-    def give_rows(self, first: int, end: int, memory: bool) -> tuple:
-        """Own nodes from `first` to before `end`: their rows, or what contact remembers of them."""
-        arrays = [array for _, array in of_nodes(self.setup)]
-        return self.rows(self.memory() if memory else arrays, first, end)
-
-    def node_rows(self, first: int, end: int, sums: dict[str, np.ndarray]) -> tuple:
-        """The nodes from `first` to before `end`: what of them others do not show, and `sums`."""
-        used = _from_to(numbers(self.setup.spans), first, end)
-        rows = self.rows([array for _, array in of_nodes(self.setup)], first, end)
-        return *rows, used, {name: of[used] for name, of in sums.items()}
-
-    def rows(self, arrays: list[np.ndarray], first: int, end: int) -> tuple:
-        """Numbers of nodes from `first` to before `end` that others do not show, and their rows."""
-        own = _from_to(self.counted(), first, end)
-        return own, [array[own] for array in arrays]
-
-    def piece(self, first: int, end: int, *, last: bool) -> list[list[np.ndarray]]:
-        """The points with ids from `first` to before `end`, block by block; the `last` piece."""
-        if first == 0:
-            self._ordered = list(map(Ordered, self.setup.blocks))
-        own = [one.between(first, end) for one in self._ordered]
-        if last:
-            self._ordered = []
-        return [[array for _, array in arrays_of(block.points)] for block in own]
 
     # --- work -------------------------------------------------------------------------------------
 
-    def begin(self) -> None:
-        """Before steps whose work is measured."""
+    def begin(self, hooks: Any, *, from_python: bool) -> None:
+        """Make ready for steps whose work is measured."""
+        self.callbacks.at_once = from_python or reads_totals(hooks)
         self.rebalance()
-        self._counted_at = self.step
-        self.work.pause()
+        self._counted_at = self.simulation.step
+        self.load.pause()
+
+    def end(self) -> None:
+        """Account for the last steps, and publish what their fixes have added up."""
+        self.account()
+        self.callbacks.publish()
 
     def account(self) -> None:
         """Take note of the steps so far; what comes before the next is not counted."""
-        blocks = self.setup.blocks
+        blocks, step = self.simulation.setup.blocks, self.simulation.step
         counts = [block.points.mass.size for block in blocks]
         counts.append(sum(int(nodes_of(block.tiling).sum()) for block in blocks))
-        self.work.done(counts, self.step - self._counted_at)
-        self._counted_at = self.step
-        self.work.pause()
+        self.load.done(counts, step - self._counted_at)
+        self._counted_at = step
+        self.load.pause()
 
     def learn(self) -> np.ndarray:
-        """What points and nodes cost."""
-        self._learned_at = self.step
-        self.work.learn(self.crew)
-        return self.work.costs
+        """Find what points and nodes cost."""
+        self._learned_at = self.simulation.step
+        self.load.learn(self.comm)
+        return self.load.costs
 
     def rebalance(self) -> None:
         """Hand over tiles as they are where that is due: points may never be sorted again."""
-        s, tiles = self.setup, self.tiles
+        simulation, tiles = self.simulation, self.tiles
+        s = simulation.setup
         clock = s.control.clock[0]
         sorted_next = clock.drift > clock.drift_limit  # and cut anew then
-        due = abs(self.step - self._learned_at) >= LEARN_EVERY
+        due = abs(simulation.step - self._learned_at) >= LEARN_EVERY
         due = due and not (tiles.direct or sorted_next)
         if not due or not tiles.balance(work_of(tiles.loads(s.blocks), self.learn())):
             return
-        self.tell_what_touched()
+        self.share_contact()
         own = [tiles.owner[occupied(block.tiling)[0]] for block in s.blocks]
-        others = tiles.partners(np.bincount(np.concatenate(own), minlength=self.crew.size))
-        given = {rank: self.share_of(s, rank) for rank in others}
-        shares = [self.share_of(s, self.crew.rank), *self.crew.traded(given).values()]
+        others = tiles.partners(np.bincount(np.concatenate(own), minlength=self.comm.size))
+        given = {rank: share_of(s, tiles.owner == rank) for rank in others}
+        mine = share_of(s, tiles.owner == self.comm.rank)
+        shares = [mine, *self.comm.exchange(given).values()]
         tiles.empty_nodes(s)
         blocks = []
         for k, block in enumerate(s.blocks):
@@ -251,30 +138,5 @@ class Part:
             }
             join_tilings(block.tiling, tilings)
             blocks.append(block._replace(points=take_points(block.points, arrays, "")))
-        self.setup = s._replace(blocks=tuple(blocks))
-        tiles.lay_out(self.setup)
-
-    # --- state that can be returned to ------------------------------------------------------------
-
-    def keep(self) -> dict[str, np.ndarray]:
-        """Copy every array that a step changes."""
-        self.kept = copied(self, self.kept)
-        self.kept["owner"] = self.tiles.owner
-        return self.kept
-
-    def go_back(self) -> None:
-        """Put back what was kept."""
-        self.tiles.empty_nodes(self.setup)
-        self.tiles.owner = self.kept["owner"]
-        go_back(self, self.kept)
-
-
-def _from_to(numbers: np.ndarray, first: int, end: int) -> np.ndarray:
-    """Those of ascending numbers from `first` to before `end`."""
-    return numbers[slice(*np.searchsorted(numbers, (first, end)))]
-
-
-def _like(nodes: Nodes) -> Nodes:
-    """Nodes of the same kind, zero."""
-    fields = tuple(type(one)(records(*one.array.shape, one.array.dtype)) for one in nodes.fields)
-    return Nodes(*(records(*array.shape, array.dtype) for array in nodes[:-1]), fields)
+        simulation.setup = s._replace(blocks=tuple(blocks))
+        tiles.lay_out(simulation.setup)

@@ -23,9 +23,9 @@ from karamelo_py.kernels.arrays import (
 )
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.sorting import (
-    Cut,
-    Order,
-    Sight,
+    Neighbourhood,
+    SortedOrder,
+    TileGrid,
     find_rows,
     find_tiles,
     sort_points,
@@ -123,7 +123,7 @@ class Tiles:
         rows = np.prod(widest[:, :-1], axis=1, dtype=np.int64).max()
         self._most_in_box = int(rows) if self._by_rows(shaped) else 0  # rows of a box, at most
         self.count = int(self.first[-1])
-        self._cut = Cut(self.size, self.shapes, self.first)
+        self._cut = TileGrid(self.size, self.shapes, self.first)
         tiles = -(-self._nodes // self.node_size)
         self._tile_steps = steps_of(tiles)
         self._first_of_nodes = numbered(tiles)
@@ -237,7 +237,7 @@ class Tiles:
         else:
             mode = self.mode
         scratch = np.empty((4, x.shape[1]), np.int64)
-        found = Order(
+        found = SortedOrder(
             lanes_for(8 * x.itemsize).width,
             np.empty((parts, self.count), np.int64),
             np.empty(parts + 1, np.int64),
@@ -248,7 +248,7 @@ class Tiles:
         )
         top, least = self._nodes - 1, self.least_nodes - 1
         offset = first_node(s.basis, s.grids.h[0])
-        sight = Sight(top, self.per_cell, self.beyond, least, reach, offset)
+        sight = Neighbourhood(top, self.per_cell, self.beyond, least, reach, offset)
         kin, of, ids = planar(s.kin), points.grid, points.id
         rows = addresses_of_rows(array for _, array in arrays_of(points))
         sort_points(mode, kin, s.grids, sight, self._cut, x, of, ids, found, rows)

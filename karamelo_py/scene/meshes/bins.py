@@ -1,4 +1,4 @@
-"""Which of many boxes may hold a position: boxes filed in the cells of a coarse grid."""
+"""Search for the boxes that may hold a position, filed in the cells of a coarse grid."""
 
 from collections.abc import Iterator
 

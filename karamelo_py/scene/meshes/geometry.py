@@ -1,4 +1,4 @@
-"""What a geometry in Gmsh's language does beside describing a shape."""
+"""Commands in a geometry of Gmsh's language that do more than describe a shape."""
 
 import re
 from collections.abc import Iterator

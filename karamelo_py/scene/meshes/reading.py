@@ -102,7 +102,7 @@ def _by_meshio(path: Path, name: str | None = None) -> meshio.Mesh:
 
 
 def _reason(error: BaseException) -> str:
-    """What went wrong, in one line; where no format fits, meshio says so only in passing."""
+    """Word an exception in one line; where no format fits, meshio says so only in passing."""
     if isinstance(error, SystemExit) or not str(error).strip():
         return "its content does not fit its ending"
     return f"{' '.join(str(error).split())} ({type(error).__name__})"

@@ -8,7 +8,7 @@ from karamelo_py.scene.meshes.bins import Bins
 
 
 class Skin:
-    """What bounds a body in d dimensions: simplices of d - 1 dimensions.
+    """Surface of a body in d dimensions: simplices of d - 1 dimensions.
 
     Parameters
     ----------

@@ -52,7 +52,7 @@ class Surface:
         self.bins = Bins(flat.min(axis=1) - tolerance, flat.max(axis=1) + tolerance)
 
     def encloses(self, x: np.ndarray) -> np.ndarray:
-        """Which positions (n, 3) lie inside or on the surface: (n,) bool."""
+        """Test which positions (n, 3) lie inside or on the surface: (n,) bool."""
         odd = np.zeros(len(x), bool)
         flat = np.ascontiguousarray(x[:, :2])
         for rows, items in self.bins.candidates(flat):
@@ -60,7 +60,7 @@ class Surface:
         return odd | self.skin.contain(x)
 
     def _crossed(self, x: np.ndarray, items: np.ndarray) -> np.ndarray:
-        """Whether the ray upwards from each position crosses the triangle beside it: (k,) bool."""
+        """Test if the ray upwards from each position crosses the triangle beside it: (k,) bool."""
         start, end = self.start[items], self.end[items]
         y = x[:, None, 1]
         reached = (start[..., 1] > y) != (end[..., 1] > y)

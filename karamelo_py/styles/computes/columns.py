@@ -1,4 +1,4 @@
-"""What computes that compare fields of points have in common: fields by name, curves in files."""
+"""Base of computes that compare fields of points: fields by name, curves in files."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def column(points: Fields, name: str) -> np.ndarray:
     return points.particle(name)
 
 
-class Field:
+class PointField:
     """A field of points, by the columns it has.
 
     Attributes
@@ -50,7 +50,7 @@ class Field:
         self.weights = [2.0 if shear and k >= 3 else 1.0 for k in range(len(columns))]
 
     @classmethod
-    def from_script(cls, hub: Scene, argument: Argument) -> Field:
+    def from_script(cls, hub: Scene, argument: Argument) -> PointField:
         """The field that `argument` names."""
         known = [*hub.fields.particle_names(), *DISPLACEMENTS, *VECTORS, *TENSORS]
         name = argument.words(known)
@@ -105,7 +105,7 @@ class Norm:
         self.largest = 0.0
 
     def terms(self, sizes: np.ndarray, weight: np.ndarray) -> np.ndarray:
-        """What is to be added up of sizes (2, n) of differences and exact values, and weights."""
+        """Return the terms of a norm from the sizes (2, n) of differences and exact values."""
         return np.vstack([weight * sizes ** (2 if self.kind == "L2" else 1), weight])
 
     def moment(self, sums: np.ndarray, largest: list[np.ndarray]) -> np.ndarray:
@@ -155,7 +155,7 @@ class Compared:
         return self.norm.moment(sums, largest), sums[3:]
 
     def terms(self, points: Fields) -> np.ndarray:
-        """What is to be added up of points."""
+        """Return the terms of the points for sums."""
         sizes, weight, *rest = self.sizes(points)
         return np.vstack([self.norm.terms(sizes, weight), *rest])
 

@@ -1,4 +1,4 @@
-"""How far what should be conserved has moved from where it was at first."""
+"""Drift of a conserved quantity from its first value."""
 
 import numpy as np
 

@@ -59,7 +59,7 @@ class Probe(Compute):
 
     @property
     def at_place(self) -> bool:
-        """Whether a place was given."""
+        """True if the script gave a place."""
         return any(c is not None for c in self.place_xyz)
 
     def refresh(self) -> None:

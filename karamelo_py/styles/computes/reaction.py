@@ -48,7 +48,7 @@ class Reaction(Compute):
         self.publish_components(total)
 
     def _contains(self, fix) -> bool:
-        """Whether the nodes that a fix holds belong to the group."""
+        """Return True if the nodes that a fix holds belong to the group."""
         if self.group.all:
             return True
         inside = np.isin(fix.group.members, self.group.members)

@@ -139,6 +139,6 @@ class Reference(Compared, Compute):
         return sizes, points.reference_volume[within], exact, np.ones(len(exact))
 
     def _exact(self, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Which of these places the curve has, and its values there."""
+        """Return which places (n,) the curve covers, and its values there."""
         within = (at >= self.curve[0][0]) & (at <= self.curve[0][-1])
         return within, np.interp(at[within], *self.curve)

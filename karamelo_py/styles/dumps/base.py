@@ -1,9 +1,10 @@
-"""What every dump has: a rhythm, a file name with the step in it, checked columns."""
+"""The base of dumps: a rhythm, a file name with the step in it, checked columns."""
 
 from collections.abc import Sequence
 from pathlib import Path
 
 from karamelo_py.language.signature import OutputFile
+from karamelo_py.output.files import discarded, folder_of_discarded
 from karamelo_py.output.log import begins_anew
 from karamelo_py.output.rhythm import Every, Rhythmic
 from karamelo_py.scene.hub import Hub
@@ -44,16 +45,23 @@ class Dump(Rhythmic):
 
     @property
     def one_file_per_step(self) -> bool:
-        """Whether the name has a ``*``."""
+        """Tell if the name has a ``*``."""
         return "*" in str(self.file)
 
     def path(self) -> Path:
-        """The file of the present state."""
-        return self.hub.folder / str(self.file).replace("*", str(self.hub.update.step), 1)
+        """Name the file of the present state."""
+        folder, file = folder_of_discarded(), self.file
+        folder, file = (self.hub.folder, file) if folder is None else (folder, file.name)
+        return folder / str(file).replace("*", str(self.hub.update.step), 1)
 
     def write(self) -> None:
         """Write the present state."""
         raise NotImplementedError
+
+    def take_part(self) -> None:
+        """Do the same as the first of several processes, which alone keeps what is written."""
+        with discarded():
+            self.write()
 
     def finish(self) -> None:
         """Complete what is written; called at the end of each run, also of one that breaks off."""

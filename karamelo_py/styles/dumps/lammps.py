@@ -22,20 +22,20 @@ class Encoder(Protocol):
     """Turns text into the bytes of a file; the interface of ``zlib.compressobj``."""
 
     def compress(self, data: bytes) -> bytes:
-        """Bytes that can be written now."""
+        """Return bytes that can be written now."""
 
     def flush(self) -> bytes:
-        """The last bytes of the file."""
+        """Return the last bytes of the file."""
 
     def copy(self) -> Encoder:
-        """An independent encoder in the same state."""
+        """Make an independent encoder in the same state."""
 
 
 class Plain:
     """Leaves text as it is."""
 
     def compress(self, data: bytes) -> bytes:
-        """The same bytes."""
+        """Return the same bytes."""
         return data
 
     def flush(self) -> bytes:
@@ -53,12 +53,13 @@ class LammpsDump(TableDump):
     # Of a file with all snapshots: where the next one goes, how much text there is up to there, and
     # the encoder's state.
     remembers = ("_end", "_length")
+    to_first = True
     _end = 0
     _length = 0
     _encoder: Encoder | None = None
 
     def encoder(self) -> Encoder:
-        """What the text goes through on its way to a new file."""
+        """Make the encoder of the text of a new file."""
         return Plain()
 
     def write(self) -> None:
@@ -100,17 +101,17 @@ class LammpsDump(TableDump):
                 self._encoder.compress(file.read(min(PIECE, self._length - begin)))
 
     def begin_anew(self) -> None:
-        """The file of the earlier run is not there."""
+        """Begin a new file: that of the earlier run is not there."""
         self.warn_of_absence()
         self._end = self._length = 0
 
     @staticmethod
     def opened(path: Path) -> BinaryIO:
-        """The text of a file."""
+        """Open the text of a file."""
         return path.open("rb")
 
     def _snapshot(self) -> Iterator[bytes]:
-        """The text of the present state, piece by piece."""
+        """Write the text of the present state, piece by piece."""
         yield header(self.hub, self.extent()[0], ["id", "type", *self.columns])
         for ids, types, columns in self.tables():
             yield from rows([ids, types, *columns])
@@ -127,17 +128,17 @@ class Gzipped:
     """
 
     def encoder(self) -> Encoder:
-        """A gzip stream without name and date, so that the same run gives the same bytes."""
+        """Make a gzip stream without name and date, so that the same run gives the same bytes."""
         return zlib.compressobj(COMPRESSION, zlib.DEFLATED, 16 + zlib.MAX_WBITS)
 
     @staticmethod
     def opened(path: Path) -> BinaryIO:
-        """The text of a file."""
+        """Open the text of a file."""
         return gzip.open(path)
 
 
 def header(hub: Hub, count: int, names: Sequence[str]) -> bytes:
-    """The lines above the rows of a snapshot."""
+    """Write the lines above the rows of a snapshot."""
     domain = hub.domain
     bounds = []
     for axis in range(3):

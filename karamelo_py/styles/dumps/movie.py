@@ -40,7 +40,7 @@ class Movie(PyPlot):
         return Frames(FRAMES_PER_SECOND)
 
     def check_format(self) -> str:
-        """The format that the file name asks for."""
+        """Read the format that the file name asks for."""
         return movie_format(self.file)
 
     def write(self) -> None:

@@ -18,7 +18,7 @@ POSITIONS = ("x", "y", "z")
 LEADING = ("id", "type", "tag")
 
 
-class Table(NamedTuple):
+class TableRows(NamedTuple):
     """Some rows, in the order of their ids: identities and types, (n,) whole numbers; columns."""
 
     ids: np.ndarray
@@ -38,10 +38,16 @@ class TableDump(Dump):
         Columns that are always 0.
     rows_are
         What a row is about.
+    to_first
+        Whether the first of several processes alone gets the tables, which all go through once.
+    counts_rows
+        Whether it asks for the extent before.
     """
 
     absent: Sequence[str] = ()
     rows_are = "points"
+    to_first = False
+    counts_rows = True
 
     def __init__(
         self,
@@ -68,22 +74,32 @@ class TableDump(Dump):
 
     @staticmethod
     def names(hub: Hub) -> Sequence[str]:
-        """Names of the columns that can be written."""
+        """List names of the columns that can be written."""
         raise NotImplementedError
 
     def extent(self) -> tuple[int, int]:
-        """Number of rows, and the largest id."""
+        """Count number of rows, and the largest id."""
         raise NotImplementedError
 
-    def tables(self) -> Iterator[Table]:
-        """All rows in the order of their ids, in pieces whose columns fit into memory."""
+    def tables(self) -> Iterator[TableRows]:
+        """Give all rows in the order of their ids, in pieces whose columns fit into memory."""
         raise NotImplementedError
 
-    def table(self) -> Table:
-        """All rows."""
+    def take_part(self) -> None:
+        """Give the first of several processes the own rows, or do what it does."""
+        if not self.to_first:
+            super().take_part()
+            return
+        if self.counts_rows:
+            self.extent()
+        for _ in self.tables():
+            pass
+
+    def table(self) -> TableRows:
+        """Give all rows."""
         ids, types, columns = zip(*self.tables(), strict=True)
         joined = (np.concatenate(same) for same in zip(*columns, strict=True))
-        return Table(np.concatenate(ids), np.concatenate(types), list(joined))
+        return TableRows(np.concatenate(ids), np.concatenate(types), list(joined))
 
 
 class OfPoints:
@@ -99,7 +115,7 @@ class OfPoints:
 
     @staticmethod
     def names(hub: Hub) -> Sequence[str]:
-        """Names of the columns that can be written."""
+        """List names of the columns that can be written."""
         return hub.fields.particle_names()
 
     @property
@@ -108,16 +124,16 @@ class OfPoints:
         return self.hub.fields.absent_at_points()
 
     def extent(self) -> tuple[int, int]:
-        """Number of the points that there are, and the last of them."""
+        """Count number of the points that there are, and the last of them."""
         present = self.hub.fields.present
         count = int(np.count_nonzero(present))
         return count, len(present) - int(present[::-1].argmax()) if count else 0
 
-    def tables(self) -> Iterator[Table]:
-        """Number and solid of each point, and its columns."""
-        for fields in self.hub.fields.pieces():
+    def tables(self) -> Iterator[TableRows]:
+        """Give number and solid of each point, and its columns."""
+        for fields in self.hub.fields.pieces(to_first=self.to_first):
             ids, types = (fields.particle(name).astype(np.int64) for name in ("id", "type"))
-            yield Table(ids, types, [fields.particle(name) for name in self.columns])
+            yield TableRows(ids, types, [fields.particle(name) for name in self.columns])
 
 
 class OfNodes:
@@ -154,21 +170,21 @@ class OfNodes:
 
     @staticmethod
     def names(hub: Hub) -> Sequence[str]:
-        """Names of the columns that can be written."""
+        """List names of the columns that can be written."""
         return hub.fields.node_names()
 
     def extent(self) -> tuple[int, int]:
-        """Number of the nodes that are written, and the last of them."""
+        """Count number of the nodes that are written, and the last of them."""
         fields = self.hub.fields
         return (
             fields.occupied_nodes if self.occupied else (fields.node_count, fields.node_count - 1)
         )
 
-    def tables(self) -> Iterator[Table]:
-        """Number and grid of each node, and its columns."""
-        for nodes in self.hub.fields.node_pieces(self.columns):
+    def tables(self) -> Iterator[TableRows]:
+        """Give number and grid of each node, and its columns."""
+        for nodes in self.hub.fields.node_pieces(self.columns, to_first=self.to_first):
             rows = np.flatnonzero(nodes.node("mass") > 0) if self.occupied else slice(None)
-            yield Table(
+            yield TableRows(
                 *(nodes.node(name)[rows] for name in ("id", "type")),
                 [nodes.node(name)[rows] for name in self.columns],
             )

@@ -24,6 +24,7 @@ class VtkDump(TableDump):
     """
 
     remembers = ("_series",)
+    to_first, counts_rows = True, False
 
     def __init__(
         self,

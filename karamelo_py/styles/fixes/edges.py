@@ -1,4 +1,4 @@
-"""What fixes share that load the edge of a region: the faces that points show there."""
+"""Base of fixes that load the edge of a region: the faces that points show there."""
 
 from typing import NamedTuple
 

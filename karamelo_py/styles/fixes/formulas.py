@@ -1,4 +1,4 @@
-"""What fixes that act by a formula for each component have in common."""
+"""Base of fixes that act by a formula for each component."""
 
 from collections.abc import Callable, Sequence
 from typing import Any

@@ -1,4 +1,4 @@
-"""What fixes with Coulomb friction share."""
+"""Checks of fixes with Coulomb friction."""
 
 from karamelo_py.scene.hub import Hub
 

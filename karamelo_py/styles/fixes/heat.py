@@ -1,4 +1,4 @@
-"""What fixes that act on heat have in common."""
+"""Base of fixes that act on heat."""
 
 from typing import Any
 

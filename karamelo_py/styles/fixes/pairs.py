@@ -1,4 +1,4 @@
-"""What fixes between two solids share."""
+"""Base of fixes between two solids."""
 
 from functools import partial
 from typing import Any, NamedTuple
@@ -9,6 +9,7 @@ from karamelo_py.compiler.fields import field
 from karamelo_py.kernels import pairs
 from karamelo_py.kernels.arrays import Block
 from karamelo_py.kernels.p2g import Force
+from karamelo_py.language.rules import gain
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
@@ -68,7 +69,7 @@ class PairContact(Fix):
         simulation, total = self.hub.simulation, np.zeros(3)
         kin, corners = simulation.kin, self._where_both_are(simulation)
         if corners is not None:
-            blocks = simulation.stepped.blocks
+            blocks = simulation.setup.blocks
             rows = [self._picked(simulation, block, *corners) for block in blocks]
             own = [self._known(simulation, *one) for one in zip(blocks, rows, strict=True)]
             push = partial(self._push, kin, points.dt, points.kick)
@@ -79,7 +80,7 @@ class PairContact(Fix):
         self.publish_components(total)
 
     def sent(self, simulation: Any) -> int:
-        """How many points may touch others as they lie now: one process looks at all of them."""
+        """Count the points that may touch others now: one process looks at all of them."""
         corners = self._where_both_are(simulation)
         blocks = simulation.blocks if corners is not None else ()
         return sum(len(self._picked(simulation, block, *corners)) for block in blocks)
@@ -89,7 +90,7 @@ class PairContact(Fix):
 
         Each solid is in a box, and reaches beyond it as far as two points touch.
         """
-        s, d = simulation.stepped, simulation.kin.dimension
+        s, d = simulation.setup, simulation.kin.dimension
         extents = np.full((2, 7), -np.inf)
         for block in s.blocks:
             x = block.points.x[simulation.now]
@@ -122,9 +123,17 @@ class PairContact(Fix):
         n, total = len(order), np.zeros(3)
         _, mass, radius, *both = np.ascontiguousarray(of_all[order].T)
         x, v = (np.stack(part, axis=1) for part in (both[:d], both[d:]))
-        bodies = pairs.Bodies(x, v, mass, radius, np.zeros((n, d)), n - int(second.sum()))
+        bodies = pairs.TwoBodies(x, v, mass, radius, np.zeros((n, d)), n - int(second.sum()))
         pairs.push_apart(self.law(), kin, bodies, pairs.cells_for(n), self._reach, dt, kick, total)
         force = np.empty((n, d))
         force[order] = bodies.force
         ends = np.cumsum([len(one) for one in found])[:-1]
         return [(own, total) for own in np.split(force, ends)]
+
+
+gain(
+    PairContact,
+    when=lambda fix, scene: True,
+    cause="contact between points",
+    cure="a smaller step, or method ulmpm/contacts",
+)

@@ -164,7 +164,7 @@ class Python(Fix):
 
     @property
     def state(self) -> dict[str, Any]:
-        """What the function keeps and names."""
+        """Values that the function keeps and names."""
         return self.keeper.state()
 
     @state.setter
@@ -172,7 +172,7 @@ class Python(Fix):
         self.keeper.restore(kept)
 
     def filed(self) -> None:
-        """What else the function has changed is told, once: files do not hold it."""
+        """Warn once of other values that the function has changed: files do not hold them."""
         keeper = self.keeper
         forgotten = [] if self.told else keeper.forgotten()
         if forgotten:
@@ -225,7 +225,7 @@ class Python(Fix):
 
 
 class Keeper:
-    """Who keeps what a function needs from step to step: the object it belongs to, or its module.
+    """Owner of the values that a function needs from step to step: its object, or its module.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What fixes share that put forces on points: tools, walls and tractions."""
+"""Base of fixes that put forces on points: tools, walls and tractions."""
 
 from collections.abc import Sequence
 from functools import cached_property

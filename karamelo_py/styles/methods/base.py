@@ -1,4 +1,4 @@
-"""What the methods share: which grids there are, what points keep, what a step is made of."""
+"""Base of methods: grids, data of the points, parts of a step."""
 
 from collections.abc import Sequence
 from typing import Any, ClassVar, Literal, NamedTuple
@@ -62,7 +62,7 @@ class Method:
     fields_per_solid: ClassVar[bool] = False
 
     def __init__(self, hub: Hub, heat: Literal["mechanical", "thermo-mechanical"] = "mechanical"):
-        """What a script may add.
+        """Take the option that scripts may add.
 
         Parameters
         ----------
@@ -73,11 +73,11 @@ class Method:
 
     @property
     def regular_points(self) -> bool:
-        """Whether points of a cell stand at equal distances, so that their domains tile it."""
+        """True if points of a cell stand at equal distances, so that their domains tile it."""
         return bool(getattr(self.basis, "shape", ()))
 
     def contact_between(self, hub: Hub, lattices: Sequence[Lattice]) -> NamedTuple:
-        """How solids with velocity fields of their own touch: a tag with what that takes."""
+        """Return the tag of contact between solids with velocity fields of their own."""
         return NoContact()
 
     def begin(self, hub: Hub, contact: NamedTuple) -> None:
@@ -99,7 +99,7 @@ class Method:
         return [self._lattice(domain.dimension, domain.lo, domain.hi, domain.h)]
 
     def lattice_of(self, hub: Hub, solid: Solid) -> int:
-        """Which of the grids the points of a solid see."""
+        """Return the number of the grid that the points of a solid see."""
         return 0
 
     def held_with(self, hub: Hub, nodes: np.ndarray) -> np.ndarray:
@@ -111,7 +111,7 @@ class Method:
         return Axisymmetric() if hub.domain.axisymmetric else KINEMATICS[hub.domain.dimension]()
 
     def averaging(self, hub: Hub) -> NamedTuple:
-        """Whether changes of volume are averaged."""
+        """Return the tag of averaging: `FBar` where changes of volume are averaged."""
         return FBar() if hub.update.anti_locking else PointByPoint()
 
     def places(self, kin: Any, solid: Solid, real: type) -> np.ndarray:
@@ -119,7 +119,7 @@ class Method:
         return np.concatenate([solid.x0, self.shapes(kin, solid)], axis=1).astype(real)
 
     def shapes(self, kin: Any, solid: Solid) -> np.ndarray:
-        """What the basis keeps of the domains of a solid's points, (n, s)."""
+        """Return the shapes of the domains of a solid's points, (n, s), as the basis keeps them."""
         return initial_shape(type(self.basis), solid)
 
     def _lattice(

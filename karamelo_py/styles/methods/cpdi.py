@@ -1,4 +1,4 @@
-"""What the methods with convected domains share: their variants, and what they refuse."""
+"""Base of methods with convected domains: their variants, and what they refuse."""
 
 from typing import Any, ClassVar
 
@@ -35,7 +35,7 @@ class Convected(Method):
     variants: ClassVar[dict[str, type]] = VARIANTS
 
     def shapes(self, kin: Any, solid: Solid) -> np.ndarray:
-        """What the basis keeps of the domains of a solid's points, (n, s)."""
+        """Return the shapes of the domains of a solid's points, (n, s), as the basis keeps them."""
         self._check_domain(kin.dimension)
         self._check_solid(solid)
         return super().shapes(kin, solid)

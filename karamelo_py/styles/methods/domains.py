@@ -11,7 +11,7 @@ from karamelo_py.scene.solid import Solid
 
 
 def initial_shape(basis: type, solid: Solid) -> np.ndarray:
-    """What `basis` keeps of the domains of a solid's points, (n, s)."""
+    """Return the shapes of the domains of a solid's points, (n, s), as `basis` keeps them."""
     half = solid.half_size
     n, d = half.shape
     unit = np.eye(d)

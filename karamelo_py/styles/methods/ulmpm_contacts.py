@@ -199,7 +199,7 @@ class ULMPMContacts(Method):
         contact.reactions[: 1 + len(slots)] = [len(slots), *slots]
 
     def remembered(self, contact: NamedTuple, spans: np.ndarray) -> list[np.ndarray]:
-        """Which nodes touched last: usf and usavg ask for it at the start of a step."""
+        """Return views of the record of last contact: usf and usavg need it when a step starts."""
         return [contact.touched[begin:end] for begin, end in spans]
 
     def resume(self, contact: NamedTuple, before: NamedTuple) -> None:

@@ -18,7 +18,7 @@ FORMS = Forms(
 )
 
 
-class Block(Region):
+class BlockRegion(Region):
     """A box with faces along the axes; its faces belong to it.
 
     Parameters
@@ -56,7 +56,7 @@ class Block(Region):
         super().__init__(hub, self.corner_lo, self.corner_hi, exterior=exterior)
 
     def contains(self, x: np.ndarray) -> np.ndarray:
-        """Which positions lie between the faces, see `Region.contains`."""
+        """Test which positions lie between the faces, see `Region.contains`."""
         inside = np.ones(len(x), dtype=bool)
         for axis, (lo, hi) in enumerate(zip(self.corner_lo, self.corner_hi, strict=True)):
             if lo > -np.inf:
@@ -66,7 +66,7 @@ class Block(Region):
         return inside
 
     def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
-        """How far positions lie between the faces, see `Region.distance`."""
+        """Return the depth of positions between the faces, see `Region.distance`."""
         depth = np.full(len(x), reach)
         for axis, (lo, hi) in enumerate(zip(self.corner_lo, self.corner_hi, strict=True)):
             if lo > -np.inf:

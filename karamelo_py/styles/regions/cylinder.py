@@ -60,6 +60,7 @@ class Cylinder(region.Region):
             self.along = "xyz".index(values["axis"])
             self.across = tuple(axis for axis in range(3) if axis != self.along)
             self.centre = (values["c1"], values["c2"])
+            self.axis = self.along, self.centre
             self.ends = (values["lo"], values["hi"])
             region.check_order(*self.ends, ("lo", "hi"), place_of(names, given, "lo"))
         lo, hi = np.empty(dimension), np.empty(dimension)
@@ -70,7 +71,7 @@ class Cylinder(region.Region):
         super().__init__(hub, lo, hi, exterior=exterior)
 
     def contains(self, x: np.ndarray) -> np.ndarray:
-        """Which positions lie in the cylinder, see `Region.contains`."""
+        """Test which positions lie in the cylinder, see `Region.contains`."""
         inside = region.within(x, self.centre, self.across, self.radius + self.tolerance)
         if self.along is not None:
             inside &= x[:, self.along] >= self.ends[0] - self.tolerance
@@ -78,7 +79,7 @@ class Cylinder(region.Region):
         return inside
 
     def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
-        """How far positions lie below the surface, see `Region.distance`."""
+        """Return the depth of positions below the surface, see `Region.distance`."""
         depth = region.below(x, self.centre, self.across, self.radius)
         if self.along is not None:
             depth = np.minimum(depth, x[:, self.along] - self.ends[0])

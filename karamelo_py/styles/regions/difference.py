@@ -33,13 +33,13 @@ class Difference(Region):
         super().__init__(hub, first.box_lo[used], first.box_hi[used], parts=(first, second))
 
     def contains(self, x: np.ndarray) -> np.ndarray:
-        """Which positions lie in the first region only, see `Region.contains`."""
+        """Test which positions lie in the first region only, see `Region.contains`."""
         first, second = self.parts
         inside = first.inside(x)
         inside &= ~second.inside(x)
         return inside
 
     def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
-        """How far positions lie in it, see `Region.distance`."""
+        """Return the depth of positions in it, see `Region.distance`."""
         first, second = (part.depth(x, reach) for part in self.parts)
         return np.minimum(first, -second)

@@ -67,7 +67,7 @@ class MeshRegion(Region):
         self.simplices = Simplices(corners, tolerance)
 
     def contains(self, x: np.ndarray) -> np.ndarray:
-        """Which positions lie in an element, see `Region.contains`."""
+        """Test which positions lie in an element, see `Region.contains`."""
         return self.simplices.contain(np.asarray(x)[:, : self.dimension])
 
     @cached_property
@@ -76,7 +76,7 @@ class MeshRegion(Region):
         return Skin(outer_faces(self.corners))
 
     def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
-        """How far positions lie below the surface, see `Region.distance`."""
+        """Return the depth of positions below the surface, see `Region.distance`."""
         if self.simplices.flat:
             return np.full(len(x), -reach)  # nothing lies in a surface or a line
         distance = self.skin.distance(x[:, : self.dimension], reach)

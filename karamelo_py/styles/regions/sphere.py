@@ -45,9 +45,9 @@ class Sphere(Region):
         )
 
     def contains(self, x: np.ndarray) -> np.ndarray:
-        """Which positions lie in the sphere, see `Region.contains`."""
+        """Test which positions lie in the sphere, see `Region.contains`."""
         return within(x, self.centre, range(self.dimension), self.radius + self.tolerance)
 
     def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
-        """How far positions lie below the surface, see `Region.distance`."""
+        """Return the depth of positions below the surface, see `Region.distance`."""
         return below(x, self.centre, range(self.dimension), self.radius)

@@ -64,7 +64,7 @@ class STL(Region):
         self.surface = Surface(points, triangles.astype(np.int64), tolerance)
 
     def contains(self, x: np.ndarray) -> np.ndarray:
-        """Which positions the surface encloses, see `Region.contains`."""
+        """Test which positions the surface encloses, see `Region.contains`."""
         return self.surface.encloses(np.asarray(x)[:, :3])
 
     @cached_property
@@ -73,6 +73,6 @@ class STL(Region):
         return Skin(self.surface.corners)
 
     def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
-        """How far positions lie below the surface, see `Region.distance`."""
+        """Return the depth of positions below the surface, see `Region.distance`."""
         distance = self.skin.distance(x[:, :3], reach)
         return np.where(self.contains(x), distance, -distance)

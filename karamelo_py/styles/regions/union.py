@@ -40,9 +40,9 @@ class Union(Region):
         )
 
     def contains(self, x: np.ndarray) -> np.ndarray:
-        """Which positions lie inside, see `Region.contains`."""
+        """Test which positions lie inside, see `Region.contains`."""
         return self.joined.reduce([part.inside(x) for part in self.parts])
 
     def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
-        """How far positions lie in it, see `Region.distance`."""
+        """Return the depth of positions in it, see `Region.distance`."""
         return self.high.reduce([part.depth(x, reach) for part in self.parts])

@@ -8,7 +8,7 @@ before it gets there. In space that takes more than it saves: 27 nodes, eight co
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import beside, first_lane, fma, in_all, is_one, real, shared
+from karamelo_py.compiler.compile import all_lanes, beside, first_lane, fma, is_one, real, shared
 from karamelo_py.points.basis import affine_weight, entry, reach, support
 from karamelo_py.points.basis.cpdi.corners import CornerStencil, arm, solve
 from karamelo_py.points.basis.product import digits, hoop, item, node_number
@@ -18,7 +18,7 @@ from karamelo_py.points.kinematics import TAGS, Axisymmetric, gradient, vector
 WIDTH = 3  # nodes along each direction
 
 
-class Block(NamedTuple):
+class NodeBlock(NamedTuple):
     """The nodes next to a point, and what it sees of them. Nobody computes what nobody reads."""
 
     first: tuple[int, ...]  # number of the first of them, along each direction
@@ -29,7 +29,7 @@ class Block(NamedTuple):
 
 
 class InBlock(NamedTuple):
-    """In the place of a basis: the point sees a :class:`Block`."""
+    """In the place of a basis: the point sees a :class:`NodeBlock`."""
 
     basis: NamedTuple
 
@@ -57,13 +57,13 @@ def block_of(kin, grid, stencil):
     hats = list(zip(*ahead, strict=True))
     weights = _spread_out(hats, stencil.weights)
     slopes = [_spread_out(hats, component) for component in zip(*stencil.gradients, strict=True)]
-    return Block(tuple(first), weights, tuple(zip(*slopes, strict=True)), holds, stencil)
+    return NodeBlock(tuple(first), weights, tuple(zip(*slopes, strict=True)), holds, stencil)
 
 
 @shared
 def is_whole(block):
     """Whether all that the points in all lanes see lies in their blocks."""
-    return len(block) > 0 and in_all(block.holds)
+    return len(block) > 0 and all_lanes(block.holds)
 
 
 @shared
@@ -78,7 +78,7 @@ def is_one_block(block):
 @shared
 def of_one(block):
     """The block of points that see the same nodes: their numbers have no lanes."""
-    return Block(tuple([first_lane(number) for number in block.first]), *block[1:])
+    return NodeBlock(tuple([first_lane(number) for number in block.first]), *block[1:])
 
 
 def _spread_out(hats: Iterable, values: Iterable) -> tuple:

@@ -3,7 +3,7 @@
 from math import inf
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import Weighted, beside, choose, index, real
+from karamelo_py.compiler.compile import Weighted, beside, index, real, where
 from karamelo_py.points.basis import (
     affine_weight,
     carried,
@@ -85,7 +85,7 @@ def corner_at(kin, grid, x):
 def hat(corner, j):
     """Linear function of the j-th node of a corner's cell."""
     sides = zip(digits(j, 2, len(corner.cell)), corner.fractions, strict=True)
-    return product([choose(far > 0, r, 1 - r) for far, r in sides])
+    return product([where(far > 0, r, 1 - r) for far, r in sides])
 
 
 def node_around(grid, corner, j):
@@ -244,7 +244,7 @@ def extent_of_corners(basis, kin, grid, place):
     far = abs(place[d] - place[0])
     for k in range(d + 1, d + d * basis.domain_corners):
         far = max(abs(place[k] - place[k % d]), far)
-    return choose(upright(basis, kin, place), max(far * grid.inv_h, LEAST[d]), inf)
+    return where(upright(basis, kin, place), max(far * grid.inv_h, LEAST[d]), inf)
 
 
 def register_carried(basis: type) -> None:

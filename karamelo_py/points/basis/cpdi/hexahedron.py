@@ -1,6 +1,6 @@
 """CPDI2 in space: hexahedra (H8) whose corners go with the velocity of the grid."""
 
-from karamelo_py.points.basis.cpdi import CUBE, Domain, Element, domain, upright
+from karamelo_py.points.basis.cpdi import CUBE, ConvectedDomain, Element, domain, upright
 from karamelo_py.points.basis.cpdi.corners import register_carried
 from karamelo_py.points.kinematics import Space
 
@@ -8,7 +8,7 @@ from karamelo_py.points.kinematics import Space
 NEAR, FAR = (1 + 3**-0.5) / 2, (1 - 3**-0.5) / 2
 
 
-class H8(Domain):
+class H8(ConvectedDomain):
     """Trilinear hexahedra of eight corners, which neighbouring points move alike.
 
     Weights and gradients are the exact means over the hexahedron: 2 x 2 x 2 Gauss points integrate

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any, NamedTuple
 
-from karamelo_py.compiler.compile import choose, in_any, point_function
+from karamelo_py.compiler.compile import any_lane, point_function, where
 from karamelo_py.compiler.powers import exponential, logarithm
 from karamelo_py.language.signature import NonNegative
 from karamelo_py.points.laws import column, damage, damage_initiation
@@ -110,14 +110,14 @@ def _initial_damage_johnson_cook_damage(damage, like):
 @damage_after.on(JohnsonCookDamage)
 def _damage_after_johnson_cook_damage(damage, memory, strain, triaxiality, heat, dt):
     grows = (strain > 0) & (triaxiality > _CLOSED)
-    if not in_any(grows):
+    if not any_lane(grows):
         return memory
     failure = damage.d1 + damage.d2 * exponential(min(damage.d3 * triaxiality, 50))
     rate = max(strain / (dt * damage.epsdot0), 1)
     failure *= 1 + damage.d4 * logarithm(rate)
     failure *= temperature_factor(heat, damage)
     further = strain / max(failure, _SMALLEST_FAILURE_STRAIN)
-    return Accumulated(choose(grows, memory.w + further, memory.w))
+    return Accumulated(where(grows, memory.w + further, memory.w))
 
 
 @integrity.on(JohnsonCookDamage)

@@ -47,7 +47,8 @@ class Tait(NamedTuple):
     """
 
     in_lanes = True
-    one_by_one = ("compression_energy",)
+    any_speed = True
+    scalarised = ("compression_energy",)
 
     specific_volume: float  # reference volume per mass
     K: float  # reference pressure; K gamma is the bulk modulus

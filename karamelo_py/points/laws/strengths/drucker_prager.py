@@ -71,7 +71,8 @@ class DruckerPrager(NamedTuple):
     """
 
     in_lanes = True
-    one_by_one = ("respond",)
+    flows = True
+    scalarised = ("respond",)
 
     G: float  # shear modulus
     cohesion: float

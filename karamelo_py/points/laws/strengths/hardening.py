@@ -2,7 +2,7 @@
 
 from math import sqrt
 
-from karamelo_py.compiler.compile import choose, in_any, point_function, round_off, shared
+from karamelo_py.compiler.compile import any_lane, point_function, round_off, shared, where
 from karamelo_py.points.kinematics import von_mises
 from karamelo_py.points.laws.strengths.linear import elastic_trial
 
@@ -40,7 +40,7 @@ def updated_memory(strength, memory, increment, dt):
 def onto_yield_surface(trial, q, flow, x):
     """Shrink the deviatoric stress `trial` from q to `flow` where the plastic strain `x` grows."""
     yields = x > 0
-    return choose(yields, flow / choose(yields, q, 1), 1) * trial
+    return where(yields, flow / where(yields, q, 1), 1) * trial
 
 
 def radial_return(strength, kin, s, strain, memory, heat, dt):
@@ -80,8 +80,8 @@ def plastic_increment(strength, q, memory, heat, dt):
         flow, hardening = flow_stress(strength, memory, known, x, heat, dt)
         excess = q - slope * x - flow
         active = active & ((x > 0) | (excess > 0))
-        low = choose(excess > 0, x, low)
-        high = choose(excess > 0, high, x)
+        low = where(excess > 0, x, low)
+        high = where(excess > 0, high, x)
         change = excess / (slope + hardening)
         new = x + change
         # Changes go like their squares, c_(n+1) = (c_n / c_(n-1))^2 c_n: is the next one round-off?
@@ -92,10 +92,10 @@ def plastic_increment(strength, q, memory, heat, dt):
         within = (low < new) & (new < high)
         middle = 0.5 * (low + high)
         # What is rounded may lie below 0: plastic strain only grows.
-        x = choose(active, max(choose(done | within, new, middle), 0), x)
+        x = where(active, max(where(done | within, new, middle), 0), x)
         last = change
         # Lanes that have finished wait for the others.
         active = active & (not (done | (middle <= low) | (middle >= high)))
-        if not in_any(active):
+        if not any_lane(active):
             break
     return x

@@ -2,8 +2,9 @@
 
 from typing import Annotated, Any, NamedTuple
 
-from karamelo_py.compiler.compile import choose, fma, in_all, point_function, real, round_off
+from karamelo_py.compiler.compile import all_lanes, fma, point_function, real, round_off, where
 from karamelo_py.compiler.powers import logarithm, power
+from karamelo_py.language.rules import suggestion
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.laws import Absent
 from karamelo_py.points.laws.checks import check_temperatures, reference_rate
@@ -85,6 +86,14 @@ class JohnsonCook(NamedTuple):
         return cls(G, A, B, n, rate, Softening(m, Tr, Tm) if m > 0 else Absent())
 
 
+suggestion(
+    JohnsonCook,
+    when=lambda s, scene: s.B == 0 and all(isinstance(f, Absent) for f in (s.rate, s.softening)),
+    cost="the strength of {owner.id} neither hardens nor depends on rate or heat",
+    instead="strength(..., plastic, {part.G:g}, {part.A:g})",
+)
+
+
 class RateFactor(NamedTuple):
     """1 + C ln(rate/epsdot0) above the reference rate."""
 
@@ -115,7 +124,7 @@ _NEAR, _TERMS = 1 / 32, 9
 def power_of_strain(factor, exponent, strain):
     """factor strain^exponent, 0 at no strain."""
     some = strain > 0
-    return choose(some, factor * power(choose(some, strain, 1), exponent), 0)
+    return where(some, factor * power(where(some, strain, 1), exponent), 0)
 
 
 def power_law(factor, exponent, strain, value, increment):
@@ -124,15 +133,15 @@ def power_law(factor, exponent, strain, value, increment):
     `value` is that without the increment: (1 + x)^n times as much is a short series for small x.
     """
     near = max(exponent, 1) * increment <= _NEAR * strain
-    x = increment / choose(strain > 0, strain, 1)
+    x = increment / where(strain > 0, strain, 1)
     series = real(1, x)
     for k in range(_TERMS, 0, -1):
         series = fma(x * ((exponent - (k - 1)) * real(1 / k, x)), series, 1)
     after = strain + increment
     value = value * series
-    if not in_all(near):
-        value = choose(near, value, power_of_strain(factor, exponent, after))
-    return value, value * (exponent / choose(after > 0, after, 1))
+    if not all_lanes(near):
+        value = where(near, value, power_of_strain(factor, exponent, after))
+    return value, value * (exponent / where(after > 0, after, 1))
 
 
 def power_law_guess(exponent, strain, hard, excess, slope):
@@ -141,7 +150,7 @@ def power_law_guess(exponent, strain, hard, excess, slope):
     `excess` is how far the stress lies above the flow stress; it falls by `slope` with the strain.
     """
     some = strain > round_off(strain)
-    inverse = choose(some, 1 / choose(some, strain, 1), 0)
+    inverse = where(some, 1 / where(some, strain, 1), 0)
     steeper = hard * exponent * inverse
     flatter = 1 / (slope + steeper)
     curved = 0.5 * (1 - exponent) * steeper * inverse * flatter
@@ -177,8 +186,8 @@ def with_rate_factor(rate, flow, slope, increment, dt):
 def _with_rate_factor_rate_factor(rate, flow, slope, increment, dt):
     relative = increment / (dt * rate.epsdot0)
     faster = relative > 1
-    factor = 1 + choose(faster, rate.C * logarithm(choose(faster, relative, 1)), 0)
-    steeper = choose(faster, flow * rate.C / choose(faster, increment, 1), 0)
+    factor = 1 + where(faster, rate.C * logarithm(where(faster, relative, 1)), 0)
+    steeper = where(faster, flow * rate.C / where(faster, increment, 1), 0)
     return flow * factor, slope * factor + steeper
 
 

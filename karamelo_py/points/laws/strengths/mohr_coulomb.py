@@ -52,7 +52,8 @@ class MohrCoulomb(NamedTuple):
     """
 
     in_lanes = True
-    one_by_one = ("respond",)
+    flows = True
+    scalarised = ("respond",)
 
     G: float  # shear modulus
     cohesion: float  # c cos(phi)

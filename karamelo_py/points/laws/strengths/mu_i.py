@@ -3,7 +3,7 @@
 from math import sqrt
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import choose
+from karamelo_py.compiler.compile import where
 from karamelo_py.compiler.tuples import only
 from karamelo_py.language.signature import Positive
 from karamelo_py.points.kinematics import inner
@@ -53,6 +53,8 @@ class MuI(NamedTuple):
     """
 
     in_lanes = True
+    flows = True
+    rings = False
 
     G: Annotated[float, Positive]
     mu_s: Annotated[float, Positive]
@@ -96,7 +98,7 @@ def _respond_mu_i(strength, law, kin, s, strain, j, memories, dt):
     trial = elastic_trial(strength.G, s, strain)
     shear = sqrt(0.5 * inner(trial, trial))
     flows = together & (shear > strength.mu_s * p)
-    p = choose(together, p, 1)
+    p = where(together, p, 1)
     slow, fast = strength.mu_s * p, strength.mu_2 * p
     # (shear - tau)/(G dt) is the shear rate that tau = mu(I) p asks for: a quadratic equation.
     grain = strength.d * sqrt(strength.rho_s / p)
@@ -104,7 +106,7 @@ def _respond_mu_i(strength, law, kin, s, strain, j, memories, dt):
     b = fast + shear + viscous
     c = fast * shear + slow * viscous
     tau = 2 * c / (b + sqrt(b * b - 4 * c))
-    slip = choose(flows, (shear - tau) / strength.G, 0)
-    share = choose(together, choose(flows, tau / choose(flows, shear, 1), 1), 0)
+    slip = where(flows, (shear - tau) / strength.G, 0)
+    share = where(together, where(flows, tau / where(flows, shear, 1), 1), 0)
     ep = memory.ep + slip * sqrt(1 / 3)
     return share * trial, memory._replace(ep=ep, inertial=slip / dt * grain), tau * slip

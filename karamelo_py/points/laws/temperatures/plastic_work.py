@@ -2,7 +2,7 @@
 
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import choose
+from karamelo_py.compiler.compile import where
 from karamelo_py.language.signature import In, NonNegative, Positive
 from karamelo_py.points.laws import column, conductivity, heat_capacity, temperature
 from karamelo_py.points.laws.checks import check_temperatures
@@ -70,7 +70,7 @@ def _initial_heat_plastic_work(temperature, like):
 @heated.on(PlasticWork)
 def _heated_plastic_work(temperature, heat, work):
     warmer = heat.T + temperature.chi / temperature.cp * work
-    return Warm(choose(temperature.Tm > heat.T, warmer, heat.T))
+    return Warm(where(temperature.Tm > heat.T, warmer, heat.T))
 
 
 @thermal_pressure.on(PlasticWork)

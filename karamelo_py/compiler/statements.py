@@ -1,0 +1,357 @@
+"""Functions with branches and loops, written down by walking through their text.
+
+What asks what only a run can know cannot be run by Python (:mod:`karamelo_py.compiler.trace`): here
+its statements are gone through one by one. What only concerns Python is done; where a number
+decides, code is written for all edges, and where edges meet, a variable is what it was on the way
+that was taken. A loop over a range that is known is written out, any other one becomes a loop.
+"""
+
+import ast
+import builtins
+import copy
+import functools
+import inspect
+import types as python
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from numba import types
+
+from karamelo_py.compiler.expressions import BINARY, CHANGING, ON_ALL_WAYS, ExpressionCompiler
+from karamelo_py.compiler.flow import Counter, Edge, Flow, Grows, Range, is_value
+from karamelo_py.compiler.source import source_of
+from karamelo_py.compiler.values import LONG, DataDependentBranch, Untraceable
+
+
+@functools.cache
+def _stored(node: ast.AST) -> frozenset[str]:
+    """List the names that a statement gives something to."""
+    return frozenset(
+        n.id for n in ast.walk(node) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)
+    )
+
+
+def place_in_text(frame: python.FrameType) -> tuple[str, int] | None:
+    """Find the file and line of the statement that a frame is about, if it is about one."""
+    if frame.f_code is not AstCompiler.block.__code__ or "statement" not in frame.f_locals:
+        return None
+    walk, statement = frame.f_locals["self"], frame.f_locals["statement"]
+    return walk.walked.__code__.co_filename, statement.lineno
+
+
+# --- the walk -------------------------------------------------------------------------------------
+
+
+class AstFunction:
+    """Compile a function from its text, statement by statement, where it is called.
+
+    Parameters
+    ----------
+    function
+        With the globals that it is to see.
+    flow
+        Makes what writes the code of edges, when a call begins.
+    """
+
+    def __init__(self, function: Callable, flow: Callable[[], Flow]):
+        self.function, self.flow = function, flow
+        self.definition = source_of(function)
+        self.unrolled: set[ast.For] = set()  # loops that must be
+        self.grown: dict[tuple, dict] = {}  # types of literals that loops begin with, by place
+        self.signature = inspect.signature(function)
+        self.__code__ = function.__code__
+        free = function.__code__.co_freevars
+        cells = (cell.cell_contents for cell in function.__closure__ or ())
+        self.free = dict(zip(free, cells, strict=True))
+
+    def __call__(self, *arguments: Any, **keywords: Any) -> Any:
+        bound = self.signature.bind(*arguments, **keywords)
+        bound.apply_defaults()
+        return AstCompiler(self, self.flow(), dict(bound.arguments)).result()
+
+
+class AstCompiler(ExpressionCompiler):
+    """Compile one call of a function.
+
+    Attributes
+    ----------
+    names
+        What the function's own names stand for.
+    goes
+        Whether anything is done after the statement before.
+    """
+
+    def __init__(self, walked: AstFunction, flow: Flow, names: dict[str, Any]):
+        self.walked, self.flow, self.names = walked, flow, names
+        self.function, self.free = walked.function, walked.free
+        self.goes = True
+        self.returns: list[Edge] = []
+        self.breaks: list[Edge] = []
+        self.continues: list[Edge] = []
+
+    def result(self) -> Any:
+        """Compile the body; return what the function returns."""
+        self.block(self.walked.definition.body)
+        if self.goes:
+            self.names = {"": None}
+            self.returns.append(self.edge())
+        self.meet(self.returns)
+        if "" not in self.names:
+            raise Untraceable("what it returns is not of one kind on all edges")
+        return self.names[""]
+
+    # --- ways
+
+    def edge(self) -> Edge:
+        """End a way here."""
+        return self.flow.edge(self.names)
+
+    def leave(self, edges: list[Edge]) -> None:
+        """End this way here: it goes on where `ways` meet."""
+        edges.append(self.edge())
+        self.goes = False
+
+    def meet(self, edges: list[Edge]) -> None:
+        """Go on where ways meet."""
+        self.goes = bool(edges)
+        if edges:
+            self.names = self.flow.meet(edges)
+
+    def branch(self, condition: Any, then: Callable, otherwise: Callable) -> None:
+        """Go both ways, and on from where they meet."""
+        edges: list[Edge] = []
+        before = self.names
+        for begin, do in zip(self.flow.part(condition), (then, otherwise), strict=True):
+            self.names = dict(before)
+            self.goes = True
+            self.flow.start(begin)
+            do()
+            if self.goes:
+                edges.append(self.edge())
+        self.meet(edges)
+
+    # --- statements
+
+    def block(self, statements: list[ast.stmt]) -> None:
+        """Compile statements one after another."""
+        for statement in statements:
+            if not self.goes:
+                return
+            self.do(statement)
+
+    def Pass(self, node: ast.Pass) -> None:
+        pass
+
+    def Expr(self, node: ast.Expr) -> None:
+        self.do(node.value)
+
+    def Return(self, node: ast.Return) -> None:
+        self.names = {"": self.do(node.value) if node.value else None}
+        self.leave(self.returns)
+
+    def Break(self, node: ast.Break) -> None:
+        self.leave(self.breaks)
+
+    def Continue(self, node: ast.Continue) -> None:
+        self.leave(self.continues)
+
+    def Assign(self, node: ast.Assign) -> None:
+        value = self.do(node.value)
+        for target in node.targets:
+            self.give(target, value)
+
+    def AnnAssign(self, node: ast.AnnAssign) -> None:
+        if node.value:
+            self.give(node.target, self.do(node.value))
+
+    def FunctionDef(self, node: ast.FunctionDef) -> None:
+        names = [a.arg for a in node.args.args]
+        every = [a for a in ast.walk(node.args) if isinstance(a, ast.arg)]
+        if node.decorator_list or len(names) < len(every):
+            self.unknown(node)
+        defaults = dict(zip(names[::-1], map(self.do, node.args.defaults[::-1]), strict=False))
+
+        def call(*arguments: Any, **keywords: Any) -> Any:
+            inner = copy.copy(self.walked)
+            inner.definition, inner.free = node, self.free | self.names
+            given = defaults | dict(zip(names, arguments, strict=False)) | keywords
+            if len(arguments) > len(names) or given.keys() != set(names):
+                raise TypeError(f"{node.name} takes {len(names)} arguments")
+            return AstCompiler(inner, self.flow, given).result()
+
+        self.names[node.name] = call
+
+    def Raise(self, node: ast.Raise) -> None:
+        what, arguments = node.exc, []
+        if isinstance(what, ast.Call):
+            what, arguments = what.func, self.items(what.args)
+        kind = getattr(builtins, what.id, None) if isinstance(what, ast.Name) else None
+        if not isinstance(kind, type) or any(map(is_value, arguments)):
+            self.unknown(node)
+        self.flow.fail(kind, tuple(arguments))
+        self.goes = False
+
+    def Assert(self, node: ast.Assert) -> None:
+        text = [node.msg] if node.msg else []
+        failed = ast.Raise(ast.Call(ast.Name(AssertionError.__name__), text, []))
+        self.If(ast.If(node.test, [], [ast.copy_location(failed, node)]))
+
+    def give(self, target: ast.expr, value: Any) -> None:
+        """Let a target stand for a value."""
+        if isinstance(target, ast.Name):
+            self.names[target.id] = value
+        elif isinstance(target, ast.Tuple | ast.List):
+            values = list(value)
+            stars = [k for k, t in enumerate(target.elts) if isinstance(t, ast.Starred)]
+            if stars:
+                first, behind = stars[0], len(target.elts) - 1 - stars[0]
+                values[first : len(values) - behind] = [values[first : len(values) - behind]]
+            for inner, item in zip(target.elts, values, strict=True):
+                self.give(inner.value if isinstance(inner, ast.Starred) else inner, item)
+        elif isinstance(target, ast.Attribute):
+            setattr(self.do(target.value), target.attr, value)
+        elif isinstance(target, ast.Subscript):
+            array = self.do(target.value)
+            if isinstance(array, CHANGING):
+                raise Untraceable(ON_ALL_WAYS)
+            array[self.do(target.slice)] = value
+        else:
+            self.unknown(target)
+
+    def AugAssign(self, node: ast.AugAssign) -> None:
+        operation = BINARY[type(node.op)]
+        target = node.target
+        if isinstance(target, ast.Attribute):
+            thing = self.do(target.value)
+            made = operation(getattr(thing, target.attr), self.do(node.value))
+            setattr(thing, target.attr, made)
+        elif isinstance(target, ast.Subscript):
+            array = self.do(target.value)
+            place = self.do(target.slice)
+            if isinstance(array, CHANGING):
+                raise Untraceable(ON_ALL_WAYS)
+            array[place] = operation(array[place], self.do(node.value))
+        else:
+            before = self.name(target.id)
+            if is_value(before) and isinstance(before._kind, types.Array):  # it would change
+                raise Untraceable("an array as a whole is changed: change its items")
+            self.names[target.id] = operation(before, self.do(node.value))
+
+    def If(self, node: ast.If) -> None:
+        condition = self.do(node.test)
+        if is_value(condition):
+            self.branch(condition, lambda: self.block(node.body), lambda: self.block(node.orelse))
+        else:
+            self.block(node.body if condition else node.orelse)
+
+    def For(self, node: ast.For) -> None:
+        through = self.do(node.iter)
+        if isinstance(through, range) and self.is_rolled(node, through):
+            through = Range((through.start, through.stop, through.step))
+        if is_value(through):
+            array, through = through, Range((through.shape[0],))
+            self.roll(node, self.flow.counted(through.bounds), lambda k: array[k])
+        elif isinstance(through, Range):
+            self.roll(node, self.flow.counted(through.bounds), lambda k: k)
+        else:
+            self.unroll(node, through)
+
+    def is_rolled(self, node: ast.For, through: range) -> bool:
+        """Tell whether a loop over a known range stays a loop: a long one, if it can be."""
+        if len(through) <= LONG or node in self.walked.unrolled:
+            return False
+        if not self.flow.builder:
+            state = dict(self.names), self.breaks, self.continues, [*self.returns]
+            bounds = through.start, through.stop, through.step
+            try:
+                self.roll(node, self.flow.counted(bounds), lambda k: k)
+            except DataDependentBranch:
+                raise
+            except (Exception, Untraceable):
+                self.walked.unrolled.add(node)
+            self.names, self.breaks, self.continues, self.returns = state
+            self.goes = True
+        return node not in self.walked.unrolled
+
+    def unroll(self, node: ast.For, through: Iterable) -> None:
+        """Write a loop out."""
+        outer = self.breaks, self.continues
+        self.breaks, self.continues = [], []
+        for item in through:
+            self.give(node.target, item)
+            self.block(node.body)
+            self.meet([*self.continues, *([self.edge()] if self.goes else [])])
+            self.continues = []
+            if not self.goes:
+                break
+        breaks, (self.breaks, self.continues) = self.breaks, outer
+        self.block(node.orelse)
+        self.meet([*breaks, *([self.edge()] if self.goes else [])])
+
+    def While(self, node: ast.While) -> None:
+        self.roll(node, None)
+
+    def roll(
+        self, node: ast.For | ast.While, counter: Counter | None, item: Callable | None = None
+    ) -> None:
+        """Compile a loop that ends when the run says so; `item` is what a count stands for.
+
+        Types are found first: literals that it begins with become numbers of these types.
+        """
+        kinds = tuple(sorted((n, v._kind._code) for n, v in self.names.items() if is_value(v)))
+        grown = self.walked.grown.setdefault((node, kinds), {})
+        state = dict(self.names), self.breaks, self.continues, [*self.returns]
+        read = dict(self.flow.lowering.read)
+        while True:
+            try:
+                self.rolled(node, counter, item, grown)
+                return
+            except Grows as literal:
+                if self.flow.builder:
+                    raise
+                grown[literal.place] = literal.kind
+                self.names, self.breaks, self.continues, self.returns = (
+                    dict(state[0]),
+                    state[1],
+                    state[2],
+                    [*state[3]],
+                )
+                self.goes, self.flow.lowering.read = True, dict(read)
+
+    def rolled(
+        self, node: ast.For | ast.While, counter: Counter | None, item: Callable | None, grown: dict
+    ) -> None:
+        outer = self.breaks, self.continues
+        self.breaks, self.continues = [], []
+        if counter:
+            self.names[_COUNT] = counter.start
+        changed = _stored(node) | ({_COUNT} if counter else frozenset())
+        head, self.names = self.flow.loop(self.names, changed, grown)
+        count = self.names.get(_COUNT)
+        condition = counter.goes_on(count) if counter else self.do(node.test)
+        edges = []
+        if is_value(condition):
+            inside, outside = self.flow.part(condition)
+            edges.append(outside._replace(names=self.names))
+            self.names = dict(self.names)
+            self.flow.start(inside)
+        elif not condition:
+            raise Untraceable("a loop that never begins")
+        if counter:
+            self.give(node.target, item(count))
+        self.block(node.body)
+        self.meet([*self.continues, *([self.edge()] if self.goes else [])])
+        if self.goes:
+            if counter:
+                self.names[_COUNT] = counter.after(count)
+            self.flow.close(head, self.names)
+        breaks, (self.breaks, self.continues) = self.breaks, outer
+        if node.orelse and edges:
+            self.meet(edges)
+            self.block(node.orelse)
+            edges = [self.edge()] if self.goes else []
+        self.meet([*edges, *breaks])
+        self.names.pop(_COUNT, None)
+
+
+_COUNT = "for"  # no name of a function

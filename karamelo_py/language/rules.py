@@ -1,0 +1,75 @@
+"""Rules: what a part of a scene knows of itself, told before a run, by `check`, or of a gain.
+
+A part is a basis, a transfer, a scheme, a method, a field, a law or one of its parts, a fix. Its
+rules are declared beside it, those of plug-ins as well::
+
+    known_failure(
+        PIC,
+        "angular momentum",
+        when=lambda pic, scene: scene.turns,
+        reason="PIC takes a per cent or more of the angular momentum of a turning body",
+        cure="APIC, or FLIP, in the place of PIC",
+    )
+
+`when` gets the part and the facts of the scene (:class:`karamelo_py.run.advice.facts.SceneFacts`).
+It returns whether the rule speaks, or the numbers for its words, by name, or a list of these, one
+for each time that it speaks. Between braces words have these numbers and what ``part``, ``scene``
+and ``owner`` have, such as ``{scene.turn:.2g}``; the owner of a law, or of one of its parts, is the
+material. Two names mean more: ``place``, the place in the script that is marked (else that of the
+fix, the material or the method), and ``share``, of noise how much it takes of what a body bears.
+"""
+
+from collections.abc import Callable, Iterator
+from math import inf
+from typing import Any, NamedTuple
+
+When = Callable[[Any, Any], Any]
+
+
+class Advice(NamedTuple):
+    """Words of a rule on a scene: what is wrong, costs or feeds energy, and what to write."""
+
+    name: str
+    reason: str
+    cure: str
+    share: float = inf
+    place: Any = None
+
+
+_rules: dict[tuple[str, type], list[tuple[When, str, str, str]]] = {}
+
+
+def known_failure(
+    part: type, name: str, *, when: When, reason: str, cure: str, cause: str = ""
+) -> None:
+    """Declare what is known to go wrong with a part, by a name by which it is told once.
+
+    With a `cause`, it is noise: told where its share is above 1, and as the cause of a gain.
+    """
+    _rules.setdefault(("failure", part), []).append((when, name, reason, cure))
+    if cause:
+        gain(part, when=when, cause=cause, cure=cure)
+
+
+def suggestion(part: type, *, when: When, cost: str, instead: str) -> None:
+    """Declare what a part costs without need, told by `check`."""
+    _rules.setdefault(("suggestion", part), []).append((when, "", cost, instead))
+
+
+def gain(part: type, *, when: When, cause: str, cure: str) -> None:
+    """Declare how a part feeds energy, told where energy comes from nowhere."""
+    _rules.setdefault(("gain", part), []).append((when, "", cause, cure))
+
+
+def advice(kind: str, part: Any, owner: Any, scene: Any) -> Iterator[Advice]:
+    """Tell what the rules of one kind say of a part (or of a field, which is a class)."""
+    for one in (part if isinstance(part, type) else type(part)).__mro__:
+        for when, *words in _rules.get((kind, one), ()):
+            found = when(part, scene)
+            for case in found if isinstance(found, list) else [found] if found else []:
+                numbers = case if isinstance(case, dict) else {}
+                share = numbers.get("share", inf)
+                if kind != "failure" or share > 1:
+                    names = {"part": part, "owner": owner, "scene": scene, **numbers}
+                    place = numbers.get("place", getattr(owner or part, "place", None))
+                    yield Advice(*(text.format(**names) for text in words), share, place)

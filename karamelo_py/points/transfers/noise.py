@@ -1,0 +1,64 @@
+"""Rules on motion through the grid that feeds what the grid does not see of velocities."""
+
+from typing import Any
+
+from karamelo_py.language.rules import known_failure
+from karamelo_py.points.basis.noise import borne
+
+GROWS = "what the grid does not see of the velocities grows with each cell"
+TURNS = "turns by about {angle:.2g} rad, its rim at {speed:.2g} times the speed of waves"
+WITH = "with {scene.transfer_name} and {scene.basis_name} functions"
+
+
+def drifts(transfer: type) -> None:
+    """Let bodies that drift with `transfer` be judged."""
+    known_failure(
+        transfer,
+        "noise of a drift",
+        when=_drift,
+        reason="a body drifts at {speed:.2g} times the speed of waves through about {cells:.0f} "
+        f"cells, and with {{schemes}} {GROWS}: {{gains}}",
+        cause="a drift through the grid, at {speed:.2g} times the speed of waves: with {schemes} "
+        f"and {{scene.basis_name}} functions {GROWS}",
+        cure="{cure}",
+    )
+
+
+def turns(transfer: type) -> None:
+    """Let bodies that turn with `transfer`, or with one that needs this field, be judged."""
+    known_failure(
+        transfer,
+        "noise of a turn",
+        when=_turn,
+        reason=f"a body {TURNS} through about {{cells:.0f}} cells, and {WITH} it {{ends}} on the "
+        "way",
+        cause=f"a turn: a body {TURNS}, {WITH}",
+        cure="{cure}",
+    )
+
+
+def _drift(transfer: Any, scene: Any) -> dict[str, Any] | None:
+    if scene.drift is None:
+        return None
+    averages = getattr(scene.scheme, "bears_drift", False)
+    gains = "if it vibrates, that gains a tenth to several times its energy"
+    cure = "scheme(usavg), with which it grows ten times less, or not"
+    if borne(scene.basis).damps and scene.d == 3:
+        gains = "it damps what vibrates (to 0.85 of its energy where that was tried)"
+        cure = "method tlmpm"
+    elif averages:
+        cure = "quadratic-spline in the place of the basis"
+    schemes = "usavg" if averages else "musl and usf"
+    return {**scene.drift._asdict(), "schemes": schemes, "gains": gains, "cure": cure}
+
+
+def _turn(transfer: Any, scene: Any) -> dict[str, Any] | None:
+    turn, cure = scene.rotation, "or method tlmpm"
+    if turn is None:
+        return None
+    if scene.sparse:
+        cure = f"{scene.corners} points a cell, {cure}"
+    elif turn.noisy:
+        cure = f"quadratic-spline in the place of the basis, {cure}"
+    ends = "loses points at its rim" if turn.torn else "gains a tenth of its energy or more"
+    return {**turn._asdict(), "ends": ends, "cure": cure}

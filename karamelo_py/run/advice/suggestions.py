@@ -1,0 +1,291 @@
+"""Suggestions: what a scene pays for and could leave out, with the words to write instead."""
+
+import re
+from collections.abc import Callable, Iterator
+from math import inf
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.language.rules import Advice
+from karamelo_py.run.advice.facts import SceneFacts
+from karamelo_py.run.timestep import own_step
+from karamelo_py.scene.group import NodeGroup
+from karamelo_py.scene.hub import Hub
+
+AXES = "xyz"
+SMALL_STEP = 0.4  # of the stable one; scripts with moderate reserve are left alone
+NEARLY_INCOMPRESSIBLE = 0.4  # Poisson's ratio from where on linear functions lock
+MANY_POINTS = 4  # a cell and direction
+
+
+def suggestions(hub: Hub, simulation: Any) -> list[Advice]:
+    """Find all that is known to be paid for without need, before anything has run."""
+    rules = (_step, _unread, _unused, _of_parts, _averaging, _flat, _round, _points)
+    return [suggestion for rule in rules for suggestion in rule(hub, simulation)]
+
+
+def _of_parts(hub: Hub, simulation: Any) -> Iterator[Advice]:
+    """Ask the rules of the parts."""
+    return SceneFacts(hub, simulation, inf).advice("suggestion")
+
+
+def _suggestion(cost: str, instead: str) -> Advice:
+    return Advice("", cost, instead)
+
+
+# --- the step ------------------------------------------------------------------------------------
+
+
+def _step(hub: Hub, simulation: Any) -> Iterator[Advice]:
+    share, limit = hub.update.dt_factor, simulation.limit
+    if hub.update.fixed_dt is not None:
+        dt = simulation.dt
+    elif share is not None:
+        dt = share * limit  # not what the end of a short run makes of it
+    else:
+        return  # the program's own
+    best = own_step(hub, simulation)
+    if not 0 < dt < SMALL_STEP * best < np.inf:
+        return
+    times = f"{best / dt:.3g} times as many steps as the program's own step asks for"
+    if hub.update.fixed_dt is not None:
+        yield _suggestion(f"set_dt({dt:g}): {times}", f"leave set_dt out, or set_dt({best:.3g})")
+    else:
+        yield _suggestion(
+            f"dt_factor({hub.update.dt_factor:g}): {times}", f"dt_factor({best / limit:.3g})"
+        )
+
+
+# --- what nobody reads ---------------------------------------------------------------------------
+
+
+def _unread(hub: Hub, simulation: Any) -> Iterator[Advice]:
+    text = _script(hub)
+    for kind, catalogue in (("compute", hub.computes), ("fix", hub.fixes)):
+        for ID, item in catalogue.items():
+            measures = kind == "compute" or not (item.hooks() or item.for_method)
+            if not measures or "(" in ID or not item.published:
+                continue
+            defined = rf"\b{kind}\s*\(\s*{re.escape(ID)}\s*,"
+            uses = len(re.findall(rf"\b{re.escape(ID)}(?:_\w+)?\b", text))
+            if 0 < uses <= len(re.findall(defined, text)):
+                yield _suggestion(
+                    f"{kind} {ID} ({item.style}) is measured at each output and shown nowhere",
+                    f"leave it out, or name {_published(ID, item)} in log_modify",
+                )
+
+
+def _unused(hub: Hub, simulation: Any) -> Iterator[Advice]:
+    """Groups whose names stand nowhere but where they are made."""
+    text = _script(hub)
+    if re.search(r"\binclude\s*\(", text):
+        return  # who knows what stands there
+    for ID in hub.groups:
+        made = len(re.findall(rf"\bgroup\s*\(\s*{re.escape(ID)}\s*,", text))
+        if 0 < len(re.findall(rf"(?<!\w){re.escape(ID)}(?!\w)", text)) <= made:
+            yield _suggestion(f"group {ID} is used by nothing", "leave it out, or name it in a fix")
+
+
+def _published(ID: str, item: Any) -> str:
+    suffix = item.published[0]
+    return f"{ID}_{suffix}" if suffix else ID
+
+
+def _script(hub: Hub) -> str:
+    """The text of all files of the script, without comments."""
+    files = dict.fromkeys(getattr(hub.interpreter, "files", []))
+    lines = [line for path in files for line in path.read_text("utf-8").splitlines()]
+    return "\n".join(line.partition("#")[0] for line in lines)
+
+
+def _averaging(hub: Hub, simulation: Any) -> Iterator[Advice]:
+    if not hub.update.anti_locking:
+        return
+    for solid in hub.solids.values():
+        law = solid.material.law
+        moduli = (getattr(law, "lam", None), getattr(law, "G", None))
+        if None in moduli or moduli[0] / (2 * sum(moduli)) >= NEARLY_INCOMPRESSIBLE:
+            return
+    yield _suggestion(
+        "anti_volumetric_locking(true): a visit of the points more, and nothing is nearly "
+        "incompressible or flows",
+        "leave it out",
+    )
+
+
+# --- dimensions ----------------------------------------------------------------------------------
+
+
+def _acting(hub: Hub) -> list[Any]:
+    """The fixes that do something in a run."""
+    return [fix for fix in hub.fixes.values() if fix.hooks() or fix.for_method]
+
+
+def _given(fix: Any) -> tuple:
+    """Its formulas by direction; of fixes without, that they may do anything."""
+    return tuple(fix.formulas) or (np.nan,) * 3
+
+
+def _is_zero(formula: Any) -> bool:
+    return formula is None or (getattr(formula, "is_constant", False) and formula.constant == 0)
+
+
+def _depends(formula: Any, axes: str) -> bool:
+    if formula is None:
+        return False
+    if not hasattr(formula, "names"):
+        return True
+    return any(name in formula.names for axis in axes for name in (axis, axis + "0"))
+
+
+def _alike(hub: Hub, fix: Any, key: Callable[[np.ndarray], np.ndarray]) -> bool:
+    """Tell whether all points (or nodes) of a grid with one key are in the group, or none.
+
+    `key` makes one or two numbers of each of positions (n, 3).
+    """
+    group = fix.group
+    if group is None or group.all:
+        return group is not None
+    if isinstance(group, NodeGroup):
+        whole = [(lattice.first, lattice.positions()) for lattice in hub.lattices]
+        members = fix.nodes
+    else:
+        whole = [(solid.first_id, solid.x0) for solid in hub.solids.values() if solid.count]
+        members = group.members
+    for first, x in whole:
+        places = np.rint(key(x) * (1e6 / hub.domain.h)).astype(np.int64)
+        rows = places @ (1 << 32 * np.arange(places.shape[1]))  # sorted faster as one number
+        _, which = np.unique(rows, return_inverse=True)
+        found = np.bincount(which, np.isin(first + np.arange(len(x)), members))
+        if ((found > 0) & (found < np.bincount(which))).any():
+            return False
+    return True
+
+
+def _flat(hub: Hub, simulation: Any) -> Iterator[Advice]:
+    """Solids that are the same all along a direction in which nothing moves."""
+    domain = hub.domain
+    d = domain.dimension
+    if d == 1 or domain.axisymmetric or len(hub.lattices) > 1:
+        return
+    for k in range(d):
+        rest = [axis for axis in range(d) if axis != k]
+        layers = _layers(hub, k, rest) if _moves_nothing(hub, k, rest) else 0
+        if layers and _acts_alike(hub, rest):
+            given = [f"{domain.lo[axis]:g}, {domain.hi[axis]:g}" for axis in rest]
+            kept = " and ".join(AXES[axis] for axis in rest)
+            named = "" if k == d - 1 else f", with {kept} called {' and '.join(AXES[: d - 1])}"
+            yield _suggestion(
+                f"all solids are the same along {AXES[k]}, in which nothing moves: {layers} times "
+                f"the points of {'plane strain' if d == 3 else 'a line'}",
+                f"dimension({d - 1}, {', '.join(given)}, {domain.h:g}){named}",
+            )
+            return
+
+
+def _moves_nothing(hub: Hub, k: int, rest: list[int]) -> bool:
+    """Tell whether fixes say nothing that is not 0 along direction k, nor depends on it."""
+    for fix in _acting(hub):
+        given = _given(fix)
+        if len(given) <= len(rest) or not _is_zero(given[k]):
+            return False
+        if any(_depends(act, AXES[k]) for act in (*(given[j] for j in rest), fix.wall_friction)):
+            return False
+    return True
+
+
+def _acts_alike(hub: Hub, rest: list[int]) -> bool:
+    """Tell whether fixes act on all that lies at one place in the directions `rest`, or none."""
+    for fix in _acting(hub):
+        smooth_wall = fix.wall_friction is None and all(_given(fix)[j] is None for j in rest)
+        if not smooth_wall and not _alike(hub, fix, lambda x: x[:, rest]):
+            return False
+    return True
+
+
+def _layers(hub: Hub, k: int, rest: list[int]) -> int:
+    """In how many equal layers across direction k the points lie, between faces that are held.
+
+    0 where layers differ, where solids do not begin and end together, or a face is free.
+    """
+    most, ends = 0, set()
+    for solid in hub.solids.values():
+        if not solid.count:
+            continue
+        places = np.rint(solid.x0 * (1e6 / solid.h)).astype(np.int64)
+        across, counts = np.unique(places[:, k], return_counts=True)
+        columns = np.unique(places[:, rest], axis=0)
+        if len(set(counts)) > 1 or len(columns) * len(across) != len(places):
+            return 0
+        most = max(most, len(across))
+        first, last = solid.x0[:, k].min(), solid.x0[:, k].max()
+        apart = len(across) - 1
+        half = (last - first) / apart / 2 if apart else solid.h / getattr(solid, "ppc", 1) / 2
+        ends.add((round((first - half) / solid.h, 6), round((last + half) / solid.h, 6)))
+    return most if len(ends) == 1 and _faces_held(hub, k, *ends.pop()) else 0
+
+
+def _faces_held(hub: Hub, k: int, low: float, high: float) -> bool:
+    """Tell whether no node of the planes at `low` and `high` (in cells) moves along k."""
+    lattice = hub.lattices[0]
+    held = np.zeros(lattice.shape, np.bool_)
+    for fix in hub.fixes.values():
+        if fix.prescribes_velocity and len(fix.formulas) > k and fix.formulas[k] is not None:
+            held.ravel()[fix.nodes - lattice.first] = _is_zero(fix.formulas[k])
+    if held.all():
+        return True
+    planes = [(end * lattice.h - lattice.lo[k]) / lattice.spacing for end in (low, high)]
+    if any(abs(plane - round(plane)) > 1e-4 for plane in planes):
+        return False
+    numbers = [round(plane) for plane in planes]
+    inside = all(0 <= number < lattice.shape[k] for number in numbers)
+    return inside and bool(held.take(numbers, axis=k).all())
+
+
+def _round(hub: Hub, simulation: Any) -> Iterator[Advice]:
+    """Cylinders about one axis, along which all acts."""
+    if hub.domain.dimension != 3:
+        return
+    regions = [getattr(solid, "region", None) for solid in hub.solids.values()]
+    axes = {getattr(region, "axis", None) for region in regions}
+    if len(axes) > 1 or None in axes:
+        return
+    along, middle = axes.pop()
+    across = [axis for axis in range(3) if axis != along]
+    centre = np.zeros(3)
+    centre[across] = middle
+
+    def turned(x: np.ndarray) -> np.ndarray:
+        r = np.linalg.norm((x - centre)[:, across], axis=1)
+        return np.stack([r, x[:, along]], axis=1)
+
+    for fix in _acting(hub):
+        act = _given(fix)
+        if len(act) < 3 or not all(_is_zero(act[axis]) for axis in across):
+            return
+        if _depends(act[along], "".join(AXES[axis] for axis in across)):
+            return
+        if not _alike(hub, fix, turned):
+            return
+    radius = max(region.radius for region in regions)
+    lo, hi = hub.domain.lo[along], hub.domain.hi[along]
+    h = hub.domain.h
+    yield _suggestion(
+        "cylinders about one axis, and nothing acts around it: about "
+        f"{np.pi * radius / h:.3g} times the points of the plane of radius and axis",
+        f"dimension(2, 0, {max(hub.domain.hi[axis] for axis in across):g}, {lo:g}, {hi:g}, {h:g}) "
+        "and axisymmetric(true), y along the axis, and the nodes at x = 0 held in x",
+    )
+
+
+def _points(hub: Hub, simulation: Any) -> Iterator[Advice]:
+    for solid in hub.solids.values():
+        ppc = getattr(solid, "ppc", 0)
+        if ppc >= MANY_POINTS:
+            each = ppc**hub.domain.dimension
+            yield _suggestion(
+                f"solid {solid.id} has {each} points a cell; more than two a direction gain little "
+                "once points have moved",
+                f"2 or 3 points a direction, and finer cells for what {each} cost",
+            )

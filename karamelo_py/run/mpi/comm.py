@@ -1,0 +1,245 @@
+"""The processes of MPI that share a scene, through mpi4py."""
+
+import os
+import signal
+import socket
+import threading
+import time
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from math import inf
+from typing import Any
+from zlib import crc32
+
+import numpy as np
+
+from karamelo_py.scene.comm import SerialComm
+from karamelo_py.scene.hub import Hub
+from karamelo_py.script.errors import Quit, ScriptError
+
+INSTALL = "pip install 'karamelo-py[mpi]'"
+# What the launchers of MPI tell each process: how many there are, and which it is.
+LAUNCHED = (
+    ("OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_RANK"),
+    ("PMI_SIZE", "PMI_RANK"),
+    ("MV2_COMM_WORLD_SIZE", "MV2_COMM_WORLD_RANK"),
+    ("SLURM_STEP_NUM_TASKS", "SLURM_PROCID"),
+)
+# Ctrl-C; batch systems, kill; a terminal that is closed (which Windows does not tell).
+NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
+ENDING = [getattr(signal, name) for name in NAMES if hasattr(signal, name)]
+# Words of processes beside those of runs, which are above zero.
+WELL, HERE, FAILED = 0, -1, -2
+PAUSE = 0.005  # seconds between two looks whether the others have come
+
+
+@contextmanager
+def handled_signals(handler: Callable[[int, Any], None]) -> Iterator[None]:
+    """Have signals that end programs call a handler, but for those that are ignored."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {number: signal.getsignal(number) for number in ENDING}
+    # Whoever started the program may have it go on when the terminal is closed (nohup).
+    heeded = [number for number, now in before.items() if now != signal.SIG_IGN]
+    for number in heeded:
+        signal.signal(number, handler)
+    try:
+        yield
+    finally:
+        for number in heeded:
+            signal.signal(number, before[number])
+
+
+def launched() -> tuple[int, int]:
+    """Read how many processes a launcher of MPI has started, and which of them this is."""
+    for size, rank in LAUNCHED:
+        if os.environ.get(size, "").isdigit():
+            return int(os.environ[size]), int(os.environ.get(rank, 0))
+    return 1, 0
+
+
+class MpiComm(SerialComm):
+    """All processes of a run, in the order of their ranks. The first writes.
+
+    Parameters
+    ----------
+    ends
+        Ends all of them because of an error, of which it tells.
+
+    Attributes
+    ----------
+    parted
+        Whether the processes do not go on together: one has failed, or has another script.
+
+    Raises
+    ------
+    ScriptError
+        If mpi4py is not there, or finds no MPI.
+    """
+
+    parted = False
+    _ends: Callable[[BaseException], None] | None = None
+
+    def __init__(self, ends: Callable[[BaseException], None] | None = None):
+        self._ends = ends
+        try:
+            from mpi4py import MPI
+            from mpi4py.util import pkl5
+        except (ImportError, RuntimeError) as error:
+            raise ScriptError(
+                f"several processes of one scene need mpi4py, which does not load: {error}",
+                hint=INSTALL,
+            ) from None
+        self.mpi = MPI
+        # Its messages may be longer than 2 GB.
+        self.world = world = pkl5.Intracomm(MPI.COMM_WORLD)
+        self.rank, self.size = world.Get_rank(), world.Get_size()
+        self._aside = world.Dup()  # where they agree, whatever is under way elsewhere
+        self._between = world.Dup()  # for what is passed on in steps
+        cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
+        mine = socket.gethostname(), cores
+        self.beside = self.allgather(mine).count(mine)
+        near = MPI.COMM_WORLD.Split_type(MPI.COMM_TYPE_SHARED)
+        self.on_machine = near.Get_size()
+        near.Free()
+
+    def barrier(self) -> None:
+        """Wait for all processes.
+
+        Raises
+        ------
+        Quit
+            If one of them has failed, which tells of it.
+        """
+        if (self.agree(HERE) == FAILED).any():
+            self.parted = True
+            raise Quit
+
+    def agree(self, word: int, patience: float = inf) -> np.ndarray | None:
+        """Gather a word of each process (size,), or None if one has not come in time."""
+        own, found = np.array([word], np.int64), np.empty(self.size, np.int64)
+        request = self._aside.Iallgather(own, found)
+        end = time.monotonic() + patience
+        while not request.Test():
+            if time.monotonic() > end:
+                return None
+            time.sleep(PAUSE)
+        return found
+
+    def bcast(self, thing: Any = None) -> Any:
+        """Hand what the first process has to all."""
+        return self.world.bcast(thing)
+
+    def gather(self, thing: Any) -> list | None:
+        """Gather what each process has at the first; None at the others."""
+        return self.world.gather(thing)
+
+    def allgather(self, thing: Any) -> list:
+        """Gather what each process has at all of them."""
+        return self.world.allgather(thing)
+
+    def gather_rows(self, own: np.ndarray, out: np.ndarray | None, counts: Sequence[int]) -> None:
+        """Put the numbers of all processes, one after another, into `out` of the first."""
+        self.world.Gatherv(own, (out, counts) if self.leads else None)
+
+    def scatter(self, things: Sequence | None) -> Any:
+        """Hand out what the first process has for each."""
+        return self.world.scatter(things)
+
+    def exchange(self, things: dict[int, Any]) -> dict[int, Any]:
+        """Swap things with some other processes, by rank; both sides name each other."""
+        sent = [self.world.isend(thing, rank) for rank, thing in things.items()]
+        found = {rank: self.world.recv(source=rank) for rank in things}
+        for one in sent:
+            one.wait()
+        return found
+
+    def alltoall(self, numbers: np.ndarray) -> np.ndarray:
+        """Swap a number (size,) with each process."""
+        out = np.empty_like(numbers)
+        self.world.Alltoall(numbers, out)
+        return out
+
+    def allreduce(self, array: np.ndarray) -> np.ndarray:
+        """Add up whole numbers over all processes: for such, order does not matter."""
+        out, begun = np.empty_like(array), time.perf_counter()
+        self.world.Allreduce(array, out)
+        self.waited += time.perf_counter() - begun
+        return out
+
+    def allreduce_max(self, array: np.ndarray) -> np.ndarray:
+        """Take the largest of each number over all processes, in place."""
+        begun = time.perf_counter()
+        self.world.Allreduce(self.mpi.IN_PLACE, array, self.mpi.MAX)
+        self.waited += time.perf_counter() - begun
+        return array
+
+    def in_turn(self, act: Callable[[], None]) -> None:
+        """Let the first process act, and then all others: they find what it has made."""
+        if self.leads:
+            act()
+        self.barrier()
+        if not self.leads:
+            act()
+
+    def connect(self, given: list[tuple[int, Any]], taken: list[tuple[int, Any]]) -> Any:
+        """Make requests by which arrays go to others (rank, array), again and again, and come."""
+        requests = [self._between.Recv_init(array, rank) for rank, array in taken]
+        return requests + [self._between.Send_init(array, rank) for rank, array in given]
+
+    def start(self, link: Any) -> None:
+        """Begin to send what is in the arrays, and to fill others."""
+        self.mpi.Prequest.Startall(link)
+
+    def finish(self, link: Any) -> None:
+        """Wait until all is sent and there."""
+        begun = time.perf_counter()
+        self.mpi.Request.Waitall(link)
+        self.waited += time.perf_counter() - begun
+
+    def disconnect(self, link: Any) -> None:
+        """Free requests."""
+        for request in link:
+            request.Free()
+
+    def fail(self, error: BaseException) -> None:
+        """End all processes because of an error that cannot be raised here."""
+        if self._ends is not None:
+            self._ends(error)
+            return
+        traceback.print_exception(error)
+        self.abort()
+
+    def abort(self, status: int = 1) -> None:
+        """End all processes at once."""
+        self.world.Abort(status)
+
+
+def check_same_run(hub: Hub) -> None:
+    """See that all processes are about to do the same run.
+
+    Raises
+    ------
+    Quit
+        If another process tells what is wrong.
+    ScriptError
+        If the scripts are not the same.
+    """
+    comm = hub.settings.comm
+    if comm.size == 1:
+        return
+    present = [hub.place and (hub.place.file, hub.place.line), len(hub.runs)]
+    words = comm.agree(1 + crc32(repr((present, hub.interpreter.presets)).encode()))
+    if (words == words[0]).all():
+        return
+    comm.parted = True
+    # One that has failed tells of it.
+    if (words == FAILED).any() or comm.rank != int((words > 0).argmax()):
+        raise Quit
+    raise ScriptError(
+        "the processes do not come to the same run",
+        place=hub.place,
+        expected="the same script, files and variables for all of them",
+    )

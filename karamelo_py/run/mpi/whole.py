@@ -1,0 +1,184 @@
+"""The whole of a scene that processes share, at the first, for what acts on all points at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.kernels.arrays import Setup, arrays_of
+from karamelo_py.kernels.totals import WORK
+from karamelo_py.run.checkpoint.arrays import of_nodes
+from karamelo_py.run.lower.build import lower
+from karamelo_py.run.mpi.pack import by_tile, join_tilings, share_of, tilings_in_use
+from karamelo_py.run.mpi.partition import sized, work_of
+from karamelo_py.run.tiles.boxes import numbers
+from karamelo_py.run.tiles.tiles import SHARES
+from karamelo_py.scene.comm import SerialComm
+from karamelo_py.script.errors import Quit
+
+
+class PointsMoved(Exception):
+    """A fix in Python has moved points at the start of a step: other processes have them now."""
+
+
+class Whole:
+    """Arrays of a whole scene, gathered from the processes, and handed out again."""
+
+    def __init__(self, simulation: Any):
+        self.simulation = simulation
+        # With arrays of nodes, and next to no points.
+        s, self.tiles = lower(simulation.hub, ids=(0, 1), comm=SerialComm())
+        control = simulation.control._replace(ranks=s.control.ranks)
+        self.setup = s._replace(control=control, contact=simulation.setup.contact)
+        self.tiles.threads, self.tiles.mode = simulation.threads, simulation.mode
+
+    def act(self, function: Callable[[Setup], None]) -> None:
+        """Let the first process call a function of the whole; all take over what it has done.
+
+        Raises
+        ------
+        PointsMoved
+            If points were moved and sorted anew, so that the step has to be begun anew.
+        Quit
+            On the other processes if the function fails: the first tells of it.
+        """
+        simulation, comm = self.simulation, self.simulation.comm
+        self.gather()
+        news = None
+        if comm.leads:
+            sorts = self.tiles.sorts
+            try:
+                with self._in_place():
+                    function(self.setup)
+            except BaseException:
+                comm.bcast()
+                raise
+            moved = self.tiles.sorts > sorts
+            control = simulation.control
+            news = moved, control.values, control.clock.view(np.ndarray), self._nodes(moved)
+        news = comm.bcast(news)
+        if news is None:
+            raise Quit
+        moved, values, clock, rows = news
+        simulation.control.values[:] = values
+        simulation.control.clock.view(np.ndarray)[:] = clock
+        if moved:
+            self._hand_out_tiles(*rows)
+            raise PointsMoved
+        self._hand_back(*rows)
+
+    @contextmanager
+    def _in_place(self) -> Iterator[None]:
+        """Let the simulation be that of the whole, of one process."""
+        simulation = self.simulation
+        own = simulation.setup, simulation.tiles, simulation.comm, simulation.subdomain
+        simulation.setup, simulation.tiles = self.setup, self.tiles
+        simulation.comm, simulation.subdomain = SerialComm(), None
+        try:
+            yield
+        finally:
+            self.setup = simulation.setup
+            simulation.setup, simulation.tiles, simulation.comm, simulation.subdomain = own
+
+    # --- gathering --------------------------------------------------------------------------------
+
+    def gather(self) -> None:
+        """Gather the points of all at the first process, tile after tile, and the nodes.
+
+        Points come component by component, so that nothing of that size is there twice.
+        """
+        simulation, comm = self.simulation, self.simulation.comm
+        totals = simulation.control.totals
+        parts = comm.gather(self._own() | {"work": totals[WORK].copy()})
+        totals[WORK] = 0
+        blocks = []
+        own = zip(self.setup.blocks, simulation.setup.blocks, strict=True)
+        for k, (block, mine) in enumerate(own):
+            counts = [part["counts"][k] for part in parts or ()]
+            order = by_tile([part["tiling"][k] for part in parts]) if comm.leads else None
+            points = sized(block.points, sum(counts)) if comm.leads else block.points
+            rows = [array for _, array in arrays_of(points)]
+            for row, (_, array) in zip(rows, arrays_of(mine.points), strict=True):
+                for c in np.ndindex(array.shape[:-1]):
+                    comm.gather_rows(array[c], row[c] if comm.leads else None, counts)
+                    if comm.leads:
+                        row[c] = row[c][order]
+            blocks.append(block._replace(points=points))
+        self.setup = self.setup._replace(blocks=tuple(blocks))
+        if comm.leads:
+            totals[WORK] = sum(part["work"] for part in parts)
+            self._join(parts)
+
+    def _own(self) -> dict:
+        """Find tiles and nodes that no other process shows, and how many points there are."""
+        simulation, subdomain = self.simulation, self.simulation.subdomain
+        s, own = simulation.setup, subdomain.counted()
+        return {
+            "counts": [block.points.mass.size for block in s.blocks],
+            "tiling": [
+                tiling | {"report": block.tiling.report[: block.tiling.count[0]]}
+                for tiling, block in zip(tilings_in_use(s), s.blocks, strict=True)
+            ],
+            "nodes": own,
+            "at nodes": [array[own] for _, array in of_nodes(s)],
+            "memory": [array[own] for array in subdomain.contact_memory()],
+        }
+
+    def _join(self, parts: list[dict[str, Any]]) -> None:
+        """Join the tiles and nodes of all processes, and what contact remembers of nodes."""
+        whole, tiles = self.setup, self.tiles
+        for k, block in enumerate(whole.blocks):
+            block.tiling.count[1] = 1 if tiles.direct else SHARES
+            join_tilings(block.tiling, [part["tiling"][k] for part in parts])
+        tiles.empty_nodes(whole)
+        tiles.lay_out(whole)
+        nodes = numbers(whole.spans)
+        for _, array in of_nodes(whole):
+            array[nodes] = 0  # also those that no box reaches: nobody has them
+        memory = self.simulation.subdomain.contact_memory()
+        for part in parts:
+            for (_, array), rows in zip(of_nodes(whole), part["at nodes"], strict=True):
+                array[part["nodes"]] = rows
+            for array, rows in zip(memory, part["memory"], strict=True):
+                array[part["nodes"]] = rows
+
+    # --- handing out ------------------------------------------------------------------------------
+
+    def _nodes(self, moved: bool) -> tuple:
+        """Find what all are to know: who has which tile, where points were moved, and of nodes."""
+        subdomain, tiles = self.simulation.subdomain, self.simulation.tiles
+        nodes = numbers(self.setup.spans)
+        if not moved:
+            return nodes, [array[nodes] for _, array in of_nodes(self.setup)]
+        tiles.share_out(work_of(tiles.loads(self.setup.blocks), subdomain.load.costs))
+        return tiles.owner, nodes, [one[nodes] for one in subdomain.contact_memory()]
+
+    def _shares(self) -> list[dict[str, np.ndarray]] | None:
+        """Pack what each process has of the whole."""
+        comm, owner = self.simulation.comm, self.simulation.tiles.owner
+        if not comm.leads:
+            return None
+        return [share_of(self.setup, owner == rank) for rank in range(comm.size)]
+
+    def _hand_out_tiles(self, owner: np.ndarray, nodes: np.ndarray, memory: list) -> None:
+        """Hand out the tiles of the whole, cut anew."""
+        simulation, subdomain = self.simulation, self.simulation.subdomain
+        simulation.tiles.owner = owner
+        found = simulation.comm.scatter(self._shares())
+        simulation.tiles.empty_nodes(simulation.setup)
+        for one, rows in zip(subdomain.contact_memory(), memory, strict=True):
+            one[nodes] = rows
+        subdomain.put(found)
+
+    def _hand_back(self, nodes: np.ndarray, rows: list) -> None:
+        """Put what the first has changed into the arrays that a step is at work on."""
+        s, found = self.simulation.setup, self.simulation.comm.scatter(self._shares())
+        here = np.isin(nodes, numbers(s.spans))
+        for (_, array), own in zip(of_nodes(s), rows, strict=True):
+            array[nodes[here]] = own[here]
+        for k, block in enumerate(s.blocks):
+            for name, array in arrays_of(block.points):
+                array[...] = found[f"points/{k}/{name}"]

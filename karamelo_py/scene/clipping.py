@@ -1,0 +1,231 @@
+"""Clipping of the boxes of points at the edge of a region: volumes and middles.
+
+A region says how far its surface is at least (`Region.depth`), so that a box is looked at only
+where the surface may pass through it. There the surface is a plane, found from that distance at the
+corners and the middle; where it is not plane, the box is taken in halves, up to `HALVED` times.
+"""
+
+import itertools
+import math
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from karamelo_py.scene.region import Region
+
+HALVED = 5  # times, at most, along each direction
+PLANE = 0.01  # of a box: how far from a plane a surface may be
+EDGE = 0.05  # the same of a part of it, which has a sharp edge else
+SHEET = 0.01  # the same where it may be that of a thin sheet
+LEAST = 0.1  # of a box: less is given to a point beside it
+NOTHING = 1e-9  # of a box: rounding
+# Of a box, in the smallest parts that are not plane: a corner in the plane, an edge in space have a
+# third of that; a sheet that is thinner than these parts more, or it is most of its body.
+ROUGH = 0.025
+MOSTLY = 0.1
+SLOPE = 1e-3  # over the largest: one that is less is none (sums would lose their digits)
+
+
+class Pieces(NamedTuple):
+    """Clipped boxes: the parts in a region of boxes through which its surface passes.
+
+    Attributes
+    ----------
+    number : ndarray (n,)
+        Numbers of the boxes, in order.
+    middle : ndarray (n, d)
+        Middles of what is left of them.
+    share : ndarray (n,)
+        How much that is, of a whole box.
+    rough : ndarray (m,)
+        Where the surface is not plane in parts too small to be halved again: how much they are, of
+        each box that has some.
+    """
+
+    number: np.ndarray
+    middle: np.ndarray
+    share: np.ndarray
+    rough: np.ndarray
+
+    @classmethod
+    def all_of(cls, pieces: list["Pieces"]) -> "Pieces":
+        """Several as one."""
+        return cls(*map(np.concatenate, zip(*pieces, strict=True)))
+
+    def missed(self, size: float) -> float:
+        """Return the least thickness whose mass is known; 0 where nothing is as thin."""
+        mostly = self.rough.sum() > MOSTLY * self.share.sum()
+        return size / 2**HALVED if mostly or self.rough.max(initial=0) > ROUGH else 0.0
+
+
+class CellBoxes(Protocol):
+    """Boxes in rows, numbered."""
+
+    def beside(self, number: np.ndarray, step: np.ndarray) -> np.ndarray:
+        """Numbers (n,) of those so many boxes (n, d) further along each axis; -1 for none."""
+
+    def middles(self, number: np.ndarray) -> np.ndarray:
+        """Their middles, (n, d)."""
+
+
+def clip(region: Region, x: np.ndarray, size: float, first: int) -> tuple[np.ndarray, Pieces]:
+    """Of which boxes of edge length `size` around `x` (n, d) something is left; what, at the edge.
+
+    They are numbered from `first`. What is left lies in `region` and in the domain. Boxes end at
+    the box around the region, so that what lies along the axes is exact.
+    """
+    d = x.shape[1]
+    half = size / 2
+    reach = (1 + NOTHING) * math.sqrt(d) * half
+    inner, outer = half - NOTHING * size, half + NOTHING * size
+    lo, hi = region.lo[:d], region.hi[:d]
+    depth = region.depth(x, (1 + NOTHING) * reach)
+    kept = depth > -reach
+    passed = depth < reach
+    passed &= kept
+    for k in range(d):
+        if (x[:, k].min() < lo[k] + inner) or (x[:, k].max() > hi[k] - inner):
+            kept &= (x[:, k] > lo[k] - outer) & (x[:, k] < hi[k] + outer)
+            passed |= (x[:, k] < lo[k] + inner) | (x[:, k] > hi[k] - inner)
+            passed &= kept
+    edge = np.flatnonzero(passed)
+    at = x[edge]
+    corner = np.maximum(at - half, lo)
+    share, moment, rough = _measure(region, corner, np.minimum(at + half, hi) - corner, size)
+    middle = moment / np.maximum(share, NOTHING)[:, None]
+    kept[edge] = share > NOTHING
+    left = kept[edge] & (share <= 1 - NOTHING)
+    return kept, Pieces(first + edge[left], middle[left], share[left], rough)
+
+
+def join(region: Region, boxes: CellBoxes, pieces: Pieces) -> Pieces:
+    """Give what is little to the nearest piece that is not, if one is in a box beside it.
+
+    What has been given away has the share 0; whole boxes that took something are added.
+    """
+    small = np.flatnonzero(pieces.share < LEAST)
+    middle = pieces.middle[small]
+    d = middle.shape[1]
+    nearest, taker = np.full(len(small), np.inf), np.full(len(small), -1)
+    # It leans to the side of its box beyond which there is more.
+    lean = np.where(middle > boxes.middles(pieces.number[small]), 1, -1)
+    for step in np.array(list(itertools.product((0, 1), repeat=d))):
+        number = boxes.beside(pieces.number[small], step * lean)
+        row = np.minimum(np.searchsorted(pieces.number, number), len(pieces.number) - 1)
+        known = pieces.number[row] == number
+        large = known & (pieces.share[row] >= LEAST)
+        at = pieces.middle[row]
+        other = np.flatnonzero(~known & (number >= 0))
+        at[other] = boxes.middles(number[other])
+        large[other] = region.depth(at[other], 1.0) > 0
+        for k in range(d):
+            large &= (at[:, k] > region.lo[k]) & (at[:, k] < region.hi[k])
+        at -= middle
+        distance = np.sqrt(np.einsum("ni,ni->n", at, at))
+        nearer = large & (distance < nearest * (1 - NOTHING))
+        nearest[nearer], taker[nearer] = distance[nearer], number[nearer]
+    given = taker >= 0
+    small, taker = small[given], taker[given]
+    new = np.setdiff1d(taker, pieces.number)
+    order = np.argsort(np.concatenate([pieces.number, new]), kind="stable")
+    number = np.concatenate([pieces.number, new])[order]
+    share = np.concatenate([pieces.share, np.ones(len(new))])[order]
+    middle = np.concatenate([pieces.middle, boxes.middles(new)])[order]
+    giver = np.searchsorted(number, pieces.number[small])
+    taker = np.searchsorted(number, taker)
+    moment = middle * share[:, None]
+    np.add.at(moment, taker, moment[giver])
+    np.add.at(share, taker, share[giver])
+    share[giver] = 0
+    middle[taker] = moment[taker] / share[taker][:, None]
+    return Pieces(number, middle, share, pieces.rough)
+
+
+def _measure(
+    region: Region, lo: np.ndarray, edges: np.ndarray, size: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Measure boxes clipped by a surface: share (n,) of a box, its moment (n, d).
+
+    In shares of a whole box. Third, how much is rough, see `Pieces`.
+    """
+    n, d = lo.shape
+    sums: np.ndarray = np.zeros((1 + d, n))
+    rough: np.ndarray = np.empty(0)
+    box = np.flatnonzero((edges > NOTHING * size).all(axis=1))
+    # One direction after another, as regions look at them: rows are contiguous.
+    lo, edges = lo[box].T, edges[box].T
+    corners = np.array(list(itertools.product((0.0, 1.0), repeat=d)))
+    places = np.concatenate([corners, np.full((1, d), 0.5)])
+    for halved in range(HALVED + 1):
+        if not len(box):
+            break
+        reach = np.sqrt((edges**2).sum(axis=0)) / 2
+        x = lo[:, None, :] + edges[:, None, :] * places.T[:, :, None]
+        depth = region.depth(x.reshape(d, -1).T, 2 * reach.max()).reshape(len(places), -1)
+        at_corners, inmost = depth[:-1], depth[-1]
+        mean = at_corners.mean(axis=0)
+        slopes = (corners - 0.5).T @ at_corners / 2 ** (d - 2)
+        off = np.abs(at_corners - mean - (corners - 0.5) @ slopes).max(axis=0)
+        off = np.maximum(off, np.abs(mean - inmost))
+        whole = at_corners.min(axis=0) >= -NOTHING * size
+        whole &= inmost >= (0.5 - NOTHING) * edges.min(axis=0)
+        passed = (np.abs(inmost) < reach) & ~whole
+        slopes[:, ~passed] = 0
+        # Where nothing is seen of it, or of what is beside it, it may be a sheet.
+        unseen = np.abs(np.sign(depth).sum(axis=0)) == len(depth)
+        edge = np.where(unseen, SHEET, EDGE) * edges.max(axis=0)
+        bent = passed & (off > (edge if halved == HALVED else np.minimum(edge, PLANE * size)))
+        volume = edges.prod(axis=0) / size**d
+        if halved == HALVED:
+            rough = np.bincount(box[bent], volume[bent])
+            bent[:] = False
+        # Simpson's rule: the mean over a box of what is bent a little.
+        done = ~bent
+        share, middle = _plane((mean + 2 * inmost)[done] / 3, slopes[:, done])
+        share *= volume[done]
+        sums[0] += np.bincount(box[done], share, n)
+        for k in range(d):
+            along = lo[k, done] + edges[k, done] * middle[k]
+            sums[1 + k] += np.bincount(box[done], share * along, n)
+        edges, parts = edges[:, bent] / 2, len(corners)
+        lo = lo[:, None, bent] + corners.T[:, :, None] * edges[:, None, :]
+        lo, edges, box = lo.reshape(d, -1), np.tile(edges, parts), np.tile(box[bent], parts)
+    return sums[0], sums[1:].T, rough[rough > 0]
+
+
+def _plane(mean: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Clip a unit cube by a linear function: share (n,) and middle (d, n) of its positive part.
+
+    It is `mean` (n,) at the middle of the cube.
+    """
+    m = np.abs(slopes)
+    steep = m > SLOPE * np.maximum(m.max(axis=0), np.abs(mean))
+    share, middle = (mean > 0).astype(float), np.full(slopes.shape, 0.5)
+    ways = (1 << np.arange(len(m))) @ steep
+    for way in range(1, 1 << len(m)):
+        rows = np.flatnonzero(ways == way)
+        if len(rows):
+            axes = [k for k in range(len(m)) if way >> k & 1]
+            here = np.ix_(np.array(axes), rows)
+            share[rows], middle[here] = _simplices(mean[rows], m[here])
+    return share, np.where(slopes > 0, 1 - middle, middle)
+
+
+def _simplices(mean: np.ndarray, m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The same for a function that falls by `m` > 0 (d, n) along each edge.
+
+    From the lowest corner of the cube a simplex is above 0; those at the other corners, beyond the
+    cube, are taken away and added in turn.
+    """
+    d = len(m)
+    top = mean + m.sum(axis=0) / 2
+    share, moment = np.zeros(len(mean)), np.zeros(m.shape)
+    unit = 1 / (math.factorial(d) * m.prod(axis=0))
+    for corner in itertools.product((0, 1), repeat=d):
+        height = np.maximum(top - np.array(corner, float) @ m, 0)
+        part = (-1) ** sum(corner) * height**d * unit
+        share += part
+        for k in range(d):
+            moment[k] += part * (corner[k] + height / ((d + 1) * m[k]))
+    share = np.clip(share, 0, 1)
+    return share, np.clip(moment / np.maximum(share, NOTHING), 0, 1)

@@ -1,0 +1,101 @@
+"""The processes that share a scene: here the only one; :mod:`karamelo_py.run.mpi.comm` has more."""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+
+class SerialComm:
+    """One process that has the whole scene, with the methods of several.
+
+    All processes carry out the same statements of Python, and call these methods together.
+
+    Attributes
+    ----------
+    rank, size
+        The number of this process, from 0, and how many there are.
+    beside
+        How many of them have the same cores as this one, itself among them.
+    on_machine
+        How many of them share the memory of its machine.
+    waited
+        Seconds in which this process waited for others, or for what they sent, in steps.
+    failed_within
+        Whether this process has failed in the midst of what all do together.
+    """
+
+    rank, size = 0, 1
+    beside = on_machine = 1
+    waited = 0.0
+    failed_within = False
+
+    @property
+    def leads(self) -> bool:
+        """Tell whether this is the first process, which writes."""
+        return self.rank == 0
+
+    @contextmanager
+    def joint(self) -> Iterator[None]:
+        """Note an error in what all do together: the others would wait for ever."""
+        try:
+            yield
+        except BaseException:
+            self.failed_within = True
+            raise
+
+    def barrier(self) -> None:
+        """Wait for all processes."""
+
+    def agree(self, word: int, patience: float = np.inf) -> np.ndarray | None:
+        """Gather a word of each process (size,), or None if one has not come in time.
+
+        Parameters
+        ----------
+        word
+            Of this process.
+        patience
+            Seconds that it waits for the others.
+        """
+        return np.array([word])
+
+    def bcast(self, thing: Any = None) -> Any:
+        """Hand what the first process has to all."""
+        return thing
+
+    def gather(self, thing: Any) -> list | None:
+        """Gather what each process has at the first; None at the others."""
+        return [thing]
+
+    def allgather(self, thing: Any) -> list:
+        """Gather what each process has at all of them."""
+        return [thing]
+
+    def gather_rows(self, own: np.ndarray, out: np.ndarray | None, counts: Sequence[int]) -> None:
+        """Put the numbers of all processes, one after another, into `out` of the first."""
+        out[:] = own
+
+    def scatter(self, things: Sequence | None) -> Any:
+        """Hand out what the first process has for each."""
+        return things[0]
+
+    def exchange(self, things: dict[int, Any]) -> dict[int, Any]:
+        """Swap things with some other processes, by rank; both sides name each other."""
+        return {}
+
+    def alltoall(self, numbers: np.ndarray) -> np.ndarray:
+        """Swap a number (size,) with each process."""
+        return numbers
+
+    def allreduce(self, array: np.ndarray) -> np.ndarray:
+        """Add up whole numbers over all processes: for such, order does not matter."""
+        return array
+
+    def allreduce_max(self, array: np.ndarray) -> np.ndarray:
+        """Take the largest of each number over all processes, in place."""
+        return array
+
+    def in_turn(self, act: Callable[[], None]) -> None:
+        """Let the first process act, and then all others: they find what it has made."""
+        act()

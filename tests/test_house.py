@@ -1,0 +1,99 @@
+"""The house holds to its rules: counts that only fall, in the table of docs/house-numbers.md."""
+
+import ast
+import re
+from collections import Counter, defaultdict
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+PACKAGE = ROOT / "karamelo_py"
+TREES = {path: ast.parse(path.read_text("utf-8")) for path in sorted(PACKAGE.rglob("*.py"))}
+PAGE = (ROOT / "docs" / "house-numbers.md").read_text("utf-8")
+LIMITS = {name: int(n) for name, n in re.findall(r"^\| ([^|]+) \| (\d+) \|$", PAGE, re.M)}
+RIDDLE = re.compile(r"(What|Who|Whether|How|That|Where|Which)\b")
+
+
+def nodes(*kinds: type):
+    """All nodes of these kinds in the package, with their files."""
+    return (
+        (path, node)
+        for path, tree in TREES.items()
+        for node in ast.walk(tree)
+        if isinstance(node, kinds)
+    )
+
+
+def room_of(path: Path) -> str:
+    return path.relative_to(PACKAGE).parts[0]
+
+
+def unnamed_functions() -> int:
+    return sum(node.name == "_" for _, node in nodes(ast.FunctionDef))
+
+
+def shared_class_names() -> list[str]:
+    """Names of several classes, but where one refines another of that name."""
+    found = defaultdict(list)
+    for _, node in nodes(ast.ClassDef):
+        bases = [ast.unparse(base).rpartition(".")[2] for base in node.bases]
+        if node.name not in bases:
+            found[node.name].append(node)
+    return [name for name, classes in found.items() if len(classes) > 1]
+
+
+def riddles() -> Counter:
+    """Docstrings by room whose first word is a question, or points at what is not yet named."""
+    found = Counter()
+    for path, node in nodes(ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef):
+        if RIDDLE.match(ast.get_docstring(node) or ""):
+            found[room_of(path)] += 1
+    return found
+
+
+def private_imports() -> int:
+    """Names imported from modules of Numba that are not its public door, or have an underscore."""
+    count = 0
+    for _, node in nodes(ast.ImportFrom):
+        module = node.module or ""
+        if module.split(".")[0] != "numba":
+            continue
+        private = any(part.startswith("_") for part in module.split("."))
+        private |= module.split(".")[1:2] not in ([], ["extending"], ["types"])
+        count += sum(private or alias.name.startswith("_") for alias in node.names)
+    return count
+
+
+def lenient() -> int:
+    """Kinds of errors that mypy does not look for, by room."""
+    text = (ROOT / "pyproject.toml").read_text("utf-8")
+    return sum(line.count('"') // 2 for line in re.findall(r"^disable_error_code = .*", text, re.M))
+
+
+COUNTS = {
+    "functions named `_`": unnamed_functions,
+    "names that several classes have": lambda: len(shared_class_names()),
+    "names imported from private modules of Numba": private_imports,
+    "kinds of errors that mypy passes over, by room": lenient,
+}
+
+
+@pytest.mark.parametrize("count", COUNTS)
+def test_counts_do_not_grow(count):
+    found = COUNTS[count]()
+    assert found <= LIMITS[count], f"{count}: {found}, {shared_class_names()}"
+
+
+def test_docstrings_begin_with_a_verb_or_a_noun():
+    for room, found in riddles().items():
+        assert found <= LIMITS.get(f"docstrings that begin with a question, in `{room}/`", 0), room
+
+
+def test_lines_of_the_rooms():
+    """Shown with ``pytest -s -n 0``."""
+    lines = Counter()
+    for path in TREES:
+        lines[room_of(path)] += len(path.read_text("utf-8").splitlines())
+    print("", *(f"{n:6} {room}" for room, n in lines.most_common()), sep="\n")
+    assert sum(lines.values()) <= LIMITS["lines of Python"]
