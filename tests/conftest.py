@@ -133,15 +133,14 @@ def state_interpreted(tmp_path, _interpreter) -> Callable[..., dict[str, np.ndar
     """``state_interpreted(script, *columns)``: the exact state at the end, or columns of it.
 
     With ``boxes=True`` points give to boxes of small tiles, as many points do, not to the nodes;
-    with ``plainly=True`` every function is called as it is (see `straight.py`); with ``ranks=N``
-    so many share them. Files are kept in `out`. Of a script that ``fails`` it is the message.
+    with ``ranks=N`` so many share them. Files are kept in `out`. Of a script that ``fails`` it is
+    the message.
     """
 
     def run(
         script: str,
         *columns: str,
         boxes: bool = False,
-        plainly: bool = False,
         ranks: int = 1,
         out: str = "",
         fails: bool = False,
@@ -149,7 +148,7 @@ def state_interpreted(tmp_path, _interpreter) -> Callable[..., dict[str, np.ndar
         path = _prepared(tmp_path, script)
         file = str(tmp_path / "state.npz")
         request = {"folder": str(tmp_path), "arguments": [str(path)], "state": file}
-        request |= {"columns": columns, "boxes": boxes, "plainly": plainly}
+        request |= {"columns": columns, "boxes": boxes}
         if out:
             (tmp_path / out).mkdir()
         request |= {"ranks": ranks, "out": out and str(tmp_path / out), "fails": fails}

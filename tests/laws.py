@@ -3,7 +3,13 @@
 import numpy as np
 from tensors import flat, symmetric_matrix
 
-from karamelo_py.points.laws import advance, cauchy_stress, initial_state, kirchhoff_stress
+from karamelo_py.points.laws import (
+    advance,
+    cauchy_stress,
+    initial_state,
+    jacobian,
+    kirchhoff_stress,
+)
 
 TURN = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
 
@@ -27,8 +33,8 @@ def stretched(law, kin, state, full, steps, dt=1.0):
 
 
 def closed_to(law, kin, state, j, steps=1, dt=1.0):
-    """The state when the volume ratio has come to `j` along x, from det F = state[0]."""
-    ratio = (j / state[0]) ** (1 / steps)
+    """The state when the volume ratio has come to `j` along x, from det F."""
+    ratio = (j / jacobian(law, kin, state)) ** (1 / steps)
     return stretched(law, kin, state, np.diag([ratio - 1, 0, 0]), steps, dt)
 
 

@@ -17,7 +17,8 @@ from karamelo_py.points.laws import (
     kirchhoff_stress,
     wave_speed_squared,
 )
-from karamelo_py.points.laws.strengths.hardening import flow_stress, hardened, hardening
+from karamelo_py.points.laws.strengths import remembers, shear_response
+from karamelo_py.points.laws.strengths.hardening import flow_stress, radial_return, updated_memory
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.modify import Compute, Fix, heat_hook, node_hook, point_hook
 from karamelo_py.script.expressions import Expression
@@ -252,9 +253,9 @@ class Uncompiled(Law): ...
 
 for kind in (Motionless, Growing, Raising, Short, Uncompiled):
     initial_state.on(kind)(lambda law, kin, like: (like,))
-    cauchy_stress.on(kind)(lambda law, kin, state: (state[0],) * 3)
-    kirchhoff_stress.on(kind)(lambda law, kin, state: (state[0],) * 3)
-    elastic_strain.on(kind)(lambda law, kin, state: (state[0],) * 3)
+    cauchy_stress.on(kind)(lambda law, kin, state: kin.Symmetric._make((state[0],) * 3))
+    kirchhoff_stress.on(kind)(lambda law, kin, state: kin.Symmetric._make((state[0],) * 3))
+    elastic_strain.on(kind)(lambda law, kin, state: kin.Symmetric._make((state[0],) * 3))
     jacobian.on(kind)(lambda law, kin, state: state[0])
     energy_density.on(kind)(lambda law, kin, state: state[0])
     wave_speed_squared.on(kind)(lambda law, kin, state: law.E)
@@ -290,9 +291,10 @@ class Forgetful(NamedTuple):
     G: float
 
 
-hardening(Forgetful, R=0.0)
-flow_stress.on(Forgetful)(lambda strength, memory, increment, heat, dt: (strength.G, strength.G))
-hardened.on(Forgetful)(lambda strength, memory, increment, dt: (memory[0],))
+remembers(Forgetful, ep=0.0, R=0.0)
+shear_response.on(Forgetful)(radial_return)
+flow_stress.on(Forgetful)(lambda strength, memory, *others: (strength.G, strength.G))
+updated_memory.on(Forgetful)(lambda strength, memory, increment, dt: (memory[0],))
 
 
 # --- parts of a step

@@ -1,4 +1,4 @@
-"""Flat tuples of a kinematics as NumPy matrices (3, 3), and back; strategies for Hypothesis."""
+"""Tensors of a kinematics as NumPy matrices (3, 3), and back; strategies for Hypothesis."""
 
 import numpy as np
 import pytest
@@ -26,10 +26,8 @@ def matrix(kin, flat, rest=0.0):
 
 
 def flat(kin, full):
-    """The components that the kinematics has, of a (3, 3) tensor."""
-    d = kin.dimension
-    around = (float(full[2, 2]),) if isinstance(kin, Axisymmetric) else ()
-    return tuple(float(a) for a in full[:d, :d].ravel()) + around
+    """The tensor with the components that the kinematics has, of a (3, 3) one."""
+    return kin.Tensor._make([float(full[place]) for place in kin.Tensor.places])
 
 
 def symmetric_matrix(kin, components):
@@ -41,14 +39,18 @@ def symmetric_matrix(kin, components):
 
 
 def symmetric_flat(kin, full):
-    """The components that the kinematics has, of a symmetric (3, 3) tensor."""
-    count = len(kin.symmetric_names)
-    return tuple(float(full[i, j]) for i, j in SYMMETRIC[:count])
+    """The tensor with the components that the kinematics has, of a symmetric (3, 3) one."""
+    return kin.Symmetric._make([float(full[place]) for place in kin.Symmetric.places])
 
 
 def gradients(kin):
     """Gradients of a basis function: a vector, and N/r where there is a radius."""
-    return numbers(kin.dimension + isinstance(kin, Axisymmetric))
+    return numbers(len(kin.Gradient._fields)).map(kin.Gradient._make)
+
+
+def vectors(kin, low=-1.0, high=1.0):
+    """Vectors."""
+    return numbers(kin.dimension, low, high).map(kin.Vector._make)
 
 
 def numbers(size, low=-1.0, high=1.0):
@@ -59,12 +61,12 @@ def numbers(size, low=-1.0, high=1.0):
 
 def tensors(kin, size=1.0):
     """Tensors such as grad v."""
-    return numbers(kin.tensor_size, -size, size)
+    return numbers(kin.tensor_size, -size, size).map(kin.Tensor._make)
 
 
 def symmetric_tensors(kin, size=1.0):
     """Tensors such as stress."""
-    return numbers(len(kin.symmetric_names), -size, size)
+    return numbers(len(kin.symmetric_names), -size, size).map(kin.Symmetric._make)
 
 
 def deformations(kin):
@@ -72,7 +74,7 @@ def deformations(kin):
     d = kin.dimension
     unit = flat(kin, np.eye(3))
     return numbers(kin.tensor_size, -0.3 / d, 0.3 / d).map(
-        lambda a: tuple(float(x) for x in np.add(unit, a))
+        lambda a: kin.Tensor._make([x + y for x, y in zip(unit, a, strict=True)])
     )
 
 

@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 from numba import njit
 from tensors import ALL_KINEMATICS, every_kinematics, flat
 
-from karamelo_py.compiler.tuples import scale
 from karamelo_py.points.basis import (
     affine_weight,
     blank,
@@ -29,7 +28,7 @@ from karamelo_py.points.basis.quadratic_spline import QuadraticSpline
 from karamelo_py.points.basis.surface import ENTRIES, profile, surface_table
 from karamelo_py.points.basis.ugimp import UGIMP
 from karamelo_py.points.grid import inside
-from karamelo_py.points.kinematics import Axisymmetric, Line, diagonal
+from karamelo_py.points.kinematics import Axisymmetric, Line
 from karamelo_py.scene.lattice import Lattice
 
 H = 0.15
@@ -439,7 +438,7 @@ def after_box(basis, kin, grid, place, dl):
         stencil = locate(basis, kin, grid, place)
         for corner in range(carried(basis, kin)):
             for weight in carrier(basis, kin, grid, stencil, corner).weights:
-                u = scale(weight, diagonal(kin, dl))
+                u = weight * dl.diagonal()
                 new = carry(basis, kin, new, place, corner, u)
     return new
 

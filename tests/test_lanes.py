@@ -23,7 +23,7 @@ from karamelo_py.compiler.lanes.records import accumulate_affine
 from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.powers import exponential, logarithm, logarithm_near_one, power
 from karamelo_py.compiler.trace import CannotCompile
-from karamelo_py.compiler.tuples import row, scale
+from karamelo_py.compiler.tuples import row
 from karamelo_py.kernels.arrays import arrays_of, with_nodes
 from karamelo_py.kernels.averaging import NodalMean
 from karamelo_py.kernels.g2p import empty, gathered, settled
@@ -56,7 +56,7 @@ from karamelo_py.points.basis.quadratic_spline import QuadraticSpline
 from karamelo_py.points.basis.ugimp import UGIMP
 from karamelo_py.points.boundary import ReflectingGrid, reflected
 from karamelo_py.points.grid import Grid
-from karamelo_py.points.kinematics import PlaneStrain, Space, zero_tensor
+from karamelo_py.points.kinematics import PlaneStrain, Space, zero
 from karamelo_py.points.laws import Absent, advance, initial_state, law_kind, plastic_strain
 from karamelo_py.points.laws.damages.damage_johnson_cook import JohnsonCookDamage
 from karamelo_py.points.laws.eos.fluid import Tait
@@ -176,7 +176,7 @@ def test_whole_numbers_are_not_cut_off():
 def _advance(law, kin, state, dl, dt, p):
     like = state[0, p]
     old = load(state, p, initial_state(law, kin, like))
-    store(state, p, advance(law, kin, old, load(dl, p, zero_tensor(kin, like)), dt))
+    store(state, p, advance(law, kin, old, load(dl, p, zero(kin, like)), dt))
 
 
 @kernel
@@ -316,7 +316,7 @@ def _grown(basis, grid, stencil, here, seen):
     new = deformed(basis, KIN, here, tuple(real(c, here[0]) for c in (0.1, 0.2, -0.1, 0.05)))
     for corner in range(carried(basis, KIN)):
         u = row(seen, carrier(basis, KIN, grid, stencil, corner), 0, here[:2])
-        new = carry(basis, KIN, new, here, corner, scale(real(1e-3, u[0]), u))
+        new = carry(basis, KIN, new, here, corner, 1e-3 * u)
     return (*new, extent(basis, KIN, grid, new) + real(0, here[0]))
 
 
@@ -470,7 +470,7 @@ def test_affine_fields_at_the_nodes(real_type, give):
 
 @kernel
 def _reflect(grid, x, v, moment, out, p):
-    like = zero_tensor(KIN, x[0, p])
+    like = zero(KIN, x[0, p])
     place, velocity = load(x, p, like[:2]), load(v, p, like[:2])
     y, v, moment, met = reflected(grid, KIN, place, velocity, load(moment, p, like[:4]))
     store(out, p, y + v + moment + met)

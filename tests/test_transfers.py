@@ -6,22 +6,22 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tensors import ALL_KINEMATICS, numbers, tensors
+from tensors import ALL_KINEMATICS, numbers, tensors, vectors
 
 from karamelo_py.points.basis import affine_weight, entry, locate, reach, support
 from karamelo_py.points.basis.cubic_spline import CubicSpline
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.basis.product import evenly, inverse_spread
 from karamelo_py.points.basis.quadratic_spline import QuadraticSpline
-from karamelo_py.points.kinematics import Space, planar
+from karamelo_py.points.kinematics import PlaneStrain, Space, gradient, planar, vector
 from karamelo_py.points.transfers import (
     Moment,
     add_moment,
-    add_momentum,
     affine_velocity,
     by_arms,
     displacing_velocity,
     gradient_weight,
+    nodal_momentum,
     terms,
     updated_velocity,
     zero_moment,
@@ -102,12 +102,12 @@ class Met:
 
     def given(self, transfer, mass, v, moment):
         """Momentum (n, d) that the nodes get."""
-        start = (0.0,) * len(v)
+        v = vector(self.kin, v)
         return np.array(
             [
-                add_momentum(
+                nodal_momentum(
                     transfer, self.kin, self.basis, self.grid, self.stencil, k, self.weights[k],
-                    mass, v, moment, start,
+                    mass, v, moment,
                 )
                 for k in self.count
             ]
@@ -115,9 +115,8 @@ class Met:
 
     def gradient(self, transfer, k):
         """What stands for the gradient of the k-th node."""
-        return gradient_weight(
-            transfer, self.basis, self.kin, self.grid, self.stencil, k, tuple(self.gradients[k])
-        )
+        own = gradient(self.kin, self.gradients[k])
+        return gradient_weight(transfer, self.basis, self.kin, self.grid, self.stencil, k, own)
 
     def taken(self, transfer, field):
         """What the point keeps of the nodal velocity `field` (n, d)."""
@@ -125,14 +124,14 @@ class Met:
         for k in self.count:
             moment = add_moment(
                 transfer, self.kin, self.basis, self.grid, self.stencil, k, self.weights[k],
-                self.gradient(transfer, k), tuple(field[k]), moment,
+                self.gradient(transfer, k), vector(self.kin, field[k]), moment,
             )  # fmt: skip
         return moment
 
 
 def test_definitions():
     """v_p = (1 - alpha) v_pic + alpha (v_p + dv); alpha = 0 is PIC (Brackbill & Ruppel 1986)."""
-    v, v_pic, dv = (1.0, 2.0), (3.0, 4.0), (0.1, 0.2)
+    v, v_pic, dv = (PlaneStrain.Vector(*a) for a in ((1.0, 2.0), (3.0, 4.0), (0.1, 0.2)))
     for transfer in (PIC(), APIC(), MLS(), TPIC()):
         assert updated_velocity(transfer, v, v_pic, dv) == v_pic
     assert updated_velocity(FLIP(1.0), v, v_pic, dv) == pytest.approx((1.1, 2.2))
@@ -155,7 +154,7 @@ def test_definitions():
 def test_linear_momentum_is_given_whole(transfer, basis, kin, data):
     """sum_I p_I = m v, whatever the point keeps beside its velocity."""
     x = position(kin, data.draw(st.tuples(everywhere, everywhere, everywhere)))
-    v = data.draw(numbers(kin.dimension))
+    v = data.draw(vectors(kin))
     keeps = Moment in getattr(transfer, "point_fields", ())
     moment = data.draw(tensors(planar(kin))) if keeps else ()
     momentum = Met(basis, kin, x).given(transfer, 2.5, v, moment)
@@ -170,7 +169,7 @@ def test_affine_transfers_give_their_angular_momentum_whole(transfer, basis, kin
     """sum_I (X_I - x) p_I^T = m B^T: the moment arrives at the nodes (Jiang et al. 2017)."""
     x = position(kin, data.draw(st.tuples(inner, inner, inner)))
     d = kin.dimension
-    v, moment = data.draw(numbers(d)), data.draw(tensors(planar(kin)))
+    v, moment = data.draw(vectors(kin)), data.draw(tensors(planar(kin)))
     met = Met(basis, kin, x)
     momentum = met.given(transfer, 2.5, v, moment)
     assert momentum.T @ met.arms == pytest.approx(2.5 * np.reshape(moment, (d, d)), abs=1e-11)
@@ -250,7 +249,7 @@ def test_mls_takes_the_gradient_of_an_affine_field(basis, kin, data):
 def test_on_a_wall_all_stays_finite(transfer, basis, kin):
     """There D vanishes; N D^-1 (X - x) has a limit."""
     x = tuple(LO[: kin.dimension])
-    moment = tuple(0.1 for _ in range(planar(kin).tensor_size))
+    moment = planar(kin).Tensor._make([0.1] * kin.dimension**2)
     met = Met(basis, kin, x)
     assert np.isfinite(met.given(transfer, 1.0, (1.0,) * kin.dimension, moment)).all()
     assert np.isfinite(met.each(affine_weight)).all()

@@ -70,8 +70,6 @@ def save_state(request: dict) -> int:
 def main() -> None:
     """Serve requests until the input ends."""
     requests, answers = sys.stdin, sys.stdout
-    import straight
-
     import karamelo_py
     from karamelo_py.app.cli import main as command
     from karamelo_py.run import runner  # noqa: F401
@@ -83,7 +81,6 @@ def main() -> None:
     warnings.simplefilter("ignore")
     for line in requests:
         request = json.loads(line)
-        (straight.use_plain if request.get("plainly") else straight.use)()
         os.chdir(request["folder"])
         out, err = io.StringIO(), io.StringIO()
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):

@@ -264,5 +264,5 @@ def increase(array, p, values):
 
 @shared
 def load_vector(kin, array, p):
-    """The first components of point `p`, as many as a vector has."""
-    return tuple([array[k, p] for k in range(kin.dimension)])
+    """The first components of point `p` as a vector."""
+    return kin.Vector._make([array[k, p] for k in range(kin.dimension)])

@@ -16,6 +16,7 @@ from numba.extending import intrinsic
 
 from karamelo_py.compiler.compile import all_lanes, by_type, fma, implements, real, shared, where
 from karamelo_py.compiler.lanes.registers import Lanes, element, vector_of
+from karamelo_py.compiler.values import OF_REALS
 
 
 def logarithm(x: float) -> float:
@@ -36,6 +37,9 @@ def exponential(x: float) -> float:
 def power(x: float, y: float) -> float:
     """x to the power of y, for x not below 0; infinite for 0 to a negative one."""
     return x**y if x != 0 or y >= 0 else inf
+
+
+OF_REALS |= {power}
 
 
 def _bits(kind: Any) -> tuple[Any, Any, int, int]:

@@ -8,18 +8,16 @@ from karamelo_py.compiler.compile import point_function, real, shared
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.lanes import EightLanes, FourLanes
 from karamelo_py.compiler.lanes.records import accumulate_affine
-from karamelo_py.compiler.tuples import add, add_scaled, nested_as, scale
 from karamelo_py.kernels import p2g
 from karamelo_py.kernels.arrays import MASS, Tag, of_force
 from karamelo_py.kernels.averaging import NodalStress
-from karamelo_py.kernels.g2p import Move, update_at, zero_vector
+from karamelo_py.kernels.g2p import Move, update_at
 from karamelo_py.kernels.loss import EnergyLoss
 from karamelo_py.kernels.visit import Work, for_tags
 from karamelo_py.points.basis import entry, reach, support
 from karamelo_py.points.basis.product import inverse_spread, spacing
-from karamelo_py.points.frames import force_columns
-from karamelo_py.points.kinematics import columns, dimension, from_columns, planar
-from karamelo_py.points.transfers import add_momentum, affine_velocity, by_arms, forces_by_arms
+from karamelo_py.points.kinematics import dimension, from_columns, zero_vector
+from karamelo_py.points.transfers import affine_velocity, by_arms, forces_by_arms, nodal_momentum
 
 
 @point_function(otherwise=True)
@@ -42,21 +40,21 @@ def _affine(w, stencil, value, growths):
     """Value at the first node, and growth a node, of `value` at the point and growths a length."""
     arm = reach(w.basis, w.kin, w.grid, stencil, 0)
     for growth, way in zip(growths, arm, strict=True):
-        value = add_scaled(value, way, growth)
-    step = w.grid.h * spacing(w.basis, value[0])
-    return value, tuple([scale(step, growth) for growth in growths])
+        value = value + way * growth
+    step = w.grid.h * spacing(w.basis)
+    return value, tuple([step * growth for growth in growths])
 
 
 @shared
 def _momentum(w, stencil, mass, v, moment):
     """The momentum at the first node, and its growth; () where nobody knows."""
-    momentum = scale(mass, v)
+    momentum = mass * v
     if not len(moment):
-        return () if add_momentum.defined(type(w.transfer)) else (momentum, ())
+        return () if nodal_momentum.defined(type(w.transfer)) else (momentum, ())
     c = affine_velocity(w.transfer, moment, inverse_spread(w.basis, w.grid))
     if not len(c):
         return ()
-    return _affine(w, stencil, momentum, columns(planar(w.kin), scale(mass, c)))
+    return _affine(w, stencil, momentum, (mass * c).columns())
 
 
 @affine_part.on(p2g.MassMomentum)
@@ -85,7 +83,7 @@ def _affine_part_internal_force(quantity, w, stencil, load):
         return ()
     stress, outer, _ = load
     own = outer if len(outer) else zero_vector(w.kin, stress[0])
-    growths = [scale(inverse_d[0], c) for c in force_columns(w.frame, w.kin, stress)]
+    growths = [inverse_d[0] * column for column in stress.columns()]
     return w.nodes.sums, of_force(w.kin), *_affine(w, stencil, own, tuple(growths))
 
 
@@ -121,6 +119,7 @@ def give_affine(width, w, stencil, parts):
     seen = [entry(w.basis, w.kin, w.grid, stencil, k)[:2] for k in range(support(w.basis, w.kin))]
     nodes, weights = tuple([node for node, _ in seen]), tuple([weight for _, weight in seen])
     for array, first, value, growths in joined(width, w.kin, parts):
+        value, growths = (*value,), tuple([(*growth,) for growth in growths])
         accumulate_affine(array, nodes, first, weights, value, growths)
 
 
@@ -153,22 +152,19 @@ def _gathered_at_once_move(task, w, stencil, total):
         changes = tuple([_tails(line.weights, changes[k:])[-1] for k in rows])
     v, *moments = sums[0]
     arm = reach(w.basis, w.kin, w.grid, stencil, 0)
-    step = w.grid.h * spacing(w.basis, arm[0])
+    step = w.grid.h * spacing(w.basis)
     pairs = zip(moments, arm, strict=True)
-    moment = from_columns(
-        planar(w.kin), tuple([add_scaled(scale(step, m), way, v) for m, way in pairs])
-    )
-    moment = scale(real(factor[0], step), moment)
-    return v, add(total[1], changes[0]), nested_as(total[2], moment)
+    moment = from_columns([step * m + way * v for m, way in pairs])
+    return v, total[1] + changes[0], real(factor[0], step) * moment
 
 
 @shared
 def _tails(weights, vectors):
     """Sums of weights times vectors: of the last one, of the last two, ... of all."""
     last = len(weights) - 1
-    sums = (scale(weights[last], vectors[last]),)
+    sums = (weights[last] * vectors[last],)
     for k in range(last - 1, -1, -1):
-        sums = (*sums, add_scaled(sums[-1], weights[k], vectors[k]))
+        sums = (*sums, sums[-1] + weights[k] * vectors[k])
     return sums
 
 
@@ -184,7 +180,7 @@ def _with_moment(weights, row):
 def _sum(vectors):
     total = vectors[0]
     for vector in vectors[1:]:
-        total = add(total, vector)
+        total = total + vector
     return total
 
 

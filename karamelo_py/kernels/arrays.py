@@ -12,9 +12,10 @@ import numpy as np
 
 from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.fields import name_of
+from karamelo_py.compiler.tuples import row
 from karamelo_py.kernels.totals import LIMBS, Alone
 from karamelo_py.points.grid import Grid
-from karamelo_py.points.kinematics import dimension
+from karamelo_py.points.kinematics import dimension, vector
 
 # A NamedTuple, often empty, whose class selects the implementation of point functions.
 Tag: TypeAlias = Any
@@ -56,6 +57,12 @@ def of_force(kin):
 def of_change(kin):
     """First component of v* - v in `Nodes.update`; that of v* is 0."""
     return 4 if dimension(kin) == 3 else dimension(kin)
+
+
+@shared
+def vector_at(kin, records, i, first, like):
+    """The components of a record of a node from the `first` on, as a vector."""
+    return vector(kin, row(records, i, first, (*like,)))
 
 
 # Widths of the records of Nodes by dimension.

@@ -2,9 +2,9 @@
 
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import point_function, real
+from karamelo_py.compiler.compile import fma, point_function, real
 from karamelo_py.compiler.fields import StepField, SummedField, field, pair
-from karamelo_py.compiler.tuples import add_scaled, row
+from karamelo_py.compiler.tuples import row
 from karamelo_py.kernels.visit import deformation_of, law_of, state_of
 from karamelo_py.points.basis import entry
 from karamelo_py.points.frames import scaled_increment
@@ -75,7 +75,8 @@ def gathered_ratio(averaging, w, stencil, k, total):
 @gathered_ratio.on(FBar)
 def _gathered_ratio_f_bar(averaging, w, stencil, k, total):
     i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
-    return add_scaled(total, weight, row(field(w.nodes.fields, NodalMean), i, 0, total))
+    (mean,) = row(field(w.nodes.fields, NodalMean), i, 0, total)
+    return (fma(weight, mean, total[0]),)
 
 
 @point_function(otherwise=True)

@@ -6,7 +6,7 @@ from typing import Any
 from karamelo_py.compiler.compile import real, shared
 from karamelo_py.compiler.loops import entered
 from karamelo_py.kernels.arrays import DT, MASS, TIME, TIMESTEP, Control, Number, Setup, Tag
-from karamelo_py.points.kinematics import vector_at
+from karamelo_py.points.kinematics import vector
 
 
 @shared
@@ -39,7 +39,7 @@ def kick(s: Setup) -> Number:
 @shared
 def common_velocity(kin: Tag, clock: Any, like: Number) -> tuple:
     """The velocity that speeds are measured from, in the number type of `like`."""
-    return tuple([real(a, like) for a in vector_at(kin, clock.common, 0)])
+    return vector(kin, [real(clock.common[0, k], like) for k in range(kin.dimension)])
 
 
 NEXT_TO_NOTHING = 1e-9  # of a step

@@ -12,7 +12,7 @@ from karamelo_py.kernels.loss import EnergyLoss
 from karamelo_py.points.basis import carried, support
 from karamelo_py.points.basis.cpdi.block import InBlock
 from karamelo_py.points.basis.cpdi.corners import AtCorners
-from karamelo_py.points.transfers import add_moment, add_momentum, gradient_weight
+from karamelo_py.points.transfers import add_moment, gradient_weight, nodal_momentum
 
 
 @shared
@@ -25,7 +25,7 @@ def by_corners(part, w):
     unless = getattr(type(part), "not_at_corners", None)
     if unless is None:
         return False
-    asked = add_moment, add_momentum, gradient_weight
+    asked = add_moment, nodal_momentum, gradient_weight
     moments = any(function.defined(type(w.transfer)) for function in asked)
     loss = field(w.nodes.fields, EnergyLoss) is not None
     return not ("moments" in unless and moments) and not ("loss" in unless and loss)

@@ -4,10 +4,10 @@ from karamelo_py.compiler.compile import index
 from karamelo_py.compiler.fields import load, store
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import loop
-from karamelo_py.compiler.tuples import put_at, record, row, scale
+from karamelo_py.compiler.tuples import put_at, record, row
 from karamelo_py.kernels.visit import place_at
 from karamelo_py.points.basis import entry, locate, reach, support
-from karamelo_py.points.kinematics import add_outer, planar, tensor_dot, zero_tensor
+from karamelo_py.points.kinematics import outer, planar, zero
 from karamelo_py.points.laws import (
     cauchy_stress,
     elastic_strain,
@@ -102,10 +102,10 @@ def export_velocity_moment(basis, kin, grids, grid_of, where, gradients, out):
         grid = record(grids, index(grid_of[p]))
         place = place_at(basis, kin, where, p)
         stencil = locate(basis, kin, grid, place)
-        total = zero_tensor(flat, place[0])
+        total = zero(flat, place[0])
         gradient = load(gradients, p, total)
         for k in range(support(basis, kin)):
             weight = entry(basis, kin, grid, stencil, k)[1]
             arm = reach(basis, kin, grid, stencil, k)
-            total = add_outer(flat, total, scale(weight, tensor_dot(flat, gradient, arm)), arm)
+            total = total + outer(weight * (gradient @ arm), arm)
         store(out, p, total)

@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 from karamelo_py.compiler.compile import all_lanes, fma, point_function, real, shared, where
 from karamelo_py.compiler.fields import field, increase, load_vector, store, store_from
-from karamelo_py.compiler.tuples import add_row, add_scaled, row, scale, subtract
+from karamelo_py.compiler.tuples import row
 from karamelo_py.kernels import averaging, visit
-from karamelo_py.kernels.arrays import Index, Nodes, Number, Tag, of_change
+from karamelo_py.kernels.arrays import Index, Nodes, Number, Tag, of_change, vector_at
 from karamelo_py.kernels.loss import FrictionalHeat, in_company, reflect, warm, warm_by_friction
 from karamelo_py.kernels.visit import Work
 from karamelo_py.points import frames, transfers
@@ -19,14 +19,7 @@ from karamelo_py.points.basis import carried, carrier, carry, deformed, entry, e
 from karamelo_py.points.basis.cpdi.corners import AtCorners
 from karamelo_py.points.boundary import Bounces, reflected
 from karamelo_py.points.grid import inside
-from karamelo_py.points.kinematics import (
-    add_outer,
-    dimension,
-    largest_component,
-    volume_ratio,
-    zero_tensor,
-)
-from karamelo_py.points.kinematics.tensors import tensor, vector
+from karamelo_py.points.kinematics import I, det, outer, vector, zero, zero_vector
 from karamelo_py.points.laws import (
     advance,
     constrained_velocity,
@@ -143,27 +136,26 @@ def empty(task: Tag, w: Work, x: tuple) -> tuple:
 
 @empty.on(Move)
 def _empty_move(task, w, x):
-    zero = subtract(x, x)
-    return zero, zero, transfers.zero_moment(w.transfer, w.kin, x[0])
+    return x - x, x - x, transfers.zero_moment(w.transfer, w.kin, x[0])
 
 
 @empty.on(Strain)
 @empty.on(StrainOfLastStep)
 @empty.on(SecondStrain)
 def _empty_second_strain(task, w, x):
-    return zero_tensor(w.kin, x[0]), averaging.no_ratio(w.averaging, x[0])
+    return zero(w.kin, x[0]), averaging.no_ratio(w.averaging, x[0])
 
 
 @empty.on(StrainInMove)
 def _empty_strain_in_move(task, w, x):
-    gradient = zero_tensor(w.kin, x[0])
+    gradient = zero(w.kin, x[0])
     return averaging.kept_out(w.averaging, w, gradient), averaging.no_ratio(w.averaging, x[0])
 
 
 @empty.on(TrialStrain)
 @empty.on(TrialStrainOfLastStep)
 def _empty_trial_strain_of_last_step(task, w, x):
-    return zero_tensor(w.kin, x[0])
+    return zero(w.kin, x[0])
 
 
 @empty.on(SetMeanStress)
@@ -173,7 +165,7 @@ def _empty_average_stress(task, w, x):
 
 @empty.on(SeriesTerm)
 def _empty_series_term(task, w, x):
-    return subtract(x, x)
+    return x - x
 
 
 @visit.records_of.on(Move)
@@ -194,18 +186,15 @@ def gathered(task: Tag, w: Work, stencil: tuple, k: int, total: tuple) -> tuple:
 
 @gathered.on(Move)
 def _gathered_move(task, w, stencil, k, total):
-    i, weight, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
-    g = transfers.gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, gradient)
-    v, dv = update_at(w.kin, w.nodes, i, total[0])
-    corners = (*total[3:], v) if moves_corners(w.basis, w.kin) else ()
-    return (
-        add_scaled(total[0], weight, v),
-        add_scaled(total[1], weight, dv),
-        transfers.add_moment(
-            w.transfer, w.kin, w.basis, w.grid, stencil, k, weight, g, v, total[2]
-        ),
-        *corners,
+    i, N, grad_N = entry(w.basis, w.kin, w.grid, stencil, k)
+    grad_N = transfers.gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, grad_N)
+    v_pic, dv_pic, moment, *corners = total
+    v, dv = update_at(w.kin, w.nodes, i, v_pic)
+    moment = transfers.add_moment(
+        w.transfer, w.kin, w.basis, w.grid, stencil, k, N, grad_N, v, moment
     )
+    corners = (*corners, v) if moves_corners(w.basis, w.kin) else ()
+    return v_pic + N * v, dv_pic + N * dv, moment, *corners
 
 
 @shared
@@ -215,26 +204,21 @@ def moves_corners(basis: Tag, kin: Tag) -> bool:
 
 
 @shared
-def zero_vector(kin, like):
-    """The components of a vector, all 0."""
-    return (real(0, like),) * kin.dimension
-
-
-@shared
 def update_at(kin: Tag, nodes: Nodes, i: Index, like: Number) -> tuple:
     """v* and v* - v of a node: one record in the plane, two in space."""
     if kin.dimension == 2:
-        both = row(nodes.update, i, 0, like + like)
-        return both[:2], both[2:]
-    return row(nodes.update, i, 0, like), row(nodes.update, i, of_change(kin), like)
+        both = row(nodes.update, i, 0, (*like, *like))
+        return vector(kin, both[:2]), vector(kin, both[2:])
+    v = vector_at(kin, nodes.update, i, 0, like)
+    return v, vector_at(kin, nodes.update, i, of_change(kin), like)
 
 
 @shared
-def _gradient(w, stencil, k, total):
-    i, _, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
-    g = transfers.gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, gradient)
-    v = row(w.nodes.velocity, i, 0, zero_vector(w.kin, g[0]))
-    return add_outer(w.kin, total, v, g)
+def _gradient(w, stencil, k, grad_v):
+    i, _, grad_N = entry(w.basis, w.kin, w.grid, stencil, k)
+    grad_N = transfers.gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, grad_N)
+    v = vector_at(w.kin, w.nodes.velocity, i, 0, zero_vector(w.kin, grad_N[0]))
+    return grad_v + outer(v, grad_N)
 
 
 @shared
@@ -269,7 +253,7 @@ def _gathered_average_stress(task, w, stencil, k, total):
 @gathered.on(SeriesTerm)
 def _gathered_series_term(task, w, stencil, k, total):
     i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
-    return add_scaled(total, weight, row(field(w.nodes.fields, Series), i, 0, total))
+    return total + weight * vector_at(w.kin, field(w.nodes.fields, Series), i, 0, total)
 
 
 # --- settle -----------------------------------------------------------------------------------
@@ -296,36 +280,42 @@ def settled(
 
 @settled.on(Strain)
 def _settled_strain(task, w, stencil, p, dt, total, totals, fastest):
-    return _strain(w, w.places.x, p, dt, scale(dt, total[0]), total[1], fastest)
+    return _strain(w, w.places.x, p, dt, increment(dt, total[0]), total[1], fastest)
 
 
 @settled.on(StrainOfLastStep)
 def _settled_strain_of_last_step(task, w, stencil, p, dt, total, totals, fastest):
-    dl = frames.of_places_before(w.frame, w.kin, scale(dt, total[0]))
+    dl = frames.of_places_before(w.frame, w.kin, increment(dt, total[0]))
     return _strain(w, w.places.x, p, dt, dl, total[1], fastest)
 
 
 @settled.on(SecondStrain)
 def _settled_second_strain(task, w, stencil, p, dt, total, totals, fastest):
-    return _strain(w, w.places.y, p, dt, scale(dt, total[0]), total[1], fastest)
+    return _strain(w, w.places.y, p, dt, increment(dt, total[0]), total[1], fastest)
 
 
 @settled.on(StrainInMove)
 def _settled_strain_in_move(task, w, stencil, p, dt, total, totals, fastest):
     gradient = averaging.known_gradient(w.averaging, w, totals[0][2], total[0])
-    return _strain(w, w.places.x, p, dt, scale(dt, gradient), total[1], fastest)
+    return _strain(w, w.places.x, p, dt, increment(dt, gradient), total[1], fastest)
 
 
 @settled.on(TrialStrain)
 def _settled_trial_strain(task, w, stencil, p, dt, total, totals, fastest):
-    _keep_ratio(w, p, dt, scale(dt, total))
+    _keep_ratio(w, p, dt, increment(dt, total))
     return real(0, dt), fastest
 
 
 @settled.on(TrialStrainOfLastStep)
 def _settled_trial_strain_of_last_step(task, w, stencil, p, dt, total, totals, fastest):
-    _keep_ratio(w, p, dt, frames.of_places_before(w.frame, w.kin, scale(dt, total)))
+    _keep_ratio(w, p, dt, frames.of_places_before(w.frame, w.kin, increment(dt, total)))
     return real(0, dt), fastest
+
+
+@shared
+def increment(dt, grad_v):
+    """dl = dt grad v, as numbers: F + dl is a sum of two of them."""
+    return grad_v._make(dt * grad_v)
 
 
 @shared
@@ -333,8 +323,8 @@ def _keep_ratio(w, p, dt, dl):
     law = visit.law_of(w, p)
     state = visit.state_of(w, law, p, dt)
     f = visit.deformation_of(w.frame, w.kin, law, state, w.points, p)
-    increment = frames.spatial_increment(w.frame, w.kin, dl, f)
-    field(w.points.fields, averaging.VolumeRatio)[0, p] = volume_ratio(w.kin, increment)
+    dl = frames.spatial_increment(w.frame, w.kin, dl, f)
+    field(w.points.fields, averaging.VolumeRatio)[0, p] = det(I + dl)
 
 
 @settled.on(SetMeanStress)
@@ -354,7 +344,7 @@ def _settled_series_term(task, w, stencil, p, dt, total, totals, fastest):
 def further_reach(basis, kin, grid, before, after):
     """By how many cells the domain of a point reaches further than before."""
     further = extent(basis, kin, grid, after) - extent(basis, kin, grid, before)
-    return max(further, real(0, further))
+    return max(further, 0)
 
 
 @settled.on(Move)
@@ -366,38 +356,38 @@ def _settled_move(task, w, stencil, p, dt, total, totals, fastest):
 def _move(w, stencil, p, dt, total):
     """New velocity, position and carried corners; how far that is in cells."""
     law = visit.law_of(w, p)
-    old = vector(w.kin, load_vector(w.kin, w.points.v, p))
-    v_pic, dv = vector(w.kin, total[0]), vector(w.kin, total[1])
+    v_pic, dv, moment, *corners = total
+    old = load_vector(w.kin, w.points.v, p)
     v = constrained_velocity(law, old, transfers.updated_velocity(w.transfer, old, v_pic, dv))
     x = load_vector(w.kin, w.places.x, p)
     j = transfers.known_volume(w.transfer, law, w.kin, visit.state_of(w, law, p, dt))
-    displacing = transfers.displacing_velocity(w.transfer, v, total[0], j)
-    step = scale(dt, constrained_velocity(law, v, displacing))
-    y = add_scaled(x, real(1, dt), step)
+    displacing = transfers.displacing_velocity(w.transfer, v, v_pic, j)
+    step = vector(w.kin, dt * constrained_velocity(law, v, displacing))
+    y = x + step
     warm_by_friction(field(w.nodes.fields, FrictionalHeat), w, stencil, p, v[0])
-    warm(w, stencil, p, subtract(total[0], total[1]))
-    moment = in_company(w, stencil, p, total[2])
+    warm(w, stencil, p, v_pic - dv)
+    moment = in_company(w, stencil, p, moment)
     y, v, moment, hits = reflected(w.grid, w.kin, y, v, moment)
     increase(field(w.points.fields, Bounces), p, hits)
     store(w.points.v, p, v)
     store(field(w.points.fields, transfers.Moment), p, moment)
     store(w.places.y, p, y)
-    moved = largest_component(w.kin, subtract(y, x)) * w.grid.inv_h
+    moved = (y - x).largest() * w.grid.inv_h
     if not frames.follows(w.frame):
         return moved
     if carried(w.basis, w.kin) > 0:
         before = visit.place_at(w.basis, w.kin, w.places.x, p)
-        new = add_row(before, 0, step)
+        new = (*(x + step), *before[len(x) :])
         for corner in range(carried(w.basis, w.kin)):
-            if len(total) > 3:
-                u = total[3 + corner]
+            if len(corners):
+                u = corners[corner]
             else:
                 by = carrier(w.basis, w.kin, w.grid, stencil, corner)
-                u = row(w.nodes.update, by, 0, x)
-            new = carry(w.basis, w.kin, new, before, corner, scale(dt, u))
+                u = vector_at(w.kin, w.nodes.update, by, 0, x)
+            new = carry(w.basis, w.kin, new, before, corner, dt * u)
         store(w.places.y, p, new)
         moved += further_reach(w.basis, w.kin, w.grid, before, new)
-    return where(inside(w.grid, w.kin, y), moved, real(inf, moved))
+    return where(inside(w.grid, w.kin, y), moved, inf)
 
 
 @shared
@@ -410,8 +400,8 @@ def _strain(w, x, p, dt, dl, ratio, fastest):
     law = visit.law_of(w, p)
     old = visit.state_of(w, law, p, dt)
     f = visit.deformation_of(w.frame, w.kin, law, old, w.points, p)
-    increment = frames.spatial_increment(w.frame, w.kin, dl, f)
-    state = advance(law, w.kin, old, tensor(w.kin, increment), dt)
+    growth = frames.spatial_increment(w.frame, w.kin, dl, f)
+    state = advance(law, w.kin, old, growth, dt)
     store(w.points.state, p, state)
     now = frames.strained(w.frame, w.kin, f, dl)
     store_optional(field(w.points.fields, frames.DeformationGradient), p, now)
@@ -419,15 +409,15 @@ def _strain(w, x, p, dt, dl, ratio, fastest):
     grown = real(0, j)
     if frames.follows(w.frame) and carried(w.basis, w.kin) == 0:
         before = visit.place_at(w.basis, w.kin, x, p)
-        after = deformed(w.basis, w.kin, before, increment)
-        store_from(w.places.y, p, dimension(w.kin), after)
+        after = deformed(w.basis, w.kin, before, growth)
+        store_from(w.places.y, p, w.kin.dimension, after)
         grown = grown + further_reach(w.basis, w.kin, w.grid, before, after)
     if not all_lanes(j > 0):
-        return where(j > 0, grown, real(inf, j)), fastest
+        return where(j > 0, grown, inf), fastest
     # The speed of waves is only asked of the few points that may be faster than all before them.
     shorter = frames.inverse_stretch_squared(w.frame, w.kin, now, dt)
     most = wave_speed_bound(law, w.kin, state) * shorter
-    speed = largest_component(w.kin, subtract(load_vector(w.kin, w.points.v, p), w.common))
+    speed = (load_vector(w.kin, w.points.v, p) - w.common).largest()
     slack = fastest - speed
     if all_lanes((slack >= 0) & (most <= slack * slack)):  # so written, NaN is noticed too
         return grown, fastest

@@ -21,7 +21,6 @@ from karamelo_py.compiler.compile import (
     where,
 )
 from karamelo_py.compiler.fields import Field, StepField, field, load, load_vector, store, vector
-from karamelo_py.compiler.tuples import add_scaled, leading, scale, subtract
 from karamelo_py.kernels.arrays import MASS, Buffers, Nodes, of_force
 from karamelo_py.kernels.averaging import NodalMean
 from karamelo_py.kernels.g2p import empty, gathered, settled
@@ -199,7 +198,7 @@ def _load_of_heat_flow(quantity, w, p, like):
     against = pulled_back(w.frame, w.kin, _gradient(w, p), f)
     fields = w.points.fields
     conductance = of_present(p, field(fields, Conductance)[0, p])
-    return scale(-conductance, against), of_present(p, field(fields, Supply)[0, p])
+    return -conductance * against, of_present(p, field(fields, Supply)[0, p])
 
 
 @scattered.on(HeatFlow)
@@ -217,14 +216,14 @@ def _scattered_heat_flow(quantity, w, stencil, k, load):
 
 @empty.on(TemperatureGradient)
 def _empty_temperature_gradient(task, w, x):
-    return subtract(x, x)
+    return x - x
 
 
 @gathered.on(TemperatureGradient)
 def _gathered_temperature_gradient(task, w, stencil, k, total):
     i, _, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
     # An axisymmetric gradient has the part around the axis behind; a scalar has none there.
-    return add_scaled(total, w.nodes.velocity[i, 0], leading(gradient, total))
+    return total + w.nodes.velocity[i, 0] * gradient.planar()
 
 
 @settled.on(TemperatureGradient)
@@ -242,8 +241,10 @@ def _empty_warming(task, w, x):
 @gathered.on(Warming)
 def _gathered_warming(task, w, stencil, k, total):
     i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
-    shown = w.nodes.update[i, 1], field(w.nodes.fields, NodalMean)[i, 0]
-    return add_scaled(total, at_least_round_off(weight), shown)
+    weight = at_least_round_off(weight)
+    change, mean = total
+    mean = fma(weight, field(w.nodes.fields, NodalMean)[i, 0], mean)
+    return fma(weight, w.nodes.update[i, 1], change), mean
 
 
 @settled.on(Warming)

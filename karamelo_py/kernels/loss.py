@@ -22,8 +22,7 @@ move (not with splines), and that usl strains by dv, which may only cost.
 
 from karamelo_py.compiler import fields
 from karamelo_py.compiler.compile import accumulate, real, round_off, shared, where
-from karamelo_py.compiler.tuples import add_scaled, row, scale, subtract
-from karamelo_py.kernels.arrays import MASS, of_change, of_momentum
+from karamelo_py.kernels.arrays import MASS, of_change, of_momentum, vector_at
 from karamelo_py.kernels.visit import law_of, state_of
 from karamelo_py.points.basis import entry, support
 from karamelo_py.points.kinematics import dimension
@@ -36,9 +35,9 @@ from karamelo_py.points.laws import (
 )
 from karamelo_py.points.transfers import (
     add_moment,
-    add_momentum,
     gradient_weight,
     lost_shares,
+    nodal_momentum,
     zero_moment,
 )
 from karamelo_py.points.transfers.xpic import Reflected, Series
@@ -92,16 +91,10 @@ def _heat_of_nodes(rubbed, w, stencil, like):
 
 
 @shared
-def squared(v):
-    """|v|^2."""
-    return sum([component * component for component in v])
-
-
-@shared
 def energy_of(mass, momentum):
     """|momentum|^2 / (2 mass); 0 without mass."""
     least = real(1e-36, mass)
-    return where(mass > least, real(0.5, mass) * squared(momentum) / max(mass, least), mass - mass)
+    return where(mass > least, 0.5 * momentum.squared() / max(mass, least), mass - mass)
 
 
 @shared
@@ -141,7 +134,7 @@ def warm(w, stencil, p, v):
         moment = in_company(w, stencil, p, moment)
         _heat(w, p, _gone(lost, w, stencil, v, moment))
     if reflected is not None:
-        last = gathered_term(w, stencil, subtract(v, v))
+        last = gathered_term(w, stencil, v - v)
         reflect(reflected, w, stencil, p, last, w.transfer.order - 1)
         _heat(w, p, reflected[0, p])
 
@@ -160,7 +153,7 @@ def in_company(w, stencil, p, moment):
     mass = w.points.mass[p]
     one = real(1, mass)
     kept = (one - _own_share(lost, w, stencil, mass)) / real(1 - ALONE ** dimension(w.kin), mass)
-    return scale(max(min(kept, one), mass - mass), moment)
+    return max(min(kept, one), mass - mass) * moment
 
 
 @shared
@@ -193,11 +186,11 @@ def reflect(reflected, w, stencil, p, term, k):
         none, half, one = real(0, like), real(0.5, like), real(1, like)
         before = fields.load(reflected, p, (like, *v))
         order = w.transfer.order
-        rest = subtract(where(k == 0, v, before[1:]), term)
+        rest = v._make(where(k == 0, (*v,), before[1:])) - term
         gone = where(k == 0, none, before[0])
         gone += where(2 * k >= order - 1, one, none) * _spread(w, stencil, term)
-        gone += where(2 * k >= order, half, none) * squared(term)
-        gone += where((order + 1) // 2 == k + 1, half, none) * squared(rest)
+        gone += where(2 * k >= order, half, none) * term.squared()
+        gone += where((order + 1) // 2 == k + 1, half, none) * rest.squared()
         fields.store(reflected, p, (gone, *rest))
 
 
@@ -206,7 +199,7 @@ def gathered_term(w, stencil, term):
     """The present term of XPIC's series at a point."""
     for k in range(support(w.basis, w.kin)):
         i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
-        term = add_scaled(term, weight, row(fields.field(w.nodes.fields, Series), i, 0, term))
+        term = term + weight * term_at(w, i, term)
     return term
 
 
@@ -216,15 +209,21 @@ def _spread(w, stencil, term):
     spread = term[0] - term[0]
     for k in range(support(w.basis, w.kin)):
         i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
-        apart = subtract(row(fields.field(w.nodes.fields, Series), i, 0, term), term)
-        spread += weight * squared(apart)
+        spread += weight * (term_at(w, i, term) - term).squared()
     return spread
+
+
+@shared
+def term_at(w, i, like):
+    """The present term of XPIC's series at a node."""
+    return vector_at(w.kin, fields.field(w.nodes.fields, Series), i, 0, like)
 
 
 @shared
 def _before(w, i, like):
     """The velocity of a node before the update."""
-    return subtract(row(w.nodes.update, i, 0, like), row(w.nodes.update, i, of_change(w.kin), like))
+    v = vector_at(w.kin, w.nodes.update, i, 0, like)
+    return v - vector_at(w.kin, w.nodes.update, i, of_change(w.kin), like)
 
 
 @shared
@@ -241,8 +240,7 @@ def _moment_before(w, stencil, v, moment):
 @shared
 def _gone(lost, w, stencil, v, moment):
     """Kinetic energy per mass that a point has lost at the nodes and on the way back."""
-    none = subtract(v, v)
-    gone = none[0]
+    gone = v[0] - v[0]
     there, here = lost_shares(w.transfer, gone)
     for k in range(support(w.basis, w.kin)):
         i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
@@ -252,10 +250,9 @@ def _gone(lost, w, stencil, v, moment):
 
 @shared
 def _part_gone(lost, w, stencil, k, i, weight, v, moment, there, here):
-    none = subtract(v, v)
-    one = real(1, none[0])
-    held = add_momentum(
-        w.transfer, w.kin, w.basis, w.grid, stencil, k, weight, one, none, moment, none
+    one = real(1, weight)
+    held = nodal_momentum(
+        w.transfer, w.kin, w.basis, w.grid, stencil, k, weight, one, v - v, moment
     )
-    apart = real(0.5, none[0]) * weight * squared(subtract(_before(w, i, v), v))
+    apart = 0.5 * weight * (_before(w, i, v) - v).squared()
     return there * weight * lost[i, 1] + here * (apart - energy_of(weight, held))

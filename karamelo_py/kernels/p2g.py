@@ -4,7 +4,6 @@ from typing import Any, NamedTuple
 
 from karamelo_py.compiler.compile import accumulate, of_present, point_function, real, shared
 from karamelo_py.compiler.fields import StepField, SummedField, field, load, load_vector, vector
-from karamelo_py.compiler.tuples import add_optional, leading, scale, subtract
 from karamelo_py.kernels.arrays import (
     MASS,
     SUMS_WIDTH,
@@ -15,19 +14,18 @@ from karamelo_py.kernels.arrays import (
     of_force,
 )
 from karamelo_py.kernels.averaging import AveragedStress, FBar, NodalMean, NodalStress, VolumeRatio
-from karamelo_py.kernels.g2p import zero_vector
 from karamelo_py.kernels.loss import EnergyLoss, bring_energy
 from karamelo_py.kernels.visit import Work, deformation_of, for_tags, law_of, records_of, state_of
 from karamelo_py.points.basis import entry, mapped_again
-from karamelo_py.points.frames import Total, add_force, force_stress
-from karamelo_py.points.kinematics import add_pressure, dimension, stretching_mean, zero_symmetric
+from karamelo_py.points.frames import Total, force_stress
+from karamelo_py.points.kinematics import I, dimension, nothing
 from karamelo_py.points.laws import (
     constrained_velocity,
     jacobian,
     kirchhoff_stress,
     specific_volume,
 )
-from karamelo_py.points.transfers import Moment, add_momentum, gradient_weight, zero_moment
+from karamelo_py.points.transfers import Moment, gradient_weight, nodal_momentum, zero_moment
 from karamelo_py.points.transfers.xpic import Series, TermOfSeries
 
 
@@ -228,23 +226,21 @@ def momentum_part(
     w: Work, stencil: tuple, k: int, weight: Number, mass: Number, v: tuple, moment: tuple
 ) -> tuple:
     """The momentum that a point gives to the k-th node."""
-    none = subtract(v, v)
-    return add_momentum(
-        w.transfer, w.kin, w.basis, w.grid, stencil, k, weight, mass, v, moment, none
-    )
+    return nodal_momentum(w.transfer, w.kin, w.basis, w.grid, stencil, k, weight, mass, v, moment)
 
 
 @scattered.on(MassMomentum)
 def _scattered_mass_momentum(quantity, w, stencil, k, load):
-    i, weight, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
+    i, N, grad_N = entry(w.basis, w.kin, w.grid, stencil, k)
     mass, v, moment, led, x = load
-    part = momentum_part(w, stencil, k, weight, mass, v, moment)
-    accumulate(w.nodes.sums, i, MASS, (weight * mass,) + part)
-    bring_energy(field(w.nodes.fields, EnergyLoss), i, weight * mass, part)
-    accumulate_led(field(w.nodes.fields, RigidSums), i, weight, led, v)
-    accumulate_optional(field(w.nodes.fields, Centre), i, scale(weight * mass, x))
-    accumulate_optional(field(w.nodes.fields, Normal), i, scale(mass, leading(gradient, v)))
-    accumulate_optional(field(w.nodes.fields, SquaredMass), i, (weight * mass * mass,))
+    momentum = momentum_part(w, stencil, k, N, mass, v, moment)
+    accumulate(w.nodes.sums, i, MASS, (N * mass, *momentum))
+    bring_energy(field(w.nodes.fields, EnergyLoss), i, N * mass, momentum)
+    accumulate_led(field(w.nodes.fields, RigidSums), i, N, led, v)
+    if len(x):
+        accumulate_optional(field(w.nodes.fields, Centre), i, N * mass * x)
+    accumulate_optional(field(w.nodes.fields, Normal), i, mass * grad_N.planar())
+    accumulate_optional(field(w.nodes.fields, SquaredMass), i, (N * mass * mass,))
 
 
 @point_function(otherwise=True)
@@ -255,7 +251,7 @@ def mean_stress(averaging, kin, law, state, volume):
 
 @mean_stress.on(FBar)
 def _mean_stress_f_bar(averaging, kin, law, state, volume):
-    tau = stretching_mean(kin, kirchhoff_stress(law, kin, state))
+    tau = kirchhoff_stress(law, kin, state).mean_of_stretching()
     return volume * tau, volume * jacobian(law, kin, state)
 
 
@@ -267,16 +263,14 @@ def _load_of_averaged_force(quantity, w, p, like):
     volume = _mass(w, p) * specific_volume(law)
     own, present = mean_stress(w.averaging, w.kin, law, state, volume)
     change = present * field(w.points.fields, AveragedStress)[0, p] - own
-    none = zero_symmetric(w.kin, change)
-    return force_stress(w.frame, w.kin, add_pressure(w.kin, change, none, -change), f)
+    return force_stress(w.frame, w.kin, nothing(w.kin) - change * I, f)
 
 
 @scattered.on(AveragedForce)
 def _scattered_averaged_force(quantity, w, stencil, k, load):
-    i, weight, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
-    g = gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, gradient)
-    part = add_force(w.frame, w.kin, zero_vector(w.kin, weight), load, g)
-    accumulate(w.nodes.sums, i, of_force(w.kin), part)
+    i, _, grad_N = entry(w.basis, w.kin, w.grid, stencil, k)
+    grad_N = gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, grad_N)
+    accumulate(w.nodes.sums, i, of_force(w.kin), (*load.dot(grad_N),))
 
 
 @load_of.on(InternalForce)
@@ -286,21 +280,23 @@ def _load_of_internal_force(quantity, w, p, like):
     f = deformation_of(w.frame, w.kin, law, state, w.points, p)
     volume = _mass(w, p) * specific_volume(law)
     # Minus volume times stress, with the sign of the internal force.
-    stress = scale(-volume, force_stress(w.frame, w.kin, kirchhoff_stress(law, w.kin, state), f))
+    stress = -volume * force_stress(w.frame, w.kin, kirchhoff_stress(law, w.kin, state), f)
     force = load(field(w.points.fields, Force), p, load_vector(w.kin, w.points.v, p))
     mean = mean_stress(w.averaging, w.kin, law, state, volume)
-    return stress, scale(of_present(p, real(1, volume)), force), mean
+    here = of_present(p, real(1, volume))
+    return stress, here * force if len(force) else (), mean
 
 
 @scattered.on(InternalForce)
 def _scattered_internal_force(quantity, w, stencil, k, load):
-    i, weight, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
-    g = gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, gradient)
-    stress, outer, mean = load
-    none = zero_vector(w.kin, weight)
-    part = add_force(w.frame, w.kin, add_optional(none, weight, outer), stress, g)
-    accumulate(w.nodes.sums, i, of_force(w.kin), part)
-    accumulate_optional(field(w.nodes.fields, NodalStress), i, scale(weight, mean))
+    i, N, grad_N = entry(w.basis, w.kin, w.grid, stencil, k)
+    grad_N = gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, grad_N)
+    stress, of_fixes, mean = load
+    force = stress.dot(grad_N)
+    if len(of_fixes):
+        force = N * of_fixes + force
+    accumulate(w.nodes.sums, i, of_force(w.kin), (*force,))
+    accumulate_optional(field(w.nodes.fields, NodalStress), i, tuple([N * a for a in mean]))
 
 
 @point_function(otherwise=True)
@@ -316,7 +312,9 @@ def _mapped_again_in_total(frame, basis, grid, moment):
 
 @load_of.on(MomentumAgain)
 def _load_of_momentum_again(quantity, w, p, like):
-    moment = mapped_again_in(w.frame, w.basis, w.grid, _moment(w, p, like))
+    moment = _moment(w, p, like)
+    if len(moment):
+        moment = mapped_again_in(w.frame, w.basis, w.grid, moment)
     return _mass(w, p), load_vector(w.kin, w.points.v, p), moment
 
 
@@ -324,7 +322,8 @@ def _load_of_momentum_again(quantity, w, p, like):
 def _scattered_momentum_again(quantity, w, stencil, k, load):
     i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
     mass, v, moment = load
-    accumulate(w.nodes.velocity, i, 0, momentum_part(w, stencil, k, weight, mass, v, moment))
+    momentum = momentum_part(w, stencil, k, weight, mass, v, moment)
+    accumulate(w.nodes.velocity, i, 0, (*momentum,))
 
 
 @load_of.on(Volumes)
@@ -352,7 +351,7 @@ def _load_of_series_back(quantity, w, p, like):
 def _scattered_series_back(quantity, w, stencil, k, load):
     i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
     mass, u = load
-    accumulate(field(w.nodes.fields, Series), i, len(u), scale(weight * mass, u))
+    accumulate(field(w.nodes.fields, Series), i, len(u), (*(weight * mass * u),))
 
 
 @shared
@@ -360,14 +359,14 @@ def accumulate_led(array, i, weight, led, v):
     """Give a node the mass and momentum of a rigid point."""
     if len(led):
         part = weight * led[0]
-        accumulate(array, i, MASS, (part, *scale(part, v)))
+        accumulate(array, i, MASS, (part, *(part * v)))
 
 
 @shared
 def accumulate_optional(array, i, values):
     """Add to a node, where there is an array for it."""
     if array is not None:
-        accumulate(array, i, 0, values)
+        accumulate(array, i, 0, (*values,))
 
 
 load_all = for_tags(load_of, "w, p, like")

@@ -13,8 +13,8 @@ from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.fields import load, load_vector
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import loop, subkernel
-from karamelo_py.compiler.tuples import record, subtract
-from karamelo_py.points.kinematics import dimension, vector_at
+from karamelo_py.compiler.tuples import record
+from karamelo_py.points.kinematics import dimension, vector
 from karamelo_py.points.laws import initial_state, jacobian, specific_volume
 from karamelo_py.points.pairs import force_between, radius
 
@@ -188,11 +188,17 @@ def _find_cells(d, bodies, cells, width):
             cells.start[c] += 1
 
 
+@shared
+def vector_at(kin, array, i):
+    """Row `i` of `array` (n, >= d) as a vector."""
+    return vector(kin, [array[i, k] for k in range(kin.dimension)])
+
+
 @subkernel
 def _touch(law, kin, bodies, reach, dt, kick, i, j, total):
     """The force between two points, if they touch; whether they do."""
     x, f = bodies.x, bodies.force
-    dx = subtract(vector_at(kin, x, j), vector_at(kin, x, i))
+    dx = vector_at(kin, x, j) - vector_at(kin, x, i)
     squared = 0.0
     for k in range(dimension(kin)):
         if not abs(dx[k]) < reach:
@@ -201,7 +207,7 @@ def _touch(law, kin, bodies, reach, dt, kick, i, j, total):
     both = bodies.radius[i] + bodies.radius[j]
     if not 0 < squared < both * both:
         return 0
-    dv = subtract(vector_at(kin, bodies.v, j), vector_at(kin, bodies.v, i))
+    dv = vector_at(kin, bodies.v, j) - vector_at(kin, bodies.v, i)
     force = force_between(
         law, kin, dx, sqrt(squared), bodies.radius[i], bodies.radius[j],
         bodies.mass[i], bodies.mass[j], dv, dt, kick,

@@ -5,12 +5,11 @@ from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import entered, subkernel
 from karamelo_py.compiler.threads import shared_out
-from karamelo_py.compiler.tuples import record, subtract
+from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Setup, Tag
 from karamelo_py.kernels.totals import agree_on_reports
 from karamelo_py.points.frames import follows
 from karamelo_py.points.grid import inside
-from karamelo_py.points.kinematics import largest_component
 
 
 @entered
@@ -65,7 +64,7 @@ def _check_share(frame, kin, grids, points, tiling, now, k):
         for p in range(tiling.range[t, 0], tiling.range[t, 1]):
             grid = record(grids, points.grid[p])
             y = load_vector(kin, points.x[1 - now], p)
-            step = largest_component(kin, subtract(y, load_vector(kin, points.x[now], p)))
+            step = (y - load_vector(kin, points.x[now], p)).largest()
             cells = float(step * grid.inv_h)
             furthest = max(furthest, cells)
             if not (cells <= 1 and (inside(grid, kin, y) or not follows(frame))):

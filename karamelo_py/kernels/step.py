@@ -13,7 +13,7 @@ from karamelo_py.compiler.fields import load, load_vector
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import loop
 from karamelo_py.compiler.threads import by_team
-from karamelo_py.compiler.tuples import record, subtract
+from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels import table
 from karamelo_py.kernels.arrays import DT, TIME, NoHooks, Setup, Tag
 from karamelo_py.kernels.clock import common_velocity, finish, kick, last_step_size, step_size
@@ -25,7 +25,6 @@ from karamelo_py.kernels.sweep import sweep, sweep_nodes
 from karamelo_py.kernels.visit import deformation_of
 from karamelo_py.kernels.watch import look, look_at_heat
 from karamelo_py.points.frames import inverse_stretch_squared
-from karamelo_py.points.kinematics import largest_component
 from karamelo_py.points.laws import initial_state, wave_speed_squared
 
 
@@ -184,8 +183,8 @@ def _fastest(frame, kin, points, laws, control):
         speed = sqrt(
             wave_speed_squared(law, kin, state) * inverse_stretch_squared(frame, kin, f, mass)
         )
-        v = subtract(load_vector(kin, points.v, p), common)
-        rate = max(rate, speed + largest_component(kin, v))
+        v = load_vector(kin, points.v, p) - common
+        rate = max(rate, speed + v.largest())
     clock.rate = max(clock.rate, rate)
 
 

@@ -47,7 +47,7 @@ from karamelo_py.kernels.arrays import (
     Tag,
 )
 from karamelo_py.kernels.clock import common_velocity
-from karamelo_py.kernels.g2p import empty_all, settled_all, zero_vector
+from karamelo_py.kernels.g2p import empty_all, settled_all
 from karamelo_py.kernels.lanes import (
     lanes_of_update,
     lanes_of_visit,
@@ -71,6 +71,7 @@ from karamelo_py.kernels.visit import (
 from karamelo_py.points.basis import locate
 from karamelo_py.points.frames import Total, Updated, follows
 from karamelo_py.points.grid import Grid, inside, renumbered
+from karamelo_py.points.kinematics import zero_vector
 
 ROUNDING = 1e-3  # cells by which distances in cells may be rounded
 STRETCH = 64  # points: what they gather, and what they have, stays in the nearest cache

@@ -18,7 +18,7 @@ from karamelo_py.kernels.arrays import Index, Nodes, Number, Places, Points, Tag
 from karamelo_py.points.basis import blank, locate
 from karamelo_py.points.frames import DeformationGradient, Total
 from karamelo_py.points.grid import Grid
-from karamelo_py.points.kinematics import zero_tensor
+from karamelo_py.points.kinematics import zero
 from karamelo_py.points.laws import deformation, initial_state
 from karamelo_py.points.transfers import Moment, zero_moment
 
@@ -85,7 +85,7 @@ def ask_ahead_of_stretch(w: Work, p: Index, like: Number) -> None:
         _ask(w.points.state, count_in(initial_state(law_of(w, p), w.kin, like)), p)
         f = field(w.points.fields, DeformationGradient)
         if f is not None:
-            _ask(f, len(zero_tensor(w.kin, like)), p)
+            _ask(f, w.kin.tensor_size, p)
 
 
 @shared
@@ -117,7 +117,7 @@ def deformation_of(frame: Tag, kin: Tag, law: Tag, state: tuple, points: Points,
 
 @deformation_of.on(Total)
 def _deformation_of_total(frame, kin, law, state, points, p):
-    f = load(field(points.fields, DeformationGradient), p, zero_tensor(kin, points.mass[p]))
+    f = load(field(points.fields, DeformationGradient), p, zero(kin, points.mass[p]))
     return stored_or_own(f, law, kin, state)
 
 

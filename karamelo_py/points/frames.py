@@ -7,12 +7,10 @@ needs the deformation gradient F of the points.
 
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import point_function, real
+from karamelo_py.compiler.compile import point_function
 from karamelo_py.compiler.fields import Field, tensor
 from karamelo_py.compiler.powers import power
-from karamelo_py.compiler.tuples import add, add_scaled, leading, scale, subtract
-from karamelo_py.points import kinematics
-from karamelo_py.points.kinematics.components import Number, formula
+from karamelo_py.points.kinematics import I, inv, unit
 from karamelo_py.points.laws import deformation
 
 
@@ -30,7 +28,7 @@ class DeformationGradient(Field):
     @staticmethod
     def start(kin: Any) -> tuple[float, ...]:
         """The unit tensor."""
-        return kinematics.identity(kin, 1.0)
+        return tuple(map(float, unit(kin)))
 
     @staticmethod
     def needed(law: NamedTuple) -> bool:
@@ -65,7 +63,7 @@ def spatial_increment(frame, kin, dl, f):
 @spatial_increment.on(Total)
 def _spatial_increment_total(frame, kin, dl, f):
     # F + dt Fdot = (I + dt Fdot F^-1) F exactly
-    return kinematics.increment_of(kin, dl, f)
+    return dl @ inv(f)
 
 
 @point_function(otherwise=True)
@@ -73,7 +71,7 @@ def of_places_before(frame, kin, dl):
     """`dl` of the places before a motion, from that of the places after it."""
     # grad v there is grad v here (I - dl)^-1, so that F grows by (I - dl)^-1 exactly. As a product
     # it keeps its digits where dl is small.
-    return kinematics.increment_of(kin, dl, subtract(kinematics.identity(kin, dl[0]), dl))
+    return dl @ inv(I - dl)
 
 
 @of_places_before.on(Total)
@@ -89,7 +87,7 @@ def strained(frame, kin, f, dl):
 
 @strained.on(Total)
 def _strained_total(frame, kin, f, dl):
-    return add(f, dl)
+    return f + dl
 
 
 @point_function(otherwise=True)
@@ -100,29 +98,7 @@ def force_stress(frame, kin, tau, f):
 
 @force_stress.on(Total)
 def _force_stress_total(frame, kin, tau, f):
-    return kinematics.nominal(kin, tau, f)
-
-
-@point_function(otherwise=True)
-def add_force(frame, kin, total, stress, gradient):
-    """total + stress . gradient of a basis function."""
-    return kinematics.add_symmetric_dot(kin, total, stress, gradient)
-
-
-@add_force.on(Total)
-def _add_force_total(frame, kin, total, stress, gradient):
-    return kinematics.add_tensor_dot(kin, total, stress, gradient)
-
-
-@point_function(otherwise=True)
-def force_columns(frame, kin, stress):
-    """The columns of a stress that makes nodal forces, vectors."""
-    return kinematics.symmetric_columns(kin, stress)
-
-
-@force_columns.on(Total)
-def _force_columns_total(frame, kin, stress):
-    return kinematics.columns(kin, stress)
+    return tau.nominal(f)
 
 
 @point_function(otherwise=True)
@@ -137,43 +113,32 @@ def pulled_back(frame, kin, g, f):
 
 @pulled_back.on(Total)
 def _pulled_back_total(frame, kin, g, f):
-    flat = kinematics.planar(kin)
-    inside = kinematics.inverse(flat, leading(f, kinematics.zero_tensor(flat, g[0])))
-    return kinematics.add_symmetric_dot(
-        flat, subtract(g, g), kinematics.left_cauchy_green(flat, inside), g
-    )
+    inside = inv(f.planar()).left_cauchy_green()
+    return inside.dot(g)
 
 
 @point_function(otherwise=True)
 def scaled_increment(frame, kin, dl, f, ratio):
     """`dl` changed such that the volume after it is `ratio` times what it would be."""
     # (I + dl) s - I
-    s = power(ratio, stretched_share(kin, ratio))
-    return add_scaled(scale(s, dl), s - real(1, s), kinematics.identity(kin, s))
+    s = power(ratio, 1 / len(dl.axes))
+    return s * dl + (s - 1) * I
 
 
 @scaled_increment.on(Total)
 def _scaled_increment_total(frame, kin, dl, f, ratio):
     # (F + dl) s - F
-    s = power(ratio, stretched_share(kin, ratio))
-    return add_scaled(scale(s, dl), s - real(1, s), f)
-
-
-@formula()
-def stretched_share(kin, like: Number):
-    """One over the number of directions that can stretch."""
-    return 1 / len(kin.axes)
+    s = power(ratio, 1 / len(dl.axes))
+    return s * dl + (s - 1) * f
 
 
 @point_function(otherwise=True)
 def inverse_stretch_squared(frame, kin, f, like):
     """(h / size of a deformed cell)^2, one over the least stretch squared: it shortens the step."""
-    return real(1, like)
+    return 1
 
 
 @inverse_stretch_squared.on(Total)
 def _inverse_stretch_squared_total(frame, kin, f, like):
     # 1 / (smallest stretch)^2 is the largest eigenvalue of F^-1 F^-T.
-    return kinematics.largest_row_sum(
-        kin, kinematics.left_cauchy_green(kin, kinematics.inverse(kin, f))
-    )
+    return inv(f).left_cauchy_green().largest_row_sum()

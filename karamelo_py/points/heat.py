@@ -2,7 +2,7 @@
 
 from math import sqrt
 
-from karamelo_py.compiler.compile import point_function, real
+from karamelo_py.compiler.compile import point_function
 from karamelo_py.compiler.powers import power
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
 
@@ -17,7 +17,7 @@ def face(kin, volume, x):
 
 @face.on(Line)
 def _face_line(kin, volume, x):
-    return real(1, volume)
+    return 1
 
 
 @face.on(PlaneStrain)
@@ -33,4 +33,4 @@ def _face_axisymmetric(kin, volume, x):
 
 @face.on(Space)
 def _face_space(kin, volume, x):
-    return power(volume, real(2 / 3, volume))
+    return power(volume, 2 / 3)

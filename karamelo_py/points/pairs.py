@@ -4,7 +4,6 @@ from math import pi, sqrt
 from typing import NamedTuple
 
 from karamelo_py.compiler.compile import point_function
-from karamelo_py.compiler.tuples import add_scaled, scale
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space, dimension
 
 
@@ -56,7 +55,7 @@ def _force_between_hertz(law, kin, dx, r, radius1, radius2, mass1, mass2, dv, dt
     p = radius1 + radius2 - r
     round_ = radius1 * radius2 / (radius1 + radius2)
     stiffness = 4.0 / 3.0 if dimension(kin) == 3 else pi / 4.0
-    return scale(-stiffness * law.modulus * sqrt(round_ * p * p * p) / r, dx)
+    return -stiffness * law.modulus * sqrt(round_ * p * p * p) / r * dx
 
 
 @force_between.on(MinimizePenetration)
@@ -66,12 +65,12 @@ def _force_between_minimize_penetration(
     reduced = mass1 * mass2 / (mass1 + mass2)
     p = radius1 + radius2 - r
     push = reduced * p / (dt * kick)
-    force = scale(-push / r, dx)
+    force = -push / r * dx
     if law.friction > 0:
         along = 0.0
         for k in range(dimension(kin)):
             along += dv[k] * dx[k]
-        slide = add_scaled(dv, -along / (r * r), dx)
+        slide = dv + -along / (r * r) * dx
         slip = 0.0
         for k in range(dimension(kin)):
             slip += slide[k] * slide[k]
@@ -79,5 +78,5 @@ def _force_between_minimize_penetration(
         if slip > 0:
             # Friction stops the slip of two free points at most: it does not turn it around.
             rub = min(law.friction * push, reduced * slip / kick)
-            force = add_scaled(force, rub / slip, slide)
+            force = force + rub / slip * slide
     return force

@@ -53,7 +53,7 @@ shape
     :class:`~karamelo_py.points.basis.cpdi.Element`).
 """
 
-from karamelo_py.compiler.compile import point_function, real, shared
+from karamelo_py.compiler.compile import point_function, shared
 
 
 @point_function(tags=2)
@@ -70,8 +70,8 @@ def support(basis, kin):
 def entry(basis, kin, grid, stencil, k):
     """(node number, weight N, gradient of N) of the k-th node of a stencil.
 
-    The gradient has the components of a vector; axisymmetric, N / r comes third. A node may come
-    more than once: its parts add up.
+    The gradient is a vector; axisymmetric with N / r behind (`Gradient` of the kinematics). A node
+    may come more than once: its parts add up.
     """
 
 
@@ -94,7 +94,7 @@ def mapped_again(basis, grid, moment):
 @point_function(otherwise=True)
 def first_node(basis, like):
     """What is added to a position in cells, so that its whole part tells which nodes are seen."""
-    return real(0, like)
+    return 0
 
 
 # --- the shape of a point's domain ------------------------------------------------------------

@@ -3,7 +3,6 @@
 from typing import NamedTuple
 
 from karamelo_py.compiler.compile import real
-from karamelo_py.compiler.tuples import scale
 from karamelo_py.language.rules import known_failure
 from karamelo_py.points.basis import mapped_again
 from karamelo_py.points.basis.product import Along, along, register, spacing
@@ -45,7 +44,7 @@ def _along_bernstein_quadratic(basis, kin, grid, place, direction):
     a = in_cells(grid, direction, place[direction])
     i = min(int(a), cells_along(grid, direction) - 1)  # the last face belongs to the last cell
     s = a - real(i, a)
-    t = real(1, s) - s
+    t = 1 - s
     twice = grid.inv_h + grid.inv_h
     weights = (t * t, (s + s) * t, s * s)
     gradients = (-twice * t, twice * (t - s), twice * s)
@@ -54,14 +53,14 @@ def _along_bernstein_quadratic(basis, kin, grid, place, direction):
 
 
 @spacing.on(BernsteinQuadratic)
-def _spacing_bernstein_quadratic(basis, like):
-    return real(0.5, like)
+def _spacing_bernstein_quadratic(basis):
+    return 0.5
 
 
 @mapped_again.on(BernsteinQuadratic)
 def _mapped_again_bernstein_quadratic(basis, grid, moment):
     # As with linear functions: B D^-1 grows without bound where D vanishes.
-    return scale(grid.h - grid.h, moment)
+    return (grid.h - grid.h) * moment
 
 
 register(BernsteinQuadratic, 3)

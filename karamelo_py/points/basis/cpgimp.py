@@ -1,22 +1,17 @@
 """Contiguous-particle GIMP: hat functions averaged over a box that deforms with the point."""
 
-from math import prod
 from types import MappingProxyType
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import Weighted, index, real, shared, where
+from karamelo_py.compiler.compile import Weighted, index, real
 from karamelo_py.compiler.powers import power
-from karamelo_py.compiler.symbols import Symbol, call
-from karamelo_py.compiler.tuples import scale
 from karamelo_py.language.rules import known_failure
-from karamelo_py.points import kinematics
 from karamelo_py.points.basis import carried, carrier, carry, deformed, mapped_again
-from karamelo_py.points.basis.product import along, node_number, register
+from karamelo_py.points.basis.product import along, node_number, product, register
 from karamelo_py.points.basis.ugimp import averaged_hats, box
 from karamelo_py.points.basis.wide import wide
-from karamelo_py.points.frames import stretched_share
 from karamelo_py.points.grid import cells_along
-from karamelo_py.points.kinematics.components import Number, Tensor, Vector, formula
+from karamelo_py.points.kinematics import I, det, planar, tensor
 
 # Half sizes that weights are made with, in cells.
 LEAST = 1e-3
@@ -145,16 +140,13 @@ class CPGIMP(_Box):
 
 # --- weights ----------------------------------------------------------------------------------
 
-_averaged = averaged_hats(3)
 
-
-@shared
 def _along(kin, grid, place, direction):
     a, lo, hi = box(grid, kin, place, direction, LEAST, MOST)
     last = cells_along(grid, direction)
     first = max(min(min(int(a), last - 1) - 1, last - 3), 0)
     start = real(first, a)
-    return _averaged(grid, first, max(lo, real(0, a)) - start, min(hi, real(last, a)) - start)
+    return averaged_hats(3, grid, first, max(lo, 0) - start, min(hi, real(last, a)) - start)
 
 
 @along.on(CPGIMPDet)
@@ -184,7 +176,6 @@ def _along_cpgimp_corners(basis, kin, grid, place, direction):
     return AlongWithEnds(line.first, line.r, line.weights, line.gradients, line.affine, ends)
 
 
-@shared
 def _end(at, first, top):
     """The cell from node `first` on in which an end of a box lies, and how far into it.
 
@@ -198,55 +189,43 @@ def _end(at, first, top):
 @mapped_again.on(CPGIMPDiagonal)
 def _mapped_again_cpgimp_diagonal(basis, grid, moment):
     # As with linear functions, which these become where the box vanishes.
-    return scale(grid.h - grid.h, moment)
+    return (grid.h - grid.h) * moment
 
 
 # --- boxes ------------------------------------------------------------------------------------
-# F in the plane is enough for boxes: axisymmetric points need no part around the axis, and what
-# `dl` holds of it comes last, where the functions of plane tensors do not look.
-
-
-@formula()
-def _scaled_box(kin, place: Vector, factor: Number):
-    """The place with all half sizes times `factor`."""
-    d = kin.dimension
-    return [place[k] if k < d else factor * place[k] for k in range(2 * d)]
-
-
-@formula()
-def _deformation(kin, place: Vector):
-    """F of a place that keeps it."""
-    return [place[3 * kin.dimension + k] for k in range(kin.dimension**2)]
-
-
-@formula()
-def _stretched_box(kin, place: Vector, factors: Vector, f: Tensor):
-    """The place with half sizes that are `factors` times those at the start, and with this F."""
-    position = kin.vector(lambda i: place[i])
-    start = kin.vector(lambda i: place[2 * kin.dimension + i])
-    half = kin.vector(lambda i: start[i] * abs(factors[i]))
-    return position + half + start + kin.tensor(lambda i, j: f[i, j])
+# F in the plane is enough for boxes: axisymmetric points need no part around the axis.
 
 
 @deformed.on(CPGIMPDet)
 def _deformed_cpgimp_det(basis, kin, place, dl):
-    return _scaled_box(
-        kin, place, power(kinematics.volume_ratio(kin, dl), stretched_share(kin, dl[0]))
-    )
+    factor = power(det(I + dl), 1 / len(dl.axes))
+    d = kin.dimension
+    return (*place[:d], *[factor * half for half in place[d : 2 * d]])
 
 
 @deformed.on(CPGIMPDiagonal)
 def _deformed_cpgimp_diagonal(basis, kin, place, dl):
-    flat = kinematics.planar(kin)
-    f = kinematics.deform(flat, dl, _deformation(flat, place))
-    return _stretched_box(flat, place, kinematics.diagonal(flat, f), f)
+    F = deformation_of_box(kin, place).after(dl.planar())
+    return stretched_box(kin, place, F.diagonal(), F)
 
 
 @deformed.on(CPGIMPStretch)
 def _deformed_cpgimp_stretch(basis, kin, place, dl):
-    flat = kinematics.planar(kin)
-    f = kinematics.deform(flat, dl, _deformation(flat, place))
-    return _stretched_box(flat, place, kinematics.stretch(flat, f), f)
+    F = deformation_of_box(kin, place).after(dl.planar())
+    return stretched_box(kin, place, F.stretch(), F)
+
+
+def deformation_of_box(kin, place):
+    """F of a place that keeps it."""
+    return tensor(planar(kin), place[3 * kin.dimension :])
+
+
+def stretched_box(kin, place, factors, F):
+    """Make the place with half sizes that are `factors` times those at the start, and with F."""
+    d = kin.dimension
+    start = place[2 * d : 3 * d]
+    half = [size * abs(factor) for size, factor in zip(start, factors[:d], strict=True)]
+    return (*place[:d], *half, *start, *F)
 
 
 # --- corners ----------------------------------------------------------------------------------
@@ -256,49 +235,33 @@ def _deformed_cpgimp_stretch(basis, kin, place, dl):
 
 @carried.on(CPGIMPCorners)
 def _carried_cpgimp_corners(basis, kin):
-    return 1 << kinematics.dimension(kin)
+    return 1 << kin.dimension
 
 
-@shared
 def _side(line, corner, j):
     """Node along one direction, and weight, of bit `j` for the end that bit `corner` is."""
     i, b = line.ends[1] if corner else line.ends[0]
-    return (i + 1, b) if j else (i, real(1, b) - b)
-
-
-@formula()
-def _carrier(kin, grid: Number, stencil: Number, corner: Number):
-    """The nodes that carry a corner, and their weights."""
-    bits = kin.vector(lambda i: Symbol(f"{{}} & {1 << i}", corner))
-    first = node_number(grid.first, kin.vector(lambda i: stencil.lines[i].first))
-    rows, weights = [], []
-    for j in range(2**kin.dimension):
-        sides = kin.vector(lambda i, j=j: call(_side, stencil.lines[i], bits[i], j & 1 << i))
-        rows.append(call(index, node_number(first, [side[0] for side in sides])))
-        weights.append(prod(side[1] for side in sides))
-    return call(Weighted, rows, weights)
+    return (i + 1, b) if j else (i, 1 - b)
 
 
 @carrier.on(CPGIMPCorners)
 def _carrier_cpgimp_corners(basis, kin, grid, stencil, corner):
-    return _carrier(kin, grid, stencil, corner)
-
-
-@formula()
-def _carry(kin, place: Vector, corner: Number, u: Vector):
-    """The place with the part of a corner's displacement `u` in the half sizes."""
-    d = kin.dimension
-
-    def half(i):
-        outward = call(where, Symbol(f"{{}} & {1 << i}", corner), u[i], -u[i])
-        return place[d + i] + 0.5**d * outward
-
-    return kin.vector(lambda i: place[i]) + kin.vector(half)
+    first = node_number(grid, grid.first, [line.first for line in stencil.lines])
+    rows, weights = [], []
+    for j in range(2**kin.dimension):
+        lines = enumerate(stencil.lines)
+        sides = [_side(line, corner & (1 << i), j & (1 << i)) for i, line in lines]
+        rows.append(index(node_number(grid, first, [side[0] for side in sides])))
+        weights.append(product([side[1] for side in sides]))
+    return Weighted(tuple(rows), tuple(weights))
 
 
 @carry.on(CPGIMPCorners)
 def _carry_cpgimp_corners(basis, kin, place, old, corner, displacement):
-    return _carry(kin, place, corner, displacement)
+    d = kin.dimension
+    moves = enumerate(zip(place[d : 2 * d], displacement, strict=True))
+    half = [size + 0.5**d * (u if corner & (1 << i) else -u) for i, (size, u) in moves]
+    return (*place[:d], *half)
 
 
 for _basis in (CPGIMPDet, CPGIMPDiagonal, CPGIMPStretch, CPGIMPCorners):

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import all_lanes, real, shared, where
+from karamelo_py.compiler.compile import all_lanes, real, where
 from karamelo_py.points.basis.noise import CUBIC
 from karamelo_py.points.basis.product import Along, along, register
 from karamelo_py.points.basis.wide import wide
@@ -50,81 +50,68 @@ def _along_cubic_spline(basis, kin, grid, place, direction):
     last = cells_along(grid, direction)
     cell = int(a)
     t = a - real(cell, a)
-    s = real(1, a) - t
-    half, sixth, two_thirds = real(0.5, a), real(1 / 6, a), real(2 / 3, a)
+    s = 1 - t
     tt, ss = t * t, s * s
     weights = (
-        sixth * (ss * s),
-        two_thirds + tt * (half * t - real(1, a)),
-        two_thirds + ss * (half * s - real(1, a)),
-        sixth * (tt * t),
+        1 / 6 * (ss * s),
+        2 / 3 + tt * (0.5 * t - 1),
+        2 / 3 + ss * (0.5 * s - 1),
+        1 / 6 * (tt * t),
     )
-    h, k = half * grid.inv_h, real(1.5, a) * grid.inv_h
-    gradients = (
-        -h * ss,
-        t * (k * t - (grid.inv_h + grid.inv_h)),
-        -s * (k * s - (grid.inv_h + grid.inv_h)),
-        h * tt,
-    )
+    h, k, twice = 0.5 * grid.inv_h, 1.5 * grid.inv_h, grid.inv_h + grid.inv_h
+    gradients = (-h * ss, t * (k * t - twice), -s * (k * s - twice), h * tt)
     # D = h^2 / 3
-    three = real(3, a) * grid.inv_h
-    r = real(1, a) + t
+    three = 3 * grid.inv_h
+    r = 1 + t
     affine = (
         -three * r * weights[0],
         -three * t * weights[1],
         three * s * weights[2],
-        three * (real(1, a) + s) * weights[3],
+        three * (1 + s) * weights[3],
     )
     line = Along(cell - 1, r, weights, gradients, affine)
     bulk = (cell >= 1) & (cell < last - 1)
     if all_lanes(bulk):
         return line
-    return where(bulk, line, _at_wall(grid, a, last))
+    return where(bulk, line, at_wall(grid, a, last))
 
 
-@shared
-def _at_wall(grid, a, last):
+def at_wall(grid, a, last):
     """The modified functions of the cell at a wall; nodes that make up the four have no weight."""
     cell = min(int(a), last - 1)
     first = max(min(cell, last - 3), 0)
     r = a - real(first, a)
-    zero, one = real(0, a), real(1, a)
     if last == 1:  # both walls at once: what is left are the hat functions
+        zero = real(0, a)
         gradients = (zero - grid.inv_h, zero + grid.inv_h, zero, zero)
-        return Along(first, r, (one - r, r, zero, zero), gradients, gradients)
+        return Along(first, r, (1 - r, r, zero, zero), gradients, gradients)
     lower = cell == 0
-    n, g, c = _beside_wall(grid, where(lower, a, real(last, a) - a))
+    n, g, c = beside_wall(grid, where(lower, a, real(last, a) - a))
     n = where(lower, n, (n[2], n[1], n[0]))
     g = where(lower, g, (-g[2], -g[1], -g[0]))
     c = where(lower, c, (-c[2], -c[1], -c[0]))
     behind = (cell > 0) & (last > 2)  # they are the last three of the four
-    n = where(behind, (zero,) + n, n + (zero,))
-    g = where(behind, (zero,) + g, g + (zero,))
-    c = where(behind, (zero,) + c, c + (zero,))
+    n, g, c = [
+        tuple([where(behind, *pair) for pair in zip((0, *of), (*of, 0), strict=True)])
+        for of in (n, g, c)
+    ]
     return Along(first, r, n, g, c)
 
 
-@shared
-def _beside_wall(grid, t):
+def beside_wall(grid, t):
     """N, dN/dx and N D^-1 (X - x) of the three nodes from a wall on, `t` cells away from it.
 
     The ghost node takes D to h^2 t (1 - t + t^2/3), which vanishes at the wall, but t cancels out
     of N D^-1 (X - x).
     """
-    one, half, third = real(1, t), real(0.5, t), real(1 / 3, t)
     tt = t * t
-    sixth = half * third
-    weights = (one - t + sixth * tt * t, t * (one - third * tt), sixth * tt * t)
-    slopes = (
-        (half * tt - one) * grid.inv_h,
-        (one - tt) * grid.inv_h,
-        half * tt * grid.inv_h,
-    )
-    k = grid.inv_h / (one - t + third * tt)
+    weights = (1 - t + 1 / 6 * tt * t, t * (1 - 1 / 3 * tt), 1 / 6 * tt * t)
+    slopes = ((0.5 * tt - 1) * grid.inv_h, (1 - tt) * grid.inv_h, 0.5 * tt * grid.inv_h)
+    k = grid.inv_h / (1 - t + 1 / 3 * tt)
     affine = (
         -k * weights[0],
-        k * (one - third * tt) * (one - t),
-        k * sixth * tt * (one + one - t),
+        k * (1 - 1 / 3 * tt) * (1 - t),
+        k * (1 / 6) * tt * (2 - t),
     )
     return weights, slopes, affine
 

@@ -3,7 +3,6 @@
 from typing import NamedTuple
 
 from karamelo_py.compiler.compile import real
-from karamelo_py.compiler.tuples import scale
 from karamelo_py.language.rules import known_failure
 from karamelo_py.points.basis import mapped_again
 from karamelo_py.points.basis.product import Along, along, register
@@ -73,19 +72,18 @@ def _along_linear(basis, kin, grid, place, direction):
     a = in_cells(grid, direction, place[direction])
     i = min(int(a), cells_along(grid, direction) - 1)  # the last face belongs to the last cell
     r = a - real(i, a)
-    one = real(1, r)
     gradients = (-grid.inv_h, grid.inv_h)
     # D = r (1 - r) h^2 vanishes at the nodes, but N D^-1 (X - x) is the gradient everywhere
     # (Jiang, Schroeder & Teran 2017, "An angular momentum conserving affine-particle-in-cell
     # method", section 5.3).
-    return Along(i, r, (one - r, r), gradients, gradients)
+    return Along(i, r, (1 - r, r), gradients, gradients)
 
 
 @mapped_again.on(Linear)
 def _mapped_again_linear(basis, grid, moment):
     # B D^-1 grows without bound where D vanishes: the velocity that deforms the points leaves it
     # out, and the points keep B, so that nothing is lost.
-    return scale(grid.h - grid.h, moment)
+    return (grid.h - grid.h) * moment
 
 
 register(Linear, 2)

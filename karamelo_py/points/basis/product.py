@@ -1,17 +1,13 @@
 """Bases that are a product of one function a direction: hats, splines, uniform GIMP.
 
 The one-dimensional part is the point function `along`; everything else is the same product for any
-number of directions, unrolled from one definition.
+number of directions.
 """
 
-from collections.abc import Callable
-from functools import cache
-from math import prod
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from karamelo_py.compiler.compile import (
     beside,
-    define,
     first_lane,
     is_one,
     point_function,
@@ -19,10 +15,8 @@ from karamelo_py.compiler.compile import (
     shared,
     where,
 )
-from karamelo_py.compiler.symbols import Symbol, call, written
 from karamelo_py.points.basis import affine_weight, entry, locate, reach, support
-from karamelo_py.points.kinematics import Axisymmetric
-from karamelo_py.points.kinematics.tags import TAGS
+from karamelo_py.points.kinematics import TAGS, Axisymmetric, gradient, vector
 
 
 class Along(NamedTuple):
@@ -70,9 +64,9 @@ def affine_along(basis, grid, line, direction):
 
 
 @point_function(otherwise=True)
-def spacing(basis, like):
+def spacing(basis):
     """Distance of neighbouring nodes, in cells."""
-    return real(1, like)
+    return 1
 
 
 @point_function(otherwise=True)
@@ -87,83 +81,112 @@ def evenly(basis, grid, stencil):
     return True
 
 
-@shared
 def hoop(weight, gradient, inv_r):
     """N / r at an axisymmetric point; at r = 0 its limit, dN/dr (`inv_r` is 0 there)."""
     return where(inv_r > 0, weight * inv_r, gradient)
 
 
-@shared
 def inverse_radius(r):
     """1 / r, or 0 on the axis and so close to it that 1 / r would overflow."""
-    least = real(1e-30, r)
-    return where(r > least, real(1, r) / max(r, least), real(0, r))
+    return where(r > 1e-30, 1 / max(r, 1e-30), 0)
 
 
-@shared
-def _arm(basis, grid, line, k):
-    """X_I - x along one direction."""
-    return (real(k, line.r) * spacing(basis, line.r) - line.r) * grid.h
-
-
-@shared
-def _radius(basis, grid, line):
-    """The radius that the weights reproduce: the point's, but for domains cut at a wall."""
+def radius(basis, grid, line):
+    """Radius that the weights reproduce: the point's, but for domains cut at a wall."""
     r = line.r - line.r
     for k in range(len(line.weights)):
-        node = real(line.first + k, r) * spacing(basis, r)
+        node = real(line.first + k, r) * spacing(basis)
         r += line.weights[k] * (grid.x0 + node * grid.h)
     return r
 
 
-def node_number(first: Any, numbers: Any) -> Symbol:
-    """The number in `grid` of the node that is so many along each direction from node `first`."""
-    grid = Symbol("grid")
-    steps = (*(grid.step_x, grid.step_y)[: len(numbers) - 1], 1)
-    return sum((n * step for n, step in zip(numbers, steps, strict=True)), first)
+# --- numbers of nodes -------------------------------------------------------------------------
 
 
-def digits(k: str, base: int, d: int) -> list[Symbol]:
-    """The `d` digits of a number in this base, the highest first."""
-    divided = [Symbol(f"({{}} // {base**i})", Symbol(k)) if i else Symbol(k) for i in range(d)]
-    divided.reverse()
-    return [divided[0], *(Symbol(f"({{}} % {base})", item) for item in divided[1:])]
+def node_number(grid, first, steps):
+    """Number of the node that is so many steps along each direction from node `first`."""
+    *others, last = steps
+    for step, far in zip(others, (grid.step_x, grid.step_y), strict=False):
+        first = first + step * far
+    return first + last
 
 
-@cache
-def _written(kin: type, width: int) -> dict[Callable, Callable]:
-    """The point functions of a product of `width` nodes a direction."""
-    d, axisymmetric = kin.dimension, kin is Axisymmetric
-    basis, grid, stencil = Symbol("basis"), Symbol("grid"), Symbol("stencil")
-    lines = [call(along, basis, Symbol("kin"), grid, Symbol("place"), i) for i in range(d)]
-    inv_r = call(inverse_radius, call(_radius, basis, grid, lines[0])) if axisymmetric else 0
-    located = call(Stencil, lines, inv_r)
+def digits(k, base, d):
+    """Split a number into `d` digits in a base, the highest first."""
+    divided = [k // base**i if i else k for i in reversed(range(d))]
+    return [divided[0], *[n % base for n in divided[1:]]]
 
-    lines = [stencil.lines[i] for i in range(d)]
-    at = digits("k", width, d)
-    weights = [line.weights[k] for line, k in zip(lines, at, strict=True)]
-    weight = prod(weights)
 
-    def with_one(of: list[Symbol]) -> list[Symbol]:
-        """For each direction the product of the weights, with one of `of` in place of its own."""
-        others = [values[k] for values, k in zip(of, at, strict=True)]
-        return [prod([*weights[:i], others[i], *weights[i + 1 :]]) for i in range(d)]
+def item(values, k):
+    """Take values[k], where only a run may know k."""
+    return values[k]
 
-    gradient = with_one([line.gradients for line in lines])
-    affine = [call(affine_along, basis, grid, line, i) for i, line in enumerate(lines)]
-    if axisymmetric:
-        gradient.append(call(hoop, weight, gradient[0], stencil.inv_r))
-    first = node_number(grid.first, [line.first for line in lines])
-    node = call(beside, first, node_number(0, at))
-    arms = [call(_arm, basis, grid, *pair) for pair in zip(lines, at, strict=True)]
-    seen = "basis, kin, grid, stencil, k"
-    return {
-        locate: written("basis, kin, grid, place", located),
-        support: define("basis, kin", f"return {width**d}"),
-        entry: written(seen, (node, weight, gradient)),
-        reach: written(seen, arms),
-        affine_weight: written(seen, with_one(affine)),
-    }
+
+def product(factors):
+    """Multiply factors, from the first on."""
+    made = factors[0]
+    for factor in factors[1:]:
+        made = made * factor
+    return made
+
+
+# --- the product ------------------------------------------------------------------------------
+
+
+def each_for_its_own(weights, others):
+    """Multiply weights; for each direction with one of `others` in the place of its own."""
+    pairs = enumerate(others)
+    return [product([*weights[:i], other, *weights[i + 1 :]]) for i, other in pairs]
+
+
+def places_of(stencil, k):
+    """Find which node of each line the k-th node of a stencil is."""
+    return digits(k, len(stencil.lines[0].weights), len(stencil.lines))
+
+
+def weights_of(stencil, at):
+    """Find the weights along each direction."""
+    return [item(line.weights, n) for line, n in zip(stencil.lines, at, strict=True)]
+
+
+def locate_product(basis, kin, grid, place):
+    """See `locate`."""
+    lines = tuple([along(basis, kin, grid, place, i) for i in range(kin.dimension)])
+    axis = isinstance(kin, Axisymmetric)
+    return Stencil(lines, inverse_radius(radius(basis, grid, lines[0])) if axis else 0)
+
+
+def support_of_product(basis, kin):
+    """See `support`."""
+    return basis.line_nodes**kin.dimension
+
+
+def entry_of_product(basis, kin, grid, stencil, k):
+    """See `entry`."""
+    at = places_of(stencil, k)
+    weights = weights_of(stencil, at)
+    lines = zip(stencil.lines, at, strict=True)
+    slopes = each_for_its_own(weights, [item(line.gradients, n) for line, n in lines])
+    weight = product(weights)
+    if isinstance(kin, Axisymmetric):
+        slopes = [*slopes, hoop(weight, slopes[0], stencil.inv_r)]
+    first = node_number(grid, grid.first, [line.first for line in stencil.lines])
+    return beside(first, node_number(grid, 0, at)), weight, gradient(kin, slopes)
+
+
+def reach_of_product(basis, kin, grid, stencil, k):
+    """See `reach`."""
+    pairs = zip(stencil.lines, places_of(stencil, k), strict=True)
+    steps = [real(n, line.r) * spacing(basis) - line.r for line, n in pairs]
+    return vector(kin, [step * grid.h for step in steps])
+
+
+def affine_weight_of_product(basis, kin, grid, stencil, k):
+    """See `affine_weight`."""
+    at = places_of(stencil, k)
+    lines = enumerate(zip(stencil.lines, at, strict=True))
+    affine = [item(affine_along(basis, grid, line, i), n) for i, (line, n) in lines]
+    return vector(kin, each_for_its_own(weights_of(stencil, at), affine))
 
 
 def register(basis: type, width: int) -> None:
@@ -175,6 +198,10 @@ def register(basis: type, width: int) -> None:
     usual = {"cells": cells, "nodes_per_cell": 1, "least_nodes": width, "steady_moment": True}
     for name, value in usual.items():
         setattr(basis, name, getattr(basis, name, value))
+    basis.line_nodes = width
     for kin in TAGS:
-        for function, implementation in _written(kin, width).items():
-            function.on(basis, kin)(implementation)
+        locate.on(basis, kin)(locate_product)
+        support.on(basis, kin)(support_of_product)
+        entry.on(basis, kin)(entry_of_product)
+        reach.on(basis, kin)(reach_of_product)
+        affine_weight.on(basis, kin)(affine_weight_of_product)

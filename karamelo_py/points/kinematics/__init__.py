@@ -1,7 +1,5 @@
 """Kinematics: which components of vectors and tensors exist, and the algebra on them.
 
-Every tensor of a point is a flat tuple with the components that its kinematics has:
-
 ================  ==============  =============================  =================================
 tag               vector          velocity gradient, F           symmetric tensor (stress, strain)
 ================  ==============  =============================  =================================
@@ -12,41 +10,14 @@ tag               vector          velocity gradient, F           symmetric tenso
 ================  ==============  =============================  =================================
 
 The gradient of a basis function has the components of a vector, and a third, N/r, at an
-axisymmetric point. The tags are empty NamedTuples: Numba compiles a kernel for each of them,
-without branches.
+axisymmetric point. The tags are empty NamedTuples: kernels are made for each of them, without
+branches.
 """
 
-from karamelo_py.points.kinematics.deformation import (
-    deform,
-    determinant,
-    identity,
-    increment_of,
-    inverse,
-    left_cauchy_green,
-    multiply,
-    right_cauchy_green,
-    stretch,
-    volume_ratio,
-    zero_tensor,
-)
 from karamelo_py.points.kinematics.principal import from_principal, principal
-from karamelo_py.points.kinematics.symmetric import (
-    add_pressure,
-    after_symmetric,
-    contract,
-    deviator,
-    largest_row_sum,
-    leading_symmetric,
-    nominal,
-    spin,
-    stretching_mean,
-    symmetric_part,
-    trace,
-    von_mises,
-    zero_symmetric,
-)
 from karamelo_py.points.kinematics.tags import (
     KINEMATICS,
+    TAGS,
     Axisymmetric,
     Line,
     PlaneStrain,
@@ -55,15 +26,27 @@ from karamelo_py.points.kinematics.tags import (
     free_from,
     planar,
 )
-from karamelo_py.points.kinematics.vectors import (
-    add_outer,
-    add_symmetric_dot,
-    add_tensor_dot,
-    columns,
-    diagonal,
+from karamelo_py.points.kinematics.tensors import (
+    I,
+    Isotropic,
+    SymmetricTensor,
+    Tensor,
+    Vector,
+    det,
+    dev,
     from_columns,
-    largest_component,
-    symmetric_columns,
-    tensor_dot,
-    vector_at,
+    gradient,
+    inner,
+    inv,
+    nothing,
+    outer,
+    sym,
+    symmetric_tensor,
+    tensor,
+    tr,
+    unit,
+    vector,
+    von_mises,
+    zero,
+    zero_vector,
 )

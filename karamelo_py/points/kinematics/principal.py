@@ -1,66 +1,69 @@
 """Principal values and directions of symmetric tensors, and back."""
 
 from math import sqrt
+from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import point_function, real, round_off, shared, where
-from karamelo_py.compiler.tuples import add, scale, subtract
-from karamelo_py.points.kinematics.components import Number, formula
+from karamelo_py.compiler.compile import point_function, round_off, shared, where
 from karamelo_py.points.kinematics.tags import Axisymmetric, Line, PlaneStrain, Space
+from karamelo_py.points.kinematics.tensors import SymmetricTensor
+
+
+class Angle(NamedTuple):
+    """Directions in the plane: cosine and sine of twice the angle to the first."""
+
+    cosine: Any
+    sine: Any
 
 
 @point_function()
-def principal(kin, s):
-    """Principal values (3,) of a symmetric tensor, in no order, and what `from_principal` needs."""
+def principal(s: SymmetricTensor):
+    """Find principal values (3,) of a symmetric tensor, in no order, and their directions."""
 
 
 @point_function()
-def from_principal(kin, values, frame):
-    """The symmetric tensor with these principal values in the directions of `frame`."""
+def from_principal(s: SymmetricTensor, values, directions):
+    """Make the symmetric tensor with principal values in directions; of the class of `s`."""
 
 
-@principal.on(Line)
-def _principal_line(kin, s):
-    return s, ()
+@principal.on(Line.Symmetric)
+def _principal_line(s):
+    return (s.xx, s.yy, s.zz), ()
 
 
-@from_principal.on(Line)
-def _from_principal_line(kin, values, frame):
-    return values
+@from_principal.on(Line.Symmetric)
+def _from_principal_line(s, values, directions):
+    return s._make(values)
 
 
-@principal.on(PlaneStrain)
-@principal.on(Axisymmetric)
-def _principal_axisymmetric(kin, s):
-    half = real(0.5, s[0])
-    apart = half * (s[0] - s[1])
-    mean = half * (s[0] + s[1])
-    radius = sqrt(apart * apart + s[3] * s[3])
-    values = (mean + radius, mean - radius, s[2])
-    one = real(1, s[0])
+@principal.on(PlaneStrain.Symmetric)
+@principal.on(Axisymmetric.Symmetric)
+def _principal_plane(s):
+    apart = 0.5 * (s.xx - s.yy)
+    mean = 0.5 * (s.xx + s.yy)
+    radius = sqrt(apart * apart + s.xy * s.xy)
     turned = radius > 0
-    over = where(turned, radius, one)
-    return values, (where(turned, apart / over, one), s[3] / over)
+    over = where(turned, radius, 1)
+    angle = Angle(where(turned, apart / over, 1), s.xy / over)
+    return (mean + radius, mean - radius, s.zz), angle
 
 
-@from_principal.on(PlaneStrain)
-@from_principal.on(Axisymmetric)
-def _from_principal_axisymmetric(kin, values, frame):
-    # frame: cosine and sine of twice the angle to the first principal direction
-    half = real(0.5, values[0])
-    mean = half * (values[0] + values[1])
-    radius = half * (values[0] - values[1])
-    change = radius * frame[0]
-    return (mean + change, mean - change, values[2], radius * frame[1])
+@from_principal.on(PlaneStrain.Symmetric)
+@from_principal.on(Axisymmetric.Symmetric)
+def _from_principal_plane(s, values, directions):
+    a, b, c = values
+    mean = 0.5 * (a + b)
+    radius = 0.5 * (a - b)
+    change = radius * directions.cosine
+    return s._make([mean + change, mean - change, c, radius * directions.sine])
 
 
 @shared
-def _rotation(a, b, c):
-    """Cosine, sine and tangent of the rotation that makes c vanish in [[a, c], [c, b]]."""
-    one = real(1, a)
-    cotangent = (b - a) / where(c == 0, one, c + c)
-    t = one / (abs(cotangent) + sqrt(cotangent * cotangent + one))
-    t = where(c == 0, real(0, a), where(cotangent < 0, -t, t))
-    cosine = one / sqrt(t * t + one)
+def jacobi_rotation(a, b, c):
+    """Find cosine, sine and tangent of the rotation that makes c vanish in [[a, c], [c, b]]."""
+    cotangent = (b - a) / where(c == 0, 1, c + c)
+    t = 1 / (abs(cotangent) + sqrt(cotangent * cotangent + 1))
+    t = where(c == 0, 0, where(cotangent < 0, -t, t))
+    cosine = 1 / sqrt(t * t + 1)
     return cosine, t * cosine, t
 
 
@@ -68,45 +71,40 @@ def _rotation(a, b, c):
 _SWEEPS = 8
 
 
-@principal.on(Space)
-def _principal_space(kin, s):
+@principal.on(Space.Symmetric)
+def _principal_space(s):
     # Jacobi's rotations (Golub & Van Loan 2013, section 8.5): directions are right to round-off
     # whether or not principal values are equal, which closed forms are not.
     a, b, c, d, e, f = s
-    one = real(1, a)
-    zero = real(0, a)
-    u = (one, zero, zero)
-    v = (zero, one, zero)
-    w = (zero, zero, one)
-    enough = real(1e-3, a) * round_off(a)
+    u, v, w = Space.Vector(1, 0, 0), Space.Vector(0, 1, 0), Space.Vector(0, 0, 1)
+    enough = 1e-3 * round_off(a)
     for _ in range(_SWEEPS):
         if abs(d) + abs(e) + abs(f) <= enough * (abs(a) + abs(b) + abs(c)):
             break
-        k, g, t = _rotation(a, b, d)
-        a, b, d = a - t * d, b + t * d, zero
+        k, g, t = jacobi_rotation(a, b, d)
+        a, b, d = a - t * d, b + t * d, 0
         e, f = k * e - g * f, g * e + k * f
-        u, v = _turned(k, g, u, v)
-        k, g, t = _rotation(a, c, e)
-        a, c, e = a - t * e, c + t * e, zero
+        u, v = rotated(k, g, u, v)
+        k, g, t = jacobi_rotation(a, c, e)
+        a, c, e = a - t * e, c + t * e, 0
         d, f = k * d - g * f, g * d + k * f
-        u, w = _turned(k, g, u, w)
-        k, g, t = _rotation(b, c, f)
-        b, c, f = b - t * f, c + t * f, zero
+        u, w = rotated(k, g, u, w)
+        k, g, t = jacobi_rotation(b, c, f)
+        b, c, f = b - t * f, c + t * f, 0
         d, e = k * d - g * e, g * d + k * e
-        v, w = _turned(k, g, v, w)
+        v, w = rotated(k, g, v, w)
     return (a, b, c), (u, v, w)
 
 
-@shared
-def _turned(k, g, u, v):
-    return subtract(scale(k, u), scale(g, v)), add(scale(g, u), scale(k, v))
+def rotated(k, g, u, v):
+    """Turn two directions in their plane by the angle with the cosine k and the sine g."""
+    return k * u - g * v, k * v - (-g) * u  # differences: a sum would be rounded once
 
 
-@formula(Space)
-def _composed(kin, values: Number, frame: Number):
-    return kin.symmetric(lambda i, j: sum(values[m] * frame[m][i] * frame[m][j] for m in range(3)))
+@from_principal.on(Space.Symmetric)
+def _from_principal_space(s, values, directions):
+    def component(i, j):
+        a, b, c = [p * u[i] * u[j] for p, u in zip(values, directions, strict=True)]
+        return a + b + c
 
-
-@from_principal.on(Space)
-def _from_principal_space(kin, values, frame):
-    return _composed(kin, values, frame)
+    return s._make([component(i, j) for i, j in s.places])

@@ -1,8 +1,9 @@
 """Constitutive laws of one point. One file each: what a script says, and the point functions.
 
-A law is a NamedTuple of parameters (its class is the tag). It owns a state, a flat tuple with as
-many numbers as it needs; kernels only load it, pass it on and store it. All tensors have the
-components of the kinematics `kin`; `j` = det F is the volume over the reference volume. A law may
+A law is a NamedTuple of parameters (its class is the tag). It owns a state, a NamedTuple of numbers
+and tensors; kernels only load it, pass it on and store it. Tensors have the components of the
+kinematics `kin` (`karamelo_py.points.kinematics`); `j` = det F is the volume over the reference
+volume. A law may
 be composed of parts, NamedTuples among its parameters (`eos_strength`).
 
 The class is the style, too: its docstring is the manual, and its fields with their annotations are

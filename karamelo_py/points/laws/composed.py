@@ -7,9 +7,9 @@ and damage need more than one of them.
 from math import sqrt
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import point_function, shared, where
+from karamelo_py.compiler.compile import point_function, where
 from karamelo_py.compiler.tuples import either, only
-from karamelo_py.points.kinematics.tensors import von_mises
+from karamelo_py.points.kinematics import von_mises
 from karamelo_py.points.laws import Absent, specific_volume
 from karamelo_py.points.laws.damages import damage_after, integrity
 from karamelo_py.points.laws.eos import bulk_modulus, compression_energy, pressure
@@ -29,7 +29,7 @@ from karamelo_py.points.laws.viscosity import (
 
 
 class Memory(NamedTuple):
-    """What the parts of a law remember at one point: flat tuples, empty for parts without."""
+    """What the parts of a law remember at one point: tuples, empty for parts without."""
 
     energy: Any  # of the equation of state
     viscous: Any  # viscous pressure
@@ -40,7 +40,6 @@ class Memory(NamedTuple):
     further: Any
 
 
-@shared
 def lossless(law, like):
     """(0,) where a part dissipates energy, else ()."""
     return either(initial_loss(law.strength, like), initial_viscous_pressure(law.viscosity, like))
@@ -57,7 +56,6 @@ class State(NamedTuple):
 # ---- pressure -----------------------------------------------------------------------------------
 
 
-@shared
 def intact_pressure(law, j, m):
     """Pressure of the intact material, without viscous pressure."""
     elastic = elastic_ratio(law.strength, m.strength, j)
@@ -66,14 +64,12 @@ def intact_pressure(law, j, m):
     return further_pressure(law.further, m.further, p)
 
 
-@shared
 def full_pressure(law, j, m):
     """The pressure in the stress: damage takes of tension, not of compression."""
     p = intact_pressure(law, j, m)
     return where(p < 0, p * borne_share(law.damage, m.damage, p), p) + only(m.viscous)
 
 
-@shared
 def sound(law, j, m):
     """Speed of sound without shear."""
     elastic = elastic_ratio(law.strength, m.strength, j)

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from karamelo_py.compiler.compile import where
 from karamelo_py.compiler.tuples import added, increased, only
 from karamelo_py.language.rules import suggestion
-from karamelo_py.points.kinematics import tensors
+from karamelo_py.points.kinematics import I, det, dev, nothing, sym, symmetric_tensor, tr
 from karamelo_py.points.laws import (
     Absent,
     advance,
@@ -59,7 +59,12 @@ from karamelo_py.points.laws.further import (
     initial_further,
 )
 from karamelo_py.points.laws.named import Eos, Option, Strength
-from karamelo_py.points.laws.temperatures import heat_from, heated, initial_heat, thermal_pressure
+from karamelo_py.points.laws.temperatures import (
+    at_temperature,
+    heated,
+    initial_heat,
+    thermal_pressure,
+)
 from karamelo_py.points.laws.viscosity import initial_viscous_pressure
 from karamelo_py.script.errors import ScriptError
 
@@ -171,17 +176,17 @@ def _initial_state_eos_strength(law, kin, like):
         strengths.initial_memory(law.strength, like),
         initial_further(law.further, like),
     )
-    return composed.State(1, tensors.nothing(kin), m)
+    return composed.State(1, nothing(kin), m)
 
 
 @advance.on(EosStrength)
 def _advance_eos_strength(law, kin, state, dl, dt):
     before, s, m = state
-    J = before * tensors.det(tensors.I + dl)
-    eps = tensors.sym(dl)
+    J = before * det(I + dl)
+    eps = sym(dl)
     s, memory, work = strengths.respond(law.strength, law, kin, s.turned(dl), eps, J, m, dt)
     work = J * work * composed.borne_share(law.damage, m.damage, work)
-    viscous = composed.viscous_after(law.viscosity, law, J, m, tensors.tr(eps) / dt)
+    viscous = composed.viscous_after(law.viscosity, law, J, m, tr(eps) / dt)
     viscous_work = only(viscous) * (before - J)
     energy = compressed(law.eos, m.energy, before, J, work + viscous_work)
     flow = strengths.equivalent_plastic_strain(law.strength, memory)
@@ -204,13 +209,13 @@ def stress_left(law, state):
 
 @cauchy_stress.on(EosStrength)
 def _cauchy_stress_eos_strength(law, kin, state):
-    return stress_left(law, state) - composed.full_pressure(law, state.J, state.m) * tensors.I
+    return stress_left(law, state) - composed.full_pressure(law, state.J, state.m) * I
 
 
 @kirchhoff_stress.on(EosStrength)
 def _kirchhoff_stress_eos_strength(law, kin, state):
     J = state.J
-    return J * stress_left(law, state) - J * composed.full_pressure(law, J, state.m) * tensors.I
+    return J * stress_left(law, state) - J * composed.full_pressure(law, J, state.m) * I
 
 
 @jacobian.on(EosStrength)
@@ -252,9 +257,9 @@ def _dissipated_energy_eos_strength(law, kin, state):
 @elastic_strain.on(EosStrength)
 def _elastic_strain_eos_strength(law, kin, state):
     """ln J / 3, the mean of the elastic strain increments, and the elastic shear."""
-    strain = tensors.symmetric_tensor(kin, strengths.shear_strain(law.strength, kin, state.s))
+    strain = symmetric_tensor(kin, strengths.shear_strain(law.strength, kin, state.s))
     elastic = strengths.elastic_ratio(law.strength, state.m.strength, state.J)
-    return strain + 1 / 3 * log(elastic) * tensors.I
+    return strain + 1 / 3 * log(elastic) * I
 
 
 @plastic_strain.on(EosStrength)
@@ -271,12 +276,12 @@ def _shown_remembered(what, law, kin, state):
 def _with_stress_eos_strength(law, kin, state, stress):
     # Pressure follows from volume, so the point gets the volume that has this pressure.
     J, _, m = state
-    stress = tensors.symmetric_tensor(kin, stress)
+    stress = symmetric_tensor(kin, stress)
     elastic = strengths.elastic_ratio(law.strength, m.strength, J)
     beside = only(thermal_pressure(law.temperature, m.heat)) + only(m.viscous)
-    p = -tensors.tr(stress) * (1 / 3) - further_pressure(law.further, m.further, beside)
+    p = -tr(stress) * (1 / 3) - further_pressure(law.further, m.further, beside)
     after, energy = at_pressure(law.eos, elastic, m.energy, p, m.heat)
-    return composed.State(J * (after / elastic), tensors.dev(stress), m._replace(energy=energy))
+    return composed.State(J * (after / elastic), dev(stress), m._replace(energy=energy))
 
 
 @specific_volume.on(EosStrength)
@@ -301,7 +306,7 @@ def _temperature_eos_strength(law, kin, state):
 
 @with_temperature.on(EosStrength)
 def _with_temperature_eos_strength(law, kin, state, T):
-    heat = heat_from(state.m.heat, (T,))
+    heat = at_temperature(state.m.heat, T)
     return state._replace(m=state.m._replace(heat=heat))
 
 

@@ -8,7 +8,7 @@ from functools import reduce
 from typing import Any, NamedTuple
 
 from karamelo_py.compiler.compile import point_function
-from karamelo_py.compiler.tuples import following, leading, plus
+from karamelo_py.compiler.tuples import only
 from karamelo_py.points.laws import Absent
 
 
@@ -52,13 +52,13 @@ def part_pressure(part, memory):
 
 @point_function(otherwise=True)
 def initial_further(parts, like):
-    """The memories of all parts, one after the other."""
+    """Memory of the first part, and that of the others."""
     return ()
 
 
 @initial_further.on(Further)
 def _initial_further_further(parts, like):
-    return initial_part(parts.part, like) + initial_further(parts.rest, like)
+    return initial_part(parts.part, like), initial_further(parts.rest, like)
 
 
 @point_function(otherwise=True)
@@ -69,10 +69,9 @@ def further_after(parts, memory, law, kin, j, s, memories, dt):
 
 @further_after.on(Further)
 def _further_after_further(parts, memory, law, kin, j, s, memories, dt):
-    own = leading(memory, initial_part(parts.part, j))
-    rest = following(memory, own)
+    own, rest = memory
     after = part_after(parts.part, own, law, kin, j, s, memories, dt)
-    return after + further_after(parts.rest, rest, law, kin, j, s, memories, dt)
+    return after, further_after(parts.rest, rest, law, kin, j, s, memories, dt)
 
 
 @point_function(otherwise=True)
@@ -83,6 +82,5 @@ def further_pressure(parts, memory, p):
 
 @further_pressure.on(Further)
 def _further_pressure_further(parts, memory, p):
-    own = leading(memory, initial_part(parts.part, p))
-    rest = following(memory, own)
-    return further_pressure(parts.rest, rest, plus(p, part_pressure(parts.part, own)))
+    own, rest = memory
+    return further_pressure(parts.rest, rest, p + only(part_pressure(parts.part, own)))

@@ -6,7 +6,7 @@ from karamelo_py.compiler.compile import point_function
 from karamelo_py.language.rules import gain
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points import laws
-from karamelo_py.points.kinematics import tensors
+from karamelo_py.points.kinematics import I, det, inner, nothing, sym, symmetric_tensor, tr
 from karamelo_py.points.laws.elasticity import check_poisson_ratio, lame_parameters
 from karamelo_py.points.laws.thermoelastic import expanding
 
@@ -122,15 +122,15 @@ def _turned_fixed_frame(law, dl, sigma):
 @laws.initial_state.on(LinearElastic)
 @laws.initial_state.on(FixedFrame)
 def _initial_state_fixed_frame(law, kin, like):
-    return State(1, tensors.nothing(kin))
+    return State(1, nothing(kin))
 
 
 @laws.advance.on(LinearElastic)
 @laws.advance.on(FixedFrame)
 def _advance_fixed_frame(law, kin, state, dl, dt):
-    eps = tensors.sym(dl)
-    increment = 2 * law.G * eps + law.lam * tensors.tr(eps) * tensors.I
-    return State(state.J * tensors.det(tensors.I + dl), turned(law, dl, state.sigma) + increment)
+    eps = sym(dl)
+    increment = 2 * law.G * eps + law.lam * tr(eps) * I
+    return State(state.J * det(I + dl), turned(law, dl, state.sigma) + increment)
 
 
 @laws.kirchhoff_stress.on(LinearElastic)
@@ -162,17 +162,17 @@ def _wave_speed_squared_fixed_frame(law, kin, state):
 @laws.elastic_strain.on(FixedFrame)
 def _elastic_strain_fixed_frame(law, kin, state):
     # Hooke's law is isotropic and turns with the point, so the strain follows from the stress.
-    mean = law.lam / (3 * law.lam + 2 * law.G) * tensors.tr(state.sigma)
-    return 0.5 / law.G * (state.sigma - mean * tensors.I)
+    mean = law.lam / (3 * law.lam + 2 * law.G) * tr(state.sigma)
+    return 0.5 / law.G * (state.sigma - mean * I)
 
 
 @laws.energy_density.on(LinearElastic)
 @laws.energy_density.on(FixedFrame)
 def _energy_density_fixed_frame(law, kin, state):
-    return 0.5 * state.J * tensors.inner(state.sigma, laws.elastic_strain(law, kin, state))
+    return 0.5 * state.J * inner(state.sigma, laws.elastic_strain(law, kin, state))
 
 
 @laws.with_stress.on(LinearElastic)
 @laws.with_stress.on(FixedFrame)
 def _with_stress_fixed_frame(law, kin, state, stress):
-    return State(state.J, tensors.symmetric_tensor(kin, stress))
+    return State(state.J, symmetric_tensor(kin, stress))

@@ -1,9 +1,9 @@
 """The rate of plastic strain, for output: a further part of laws that lowering adds when asked."""
 
 from math import sqrt
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import real, where
+from karamelo_py.compiler.compile import where
 from karamelo_py.points import laws
 from karamelo_py.points.laws.eos_strength import EosStrength
 from karamelo_py.points.laws.further import Further, initial_part, part_after
@@ -28,23 +28,35 @@ class Smoothed(NamedTuple):
 laws.column(PlasticRate, "epdot", Smoothed())
 
 
+class RateMemory(NamedTuple):
+    """What a point remembers."""
+
+    rate: Any
+    ep: Any  # plastic strain, -1 where none is known yet
+
+
 @initial_part.on(PlasticRate)
 def _initial_part_plastic_rate(part, like):
-    return (real(0, like), real(-1, like))  # no plastic strain is known yet
+    return RateMemory(0.0, -1.0)
 
 
 @part_after.on(PlasticRate)
 def _part_after_plastic_rate(part, memory, law, kin, j, s, memories, dt):
     ep = equivalent_plastic_strain(law.strength, memories.strength)
-    before = where(memory[1] < 0, ep, memory[1])
-    change = (ep - before - dt * memory[0]) / part.time
-    return (max(memory[0] + change, real(0, j)), ep)
+    before = where(memory.ep < 0, ep, memory.ep)
+    change = (ep - before - dt * memory.rate) / part.time
+    return RateMemory(max(memory.rate + change, 0), ep)
 
 
 @laws.shown.on(Smoothed)
 def _shown_smoothed(what, law, kin, state):
-    further = state.m.further
-    return further[len(further) - 2]
+    return last_memory(state.m.further).rate
+
+
+def last_memory(memories):
+    """Find the memory of the last of several further parts."""
+    own, rest = memories
+    return last_memory(rest) if len(rest) else own
 
 
 def has_rate(law: NamedTuple) -> bool:

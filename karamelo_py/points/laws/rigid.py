@@ -2,10 +2,9 @@
 
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import real
 from karamelo_py.language.signature import Positive
 from karamelo_py.points import laws
-from karamelo_py.points.kinematics import zero_symmetric
+from karamelo_py.points.kinematics import nothing
 
 
 class Rigid(NamedTuple):
@@ -68,15 +67,15 @@ def _constrained_velocity_rigid(law, own, given):
 @laws.kirchhoff_stress.on(Rigid)
 @laws.elastic_strain.on(Rigid)
 def _elastic_strain_rigid(law, kin, state):
-    return zero_symmetric(kin, law.specific_volume)
+    return nothing(kin)
 
 
 @laws.jacobian.on(Rigid)
 def _jacobian_rigid(law, kin, state):
-    return real(1, law.specific_volume)
+    return 1
 
 
 @laws.wave_speed_squared.on(Rigid)
 @laws.energy_density.on(Rigid)
 def _energy_density_rigid(law, kin, state):
-    return real(0, law.specific_volume)
+    return 0

@@ -19,9 +19,8 @@ inverts_spread
 What else is not defined for a class is that of PIC: nothing is kept, v alone is mapped.
 """
 
-from karamelo_py.compiler.compile import point_function, real
+from karamelo_py.compiler.compile import point_function
 from karamelo_py.compiler.fields import Field, planar
-from karamelo_py.compiler.tuples import add_scaled
 from karamelo_py.language.rules import known_failure
 from karamelo_py.points.transfers import noise
 
@@ -51,7 +50,7 @@ def take_nodal_velocity(transfer: type) -> None:
 
     @lost_shares.on(transfer)
     def _lost_shares_transfer(transfer, like):
-        return real(1, like), real(1, like)
+        return 1.0, 1.0
 
     @updated_velocity.on(transfer)
     def _updated_velocity_transfer(transfer, v, v_pic, dv):
@@ -71,9 +70,9 @@ def known_volume(transfer, law, kin, state):
 
 
 @point_function(otherwise=True)
-def add_momentum(transfer, kin, basis, grid, stencil, k, weight, mass, v, moment, total):
-    """total + the momentum that a point gives to the k-th node of its stencil."""
-    return add_scaled(total, weight * mass, v)
+def nodal_momentum(transfer, kin, basis, grid, stencil, k, weight, mass, v, moment):
+    """Find the momentum that a point gives to the k-th node of its stencil."""
+    return weight * mass * v
 
 
 @point_function(otherwise=True)

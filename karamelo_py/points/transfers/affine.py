@@ -8,40 +8,46 @@ eqs. 15 to 18).
 """
 
 from karamelo_py.points.basis import affine_weight, reach
-from karamelo_py.points.kinematics import planar
-from karamelo_py.points.kinematics.tensors import outer, vector, zero
+from karamelo_py.points.kinematics import outer, planar, zero
 from karamelo_py.points.transfers import (
     add_moment,
-    add_momentum,
     affine_velocity,
     by_arms,
+    nodal_momentum,
     zero_moment,
 )
+
+
+def nodal_momentum_affine(transfer, kin, basis, grid, stencil, k, weight, mass, v, B):
+    """See `nodal_momentum`."""
+    return weight * mass * v + mass * (B @ affine_weight(basis, kin, grid, stencil, k))
+
+
+def add_moment_affine(transfer, kin, basis, grid, stencil, k, weight, gradient, v, B):
+    """See `add_moment`."""
+    return B + outer(weight * v, reach(basis, kin, grid, stencil, k))
+
+
+def affine_velocity_of_moment(transfer, B, inverse_d):
+    """See `affine_velocity`."""
+    return inverse_d[0] * B if len(inverse_d) else ()
+
+
+def zero_planar(transfer, kin, like):
+    """See `zero_moment`."""
+    return zero(planar(kin), like)
+
+
+def by_arms_alone(transfer, inverse_d):
+    """See `by_arms`."""
+    return (1.0,)
 
 
 def register(transfer: type) -> None:
     """Let the points of `transfer` keep the moment of velocity and map it with their velocity."""
     transfer.keeps_gradient = False
-
-    @add_momentum.on(transfer)
-    def _add_momentum_transfer(transfer, kin, basis, grid, stencil, k, weight, mass, v, B, total):
-        flat = planar(kin)
-        affine = vector(flat, affine_weight(basis, kin, grid, stencil, k))
-        return vector(flat, total) + weight * mass * vector(flat, v) + mass * (B @ affine)
-
-    @affine_velocity.on(transfer)
-    def _affine_velocity_transfer(transfer, B, inverse_d):
-        return inverse_d[0] * B if len(inverse_d) else ()
-
-    @zero_moment.on(transfer)
-    def _zero_moment_transfer(transfer, kin, like):
-        return zero(planar(kin), like)
-
-    @by_arms.on(transfer)
-    def _by_arms_transfer(transfer, inverse_d):
-        return (1.0,)
-
-    @add_moment.on(transfer)
-    def _add_moment_transfer(transfer, kin, basis, grid, stencil, k, weight, gradient, v, B):
-        arm = vector(planar(kin), reach(basis, kin, grid, stencil, k))
-        return B + outer(weight * vector(planar(kin), v), arm)
+    nodal_momentum.on(transfer)(nodal_momentum_affine)
+    add_moment.on(transfer)(add_moment_affine)
+    affine_velocity.on(transfer)(affine_velocity_of_moment)
+    zero_moment.on(transfer)(zero_planar)
+    by_arms.on(transfer)(by_arms_alone)

@@ -2,8 +2,7 @@
 
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import real, where
-from karamelo_py.compiler.tuples import add_scaled, subtract
+from karamelo_py.compiler.compile import where
 from karamelo_py.language.kinds import In
 from karamelo_py.language.rules import known_failure
 from karamelo_py.points.laws import jacobian
@@ -68,9 +67,8 @@ def _known_volume_asflip(transfer, law, kin, state):
 
 @displacing_velocity.on(ASFLIP)
 def _displacing_velocity_asflip(transfer, v, v_pic, j):
-    one = real(1, j)
-    beta = where(one - j < real(COMPRESSED, j), transfer.beta * one, j - j)
-    return add_scaled(v_pic, beta, subtract(v, v_pic))
+    beta = where(1 - j < COMPRESSED, transfer.beta, 0)
+    return v_pic + beta * (v - v_pic)
 
 
 blended(ASFLIP)

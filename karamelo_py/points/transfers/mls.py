@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from karamelo_py.points.basis import affine_weight
 from karamelo_py.points.kinematics import Line, PlaneStrain, Space
-from karamelo_py.points.kinematics.components import Vector, formula
+from karamelo_py.points.kinematics import gradient as as_gradient
 from karamelo_py.points.transfers import (
     Moment,
     by_arms,
@@ -37,13 +37,9 @@ class MLS(NamedTuple):
 
 @gradient_weight.on(MLS)
 def _gradient_weight_mls(transfer, basis, kin, grid, stencil, k, gradient):
-    return with_hoop(kin, affine_weight(basis, kin, grid, stencil, k), gradient)
-
-
-@formula()
-def with_hoop(kin, planar: Vector, gradient: Vector):
-    """The planar gradient, with the hoop part N / r of an axisymmetric one."""
-    return [planar[i] if i < kin.dimension else gradient[i] for i in kin.axes]
+    # The hoop part N / r of an axisymmetric one stays.
+    moved = affine_weight(basis, kin, grid, stencil, k)
+    return as_gradient(kin, [*moved, *gradient[len(moved) :]])
 
 
 @forces_by_arms.on(MLS, Line)

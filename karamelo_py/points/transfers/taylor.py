@@ -6,33 +6,31 @@ Bernstein-quadratic) this is APIC in another form, and angular momentum is conse
 stays the same; for splines as far as velocity is linear over their support.
 """
 
-from karamelo_py.compiler.tuples import add, add_scaled
 from karamelo_py.points.basis import reach
-from karamelo_py.points.kinematics import add_outer, planar, tensor_dot, zero_tensor
-from karamelo_py.points.transfers import add_moment, add_momentum, affine_velocity, zero_moment
+from karamelo_py.points.kinematics import outer
+from karamelo_py.points.transfers import add_moment, affine_velocity, nodal_momentum, zero_moment
+from karamelo_py.points.transfers.affine import zero_planar
+
+
+def nodal_momentum_taylor(transfer, kin, basis, grid, stencil, k, weight, mass, v, L):
+    """See `nodal_momentum`."""
+    return weight * mass * (v + L @ reach(basis, kin, grid, stencil, k))
+
+
+def add_moment_taylor(transfer, kin, basis, grid, stencil, k, weight, gradient, v, L):
+    """See `add_moment`."""
+    return L + outer(v, gradient.planar())
+
+
+def kept_velocity_gradient(transfer, L, inverse_d):
+    """See `affine_velocity`."""
+    return L
 
 
 def register(transfer: type) -> None:
     """Let the points of `transfer` keep the gradient of velocity and map it with their velocity."""
     transfer.keeps_gradient = True
-
-    @add_momentum.on(transfer)
-    def _add_momentum_transfer(
-        transfer, kin, basis, grid, stencil, k, weight, mass, v, moment, total
-    ):
-        arm = reach(basis, kin, grid, stencil, k)
-        return add_scaled(total, weight * mass, add(v, tensor_dot(planar(kin), moment, arm)))
-
-    @affine_velocity.on(transfer)
-    def _affine_velocity_transfer(transfer, moment, inverse_d):
-        return moment
-
-    @zero_moment.on(transfer)
-    def _zero_moment_transfer(transfer, kin, like):
-        return zero_tensor(planar(kin), like)
-
-    @add_moment.on(transfer)
-    def _add_moment_transfer(
-        transfer, kin, basis, grid, stencil, k, weight, gradient, velocity, moment
-    ):
-        return add_outer(planar(kin), moment, velocity, gradient)
+    nodal_momentum.on(transfer)(nodal_momentum_taylor)
+    add_moment.on(transfer)(add_moment_taylor)
+    affine_velocity.on(transfer)(kept_velocity_gradient)
+    zero_moment.on(transfer)(zero_planar)

@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.points import laws
-from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
-from karamelo_py.points.kinematics.tensors import tensor
+from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space, tensor
 from karamelo_py.run.element.load_path import COMPONENTS, LoadPath
 
 # Where the components of the velocity gradient lie in the flat tuples of each kinematics.

@@ -16,8 +16,7 @@ from karamelo_py.language.faults import fault
 from karamelo_py.points import laws
 from karamelo_py.points.basis import entry, locate, support
 from karamelo_py.points.basis.product import Along, along
-from karamelo_py.points.kinematics import zero_symmetric
-from karamelo_py.points.kinematics.tensors import tensor
+from karamelo_py.points.kinematics import tensor
 from karamelo_py.points.transfers import updated_velocity
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.plugins import PartInUse, attributed, foreign_parts, is_foreign
@@ -74,7 +73,7 @@ def _try_law(hub: Hub, setup: Any, solid: Any) -> None:
     part = next((part for part in foreign_parts(hub) if part.kind in kinds), usual)
     kin, one = setup.kin, _one(setup)
     law = law_in(law_on(solid.material.law, solid.h, solid.T0), type(one))
-    size = len(zero_symmetric(kin, one))
+    size = len(kin.Symmetric.places)
     for strain in (0, 1e-3):
         dl = (type(one)(strain),) * kin.tensor_size
         with _trial(hub, part):
@@ -82,12 +81,17 @@ def _try_law(hub: Hub, setup: Any, solid: Any) -> None:
             after = laws.advance(law, kin, state, tensor(kin, dl), one)
             if len(flat(after)) != len(flat(state)):
                 what = (
-                    f"what a point remembers is {len(state)} numbers at first and {len(after)} "
+                    f"what a point remembers is {len(flat(state))} numbers at first and "
+                    f"{len(flat(after))} "
                     "after a step: their number must not change"
                 )
                 raise fault(part.name, what, part.place)
             for function in TENSORS:
-                _expect(part, function, function(law, kin, after), size)
+                found = function(law, kin, after)
+                _expect(part, function, found, size)
+                if not isinstance(found, kin.Symmetric):
+                    what = f"{function.__name__} has to return a symmetric tensor, not a tuple"
+                    raise fault(part.name, what, part.place)
             for function in NUMBERS:
                 function(law, kin, after)
             laws.specific_volume(law)

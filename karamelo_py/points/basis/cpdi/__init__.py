@@ -41,7 +41,7 @@ class ConvectedDomain(NamedTuple):
 
 # By dimension, the cells that domains count as reaching at least: in the plane points give to the
 # nodes next to them at once.
-LEAST = {2: 0.5, 3: 0.0}
+LEAST = (0.0, 0.0, 0.5, 0.0)
 # Corners in the order of a mesh: around the square; around the lower face of the cube and the upper
 SQUARE = ((-1, -1), (1, -1), (1, 1), (-1, 1))
 CUBE = tuple((*corner, z) for z in (-1, 1) for corner in SQUARE)

@@ -8,23 +8,12 @@ before it gets there. In space that takes more than it saves: 27 nodes, eight co
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import (
-    all_lanes,
-    beside,
-    define,
-    first_lane,
-    fma,
-    is_one,
-    real,
-    shared,
-)
-from karamelo_py.compiler.symbols import Symbol, call, written
+from karamelo_py.compiler.compile import all_lanes, beside, first_lane, fma, is_one, real, shared
 from karamelo_py.points.basis import affine_weight, entry, reach, support
 from karamelo_py.points.basis.cpdi.corners import CornerStencil, arm, solve
-from karamelo_py.points.basis.product import digits, hoop, node_number
+from karamelo_py.points.basis.product import digits, hoop, item, node_number
 from karamelo_py.points.grid import cells_along
-from karamelo_py.points.kinematics import Axisymmetric, dimension
-from karamelo_py.points.kinematics.tags import TAGS
+from karamelo_py.points.kinematics import TAGS, Axisymmetric, gradient, vector
 
 WIDTH = 3  # nodes along each direction
 
@@ -34,7 +23,7 @@ class NodeBlock(NamedTuple):
 
     first: tuple[int, ...]  # number of the first of them, along each direction
     weights: tuple[float, ...]
-    gradients: tuple[tuple[float, ...], ...]  # from those of the corners, without N / r
+    gradients: tuple[Any, ...]  # from those of the corners, without N / r
     holds: bool  # whether the corners lie between them, and no node is missing at a wall
     seen: CornerStencil
 
@@ -45,21 +34,19 @@ class InBlock(NamedTuple):
     basis: NamedTuple
 
 
-@shared
 def _hats(a):
     """The linear functions of three nodes, `a` cells from the first."""
-    one, none = real(1, a), real(0, a)
-    return max(one - a, none), min(a, real(2, a) - a), max(a - one, none)
+    return max(1 - a, 0), min(a, 2 - a), max(a - 1, 0)
 
 
 @shared
 def block_of(kin, grid, stencil):
     """The block of a point; () in space."""
-    if dimension(kin) > 2:
+    if kin.dimension > 2:
         return ()
     first, ahead, holds = [], [], True
     for k, at in enumerate(stencil.point):
-        low = at - real(0.5, at)
+        low = at - 0.5
         number = int(low)
         of_corners = [corner.at[k] - real(number, at) for corner in stencil.corners]
         inside = (low >= 0) & (number + 2 <= cells_along(grid, k))
@@ -106,26 +93,36 @@ def _spread_out(hats: Iterable, values: Iterable) -> tuple:
     return totals
 
 
-def _register(tag: type) -> None:
-    d = tag.dimension
-    kin, grid, stencil, k = map(Symbol, ("kin", "grid", "stencil", "k"))
-    at = digits("k", WIDTH, d)
-    first = node_number(grid.first, [stencil.first[i] for i in range(d)])
-    weight = stencil.weights[k]
-    gradient: list[Any] = [stencil.gradients[k][i] for i in range(d)]
-    if tag is Axisymmetric:
-        gradient.append(call(hoop, weight, gradient[0], stencil.seen.inv_r))
-    centre = stencil.seen.centre
-    arms = [call(arm, grid, stencil.first[i], at[i], centre[i]) for i in range(d)]
-    solved = call(solve, kin, stencil.seen.spread, arms)
-    seen = "basis, kin, grid, stencil, k"
-    number = call(beside, first, node_number(0, at))
-    support.on(InBlock, tag)(define("basis, kin", f"return {WIDTH**d}"))
-    entry.on(InBlock, tag)(written(seen, (number, weight, gradient)))
-    reach.on(InBlock, tag)(written(seen, arms))
-    affine_weight.on(InBlock, tag)(written(seen, [weight * solved[i] for i in range(d)]))
+def support_of_block(basis, kin):
+    """See `support`."""
+    return WIDTH**kin.dimension
 
 
-for _tag in TAGS:
-    if _tag.dimension == 2:
-        _register(_tag)
+def entry_of_block(basis, kin, grid, stencil, k):
+    """See `entry`."""
+    weight, slopes = item(stencil.weights, k), item(stencil.gradients, k)
+    if isinstance(kin, Axisymmetric):
+        slopes = (*slopes, hoop(weight, slopes[0], stencil.seen.inv_r))
+    first = node_number(grid, grid.first, stencil.first)
+    number = beside(first, node_number(grid, 0, digits(k, WIDTH, kin.dimension)))
+    return number, weight, gradient(kin, slopes)
+
+
+def reach_of_block(basis, kin, grid, stencil, k):
+    """See `reach`."""
+    places = zip(stencil.first, digits(k, WIDTH, kin.dimension), stencil.seen.centre, strict=True)
+    return vector(kin, [arm(grid, *place) for place in places])
+
+
+def affine_weight_of_block(basis, kin, grid, stencil, k):
+    """See `affine_weight`."""
+    solved = solve(kin, stencil.seen.spread, reach_of_block(basis, kin, grid, stencil, k))
+    weight = item(stencil.weights, k)
+    return vector(kin, [weight * a for a in solved])
+
+
+for _tag in (tag for tag in TAGS if tag.dimension == 2):
+    support.on(InBlock, _tag)(support_of_block)
+    entry.on(InBlock, _tag)(entry_of_block)
+    reach.on(InBlock, _tag)(reach_of_block)
+    affine_weight.on(InBlock, _tag)(affine_weight_of_block)

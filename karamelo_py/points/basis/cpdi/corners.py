@@ -1,12 +1,9 @@
 """What all domains share: from corners, their weights and gradients to nodes."""
 
-from collections.abc import Callable
-from math import inf, prod
+from math import inf
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import Weighted, beside, define, index, real, shared, where
-from karamelo_py.compiler.symbols import Symbol, call, cofactor, determinant, written
-from karamelo_py.compiler.tuples import add_row, add_scaled, scale
+from karamelo_py.compiler.compile import Weighted, beside, index, real, where
 from karamelo_py.points.basis import (
     affine_weight,
     carried,
@@ -21,11 +18,17 @@ from karamelo_py.points.basis import (
     support,
 )
 from karamelo_py.points.basis.cpdi import LEAST, domain, upright
-from karamelo_py.points.basis.product import digits, hoop, inverse_radius, node_number
+from karamelo_py.points.basis.product import (
+    digits,
+    hoop,
+    inverse_radius,
+    item,
+    node_number,
+    product,
+)
 from karamelo_py.points.grid import cells_along, in_cells
-from karamelo_py.points.kinematics import Axisymmetric
-from karamelo_py.points.kinematics.components import Components, Number, Vector, formula
-from karamelo_py.points.kinematics.tags import TAGS
+from karamelo_py.points.kinematics import TAGS, Axisymmetric, gradient, vector
+from karamelo_py.points.kinematics.tensors import cofactor, determinant, total
 
 
 class Corner(NamedTuple):
@@ -33,7 +36,7 @@ class Corner(NamedTuple):
 
     cell: tuple[int, ...]  # its cell, along each direction
     fractions: tuple[float, ...]  # how far into the cell, along each direction
-    at: tuple[float, ...]  # both together, in cells from the corner of the grid
+    at: Any  # both together, in cells from the corner of the grid, a vector
 
 
 class CornerStencil(NamedTuple):
@@ -41,9 +44,9 @@ class CornerStencil(NamedTuple):
 
     corners: tuple[Corner, ...]
     weights: tuple[float, ...]  # of the corners, and their gradients
-    gradients: tuple[tuple[float, ...], ...]
+    gradients: tuple[Any, ...]
     point: tuple[float, ...]  # where the point lies, in cells
-    centre: tuple[float, ...]  # sum_I N_I X_I, in cells
+    centre: Any  # sum_I N_I X_I, in cells, a vector
     spread: tuple[float, ...]  # D of the affine transfers: xx yy (zz) xy (xz yz)
     inv_r: float  # 1 / r of an axisymmetric point
 
@@ -61,7 +64,6 @@ class AtCorners(NamedTuple):
 # --- one corner -------------------------------------------------------------------------------
 
 
-@shared
 def along_cell(grid, direction, x):
     """The cell of a corner in one direction, how far the corner lies in it (0 to 1), and both.
 
@@ -74,125 +76,112 @@ def along_cell(grid, direction, x):
     return i, a - real(i, a), a
 
 
-@formula()
-def _corner(kin, grid: Number, x: Vector):
-    """Where a corner at `x` lies on the grid."""
-    cells = kin.vector(lambda i: call(along_cell, grid, i, x[i]))
-    return call(Corner, *([cell[n] for cell in cells] for n in range(3)))
+def corner_at(kin, grid, x):
+    """Find where a corner at `x` lies on the grid."""
+    cell, fractions, at = zip(*[along_cell(grid, i, x[i]) for i in range(len(x))], strict=True)
+    return Corner(tuple(cell), tuple(fractions), vector(kin, at))
 
 
-@shared
-def _side(far, fraction):
-    return where(far > 0, fraction, real(1, fraction) - fraction)
+def hat(corner, j):
+    """Linear function of the j-th node of a corner's cell."""
+    sides = zip(digits(j, 2, len(corner.cell)), corner.fractions, strict=True)
+    return product([where(far > 0, r, 1 - r) for far, r in sides])
 
 
-@formula()
-def _hat(kin, corner: Number, j: Number):
-    """The linear function of the j-th node of a corner's cell."""
-    sides = zip(digits("j", 2, kin.dimension), kin.directions, strict=True)
-    return prod(call(_side, far, corner.fractions[i]) for far, i in sides)
+def node_around(grid, corner, j):
+    """Number of the j-th node of a corner's cell, and that of the first."""
+    first = node_number(grid, grid.first, corner.cell)
+    return first, node_number(grid, 0, digits(j, 2, len(corner.cell)))
 
 
-@formula()
-def _node(kin, grid: Number, corner: Number, j: Number):
-    """The number of the j-th node of a corner's cell."""
-    first = node_number(grid.first, kin.vector(lambda i: corner.cell[i]))
-    return call(index, node_number(first, digits("j", 2, kin.dimension)))
-
-
-@formula()
-def _around(kin, grid: Number, corner: Number):
+def around(grid, corner):
     """The nodes around a corner, and their weights."""
-    first = node_number(grid.first, kin.vector(lambda i: corner.cell[i]))
-    nodes = range(2**kin.dimension)
-    rows = [call(beside, first, node_number(0, digits(str(j), 2, kin.dimension))) for j in nodes]
-    return call(Weighted, rows, [call(_hat, Symbol("kin"), corner, j) for j in nodes])
+    nodes = range(2 ** len(corner.cell))
+    rows = tuple([beside(*node_around(grid, corner, j)) for j in nodes])
+    return Weighted(rows, tuple([hat(corner, j) for j in nodes]))
 
 
-@shared
 def arm(grid, first, far, centre):
     """From the weighted centre to the node that is `far` from the `first` along a direction."""
     return (real(first + far, centre) - centre) * grid.h
 
 
-@formula()
-def _away(kin, grid: Number, corner: Number, centre: Vector, j: Number):
-    """From the weighted centre to the j-th node of a corner's cell."""
-    far = digits("j", 2, kin.dimension)
-    return kin.vector(lambda i: call(arm, grid, corner.cell[i], far[i], centre[i]))
-
-
 # --- all corners ------------------------------------------------------------------------------
 
 
-def _spread_pairs(kin: Components) -> list[tuple[int, int]]:
+def pairs_of_spread(kin):
     """Rows and columns of D in the layout of :class:`CornerStencil`."""
-    return [pair for pair in kin.symmetric_pairs if max(pair) < kin.dimension]
+    return [pair for pair in kin.Symmetric.places if max(*pair) < kin.dimension]
 
 
-@formula()
-def _add_spread(kin, grid: Number, total: Vector, weight: Number, corner: Number, centre: Number):
-    """total + the part of one corner in D, that is w [(x_c - x)(x_c - x)^T + h^2 r (1 - r)]."""
-    away = kin.vector(lambda i: corner.at[i] - centre[i])
-    r = corner.fractions
+def spread_of(kin, grid, weight, corner, centre):
+    """The part of one corner in D, that is w [(x_c - x)(x_c - x)^T + h^2 r (1 - r)]."""
+    away, r = corner.at - centre, corner.fractions
+    parts = []
+    for i, j in pairs_of_spread(kin):
+        part = away[i] * away[j]
+        if i == j:
+            part = part + r[i] * (1 - r[i])
+        parts = [*parts, weight * (grid.h * grid.h) * part]
+    return parts
 
-    def part(i, j):
-        within = r[i] * (1 - r[i]) if i == j else 0
-        return weight * (grid.h * grid.h) * (away[i] * away[j] + within)
 
-    return [total[n] + part(i, j) for n, (i, j) in enumerate(_spread_pairs(kin))]
-
-
-@formula()
-def solve(kin, spread: Vector, a: Vector):
+def solve(kin, spread, a):
     """D^-1 a."""
     d = kin.dimension
-    m = {pair: spread[n] for n, pair in enumerate(_spread_pairs(kin))}
-    m |= {(j, i): value for (i, j), value in m.items()}
+    m = dict(zip(pairs_of_spread(kin), spread, strict=True))
+    m = m | {(j, i): value for (i, j), value in m.items()}
     k = 1 / determinant(m, d)
-    return kin.vector(lambda i: k * sum(cofactor(m, d, i, j) * a[j] for j in range(d)))
+    rows = [total([cofactor(m, d, i, j) * a[j] for j in range(d)]) for i in range(d)]
+    return vector(kin, [k * row for row in rows])
 
 
-def _seen(tag: type, c: Any) -> tuple[Symbol, Symbol, list[Symbol]]:
+def locate_corners(basis, kin, grid, place):
+    """See `locate`."""
+    x, weights, gradients = domain(basis, kin, place)
+    corners = tuple([corner_at(kin, grid, corner) for corner in x])
+    centre = weights[0] * corners[0].at
+    for weight, corner in zip(weights[1:], corners[1:], strict=True):
+        centre = centre + weight * corner.at
+    pairs = zip(weights, corners, strict=True)
+    parts = zip(*[spread_of(kin, grid, w, corner, centre) for w, corner in pairs], strict=True)
+    spread = tuple([total(part) for part in parts])
+    point = tuple([in_cells(grid, i, place[i]) for i in range(kin.dimension)])
+    inv_r = inverse_radius(grid.x0 + centre[0] * grid.h)
+    return CornerStencil(corners, weights, gradients, point, centre, spread, inv_r)
+
+
+def seen_at_corner(kin, stencil, c):
     """The c-th corner of a stencil, its weight, and its gradient."""
-    stencil = Symbol("stencil")
-    weight, gradient = stencil.weights[c], [stencil.gradients[c][i] for i in range(tag.dimension)]
-    if tag is Axisymmetric:
-        gradient.append(call(hoop, weight, gradient[0], stencil.inv_r))
-    return stencil.corners[c], weight, gradient
+    weight, slopes = item(stencil.weights, c), item(stencil.gradients, c)
+    if isinstance(kin, Axisymmetric):
+        slopes = (*slopes, hoop(weight, slopes[0], stencil.inv_r))
+    return item(stencil.corners, c), weight, gradient(kin, slopes)
 
 
-def _domain_functions(tag: type, corners: int) -> dict[Callable, Callable]:
-    """The point functions of domains of so many corners."""
-    basis, kin, grid, place, stencil = map(Symbol, ("basis", "kin", "grid", "place", "stencil"))
-    described = call(domain, basis, kin, place)
-    x, weights, gradients = (described[i] for i in range(3))
-    at = [call(_corner, kin, grid, x[c]) for c in range(corners)]
-    centre = call(scale, weights[0], at[0].at)
-    for c in range(1, corners):
-        centre = call(add_scaled, centre, weights[c], at[c].at)
-    spread = (0,) * len(_spread_pairs(Components(tag)))
-    for c in range(corners):
-        spread = call(_add_spread, kin, grid, spread, weights[c], at[c], centre)
-    inv_r = call(inverse_radius, grid.x0 + centre[0] * grid.h)
-    point = [call(in_cells, grid, i, place[i]) for i in range(tag.dimension)]
-    located = call(CornerStencil, at, weights, gradients, point, centre, spread, inv_r)
+def entry_of_corners(basis, kin, grid, stencil, k):
+    """See `entry`."""
+    nodes = 2**kin.dimension
+    corner, weight, slopes = seen_at_corner(kin, stencil, k // nodes)
+    share = hat(corner, k % nodes)
+    first, far = node_around(grid, corner, k % nodes)
+    return index(first + far), weight * share, gradient(kin, [share * g for g in slopes])
 
-    d = tag.dimension
-    c, j = (Symbol(f"({{}} {operation} {2**d})", Symbol("k")) for operation in ("//", "%"))
-    corner, weight, gradient = _seen(tag, c)
-    hat = call(_hat, kin, corner, j)
-    weight, gradient = weight * hat, [hat * g for g in gradient]
-    away = call(_away, kin, grid, corner, stencil.centre, j)
-    solved = call(solve, kin, stencil.spread, away)
-    seen = "basis, kin, grid, stencil, k"
-    return {
-        locate: written("basis, kin, grid, place", located, "place[0]"),
-        support: define("basis, kin", f"return {corners * 2**d}"),
-        entry: written(seen, (call(_node, kin, grid, corner, j), weight, gradient)),
-        reach: written(seen, away),
-        affine_weight: written(seen, [weight * solved[i] for i in range(d)]),
-    }
+
+def reach_of_corners(basis, kin, grid, stencil, k):
+    """See `reach`."""
+    nodes, d = 2**kin.dimension, kin.dimension
+    cell, far = item(stencil.corners, k // nodes).cell, digits(k % nodes, 2, d)
+    return vector(kin, [arm(grid, cell[i], far[i], stencil.centre[i]) for i in range(d)])
+
+
+def affine_weight_of_corners(basis, kin, grid, stencil, k):
+    """See `affine_weight`."""
+    nodes = 2**kin.dimension
+    weight = item(stencil.weights, k // nodes)
+    weight = weight * hat(item(stencil.corners, k // nodes), k % nodes)
+    solved = solve(kin, stencil.spread, reach_of_corners(basis, kin, grid, stencil, k))
+    return vector(kin, [weight * a for a in solved])
 
 
 # --- registration -----------------------------------------------------------------------------
@@ -203,6 +192,16 @@ def tags_of(d: int) -> list[type]:
     return [tag for tag in TAGS if tag.dimension == d]
 
 
+def support_of_corners(basis, kin):
+    """See `support`."""
+    return basis.domain_corners * 2**kin.dimension
+
+
+def half_cell(basis, like):
+    """See `first_node`."""
+    return 0.5
+
+
 def register(basis: type, d: int, corners: int) -> None:
     """Give `basis`, a class with :func:`domain`, what an engine asks of a basis.
 
@@ -211,56 +210,64 @@ def register(basis: type, d: int, corners: int) -> None:
     linear momentum stays exact, and angular momentum is that about these centres: what the points
     themselves show wanders by a thousandth of what it does with FLIP (a spinning square, Q4).
     """
-
-    @first_node.on(basis)
-    def _first_node_basis(basis, like):
-        return real(0.5, like)
-
+    basis.domain_corners = corners
+    first_node.on(basis)(half_cell)
     for kin in tags_of(d):
-        for function, implementation in _domain_functions(kin, corners).items():
-            function.on(basis, kin)(implementation)
+        locate.on(basis, kin)(locate_corners)
+        support.on(basis, kin)(support_of_corners)
+        entry.on(basis, kin)(entry_of_corners)
+        reach.on(basis, kin)(reach_of_corners)
+        affine_weight.on(basis, kin)(affine_weight_of_corners)
+
+
+def all_corners(basis, kin):
+    """See `carried` and `placed`."""
+    return basis.domain_corners
+
+
+def carrier_of_corner(basis, kin, grid, stencil, corner):
+    """See `carrier`."""
+    return around(grid, stencil.corners[corner])
+
+
+def carry_corner(basis, kin, place, old, corner, displacement):
+    """See `carry`."""
+    first = kin.dimension * (1 + corner)
+    last = first + kin.dimension
+    moves = zip(place[first:last], displacement, strict=True)
+    return (*place[:first], *[a + u for a, u in moves], *place[last:])
+
+
+def extent_of_corners(basis, kin, grid, place):
+    """See `extent`; NaN if any corner is."""
+    d = kin.dimension
+    far = abs(place[d] - place[0])
+    for k in range(d + 1, d + d * basis.domain_corners):
+        far = max(abs(place[k] - place[k % d]), far)
+    return where(upright(basis, kin, place), max(far * grid.inv_h, LEAST[d]), inf)
 
 
 def register_carried(basis: type) -> None:
     """Let the corners of `basis`, which defines `upright`, be kept and go with the grid."""
-    d, corners = basis.dimension, basis.element.corners
-    register(basis, d, corners)
-    carried.on(basis)(define("basis, kin", f"return {corners}"))
-    placed.on(basis)(define("basis, kin", f"return {corners}"))
+    register(basis, basis.dimension, basis.element.corners)
+    carried.on(basis)(all_corners)
+    placed.on(basis)(all_corners)
+    carrier.on(basis)(carrier_of_corner)
+    carry.on(basis)(carry_corner)
+    extent.on(basis)(extent_of_corners)
 
-    @carrier.on(basis)
-    def _carrier_basis(basis, kin, grid, stencil, corner):
-        return _around(kin, grid, stencil.corners[corner])
 
-    carry.on(basis)(
-        define(
-            "basis, kin, place, old, corner, displacement",
-            f"return add_row(place, {d} + {d} * corner, displacement)",
-            add_row=add_row,
-        )
-    )
-    # How far a corner is from the point in any direction; NaN if any is.
-    basis_, kin, place, grid = map(Symbol, ("basis", "kin", "place", "grid"))
-    far = abs(place[d] - place[0])
-    for k in range(d + 1, d + d * corners):
-        far = call(max, abs(place[k] - place[k % d]), far)
-    far = call(max, far * grid.inv_h, LEAST[d])
-    reached = call(where, call(upright, basis_, kin, place), far, inf)
-    extent.on(basis)(written("basis, kin, grid, place", reached, "place[0]"))
+def support_at_corners(basis, kin):
+    """See `support`."""
+    return support(basis.basis, kin) // 2**kin.dimension
+
+
+def entry_at_corners(basis, kin, grid, stencil, k):
+    """See `entry`."""
+    corner, weight, slopes = seen_at_corner(kin, stencil, k)
+    return around(grid, corner), weight, slopes
 
 
 for _tag in (tag for tag in TAGS if tag.dimension > 1):
-    support.on(AtCorners, _tag)(
-        define(
-            "basis, kin",
-            f"return support(basis.basis, kin) // {2**_tag.dimension}",
-            support=support,
-        )
-    )
-    _corner_seen, *_shares = _seen(_tag, Symbol("k"))
-    entry.on(AtCorners, _tag)(
-        written(
-            "basis, kin, grid, stencil, k",
-            (call(_around, Symbol("kin"), Symbol("grid"), _corner_seen), *_shares),
-        )
-    )
+    support.on(AtCorners, _tag)(support_at_corners)
+    entry.on(AtCorners, _tag)(entry_at_corners)

@@ -1,12 +1,8 @@
 """CPDI2 in space: hexahedra (H8) whose corners go with the velocity of the grid."""
 
-from karamelo_py.compiler.compile import real, shared
-from karamelo_py.compiler.symbols import call
-from karamelo_py.compiler.tuples import add, scale
 from karamelo_py.points.basis.cpdi import CUBE, ConvectedDomain, Element, domain, upright
 from karamelo_py.points.basis.cpdi.corners import register_carried
 from karamelo_py.points.kinematics import Space
-from karamelo_py.points.kinematics.components import Number, Vector, formula
 
 # Weights of the ends of an edge at the nearer and the farther of its two Gauss points.
 NEAR, FAR = (1 + 3**-0.5) / 2, (1 - 3**-0.5) / 2
@@ -29,36 +25,35 @@ class H8(ConvectedDomain):
     element = Element("hexahedron", 8, ((0, 1), (0, 3), (0, 4)), (4, 5, 6, 7, 0, 1, 2, 3), CUBE)
 
 
-@shared
 def _cross(a, b):
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
-@shared
 def _dot(a, b):
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@shared
 def _at_gauss(a, b, c, d):
     """What a bilinear function with these values at (-,-), (+,-), (-,+), (+,+) is at Gauss points.
 
     Also, since the weights are symmetric, what values at the Gauss points give to the corners.
     """
-    near, far = real(NEAR, a[0]), real(FAR, a[0])
-    e, f = _mix(near, a, far, b), _mix(far, a, near, b)
-    g, h = _mix(near, c, far, d), _mix(far, c, near, d)
+    e, f = _mix(NEAR, a, FAR, b), _mix(FAR, a, NEAR, b)
+    g, h = _mix(NEAR, c, FAR, d), _mix(FAR, c, NEAR, d)
     return (
-        _mix(near, e, far, g),
-        _mix(near, f, far, h),
-        _mix(far, e, near, g),
-        _mix(far, f, near, h),
+        _mix(NEAR, e, FAR, g),
+        _mix(NEAR, f, FAR, h),
+        _mix(FAR, e, NEAR, g),
+        _mix(FAR, f, NEAR, h),
     )
 
 
-@shared
 def _mix(p, a, q, b):
-    return add(scale(p, a), scale(q, b))
+    return tuple([p * x + q * y for x, y in zip(a, b, strict=True)])
+
+
+def _add(a, b):
+    return tuple([x + y for x, y in zip(a, b, strict=True)])
 
 
 def _across(e: int, a: int, b: int, s: int) -> tuple[int, ...]:
@@ -67,8 +62,7 @@ def _across(e: int, a: int, b: int, s: int) -> tuple[int, ...]:
     return (*others[:e], s, *others[e:])
 
 
-@formula(Space)
-def _edges(kin, place: Vector):
+def _edges(place):
     """Half of the edges along each direction; the other two directions go as in `_at_gauss`."""
     at = {signs: [place[3 * c + 3 + i] for i in range(3)] for c, signs in enumerate(CUBE)}
 
@@ -81,7 +75,7 @@ def _edges(kin, place: Vector):
 
 @domain.on(H8, Space)
 def _domain_h8_space(basis, kin, place):
-    along = _edges(kin, place)
+    along = _edges(place)
     # Rows of the Jacobian at the Gauss points: u does not depend on xi, v not on eta, w not on
     # zeta; numbers say at which points of the other two directions.
     u00, u10, u01, u11 = _at_gauss(along[0][0], along[0][1], along[0][2], along[0][3])
@@ -93,18 +87,18 @@ def _domain_h8_space(basis, kin, place):
     c010, c110 = _cross(v00, w01), _cross(v10, w11)
     c001, c101 = _cross(v01, w00), _cross(v11, w10)
     c011, c111 = _cross(v01, w01), _cross(v11, w11)
-    p = _at_gauss(add(c000, c100), add(c010, c110), add(c001, c101), add(c011, c111))
+    p = _at_gauss(_add(c000, c100), _add(c010, c110), _add(c001, c101), _add(c011, c111))
     q = _at_gauss(
-        add(_cross(w00, u00), _cross(w01, u10)),
-        add(_cross(w10, u00), _cross(w11, u10)),
-        add(_cross(w00, u01), _cross(w01, u11)),
-        add(_cross(w10, u01), _cross(w11, u11)),
+        _add(_cross(w00, u00), _cross(w01, u10)),
+        _add(_cross(w10, u00), _cross(w11, u10)),
+        _add(_cross(w00, u01), _cross(w01, u11)),
+        _add(_cross(w10, u01), _cross(w11, u11)),
     )
     r = _at_gauss(
-        add(_cross(u00, v00), _cross(u01, v01)),
-        add(_cross(u00, v10), _cross(u01, v11)),
-        add(_cross(u10, v00), _cross(u11, v01)),
-        add(_cross(u10, v10), _cross(u11, v11)),
+        _add(_cross(u00, v00), _cross(u01, v01)),
+        _add(_cross(u00, v10), _cross(u01, v11)),
+        _add(_cross(u10, v00), _cross(u11, v01)),
+        _add(_cross(u10, v10), _cross(u11, v11)),
     )
     # det J, two Gauss points of xi in each tuple; spread over the corners.
     d00, d10, d01, d11 = _at_gauss(
@@ -113,7 +107,7 @@ def _domain_h8_space(basis, kin, place):
         (_dot(u01, c001), _dot(u01, c101)),
         (_dot(u11, c011), _dot(u11, c111)),
     )
-    return _means(kin, place, (d00, d10, d01, d11), p, q, r)
+    return _means(place, (d00, d10, d01, d11), p, q, r)
 
 
 def _at(a: int, b: int) -> int:
@@ -121,36 +115,30 @@ def _at(a: int, b: int) -> int:
     return (a > 0) + 2 * (b > 0)
 
 
-@formula(Space)
-def _means(kin, place: Vector, d: Number, p: Number, q: Number, r: Number):
+def _means(place, d, p, q, r):
     """Corners, weights and gradients, from what det J and its cofactors give to the corners."""
     sums = [(d[0][n] + d[1][n]) + (d[2][n] + d[3][n]) for n in range(2)]
     k = 1 / (sums[0] + sums[1])
     near, far, half = k * NEAR, k * FAR, k * 0.5
     corners, weights, gradients = [], [], []
     for c, (x, y, z) in enumerate(CUBE):
-        corners.append([place[3 * c + 3 + i] for i in range(3)])
+        corners.append(Space.Vector._make(place[3 * c + 3 : 3 * c + 6]))
         first, second = (near, far) if x < 0 else (far, near)
         at = d[_at(y, z)]
         weights.append(first * at[0] + second * at[1])
         share = [-half if sign < 0 else half for sign in (x, y, z)]
         u, v, w = p[_at(y, z)], q[_at(x, z)], r[_at(x, y)]
         slope = [share[0] * u[i] + share[1] * v[i] + share[2] * w[i] for i in range(3)]
-        gradients.append(slope)
-    return corners, weights, gradients
-
-
-@formula(Space)
-def _least_jacobian(kin, u: Number, v: Number, w: Number):
-    """The least of the corners' Jacobians, from the half edges that meet there."""
-    met = ((u[_at(y, z)], v[_at(x, z)], w[_at(x, y)]) for x, y, z in CUBE)
-    return call(min, *(call(_dot, a, call(_cross, b, c)) for a, b, c in met))
+        gradients.append(Space.Vector._make(slope))
+    return tuple(corners), tuple(weights), tuple(gradients)
 
 
 @upright.on(H8)
 def _upright_h8(basis, kin, place):
-    u, v, w = _edges(kin, place)
-    return _least_jacobian(kin, u, v, w) > 0
+    # The least of the corners' Jacobians, from the half edges that meet there.
+    u, v, w = _edges(place)
+    met = [(u[_at(y, z)], v[_at(x, z)], w[_at(x, y)]) for x, y, z in CUBE]
+    return min(*[_dot(a, _cross(b, c)) for a, b, c in met]) > 0
 
 
 register_carried(H8)

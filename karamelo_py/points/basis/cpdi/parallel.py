@@ -1,11 +1,11 @@
 """CPDI proper: parallelograms (R4) and parallelepipeds (R8) that deform with the point."""
 
-from karamelo_py.compiler.symbols import Symbol, call, cofactor, determinant
+from karamelo_py.compiler.compile import real
 from karamelo_py.points.basis import deformed, extent
 from karamelo_py.points.basis.cpdi import CUBE, LEAST, SQUARE, ConvectedDomain, domain
 from karamelo_py.points.basis.cpdi.corners import register, tags_of
-from karamelo_py.points.kinematics import Axisymmetric, PlaneStrain, Space
-from karamelo_py.points.kinematics.components import Number, Tensor, Vector, formula
+from karamelo_py.points.kinematics import vector
+from karamelo_py.points.kinematics.tensors import cofactor, determinant, total
 
 
 class R4(ConvectedDomain):
@@ -37,77 +37,65 @@ class R8(ConvectedDomain):
     shape = ("half_edges",)
 
 
-def _edges(d: int, place: Symbol) -> dict[tuple[int, int], Symbol]:
-    """Component i of half edge e."""
-    return {(e, i): place[d + d * e + i] for e in range(d) for i in range(d)}
-
-
-def _combined(signs, vectors, i, start=0, factor=1):
-    """start + s_0 factor (v_0 + s_0 s_1 v_1) + s_2 v_2, component i."""
-
-    def signed(sign, item, total):
-        return total + item if sign > 0 else total - item
-
-    plane = factor * signed(signs[0] * signs[1], vectors[1, i], vectors[0, i])
-    total = signed(signs[0], plane, start)
-    for e in range(2, len(signs)):
-        total = signed(signs[e], vectors[e, i], total)
-    return total
-
-
-@formula(PlaneStrain, Axisymmetric, Space)
-def _domain(kin, place: Vector):
-    """Corners, weights and gradients."""
+def half_edges(kin, place):
+    """The half edges of a place, vectors."""
     d = kin.dimension
-    edges = _edges(d, place)
-    weight = 0.5**d
-    k = weight / determinant(edges, d)
-    # Reciprocal vectors A, B (A . a = 1, A . b = 0 ...): N_c has the mean gradient (+-A +-B) / 4.
-    # In space, nine products with k before the sums are fewer than twelve after them.
-    first, last = (k, 1) if d == 3 else (1, k)
-    reciprocal = {(e, i): first * cofactor(edges, d, e, i) for e, i in edges}
-    around = SQUARE if d == 2 else CUBE
-    corners = [[_combined(signs, edges, i, place[i]) for i in range(d)] for signs in around]
-    slopes = [[_combined(signs, reciprocal, i, 0, last) for i in range(d)] for signs in around]
-    return corners, (weight,) * len(around), slopes
+    return [vector(kin, place[d * e : d * e + d]) for e in range(1, d + 1)]
 
 
-@formula(PlaneStrain, Axisymmetric, Space)
-def _deformed_edges(kin, place: Vector, dl: Tensor):
-    """`place` with edges after the increment dl: r <- (I + dl) r."""
+def reciprocals(kin, edges, factor):
+    """Cofactors of the edges by rows, times a factor."""
     d = kin.dimension
-    edges = _edges(d, place)
-    return kin.vector(lambda i: place[i]) + tuple(
-        r + sum(dl[i, j] * edges[e, j] for j in range(d)) for (e, i), r in edges.items()
-    )
+    a = {(e, i): edges[e][i] for e in range(d) for i in range(d)}
+    return [vector(kin, [factor * cofactor(a, d, e, i) for i in range(d)]) for e in range(d)]
 
 
-@formula(PlaneStrain, Axisymmetric, Space)
-def _extent(kin, grid: Number, place: Vector):
-    """How far a corner is from the point in any direction, in cells; NaN if any component is."""
-    edges = _edges(kin.dimension, place)
-    away = kin.vector(lambda i: sum(abs(edges[e, i]) for e in kin.directions))
-    far = away[0]
-    for other in away[1:]:  # so written, NaN comes through
-        far = far + call(max, other - far, 0.0)
-    return call(max, far * grid.inv_h, LEAST[kin.dimension])
+def signed(sign, a, b):
+    """a + b, or a - b."""
+    return a + b if sign > 0 else a - b
 
 
 def domain_of(basis, kin, place):
-    """Corners, weights and gradients."""
-    return _domain(kin, place)
+    """Find corners, weights and gradients."""
+    d = kin.dimension
+    x, edges = vector(kin, place[:d]), half_edges(kin, place)
+    weight = real(0.5**d, place[0])
+    k = weight / determinant({(e, i): edges[e][i] for e in range(d) for i in range(d)}, d)
+    corners, gradients = [], []
+    # Reciprocal vectors A, B (A . a = 1, A . b = 0 ...): N_c has the mean gradient (+-A +-B) / 4.
+    # In space, nine products with k before the sums are fewer than twelve after them.
+    A = reciprocals(kin, edges, k if d == 3 else 1)
+    for signs in SQUARE if d == 2 else CUBE:
+        corner = signed(signs[0], x, signed(signs[0] * signs[1], edges[0], edges[1]))
+        slope = signed(signs[0] * signs[1], A[0], A[1])
+        if d == 2:
+            slope = vector(kin, [k * a for a in slope])
+        slope = slope if signs[0] > 0 else -slope
+        if d == 3:
+            corner, slope = signed(signs[2], corner, edges[2]), signed(signs[2], slope, A[2])
+        corners, gradients = [*corners, corner], [*gradients, slope]
+    return tuple(corners), (weight,) * len(corners), tuple(gradients)
+
+
+def deformed_edges(basis, kin, place, dl):
+    """Deform the edges of a place: r <- (I + dl) r."""
+    dl = dl.planar()
+    edges = [r + dl @ r for r in half_edges(kin, place)]
+    return (*place[: kin.dimension], *[a for edge in edges for a in edge])
+
+
+def extent_of_edges(basis, kin, grid, place):
+    """Find how far a corner is from the point in any direction, in cells; NaN if any part is."""
+    away = [total([abs(a) for a in parts]) for parts in zip(*half_edges(kin, place), strict=True)]
+    far = away[0]
+    for other in away[1:]:  # so written, NaN comes through
+        far = far + max(other - far, 0)
+    return max(far * grid.inv_h, LEAST[kin.dimension])
 
 
 for _basis in (R4, R8):
     for _tag in tags_of(_basis.dimension):
         domain.on(_basis, _tag)(domain_of)
-
-    @deformed.on(_basis)
-    def _deformed_basis(basis, kin, place, dl):
-        return _deformed_edges(kin, place, dl)
-
-    @extent.on(_basis)
-    def _extent_basis(basis, kin, grid, place):
-        return _extent(kin, grid, place)
-
+    deformed.on(_basis)(deformed_edges)
+    extent.on(_basis)(extent_of_edges)
     register(_basis, _basis.dimension, 2**_basis.dimension)

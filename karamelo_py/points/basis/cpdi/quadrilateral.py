@@ -1,6 +1,5 @@
 """CPDI2: quadrilaterals (Q4) whose corners go with the velocity of the grid."""
 
-from karamelo_py.compiler.compile import real
 from karamelo_py.points.basis.cpdi import SQUARE, ConvectedDomain, Element, domain, upright
 from karamelo_py.points.basis.cpdi.corners import register_carried
 from karamelo_py.points.kinematics import Axisymmetric, PlaneStrain
@@ -31,16 +30,16 @@ def _domain_q4_axisymmetric(basis, kin, place):
     px, py = x3 - x1, y3 - y1
     qx, qy = x4 - x2, y4 - y2
     double = px * qy - qx * py
-    k = real(1, px) / double
+    k = 1 / double
     # Sadeghirad et al. 2013: w = (6 V -+ a -+ b) / (24 V)
     a = (x4 - x1) * (y2 - y3) - (x2 - x3) * (y4 - y1)
     b = (x3 - x4) * (y1 - y2) - (x1 - x2) * (y3 - y4)
-    quarter, m = real(0.25, px), k * real(1 / 12, px)
+    m = k * (1 / 12)
     p, q = m * (a + b), m * (a - b)
     gx, gy, hx, hy = k * qy, k * qx, k * py, k * px
     return (
         ((x1, y1), (x2, y2), (x3, y3), (x4, y4)),
-        (quarter - p, quarter - q, quarter + p, quarter + q),
+        (0.25 - p, 0.25 - q, 0.25 + p, 0.25 + q),
         ((-gx, gy), (hx, -hy), (gx, -gy), (-hx, hy)),
     )
 

@@ -1,13 +1,10 @@
 """CPDI on triangles (T3) and tetrahedra (Tet4) whose corners go with the velocity of the grid."""
 
-from functools import reduce
-from operator import sub
-
-from karamelo_py.compiler.symbols import Symbol, cofactor, determinant
+from karamelo_py.compiler.compile import real
 from karamelo_py.points.basis.cpdi import ConvectedDomain, Element, domain, upright
 from karamelo_py.points.basis.cpdi.corners import register_carried, tags_of
-from karamelo_py.points.kinematics import Axisymmetric, PlaneStrain, Space
-from karamelo_py.points.kinematics.components import Vector, formula
+from karamelo_py.points.kinematics import vector
+from karamelo_py.points.kinematics.tensors import cofactor, determinant
 
 
 class T3(ConvectedDomain):
@@ -40,41 +37,35 @@ class Tet4(ConvectedDomain):
     element = Element("tetra", 4, ((0, 1), (0, 2), (0, 3)), (0, 2, 1, 3))
 
 
-def _edges(d: int, place: Symbol) -> dict[tuple[int, int], Symbol]:
-    """Component i of the edge from the first corner to corner e + 1."""
-    return {(e, i): place[d * (e + 2) + i] - place[d + i] for e in range(d) for i in range(d)}
-
-
-@formula(PlaneStrain, Axisymmetric, Space)
-def _domain(kin, place: Vector):
-    """Corners, weights and gradients."""
+def corners_and_edges(kin, place):
+    """The corners, vectors, and components of the edges from the first to the others."""
     d = kin.dimension
-    edges = _edges(d, place)
-    k = 1 / determinant(edges, d)
-    # Reciprocal vectors of the edges; the gradients add up to nothing.
-    others = [[k * cofactor(edges, d, e, i) for i in range(d)] for e in range(d)]
-    first = [reduce(sub, (g[i] for g in others[1:]), -others[0][i]) for i in range(d)]
-    corners = [[place[d * (c + 1) + i] for i in range(d)] for c in range(d + 1)]
-    return corners, (1 / (d + 1),) * (d + 1), (first, *others)
-
-
-@formula(PlaneStrain, Axisymmetric, Space)
-def _upright(kin, place: Vector):
-    """Whether the volume is positive."""
-    return determinant(_edges(kin.dimension, place), kin.dimension) > 0
+    corners = [vector(kin, place[d * c : d * c + d]) for c in range(1, d + 2)]
+    edges = [corner - corners[0] for corner in corners[1:]]
+    return corners, {(e, i): edges[e][i] for e in range(d) for i in range(d)}
 
 
 def domain_of(basis, kin, place):
-    """Corners, weights and gradients."""
-    return _domain(kin, place)
+    """Find corners, weights and gradients."""
+    d = kin.dimension
+    corners, edges = corners_and_edges(kin, place)
+    k = 1 / determinant(edges, d)
+    # Reciprocal vectors of the edges; the gradients add up to nothing.
+    others = [vector(kin, [k * cofactor(edges, d, e, i) for i in range(d)]) for e in range(d)]
+    first = -others[0]
+    for other in others[1:]:
+        first = first - other
+    weight = real(1 / (d + 1), k)
+    return tuple(corners), (weight,) * (d + 1), (first, *others)
+
+
+def upright_simplex(basis, kin, place):
+    """Whether the volume is positive."""
+    return determinant(corners_and_edges(kin, place)[1], kin.dimension) > 0
 
 
 for _basis in (T3, Tet4):
     for _tag in tags_of(_basis.dimension):
         domain.on(_basis, _tag)(domain_of)
-
-    @upright.on(_basis)
-    def _upright_basis(basis, kin, place):
-        return _upright(kin, place)
-
+    upright.on(_basis)(upright_simplex)
     register_carried(_basis)

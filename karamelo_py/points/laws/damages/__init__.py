@@ -3,7 +3,7 @@
 A damage is a NamedTuple of parameters (its class is the tag), a part of a composed law
 (`karamelo_py.points.laws.eos_strength`): the stress is 1 - D times that of the intact
 material, but for pressure, which also rubble bears. Equation of state and strength know nothing of
-it, so that it enters once. What it remembers is its memory, a flat tuple.
+it, so that it enters once. What it remembers is its memory, a tuple.
 """
 
 from karamelo_py.compiler.compile import point_function

@@ -1,8 +1,8 @@
 """damage damage_johnson_cook: ductile failure by plastic strain."""
 
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
-from karamelo_py.compiler.compile import any_lane, point_function, real, where
+from karamelo_py.compiler.compile import any_lane, point_function, where
 from karamelo_py.compiler.powers import exponential, logarithm
 from karamelo_py.language.signature import NonNegative
 from karamelo_py.points.laws import column, damage, damage_initiation
@@ -85,44 +85,47 @@ column(JohnsonCookDamage, "damage", damage)
 column(JohnsonCookDamage, "damage_init", damage_initiation)
 
 
+class Accumulated(NamedTuple):
+    """What a point remembers."""
+
+    w: Any  # sum of plastic strain over failure strain
+
+
 @point_function(otherwise=True)
-def warmed(heat, damage, one):
+def temperature_factor(heat, damage):
     """1 + d5 T*, and 1 without a temperature."""
-    return one
+    return 1
 
 
-@warmed.on(Warm)
-def _warmed_warm(heat, damage, one):
-    return one + damage.d5 * homologous(heat, damage.Tr, damage.Tm)
+@temperature_factor.on(Warm)
+def _temperature_factor_warm(heat, damage):
+    return 1 + damage.d5 * homologous(heat, damage.Tr, damage.Tm)
 
 
 @initial_damage.on(JohnsonCookDamage)
 def _initial_damage_johnson_cook_damage(damage, like):
-    return (real(0, like),)
+    return Accumulated(0.0)
 
 
 @damage_after.on(JohnsonCookDamage)
 def _damage_after_johnson_cook_damage(damage, memory, strain, triaxiality, heat, dt):
-    grows = (strain > 0) & (triaxiality > real(_CLOSED, strain))
+    grows = (strain > 0) & (triaxiality > _CLOSED)
     if not any_lane(grows):
         return memory
-    one = real(1, strain)
-    failure = damage.d1 + damage.d2 * exponential(min(damage.d3 * triaxiality, real(50, strain)))
-    rate = max(strain / (dt * damage.epsdot0), one)
-    failure *= one + damage.d4 * logarithm(rate)
-    failure *= warmed(heat, damage, one)
-    further = strain / max(failure, real(_SMALLEST_FAILURE_STRAIN, strain))
-    return (where(grows, memory[0] + further, memory[0]),)
+    failure = damage.d1 + damage.d2 * exponential(min(damage.d3 * triaxiality, 50))
+    rate = max(strain / (dt * damage.epsdot0), 1)
+    failure *= 1 + damage.d4 * logarithm(rate)
+    failure *= temperature_factor(heat, damage)
+    further = strain / max(failure, _SMALLEST_FAILURE_STRAIN)
+    return Accumulated(where(grows, memory.w + further, memory.w))
 
 
 @integrity.on(JohnsonCookDamage)
 def _integrity_johnson_cook_damage(damage, memory):
-    one = real(1, memory[0])
-    zero = real(0, memory[0])
-    D = real(_BRITTLENESS, memory[0]) * (memory[0] - one)
-    return one - min(max(D, zero), one)
+    D = _BRITTLENESS * (memory.w - 1)
+    return 1 - min(max(D, 0), 1)
 
 
 @initiation.on(JohnsonCookDamage)
 def _initiation_johnson_cook_damage(damage, memory):
-    return memory[0]
+    return memory.w

@@ -3,7 +3,7 @@
 An equation of state is a NamedTuple of parameters (its class is the tag), a part of a composed law
 (`karamelo_py.points.laws.eos_strength`). Pressure is positive in compression; `j` = det F is
 the volume over the reference volume, `heat` the temperature (`Warm`), or () where the law has none.
-What it remembers of the past is its memory, a flat tuple, nothing for most. It also has a
+What it remembers of the past is its memory, a tuple, nothing for most. It also has a
 `specific_volume`, as a law does. Where these are not usual, a class has
 
 any_speed

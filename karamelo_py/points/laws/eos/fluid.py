@@ -3,7 +3,7 @@
 from math import inf
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import real, round_off
+from karamelo_py.compiler.compile import round_off
 from karamelo_py.compiler.powers import logarithm, power
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.laws.eos import (
@@ -70,7 +70,7 @@ class Tait(NamedTuple):
 
 @pressure.on(Tait)
 def _pressure_tait(eos, j, memory, heat):
-    return max(eos.K * (power(j, -eos.gamma) - real(1, j)), -eos.tension)
+    return max(eos.K * (power(j, -eos.gamma) - 1), -eos.tension)
 
 
 @bulk_modulus.on(Tait)
@@ -80,11 +80,10 @@ def _bulk_modulus_tait(eos, j, memory, heat):
 
 @compression_energy.on(Tait)
 def _compression_energy_tait(eos, j, memory):
-    one = real(1, j)
-    exponent = one - eos.gamma
+    exponent = 1 - eos.gamma
     whole = j if eos.tension >= eos.K else min(j, ratio_at_pressure(eos, -eos.tension, ()))
-    grown = -logarithm(whole) if exponent == 0 else (one - power(whole, exponent)) / exponent
-    energy = eos.K * (grown - (one - whole))
+    grown = -logarithm(whole) if exponent == 0 else (1 - power(whole, exponent)) / exponent
+    energy = eos.K * (grown - (1 - whole))
     # From there on at constant tension.
     return energy + eos.tension * (j - whole) if j > whole else energy
 
@@ -92,6 +91,5 @@ def _compression_energy_tait(eos, j, memory):
 @ratio_at_pressure.on(Tait)
 def _ratio_at_pressure_tait(eos, p, heat):
     # Tension of K would need an infinite volume.
-    one = real(1, p)
     borne = max(p, -eos.tension)
-    return power(max(one + borne / eos.K, round_off(p)), -one / eos.gamma)
+    return power(max(1 + borne / eos.K, round_off(p)), -1 / eos.gamma)

@@ -1,8 +1,7 @@
 """eos ideal-gas: a gas whose energy follows from the work done on it."""
 
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
-from karamelo_py.compiler.compile import real
 from karamelo_py.compiler.powers import power
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.laws.eos import (
@@ -91,21 +90,27 @@ class IdealGas(NamedTuple):
         return {"eos": cls(1 / rho0, gamma, energy), **artificial_viscosity(Q1, Q2)}
 
 
+class InternalEnergy(NamedTuple):
+    """What a point remembers."""
+
+    E: Any  # per reference volume
+
+
 @initial_energy.on(IdealGas)
 def _initial_energy_ideal_gas(eos, like):
-    return (eos.energy,)
+    return InternalEnergy(eos.energy)
 
 
 @compressed.on(IdealGas)
 def _compressed_ideal_gas(eos, memory, before, j, heating):
     # dE = -p dJ has the solution E J^(gamma - 1) = const, whatever the size of the step.
-    return (memory[0] * power(before / j, eos.gamma - real(1, j)) + heating,)
+    return InternalEnergy(memory.E * power(before / j, eos.gamma - 1) + heating)
 
 
 @taken_heat.on(IdealGas)
 def _taken_heat_ideal_gas(eos, memory, heat):
     # A moment may hold a little more than there was: a cold gas does not pay all of that at once.
-    return (max(heat, real(-0.1, heat) * memory[0]),)
+    return (max(heat, -0.1 * memory.E),)
 
 
 @stored_heat.on(IdealGas)
@@ -115,20 +120,20 @@ def _stored_heat_ideal_gas(eos, loss):
 
 @pressure.on(IdealGas)
 def _pressure_ideal_gas(eos, j, memory, heat):
-    return (eos.gamma - real(1, j)) * memory[0] / j
+    return (eos.gamma - 1) * memory.E / j
 
 
 @bulk_modulus.on(IdealGas)
 def _bulk_modulus_ideal_gas(eos, j, memory, heat):
-    return eos.gamma * (eos.gamma - real(1, j)) * memory[0] / j
+    return eos.gamma * (eos.gamma - 1) * memory.E / j
 
 
 @compression_energy.on(IdealGas)
 def _compression_energy_ideal_gas(eos, j, memory):
-    return memory[0] - eos.energy
+    return memory.E - eos.energy
 
 
 @at_pressure.on(IdealGas)
 def _at_pressure_ideal_gas(eos, j, memory, p, heat):
     # The volume stays, the energy follows; a gas bears no tension.
-    return j, (max(p, real(0, p)) * j / (eos.gamma - real(1, p)),)
+    return j, InternalEnergy(max(p, 0) * j / (eos.gamma - 1))

@@ -2,7 +2,6 @@
 
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import real
 from karamelo_py.language.signature import Positive
 from karamelo_py.points.laws.eos import (
     bulk_modulus,
@@ -48,7 +47,7 @@ class LinearPressure(NamedTuple):
 
 @pressure.on(LinearPressure)
 def _pressure_linear_pressure(eos, j, memory, heat):
-    return eos.K * (real(1, eos.K) - j)
+    return eos.K * (1 - j)
 
 
 @bulk_modulus.on(LinearPressure)
@@ -58,10 +57,10 @@ def _bulk_modulus_linear_pressure(eos, j, memory, heat):
 
 @compression_energy.on(LinearPressure)
 def _compression_energy_linear_pressure(eos, j, memory):
-    change = real(1, eos.K) - j
-    return real(0.5, eos.K) * eos.K * change * change
+    change = 1 - j
+    return 0.5 * eos.K * change * change
 
 
 @ratio_at_pressure.on(LinearPressure)
 def _ratio_at_pressure_linear_pressure(eos, p, heat):
-    return real(1, eos.K) - p / eos.K
+    return 1 - p / eos.K

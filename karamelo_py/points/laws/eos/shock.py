@@ -3,7 +3,7 @@
 from math import sqrt
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import point_function, real, shared, where
+from karamelo_py.compiler.compile import point_function, where
 from karamelo_py.compiler.powers import logarithm
 from karamelo_py.language.rules import known_failure
 from karamelo_py.language.signature import NonNegative, Positive
@@ -108,86 +108,78 @@ known_failure(
 )
 
 
-@shared
 def tangent_from(eos, j):
     """The compression 1 - J beyond which pressure is a straight line."""
-    limit = real(_STEEPEST, j)
-    return where(limit < eos.S, limit / max(eos.S, limit), limit)
+    return where(_STEEPEST < eos.S, _STEEPEST / max(eos.S, _STEEPEST), _STEEPEST)
 
 
-@shared
 def cold_pressure(eos, j):
     """Pressure of the Hugoniot curve; rho0 c0^2 mu in tension."""
-    one = real(1, j)
-    closed = one - j
+    closed = 1 - j
     inside = min(closed, tangent_from(eos, j))
     y = eos.S * inside
-    flat = one - y
+    flat = 1 - y
     in_tension = closed < 0
-    inverse = one / where(in_tension, j, flat)
-    slope = (one + y) * inverse
+    inverse = 1 / where(in_tension, j, flat)
+    slope = (1 + y) * inverse
     curve = (inside + slope * (closed - inside)) * (inverse * inverse)
     return eos.modulus * where(in_tension, closed * inverse, curve)
 
 
 @point_function(otherwise=True)
-def heated(heat, p, Tr, factor):
+def with_heat(heat, p, Tr, factor):
     """p + factor (T - Tr) above the temperature Tr, p without a temperature."""
     return p
 
 
-@heated.on(Warm)
-def _heated_warm(heat, p, Tr, factor):
-    return p + max(heat.T - Tr, real(0, Tr)) * factor
+@with_heat.on(Warm)
+def _with_heat_warm(heat, p, Tr, factor):
+    return p + max(heat.T - Tr, 0) * factor
 
 
 @pressure.on(Shock)
 def _pressure_shock(eos, j, memory, heat):
-    return heated(heat, cold_pressure(eos, j), eos.Tr, eos.thermal)
+    return with_heat(heat, cold_pressure(eos, j), eos.Tr, eos.thermal)
 
 
 @bulk_modulus.on(Shock)
 def _bulk_modulus_shock(eos, j, memory, heat):
-    one = real(1, j)
-    closed = one - j
+    closed = 1 - j
     y = eos.S * min(closed, tangent_from(eos, j))
     in_tension = closed < 0
-    inverse = one / where(in_tension, j, one - y)
-    curve = j * (one + y) * (inverse * inverse)
+    inverse = 1 / where(in_tension, j, 1 - y)
+    curve = j * (1 + y) * (inverse * inverse)
     return eos.modulus * where(in_tension, inverse, curve * inverse)
 
 
 @compression_energy.on(Shock)
 def _compression_energy_shock(eos, j, memory):
-    one, half = real(1, j), real(0.5, j)
-    closed = one - j
+    closed = 1 - j
     inside = min(closed, tangent_from(eos, j))
     y = eos.S * inside
-    flat = one - y
-    in_tension, near = closed < 0, y < real(1e-3, j)
+    flat = 1 - y
+    in_tension, near = closed < 0, y < 1e-3
     log_of = logarithm(where(in_tension, j, flat))
     # From J to 1 rho0 c0^2 (1 - J) / J in tension; the closed form is a small difference near 1.
-    few = inside * inside * (half + y * (real(2 / 3, j) + real(0.75, j) * y))
-    log_of_flat = log_of + ((one - flat) - y) / flat  # y is not what 1 - y is rounded to
-    energy = where(near, few, (y / flat + log_of_flat) / where(near, one, eos.S * eos.S))
-    slope = (one + y) / (flat * flat * flat)
+    few = inside * inside * (0.5 + y * (2 / 3 + 0.75 * y))
+    log_of_flat = log_of + ((1 - flat) - y) / flat  # y is not what 1 - y is rounded to
+    energy = where(near, few, (y / flat + log_of_flat) / where(near, 1, eos.S * eos.S))
+    slope = (1 + y) / (flat * flat * flat)
     further = closed - inside
-    line = further * (inside / (flat * flat) + half * slope * further)
+    line = further * (inside / (flat * flat) + 0.5 * slope * further)
     return eos.modulus * where(in_tension, -(closed + log_of), energy + line)
 
 
 @ratio_at_pressure.on(Shock)
 def _ratio_at_pressure_shock(eos, p, heat):
-    one = real(1, p)
-    two = real(2, p)
-    cold = (p - heated(heat, real(0, p), eos.Tr, eos.thermal)) / eos.modulus
+    cold = (p - with_heat(heat, 0, eos.Tr, eos.thermal)) / eos.modulus
     if cold < 0:
-        return one / max(one + cold, real(1e-6, p))
+        return 1 / max(1 + cold, 1e-6)
     inside = tangent_from(eos, cold)
     y = eos.S * inside
-    flat = one - y
+    flat = 1 - y
     top = inside / (flat * flat)
     if cold > top:
-        return one - inside - (cold - top) * flat * flat * flat / (one + y)
-    k = two * cold * eos.S + one
-    return one - two * cold / (k + sqrt(real(4, p) * cold * eos.S + one))
+        return 1 - inside - (cold - top) * flat * flat * flat / (1 + y)
+    k = 2 * cold * eos.S + 1
+    return 1 - 2 * cold / (k + sqrt(4 * cold * eos.S + 1))

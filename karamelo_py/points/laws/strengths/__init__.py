@@ -2,7 +2,7 @@
 
 A strength is a NamedTuple of parameters (its class is the tag), a part of a composed law
 (`karamelo_py.points.laws.eos_strength`). What it remembers of the past (plastic strain and
-the like) is its memory, a flat tuple with as many numbers as it needs, none at best (`remembers`).
+the like) is its memory, a NamedTuple of as many numbers as it needs, none at best (`remembers`).
 `heat` is the temperature (`Warm`), or () where the law has none.
 
 Strengths that depend on pressure, and change the volume, have `pressure_response` in the place of
@@ -18,11 +18,12 @@ rings
     False: nor does it vibrate.
 """
 
+import sys
+from collections import namedtuple
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import define, point_function, real
-from karamelo_py.compiler.tuples import scale
-from karamelo_py.points.kinematics import contract
+from karamelo_py.compiler.compile import point_function
+from karamelo_py.points.kinematics import inner
 from karamelo_py.points.laws import column
 
 
@@ -33,7 +34,7 @@ class Remembered(NamedTuple):
 
 
 def remembers(strength: type, **numbers: float | str) -> None:
-    """Declare what `strength` remembers.
+    """Declare what `strength` remembers: its memory has these names.
 
     Parameters
     ----------
@@ -43,23 +44,35 @@ def remembers(strength: type, **numbers: float | str) -> None:
         For each number the name of its column, and what it starts from: a value, or the name of a
         parameter. ``ep`` is the equivalent plastic strain; it comes first.
     """
-    starts = [
-        f"strength.{start}" if isinstance(start, str) else f"real({start!r}, like)"
-        for start in numbers.values()
-    ]
-    initial_memory.on(strength)(
-        define("strength, like", f"return ({', '.join(starts)},)", real=real)
-    )
+    name = f"{strength.__name__}Memory"
+    made = namedtuple(name, numbers, module=strength.__module__)
+    setattr(sys.modules[strength.__module__], name, made)  # kernels on disk name it
+    starts = tuple(numbers.values())
+    parameters = tuple(start if isinstance(start, str) else "" for start in starts)
+
+    @initial_memory.on(strength)
+    def _initial_memory_strength(strength, like):
+        pairs = zip(parameters, starts, strict=True)
+        return made(*[getattr(strength, name) if name else start for name, start in pairs])
+
     for place, name in enumerate(numbers):
         column(strength, name, Remembered(place))
     if "ep" in numbers:
-        initial_loss.on(strength)(define("strength, like", "return (real(0, like),)", real=real))
-        equivalent_plastic_strain.on(strength)(define("strength, memory", "return memory[0]"))
+        initial_loss.on(strength)(_initial_loss)
+        equivalent_plastic_strain.on(strength)(_plastic_strain_remembered)
+
+
+def _initial_loss(strength, like):
+    return (0.0,)
+
+
+def _plastic_strain_remembered(strength, memory):
+    return memory.ep
 
 
 @point_function(otherwise=True)
 def initial_memory(strength, like):
-    """The memory of a point without a past, in the number type of `like`."""
+    """Memory of a point without a past."""
     return ()
 
 
@@ -118,16 +131,16 @@ def damped_speed_squared(strength, squared, density):
 @point_function(otherwise=True)
 def shear_strain(strength, kin, s):
     """Elastic part of the deviatoric strain, as a symmetric tensor."""
-    return scale(real(0.5, strength.G) / strength.G, s)
+    return 0.5 / strength.G * s
 
 
 @point_function(otherwise=True)
 def shear_energy(strength, kin, s):
     """Energy stored by elastic shear, per present volume."""
-    return real(0.25, strength.G) / strength.G * contract(kin, s, s)
+    return 0.25 / strength.G * inner(s, s)
 
 
 @point_function(otherwise=True)
 def equivalent_plastic_strain(strength, memory):
     """Sum of sqrt(2/3 d:d) of the plastic strain increments d."""
-    return real(0, strength[0])
+    return 0

@@ -4,7 +4,7 @@ from math import cos, inf, sin, sqrt, tan
 from typing import Annotated, Literal, NamedTuple
 
 from karamelo_py.language.signature import NonNegative, Positive
-from karamelo_py.points.kinematics.tensors import inner
+from karamelo_py.points.kinematics import inner
 from karamelo_py.points.laws.strengths import pressure_response
 from karamelo_py.points.laws.strengths.frictional import (
     frictional,

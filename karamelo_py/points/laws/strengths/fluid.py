@@ -2,10 +2,8 @@
 
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import real
-from karamelo_py.compiler.tuples import scale
 from karamelo_py.language.signature import NonNegative
-from karamelo_py.points.kinematics import contract, deviator, zero_symmetric
+from karamelo_py.points.kinematics import dev, inner, nothing
 from karamelo_py.points.laws import strengths
 from karamelo_py.points.laws.viscosity import damped
 
@@ -47,31 +45,31 @@ class Viscous(NamedTuple):
 
 @strengths.initial_loss.on(Viscous)
 def _initial_loss_viscous(strength, like):
-    return (real(0, like),)
+    return (0.0,)
 
 
 @strengths.shear_response.on(Viscous)
 def _shear_response_viscous(strength, kin, s, strain, memory, heat, dt):
-    new = scale(real(2, dt) * strength.mu / dt, deviator(kin, strain))
-    return new, memory, contract(kin, new, strain)
+    new = 2 * strength.mu / dt * dev(strain)
+    return new, memory, inner(new, strain)
 
 
 @strengths.damped_speed_squared.on(Viscous)
 def _damped_speed_squared_viscous(strength, squared, density):
     # nu = 4/3 mu/rho
-    return damped(squared, real(4 / 3, density) * strength.mu / (density * strength.cell_size))
+    return damped(squared, 4 / 3 * strength.mu / (density * strength.cell_size))
 
 
 @strengths.shear_modulus.on(Viscous)
 def _shear_modulus_viscous(strength):
-    return real(0, strength.mu)
+    return 0
 
 
 @strengths.shear_strain.on(Viscous)
 def _shear_strain_viscous(strength, kin, s):
-    return zero_symmetric(kin, strength.mu)
+    return nothing(kin)
 
 
 @strengths.shear_energy.on(Viscous)
 def _shear_energy_viscous(strength, kin, s):
-    return real(0, strength.mu)
+    return 0

@@ -11,7 +11,8 @@ from karamelo_py.language.arguments import Argument
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.laws.numbers import Numbers
-from karamelo_py.points.laws.strengths.hardening import flow_stress, hardening
+from karamelo_py.points.laws.strengths import remembers, shear_response
+from karamelo_py.points.laws.strengths.hardening import flow_stress, radial_return
 from karamelo_py.points.laws.temperatures import temperature_or
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
@@ -156,19 +157,19 @@ def value(strength, ep, epdot, T):
     return stack[0]
 
 
-hardening(FlowStress)
+remembers(FlowStress, ep=0.0)
+shear_response.on(FlowStress)(radial_return)
 
 
 @flow_stress.on(FlowStress)
-def _flow_stress_flow_stress(strength, memory, increment, heat, dt):
-    zero = real(0, increment)
+def _flow_stress_flow_stress(strength, memory, known, increment, heat, dt):
     T = temperature_or(heat, strength.initial_temperature)
-    near = real(1e-6, increment) * (increment + real(1e-4, increment))
+    near = 1e-6 * (increment + 1e-4)
     # In double precision: the difference of the two is small.
-    here = 0.0 + memory[0] + increment
+    here = real(memory.ep, 1.0) + increment
     there = max(value(strength, here, increment / dt, T), 0.0)
-    beyond = max(value(strength, here + near, (0.0 + increment + near) / dt, T), 0.0)
-    flow = max(real(there, increment), zero)
+    beyond = max(value(strength, here + near, (real(increment, 1.0) + near) / dt, T), 0.0)
+    flow = max(real(there, increment), 0)
     slope = real((beyond - there) / near, increment)
     # A slope of -3 G is where there is no solution any more.
-    return flow, max(slope, real(-2, slope) * strength.G)
+    return flow, max(slope, -2 * strength.G)

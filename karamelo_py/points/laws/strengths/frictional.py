@@ -1,6 +1,7 @@
 """What strengths that depend on pressure share: cohesion and friction, perhaps softening; memory.
 
-The memory is (equivalent plastic strain, plastic volume ratio, volume ratio of separation).
+The memory is the equivalent plastic strain ep, the plastic volume ratio Jp, and Js, that of
+separation.
 
 Beyond the largest tension that the strength bears, points come apart: the volume that they gain is
 not bulk, and is given back before they bear pressure again (Dunatunga & Kamrin 2015, "Continuum
@@ -12,8 +13,8 @@ Trans. Graph. 36(4), section 4.3.4). What plastic flow by shear gains (dilatancy
 from math import inf, log, sqrt
 
 from karamelo_py.compiler.compile import point_function
-from karamelo_py.compiler.tuples import plus
-from karamelo_py.points.kinematics.tensors import inner
+from karamelo_py.compiler.tuples import only
+from karamelo_py.points.kinematics import inner
 from karamelo_py.points.laws.eos import bulk_modulus, pressure, ratio_at_pressure
 from karamelo_py.points.laws.strengths import (
     elastic_ratio,
@@ -50,44 +51,49 @@ def tension_bound(strength, lowest):
     return lowest
 
 
+def elastic_part(strength, memory, j):
+    """Find the part of the volume ratio j that is elastic."""
+    return j / (memory.Jp * memory.Js)
+
+
+def with_elastic_part(strength, memory, j, elastic):
+    """Let the elastic part of the volume ratio j be `elastic`: the rest is plastic."""
+    return memory._replace(Jp=j / (elastic * memory.Js))
+
+
+def respond_by_friction(strength, law, kin, s, strain, j, memories, dt):
+    """Return an elastic trial to the yield surface, and give the change of volume to the memory."""
+    memory, heat = memories.strength, memories.heat
+    trial = elastic_trial(strength.G, s, strain)
+    elastic = elastic_part(strength, memory, j)
+    warm = only(thermal_pressure(law.temperature, heat))
+    p = pressure(law.eos, elastic, memories.energy, heat) + warm
+    if memory.Js > 1 and p > 0:
+        # What had come apart closes before it bears pressure.
+        apart = max(1, j / (memory.Jp * ratio_at_pressure(law.eos, -warm, heat)))
+        memory = memory._replace(Js=apart)
+        elastic = elastic_part(strength, memory, j)
+        p = pressure(law.eos, elastic, memories.energy, heat) + warm
+    K = bulk_modulus(law.eos, elastic, memories.energy, heat)
+    lowest = lowest_pressure(strength, memory.ep)
+    new, reached = pressure_response(strength, kin, trial, p, K, memory.ep)
+    plastic = 0.5 / strength.G * (trial - new)
+    memory = memory._replace(ep=memory.ep + sqrt(2 / 3 * inner(plastic, plastic)))
+    work = inner(new, plastic)
+    if reached != p:
+        # The volume that bears the new pressure is elastic; the rest is plastic.
+        after = ratio_at_pressure(law.eos, reached - warm, heat)
+        if p < lowest and reached - lowest <= 1e-6 * (lowest - p):
+            memory = memory._replace(Js=j / (memory.Jp * after))
+        else:
+            memory = with_elastic_part(strength, memory, j, after)
+        work -= reached * log(elastic / after)
+    return new, memory, work
+
+
 def frictional(strength: type) -> None:
     """Give `strength` (with a field ``G`` and those of `surface`) memory, and response."""
     remembers(strength, ep=0.0, Jp=1.0, Js=1.0)
-
-    @elastic_ratio.on(strength)
-    def _elastic_ratio_strength(strength, memory, j):
-        return j / (memory[1] * memory[2])
-
-    @with_elastic_ratio.on(strength)
-    def _with_elastic_ratio_strength(strength, memory, j, elastic):
-        return (memory[0], j / (elastic * memory[2]), memory[2])
-
-    @respond.on(strength)
-    def _respond_strength(strength, law, kin, s, strain, j, memories, dt):
-        memory, heat = memories.strength, memories.heat
-        trial = elastic_trial(strength.G, s, strain)
-        elastic = elastic_ratio(strength, memory, j)
-        warm = plus(0, thermal_pressure(law.temperature, heat))
-        p = pressure(law.eos, elastic, memories.energy, heat) + warm
-        if memory[2] > 1 and p > 0:
-            # What had come apart closes before it bears pressure.
-            apart = max(1, j / (memory[1] * ratio_at_pressure(law.eos, -warm, heat)))
-            memory = (memory[0], memory[1], apart)
-            elastic = elastic_ratio(strength, memory, j)
-            p = pressure(law.eos, elastic, memories.energy, heat) + warm
-        K = bulk_modulus(law.eos, elastic, memories.energy, heat)
-        lowest = lowest_pressure(strength, memory[0])
-        new, reached = pressure_response(strength, kin, trial, p, K, memory[0])
-        plastic = 0.5 / strength.G * (trial - new)
-        increment = sqrt(2 / 3 * inner(plastic, plastic))
-        memory = (memory[0] + increment, memory[1], memory[2])
-        work = inner(new, plastic)
-        if reached != p:
-            # The volume that bears the new pressure is elastic; the rest is plastic.
-            after = ratio_at_pressure(law.eos, reached - warm, heat)
-            if p < lowest and reached - lowest <= 1e-6 * (lowest - p):
-                memory = (memory[0], memory[1], j / (memory[1] * after))
-            else:
-                memory = with_elastic_ratio(strength, memory, j, after)
-            work -= reached * log(elastic / after)
-        return new, memory, work
+    elastic_ratio.on(strength)(elastic_part)
+    with_elastic_ratio.on(strength)(with_elastic_part)
+    respond.on(strength)(respond_by_friction)

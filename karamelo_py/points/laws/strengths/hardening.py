@@ -3,71 +3,58 @@
 from math import sqrt
 
 from karamelo_py.compiler.compile import any_lane, point_function, round_off, shared, where
-from karamelo_py.points.kinematics.tensors import von_mises
-from karamelo_py.points.laws.strengths import remembers, shear_response
+from karamelo_py.points.kinematics import von_mises
 from karamelo_py.points.laws.strengths.linear import elastic_trial
 
 
 @point_function()
-def flow_stress(strength, memory, increment, heat, dt):
-    """Flow stress and its slope by `increment`, the part of the plastic strain of a step dt.
+def flow_stress(strength, memory, known, increment, heat, dt):
+    """Find flow stress and its slope by `increment`, the part of the plastic strain of a step dt.
 
-    `memory` is that before the step, memory[0] the plastic strain.
+    `memory` is that before the step, `known` what is `precompute`d from it.
     """
 
 
 @point_function(otherwise=True)
-def foreseen(strength, memory, heat):
-    """What the flow stress of a step takes from its beginning, whatever the increment is.
-
-    `flow_stress` gets it behind the memory.
-    """
+def precompute(strength, memory, heat):
+    """Find what the flow stress of a step takes from its beginning, whatever the increment is."""
     return ()
 
 
 @point_function(otherwise=True)
-def first_guess(strength, memory, q, slope):
-    """Plastic strain to begin with, 0 for q below the flow stress; and how Newton's changes fall.
+def first_guess(strength, memory, known, q, slope):
+    """Guess plastic strain, 0 for q below the flow stress; and how Newton's changes fall.
 
-    `slope` is 3 G, `memory` with what is `foreseen`. A change c is followed by about k c^2, or less
-    the further the flow stress has hardened: k is the second number.
+    `slope` is 3 G. A change c is followed by about k c^2, or less the further the flow stress has
+    hardened: k is the second number.
     """
     return 0.0, 0.0
 
 
 @point_function(otherwise=True)
-def hardened(strength, memory, increment, dt):
-    """The memory after a step, which may be without plastic strain."""
-    return (memory[0] + increment,)
+def updated_memory(strength, memory, increment, dt):
+    """Find the memory after a step, which may be without plastic strain."""
+    return memory._replace(ep=memory.ep + increment)
 
 
-def returned(trial, q, flow, x):
-    """The deviatoric stress `trial`, brought back to `flow` where the plastic strain `x` grows."""
+def onto_yield_surface(trial, q, flow, x):
+    """Shrink the deviatoric stress `trial` from q to `flow` where the plastic strain `x` grows."""
     yields = x > 0
     return where(yields, flow / where(yields, q, 1), 1) * trial
 
 
-def hardening(strength: type, **own: float | str) -> None:
-    """Give `strength` (with a field ``G`` and a `flow_stress`) the radial return.
+def radial_return(strength, kin, s, strain, memory, heat, dt):
+    """Respond with a deviatoric stress that shrinks to flow/q of itself (Wilkins 1964).
 
-    The deviatoric stress shrinks to flow/q of itself, q its von Mises stress (Wilkins 1964).
-
-    Parameters
-    ----------
-    strength
-        The class.
-    **own
-        What it remembers beside the plastic strain ``ep`` (`remembers`), changed by `hardened`.
+    The `shear_response` of strengths with a field ``G`` and a `flow_stress` that remember the
+    plastic strain ``ep``; q is the von Mises stress of the elastic trial.
     """
-    remembers(strength, ep=0.0, **own)
-
-    @shear_response.on(strength)
-    def _shear_response_strength(strength, kin, s, strain, memory, heat, dt):
-        trial = elastic_trial(strength.G, s, strain)
-        q = von_mises(trial)
-        x = plastic_increment(strength, q, memory, heat, dt)
-        flow = q - 3 * strength.G * x
-        return returned(trial, q, flow, x), hardened(strength, memory, x, dt), flow * x
+    trial = elastic_trial(strength.G, s, strain)
+    q = von_mises(trial)
+    x = plastic_increment(strength, q, memory, heat, dt)
+    flow = q - 3 * strength.G * x
+    after = updated_memory(strength, memory, x, dt)
+    return onto_yield_surface(trial, q, flow, x), after, flow * x
 
 
 # Newton's method takes one to three; bisection, where it has to step in, one for each bit.
@@ -86,11 +73,11 @@ def plastic_increment(strength, q, memory, heat, dt):
     small = sqrt(round_off(q)) * q
     low, high = 0.0, q / slope
     active = q > 0
-    memory += foreseen(strength, memory, heat)
-    x, curved = first_guess(strength, memory, q, slope)
+    known = precompute(strength, memory, heat)
+    x, curved = first_guess(strength, memory, known, q, slope)
     last = x
     for _ in range(_MOST_ITERATIONS):
-        flow, hardening = flow_stress(strength, memory, x, heat, dt)
+        flow, hardening = flow_stress(strength, memory, known, x, heat, dt)
         excess = q - slope * x - flow
         active = active & ((x > 0) | (excess > 0))
         low = where(excess > 0, x, low)

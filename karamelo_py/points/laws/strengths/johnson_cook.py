@@ -2,25 +2,18 @@
 
 from typing import Annotated, Any, NamedTuple
 
-from karamelo_py.compiler.compile import (
-    all_lanes,
-    fma,
-    point_function,
-    real,
-    round_off,
-    shared,
-    where,
-)
+from karamelo_py.compiler.compile import all_lanes, fma, point_function, real, round_off, where
 from karamelo_py.compiler.powers import logarithm, power
 from karamelo_py.language.rules import suggestion
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.laws import Absent
 from karamelo_py.points.laws.checks import check_temperatures, reference_rate
+from karamelo_py.points.laws.strengths import remembers, shear_response
 from karamelo_py.points.laws.strengths.hardening import (
     first_guess,
     flow_stress,
-    foreseen,
-    hardening,
+    precompute,
+    radial_return,
 )
 from karamelo_py.points.laws.temperatures import Warm, homologous
 
@@ -120,101 +113,101 @@ class Softening(NamedTuple):
     Tm: float
 
 
-hardening(JohnsonCook)
+remembers(JohnsonCook, ep=0.0)
+shear_response.on(JohnsonCook)(radial_return)
 
 
 # Increments of strain up to this share of it are a series of so many terms.
 _NEAR, _TERMS = 1 / 32, 9
 
 
-@shared
 def power_of_strain(factor, exponent, strain):
     """factor strain^exponent, 0 at no strain."""
     some = strain > 0
-    base = where(some, strain, real(1, strain))
-    return where(some, factor * power(base, exponent), real(0, strain))
+    return where(some, factor * power(where(some, strain, 1), exponent), 0)
 
 
-@shared
 def power_law(factor, exponent, strain, value, increment):
     """factor (strain + increment)^exponent and its slope; at no strain the slope is left out.
 
     `value` is that without the increment: (1 + x)^n times as much is a short series for small x.
     """
-    one = real(1, strain)
-    near = max(exponent, one) * increment <= real(_NEAR, strain) * strain
-    x = increment / where(strain > 0, strain, one)
-    series = one
+    near = max(exponent, 1) * increment <= _NEAR * strain
+    x = increment / where(strain > 0, strain, 1)
+    series = real(1, x)
     for k in range(_TERMS, 0, -1):
-        series = fma(x * ((exponent - real(k - 1, x)) * real(1 / k, x)), series, one)
+        series = fma(x * ((exponent - (k - 1)) * real(1 / k, x)), series, 1)
     after = strain + increment
     value = value * series
     if not all_lanes(near):
         value = where(near, value, power_of_strain(factor, exponent, after))
-    return value, value * (exponent / where(after > 0, after, one))
+    return value, value * (exponent / where(after > 0, after, 1))
 
 
-@shared
 def power_law_guess(exponent, strain, hard, excess, slope):
     """A `first_guess` from the first two derivatives of the power law `hard` (Chebyshev's method).
 
     `excess` is how far the stress lies above the flow stress; it falls by `slope` with the strain.
-    Strains so small that the derivatives may overflow count as none.
     """
-    zero, one = real(0, strain), real(1, strain)
     some = strain > round_off(strain)
-    inverse = where(some, one / where(some, strain, one), zero)
+    inverse = where(some, 1 / where(some, strain, 1), 0)
     steeper = hard * exponent * inverse
-    flatter = one / (slope + steeper)
-    curved = real(0.5, strain) * (one - exponent) * steeper * inverse * flatter
-    x = max(excess, zero) * flatter
-    return x + x * max(min(curved * x, one), real(-0.5, x)), abs(curved)
+    flatter = 1 / (slope + steeper)
+    curved = 0.5 * (1 - exponent) * steeper * inverse * flatter
+    x = max(excess, 0) * flatter
+    return x + x * max(min(curved * x, 1), -0.5), abs(curved)
+
+
+class Hardened(NamedTuple):
+    """Known at the beginning of a step: the hardening, and the factor of the temperature."""
+
+    hard: Any
+    soft: Any
 
 
 @point_function(tags=2, otherwise=True)
-def softened(softening, heat, like):
-    """The factor of the temperature: 1 where there is none."""
-    return real(1, like)
+def thermal_factor(softening, heat):
+    """Factor of the temperature: 1 where there is none."""
+    return 1
 
 
-@softened.on(Softening, Warm)
-def _softened_softening_warm(softening, heat, like):
-    return real(1, like) - power(homologous(heat, softening.Tr, softening.Tm), softening.m)
+@thermal_factor.on(Softening, Warm)
+def _thermal_factor_softening_warm(softening, heat):
+    return 1 - power(homologous(heat, softening.Tr, softening.Tm), softening.m)
 
 
 @point_function(otherwise=True)
-def quickened(rate, flow, slope, increment, dt):
+def with_rate_factor(rate, flow, slope, increment, dt):
     """Flow stress and slope with the factor of the rate."""
     return flow, slope
 
 
-@quickened.on(RateFactor)
-def _quickened_rate_factor(rate, flow, slope, increment, dt):
-    one = real(1, increment)
+@with_rate_factor.on(RateFactor)
+def _with_rate_factor_rate_factor(rate, flow, slope, increment, dt):
     relative = increment / (dt * rate.epsdot0)
-    faster = relative > one
-    factor = one + where(faster, rate.C * logarithm(where(faster, relative, one)), real(0, one))
-    steeper = where(faster, flow * rate.C / where(faster, increment, one), real(0, one))
+    faster = relative > 1
+    factor = 1 + where(faster, rate.C * logarithm(where(faster, relative, 1)), 0)
+    steeper = where(faster, flow * rate.C / where(faster, increment, 1), 0)
     return flow * factor, slope * factor + steeper
 
 
-@foreseen.on(JohnsonCook)
-def _foreseen_johnson_cook(strength, memory, heat):
-    hard = power_of_strain(strength.B, strength.n, memory[0])
-    return hard, softened(strength.softening, heat, hard)
+@precompute.on(JohnsonCook)
+def _precompute_johnson_cook(strength, memory, heat):
+    hard = power_of_strain(strength.B, strength.n, memory.ep)
+    return Hardened(hard, thermal_factor(strength.softening, heat))
 
 
 @first_guess.on(JohnsonCook)
-def _first_guess_johnson_cook(strength, memory, q, slope):
-    ep, hard, soft = memory
+def _first_guess_johnson_cook(strength, memory, known, q, slope):
     if not isinstance(strength.rate, Absent):
-        return real(0, q), real(0, q)  # the rate rises with the strain: what is known is for none
+        return 0.0, 0.0  # the rate rises with the strain: what is known is for none
+    hard, soft = known
     excess = q - (strength.A + hard) * soft
-    return power_law_guess(strength.n, ep, hard * soft, excess, slope)
+    return power_law_guess(strength.n, memory.ep, hard * soft, excess, slope)
 
 
 @flow_stress.on(JohnsonCook)
-def _flow_stress_johnson_cook(strength, memory, increment, heat, dt):
-    ep, before, soft = memory
-    hard, slope = power_law(strength.B, strength.n, ep, before, increment)
-    return quickened(strength.rate, (strength.A + hard) * soft, slope * soft, increment, dt)
+def _flow_stress_johnson_cook(strength, memory, known, increment, heat, dt):
+    hard, slope = power_law(strength.B, strength.n, memory.ep, known.hard, increment)
+    flow = (strength.A + hard) * known.soft
+    return with_rate_factor(strength.rate, flow, slope * known.soft, increment, dt)

@@ -3,7 +3,7 @@
 from typing import Annotated, NamedTuple
 
 from karamelo_py.language.signature import Positive
-from karamelo_py.points.kinematics.tensors import dev
+from karamelo_py.points.kinematics import dev
 from karamelo_py.points.laws.strengths import shear_response
 
 

@@ -3,9 +3,9 @@
 from math import cos, sin, sqrt
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import real, shared
+from karamelo_py.compiler.compile import shared
 from karamelo_py.language.signature import NonNegative, Positive
-from karamelo_py.points.kinematics import contract, from_principal, principal
+from karamelo_py.points.kinematics import from_principal, inner, principal
 from karamelo_py.points.laws.strengths import pressure_response
 from karamelo_py.points.laws.strengths.frictional import frictional, surface
 from karamelo_py.points.laws.strengths.soils import angles, residual
@@ -93,28 +93,26 @@ def returned_to_plane(s, k, sin_phi, sin_psi, G, K):
     To a plane of the surface; where that changes their order, to an edge of two planes; where it
     still does, to the apex (Simpson 2017, section 11.4; de Souza Neto et al. 2008, box 8.4).
     """
-    one = real(1, G)
-    two = real(2, G)
-    lam = K - two / real(3, G) * G
+    lam = K - 2 / 3 * G
     # n and m, normals of yield function and plastic potential, are (1 + sin, 0, sin - 1).
-    mean = real(4, G) * lam * sin_phi * sin_psi
-    up = two * G * (one + sin_phi) * (one + sin_psi)
-    down = two * G * (one - sin_phi) * (one - sin_psi)
-    f = s[0] - s[2] + (s[0] + s[2]) * sin_phi - two * k
-    volume = two * lam * sin_psi  # lam tr(m)
-    rise = two * G * (one + sin_psi) + volume  # C m for the largest
-    fall = volume - two * G * (one - sin_psi)  # for the smallest; `volume` for the other
+    mean = 4 * lam * sin_phi * sin_psi
+    up = 2 * G * (1 + sin_phi) * (1 + sin_psi)
+    down = 2 * G * (1 - sin_phi) * (1 - sin_psi)
+    f = s[0] - s[2] + (s[0] + s[2]) * sin_phi - 2 * k
+    volume = 2 * lam * sin_psi  # lam tr(m)
+    rise = 2 * G * (1 + sin_psi) + volume  # C m for the largest
+    fall = volume - 2 * G * (1 - sin_psi)  # for the smallest; `volume` for the other
     x = f / (up + down + mean)
     s1, s2, s3 = s[0] - x * rise, s[1] - x * volume, s[2] - x * fall
     if s1 >= s2 and s2 >= s3:
         return s1, s2, s3
     if s2 > s1:
         # Triaxial extension: planes 1-3 and 2-3.
-        other = s[1] - s[2] + (s[1] + s[2]) * sin_phi - two * k
+        other = s[1] - s[2] + (s[1] + s[2]) * sin_phi - 2 * k
         cross = down + mean
     else:
         # Triaxial compression: planes 1-3 and 1-2.
-        other = s[0] - s[1] + (s[0] + s[1]) * sin_phi - two * k
+        other = s[0] - s[1] + (s[0] + s[1]) * sin_phi - 2 * k
         cross = up + mean
     a = up + down + mean
     determinant = a * a - cross * cross
@@ -124,12 +122,12 @@ def returned_to_plane(s, k, sin_phi, sin_psi, G, K):
         t1 = s[0] - x * rise - y * volume
         t3 = s[2] - (x + y) * fall
         # Equal by construction, but for rounding: on both planes.
-        t1 = (two * k + (one - sin_phi) * t3) / (one + sin_phi)
+        t1 = (2 * k + (1 - sin_phi) * t3) / (1 + sin_phi)
         if t1 >= t3:
             return t1, t1, t3
     else:
         t1 = s[0] - (x + y) * rise
-        t3 = ((one + sin_phi) * t1 - two * k) / (one - sin_phi)
+        t3 = ((1 + sin_phi) * t1 - 2 * k) / (1 - sin_phi)
         if t1 >= t3:
             return t1, t3, t3
     apex = k / sin_phi
@@ -139,15 +137,12 @@ def returned_to_plane(s, k, sin_phi, sin_psi, G, K):
 @pressure_response.on(MohrCoulomb)
 def _pressure_response_mohr_coulomb(strength, kin, s, p, K, strain):
     k, sin_phi, sin_psi = surface(strength, strain)
-    half = real(0.5, p)
-    two = real(2, p)
     # Above this bound of the yield function principal stresses are needed to know it.
-    root = sqrt(half * contract(kin, s, s))
-    bound = two * root + sin_phi * (root / sqrt(real(3, p)) - two * p) - two * k
+    root = sqrt(0.5 * inner(s, s))
+    bound = 2 * root + sin_phi * (root / sqrt(3) - 2 * p) - 2 * k
     if bound <= 0:
         return s, p
-    values, frame = principal(kin, s)
-    a, b, c = values
+    (a, b, c), directions = principal(s)
     # Places in the order from the largest; equal values keep theirs.
     at_a = (1 if b > a else 0) + (1 if c > a else 0)
     at_b = (1 if a >= b else 0) + (1 if c > b else 0)
@@ -156,20 +151,16 @@ def _pressure_response_mohr_coulomb(strength, kin, s, p, K, strain):
     smallest = min(a, min(b, c))
     middle = -largest - smallest
     ordered = (largest - p, middle - p, smallest - p)
-    f = largest - smallest + (ordered[0] + ordered[2]) * sin_phi - two * k
+    f = largest - smallest + (ordered[0] + ordered[2]) * sin_phi - 2 * k
     if f <= 0:
         return s, p
     new = returned_to_plane(ordered, k, sin_phi, sin_psi, strength.G, K)
-    mean = (new[0] + new[1] + new[2]) / real(3, p)
-    shear = (
-        _of_three(new, at_a) - mean,
-        _of_three(new, at_b) - mean,
-        _of_three(new, at_c) - mean,
-    )
-    return from_principal(kin, shear, frame), -mean
+    mean = (new[0] + new[1] + new[2]) / 3
+    shear = tuple([of_three(new, place) - mean for place in (at_a, at_b, at_c)])
+    return from_principal(s, shear, directions), -mean
 
 
 @shared
-def _of_three(values, k):
-    """values[k], of a tuple that the compiler keeps in registers."""
+def of_three(values, k):
+    """Take values[k] of a tuple that the compiler keeps in registers."""
     return values[0] if k == 0 else values[1] if k == 1 else values[2]

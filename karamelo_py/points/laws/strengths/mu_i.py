@@ -3,10 +3,10 @@
 from math import sqrt
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import real, where
-from karamelo_py.compiler.tuples import plus, scale
+from karamelo_py.compiler.compile import where
+from karamelo_py.compiler.tuples import only
 from karamelo_py.language.signature import Positive
-from karamelo_py.points.kinematics import contract
+from karamelo_py.points.kinematics import inner
 from karamelo_py.points.laws.eos import pressure
 from karamelo_py.points.laws.strengths import elastic_ratio, remembers, respond
 from karamelo_py.points.laws.strengths.linear import elastic_trial
@@ -85,29 +85,28 @@ remembers(MuI, ep=0.0, inertial=0.0)
 
 @elastic_ratio.on(MuI)
 def _elastic_ratio_mu_i(strength, memory, j):
-    return min(j, real(1, j))  # grains that are apart are not stretched
+    return min(j, 1)  # grains that are apart are not stretched
 
 
 @respond.on(MuI)
 def _respond_mu_i(strength, law, kin, s, strain, j, memories, dt):
-    zero, one = real(0, j), real(1, j)
     memory = memories.strength
     elastic = elastic_ratio(strength, memory, j)
     p = pressure(law.eos, elastic, memories.energy, memories.heat)
-    p = plus(p, thermal_pressure(law.temperature, memories.heat))
-    together = p > zero
+    p += only(thermal_pressure(law.temperature, memories.heat))
+    together = p > 0
     trial = elastic_trial(strength.G, s, strain)
-    shear = sqrt(real(0.5, j) * contract(kin, trial, trial))
+    shear = sqrt(0.5 * inner(trial, trial))
     flows = together & (shear > strength.mu_s * p)
-    p = where(together, p, one)
+    p = where(together, p, 1)
     slow, fast = strength.mu_s * p, strength.mu_2 * p
     # (shear - tau)/(G dt) is the shear rate that tau = mu(I) p asks for: a quadratic equation.
     grain = strength.d * sqrt(strength.rho_s / p)
     viscous = strength.I0 * strength.G * dt / grain
     b = fast + shear + viscous
     c = fast * shear + slow * viscous
-    tau = real(2, c) * c / (b + sqrt(b * b - real(4, c) * c))
-    slip = where(flows, (shear - tau) / strength.G, zero)
-    share = where(flows, tau / where(flows, shear, one), where(together, one, zero))
-    ep = memory[0] + slip * sqrt(real(1 / 3, slip))
-    return scale(share, trial), (ep, slip / dt * grain), tau * slip
+    tau = 2 * c / (b + sqrt(b * b - 4 * c))
+    slip = where(flows, (shear - tau) / strength.G, 0)
+    share = where(together, where(flows, tau / where(flows, shear, 1), 1), 0)
+    ep = memory.ep + slip * sqrt(1 / 3)
+    return share * trial, memory._replace(ep=ep, inertial=slip / dt * grain), tau * slip

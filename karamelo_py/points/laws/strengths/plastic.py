@@ -4,9 +4,9 @@ from typing import Annotated, NamedTuple
 
 from karamelo_py.compiler.compile import point_function
 from karamelo_py.language.signature import NonNegative, Positive
-from karamelo_py.points.kinematics.tensors import von_mises
+from karamelo_py.points.kinematics import von_mises
 from karamelo_py.points.laws.strengths import remembers, shear_response
-from karamelo_py.points.laws.strengths.hardening import returned
+from karamelo_py.points.laws.strengths.hardening import onto_yield_surface
 from karamelo_py.points.laws.strengths.linear import elastic_trial
 
 
@@ -69,10 +69,10 @@ def _shear_response_linear_hardening(strength, kin, s, strain, memory, heat, dt)
     trial = elastic_trial(strength.G, s, strain)
     q = von_mises(trial)
     H = hardening_modulus(strength)
-    flow = strength.yield_stress + H * memory[0]
+    flow = strength.yield_stress + H * memory.ep
     x = max(q - flow, 0) / (3 * strength.G + H)
     flow += H * x
-    return returned(trial, q, flow, x), (memory[0] + x,), flow * x
+    return onto_yield_surface(trial, q, flow, x), memory._replace(ep=memory.ep + x), flow * x
 
 
 @point_function()

@@ -3,11 +3,12 @@
 from typing import Annotated, NamedTuple
 
 from karamelo_py.language.signature import NonNegative, Positive
+from karamelo_py.points.laws.strengths import remembers, shear_response
 from karamelo_py.points.laws.strengths.hardening import (
     first_guess,
     flow_stress,
-    foreseen,
-    hardening,
+    precompute,
+    radial_return,
 )
 from karamelo_py.points.laws.strengths.johnson_cook import (
     power_law,
@@ -54,22 +55,22 @@ class Swift(NamedTuple):
     n: Annotated[float, NonNegative]
 
 
-hardening(Swift)
+remembers(Swift, ep=0.0)
+shear_response.on(Swift)(radial_return)
 
 
-@foreseen.on(Swift)
-def _foreseen_swift(strength, memory, heat):
-    return (power_of_strain(strength.B, strength.n, memory[0] - strength.C),)
+@precompute.on(Swift)
+def _precompute_swift(strength, memory, heat):
+    return power_of_strain(strength.B, strength.n, memory.ep - strength.C)
 
 
 @first_guess.on(Swift)
-def _first_guess_swift(strength, memory, q, slope):
-    ep, hard = memory
-    return power_law_guess(strength.n, ep - strength.C, hard, q - strength.A - hard, slope)
+def _first_guess_swift(strength, memory, hard, q, slope):
+    excess = q - strength.A - hard
+    return power_law_guess(strength.n, memory.ep - strength.C, hard, excess, slope)
 
 
 @flow_stress.on(Swift)
-def _flow_stress_swift(strength, memory, increment, heat, dt):
-    ep, before = memory
-    hard, slope = power_law(strength.B, strength.n, ep - strength.C, before, increment)
+def _flow_stress_swift(strength, memory, before, increment, heat, dt):
+    hard, slope = power_law(strength.B, strength.n, memory.ep - strength.C, before, increment)
     return strength.A + hard, slope

@@ -5,10 +5,10 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import real
 from karamelo_py.language.signature import Positive, TableFile
 from karamelo_py.points.laws.numbers import Numbers
-from karamelo_py.points.laws.strengths.hardening import flow_stress, hardening
+from karamelo_py.points.laws.strengths import remembers, shear_response
+from karamelo_py.points.laws.strengths.hardening import flow_stress, radial_return
 from karamelo_py.script.errors import ScriptError
 
 
@@ -95,12 +95,13 @@ def _check(points: np.ndarray, G: float) -> None:
         )
 
 
-hardening(Tabulated)
+remembers(Tabulated, ep=0.0)
+shear_response.on(Tabulated)(radial_return)
 
 
 @flow_stress.on(Tabulated)
-def _flow_stress_tabulated(strength, memory, increment, heat, dt):
-    x = memory[0] + increment
+def _flow_stress_tabulated(strength, memory, known, increment, heat, dt):
+    x = memory.ep + increment
     last = int(strength.count) - 1
     for k in range(last):
         above = strength.strain[k + 1]
@@ -108,4 +109,4 @@ def _flow_stress_tabulated(strength, memory, increment, heat, dt):
             low = strength.stress[k]
             slope = (strength.stress[k + 1] - low) / (above - strength.strain[k])
             return low + slope * (x - strength.strain[k]), slope
-    return strength.stress[last], real(0, x)
+    return strength.stress[last], 0 * x

@@ -1,11 +1,12 @@
 """strength zerilli-armstrong: flow stress of bcc and fcc metals (Zerilli & Armstrong 1987)."""
 
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
-from karamelo_py.compiler.compile import real, where
+from karamelo_py.compiler.compile import where
 from karamelo_py.compiler.powers import exponential
 from karamelo_py.language.signature import NonNegative, Positive
-from karamelo_py.points.laws.strengths.hardening import flow_stress, foreseen, hardening
+from karamelo_py.points.laws.strengths import remembers, shear_response
+from karamelo_py.points.laws.strengths.hardening import flow_stress, precompute, radial_return
 from karamelo_py.points.laws.strengths.johnson_cook import power_law, power_of_strain
 from karamelo_py.points.laws.temperatures import temperature_or
 
@@ -83,32 +84,39 @@ class ZerilliArmstrong(NamedTuple):
         return cls(G, C0, C1, C2, C3, C4, C5, n, epsdot0, T)
 
 
-hardening(ZerilliArmstrong)
+remembers(ZerilliArmstrong, ep=0.0)
+shear_response.on(ZerilliArmstrong)(radial_return)
 
 
-@foreseen.on(ZerilliArmstrong)
-def _foreseen_zerilli_armstrong(strength, memory, heat):
-    half = real(0.5, memory[0])
+class Thermal(NamedTuple):
+    """Known at the beginning of a step: the parts of the flow stress."""
+
+    athermal: Any  # C5 ep^n
+    root: Any  # C2 sqrt(ep)
+    thermal: Any  # exp(-C3 T)
+
+
+@precompute.on(ZerilliArmstrong)
+def _precompute_zerilli_armstrong(strength, memory, heat):
     T = temperature_or(heat, strength.initial_temperature)
-    return (
-        power_of_strain(strength.C5, strength.n, memory[0]),
-        power_of_strain(strength.C2, half, memory[0]),
+    return Thermal(
+        power_of_strain(strength.C5, strength.n, memory.ep),
+        power_of_strain(strength.C2, 0.5, memory.ep),
         exponential(-strength.C3 * T),
     )
 
 
 @flow_stress.on(ZerilliArmstrong)
-def _flow_stress_zerilli_armstrong(strength, memory, increment, heat, dt):
-    half, one = real(0.5, increment), real(1, increment)
-    ep, athermal, root, thermal = memory
-    athermal, slope = power_law(strength.C5, strength.n, ep, athermal, increment)
-    root, root_slope = power_law(strength.C2, half, ep, root, increment)
+def _flow_stress_zerilli_armstrong(strength, memory, known, increment, heat, dt):
+    ep = memory.ep
+    athermal, slope = power_law(strength.C5, strength.n, ep, known.athermal, increment)
+    root, root_slope = power_law(strength.C2, 0.5, ep, known.root, increment)
     # exp(C4 T ln(rate)) is the rate to a power.
     power = strength.C4 * temperature_or(heat, strength.initial_temperature)
     rate = increment / (dt * strength.epsdot0)
-    at_rate = power_of_strain(one, power, rate)
-    rate, rate_slope = power_law(one, power, rate, at_rate, increment - increment)
-    rate = where(power > 0, rate, one)
+    at_rate = power_of_strain(1, power, rate)
+    rate, rate_slope = power_law(1, power, rate, at_rate, 0)
+    rate = where(power > 0, rate, 1)
     factor = strength.C1 + root
-    slope += thermal * (rate * root_slope + factor * rate_slope / (dt * strength.epsdot0))
-    return strength.C0 + thermal * rate * factor + athermal, slope
+    slope += known.thermal * (rate * root_slope + factor * rate_slope / (dt * strength.epsdot0))
+    return strength.C0 + known.thermal * rate * factor + athermal, slope

@@ -7,7 +7,7 @@ other parts see as `heat`: () where the law has no temperature.
 
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import point_function, real, shared
+from karamelo_py.compiler.compile import point_function
 
 
 class Warm(NamedTuple):
@@ -46,17 +46,16 @@ def _temperature_or_warm(heat, otherwise):
 
 
 @point_function(otherwise=True)
-def heat_from(like, numbers):
-    """The flat tuple `numbers` as `like` is: Warm(T), or ()."""
+def at_temperature(heat, T):
+    """Warm(T), or () where the law has no temperature."""
     return ()
 
 
-@heat_from.on(Warm)
-def _heat_from_warm(like, numbers):
-    return Warm(numbers[0])
+@at_temperature.on(Warm)
+def _at_temperature_warm(heat, T):
+    return Warm(T)
 
 
-@shared
 def homologous(heat, Tr, Tm):
     """(T - Tr) / (Tm - Tr), between 0 and 1."""
-    return min(max((heat.T - Tr) / (Tm - Tr), real(0, Tr)), real(1, Tr))
+    return min(max((heat.T - Tr) / (Tm - Tr), 0), 1)

@@ -1,12 +1,12 @@
 """Viscous pressure of one point, which spreads shocks over a few cells. One file each.
 
 A viscosity is a NamedTuple of parameters (its class is the tag), a part of a composed law
-(`karamelo_py.points.laws.eos_strength`). Its memory, a flat tuple, is the viscous pressure.
+(`karamelo_py.points.laws.eos_strength`). Its memory is (q,), the viscous pressure.
 """
 
 from math import sqrt
 
-from karamelo_py.compiler.compile import point_function, shared
+from karamelo_py.compiler.compile import point_function
 
 
 @point_function(otherwise=True)
@@ -25,7 +25,6 @@ def viscous_speed(viscosity, memory, density, sound):
     """nu / h, nu the kinematic viscosity against compression and h the cell size."""
 
 
-@shared
 def damped(squared, a):
     """Square of c' = sqrt(c^2 + a^2) + a, from c^2 and a = nu / h.
 

@@ -3,7 +3,6 @@
 from math import sqrt
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import real
 from karamelo_py.points.laws.viscosity import (
     initial_viscous_pressure,
     viscous_pressure,
@@ -28,12 +27,12 @@ def artificial_viscosity(Q1: float, Q2: float) -> dict[str, NamedTuple]:
 
 @initial_viscous_pressure.on(ArtificialViscosity)
 def _initial_viscous_pressure_artificial_viscosity(viscosity, like):
-    return (real(0, like),)
+    return (0.0,)
 
 
 @viscous_pressure.on(ArtificialViscosity)
 def _viscous_pressure_artificial_viscosity(viscosity, rate, density, sound):
-    closing = max(-rate, real(0, rate))
+    closing = max(-rate, 0)
     h = viscosity.cell_size
     return (density * h * closing * (viscosity.Q1 * h * closing + viscosity.Q2 * sound),)
 

@@ -1,11 +1,9 @@
-"""material elastic-fluid: a law of its own, as functions of one point. Its state is (det F,)."""
+"""material elastic-fluid: a law of its own, as functions of one point. Its state is det F."""
 
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
-from karamelo_py.compiler.compile import real
-from karamelo_py.compiler.tuples import scale
 from karamelo_py.language.signature import Positive
-from karamelo_py.points.kinematics import add_pressure, volume_ratio, zero_symmetric
+from karamelo_py.points.kinematics import I, det, nothing
 from karamelo_py.points.laws import (
     advance,
     cauchy_stress,
@@ -42,46 +40,49 @@ class ElasticFluid(NamedTuple):
         return cls(1 / rho, K)
 
 
+class FluidState(NamedTuple):
+    """State of a point."""
+
+    J: Any  # det F
+
+
 @initial_state.on(ElasticFluid)
 def _initial_state_elastic_fluid(law, kin, like):
-    return (real(1, like),)
+    return FluidState(1)
 
 
 @advance.on(ElasticFluid)
 def _advance_elastic_fluid(law, kin, state, dl, dt):
-    return (state[0] * volume_ratio(kin, dl),)
+    return FluidState(state.J * det(I + dl))
 
 
 @cauchy_stress.on(ElasticFluid)
 def _cauchy_stress_elastic_fluid(law, kin, state):
-    # Without shear: sigma = K (J - 1) I.
-    zero = zero_symmetric(kin, law.K)
-    return add_pressure(kin, real(1, law.K), zero, law.K * (state[0] - real(1, law.K)))
+    return nothing(kin) + law.K * (state.J - 1) * I  # no shear
 
 
 @kirchhoff_stress.on(ElasticFluid)
 def _kirchhoff_stress_elastic_fluid(law, kin, state):
-    return scale(state[0], cauchy_stress(law, kin, state))
+    return state.J * cauchy_stress(law, kin, state)
 
 
 @jacobian.on(ElasticFluid)
 def _jacobian_elastic_fluid(law, kin, state):
-    return state[0]
+    return state.J
 
 
 @wave_speed_squared.on(ElasticFluid)
 def _wave_speed_squared_elastic_fluid(law, kin, state):
     # dp/d(density), with density = rho0 / J
-    return law.K * law.specific_volume * state[0] * state[0]
+    return law.K * law.specific_volume * state.J * state.J
 
 
 @energy_density.on(ElasticFluid)
 def _energy_density_elastic_fluid(law, kin, state):
-    excess = state[0] - real(1, law.K)
-    return real(0.5, law.K) * law.K * excess * excess
+    excess = state.J - 1
+    return 0.5 * law.K * excess * excess
 
 
 @elastic_strain.on(ElasticFluid)
 def _elastic_strain_elastic_fluid(law, kin, state):
-    third = (state[0] - real(1, law.K)) / real(3, law.K)
-    return add_pressure(kin, real(1, law.K), zero_symmetric(kin, law.K), third)
+    return nothing(kin) + (state.J - 1) / 3 * I

@@ -2,7 +2,6 @@
 
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.tuples import add, scale
 from karamelo_py.language.rules import known_failure
 from karamelo_py.language.signature import AtLeast, In
 from karamelo_py.points.transfers import updated_velocity
@@ -42,4 +41,4 @@ known_failure(
 
 @updated_velocity.on(Growing)
 def _updated_velocity_growing(transfer, v, v_pic, dv):
-    return scale(transfer.factor**transfer.times, add(v, dv))
+    return transfer.factor**transfer.times * (v + dv)

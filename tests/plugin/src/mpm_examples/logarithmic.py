@@ -3,7 +3,6 @@
 from math import exp, log
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import real
 from karamelo_py.language.signature import Positive
 from karamelo_py.points.laws.eos import (
     bulk_modulus,
@@ -50,7 +49,7 @@ def _bulk_modulus_logarithmic(eos, j, memory, heat):
 @compression_energy.on(Logarithmic)
 def _compression_energy_logarithmic(eos, j, memory):
     # The integral of p dj from j to 1.
-    return eos.K * (real(1, j) - j + j * log(j))
+    return eos.K * (1 - j + j * log(j))
 
 
 @ratio_at_pressure.on(Logarithmic)

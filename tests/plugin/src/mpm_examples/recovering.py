@@ -2,9 +2,9 @@
 
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import real, shared
 from karamelo_py.language.signature import NonNegative, Positive
-from karamelo_py.points.laws.strengths.hardening import flow_stress, hardened, hardening
+from karamelo_py.points.laws.strengths import remembers, shear_response
+from karamelo_py.points.laws.strengths.hardening import flow_stress, radial_return, updated_memory
 
 
 class Recovering(NamedTuple):
@@ -39,22 +39,23 @@ class Recovering(NamedTuple):
     rate: Annotated[float, NonNegative]
 
 
-hardening(Recovering, R=0.0)
+remembers(Recovering, ep=0.0, R=0.0)
+shear_response.on(Recovering)(radial_return)
 
 
-@shared
-def fading(strength, dt):
-    """The share of the hardening that a step leaves."""
-    return real(1, dt) / (real(1, dt) + strength.rate * dt)
+def hardening(strength, R, increment, dt):
+    """R at the end of a step, and the share of it that a step leaves."""
+    left = 1 / (1 + strength.rate * dt)
+    return (R + strength.H * increment) * left, left
 
 
 @flow_stress.on(Recovering)
-def _flow_stress_recovering(strength, memory, increment, heat, dt):
-    R = (memory[1] + strength.H * increment) * fading(strength, dt)
-    return strength.A + R, strength.H * fading(strength, dt)
+def _flow_stress_recovering(strength, memory, known, increment, heat, dt):
+    R, left = hardening(strength, memory.R, increment, dt)
+    return strength.A + R, strength.H * left
 
 
-@hardened.on(Recovering)
-def _hardened_recovering(strength, memory, increment, dt):
-    R = (memory[1] + strength.H * increment) * fading(strength, dt)
-    return (memory[0] + increment, R)
+@updated_memory.on(Recovering)
+def _updated_memory_recovering(strength, memory, increment, dt):
+    R, _ = hardening(strength, memory.R, increment, dt)
+    return memory._replace(ep=memory.ep + increment, R=R)

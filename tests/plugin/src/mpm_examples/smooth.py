@@ -2,8 +2,6 @@
 
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import real
-from karamelo_py.compiler.tuples import scale
 from karamelo_py.language.signature import In
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.basis.product import Along, along, register
@@ -34,10 +32,11 @@ class Smooth(NamedTuple):
 @along.on(Smooth)
 def _along_smooth(basis, kin, grid, place, direction):
     hat = along(Linear(), kin, grid, place, direction)
-    r, one, two = hat.r, real(1, hat.r), real(2, hat.r)
-    right = r + basis.share * r * (one - r) * (two * r - one)
-    slope = one + basis.share * (real(6, r) * r * (one - r) - one)
-    return Along(hat.first, r, (one - right, right), scale(slope, hat.gradients), hat.affine)
+    r = hat.r
+    right = r + basis.share * r * (1 - r) * (2 * r - 1)
+    slope = 1 + basis.share * (6 * r * (1 - r) - 1)
+    gradients = tuple([slope * g for g in hat.gradients])
+    return Along(hat.first, r, (1 - right, right), gradients, hat.affine)
 
 
 register(Smooth, 2)

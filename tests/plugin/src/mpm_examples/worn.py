@@ -2,7 +2,6 @@
 
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import real
 from karamelo_py.language.signature import Positive
 from karamelo_py.points.laws import column, damage
 from karamelo_py.points.laws.damages import damage_after, initial_damage, initiation, integrity
@@ -29,17 +28,17 @@ column(Worn, "damage", damage)
 
 @initial_damage.on(Worn)
 def _initial_damage_worn(damage, like):
-    return (real(0, like),)
+    return (0.0,)
 
 
 @damage_after.on(Worn)
 def _damage_after_worn(damage, memory, strain, triaxiality, heat, dt):
-    return (min(memory[0] + strain / damage.limit, real(1, strain)),)
+    return (min(memory[0] + strain / damage.limit, 1),)
 
 
 @integrity.on(Worn)
 def _integrity_worn(damage, memory):
-    return real(1, memory[0]) - memory[0]
+    return 1 - memory[0]
 
 
 @initiation.on(Worn)
