@@ -61,13 +61,6 @@ class FakeFields:
         found = getattr(part, name)(self, *arguments)
         return [] if found is None else [found]
 
-    def counted(self, part, name, size, *arguments):
-        return np.bincount(getattr(part, name)(self, *arguments), minlength=size)
-
-    def in_order(self, part, name, *arguments):
-        keys, rows = getattr(part, name)(self, *arguments)
-        yield rows[:, np.argsort(keys)]
-
     def particle_names(self):
         return list(self.points)
 

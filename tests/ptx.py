@@ -20,8 +20,9 @@ from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Nodes, Setup
 from karamelo_py.kernels.averaging import FBar
-from karamelo_py.kernels.g2p import AverageStress, SeriesTerm, TrialStrain, empty_all, settled_all
+from karamelo_py.kernels.g2p import SeriesTerm, SetMeanStress, TrialStrain, empty_all, settled_all
 from karamelo_py.kernels.heat import HeatContent, HeatFlow, TemperatureGradient, Warming
+from karamelo_py.kernels.lanes import OneByOne, zero_of
 from karamelo_py.kernels.nodes import at_node
 from karamelo_py.kernels.p2g import AveragedForce, SeriesBack, Volumes, load_all
 from karamelo_py.kernels.rows import Insulated
@@ -32,12 +33,11 @@ from karamelo_py.kernels.sweep import (
     OldWeights,
     Visit,
     places_of,
-    restencil,
+    recompute_stencil,
     work_of,
 )
 from karamelo_py.kernels.table import Sweep, fused, staged
 from karamelo_py.kernels.visit import place_at
-from karamelo_py.kernels.width import OneByOne, zero_of
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.points.basis import locate
@@ -74,7 +74,7 @@ def visit_point(visit, s, block, then, dt, p, report):
     report[p, 1] = rate
     if not (moved <= 1 and rate < 1e300):
         return
-    stencil = restencil(visit.weights, w, stencil, p)
+    stencil = recompute_stencil(visit.weights, w, stencil, p)
     loads = load_all(visit.quantities, w, p, dt)
     scatter_nodes(width, stencil, visit.quantities, w, loads)
 
@@ -104,7 +104,7 @@ def visits_of(setup: Setup, scheme: Any, in_stages: bool = False) -> list[Visit]
         visits.append(Visit((SeriesTerm(0),), (SeriesBack(),), OldWeights()))
     if isinstance(setup.averaging, FBar):
         visits.append(Visit((TrialStrain(),), (Volumes(),), OldWeights()))
-        visits.append(Visit((AverageStress(),), (AveragedForce(),), OldWeights()))
+        visits.append(Visit((SetMeanStress(),), (AveragedForce(),), OldWeights()))
     if not isinstance(setup.heat, Insulated):
         visits.append(Visit((Warming(),), (HeatContent(),), OldWeights()))
         visits.append(Visit((TemperatureGradient(),), (HeatFlow(),), OldWeights()))

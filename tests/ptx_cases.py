@@ -14,7 +14,7 @@ from karamelo_py.compiler.fields import field
 from karamelo_py.kernels import nodes
 from karamelo_py.kernels.contact import stay_node, touch_node
 from karamelo_py.kernels.hooks import CompiledHook
-from karamelo_py.kernels.loss import Lost, Rubbed
+from karamelo_py.kernels.loss import EnergyLoss, FrictionalHeat
 from karamelo_py.kernels.nodes import KeepLoss
 from karamelo_py.language import registry
 from karamelo_py.language.docstrings import sections
@@ -193,7 +193,7 @@ def test_loss(kinematics):
     script = scene(kinematics, "ulmpm", "linear", "", "TPIC", "usl")
     gas = "\n".join(LAWS["eos ideal-gas 0"]).replace(STRENGTH, "strength(s, fluid, 0)")
     script = re.sub(r"^material\(.*$", gas, script, flags=re.MULTILINE)
-    assert field(setup_of(script)[0].nodes.fields, Lost) is not None
+    assert field(setup_of(script)[0].nodes.fields, EnergyLoss) is not None
     visits_stay_in_registers(script)
 
 
@@ -208,7 +208,7 @@ def test_contact(kinematics):
     script = script.replace("set_dt", f"{other}\n{rubs}")
     visits_stay_in_registers(script)
     s, _ = setup_of(script)
-    assert field(s.nodes.fields, Rubbed) is not None
+    assert field(s.nodes.fields, FrictionalHeat) is not None
     touched = compiled(touch_node, s.contact, s.kin, s.grids, s.nodes, s.control, 0)
     assert in_registers(touched)
     assert in_registers(compiled(stay_node, s.contact, s.kin, s.nodes, 1, 0))
@@ -221,7 +221,7 @@ def test_nodes(kinematics):
     script = scene(kinematics, "ulmpm", "linear", "", "XPIC", "usl")
     script = script.replace("region(", "anti_volumetric_locking(true)\nregion(")
     setup, _ = setup_of(script)
-    lost = Lost(np.zeros((len(setup.nodes.sums), 2)))  # of gases
+    lost = EnergyLoss(np.zeros((len(setup.nodes.sums), 2)))  # of gases
     setup = setup._replace(nodes=setup.nodes._replace(fields=(*setup.nodes.fields, lost)))
     tasks = [kind for kind in vars(nodes).values() if hasattr(kind, "goes_through")]
     assert KeepLoss in tasks

@@ -47,7 +47,7 @@ def carry(points):
 
 
 def _is_second():
-    return threading.current_thread().name == "rank 1"  # see crews.py
+    return threading.current_thread().name == "rank 1"  # see comms.py
 
 
 def is_silent(points):

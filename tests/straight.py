@@ -594,7 +594,7 @@ _FOUND = {
     **{(sweep, name): of_visit for name in ("settled_all", "load_all")},
     (sweep, "locate"): of_place,
     (sweep, "place_at"): of_point,
-    (sweep, "restencil"): of_stencil,
+    (sweep, "recompute_stencil"): of_stencil,
     (sweep, "at_node"): of_node,
     (sums, "_clear_record"): of_record,
 }

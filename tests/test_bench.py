@@ -255,7 +255,7 @@ def test_each_of_several_workloads_has_a_process(tmp_path, capfd, monkeypatch):
 @pytest.mark.xdist_group("disks")
 def test_the_process_of_a_workload_ends_with_bench():
     """Also where that is killed, and can tell nobody."""
-    part = apart.Part("disks-320", 1, {}, 600.0, 1e9, False)
+    part = apart.Measurement("disks-320", 1, {}, 600.0, 1e9, False)
     with subprocess.Popen(
         apart.COMMAND, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE
     ) as process:

@@ -19,7 +19,7 @@ from karamelo_py.compiler.compile import point_function
 from karamelo_py.compiler.loops import kernel
 from karamelo_py.kernels.step import step
 from karamelo_py.output.console import Console
-from karamelo_py.run.timings import Spent, _about
+from karamelo_py.run.timings import Timings, _about
 from karamelo_py.scene.hub import Hub
 
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
@@ -438,7 +438,7 @@ def test_the_wait_is_told_once_before_the_banner(tmp_path, monkeypatch):
     out = io.StringIO()
     hub = Hub(Console(out))
     hub.domain, hub.update = SimpleNamespace(dimension=2), SimpleNamespace(words="ulmpm")
-    wait = Spent(hub).telling_of_compilation
+    wait = Timings(hub).telling_of_compilation
     monkeypatch.setattr(os, "cpu_count", lambda: 4)
     monkeypatch.setattr(os, "getloadavg", lambda: (2.0, 0, 0), raising=False)
     with wait():
@@ -470,7 +470,7 @@ def test_a_folder_that_cannot_be_used_is_warned_of_in_a_run(tmp_path, monkeypatc
     err = io.StringIO()
     hub = Hub(Console(io.StringIO(), err))
     hub.domain, hub.update = SimpleNamespace(dimension=2), SimpleNamespace(words="ulmpm")
-    with Spent(hub).telling_of_compilation():
+    with Timings(hub).telling_of_compilation():
         assert fresh()(Tag()) == 42
         assert fresh()(Tag()) == 42
     assert err.getvalue().count("warning") == 1

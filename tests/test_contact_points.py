@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from karamelo_py.kernels.pairs import Bodies, cells_for, push_apart
+from karamelo_py.kernels.pairs import TwoBodies, cells_for, push_apart
 from karamelo_py.points.kinematics import KINEMATICS
 from karamelo_py.points.pairs import MinimizePenetration
 
@@ -59,7 +59,7 @@ def test_no_pair_is_missed(d, overlap):
     x2[:, 0] += 1 - overlap
     spacing = n ** (-1 / d)
     r1, r2 = (spacing * (0.2 + 0.4 * rng.random(k)) for k in (n, m))
-    bound = Bodies(
+    bound = TwoBodies(
         x=np.concatenate([x1, x2]), v=np.zeros((n + m, d)), mass=np.ones(n + m),
         radius=np.concatenate([r1, r2]), force=np.zeros((n + m, d)), first2=n,
     )  # fmt: skip

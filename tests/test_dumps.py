@@ -16,12 +16,12 @@ from karamelo_py.output.rhythm import ByTime, is_due, next_step
 from karamelo_py.output.units import Units
 from karamelo_py.script.errors import Place, ScriptError
 from karamelo_py.styles.dumps import lammps
-from karamelo_py.styles.dumps.grid import Grid
+from karamelo_py.styles.dumps.grid import GridDump
 from karamelo_py.styles.dumps.grid_gz import GridGz
 from karamelo_py.styles.dumps.movie import Movie
 from karamelo_py.styles.dumps.particle import Particle
 from karamelo_py.styles.dumps.particle_gz import ParticleGz
-from karamelo_py.styles.dumps.pyplot import PyPlot, Scene
+from karamelo_py.styles.dumps.pyplot import PyPlot
 
 
 @pytest.fixture(params=[1, 2, 3])
@@ -89,7 +89,7 @@ def test_ovito_reads_particles(hub, style, name):
         assert data.cell.volume > 0
 
 
-@pytest.mark.parametrize("style", [Grid, GridGz])
+@pytest.mark.parametrize("style", [GridDump, GridGz])
 def test_ovito_reads_grid(hub, style):
     io = pytest.importorskip("ovito.io", exc_type=ImportError)
     ending = "gz" if style is GridGz else "dump"
@@ -101,7 +101,7 @@ def test_ovito_reads_grid(hub, style):
 
 
 def test_grid_without_empty_nodes(plane):
-    Grid(plane, 1, "g.dump", "mass", occupied=True).write()
+    GridDump(plane, 1, "g.dump", "mass", occupied=True).write()
     table = np.loadtxt((plane.folder / "g.dump").read_text().splitlines()[11:])
     keep = plane.fields.node("mass") > 0
     np.testing.assert_array_equal(table[:, 0], np.flatnonzero(keep))
@@ -414,11 +414,11 @@ def test_a_ball_is_lit_where_it_faces_the_light(tmp_path):
 def test_points_have_the_size_of_what_they_stand_for(plane):
     """Rings of an axisymmetric scene, too, whose volume is that per radian."""
     dump = PyPlot(plane, 1, "p.png", 4, 3)
-    assert Scene(dump).side == pytest.approx(np.sqrt(0.5 / 40))
+    assert dump.side(dump.snapshot()) == pytest.approx(np.sqrt(0.5 / 40))
     plane.domain.axisymmetric = True
     x = np.linspace(1e-4, 1e-2, 40)
     plane.fields.points |= {"x": x, "volume": x * 0.05**2}
-    assert Scene(dump).side == pytest.approx(0.05)
+    assert dump.side(dump.snapshot()) == pytest.approx(0.05)
 
 
 def test_legend_of_solids_and_units(plane):
@@ -490,7 +490,7 @@ def test_pyplot_refuses_other_formats_and_fields(plane):
 
 
 def test_limits_grow_and_stay():
-    from karamelo_py.styles.dumps.picture import grown
+    from karamelo_py.output.pictures import grown
 
     limits = grown(None, np.array([0.0, 0.9]))
     assert limits[0] <= 0 and limits[1] >= 0.9

@@ -41,7 +41,7 @@ from karamelo_py.points.laws.eos_strength import EosStrength
 from karamelo_py.points.laws.further import chained, initial_part, part_after, part_pressure
 from karamelo_py.points.laws.strengths.linear import Elastic
 from karamelo_py.points.laws.strengths.plastic import Plastic
-from karamelo_py.scene.material import Part
+from karamelo_py.scene.material import MaterialPart
 from karamelo_py.script.values import Values
 
 RHO, K, G, Y = 2.0, 160.0, 80.0, 0.4
@@ -409,9 +409,9 @@ def test_parts_of_other_kinds_add_their_pressure(kin, law):
 
 def test_a_script_puts_a_part_of_another_kind_into_the_law():
     made = EosStrength.given(
-        Part("eos", "linear", LinearPressure(1 / RHO, K)),
-        Part("strength", "linear", Elastic(G)),
-        Part("swelling", "even", Swelling(3.0)),
+        MaterialPart("eos", "linear", LinearPressure(1 / RHO, K)),
+        MaterialPart("strength", "linear", Elastic(G)),
+        MaterialPart("swelling", "even", Swelling(3.0)),
     )
     assert made == ELASTIC._replace(further=chained([Swelling(3.0)]))
     assert Swelling in law_kind(made)

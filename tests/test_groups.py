@@ -15,7 +15,7 @@ from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.methods.base import Method
 from karamelo_py.styles.methods.tlmpm import TLMPM
 from karamelo_py.styles.methods.ulmpm_contacts import ULMPMContacts
-from karamelo_py.styles.regions.block import Block
+from karamelo_py.styles.regions.block import BlockRegion
 from karamelo_py.styles.regions.cylinder import Cylinder
 from karamelo_py.styles.regions.difference import Difference
 
@@ -23,14 +23,14 @@ from karamelo_py.styles.regions.difference import Difference
 def scene():
     """Two squares of 4 x 4 points each in a unit square with cells of 0.1."""
     hub = SmallHub(2, 0, 1, 0.1)
-    hub.solid("s1", hub.region("r1", Block, 0, 0.2, 0, 0.2))
-    hub.solid("s2", hub.region("r2", Block, 0.5, 0.7, 0.5, 0.7))
+    hub.solid("s1", hub.region("r1", BlockRegion, 0, 0.2, 0, 0.2))
+    hub.solid("s2", hub.region("r2", BlockRegion, 0.5, 0.7, 0.5, 0.7))
     return hub
 
 
 def test_points_by_reference_position():
     hub = scene()
-    low = hub.region("low", Block, "INF", "INF", 0, 0.05)
+    low = hub.region("low", BlockRegion, "INF", "INF", 0, 0.05)
     group(hub, "g", "particles", "region", low, "all")
     np.testing.assert_array_equal(hub.groups["g"].ids, [0, 2, 8, 10])
     assert hub.groups["g"].ids.dtype == np.int64
@@ -39,7 +39,7 @@ def test_points_by_reference_position():
 
 def test_points_of_named_solids():
     hub = scene()
-    everywhere = hub.region("e", Block, "INF", "INF", "INF", "INF")
+    everywhere = hub.region("e", BlockRegion, "INF", "INF", "INF", "INF")
     s1, s2 = hub.solids["s1"], hub.solids["s2"]
     group(hub, "second", "particles", "region", everywhere, "solid", s2)
     np.testing.assert_array_equal(hub.groups["second"].ids, np.arange(16, 32))
@@ -61,8 +61,8 @@ def test_an_id_again_adds_members():
 
 def test_points_made_later_are_no_members():
     hub = scene()
-    group(hub, "g", "particles", "region", hub.region("e", Block, *["INF"] * 4), "all")
-    hub.solid("s3", hub.region("r3", Block, 0.5, 0.7, 0, 0.2))
+    group(hub, "g", "particles", "region", hub.region("e", BlockRegion, *["INF"] * 4), "all")
+    hub.solid("s3", hub.region("r3", BlockRegion, 0.5, 0.7, 0, 0.2))
     kept, everyone = hub.groups["g"], ParticleGroup(hub, everything=True)
     ids = np.array([47, 31, 0, 32])
     assert kept.has(ids).tolist() == [False, True, True, False] and everyone.has(ids).all()
@@ -98,7 +98,7 @@ def test_nodes_by_position():
 @pytest.mark.parametrize("exterior", [(), ("exterior",)])
 def test_nodes_in_a_box_are_all_nodes_in_it(dimension, exterior):
     hub = SmallHub(dimension, 0, 1, 0.15)
-    region = hub.region("r", Block, *[0.3, 0.75] * dimension, *exterior)
+    region = hub.region("r", BlockRegion, *[0.3, 0.75] * dimension, *exterior)
     group(hub, "g", "nodes", "region", region, "all")
     want = np.flatnonzero(region.inside(hub.lattices[0].positions()))
     np.testing.assert_array_equal(hub.groups["g"].nodes, want)
@@ -107,14 +107,14 @@ def test_nodes_in_a_box_are_all_nodes_in_it(dimension, exterior):
 
 def test_open_ends_take_in_the_nodes_beyond_the_domain():
     hub = SmallHub(2, 0, 1, 0.3)  # the grid reaches to 1.2
-    group(hub, "g", "nodes", "region", hub.region("r", Block, 0, 0, "INF", "INF"), "all")
+    group(hub, "g", "nodes", "region", hub.region("r", BlockRegion, 0, 0, "INF", "INF"), "all")
     np.testing.assert_array_equal(hub.groups["g"].nodes, np.arange(5))
 
 
 def test_nodes_far_away_are_none():
     hub = SmallHub(2, 0, 1, 0.1)
     for k, bounds in enumerate([(3, 4, 0, 1), (-5, -4, 0, 1), (0.01, 0.02, 0, 1)]):
-        group(hub, f"g{k}", "nodes", "region", hub.region(f"r{k}", Block, *bounds), "all")
+        group(hub, f"g{k}", "nodes", "region", hub.region(f"r{k}", BlockRegion, *bounds), "all")
         assert len(hub.groups[f"g{k}"]) == 0
     assert len(hub.warnings) == 3
 
@@ -126,7 +126,7 @@ def test_all_is_everything_also_later():
     assert points.all and nodes.all and AnyGroup.from_script(hub, arguments("all")[0]).all
     assert len(nodes.nodes) == 121
     assert len(points.ids) == 32
-    hub.solid("s3", hub.region("r3", Block, 0.8, 0.9, 0.8, 0.9))
+    hub.solid("s3", hub.region("r3", BlockRegion, 0.8, 0.9, 0.8, 0.9))
     assert len(points.ids) == 36
 
 
@@ -141,8 +141,8 @@ def test_points_made_later_do_not_join():
 def test_nodes_of_grids_made_later_join(method):
     hub = SmallHub(2, 0, 1, 0.1)
     hub.use(method, Linear())
-    r1 = hub.region("r1", Block, 0, 0.2, 0, 0.2)
-    r2 = hub.region("r2", Block, 0.5, 0.7, 0.5, 0.7)
+    r1 = hub.region("r1", BlockRegion, 0, 0.2, 0, 0.2)
+    r2 = hub.region("r2", BlockRegion, 0.5, 0.7, 0.5, 0.7)
     group(hub, "g", "nodes", "region", r2, "all")
     s1 = hub.solid("s1", r1)
     group(hub, "one", "nodes", "region", r1, "solid", s1)
@@ -158,7 +158,7 @@ def test_nodes_of_the_grid_of_a_method_that_comes_later():
     """Functions with nodes in the middle of cells number the nodes in their own way."""
     hub = SmallHub(1, 0, 1, 0.25)
     hub.update.method = None
-    group(hub, "g", "nodes", "region", hub.region("r", Block, 0.5, 1), "all")
+    group(hub, "g", "nodes", "region", hub.region("r", BlockRegion, 0.5, 1), "all")
     np.testing.assert_array_equal(hub.groups["g"].nodes, [2, 3, 4])
     hub.use(Method, BernsteinQuadratic())
     np.testing.assert_array_equal(hub.groups["g"].nodes, [4, 5, 6, 7, 8])
@@ -181,7 +181,7 @@ def test_groups_by_name():
 
 def test_empty_groups_are_warned_about():
     hub = SmallHub()
-    group(hub, "g", "particles", "region", hub.region("r", Block, 0, 1, 0, 1), "all")
+    group(hub, "g", "particles", "region", hub.region("r", BlockRegion, 0, 1, 0, 1), "all")
     assert "holds no particles" in hub.warnings[0]
 
 
@@ -218,7 +218,7 @@ def test_a_rehearsal_leaves_groups_alone():
 def test_results_that_a_rehearsal_does_not_have_pass_silently():
     hub = scene()
     hub.rehearsing = True
-    regions = [hub.region("b", Block, 0, "nan", 0, 1), hub.region("c", Cylinder, 0, 0, "nan")]
+    regions = [hub.region("b", BlockRegion, 0, "nan", 0, 1), hub.region("c", Cylinder, 0, 0, "nan")]
     regions += [hub.region("e", Cylinder, "nan", 0, 1, "exterior")]
     regions += [hub.combine("d", Difference, hub.regions["r1"], regions[1])]
     for k, region in enumerate(regions):

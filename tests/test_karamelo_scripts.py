@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from karamelo_py.language import registry
-from karamelo_py.script.other_programs import INSTEAD, KARAMELO_COMMANDS, instead
+from karamelo_py.script.other_programs import instead, table
 
 PAGE = Path(__file__).parents[1] / "docs" / "from-karamelo.md"
 
 # The words of both branches of Karamelo, by family.
 WORDS = {
-    "command": " ".join(KARAMELO_COMMANDS),
+    "command": table()["karamelo"],
     "fix": """velocity_nodes velocity_particles initial_velocity_particles initial_velocity_nodes
         initial_stress body_force force_nodes kinetic_energy strain_energy check_solution
         contact/hertz contact/minimize_penetration contact/minimize_penetration/plane cuttingtool
@@ -48,7 +48,7 @@ def test_every_word_of_karamelo_is_known_or_answered(family):
 def test_the_page_has_what_is_refused_and_what_lammps_says_otherwise():
     """Each word with a hint of its own stands in the page."""
     page = PAGE.read_text("utf-8")
-    for words in INSTEAD.values():
+    for words in table()["instead"].values():
         for word in words:
             assert f"`{word}`" in page, word
 

@@ -18,10 +18,11 @@ from karamelo_py.compiler.compile import (
     shared,
 )
 from karamelo_py.compiler.fields import field, load, store
-from karamelo_py.compiler.lanes import Eights, Fours, group
+from karamelo_py.compiler.lanes import EightLanes, FourLanes, group
 from karamelo_py.compiler.lanes.records import accumulate_affine
 from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.powers import exponential, logarithm, logarithm_near_one, power
+from karamelo_py.compiler.trace import CannotCompile
 from karamelo_py.compiler.tuples import row, scale
 from karamelo_py.kernels.arrays import arrays_of, with_nodes
 from karamelo_py.kernels.averaging import NodalMean
@@ -79,7 +80,7 @@ from karamelo_py.scene.hub import Hub
 
 pytestmark = pytest.mark.xdist_group("lanes")
 KIN = PlaneStrain()
-WIDTHS = {np.float64: (4, Fours()), np.float32: (8, Eights())}
+WIDTHS = {np.float64: (4, FourLanes()), np.float32: (8, EightLanes())}
 
 
 @kernel
@@ -128,7 +129,7 @@ def _extremes_alone(a, b, out, n):
 @kernel
 def _extremes_in_lanes(a, b, out, n):
     for q in range(0, n, 4):
-        p = group(Fours(), q, min(4, n - q))
+        p = group(FourLanes(), q, min(4, n - q))
         out[0, p] = max(a[p], b[0, p])
         out[1, p] = min(a[p], b[0, p])
 
@@ -143,21 +144,25 @@ def test_extremes_of_what_is_no_number():
     assert together.tobytes() == alone.tobytes()
 
 
+@shared
+def _larger(a):
+    return a if a > 0 else -a
+
+
 @kernel
 def _branches(a, out):
-    p = group(Fours(), 0, 4)
-    if a[p] > 0:
-        out[0, p] = a[p]
+    p = group(FourLanes(), 0, 4)
+    out[0, p] = _larger(a[p])
 
 
 def test_a_branch_says_what_to_write():
-    with pytest.raises(TypingError, match="take choose, in_all or in_any"):
+    with pytest.raises(CannotCompile, match="take choose, in_all or in_any"):
         _branches(np.ones(4), np.zeros((1, 4)))
 
 
 @kernel
 def _whole_times_half(a, out):
-    p = group(Fours(), 0, 4)
+    p = group(FourLanes(), 0, 4)
     out[0, p] = int(a[p]) * 0.5
 
 
@@ -183,7 +188,7 @@ def _advance_alone(law, kin, state, dl, dt, n):
 @kernel
 def _advance_in_lanes(law, kin, state, dl, dt, n):
     for q in range(0, n, 4):
-        _advance(law, kin, state, dl, dt, group(Fours(), q, min(4, n - q)))
+        _advance(law, kin, state, dl, dt, group(FourLanes(), q, min(4, n - q)))
 
 
 COPPER = Shock(1 / 8940, 1.38e11, 1.5, 0.0, 298.0)
@@ -352,7 +357,7 @@ def _map_alone(basis, by, grid, x, mass, nodes, seen, out, n):
 @kernel
 def _map_in_lanes(basis, by, grid, x, mass, nodes, seen, out, n):
     for q in range(0, n, 4):
-        _map(basis, by, grid, x, mass, nodes, seen, out, group(Fours(), q, min(4, n - q)))
+        _map(basis, by, grid, x, mass, nodes, seen, out, group(FourLanes(), q, min(4, n - q)))
 
 
 HALF = (0.125, 0.125)
@@ -480,7 +485,7 @@ def _reflect_alone(grid, x, v, moment, out, n):
 @kernel
 def _reflect_in_lanes(grid, x, v, moment, out, n):
     for q in range(0, n, 4):
-        _reflect(grid, x, v, moment, out, group(Fours(), q, min(4, n - q)))
+        _reflect(grid, x, v, moment, out, group(FourLanes(), q, min(4, n - q)))
 
 
 def test_edges_that_reflect():
@@ -498,7 +503,7 @@ def test_edges_that_reflect():
 @kernel
 def _parameters_in_lanes(table, material, out, n):
     for q in range(0, n, 4):
-        p = group(Fours(), q, min(4, n - q))
+        p = group(FourLanes(), q, min(4, n - q))
         store(out, p, (table[material[p]],))
 
 

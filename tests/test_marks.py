@@ -104,17 +104,17 @@ def test_a_function_remembers_each_step_once_in_the_last_good_state(run_interpre
 HELD = """\
 import sys
 from karamelo_py.app.cli import main
-from karamelo_py.run import runner
+from karamelo_py.run import recovery
 
-class Counted(runner.Marks):
+class Counted(recovery.RollbackPoint):
     most = ahead = 0
     def note(self, **options):
         super().note(**options)
-        Counted.most = max(Counted.most, len(self._of))
-        ahead = sum(step > self.hub.update.step for step in self._of)
+        Counted.most = max(Counted.most, len(self._parts))
+        ahead = sum(step > self.hub.update.step for step in self._parts)
         Counted.ahead = max(Counted.ahead, ahead)
 
-runner.Marks = Counted
+recovery.RollbackPoint = Counted
 for script in sys.argv[1:]:
     Counted.most = Counted.ahead = 0
     main([script])

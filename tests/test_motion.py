@@ -12,7 +12,7 @@ import pytest
 from scenes import LAWS, SCHEMES, TRANSFERS, block
 from selection import covering, parameters
 
-from karamelo_py.run.body_motion import Motion
+from karamelo_py.run.body_motion import BodyMotion
 from karamelo_py.schemes.usl import USL
 
 VELOCITY = (0.7, -0.4, 0.3)
@@ -300,6 +300,6 @@ def test_spin_of_a_body(half, w, turns, reach):
     spread = np.diag(half**2 / 5)
     gradient = np.cross(np.eye(3), w)[:d, :d]  # v_b = gradient_ba X_a
     still = np.zeros(d)
-    one = Motion(0, 1.0, still, still, spread, spread @ gradient.T, -half, half, still, still)
+    one = BodyMotion(0, 1.0, still, still, spread, spread @ gradient.T, -half, half, still, still)
     assert one.spin == pytest.approx(turns)
     assert one.reach == pytest.approx(reach)

@@ -133,7 +133,7 @@ IN_KERNEL = {
     "Insulated", "NoContact", "NoHooks", "FixedFrame", "Alone",
     # what is done at points and nodes in the two visits of musl: four points at once, or eight
     "OldWeights", "PresentWeights", "Strain", "Move", "MassMomentum", "MomentumAgain",
-    "InternalForce", "Update", "MomentumToVelocity", "Eights", "Fours",
+    "InternalForce", "NodalUpdate", "MomentumToVelocity", "EightLanes", "FourLanes",
     "PointByPoint", "Stencil",
 }  # fmt: skip
 

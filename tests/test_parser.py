@@ -12,7 +12,7 @@ from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.script import parser
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.parser import parse, parse_text
-from karamelo_py.script.syntax import Assignment, Call, Evaluation
+from karamelo_py.script.syntax import Assignment, CommandCall, Evaluation
 from karamelo_py.script.values import Values
 
 PAPER = """\
@@ -58,7 +58,7 @@ def number(text):
 def arguments(text):
     """The arguments of the one call in `text`, as written."""
     (call,) = parse(text)
-    assert isinstance(call, Call)
+    assert isinstance(call, CommandCall)
     return [raw.code.strip() for raw in call.arguments]
 
 
@@ -98,7 +98,7 @@ def test_line_ends_tabs_and_a_missing_last_one_mean_nothing(end):
     text = end.join(["\ta\t=\t1 # ü", "", "# only a comment", "f(a)"])
     a, f = parse(text)
     assert isinstance(a, Assignment)
-    assert isinstance(f, Call)
+    assert isinstance(f, CommandCall)
     assert (a.place.line, a.place.column) == (1, 2)
     assert f.place.line == 4
 
@@ -232,7 +232,7 @@ def test_garbage_raises_script_errors_with_a_place_and_nothing_else(text):
         assert "in.garbage:" in error.render()
         return
     for statement in statements:
-        if isinstance(statement, Call):
+        if isinstance(statement, CommandCall):
             for raw in statement.arguments:
                 try:
                     parse_text(raw.code)

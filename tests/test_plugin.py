@@ -327,6 +327,30 @@ def test_a_body_of_a_transfer_and_a_basis_grows(run_interpreted):
     np.testing.assert_allclose(y, -2e-3 * growth, rtol=1e-9)  # ten digits
 
 
+def test_a_part_declares_what_it_is_known_for(run_interpreted):
+    """Its rule speaks before the run and in `check`, once, with the facts of the scene."""
+    start = "fix(v, initial_velocity_particles, all, 1e-3, -2e-3)"
+    script = block(2, start, "set_dt(1e-6)", "run(1)", "run(1)")
+    script = script.replace("FLIP, linear, 1", "growing, smooth, 1.5, 2, 0.25")
+    for command in ("run", "check"):
+        said = run_interpreted(script, command=command).err
+        assert said.count("warning: growing velocities: ") == 1
+        assert "with smooth functions points at 0.002 are 1.5 times as fast after each step" in said
+        assert "hint: a factor of 1 at most" in said and "| method(" in said
+    assert "growing" not in run_interpreted(script.replace("1.5, 2,", "1, 2,")).err
+
+
+def test_a_fault_in_a_rule_names_the_part(tmp_path):
+    file = install(tmp_path / "site") / "mpm_examples" / "growing.py"
+    file.write_text(file.read_text("utf-8").replace("scene.fastest > 0", "scene.fast > 0"), "utf-8")
+    script = block(2, "run(1)").replace("FLIP, linear, 1", "growing, smooth, 1.5, 2, 0.25")
+    (tmp_path / "in.script").write_text(script, "utf-8")
+    done = karamelo_py(tmp_path / "site", tmp_path, "in.script")
+    assert done.returncode == 1
+    assert "error: transfer growing (of mpm-examples" in done.stderr
+    assert "no attribute 'fast' (growing.py:" in done.stderr
+
+
 MOVING = (
     "fix(v, initial_velocity_particles, all, 0.5*x0*y0, -x0)",
     "set_dt(1e-3)",

@@ -13,7 +13,7 @@ from karamelo_py.commands import domain as commands
 from karamelo_py.scene.domain import Domain
 from karamelo_py.scene.lattice import Lattice
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.styles.regions.block import Block
+from karamelo_py.styles.regions.block import BlockRegion
 from karamelo_py.styles.regions.cylinder import Cylinder
 from karamelo_py.styles.regions.difference import Difference
 from karamelo_py.styles.regions.intersection import Intersection
@@ -112,7 +112,7 @@ def test_the_older_form():
     commands.dimension(hub, *arguments(2))
     assert hub.domain is None
     with pytest.raises(ScriptError, match="no size yet"):
-        Block(hub, *arguments(0, 1, 0, 1))
+        BlockRegion(hub, *arguments(0, 1, 0, 1))
     commands.create_domain(hub, *arguments(-0.5, 0.5, -0.5, 0.5, 0.05))
     assert hub.domain.shape == (21, 21, 1)
 
@@ -139,7 +139,7 @@ def test_create_domain_must_agree_with_the_dimension():
 def test_without_h_the_first_solid_lays_the_grid():
     hub = empty_hub()
     commands.create_domain(hub, *arguments(0, 1, 0, 1))
-    hub.solid("s1", hub.region("r", Block, 0, 0.5, 0, 0.5), h=0.1)
+    hub.solid("s1", hub.region("r", BlockRegion, 0, 0.5, 0, 0.5), h=0.1)
     assert hub.domain.h == 0.1
     assert hub.domain.shape == (11, 11, 1)
 
@@ -148,7 +148,7 @@ def test_the_domain_comes_once():
     hub = SmallHub()
     with pytest.raises(ScriptError, match="set already"):
         commands.dimension(hub, *arguments(2, 0, 1, 0, 1, 0.1))
-    hub.solid("s1", hub.region("r", Block, "INF", "INF", "INF", "INF"))
+    hub.solid("s1", hub.region("r", BlockRegion, "INF", "INF", "INF", "INF"))
     with pytest.raises(ScriptError, match="once solid 's1' is in it"):
         commands.create_domain(hub, *arguments(0, 1, 0, 1, 0.1))
 
@@ -182,7 +182,7 @@ def inside(region, *positions):
 
 def test_block_holds_its_faces_whatever_the_rounding():
     hub = SmallHub(h=0.1)
-    block = hub.region("b", Block, -0.3, 0.3, 0, 0.3)
+    block = hub.region("b", BlockRegion, -0.3, 0.3, 0, 0.3)
     assert inside(block, (0.1 + 0.2, 0.1 * 3, 0), (-0.3, 0, 0), (0.30001, 0.1, 0)) == [
         True,
         True,
@@ -193,7 +193,7 @@ def test_block_holds_its_faces_whatever_the_rounding():
 @pytest.mark.parametrize("dimension", [1, 2, 3])
 def test_block_in_every_dimension(dimension):
     hub = SmallHub(dimension)
-    block = hub.region("b", Block, *[-0.1, 0.2] * dimension)
+    block = hub.region("b", BlockRegion, *[-0.1, 0.2] * dimension)
     assert inside(block, [0.2] * dimension, [0.21] + [0] * (dimension - 1)) == [True, False]
     used = [1] * dimension + [0] * (3 - dimension)
     np.testing.assert_allclose(block.lo, np.multiply(used, -0.1))
@@ -203,17 +203,17 @@ def test_block_in_every_dimension(dimension):
 def test_open_ends_reach_as_far_as_the_domain():
     hub = SmallHub()
     for k, (lo, hi) in enumerate([("INF", "INF"), ("-INF", "+INF"), ("EDGE", "EDGE")]):
-        block = hub.region(f"b{k}", Block, 0, 0.1, lo, hi)
+        block = hub.region(f"b{k}", BlockRegion, 0, 0.1, lo, hi)
         np.testing.assert_allclose(block.lo, [0, -0.5, 0])
         np.testing.assert_allclose(block.hi, [0.1, 0.5, 0])
         assert inside(block, (0.05, 7), (0.2, 0)) == [True, False]
-    far = hub.region("far", Block, -1e20, 1e20, 0, 1)
+    far = hub.region("far", BlockRegion, -1e20, 1e20, 0, 1)
     assert np.isinf(far.box_lo[0]) and np.isinf(far.box_hi[0])
 
 
 def test_a_plane_is_a_block_with_equal_ends():
     hub = SmallHub()
-    assert inside(hub.region("b", Block, 0, 0, "INF", "INF"), (0, 0.3), (0.01, 0.3)) == [
+    assert inside(hub.region("b", BlockRegion, 0, 0, "INF", "INF"), (0, 0.3), (0.01, 0.3)) == [
         True,
         False,
     ]
@@ -222,13 +222,13 @@ def test_a_plane_is_a_block_with_equal_ends():
 @pytest.mark.parametrize(
     ("dimension", "style", "texts", "says"),
     [
-        (2, Block, (0, 1), "ylo, yhi are missing in 2D"),
-        (2, Block, (0, 1, 0, 1, 2), "1 argument too many"),
-        (2, Block, (1, 0, 0, 1), "xlo = 1 is above xhi = 0"),
-        (2, Block, ("+INF", 0, 0, 1), "xlo cannot be +INF"),
-        (2, Block, (0, "-INF", 0, 1), "xhi cannot be -INF"),
-        (2, Block, (0, "nan", 0, 1), "xhi must be a finite number"),
-        (2, Block, (0, "x0*2", 0, 1), "xhi must be a constant number"),
+        (2, BlockRegion, (0, 1), "ylo, yhi are missing in 2D"),
+        (2, BlockRegion, (0, 1, 0, 1, 2), "1 argument too many"),
+        (2, BlockRegion, (1, 0, 0, 1), "xlo = 1 is above xhi = 0"),
+        (2, BlockRegion, ("+INF", 0, 0, 1), "xlo cannot be +INF"),
+        (2, BlockRegion, (0, "-INF", 0, 1), "xhi cannot be -INF"),
+        (2, BlockRegion, (0, "nan", 0, 1), "xhi must be a finite number"),
+        (2, BlockRegion, (0, "x0*2", 0, 1), "xhi must be a constant number"),
         (2, Cylinder, (0, 0, 0), "R = 0 must be above 0"),
         (2, Cylinder, (0, 0), "R is missing"),
         (2, Cylinder, ("INF", 0, 1), "INF is not a number"),
@@ -248,7 +248,7 @@ def test_wrong_shapes(dimension, style, texts, says):
 
 def test_a_wrong_block_shows_the_form_for_the_dimension():
     with pytest.raises(ScriptError) as caught:
-        Block(SmallHub(3), *arguments(0, 1, 0, 1))
+        BlockRegion(SmallHub(3), *arguments(0, 1, 0, 1))
     assert caught.value.expected == ("region(ID, block, xlo, xhi, ylo, yhi, zlo, zhi[, exterior])")
     assert caught.value.hint == "4 arguments are the form for 2D"
 
@@ -298,7 +298,7 @@ def test_spheres(dimension):
 
 @pytest.mark.parametrize(
     ("style", "texts"),
-    [(Block, (-0.1, 0.1, -0.1, 0.1)), (Cylinder, (0, 0, 0.1)), (Sphere, (0, 0, 0.1))],
+    [(BlockRegion, (-0.1, 0.1, -0.1, 0.1)), (Cylinder, (0, 0, 0.1)), (Sphere, (0, 0, 0.1))],
 )
 def test_exterior_inverts(style, texts):
     hub = SmallHub()
@@ -312,7 +312,7 @@ def test_exterior_inverts(style, texts):
 
 def test_union_intersection_difference():
     hub = SmallHub()
-    a = hub.region("a", Block, -0.2, 0.1, -0.2, 0.2)
+    a = hub.region("a", BlockRegion, -0.2, 0.1, -0.2, 0.2)
     b = hub.region("b", Cylinder, 0.1, 0, 0.2)
     c = hub.region("c", Sphere, 0, 0, 0.15, "exterior")
     x = np.random.default_rng(2).uniform(-0.5, 0.5, (2000, 2))
@@ -337,7 +337,7 @@ def test_a_region_lies_in_its_box(seed):
     rng = np.random.default_rng(seed)
     hub = SmallHub()
     lo, hi = np.sort(rng.uniform(-0.5, 0.5, (2, 2)), axis=0)
-    a = hub.region("a", Block, lo[0], hi[0], lo[1], hi[1])
+    a = hub.region("a", BlockRegion, lo[0], hi[0], lo[1], hi[1])
     b = hub.region("b", Cylinder, *rng.uniform(-0.3, 0.3, 2), 0.2)
     x = rng.uniform(-0.5, 0.5, (300, 2))
     regions = [a, b]
@@ -355,7 +355,7 @@ def test_a_region_lies_in_its_box(seed):
 def test_distances_tell_inside_from_outside_and_are_none_too_long(dimension, exterior, tmp_path):
     """No function that changes by at most the way gone is more than the distance of its zeros."""
     hub = SmallHub(dimension)
-    block = hub.region("b", Block, *[-0.2, 0.13] * dimension, *exterior)
+    block = hub.region("b", BlockRegion, *[-0.2, 0.13] * dimension, *exterior)
     ball = hub.region("s", Sphere, *[0.1] * dimension, 0.2)
     regions = [block, ball]
     if dimension == 3:

@@ -21,7 +21,7 @@ from going_on import CURVE, FLY, OUTPUTS, SCENES, arrays, goes_on, same_files, w
 from scenes import block
 
 from karamelo_py.language import registry
-from karamelo_py.run.checkpoint.memory import memory_of, remember
+from karamelo_py.run.checkpoint.parts import give_state, state_of
 
 # --- every way to compute -----------------------------------------------------------------------
 
@@ -97,12 +97,7 @@ def test_a_step_that_was_halved(run_interpreted):
              "run(60, on_trouble=halve)"]  # fmt: skip
     script = with_files(block(2, *lines, size=(0.3, 0.3)), "restart(6, r.*.h5)\n")
     whole = goes_on(run_interpreted, script, files=9)
-    halvings = {
-        memory["halvings"]
-        for file in whole.glob("r.*.h5")
-        for kind, *_, memory in content(file)["parts"]
-        if kind == "run"
-    }
+    halvings = {content(file)["run"][0] for file in whole.glob("r.*.h5")}
     assert max(halvings) > 0
 
 
@@ -446,7 +441,7 @@ import numpy as np
 from going_on import CURVE, OUTPUTS, SCENES, block
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
-from karamelo_py.run.checkpoint.memory import remembered
+from karamelo_py.run.checkpoint.parts import named
 from karamelo_py.scene.hub import Hub
 
 PLAIN = (int, float, str, bool, list, dict, np.ndarray, type(None))
@@ -470,7 +465,7 @@ for name, script in scenes.items():
     assert before
     for part, old in before:
         for key, value in vars(part).items():
-            if isinstance(value, PLAIN) and key not in remembered(part):
+            if isinstance(value, PLAIN) and key not in named(part):
                 if repr(value) != old.get(key):
                     print("forgotten", name, type(part).__name__, key)
 print("done")
@@ -529,7 +524,7 @@ def test_generators_and_sets_are_kept():
     held: list = []
     part, other = Part(), Part()
     part.rng.normal(size=3), part.old.normal(size=3), part.seen.add(5)
-    kept = json.loads(json.dumps(memory_of(part, held)))
-    remember(other, kept, held)
+    kept = json.loads(json.dumps(state_of(part, held)))
+    give_state(other, kept, held)
     assert other.rng.normal() == part.rng.normal() and other.old.normal() == part.old.normal()
     assert (other.seen, other.z, other.raw) == (part.seen, part.z, part.raw)

@@ -1,7 +1,6 @@
 """Scenes that do not fit into the memory of the machine: told before, and never what would run."""
 
 import gc
-import mmap
 import os
 import re
 import subprocess
@@ -11,6 +10,7 @@ from contextlib import nullcontext, suppress
 from types import SimpleNamespace
 
 import numpy as np
+import psutil
 import pytest
 from conftest import INPUTS
 from scenes import block
@@ -22,7 +22,7 @@ from karamelo_py.output.console import Console
 from karamelo_py.run.lower.memory import check_room, least_bytes
 from karamelo_py.run.lower.sizes import memory_of, point_fields
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.room import SLACK, MachineMemory, machine_memory
+from karamelo_py.scene.machine_memory import SLACK, MachineMemory, machine_memory
 from karamelo_py.script.errors import Quit, ScriptError
 
 MIB = 2**20
@@ -33,23 +33,25 @@ MIB = 2**20
 # MiB
 MACHINE = {"MemTotal:": 1000, "MemFree:": 100, "MemAvailable:": 500}
 MACHINE |= {"SwapTotal:": 80, "SwapFree:": 50}
+MACHINE |= dict.fromkeys(("Buffers:", "Cached:", "Shmem:", "Active:", "Inactive:"), 0)
 
 
 @pytest.fixture
-def machine(tmp_path):
+def machine(tmp_path, monkeypatch):
     """``machine(groups, {file: text}, processes)``: what it has free, and in all, in MiB."""
 
     def told(
         groups: str | None = None, files: dict[str, str] | None = None, processes: int = 1
     ) -> MachineMemory:
         text = "".join(f"{name} {size * 1024} kB\n" for name, size in MACHINE.items())
-        files = {"proc/meminfo": text, **(files or {})}
+        files = {"proc/meminfo": text, "proc/vmstat": "pswpin 0\npswpout 0\n", **(files or {})}
         if groups is not None:
             files["proc/self/cgroup"] = groups
         for name, text in files.items():
             path = tmp_path / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text, encoding="utf-8")
+        monkeypatch.setattr(psutil, "PROCFS_PATH", str(tmp_path / "proc"))
         found = machine_memory(processes, root=tmp_path)
         return MachineMemory(*(size / MIB for size in found))
 
@@ -60,7 +62,8 @@ def test_what_the_system_can_give_is_free_swap_too(machine):
     assert machine() == pytest.approx((550 + SLACK * 1000, 1080))
 
 
-def test_a_system_that_does_not_tell_is_not_asked(tmp_path):
+def test_a_system_that_does_not_tell_is_not_asked(tmp_path, monkeypatch):
+    monkeypatch.setattr(psutil, "PROCFS_PATH", str(tmp_path))
     assert machine_memory(root=tmp_path) is None
 
 
@@ -88,32 +91,24 @@ def test_the_limit_of_a_container_of_the_older_kind(machine):
     }
     groups = "9:cpu:/docker/12ab\n4:memory:/docker/12ab\n0::/\n"
     assert machine(groups, files) == pytest.approx((220 + 50 + SLACK * 300, 380))
-    files[f"{top}/memory.memsw.limit_in_bytes"] = str(300 * MIB)
-    files[f"{top}/memory.memsw.usage_in_bytes"] = str(100 * MIB)
-    assert machine(groups, files) == pytest.approx((220 + SLACK * 300, 300))
 
 
-LIMITS = """Limit                     Soft Limit           Hard Limit           Units
-Max resident set          unlimited            unlimited            bytes
-Max address space         {}            unlimited            bytes
-"""
-
-
-def test_the_limit_of_each_process_counts_for_those_of_the_machine(machine):
+def test_the_limit_of_each_process_counts_for_those_of_the_machine(machine, monkeypatch):
     """Of addresses (ulimit -v), of which 30 MiB are taken."""
-    pages = 30 * MIB // mmap.PAGESIZE
-    files = {"proc/self/limits": LIMITS.format(200 * MIB), "proc/self/statm": f"{pages} 5 4 1 0"}
-    assert machine(None, files) == pytest.approx((170 + SLACK * 200, 200))
-    assert machine(None, files, 2) == pytest.approx((340 + SLACK * 400, 400))
-    files["proc/self/limits"] = LIMITS.format("unlimited")
-    assert machine(None, files) == pytest.approx((550 + SLACK * 1000, 1080))
+    taken = SimpleNamespace(memory_info=lambda: SimpleNamespace(vms=30 * MIB))
+    monkeypatch.setattr(psutil, "Process", lambda: taken)
+    monkeypatch.setattr("resource.getrlimit", lambda _: (200 * MIB, -1))
+    assert machine() == pytest.approx((170 + SLACK * 200, 200))
+    assert machine(processes=2) == pytest.approx((340 + SLACK * 400, 400))
+    monkeypatch.setattr("resource.getrlimit", lambda _: (-1, -1))
+    assert machine() == pytest.approx((550 + SLACK * 1000, 1080))
 
 
 @pytest.mark.skipif(not os.path.exists("/proc/self/limits"), reason="needs /proc")
 def test_a_process_finds_its_own_limit():
     code = (
         "import resource; resource.setrlimit(resource.RLIMIT_AS, (3 << 30, -1)); "
-        "from karamelo_py.scene.room import machine_memory; print(*machine_memory())"
+        "from karamelo_py.scene.machine_memory import machine_memory; print(*machine_memory())"
     )
     done = subprocess.run([sys.executable, "-c", code], text=True, check=True, capture_output=True)
     free, whole = map(float, done.stdout.split())
@@ -129,7 +124,7 @@ def small(monkeypatch):
 
     def set_to(free: float, whole: float | None = None) -> None:
         there = MachineMemory(free, free if whole is None else whole)
-        for module in ("run.lower.memory", "scene.room"):
+        for module in ("run.lower.memory", "scene.machine_memory"):
             monkeypatch.setattr(f"karamelo_py.{module}.machine_memory", lambda *_: there)
         for module in ("run.lower.memory", "scene.placement"):
             monkeypatch.setattr(f"karamelo_py.{module}.FEW", 0)
@@ -154,7 +149,7 @@ def test_scenes_of_few_points_do_not_ask(tmp_path, monkeypatch):
     """Of the system, which takes a millisecond for each solid."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "in.script").write_text(block(2, "run(1)"), encoding="utf-8")
-    for module in ("run.lower.memory", "scene.room"):
+    for module in ("run.lower.memory", "scene.machine_memory"):
         monkeypatch.setattr(f"karamelo_py.{module}.machine_memory", None)
     assert main(["in.script"]) == 0
 
@@ -332,7 +327,7 @@ def test_of_processes_those_of_one_machine_count(small, on_machine, refused):
     hub.interpreter = Interpreter(hub)
     hub.interpreter.run_text(block(2))
     whole = least_bytes(hub, np.float64, True)
-    hub.settings.crew = SimpleNamespace(size=4, on_machine=on_machine)
+    hub.settings.comm = SimpleNamespace(size=4, on_machine=on_machine)
     small(0.6 * whole)
     with pytest.raises(ScriptError, match="24 points") if refused else nullcontext():
         check_room(hub, copied=True)

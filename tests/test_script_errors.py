@@ -298,7 +298,7 @@ def test_words_of_lammps(text, column, part, tmp_path):
 
 
 def test_hints_for_words_of_lammps_are_words_of_ours():
-    for family, words in other_programs.INSTEAD.items():
+    for family, words in other_programs.table()["instead"].items():
         for word, hint in words.items():
             assert not registry.knows(family, word)
             for command in re.findall(r"(\w+)\(", hint):

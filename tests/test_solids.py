@@ -19,7 +19,7 @@ from karamelo_py.scene.region import Region
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.methods.base import Method, OwnGrids
 from karamelo_py.styles.methods.ulcpdi import ULCPDI
-from karamelo_py.styles.regions.block import Block
+from karamelo_py.styles.regions.block import BlockRegion
 from karamelo_py.styles.regions.cylinder import Cylinder
 from karamelo_py.styles.regions.difference import Difference
 from karamelo_py.styles.regions.intersection import Intersection
@@ -30,7 +30,7 @@ from karamelo_py.styles.regions.union import Union
 
 
 def whole(hub, ID="whole"):
-    return hub.region(ID, Block, *["INF"] * (2 * hub.domain.dimension))
+    return hub.region(ID, BlockRegion, *["INF"] * (2 * hub.domain.dimension))
 
 
 def karamelo_points(region, domain, ppc, dimension):
@@ -135,7 +135,7 @@ def test_boxes_that_a_ball_cuts_have_its_volume(dimension):
 
 def test_nothing_is_cut_of_whole_boxes():
     hub = SmallHub(2, 0, 1, 0.1)
-    block = hub.region("b", Block, 0.2, 0.7, 0.1, 0.55)
+    block = hub.region("b", BlockRegion, 0.2, 0.7, 0.1, 0.55)
     cut, regular = (hub.solid(p, block, ppc=2, points=p) for p in ("cut", "regular"))
     np.testing.assert_array_equal(cut.x0, regular.x0)
     np.testing.assert_array_equal(cut.mass, regular.mass)
@@ -143,20 +143,20 @@ def test_nothing_is_cut_of_whole_boxes():
 
 def thin(hub, style, part, *ends):
     """A block of 4 x 2 with a part joined to it or taken from it."""
-    whole = hub.region("whole", Block, 0, 4, 0, 2)
+    whole = hub.region("whole", BlockRegion, 0, 4, 0, 2)
     return hub.combine("thin", style, whole, hub.region("part", part, *ends))
 
 
 CUT = {
     "disk": (lambda hub: hub.region("r", Cylinder, 0.013, 0.021, 2.5), np.pi * 2.5**2, 1e-3),
-    "block": (lambda hub: hub.region("r", Block, 0, 4.1, 0, 1.03), 4.1 * 1.03, 1e-9),
-    "strip": (lambda hub: hub.region("r", Block, 0, 4.1, 0.2, 0.24), 4.1 * 0.04, 1e-9),
+    "block": (lambda hub: hub.region("r", BlockRegion, 0, 4.1, 0, 1.03), 4.1 * 1.03, 1e-9),
+    "strip": (lambda hub: hub.region("r", BlockRegion, 0, 4.1, 0.2, 0.24), 4.1 * 0.04, 1e-9),
     "slot": (
-        lambda hub: thin(hub, Difference, Block, 1.013, 5, 1.014, 1.245),
+        lambda hub: thin(hub, Difference, BlockRegion, 1.013, 5, 1.014, 1.245),
         8 - 2.987 * 0.231,
         5e-3,
     ),
-    "fin": (lambda hub: thin(hub, Union, Block, 3, 6, 1.014, 1.245), 8 + 2 * 0.231, 5e-3),
+    "fin": (lambda hub: thin(hub, Union, BlockRegion, 3, 6, 1.014, 1.245), 8 + 2 * 0.231, 5e-3),
     "hole": (lambda hub: thin(hub, Difference, Cylinder, 2, 1, 0.3), 8 - np.pi * 0.3**2, 2e-3),
 }
 
@@ -178,7 +178,7 @@ def test_a_part_that_bounds_the_region_may_be_thin():
     """A strip of a disk, along its middle: exact across, arcs as far as parts of a box tell."""
     hub = SmallHub(2, -10, 10, 1.0)
     disk = hub.region("disk", Cylinder, 0, 0, 2.5)
-    strip = hub.region("strip", Block, -5, 5, 0.2, 0.24)
+    strip = hub.region("strip", BlockRegion, -5, 5, 0.2, 0.24)
     solid = hub.solid("s", hub.combine("r", Intersection, disk, strip), points="cut")
     assert solid.volume0.sum() == pytest.approx(2 * 0.04 * np.sqrt(2.5**2 - 0.22**2), rel=5e-3)
     assert not hub.warnings
@@ -208,7 +208,7 @@ def test_a_thin_part_that_leans_has_its_area(tmp_path, thickness, tolerance):
 def test_parts_too_thin_to_be_seen_are_told(style, tmp_path):
     hub = SmallHub(2, -10, 10, 1.0)
     thin = slanted(hub, tmp_path, 5, 0.01)
-    block = hub.region("block", Block, 0, 4, 0, 2)
+    block = hub.region("block", BlockRegion, 0, 4, 0, 2)
     hub.solid("s", hub.combine("r", style, block, thin), ppc=1, points="cut")
     assert "thinner than points=cut sees, 0.0312" in hub.warnings[0]
 
@@ -251,7 +251,7 @@ def test_domains_with_corners_are_not_cut():
 @given(st.floats(0.3, 1.0), st.floats(0.02, 0.2), st.integers(1, 4))
 def test_a_region_of_any_size_is_filled_to_within_a_layer_of_points(width, h, ppc):
     hub = SmallHub(1, 0.0, 1.0, h)
-    solid = hub.solid("s", hub.region("r", Block, 0, width), ppc=ppc)
+    solid = hub.solid("s", hub.region("r", BlockRegion, 0, width), ppc=ppc)
     gap = 0.3873 * h if ppc == 3 else h / ppc
     assert abs(solid.volume0.sum() - width) <= 2 * gap
     assert solid.x0.min() >= 0 and solid.x0.max() <= width + 1e-8
@@ -268,7 +268,7 @@ def test_exterior_fills_the_rest_of_the_domain():
 
 def test_points_outside_the_domain_are_left_out_with_a_warning():
     hub = SmallHub(2, 0, 1, 0.1)
-    solid = hub.solid("s", hub.region("r", Block, 0.8, 1.2, -0.2, 0.2))
+    solid = hub.solid("s", hub.region("r", BlockRegion, 0.8, 1.2, -0.2, 0.2))
     assert solid.count == 16
     assert solid.x0.max() < 1
     assert hub.warnings == ["48 points of region 'r' outside the domain left out of the solid"]
@@ -276,7 +276,7 @@ def test_points_outside_the_domain_are_left_out_with_a_warning():
 
 def test_a_huge_region_is_not_walked_through():
     hub = SmallHub(2, 0, 1, 0.1)
-    solid = hub.solid("s", hub.region("r", Block, -1e15, 1e15, -1e15, 1e15))
+    solid = hub.solid("s", hub.region("r", BlockRegion, -1e15, 1e15, -1e15, 1e15))
     assert solid.count == 400
     assert hub.warnings == ["points of region 'r' outside the domain left out of the solid"]
 
@@ -290,7 +290,7 @@ def test_a_domain_that_is_no_multiple_of_h_loses_no_points_silently():
 
 def test_open_ends_of_a_part_do_not_warn():
     hub = SmallHub(2, 0, 1, 0.3)
-    strip = hub.region("strip", Block, "INF", "INF", 0, 0.3)
+    strip = hub.region("strip", BlockRegion, "INF", "INF", 0, 0.3)
     ball = hub.region("ball", Sphere, 0.5, 0.5, 0.1)
     hub.solid("s", hub.combine("u", Union, strip, ball))
     assert not hub.warnings
@@ -309,7 +309,7 @@ def test_open_ends_of_a_part_do_not_warn():
 def test_wrong_solids(region, options, says, argument):
     hub = SmallHub(2, 0, 1, 0.1)
     with pytest.raises(ScriptError) as caught:
-        hub.solid("s", hub.region("r", Block, *region), **options)
+        hub.solid("s", hub.region("r", BlockRegion, *region), **options)
     assert says in str(caught.value)
     assert caught.value.argument == argument
 
@@ -348,7 +348,7 @@ def test_gauss_points_carry_the_weights_of_the_quadrature():
 
 def test_gauss_points_at_the_edge_of_a_region_keep_their_own_weights():
     hub = SmallHub(2, 0, 1, 0.5)
-    solid = hub.solid("s", hub.region("r", Block, 0, 0.3, 0, 1), ppc=3, points="gauss")
+    solid = hub.solid("s", hub.region("r", BlockRegion, 0, 0.3, 0, 1), ppc=3, points="gauss")
     full = SmallHub(2, 0, 1, 0.5)
     every = full.solid("s", whole(full), ppc=3, points="gauss")
     kept = every.x0[:, 0] < 0.3
@@ -377,7 +377,7 @@ def test_three_points_with_domains_stand_so_that_these_tile_the_cell(method, bas
 
 def test_domains_of_points_are_boxes():
     hub = SmallHub(3, 0, 1, 0.1)
-    solid = hub.solid("s", hub.region("r", Block, 0.2, 0.61, 0.3, 2, "INF", 0.5))
+    solid = hub.solid("s", hub.region("r", BlockRegion, 0.2, 0.61, 0.3, 2, "INF", 0.5))
     assert solid.shape == "box" and solid.corners is None
     assert solid.half_size.shape == (solid.count, 3)
     assert (solid.half_size == 0.025).all()
@@ -409,7 +409,7 @@ def own_grids(hub, **attributes):
 def test_a_grid_of_its_own_begins_at_the_lower_corner_of_the_solid():
     """Reference, sections 3.1, 4.5: region 0.3..0.65 x 0.3..0.5, points up to x = 0.625."""
     hub = own_grids(SmallHub(2, 0, 1, 0.25))
-    solid = hub.solid("s", hub.region("r", Block, 0.3, 0.65, 0.3, 0.5), h=0.1)
+    solid = hub.solid("s", hub.region("r", BlockRegion, 0.3, 0.65, 0.3, 0.5), h=0.1)
     assert solid.h == 0.1 and hub.domain.h == 0.25
     np.testing.assert_allclose(solid.x0[0], [0.325, 0.325])
     np.testing.assert_allclose(solid.x0.max(axis=0), [0.625, 0.475])
@@ -420,23 +420,23 @@ def test_a_grid_of_its_own_begins_at_the_lower_corner_of_the_solid():
 
 def test_a_grid_of_its_own_ends_at_the_domain():
     hub = own_grids(SmallHub(2, 0, 1, 0.25))
-    strip = hub.region("strip", Block, "INF", "INF", 0.5, 1.3)
+    strip = hub.region("strip", BlockRegion, "INF", "INF", 0.5, 1.3)
     solid = hub.solid("s", strip, h=0.1, ppc=1)
     np.testing.assert_allclose(solid.x0[0], [0.05, 0.55])
     assert solid.count == 50
     assert hub.warnings == ["30 points of region 'strip' outside the domain left out of the solid"]
-    assert (hub.solid("t", hub.region("u", Block, 0, 1, 0, 0.3), h=0.3).h) == 0.3
+    assert (hub.solid("t", hub.region("u", BlockRegion, 0, 1, 0, 0.3), h=0.3).h) == 0.3
 
 
 def test_glue():
     hub = SmallHub(2, 0, 1, 0.1)
-    first = hub.solid("a", hub.region("l", Block, 0, 0.5, 0, 1))
+    first = hub.solid("a", hub.region("l", BlockRegion, 0, 0.5, 0, 1))
     assert first.glued_to is None
-    second = hub.solid("b", hub.region("r", Block, 0.5, 1, 0, 1), GlueToSolid=first)
+    second = hub.solid("b", hub.region("r", BlockRegion, 0.5, 1, 0, 1), GlueToSolid=first)
     assert second.glued_to is first
     assert len(hub.warnings) == 1 and "no effect" in hub.warnings[0]
     own_grids(hub, fields_per_solid=True)
-    hub.solid("c", hub.region("m", Block, 0.5, 0.7, 0, 1), h=0.07, GlueToSolid=first)
+    hub.solid("c", hub.region("m", BlockRegion, 0.5, 0.7, 0, 1), h=0.07, GlueToSolid=first)
     assert len(hub.warnings) == 1
 
 

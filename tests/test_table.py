@@ -3,11 +3,11 @@
 import pytest
 
 from karamelo_py.kernels.g2p import Move, SecondStrain, Strain, StrainInMove, StrainOfLastStep
-from karamelo_py.kernels.nodes import Update
+from karamelo_py.kernels.nodes import NodalUpdate
 from karamelo_py.kernels.p2g import InternalForce, MassMomentum
 from karamelo_py.kernels.rows import FORCE, MASS_AND_MOMENTUM, SUMS
 from karamelo_py.kernels.sweep import OldWeights, PresentWeights
-from karamelo_py.kernels.table import Gather, Nodes, Sweep, fused, staged
+from karamelo_py.kernels.table import Gather, NodeTask, Sweep, fused, staged
 from karamelo_py.schemes.musl import MUSL
 from karamelo_py.schemes.usavg import USAVG
 from karamelo_py.schemes.usf import USF
@@ -36,7 +36,9 @@ def test_musl_visits_them_twice_and_stages_are_parts_of_these():
 
 
 def test_parts_of_a_step_of_other_lengths_do_not_share_a_visit():
-    first, second = sweeps(fused((SUMS, Nodes(Update()), Gather(Move()), Gather(Strain(), 0.5))))
+    first, second = sweeps(
+        fused((SUMS, NodeTask(NodalUpdate()), Gather(Move()), Gather(Strain(), 0.5)))
+    )
     assert (kinds(first), first.share) == ([Move], 1.0)
     assert (second.share, second.scatters) == (0.5, True)
     assert type(second.visit.tasks[0]) is Strain
@@ -54,7 +56,13 @@ def test_velocities_of_the_last_step_are_of_the_places_after_it(rows_of):
 
 def test_a_scatter_may_stand_alone():
     """Force apart from mass, and a step that ends at the nodes."""
-    rows = (MASS_AND_MOMENTUM, FORCE, Nodes(Update()), Gather(Move()), Nodes(Update()))
+    rows = (
+        MASS_AND_MOMENTUM,
+        FORCE,
+        NodeTask(NodalUpdate()),
+        Gather(Move()),
+        NodeTask(NodalUpdate()),
+    )
     force, move, sums = sweeps(fused(rows))
     assert (force.gathers, force.scatters, force.moves) == (False, True, False)
     assert (move.gathers, move.scatters) == (True, False)

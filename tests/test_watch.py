@@ -121,7 +121,7 @@ def test_energy_that_is_no_number_ends_the_run(tmp_path, monkeypatch):
     metal = "eos(e, linear, 2, 100)\nstrength(s, plastic, 40, 1)\n"
     metal += "material(rubber, eos-strength, e, s)"
     hub.interpreter.run_text(re.sub("material.*", metal, scene) + "run(5)\n", "in.scene")
-    hub.simulation.stepped.blocks[0].points.state[-2, 7] = np.nan
+    hub.simulation.setup.blocks[0].points.state[-2, 7] = np.nan
     with pytest.raises(
         ScriptError, match=r"energy is no number any more; the first point .* point 8"
     ):

@@ -33,7 +33,7 @@ def save_state(request: dict) -> int:
     from karamelo_py.run.mpi.whole import Whole
     from karamelo_py.run.tiles import tiles
     from karamelo_py.script.errors import ScriptError
-    from karamelo_py.styles.dumps import hdf5, look
+    from karamelo_py.styles.dumps import hdf5
 
     script, columns = request["arguments"][0], request["columns"]
     usual = tiles.DIRECT_UP_TO, tiles.TILES, Whole.gather
@@ -45,7 +45,7 @@ def save_state(request: dict) -> int:
     # One process has all points in a piece, several a few; files of HDF5 are the same then, too.
     piece = 16 if request["ranks"] > 1 else 1 << 17
     by_id.PIECE = by_number.PIECE = storing.PIECE = piece
-    by_id.SAMPLES, hdf5.PIECE, look.MARKS = 8, 16, 16
+    hdf5.PIECE = 16
     try:
         folder = request["out"] and Path(request["out"])
         if request["fails"]:

@@ -27,7 +27,7 @@ def families() -> list[str]:
 
 
 def help_of(family: str, name: str) -> Help:
-    """What there is to say about a command or style.
+    """Gather the help about a command or style.
 
     Raises
     ------
@@ -212,7 +212,7 @@ def _arguments(word: str) -> dict[str, Parameter]:
 
 
 def _explain_argument(word: str, found: dict[str, Parameter]) -> int:
-    """What is said of an argument where most is said of it, and where else there is one."""
+    """Explain an argument where most is said of it, and list where else there is one."""
     page = _Page()
     owner, parameter = max(found.items(), key=lambda item: len(item[1].description))
     page.line(word, "bold")

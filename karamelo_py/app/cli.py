@@ -71,7 +71,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def outcome_of(act: Callable[[], int], *, debugging: bool = False) -> Outcome:
-    """How something ends, with what is left to be said."""
+    """Run something and tell how it ends."""
     try:
         return Outcome(act())
     except KeyboardInterrupt:
@@ -88,7 +88,7 @@ def outcome_of(act: Callable[[], int], *, debugging: bool = False) -> Outcome:
 
 
 def _rendered(error: BaseException) -> str:
-    """What the user is told; no traceback, also where the fault is ours or of a plug-in."""
+    """Write an exception for the user: no traceback, also where the fault is not the user's."""
     if isinstance(error, ScriptError):
         return error.render()
     if isinstance(error, MemoryError):

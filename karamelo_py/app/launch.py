@@ -246,7 +246,7 @@ class Launcher:
         return "\n".join([render_message("error", text), self._words()]).rstrip()
 
     def _words(self) -> str:
-        """What mpiexec said, and libraries of C through it."""
+        """Read what mpiexec said, and libraries of C through it."""
         self.said.seek(0)
         return self.said.read().decode(errors="replace").strip()
 
@@ -256,7 +256,7 @@ class Launcher:
 
 
 def _received(link: socket.socket) -> bytes:
-    """What has come; the link is closed where its other end is."""
+    """Read what has come; the link is closed where its other end is."""
     found = b""
     with suppress(OSError):
         while part := link.recv(1 << 16):

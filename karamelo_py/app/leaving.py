@@ -1,4 +1,4 @@
-"""How the program ends with a word where it is interrupted before it has begun.
+"""The end of a program that is interrupted before it has begun, with a word about it.
 
 An interrupt in the midst of an import can come out as any error; while nothing is open yet, the
 program just ends.

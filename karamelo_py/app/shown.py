@@ -1,4 +1,4 @@
-"""What a simulation in Python shows: columns by name, and pictures."""
+"""Columns by name, and pictures, as a simulation in Python shows them."""
 
 from collections.abc import Callable, Iterator, Mapping
 from os import PathLike
@@ -10,7 +10,7 @@ import numpy as np
 from karamelo_py.script.errors import NoItem, nearest_few
 
 
-class Table(Mapping):
+class Columns(Mapping):
     """Columns by name: arrays of numbers."""
 
     def __init__(self, names: Callable[[], list[str]], column: Callable[[str], np.ndarray]):
@@ -41,7 +41,7 @@ class Table(Mapping):
         return pandas.DataFrame(dict(self))
 
 
-class Picture:
+class ShownPicture:
     """A picture of the points, which a notebook shows."""
 
     def __init__(self, png: bytes):

@@ -16,7 +16,7 @@ from weakref import WeakValueDictionary
 import numpy as np
 
 from karamelo_py.app.options import make_folder
-from karamelo_py.app.shown import Picture, Table
+from karamelo_py.app.shown import Columns, ShownPicture
 from karamelo_py.app.told import Quiet, SimulationError, refuse_copies, said, threads_of, told
 from karamelo_py.language import registry, signature
 from karamelo_py.language.interpreter import Interpreter
@@ -202,7 +202,7 @@ class Simulation:
         return [*super().__dir__(), *registry.names("command")]
 
     def _word(self, value: Any) -> str:
-        """What a script would say for `value`."""
+        """Write a value as a script would."""
         if callable(value) and not isinstance(value, type):
             name = f"{getattr(value, '__name__', 'function').strip('<>')}_{next(self._numbers)}"
             self.hub.functions[name] = value
@@ -241,19 +241,19 @@ class Simulation:
     # -- what there is to see ---------------------------------------------------------------------
 
     @property
-    def points(self) -> Table:
+    def points(self) -> Columns:
         """Columns of the points by name (x, vy, s11, seq ...): arrays (n,) in the order of ids."""
         fields = self.hub.fields
-        return Table(fields.particle_names, told()(fields.particle))
+        return Columns(fields.particle_names, told()(fields.particle))
 
     @property
-    def nodes(self) -> Table:
+    def nodes(self) -> Columns:
         """Columns of the nodes by name (x, vx, mass ...): arrays (n,)."""
         fields = self.hub.fields
-        return Table(fields.node_names, told()(fields.node))
+        return Columns(fields.node_names, told()(fields.node))
 
     @property
-    def log(self) -> Table:
+    def log(self) -> Columns:
         """Columns of the log by name: arrays with a number for each line.
 
         Where the columns have changed, those of the last lines that have the same.
@@ -261,18 +261,18 @@ class Simulation:
         rows = self.hub.output.log.rows
         names = rows[-1][0] if rows else []
         last = np.array([numbers for at, numbers in rows if at == names])
-        return Table(lambda: list(names), lambda name: last[:, names.index(name)])
+        return Columns(lambda: list(names), lambda name: last[:, names.index(name)])
 
     @property
-    def values(self) -> Table:
-        """What fixes and computes publish, now: numbers by name."""
+    def values(self) -> Columns:
+        """Values that fixes and computes publish, now: numbers by name."""
 
         def read(name: str) -> float:
             if self.hub.solids and self.hub.update.method is not None:
                 self.hub.refresh_values()
             return self.hub.values.get(name)
 
-        return Table(self.hub.values.names, told()(read))
+        return Columns(self.hub.values.names, told()(read))
 
     @property
     def variables(self) -> dict[str, Any]:
@@ -303,7 +303,7 @@ class Simulation:
             dump = signature.call(PyPlot, self.hub, arguments, "dump pyplot")
             file = io.BytesIO()
             dump.draw(file)
-        return Picture(file.getvalue())
+        return ShownPicture(file.getvalue())
 
     def close(self) -> None:
         """Close its files; a further run would begin the log anew."""

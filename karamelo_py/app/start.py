@@ -1,4 +1,4 @@
-"""Where the program begins."""
+"""The start of the program."""
 
 import sys
 

@@ -27,7 +27,7 @@ PATIENCE, LONGER = 2.0, 6.0
 
 
 class Outcome(NamedTuple):
-    """How a command line ended."""
+    """The end of a command line."""
 
     status: int
     text: str = ""  # what is left to be said

@@ -1,4 +1,4 @@
-"""What Python says to a scene, in the words of a script, and what it is told."""
+"""Values and errors between Python and a scene, which speaks as a script does."""
 
 import re
 import sys
@@ -18,7 +18,7 @@ from karamelo_py.script.errors import ScriptError
 
 
 class SimulationError(ScriptError):
-    """What a script or a command is told that is wrong: the whole message, with its place.
+    """An error of a script or a command: the whole message, with its place.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class SimulationError(ScriptError):
 
 
 class KarameloWarning(UserWarning):
-    """What the command line would say as a warning."""
+    """A warning as the command line shows it."""
 
 
 class Quiet(Console):
@@ -82,7 +82,7 @@ def threads_of(given: Any) -> int | None:
 
 
 def said(value: Any) -> str:
-    """What a script says for a value in Python."""
+    """Write a value of Python as a script would."""
     if value is None:
         return "NULL"
     if isinstance(value, (bool, np.bool_)):

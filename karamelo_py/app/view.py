@@ -14,7 +14,6 @@ from karamelo_py.output.files import picture_format, unwarned, whole
 from karamelo_py.output.movies import Frames, movie_format
 from karamelo_py.output.snapshots import Snapshot, read
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.styles.dumps.look import AtHand
 
 SUMMARY = "Draw pictures or a movie of dumps of points."
 TEXT = """\
@@ -63,7 +62,10 @@ def run(options: argparse.Namespace) -> int:
         picture = None
         for snapshot in (snapshot for file in files for snapshot in read(file)):
             picture = picture or _picture(snapshot, files, options)
-            _show(picture, snapshot, options.column)
+            time = "" if np.isnan(snapshot.time) else f", time {snapshot.time:.6g}"
+            # As they stand in the file, whatever their ids.
+            snapshot.columns["id"] = np.arange(len(snapshot.columns["x"]))
+            picture.show(snapshot, picture.side, f"step {snapshot.step}{time}")
             drawn += 1
             if movie:
                 frames.add(lambda file, picture=picture: picture.save_png(file, 1))
@@ -80,7 +82,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _matching(names: Iterable[Path]) -> set[Path]:
-    """The files of these names; a pattern that no shell has replaced stands for all that match.
+    """Find the files of these names; a pattern stands for all files that match it.
 
     Raises
     ------
@@ -105,17 +107,20 @@ def _number(path: Path) -> int:
 
 
 def _picture(first: Snapshot, files: Iterable[Path], options: argparse.Namespace) -> Any:
-    """The empty picture that suits the first snapshot; place and colours suit all of them."""
-    from karamelo_py.styles.dumps import picture, projections
+    """Make the empty picture that suits the first snapshot; place and colours suit all of them."""
+    from karamelo_py.output import pictures
     from karamelo_py.styles.dumps.pyplot import colours_of
 
     if options.column is not None and options.column not in first.columns:
         said = f"the dump has no column '{options.column}'"
         raise unknown_column(said, options.column, first.columns)
-    dimension, column = _dimension(first), _coloured_by(first, options.column)
+    # A dump holds zeros where the scene has no direction.
+    dimension = 3 if first.columns["z"].any() else 2 if first.columns["y"].any() else 1
+    column = options.column or ("type" if dimension > 1 else "x")
     limits = (options.vmin, options.vmax)
     types = np.unique(first.columns["type"]).astype(int) if column == "type" else []
-    look = picture.Options(
+    look = pictures.Options(
+        column,
         column,
         tuple(f"solid {k}" for k in range(1, max(types, default=0) + 1)),
         limits,
@@ -126,24 +131,15 @@ def _picture(first: Snapshot, files: Iterable[Path], options: argparse.Namespace
     lo, hi, span = _all(files, column)
     domain = SimpleNamespace(dimension=dimension, lo=lo, hi=hi)
     size = tuple(pixels / DPI for pixels in options.size)
-    made = projections.make(domain, size, DPI, look)
+    made = pictures.make(domain, size, DPI, look)
     made.begin_with(span)
     made.side = _side(np.column_stack([first.columns[name] for name in "xyz"]))
     return made
 
 
-def _dimension(snapshot: Snapshot) -> int:
-    # A dump holds zeros where the scene has no direction.
-    return 3 if snapshot.columns["z"].any() else 2 if snapshot.columns["y"].any() else 1
-
-
-def _coloured_by(snapshot: Snapshot, column: str | None) -> str:
-    return column or ("type" if _dimension(snapshot) > 1 else "x")
-
-
 def _all(files: Iterable[Path], column: str) -> tuple[np.ndarray, np.ndarray, Any]:
-    """Corners around all snapshots, and limits of the values of a column in them."""
-    from karamelo_py.styles.dumps.picture import grown
+    """Find corners around all snapshots, and limits of the values of a column in them."""
+    from karamelo_py.output.pictures import grown
 
     corners, ends = [], []
     for snapshot in (snapshot for file in files for snapshot in read(file)):
@@ -155,15 +151,8 @@ def _all(files: Iterable[Path], column: str) -> tuple[np.ndarray, np.ndarray, An
     return np.min(lo, axis=0), np.max(hi, axis=0), grown(None, np.array(ends)) if ends else None
 
 
-def _show(picture: Any, snapshot: Snapshot, column: str | None) -> None:
-    x = np.column_stack([snapshot.columns[name] for name in "xyz"])
-    values = snapshot.columns[column or ("type" if picture.domain.dimension > 1 else "x")]
-    time = "" if np.isnan(snapshot.time) else f", time {snapshot.time:.6g}"
-    picture.show(AtHand(x, values, picture.side), f"step {snapshot.step}{time}")
-
-
 def _side(x: np.ndarray) -> float:
-    """The distance of points from their nearest neighbours."""
+    """Measure the distance of points from their nearest neighbours."""
     if len(x) < 2:
         return 0.0
     chosen: Iterable[int] = np.linspace(0, len(x) - 1, min(SAMPLE, len(x))).astype(int)

@@ -4,8 +4,8 @@ from karamelo_py.language import registry, signature
 from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument
 from karamelo_py.language.unknown import MEANINGS
-from karamelo_py.scene.guests import check_fix
 from karamelo_py.scene.hub import Catalogue, Hub
+from karamelo_py.scene.plugins import check_fix
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import SEEDS
 from karamelo_py.script.other_programs import instead

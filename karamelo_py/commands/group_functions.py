@@ -71,7 +71,7 @@ def internal_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expressio
         before = _total(hub, "momentum_before", measuring.MomentumBefore, group, direction)
         after = _total(hub, "momentum_after", measuring.MomentumAfter, group, direction)
         return _component(hub, after.minus(before), direction)
-    force = _total(hub, "internal_force", measuring.InternalForce, group, direction)
+    force = _total(hub, "internal_force", measuring.ForceBeforeFixes, group, direction)
     return _component(hub, force, direction)
 
 
@@ -105,7 +105,7 @@ def external_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expressio
         force = _total(hub, "external_force", measuring.PointForce, group, direction)
         return _component(hub, force, direction)
     total = _total(hub, "force", measuring.TotalForce, group, direction)
-    inner = _total(hub, "internal_force", measuring.InternalForce, group, direction)
+    inner = _total(hub, "internal_force", measuring.ForceBeforeFixes, group, direction)
     return _component(hub, total.minus(inner), direction)
 
 

@@ -6,9 +6,9 @@ from karamelo_py.language import registry, signature
 from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.own_words import longer
 from karamelo_py.language.signature import Argument
-from karamelo_py.scene.guests import check_columns
 from karamelo_py.scene.hub import Catalogue, Hub
-from karamelo_py.scene.material import Material, Part
+from karamelo_py.scene.material import Material, MaterialPart
+from karamelo_py.scene.plugins import check_columns
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.parser import parse_text
 
@@ -107,6 +107,6 @@ def define(hub: Hub, catalogue: Catalogue, ID: str, style: str, arguments: Seque
     target = registry.called(kind, ID, style)
     catalogue.refuse(ID)
     made = signature.call(target, hub, list(arguments), f"{kind} {style}")
-    entry = (Material if kind == "material" else Part)(kind, style, made)
+    entry = (Material if kind == "material" else MaterialPart)(kind, style, made)
     check_columns(hub, f"{kind} {style}", entry.law)
     catalogue.add(ID, entry)

@@ -8,8 +8,8 @@ from typing import Any, Literal
 from karamelo_py.language import registry, signature
 from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument, Parameter
-from karamelo_py.scene.guests import check_part
 from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.plugins import check_part
 from karamelo_py.script.errors import ScriptError, meant
 
 

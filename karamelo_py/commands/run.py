@@ -4,7 +4,7 @@ from math import isnan
 from typing import Annotated, Literal
 
 from karamelo_py.language.signature import NonNegative, Positive
-from karamelo_py.run.runner import Runner
+from karamelo_py.run.runner import carry_out
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
@@ -91,7 +91,7 @@ def run(hub: Hub, steps: Annotated[int, NonNegative], *, on_trouble: OnTrouble =
     --------
     run_time, run_until, run_while
     """
-    Runner(hub, steps=steps, halve=on_trouble == "halve").run()
+    carry_out(hub, steps=steps, halve=on_trouble == "halve")
 
 
 def run_time(
@@ -114,7 +114,7 @@ def run_time(
     --------
     run, run_until, run_while
     """
-    Runner(hub, end_time=hub.update.time + time, halve=on_trouble == "halve").run()
+    carry_out(hub, end_time=hub.update.time + time, halve=on_trouble == "halve")
 
 
 def run_until(hub: Hub, condition: Expression, *, on_trouble: OnTrouble = "stop") -> None:
@@ -137,7 +137,7 @@ def run_until(hub: Hub, condition: Expression, *, on_trouble: OnTrouble = "stop"
     run, run_time, run_while
     """
     _refuse_constant("run_until", condition)
-    Runner(hub, condition=condition, until=True, halve=on_trouble == "halve").run()
+    carry_out(hub, condition=condition, until=True, halve=on_trouble == "halve")
 
 
 def run_while(hub: Hub, condition: Expression, *, on_trouble: OnTrouble = "stop") -> None:
@@ -159,7 +159,7 @@ def run_while(hub: Hub, condition: Expression, *, on_trouble: OnTrouble = "stop"
     run, run_time, run_until
     """
     _refuse_constant("run_while", condition)
-    Runner(hub, condition=condition, until=False, halve=on_trouble == "halve").run()
+    carry_out(hub, condition=condition, until=False, halve=on_trouble == "halve")
 
 
 def _refuse_constant(command: str, condition: Expression) -> None:

@@ -1,6 +1,7 @@
 """Functions that kernels call by their address, and do not contain."""
 
 import ctypes
+import inspect
 from collections.abc import Callable
 
 import numba
@@ -10,7 +11,7 @@ from numba.core.ccallback import CFunc
 from numba.extending import intrinsic
 
 from karamelo_py.compiler.cache import KernelCache
-from karamelo_py.compiler.compile import define
+from karamelo_py.compiler.compile import define, shared
 
 _uncompiled: list[Callable] = []
 _addresses: dict[Callable, int] = {}
@@ -29,12 +30,21 @@ def address_of(function: Callable, signature: numba.types.Type) -> int:
             _addresses[function] = len(_uncompiled) - 1
         else:
             options = {"error_model": "numpy"}
-            compiled = CFunc(function, (signature.args, signature.return_type), {}, options)
-            compiled._cache = KernelCache(function, options)
+            entry = _entry_of(function)
+            compiled = CFunc(entry, (signature.args, signature.return_type), {}, options)
+            compiled._cache = KernelCache(entry, options)
             compiled.compile()
             _keep_alive.append(compiled)
             _addresses[function] = compiled.address
     return _addresses[function]
+
+
+def _entry_of(function: Callable) -> Callable:
+    """A function of the same name that calls it, so that it is traced."""
+    names = ", ".join(inspect.signature(function).parameters)
+    entry = define(names, f"return inner({names})", inner=shared(function))
+    entry.__module__, entry.__qualname__ = function.__module__, function.__qualname__
+    return entry
 
 
 def address_of_python(function: Callable, signature: numba.types.Type) -> int:

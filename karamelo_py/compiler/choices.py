@@ -35,7 +35,7 @@ class Choice(NamedTuple):
 
 
 point_functions: dict[str, list[Callable]] = {}
-_serves: WeakKeyDictionary[Callable, list[Callable]] = WeakKeyDictionary()
+choosers: dict[Callable, list[Callable]] = {}  # of what kernels choose by type
 
 
 def name_of(thing: Any) -> str:
@@ -46,23 +46,6 @@ def name_of(thing: Any) -> str:
 def declare_point_function(dispatch: Callable) -> None:
     """Make a point function known by its name; it has ``find(classes)`` and ``tags``."""
     point_functions.setdefault(name_of(dispatch), []).append(dispatch)
-
-
-def serves(implementation: Callable, dispatch: Callable) -> None:
-    """Note that a point function may choose `implementation`."""
-    function = getattr(implementation, "py_func", implementation)
-    _serves.setdefault(function, []).append(dispatch)
-
-
-_asked: list[set[tuple[Callable, tuple]]] = []  # of the choosers at work, innermost last
-_answers: WeakKeyDictionary[Callable, set[tuple[Callable, tuple]]] = WeakKeyDictionary()
-
-
-def asks(dispatch: Callable, classes: tuple) -> None:
-    """Note that whether `dispatch` is defined for `classes` was asked, maybe by a chooser."""
-    if _asked:
-        _asked[-1].add((dispatch, classes))
-    note([(dispatch, classes)])
 
 
 # Of the functions that are made, innermost last: what was asked of point functions, and the code
@@ -84,23 +67,6 @@ def parts_noted() -> Iterator[set[tuple[Callable, tuple] | python.CodeType]]:
         yield _noted[-1]
     finally:
         _noted.pop()
-
-
-def noting(chooser: Callable) -> Callable:
-    """The same chooser of code by type; what it asks is noted with the function that it chooses."""
-
-    @functools.wraps(chooser)
-    def choose(*arguments: Any) -> Callable | None:
-        _asked.append(set())
-        try:
-            chosen = chooser(*arguments)
-        finally:
-            asked = _asked.pop()
-        if asked and chosen is not None:
-            _answers.setdefault(getattr(chosen, "py_func", chosen), set()).update(asked)
-        return chosen
-
-    return choose
 
 
 def tag_class(numba_type: Any) -> Any:
@@ -154,7 +120,7 @@ class _Watch(event.Listener):
         function = dispatcher.py_func
         run = {part for part in noted if isinstance(part, python.CodeType)}
         try:
-            choices = frozenset(_own_choices(function, arguments, noted - run))
+            choices = frozenset(map(_choice, noted - run))
         except Unknown:
             _unfit[compiled.library] = True
             return
@@ -168,12 +134,9 @@ class _Watch(event.Listener):
 event.register("numba:compile", _Watch())
 
 
-def _own_choices(function: Callable, arguments: tuple, noted: set) -> Iterable[Choice]:
-    for dispatch in _serves.get(function, ()):
-        classes = tuple(tag_class(a) for a in arguments[: dispatch.tags])
-        yield Choice(name_of(dispatch), tuple(class_name(c) for c in classes))
-    for dispatch, classes in (*_answers.get(function, ()), *noted):
-        yield Choice(name_of(dispatch), tuple(class_name(c) for c in classes))
+def _choice(part: tuple[Callable, tuple]) -> Choice:
+    dispatch, classes = part
+    return Choice(name_of(dispatch), tuple(class_name(c) for c in classes))
 
 
 def contents(library: Any) -> Contents:

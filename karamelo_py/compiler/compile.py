@@ -6,21 +6,16 @@ from typing import Any, NamedTuple
 
 import numba
 from numba import config
-from numba.extending import intrinsic, overload
+from numba.extending import intrinsic
 
 from karamelo_py.compiler.choices import (
     SPELLED,
-    asks,
     declare_point_function,
-    noting,
-    serves,
+    note,
     tag_class,
 )
-from karamelo_py.compiler.trace import forget, roll, run_for_kernel, traced
+from karamelo_py.compiler.trace import Undefined, forget, roll, run_for_kernel, traced
 from karamelo_py.compiler.values import OF_REALS, at_work
-
-# Point functions must melt into the loops that call them, however large they get.
-_INLINED = {"forceinline": True, "no_cfunc_wrapper": True}
 
 
 def by_type(function: Callable) -> Callable:
@@ -28,7 +23,6 @@ def by_type(function: Callable) -> Callable:
 
     def choose(chooser: Callable) -> Callable:
         traced(function, chooser)
-        overload(function, _INLINED, strict=False)(noting(chooser))
         return chooser
 
     return choose
@@ -67,15 +61,6 @@ def looping(function: Callable) -> Callable:
     """Mark a helper with a loop that is left to the compiler to unroll."""
     roll(function)
     return shared(function)
-
-
-class Undefined(TypeError):
-    """A point function is not defined for classes that need it."""
-
-    def __init__(self, function: str, classes: tuple):
-        names = ", ".join(getattr(c, "__name__", str(c)) for c in classes)
-        super().__init__(f"{function} is not defined for ({names})")
-        self.classes = classes
 
 
 def one_by_one(function: Callable, count: int) -> Callable:
@@ -151,7 +136,6 @@ def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Calla
                 table[classes] = implementation
                 memo.clear()
                 forget()
-                serves(implementation, dispatch)
                 return implementation
 
             return register
@@ -160,11 +144,9 @@ def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Calla
         dispatch.find = find
         declare_point_function(dispatch)
         dispatch.on = on
-        if fallback is not None:
-            serves(fallback, dispatch)
 
         def defined(*classes: type) -> bool:
-            asks(dispatch, classes)
+            note([(dispatch, classes)])
             return classes in table
 
         dispatch.defined = defined

@@ -23,6 +23,7 @@ from karamelo_py.compiler.choices import (
     _OPAQUE,
     Choice,
     Unknown,
+    choosers,
     class_name,
     found_by_name,
     is_opaque,
@@ -203,13 +204,8 @@ _NOWHERE = object()
 
 
 def _choosers(function: Callable) -> list:
-    """What decides on the code of an overloaded function, and how it is compiled."""
-    known = cpu_target.typing_context._lookup_global(function)
-    parts: list = []
-    for template in getattr(known, "templates", ()):
-        if hasattr(template, "_overload_func"):
-            parts += [inspect.unwrap(template._overload_func), repr(template._jit_options)]
-    return parts
+    """What decides on the code of a function that is chosen by type."""
+    return [inspect.unwrap(chooser) for chooser in choosers.get(function, ())]
 
 
 @functools.cache

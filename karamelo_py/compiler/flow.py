@@ -7,10 +7,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from karamelo_py.compiler.values import HeldValue, Untraceable, Value, counting, emit
+from karamelo_py.compiler.values import HeldValue, Untraceable, Value, counting, emit, words
 
 _PLAIN = (bool, int, float, str, np.generic, type(None))
 _DROPPED = object()
+IN_A_LOOP = " from turn to turn of a loop"
 
 
 class Way(NamedTuple):
@@ -73,7 +74,7 @@ def _is_same(a: Any, b: Any) -> bool:
 
 
 class Grows(Untraceable):
-    """A literal, carried from turn to turn of a loop, becomes a number of a type of its own."""
+    """A number, carried from turn to turn of a loop, becomes one of another type."""
 
     def __init__(self, place: int, kind: types.Type):
         self.place, self.kind = place, kind
@@ -182,6 +183,11 @@ class Flow:
         leaves.append(_Leaf(made, things))
         return made
 
+    def fail(self, kind: type, arguments: tuple) -> None:
+        """Let the kernel raise an exception."""
+        if self.builder:
+            self.lowering.context.call_conv.return_user_exc(self.builder, kind, arguments)
+
     # --- loops
 
     def loop(
@@ -220,7 +226,7 @@ class Flow:
         self.began = [leaf.on[0] for leaf in head.leaves]
         for name, before in head.names.items():
             if name not in names:
-                raise Untraceable
+                raise Untraceable(f"'{name}' is not known on all ways through a loop")
             self._again(before, names[name], values)
         self._enter(head.block, head.leaves, values)
 
@@ -234,18 +240,19 @@ class Flow:
                 and isinstance(getattr(kind, "scalar", kind), types.Float)
             ):
                 raise Grows(len(values), kind)
-            if kind != before._kind and (
-                self.lowering.typing.unify_types(kind, before._kind) != before._kind
-            ):
-                raise Untraceable  # of another type from then on
+            both = self.lowering.typing.unify_types(kind, before._kind)
+            if both != before._kind:
+                if isinstance(both, types.Integer):
+                    raise Grows(len(values), both)
+                raise Untraceable(f"{words(before._kind)} becomes {words(kind)}{IN_A_LOOP}")
             values.append(after)
         elif isinstance(before, tuple):
             if type(before) is not type(after) or len(before) != len(after):
-                raise Untraceable
+                raise Untraceable(f"a tuple becomes a tuple of another kind{IN_A_LOOP}")
             for one, other in zip(before, after, strict=True):
                 self._again(one, other, values)
         elif not _is_same(before, after):
-            raise Untraceable
+            raise Untraceable(f"{before!r} becomes something else{IN_A_LOOP}")
 
     def counted(self, bounds: tuple) -> Counter:
         """How a loop over a range counts."""
@@ -254,20 +261,26 @@ class Flow:
         typed = lowering.typing.resolve_value_type(range)
         kind = lowering.typing.resolve_function_type(typed, kinds, {}).return_type.dtype
         start, stop, step = {1: (0, *bounds, 1), 2: (*bounds, 1)}.get(len(bounds), bounds)
-        if not isinstance(step, int) or step == 0:
-            raise Untraceable
-        lowered = [builder and lowering.lowered(bound, kind) for bound in (start, stop)]
+        known = step if isinstance(step, int) else None
+        if known == 0:
+            raise ValueError("the step of a range is 0")
+        start, stop, step = (
+            Value(kind, builder and lowering.lowered(bound, kind)) for bound in (start, stop, step)
+        )
 
         def goes_on(counter: Value) -> Value:
+            if known is None:
+                up = emit(operator.and_, step > 0, counter < stop)
+                return emit(operator.or_, up, emit(operator.and_, step < 0, counter > stop))
             compare = builder and (builder.icmp_signed if kind.signed else builder.icmp_unsigned)
-            holds = builder and compare("<" if step > 0 else ">", counter._value, lowered[1])
-            return Value(types.boolean, holds)
+            sign = "<" if known > 0 else ">"
+            return Value(types.boolean, builder and compare(sign, counter._value, stop._value))
 
         def after(counter: Value) -> Value:
-            one = builder and counter._value.type(step)
-            return Value(kind, builder and builder.add(counter._value, one, flags=("nsw",)))
+            added = builder and builder.add(counter._value, step._value, flags=("nsw",))
+            return Value(kind, added)
 
-        return Counter(Value(kind, lowered[0]), goes_on, after)
+        return Counter(start, goes_on, after)
 
     # --- what Python does otherwise where a value is met
 

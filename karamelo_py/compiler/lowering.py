@@ -7,10 +7,11 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
+from numba.core.errors import TypingError
 from numba.core.typing.templates import fold_arguments
 
 from karamelo_py.compiler.held import _Held, item_of
-from karamelo_py.compiler.values import Emitted, HeldValue, Untraceable, Value, writing
+from karamelo_py.compiler.values import Emitted, HeldValue, Untraceable, Value, words, writing
 
 MOST_OPERATIONS = 10_000  # of one formula; beyond, a loop is better left to the compiler
 LONGEST = 1000  # range that is gone through
@@ -82,7 +83,7 @@ class Lowering:
         if isinstance(thing, Emitted):
             thing = thing.seen
         elif not isinstance(thing, float | np.generic | type | None):
-            raise Untraceable  # nothing that `lowered` knows
+            raise Untraceable(f"{thing!r} is nothing that a kernel knows")
         return self.typing.resolve_value_type(thing)
 
     def lowered(self, thing: Any, wanted: types.Type) -> Any:
@@ -114,14 +115,14 @@ class Lowering:
         """What `function` gives for these arguments."""
         self.operations += 1
         if self.operations > MOST_OPERATIONS:
-            raise Untraceable
+            raise Untraceable(f"it has more than {MOST_OPERATIONS} operations: take a loop")
         kinds = tuple(map(self.kind_of, arguments))
         if hasattr(function, "py_func"):
             kinds = tuple(map(types.unliteral, kinds))
         resolved = _resolved(self.typing, function, kinds)
         called = resolved.called
         if any(isinstance(kind, types.Omitted) for kind in called.args):
-            raise Untraceable
+            raise Untraceable(f"an argument of {name_of(function)} is left out")
         if self.builder is None:
             return self.wrapped(called.return_type, None)
         if called.pysig is not None:  # with *arguments in a tuple
@@ -141,11 +142,9 @@ class Lowering:
     def call_bound(self, method: Value, arguments: tuple) -> Any:
         """What a method of a number or an array gives."""
         if not isinstance(method._kind, types.BoundFunction):
-            raise Untraceable
+            raise Untraceable(f"{words(method._kind)} cannot be called")
         kinds = tuple(map(self.kind_of, arguments))
-        called = self.typing.resolve_function_type(method._kind, kinds, {})
-        if called is None:
-            raise Untraceable
+        called = _typed(self.typing, method._kind, kinds, str(method._kind))
         if self.builder is None:
             return self.wrapped(called.return_type, None)
         values = [self.lowered(a, k) for a, k in zip(arguments, called.args, strict=True)]
@@ -156,7 +155,7 @@ class Lowering:
         """An attribute of an array or a record."""
         kind = self.typing.resolve_getattr(thing._kind, name)
         if kind is None:
-            raise Untraceable
+            raise AttributeError(f"{words(thing._kind)} has no attribute '{name}'")
         if self.builder is None or isinstance(kind, types.BoundFunction):  # of what it is bound to
             return self.wrapped(kind, thing._value)
         read = self.context.get_getattr(thing._kind, name)
@@ -167,7 +166,7 @@ class Lowering:
         """Set an attribute of a record."""
         called = self.typing.resolve_setattr(thing._kind, name, self.kind_of(value))
         if called is None:
-            raise Untraceable
+            raise AttributeError(f"{words(thing._kind)} has no attribute '{name}' of that type")
         if self.builder is not None:
             write = self.context.get_setattr(name, called)
             write(self.builder, (thing._value, self.lowered(value, called.args[1])))
@@ -249,8 +248,23 @@ def _resolved(typing: Any, function: Callable, kinds: tuple) -> _Resolved:
     key = typing, function, numbers_of(kinds)
     if key not in resolutions:
         typed = typing.resolve_value_type(function)
-        called = typing.resolve_function_type(typed, kinds, {})
-        if called is None:
-            raise Untraceable
-        resolutions[key] = _Resolved(typed, called)
+        resolutions[key] = _Resolved(typed, _typed(typing, typed, kinds, name_of(function)))
     return resolutions[key]
+
+
+def _typed(typing: Any, typed: types.Type, kinds: tuple, name: str) -> Any:
+    """The signature of a function for arguments of these types."""
+    try:
+        called = typing.resolve_function_type(typed, kinds, {})
+    except TypingError as error:
+        if "raised a specific error" in str(error):
+            raise
+        called = None
+    if called is None:
+        raise Untraceable(f"{name} is not defined for ({', '.join(map(words, kinds))})")
+    return called
+
+
+def name_of(function: Callable) -> str:
+    """What a text calls a function."""
+    return getattr(function, "__name__", str(function))

@@ -30,9 +30,11 @@ def _names_in(code: python.CodeType) -> set[str]:
 
 
 def refuse_methods(codes: Iterable[python.CodeType], classes: set[type]) -> None:
-    """Methods of tuples would run as they are, and nothing would follow them."""
+    """Refuse methods of tuples: they would run as they are, and nothing would follow them."""
     functions = frozenset().union(*map(_functions_of, classes))
-    if any(name.startswith("__") for name in functions):
-        raise Untraceable
-    if functions and not functions.isdisjoint(set().union(*map(_names_in, codes))):
-        raise Untraceable
+    named = functions & set().union(*map(_names_in, codes))
+    for name in sorted(name for name in functions if name.startswith("__") or name in named):
+        raise Untraceable(
+            f"'{name}' is a method of a class of tuples, which kernels cannot call: "
+            "write a function, or mark the class with `algebra`"
+        )

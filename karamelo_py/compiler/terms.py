@@ -1,12 +1,13 @@
 """Expressions of functions that are walked through (`karamelo_py.compiler.walk`)."""
 
 import ast
+import functools
 import operator
 from collections.abc import Callable
 from typing import Any
 
 from karamelo_py.compiler.flow import Flow, is_value
-from karamelo_py.compiler.texts import NotKnown
+from karamelo_py.compiler.values import Untraceable, emit
 
 BINARY = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul,
@@ -46,8 +47,9 @@ class Terms:
         return getattr(self, type(node).__name__, self.unknown)(node)
 
     def unknown(self, node: ast.AST) -> None:
-        """Nothing that is gone through."""
-        raise NotKnown(type(node).__name__)
+        """Refuse what kernels do not know."""
+        kind = type(node).__name__
+        raise Untraceable(f"kernels know no {_WORDS.get(kind, kind)}")
 
     def name(self, name: str) -> Any:
         """What a name stands for."""
@@ -56,7 +58,7 @@ class Terms:
         if name in self.free:
             return self.free[name]
         if name in self.function.__code__.co_varnames:
-            raise NotKnown(name)  # on one of the ways here
+            raise Untraceable(f"'{name}' is not of one kind on all ways to here")
         return self.function.__globals__[name]
 
     def Name(self, node: ast.Name) -> Any:
@@ -90,6 +92,18 @@ class Terms:
     def List(self, node: ast.List) -> list:
         return self.items(node.elts)
 
+    def Set(self, node: ast.Set) -> set:
+        return set(self.items(node.elts))
+
+    def Dict(self, node: ast.Dict) -> dict:
+        if None in node.keys:
+            self.unknown(node)
+        return dict(zip(map(self.do, node.keys), map(self.do, node.values), strict=True))
+
+    def NamedExpr(self, node: ast.NamedExpr) -> Any:
+        self.names[node.target.id] = value = self.do(node.value)
+        return value
+
     def BinOp(self, node: ast.BinOp) -> Any:
         return BINARY[type(node.op)](self.do(node.left), self.do(node.right))
 
@@ -116,10 +130,17 @@ class Terms:
         if isinstance(op, ast.Is | ast.IsNot):
             return (a is b) == isinstance(op, ast.Is)
         if isinstance(op, ast.In | ast.NotIn):
-            if is_value(a):
-                raise NotKnown("in")
-            return (a in b) == isinstance(op, ast.In)
+            return (
+                self.among(a, b) if isinstance(op, ast.In) else self.flow.negate(self.among(a, b))
+            )
         return BINARY[type(op)](a, b)
+
+    def among(self, a: Any, things: Any) -> Any:
+        """Whether `a` is one of some things."""
+        if is_value(things):
+            raise Untraceable("kernels do not look for a number in an array")
+        same = [operator.eq(a, b) for b in things] if is_value(a) else [a in things]
+        return functools.reduce(lambda one, other: emit(operator.or_, one, other), same or [False])
 
     def BoolOp(self, node: ast.BoolOp) -> Any:
         return self.chain(node.values, isinstance(node.op, ast.And))
@@ -146,7 +167,7 @@ class Terms:
         outer = self.names.get("?", _NOTHING)
         self.branch(condition, of(then), of(otherwise))
         if "?" not in self.names:
-            raise NotKnown("one of two kinds")
+            raise Untraceable("an expression gives things of two kinds")
         value = self.names.pop("?")
         if outer is not _NOTHING:
             self.names["?"] = outer
@@ -161,7 +182,7 @@ class Terms:
     def Call(self, node: ast.Call) -> Any:
         function = self.do(node.func)
         if isinstance(getattr(function, "__self__", None), CHANGING):
-            raise NotKnown("on one of several ways, a list would change on all")
+            raise Untraceable(ON_ALL_WAYS)
         arguments = self.items(node.args)
         keywords = {k.arg: self.do(k.value) for k in node.keywords}
         return self.flow.call(function, arguments, keywords)
@@ -201,4 +222,11 @@ class Terms:
 
 
 CHANGING = list | dict | set
+ON_ALL_WAYS = "on one of several ways, a list would change on all"
+_WORDS = {
+    "JoinedStr": "text with numbers in it", "Try": "`try`", "With": "`with`", "Delete": "`del`",
+    "Import": "`import` within a function", "ImportFrom": "`import` within a function",
+    "Global": "`global`", "Nonlocal": "`nonlocal`", "Match": "`match`", "ClassDef": "`class`",
+    "Raise": "`raise` of this kind", "FunctionDef": "function within of this kind",
+}  # fmt: skip
 _NOTHING = object()

@@ -8,12 +8,7 @@ import time
 import types as python
 from collections.abc import Callable, Iterator
 
-
-class NotKnown(Exception):
-    """There is no text of a function, or something in it that is not gone through."""
-
-
-# --- text -----------------------------------------------------------------------------------------
+from karamelo_py.compiler.values import Untraceable
 
 _LONGEST_END = 40  # lines of closing brackets, at most, behind the last one with code
 
@@ -32,8 +27,8 @@ def _lines(function: Callable) -> Iterator[str]:
         return
     code = function.__code__
     lines = linecache.getlines(code.co_filename)
-    if not _is_read(code.co_filename):
-        return
+    if not _is_read(code.co_filename) and not _is_in("".join(lines), code):
+        raise Untraceable("its file has changed since Python read it: start anew")
     last = _last_line(code)
     for end in range(last, min(last + _LONGEST_END, len(lines)) + 1):
         yield textwrap.dedent("".join(lines[code.co_firstlineno - 1 : end]))
@@ -43,12 +38,20 @@ _began = time.time()
 
 
 def _is_read(file: str) -> bool:
-    """Whether a file is as it was when Python read it."""
+    """Whether a file is as it was when Python read it; what was typed in lies in no file."""
     try:
         about = os.stat(file)
     except OSError:
-        return False
+        return True
     return max(about.st_ctime, about.st_mtime) < _began
+
+
+def _is_in(text: str, code: python.CodeType) -> bool:
+    """Whether a text has a function with this code."""
+    ahead: list = [compile(text, code.co_filename, "exec", dont_inherit=True)]
+    while ahead and ahead[-1] != code:
+        ahead += [c for c in ahead.pop().co_consts if isinstance(c, python.CodeType)]
+    return bool(ahead)
 
 
 def text_of(function: Callable) -> ast.FunctionDef:
@@ -61,4 +64,4 @@ def text_of(function: Callable) -> ast.FunctionDef:
         if isinstance(definition, ast.FunctionDef):
             return ast.increment_lineno(definition, function.__code__.co_firstlineno - 1)
         break
-    raise NotKnown(f"the text of {function.__qualname__}")
+    raise Untraceable("its text is not known: write it into a file")

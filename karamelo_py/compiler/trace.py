@@ -6,64 +6,108 @@ first compilation. Where a kernel calls a function marked for it, it is run by P
 meets one is lowered at once, into the function that calls. Tuples are Python's own, so that what
 only takes them apart costs nothing. The bits are the same. A function that asks what only a run can
 know (`if x > 0`) is walked through instead, statement by statement
-(:mod:`~karamelo_py.compiler.walk`). What cannot be written so, Numba compiles as a whole.
+(:mod:`~karamelo_py.compiler.walk`). What cannot be written so is refused: :class:`CannotCompile`.
 
 Functions run here see their globals through :class:`~karamelo_py.compiler.values.Globals`: what
 other code chooses by type is lowered for the types at hand, Python's functions are run in the same
 way. Only what the key of a kernel on disk follows may be run
 (:mod:`karamelo_py.compiler.fingerprint`): functions that come by another way than a global name or
-a closure, as methods do, are Numba's to compile, or to refuse.
+a closure, as methods do, are refused.
 """
 
 import dis
 import functools
 import inspect
 import itertools
-import os
+import re
 import types as python
-from collections.abc import Callable, Hashable, Iterable
+from collections.abc import Callable, Hashable, Iterable, Iterator
 from traceback import walk_tb
 from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
-from numba.core.errors import TypingError
+from numba.core.errors import NumbaError, TypingError
 from numba.core.imputils import impl_ret_borrowed, lower_builtin
 from numba.core.registry import cpu_target
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 
-from karamelo_py.compiler.choices import note, parts_noted, tag_class
+from karamelo_py.compiler.choices import choosers, note, parts_noted, tag_class
 from karamelo_py.compiler.flow import Flow
-from karamelo_py.compiler.lowering import Lowering, numbers_of, resolutions
+from karamelo_py.compiler.lowering import Lowering, name_of, numbers_of, resolutions
 from karamelo_py.compiler.methods import refuse_methods
 from karamelo_py.compiler.values import (
     OF_REALS,
     OF_WHOLE,
-    Asks,
+    DataDependentBranch,
     Emitted,
     Globals,
     HeldValue,
     Untraceable,
     Value,
     alike,
-    asking,
     at_work,
+    branching,
     counting,
     derivatives,
     emit,
     has_derivatives,
     is_literal,
     now,
+    words,
     writing,
 )
-from karamelo_py.compiler.walk import Walked
+from karamelo_py.compiler.walk import Walked, place_in_text
+
+# --- what cannot be compiled ------------------------------------------------------------------
+
+
+class CannotCompile(TypeError):
+    """Tell why a function cannot become code of a kernel; what was wrong is its cause."""
+
+    def __init__(self, reason: str, function: Callable):
+        super().__init__(f"{reason} (in {name_of(function)})")
+        code = getattr(function, "__code__", None)
+        self.begins = (code.co_filename, code.co_firstlineno) if code else ("", 0)
+
+
+class Undefined(TypeError):
+    """A point function is not defined for classes that need it."""
+
+    def __init__(self, function: str, classes: tuple):
+        names = ", ".join(getattr(c, "__name__", str(c)) for c in classes)
+        super().__init__(f"{function} is not defined for ({names})")
+        self.classes = classes
+
+
+def _reason(error: BaseException) -> str:
+    """What is wrong, in one line; of Numba, the cause that it gives."""
+    if isinstance(error, Untraceable):
+        return str(error)
+    if not isinstance(error, NumbaError):
+        return ": ".join(filter(None, (type(error).__name__, str(error))))
+    text = re.sub(r"\x1b\[[\d;]*m", "", str(error))
+    inner = text.rpartition("raised a specific error:")[2] or text
+    lines = (line.strip() for line in inner.splitlines())
+    causes = (line for line in lines if line and not re.match(r"(\w+: )?Failed in ", line))
+    return next(causes, type(error).__name__)
+
+
+def places_of(error: BaseException) -> Iterator[tuple[str, int]]:
+    """Files and lines that took part in an exception, the innermost first."""
+    if isinstance(error, CannotCompile):
+        if error.__cause__ is not None:
+            yield from places_of(error.__cause__)
+        yield error.begins
+    for frame, line in reversed([*walk_tb(error.__traceback__)]):
+        yield place_in_text(frame) or (frame.f_code.co_filename, line)
+
 
 # --- functions as they are run here -----------------------------------------------------------
 
 
 _modules: dict[int, Globals] = {}
 _copies: dict[Any, Any] = {}
-_choosers: dict[Callable, list[Callable]] = {}
 
 
 class _Module:
@@ -104,7 +148,7 @@ class _Dispatched(Emitted):
 
 def _class_of(thing: Any) -> type:
     if isinstance(thing, Value):
-        raise Untraceable
+        raise Untraceable("a kernel cannot ask for the type of a number: ask for that of a tag")
     kind = getattr(thing, "_kind", None)
     return type(thing) if kind is None else getattr(kind, "instance_class", tuple)
 
@@ -114,13 +158,13 @@ def _is_instance(thing: Any, kind: Any) -> bool:
     if not isinstance(thing, Value):
         return issubclass(_class_of(thing), kinds)
     if not all(issubclass(k, tuple) for k in kinds):
-        raise Untraceable
+        raise Untraceable("a kernel cannot ask for the type of a number: ask for that of a tag")
     return False
 
 
 def _attribute(thing: Any, *name: Any) -> Any:
     if isinstance(thing, _Module):
-        raise Untraceable
+        raise Untraceable("what is taken from a module has to be named: module.name")
     return getattr(thing, *name)
 
 
@@ -166,7 +210,7 @@ def _seen(thing: Any) -> Any:
     if isinstance(thing, np.ndarray):
         return now().constant(thing)
     if not isinstance(thing, Hashable):
-        raise Untraceable
+        raise Untraceable(f"a {type(thing).__name__} is nothing that kernels know")
     if thing not in _copies:
         _copies[thing] = _copy(thing)
     made = _copies[thing]
@@ -185,7 +229,7 @@ def _copy(thing: Any) -> Any:
         return _INSTEAD[thing]
     if thing in _SAFE:
         return thing
-    if thing in _choosers:
+    if thing in choosers:
         return _Dispatched(thing)
     number = isinstance(thing, type) and issubclass(thing, np.generic)
     if number or thing in _OF_NUMBERS or isinstance(thing, types.Number):
@@ -196,7 +240,7 @@ def _copy(thing: Any) -> Any:
         return Emitted(thing)
     if isinstance(thing, python.FunctionType):
         return _copied(thing)
-    raise Untraceable
+    raise Untraceable(f"kernels do not know {getattr(thing, '__name__', repr(thing))}")
 
 
 def _numba_knows(thing: Any) -> bool:
@@ -206,17 +250,20 @@ def _numba_knows(thing: Any) -> bool:
 
 
 @functools.cache
-def _is_fit(code: python.CodeType) -> bool:
-    """Not where a function catches what is raised here, or imports what nothing follows."""
-    catches = code.co_exceptiontable and not code.co_flags & inspect.CO_GENERATOR
-    return not catches and all(i.opname != "IMPORT_NAME" for i in dis.get_instructions(code))
+def _fault_of(code: python.CodeType) -> str:
+    """Why a function is not run: where it catches what is raised here, or nothing follows it."""
+    if code.co_exceptiontable and not code.co_flags & inspect.CO_GENERATOR:
+        return "kernels know no `try` and no `with`"
+    if any(i.opname == "IMPORT_NAME" for i in dis.get_instructions(code)):
+        return "kernels know no `import` within a function: import at the top of the file"
+    return ""
 
 
 def _copied(function: Callable) -> Callable:
     """The same function with other globals; walked through where it asks what only a run knows."""
     code = function.__code__
-    if not _is_fit(code):
-        raise Untraceable
+    if _fault_of(code):
+        raise Untraceable(_fault_of(code))
     true = function.__globals__
     seen = _modules.setdefault(id(true), Globals(true, _seen))
     cells = tuple(python.CellType(_seen(c.cell_contents)) for c in function.__closure__ or ())
@@ -224,7 +271,7 @@ def _copied(function: Callable) -> Callable:
     made = python.FunctionType(code, seen, function.__name__, defaults, cells)
     made.__kwdefaults__ = {k: _seen(v) for k, v in (function.__kwdefaults__ or {}).items()}
     rolled = code in _rolled
-    if not rolled and code not in asking:
+    if not rolled and code not in branching:
         return made
     vars(made).update(vars(function))
     return Walked(made, lambda: Flow(now()), rolled)
@@ -251,7 +298,7 @@ class _Formula(NamedTuple):
 _formulas: dict[tuple, _Formula | None] = {}
 MOST_FORMULAS = 4000  # that are kept: some 12 kB each, 800 for a scene with contact
 _numbers = itertools.count()
-_asking: dict[python.CodeType, int] = {}  # of functions left to Numba: the line that is why
+_begun: set[tuple] = set()  # of what is written now
 _own: set[Callable] = set()  # functions that are not written into what calls them
 _rolled: set[python.CodeType] = set()  # of functions with loops that are left to the compiler
 
@@ -269,11 +316,13 @@ def _is_plain(thing: Any) -> bool:
 
 def _written(dispatch: Callable, typing: Any, kinds: tuple) -> _Formula | None:
     """What :func:`_formula` gives, found by running it."""
-    chosen = None
+    chosen = dispatch
     try:
         lowering = Lowering(_seen, typing)
         with writing(lowering), parts_noted() as parts:
             chosen = _chosen(dispatch, kinds)
+            if chosen is None:
+                return None
             run = _copied(chosen)
             note([run.__code__])
             found = run(*(lowering.wrapped(kind, None) for kind in kinds))
@@ -284,50 +333,32 @@ def _written(dispatch: Callable, typing: Any, kinds: tuple) -> _Formula | None:
             parts.add((dispatch, tuple(map(tag_class, kinds[: dispatch.tags]))))
         name = f"{dispatch.__qualname__}.{next(_numbers)}"
         return _Formula(run, result, frozenset(parts), _is_plain(found), name)
-    except Asks:
+    except (DataDependentBranch, CannotCompile, Undefined):
         raise
-    except (Exception, Untraceable) as why:  # Numba tells what is wrong, if it is
-        _note_why(chosen, why)
-        return None
-
-
-def _note_why(chosen: Callable | None, why: BaseException) -> None:
-    """Keep the line of a function for which it is left to Numba."""
-    code = getattr(chosen, "__code__", None)
-    lines = [k for frame, k in walk_tb(why.__traceback__) if frame.f_code is code]
-    if getattr(why, "asking", (None,))[0] is code and code is not None:
-        lines = [why.asking[1]]
-    if lines:
-        _asking[code] = lines[-1]
+    except (Exception, Untraceable) as why:
+        raise CannotCompile(_reason(why), chosen or dispatch) from why
 
 
 def _formula(dispatch: Callable, typing: Any, kinds: tuple) -> _Formula | None:
-    """What to run for arguments of these types; None if it is Numba's to compile."""
+    """What to run for arguments of these types; None if Numba has it."""
     key = typing, dispatch, numbers_of(kinds)
     if len(_formulas) > MOST_FORMULAS and not at_work():
         forget()
     while key not in _formulas:
-        _formulas[key] = None  # of one that calls itself
+        if key in _begun:
+            raise CannotCompile("it calls itself", dispatch)
+        _begun.add(key)
         try:
             _formulas[key] = _written(dispatch, typing, kinds)
-        except Asks:
+        except DataDependentBranch:
             # Once more, and through the text of the function that asks.
             _copies.clear()
-            del _formulas[key]
+        finally:
+            _begun.remove(key)
     found = _formulas[key]
     if found is not None:
         note(found.parts)
     return found
-
-
-def line_that_asks(file: str, line: int) -> int | None:
-    """The line for which the function at a place was not run, but left to Numba."""
-    file = os.path.realpath(file)
-    for code, reason in _asking.items():
-        lines = (k for _, _, k in code.co_lines())
-        if line in lines and os.path.realpath(code.co_filename) == file:
-            return reason
-    return None
 
 
 def forget() -> None:
@@ -336,12 +367,18 @@ def forget() -> None:
     resolutions.clear()
 
 
-def _chosen(dispatch: Callable, kinds: tuple) -> Callable:
-    for chooser in _choosers[dispatch]:
+def _chosen(dispatch: Callable, kinds: tuple) -> Callable | None:
+    for chooser in choosers[dispatch]:
         found = chooser(*kinds)
         if found is not None:
             return found
-    raise Untraceable
+    if hasattr(dispatch, "tags"):
+        raise Undefined(dispatch.__name__, tuple(map(_class_in_words, kinds[: dispatch.tags])))
+    return None
+
+
+def _class_in_words(kind: types.Type) -> Any:
+    return tag_class(kind) or words(kind)
 
 
 def alone(dispatch: Callable) -> None:
@@ -355,11 +392,11 @@ def roll(function: Callable) -> None:
 
 
 def traced(dispatch: Callable, chooser: Callable) -> None:
-    """Let kernels run what `chooser` makes of `dispatch` for types; None if it must not be run."""
-    if dispatch in _choosers:
-        _choosers[dispatch].append(chooser)
+    """Let kernels run what `chooser` makes of `dispatch` for types; None if it has nothing."""
+    if dispatch in choosers:
+        choosers[dispatch].append(chooser)
         return
-    _choosers[dispatch] = [chooser]
+    choosers[dispatch] = [chooser]
 
     class Template(AbstractTemplate):
         key = dispatch
@@ -370,7 +407,7 @@ def traced(dispatch: Callable, chooser: Callable) -> None:
             return found and signature(found.result, *kinds)
 
         def get_impl_key(self, called: Any) -> Any:
-            return _choosers[dispatch][0]
+            return choosers[dispatch][0]
 
     infer_global(dispatch, types.Function(Template))
 

@@ -20,11 +20,33 @@ from karamelo_py.compiler.held import _Held
 
 
 class Untraceable(BaseException):
-    """A function asks for what only a run can know; no function may catch that."""
+    """Say why a function cannot become code of a kernel; no function may catch that."""
 
 
-class Asks(Untraceable):
+class DataDependentBranch(Untraceable):
     """The same, of a function that may be walked through (:mod:`karamelo_py.compiler.walk`)."""
+
+
+def words(kind: types.Type) -> str:
+    """Name a type as a user would."""
+    if isinstance(kind, types.BaseTuple):
+        return getattr(getattr(kind, "instance_class", None), "__name__", "a tuple")
+    if hasattr(kind, "width"):
+        return f"numbers in lanes ({kind})"
+    for one, name in _WORDS:
+        if isinstance(kind, one):
+            return name
+    return str(kind)
+
+
+_WORDS = (
+    (types.Boolean | types.BooleanLiteral, "a truth value"),
+    (types.Integer, "a whole number"),
+    (types.Float, "a number"),
+    (types.Array, "an array"),
+    (types.NoneType, "None"),
+    (types.UnicodeType | types.StringLiteral, "a text"),
+)
 
 
 class Globals(dict):
@@ -35,23 +57,29 @@ class Globals(dict):
         self.true, self.seen = true, seen
 
     def __getitem__(self, name: str) -> Any:
+        if name not in self.true and not hasattr(builtins, name):
+            raise NameError(f"name '{name}' is not defined")
         return self.seen(self.true[name] if name in self.true else getattr(builtins, name))
 
 
-asking: set = set()  # code of functions that ask
+branching: set = set()  # code of functions that ask for what only a run knows
 
 
-def _ask(frame: python.FrameType) -> None:
+def _branch(frame: python.FrameType, what: str) -> None:
     code = frame.f_code
     if type(frame.f_globals) is not Globals or code.co_name.startswith("<"):
-        raise Untraceable
-    asking.add(code)
-    raise Asks
+        raise Untraceable(what)
+    branching.add(code)
+    raise DataDependentBranch(what)
 
 
-def ask(*arguments: Any) -> Any:
-    """The function at work asks for what only a run knows."""
-    _ask(sys._getframe(1))
+def _only_at_run_time(use: str) -> Callable:
+    """Make the method of values that stands for a `use` that needs to know what they are."""
+
+    def ask(*arguments: Any) -> Any:
+        _branch(sys._getframe(1), f"{use} is only known when the kernel runs")
+
+    return ask
 
 
 # --- where code goes to -------------------------------------------------------------------------
@@ -148,8 +176,11 @@ class Value:
     def __setitem__(self, place: Any, value: Any) -> None:
         emit(operator.setitem, self, _place(place), value)
 
-    __bool__ = __int__ = __index__ = __float__ = __iter__ = __len__ = __contains__ = ask
-    __hash__ = __str__ = __repr__ = __format__ = ask
+    __bool__ = _only_at_run_time("a condition in an expression within an expression")
+    __int__ = __index__ = __float__ = _only_at_run_time("a number that has to be written")
+    __iter__ = __len__ = __contains__ = _only_at_run_time("what is gone through or counted")
+    __hash__ = _only_at_run_time("a key")
+    __str__ = __repr__ = __format__ = _only_at_run_time("a number in a text")
 
 
 def _place(place: Any) -> Any:
@@ -179,7 +210,7 @@ def _operated(operation: Callable, a: Any, b: Any) -> Any:
 def _in_place(operation: Callable) -> Callable:
     def apply(a: Value, b: Any) -> Any:
         if isinstance(a._kind, types.Array):  # it would change
-            raise Untraceable
+            raise Untraceable("an array as a whole is changed: change its items")
         return _operated(operation, a, b)
 
     return apply
@@ -217,7 +248,7 @@ class HeldValue:
 
     def __getitem__(self, k: int) -> Any:
         if isinstance(k, Value):
-            raise Untraceable
+            raise Untraceable("the number of an item of a tuple is only known when the kernel runs")
         if isinstance(k, slice):
             return tuple(self[i] for i in range(*k.indices(len(self))))
         return now().item(self, range(len(self))[k])
@@ -231,10 +262,11 @@ class HeldValue:
             return self[fields.index(name)]
         found = getattr(self._kind.instance_class, name)
         if callable(found) or isinstance(found, property):
-            raise Untraceable
+            raise Untraceable(f"'{name}' is a method of a tuple with arrays")
         return found
 
-    __eq__ = __ne__ = __hash__ = __contains__ = __add__ = __radd__ = ask
+    __eq__ = __ne__ = __hash__ = __contains__ = _only_at_run_time("a tuple with arrays")
+    __add__ = __radd__ = __eq__
 
 
 derivatives: dict = {}  # of functions, for numbers with derivatives (`karamelo_py.points.dual`)
@@ -285,10 +317,10 @@ def counting(*bounds: int) -> range:
     """`range`, in functions that are run."""
     frame = sys._getframe(1)
     if any(isinstance(bound, Value) for bound in bounds):
-        _ask(frame)
+        _branch(frame, "the end of a range")
     made = range(*bounds)
     if len(made) > LONGEST:
-        raise Untraceable
+        raise Untraceable(f"a range of more than {LONGEST} numbers in a comprehension: take a loop")
     if len(made) > LONG and type(frame.f_globals) is Globals and frame.f_code.co_name[0] != "<":
-        _ask(frame)
+        _branch(frame, "a long range")
     return made

@@ -7,17 +7,20 @@ that was taken. A loop over a range that is known is written out, any other one 
 """
 
 import ast
+import builtins
+import copy
 import functools
 import inspect
+import types as python
 from collections.abc import Callable, Iterable
 from typing import Any
 
 from numba import types
 
 from karamelo_py.compiler.flow import Counter, Flow, Grows, Range, Way, is_value
-from karamelo_py.compiler.terms import BINARY, CHANGING, Terms
-from karamelo_py.compiler.texts import NotKnown, text_of
-from karamelo_py.compiler.values import LONG, Asks, Untraceable
+from karamelo_py.compiler.terms import BINARY, CHANGING, ON_ALL_WAYS, Terms
+from karamelo_py.compiler.texts import text_of
+from karamelo_py.compiler.values import LONG, DataDependentBranch, Untraceable
 
 
 @functools.cache
@@ -26,6 +29,14 @@ def _stored(node: ast.AST) -> frozenset[str]:
     return frozenset(
         n.id for n in ast.walk(node) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)
     )
+
+
+def place_in_text(frame: python.FrameType) -> tuple[str, int] | None:
+    """The file and line of the statement that a frame is about, if it is about one."""
+    if frame.f_code is not _Walk.block.__code__ or "statement" not in frame.f_locals:
+        return None
+    walk, statement = frame.f_locals["self"], frame.f_locals["statement"]
+    return walk.walked.__code__.co_filename, statement.lineno
 
 
 # --- the walk -------------------------------------------------------------------------------------
@@ -88,7 +99,7 @@ class _Walk(Terms):
             self.returns.append(self.way())
         self.meet(self.returns)
         if "" not in self.names:
-            raise NotKnown("what is returned")
+            raise Untraceable("what it returns is not of one kind on all ways")
         return self.names[""]
 
     # --- ways
@@ -128,12 +139,7 @@ class _Walk(Terms):
         for statement in statements:
             if not self.goes:
                 return
-            try:
-                self.do(statement)
-            except BaseException as why:
-                if not hasattr(why, "asking"):
-                    why.asking = self.walked.__code__, statement.lineno
-                raise
+            self.do(statement)
 
     def Pass(self, node: ast.Pass) -> None:
         pass
@@ -156,6 +162,42 @@ class _Walk(Terms):
         for target in node.targets:
             self.give(target, value)
 
+    def AnnAssign(self, node: ast.AnnAssign) -> None:
+        if node.value:
+            self.give(node.target, self.do(node.value))
+
+    def FunctionDef(self, node: ast.FunctionDef) -> None:
+        names = [a.arg for a in node.args.args]
+        every = [a for a in ast.walk(node.args) if isinstance(a, ast.arg)]
+        if node.decorator_list or len(names) < len(every):
+            self.unknown(node)
+        defaults = dict(zip(names[::-1], map(self.do, node.args.defaults[::-1]), strict=False))
+
+        def call(*arguments: Any, **keywords: Any) -> Any:
+            inner = copy.copy(self.walked)
+            inner.definition, inner.free = node, self.free | self.names
+            given = defaults | dict(zip(names, arguments, strict=False)) | keywords
+            if len(arguments) > len(names) or given.keys() != set(names):
+                raise TypeError(f"{node.name} takes {len(names)} arguments")
+            return _Walk(inner, self.flow, given).result()
+
+        self.names[node.name] = call
+
+    def Raise(self, node: ast.Raise) -> None:
+        what, arguments = node.exc, []
+        if isinstance(what, ast.Call):
+            what, arguments = what.func, self.items(what.args)
+        kind = getattr(builtins, what.id, None) if isinstance(what, ast.Name) else None
+        if not isinstance(kind, type) or any(map(is_value, arguments)):
+            self.unknown(node)
+        self.flow.fail(kind, tuple(arguments))
+        self.goes = False
+
+    def Assert(self, node: ast.Assert) -> None:
+        text = [node.msg] if node.msg else []
+        failed = ast.Raise(ast.Call(ast.Name(AssertionError.__name__), text, []))
+        self.If(ast.If(node.test, [], [ast.copy_location(failed, node)]))
+
     def give(self, target: ast.expr, value: Any) -> None:
         """Let a target stand for a value."""
         if isinstance(target, ast.Name):
@@ -173,7 +215,7 @@ class _Walk(Terms):
         elif isinstance(target, ast.Subscript):
             array = self.do(target.value)
             if isinstance(array, CHANGING):
-                raise NotKnown("on one of several ways, a list would change on all")
+                raise Untraceable(ON_ALL_WAYS)
             array[self.do(target.slice)] = value
         else:
             self.unknown(target)
@@ -189,12 +231,12 @@ class _Walk(Terms):
             array = self.do(target.value)
             place = self.do(target.slice)
             if isinstance(array, CHANGING):
-                raise NotKnown("on one of several ways, a list would change on all")
+                raise Untraceable(ON_ALL_WAYS)
             array[place] = operation(array[place], self.do(node.value))
         else:
             before = self.name(target.id)
             if is_value(before) and isinstance(before._kind, types.Array):  # it would change
-                raise NotKnown(target.id)
+                raise Untraceable("an array as a whole is changed: change its items")
             self.names[target.id] = operation(before, self.do(node.value))
 
     def If(self, node: ast.If) -> None:
@@ -205,8 +247,6 @@ class _Walk(Terms):
             self.block(node.body if condition else node.orelse)
 
     def For(self, node: ast.For) -> None:
-        if node.orelse:
-            self.unknown(node)
         through = self.do(node.iter)
         if isinstance(through, range) and self.is_rolled(node, through):
             through = Range((through.start, through.stop, through.step))
@@ -229,7 +269,7 @@ class _Walk(Terms):
             bounds = through.start, through.stop, through.step
             try:
                 self.roll(node, self.flow.counted(bounds), lambda k: k)
-            except Asks:
+            except DataDependentBranch:
                 raise
             except (Exception, Untraceable):
                 self.walked.unrolled.add(node)
@@ -248,12 +288,11 @@ class _Walk(Terms):
             self.continues = []
             if not self.goes:
                 break
-        self.meet([*self.breaks, *([self.way()] if self.goes else [])])
-        self.breaks, self.continues = outer
+        breaks, (self.breaks, self.continues) = self.breaks, outer
+        self.block(node.orelse)
+        self.meet([*breaks, *([self.way()] if self.goes else [])])
 
     def While(self, node: ast.While) -> None:
-        if node.orelse:
-            self.unknown(node)
         self.roll(node, None)
 
     def roll(
@@ -301,7 +340,7 @@ class _Walk(Terms):
             self.names = dict(self.names)
             self.flow.start(inside)
         elif not condition:
-            raise NotKnown("a loop that never begins")
+            raise Untraceable("a loop that never begins")
         if counter:
             self.give(node.target, item(count))
         self.block(node.body)
@@ -310,9 +349,12 @@ class _Walk(Terms):
             if counter:
                 self.names[_COUNT] = counter.after(count)
             self.flow.close(head, self.names)
-        ways += self.breaks
-        self.breaks, self.continues = outer
-        self.meet(ways)
+        breaks, (self.breaks, self.continues) = self.breaks, outer
+        if node.orelse and ways:
+            self.meet(ways)
+            self.block(node.orelse)
+            ways = [self.way()] if self.goes else []
+        self.meet([*ways, *breaks])
         self.names.pop(_COUNT, None)
 
 

@@ -6,14 +6,14 @@ node: half of the work of a scatter, in space two thirds.
 
 from karamelo_py.compiler.compile import point_function, real, shared
 from karamelo_py.compiler.fields import field
-from karamelo_py.compiler.lanes import Eights, Fours
+from karamelo_py.compiler.lanes import EightLanes, FourLanes
 from karamelo_py.compiler.lanes.records import accumulate_affine
 from karamelo_py.compiler.tuples import add, add_scaled, nested_as, scale
 from karamelo_py.kernels import p2g
 from karamelo_py.kernels.arrays import MASS, of_force
 from karamelo_py.kernels.averaging import NodalStress
 from karamelo_py.kernels.g2p import Move, update_at, zero_vector
-from karamelo_py.kernels.loss import Lost
+from karamelo_py.kernels.loss import EnergyLoss
 from karamelo_py.kernels.visit import for_tags
 from karamelo_py.points.basis import entry, reach, support
 from karamelo_py.points.basis.product import inverse_spread, spacing
@@ -63,7 +63,10 @@ def _momentum(w, stencil, mass, v, moment):
 def _affine_part_mass_momentum(quantity, w, stencil, load):
     mass, v, moment, _, _ = load
     given = _momentum(w, stencil, mass, v, moment)
-    if not (len(given) and _lacks(w, (Lost, p2g.Led, p2g.Centre, p2g.Normal, p2g.SeenMass))):
+    if not (
+        len(given)
+        and _lacks(w, (EnergyLoss, p2g.RigidSums, p2g.Centre, p2g.Normal, p2g.SquaredMass))
+    ):
         return ()
     momentum, growths = given
     return w.nodes.sums, MASS, (mass, *momentum), tuple([(mass - mass, *g) for g in growths])
@@ -98,8 +101,8 @@ def joined(width, kin, parts):
     return parts
 
 
-@joined.on(Fours)
-@joined.on(Eights)
+@joined.on(FourLanes)
+@joined.on(EightLanes)
 def _joined_eights(width, kin, parts):
     if len(parts) != 2 or of_force(kin) != 4:
         return parts

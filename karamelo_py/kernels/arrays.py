@@ -6,7 +6,7 @@ every scene has are declared by their owners (:mod:`karamelo_py.compiler.fields`
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -14,6 +14,13 @@ from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.fields import as_rows_of_points, name_of, some_points
 from karamelo_py.kernels.totals import LIMBS, Alone
 from karamelo_py.points.kinematics import dimension
+
+# A NamedTuple, often empty, whose class selects the implementation of point functions.
+Tag: TypeAlias = Any
+# A double or single, lanes of these, or a number with slopes.
+Number: TypeAlias = Any
+# A number of a point or node, or of those in lanes.
+Index: TypeAlias = Any
 
 
 class Nodes(NamedTuple):

@@ -25,19 +25,24 @@ from karamelo_py.kernels.heat import (
     Conducting,
     HeatContent,
     HeatFlow,
-    Share,
     Supply,
     Temperature,
     TemperatureGradient,
+    TemperatureShare,
     Volume,
     Warming,
 )
-from karamelo_py.kernels.node_hooks import node_hooks
-from karamelo_py.kernels.nodes import SumsToVelocity, TakeMean, Update
-from karamelo_py.kernels.passes import read_reports, visit_here
-from karamelo_py.kernels.point_hooks import Warmth, clear_totals, point_hooks, publish_totals
+from karamelo_py.kernels.hook_loop import (
+    Warmth,
+    clear_totals,
+    node_hooks,
+    point_hooks,
+    publish_totals,
+)
+from karamelo_py.kernels.nodes import NodalUpdate, SumsToVelocity, TakeMean
+from karamelo_py.kernels.reports import read_reports
 from karamelo_py.kernels.rows import conduct
-from karamelo_py.kernels.sweep import OldWeights, Visit, sweep_nodes
+from karamelo_py.kernels.sweep import OldWeights, Visit, sweep, sweep_nodes
 from karamelo_py.kernels.totals import agree_on_heat
 from karamelo_py.points.kinematics import Line
 
@@ -65,15 +70,16 @@ def _supply_blocks(block, s, hooks):
     points = block.points
     fields = points.fields
     warmth = Warmth(
+        points.id,
+        s.kin,
         field(fields, Capacity),
         field(fields, Temperature),
         field(fields, Volume),
         field(fields, Supply),
-        field(fields, Share),
-        points.mass,
+        field(fields, TemperatureShare),
         points.x[s.control.clock[0].now],
     )
-    point_hooks(arrays.SUPPLY_HEAT, warmth, s.kin, points.id, hooks, s.control, step_size(s))
+    point_hooks(arrays.SUPPLY_HEAT, warmth, hooks, s.control, step_size(s))
 
 
 @point_function(otherwise=True)
@@ -97,7 +103,7 @@ def _at_heated_points_hooks(hooks, s):
 def visit_for_heat(heat, s, mode, visit, gathers, scatters):
     """Visit the points for heat: the nodes are those of heat."""
     here = arrays.with_nodes(s, heat.nodes, heat.buffers)
-    visit_here(here, mode, visit, step_size(s), gathers, scatters)
+    sweep(here, mode, visit, step_size(s), gathers, scatters, False)
 
 
 @shared
@@ -131,7 +137,7 @@ def _conduct_conducting(heat, s, mode, hooks):
     at_heated_points(hooks, s)
     flow = Visit((TemperatureGradient(),), (HeatFlow(),), OldWeights())
     visit_for_heat(heat, s, mode, flow, True, True)
-    sweep_nodes(mode, Update(), kin, nodes, s.ranges, dt)
+    sweep_nodes(mode, NodalUpdate(), kin, nodes, s.ranges, dt)
     at_heat_nodes(hooks, arrays.POST_UPDATE_GRID_HEAT, arrays.ON_UPDATE, s)
     map_heat(heat, s, mode, True, False)
     # What `Warming` reports as a rate is by what factor conduction has become faster.

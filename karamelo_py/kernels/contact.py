@@ -27,7 +27,7 @@ from karamelo_py.compiler.loops import entered, subkernel
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels import contact_pairs
 from karamelo_py.kernels.arrays import DT, MASS, TIMESTEP, of_change, of_momentum
-from karamelo_py.kernels.loss import Rubbed, warm_node
+from karamelo_py.kernels.loss import FrictionalHeat, warm_node
 from karamelo_py.kernels.p2g import Centre, Normal
 from karamelo_py.kernels.rows import touch, touch_velocity
 from karamelo_py.kernels.totals import add_to, counts, publish
@@ -192,8 +192,8 @@ def _touch_pair(contact, d, nodes, control, i, j, place, share, where):
     if rub > 0:
         heat = contact_pairs.work_of_friction(contact, d, nodes, pair, push / size, across, rub)
         share = contact.warmth[a, b]
-        warm_node(field(nodes.fields, Rubbed), pair.n, share * heat * pair.per_a)
-        warm_node(field(nodes.fields, Rubbed), pair.m, (1.0 - share) * heat * pair.per_b)
+        warm_node(field(nodes.fields, FrictionalHeat), pair.n, share * heat * pair.per_a)
+        warm_node(field(nodes.fields, FrictionalHeat), pair.m, (1.0 - share) * heat * pair.per_b)
     for k in range(d):
         impulse = push * contact_pairs.outward_of(nodes, pair, k) / size
         if rub > 0:

@@ -18,7 +18,7 @@ class Where(NamedTuple):
     dt: float
 
 
-class Pair(NamedTuple):
+class NodePair(NamedTuple):
     """Two bodies at a place: a node of each, mass and share in the common normal."""
 
     n: int
@@ -65,7 +65,7 @@ def _shares(contact, d, nodes, n, m):
 def pair_of(contact, d, nodes, n, m):
     per_a, per_b = 1.0 / nodes.sums[n, MASS], 1.0 / nodes.sums[m, MASS]
     share_a, share_b = _shares(contact, d, nodes, n, m)
-    return Pair(n, m, per_a, per_b, share_a, share_b)
+    return NodePair(n, m, per_a, per_b, share_a, share_b)
 
 
 @subkernel

@@ -8,7 +8,7 @@ what the nodes around it have, and shares out among them what it is given.
 from karamelo_py.compiler.compile import point_function, shared
 from karamelo_py.compiler.fields import field
 from karamelo_py.kernels import g2p, p2g
-from karamelo_py.kernels.loss import Lost
+from karamelo_py.kernels.loss import EnergyLoss
 from karamelo_py.points.basis import carried, support
 from karamelo_py.points.basis.cpdi.block import InBlock
 from karamelo_py.points.basis.cpdi.corners import AtCorners
@@ -31,7 +31,7 @@ def _without_moments(part, w):
     return not any(function.defined(type(w.transfer)) for function in asked)
 
 
-for _part in (g2p.AverageStress, g2p.SeriesTerm, p2g.Volumes, p2g.SeriesBack):
+for _part in (g2p.SetMeanStress, g2p.SeriesTerm, p2g.Volumes, p2g.SeriesBack):
     by_corners.on(_part)(_always)
 for _part in (
     g2p.Move, g2p.Strain, g2p.StrainOfLastStep, g2p.SecondStrain, g2p.StrainInMove, g2p.TrialStrain,
@@ -42,7 +42,7 @@ for _part in (
 
 @by_corners.on(p2g.MassMomentum)
 def _by_corners_mass_momentum(part, w):
-    return _without_moments(part, w) and field(w.nodes.fields, Lost) is None
+    return _without_moments(part, w) and field(w.nodes.fields, EnergyLoss) is None
 
 
 @shared

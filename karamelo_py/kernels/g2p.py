@@ -12,7 +12,7 @@ from karamelo_py.compiler.fields import field, increase, load_vector, store, sto
 from karamelo_py.compiler.tuples import add_row, add_scaled, row, scale, subtract
 from karamelo_py.kernels import averaging, visit
 from karamelo_py.kernels.arrays import of_change
-from karamelo_py.kernels.loss import Rubbed, in_company, reflect, warm, warm_by_friction
+from karamelo_py.kernels.loss import FrictionalHeat, in_company, reflect, warm, warm_by_friction
 from karamelo_py.points import frames, transfers
 from karamelo_py.points.basis import carried, carrier, carry, deformed, entry, extent
 from karamelo_py.points.basis.cpdi.corners import AtCorners
@@ -103,7 +103,7 @@ class TrialStrainOfLastStep(NamedTuple):
     writes = TrialStrain.writes
 
 
-class AverageStress(NamedTuple):
+class SetMeanStress(NamedTuple):
     """Gather the averaged mean stress of F-bar."""
 
     in_lanes = True
@@ -156,7 +156,7 @@ def _empty_trial_strain_of_last_step(task, w, x):
     return zero_tensor(w.kin, x[0])
 
 
-@empty.on(AverageStress)
+@empty.on(SetMeanStress)
 def _empty_average_stress(task, w, x):
     return real(0, x[0])
 
@@ -250,7 +250,7 @@ def _gathered_trial_strain_of_last_step(task, w, stencil, k, total):
     return _gradient(w, stencil, k, total)
 
 
-@gathered.on(AverageStress)
+@gathered.on(SetMeanStress)
 def _gathered_average_stress(task, w, stencil, k, total):
     i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
     return fma(weight, row(field(w.nodes.fields, averaging.NodalStress), i, 0, (total,))[0], total)
@@ -318,7 +318,7 @@ def _keep_ratio(w, p, dt, dl):
     field(w.points.fields, averaging.VolumeRatio)[0, p] = volume_ratio(w.kin, increment)
 
 
-@settled.on(AverageStress)
+@settled.on(SetMeanStress)
 def _settled_average_stress(task, w, stencil, p, dt, total, totals, fastest):
     field(w.points.fields, averaging.AveragedStress)[0, p] = total
     return real(0, dt), fastest
@@ -355,7 +355,7 @@ def _move(w, stencil, p, dt, total):
     displacing = transfers.displacing_velocity(w.transfer, v, total[0], j)
     step = scale(dt, constrained_velocity(law, v, displacing))
     y = add_scaled(x, real(1, dt), step)
-    warm_by_friction(field(w.nodes.fields, Rubbed), w, stencil, p, v[0])
+    warm_by_friction(field(w.nodes.fields, FrictionalHeat), w, stencil, p, v[0])
     warm(w, stencil, p, subtract(total[0], total[1]))
     moment = in_company(w, stencil, p, total[2])
     y, v, moment, hits = reflected(w.grid, w.kin, y, v, moment)

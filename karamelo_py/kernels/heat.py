@@ -55,8 +55,8 @@ class Supply(StepField):
     columns = ("gamma",)
 
 
-class Share(StepField):
-    """Share of the change of the nodes' temperature that a point takes."""
+class TemperatureShare(StepField):
+    """TemperatureShare of the change of the nodes' temperature that a point takes."""
 
 
 class HeatGradient(Field):
@@ -75,7 +75,15 @@ class Conducting(NamedTuple):
     nodes: Nodes
     buffers: Buffers
 
-    point_fields = (Temperature, Capacity, Conductance, Volume, Supply, Share, HeatGradient)
+    point_fields = (
+        Temperature,
+        Capacity,
+        Conductance,
+        Volume,
+        Supply,
+        TemperatureShare,
+        HeatGradient,
+    )
 
 
 class HeatContent(NamedTuple):
@@ -118,7 +126,15 @@ class Warming(NamedTuple):
 
     in_lanes = True
     says = "temperature"
-    reads = ("x", "state", "material", "temperature", "capacity", "conductance", "share")
+    reads = (
+        "x",
+        "state",
+        "material",
+        "temperature",
+        "capacity",
+        "conductance",
+        "temperature share",
+    )
     writes = ("state",)
 
 
@@ -151,7 +167,7 @@ def _load_of_heat_content(quantity, w, p, like):
     field(fields, Volume)[0, p] = volume
     # Fixes may supply heat, and reset what share of the change the point takes.
     field(fields, Supply)[0, p] = real(0, like)
-    field(fields, Share)[0, p] = real(1, like)
+    field(fields, TemperatureShare)[0, p] = real(1, like)
     return of_present(p, capacity), of_present(p, conductance), T, _gradient(w, p)
 
 
@@ -241,7 +257,7 @@ def _settled_warming(task, w, stencil, p, dt, total, totals, fastest):
     rate = field(fields, Conductance)[0, p] / choose(some, capacity, real(1, capacity))
     hidden = real(4 * dimension(w.kin), dt) * (rate * w.grid.inv_h * w.grid.inv_h) * dt
     change = total[0] + min(hidden, real(1, hidden)) * (total[1] - T)
-    T = choose(some, fma(field(fields, Share)[0, p], change, T), T)
+    T = choose(some, fma(field(fields, TemperatureShare)[0, p], change, T), T)
     store(w.points.state, p, laws.with_temperature(law, w.kin, state, T))
     # By what factor conduction has become faster than in the undeformed body.
     f = deformation_of(w.frame, w.kin, law, state, w.points, p)

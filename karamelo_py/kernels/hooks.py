@@ -25,17 +25,9 @@ The node functions of heat see capacity, temperature before and after the step, 
 from collections.abc import Callable
 from typing import NamedTuple
 
-import numpy as np
 from numba import types
 
-from karamelo_py.compiler.compile import shared
-from karamelo_py.compiler.formula import call_evaluate
-from karamelo_py.compiler.loops import subkernel
 from karamelo_py.kernels import arrays
-from karamelo_py.kernels.totals import WORK, carry, publish
-from karamelo_py.kernels.walls import FRICTION
-
-NONE = np.int64(0)  # a bare 0 would be a type of its own
 
 _F8 = types.float64
 NODE_FUNCTION = types.UniTuple(_F8, 4)(*[_F8] * 8)
@@ -115,66 +107,3 @@ def point_hook(
 def heat_hook(function: Callable, *, publishes: bool = False, holds: bool = False) -> CompiledHook:
     """A compiled hook for ``supply_heat``: `function` as described at the head of this file."""
     return CompiledHook(function, "heated points", publishes, False, False, holds)
-
-
-@shared
-def with_items_of(values, others):
-    """A NamedTuple with the items of another in the place of those with their names."""
-    new = dict(zip(others._fields, others, strict=True))
-    items = zip(values._fields, values, strict=True)
-    return type(values)(*(new.get(name, item) for name, item in items))
-
-
-@shared
-def directions(hooks):
-    """How many there are: a number that is read, so that no loop over them is unrolled."""
-    return hooks.x0.shape[1]
-
-
-@subkernel
-def evaluate(hooks, h, component, count, control, result, shift):
-    """Formula of one component over the chosen members, at the present time plus `shift`.
-
-    The results go to the row `result` of the scratch.
-    """
-    time = control.values[arrays.TIME]
-    control.values[arrays.TIME] = time + shift
-    program = hooks.programs[h, component]
-    call_evaluate(
-        hooks.evaluate,
-        hooks.code,
-        hooks.constants,
-        control.values,
-        hooks.scratch,
-        program.begin,
-        program.end,
-        program.first,
-        program.last,
-        count,
-        result,
-    )
-    control.values[arrays.TIME] = time
-
-
-@subkernel
-def clear_total(hooks, h, control):
-    """The totals of a hook start from zero."""
-    slot = hooks.table[h].slot
-    rubs = hooks.programs[h, FRICTION].begin >= 0
-    for c in range(3):
-        if slot >= 0 and (rubs or hooks.programs[h, c].begin >= 0):
-            control.totals[slot + c] = 0
-
-
-@subkernel
-def publish_total(hooks, h, control):
-    """Publish the totals of a hook."""
-    carry(control.totals[WORK])  # it grows from step to step
-    slot = hooks.table[h].slot
-    rubs = hooks.programs[h, FRICTION].begin >= 0
-    first, last = 3, -1
-    for c in range(3):
-        if slot >= 0 and (rubs or hooks.programs[h, c].begin >= 0):
-            first, last = min(first, c), c
-    if last >= 0:
-        publish(control, slot + first, last - first + 1)

@@ -48,8 +48,8 @@ from karamelo_py.points.transfers.xpic import Reflected, Series
 ALONE = 0.6
 
 
-class Lost(fields.SummedField):
-    """Kinetic energy that points bring to a node; what it did not keep, per mass; and its mass.
+class EnergyLoss(fields.SummedField):
+    """Kinetic energy brought to a node; the part that it dissipates, per mass; and its mass.
 
     A fused step brings the energy and mass of the next step while points take back the loss.
     """
@@ -57,7 +57,7 @@ class Lost(fields.SummedField):
     shape = fields.triple
 
 
-class Rubbed(fields.StepField):
+class FrictionalHeat(fields.StepField):
     """Heat of friction at a node, per mass: of contact between solids and of walls."""
 
 
@@ -134,7 +134,8 @@ def warm(w, stencil, p, v):
 
     `v` is the velocity of the nodes at the point, before the update.
     """
-    lost, reflected = fields.field(w.nodes.fields, Lost), fields.field(w.points.fields, Reflected)
+    lost = fields.field(w.nodes.fields, EnergyLoss)
+    reflected = fields.field(w.points.fields, Reflected)
     if lost is not None:
         moment = _moment_before(w, stencil, v, zero_moment(w.transfer, w.kin, v[0]))
         moment = in_company(w, stencil, p, moment)
@@ -153,7 +154,7 @@ def in_company(w, stencil, p, moment):
     its own pressure, and its volume grow without bounds, whatever the room around it. The energy of
     what it does not keep heats it.
     """
-    lost = fields.field(w.nodes.fields, Lost)
+    lost = fields.field(w.nodes.fields, EnergyLoss)
     if lost is None or len(moment) == 0:
         return moment
     mass = w.points.mass[p]

@@ -7,8 +7,8 @@ from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.tuples import clear_first
 from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
 from karamelo_py.kernels.averaging import NodalMean, NodalStress
-from karamelo_py.kernels.loss import Lost, Rubbed, keep_loss
-from karamelo_py.kernels.p2g import SeenMass
+from karamelo_py.kernels.loss import EnergyLoss, FrictionalHeat, keep_loss
+from karamelo_py.kernels.p2g import SquaredMass
 from karamelo_py.points.kinematics import dimension
 from karamelo_py.points.transfers.xpic import Series
 
@@ -40,16 +40,16 @@ class ExtendSeries(NamedTuple):
 class KeepLoss(NamedTuple):
     """What a node does not keep of the kinetic energy that it was brought."""
 
-    goes_through = ("sums", "lost", "lost")
+    goes_through = ("sums", "energy loss", "energy loss")
 
 
-class ClearRubbed(NamedTuple):
+class ClearFrictionalHeat(NamedTuple):
     """Heat of friction starts from zero."""
 
-    goes_through = ("rubbed",)
+    goes_through = ("frictional heat",)
 
 
-class Update(NamedTuple):
+class NodalUpdate(NamedTuple):
     """v* = v + dt f / m from the sums."""
 
     says = "update v*"
@@ -98,15 +98,15 @@ def per_mass(nodes, n, like):
 
 @at_node.on(KeepLoss)
 def _at_node_keep_loss(task, kin, nodes, n, dt):
-    keep_loss(field(nodes.fields, Lost), kin, nodes.sums, n)
+    keep_loss(field(nodes.fields, EnergyLoss), kin, nodes.sums, n)
 
 
-@at_node.on(ClearRubbed)
+@at_node.on(ClearFrictionalHeat)
 def _at_node_clear_rubbed(task, kin, nodes, n, dt):
-    clear_first(field(nodes.fields, Rubbed), n)
+    clear_first(field(nodes.fields, FrictionalHeat), n)
 
 
-@at_node.on(Update)
+@at_node.on(NodalUpdate)
 def _at_node_update(task, kin, nodes, n, dt):
     factor = per_mass(nodes, n, dt)
     for k in range(dimension(kin)):
@@ -144,7 +144,7 @@ def _at_node_update_to_velocity(task, kin, nodes, n, dt):
     # See UpdateToVelocity.light: the change of a light node's velocity enters the gradient by the
     # share of its mass. Points take the whole change: momentum is kept.
     one = real(1, dt)
-    share = unlimited(field(nodes.fields, SeenMass), n, nodes.sums[n, MASS], task.light)
+    share = unlimited(field(nodes.fields, SquaredMass), n, nodes.sums[n, MASS], task.light)
     for k in range(dimension(kin)):
         dv = nodes.update[n, of_change(kin) + k]
         nodes.velocity[n, k] = nodes.update[n, k] - (one - share) * dv

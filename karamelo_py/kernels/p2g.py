@@ -8,7 +8,7 @@ from karamelo_py.compiler.tuples import add_optional, leading, scale, subtract
 from karamelo_py.kernels.arrays import MASS, SUMS_WIDTH, VELOCITY_WIDTH, of_force
 from karamelo_py.kernels.averaging import AveragedStress, FBar, NodalMean, NodalStress, VolumeRatio
 from karamelo_py.kernels.g2p import zero_vector
-from karamelo_py.kernels.loss import Lost, bring_energy
+from karamelo_py.kernels.loss import EnergyLoss, bring_energy
 from karamelo_py.kernels.visit import deformation_of, for_tags, law_of, records_of, state_of
 from karamelo_py.points.basis import entry, mapped_again
 from karamelo_py.points.frames import Total, add_force, force_stress
@@ -36,10 +36,10 @@ class MassMomentum(NamedTuple):
         d = dimension(kin)
         own = (
             (Normal, 0, d),
-            (SeenMass, 0, 1),
+            (SquaredMass, 0, 1),
             (Centre, 0, d),
-            (Led, 0, of_force(kin)),
-            (Lost, 0, 1),
+            (RigidSums, 0, of_force(kin)),
+            (EnergyLoss, 0, 1),
         )
         return ("sums", 0, of_force(kin)), *own
 
@@ -123,7 +123,7 @@ class Normal(SummedField):
     shape = vector
 
 
-class SeenMass(SummedField):
+class SquaredMass(SummedField):
     """Sum of N m^2 at a node: over that of N m it is the mean mass of the points it sees (USL)."""
 
     @staticmethod
@@ -138,7 +138,7 @@ class Centre(SummedField):
     shape = vector
 
 
-class Led(SummedField):
+class RigidSums(SummedField):
     """What rigid points give a node: mass, momentum and the force on them, as in `Nodes.sums`."""
 
     @staticmethod
@@ -198,13 +198,13 @@ def led_mass(led, law, mass):
 
 @shared
 def _mass(w, p):
-    return shared_mass(field(w.nodes.fields, Led), law_of(w, p), _own_mass(w, p))
+    return shared_mass(field(w.nodes.fields, RigidSums), law_of(w, p), _own_mass(w, p))
 
 
 @load_of.on(MassMomentum)
 def _load_of_mass_momentum(quantity, w, p, like):
     v = load_vector(w.kin, w.points.v, p)
-    led = led_mass(field(w.nodes.fields, Led), law_of(w, p), _own_mass(w, p))
+    led = led_mass(field(w.nodes.fields, RigidSums), law_of(w, p), _own_mass(w, p))
     x = loaded_for(field(w.nodes.fields, Centre), w.kin, w.places.y, p)
     return _mass(w, p), v, _moment(w, p, like), led, x
 
@@ -224,11 +224,11 @@ def _scattered_mass_momentum(quantity, w, stencil, k, load):
     mass, v, moment, led, x = load
     part = momentum_part(w, stencil, k, weight, mass, v, moment)
     accumulate(w.nodes.sums, i, MASS, (weight * mass,) + part)
-    bring_energy(field(w.nodes.fields, Lost), i, weight * mass, part)
-    accumulate_led(field(w.nodes.fields, Led), i, weight, led, v)
+    bring_energy(field(w.nodes.fields, EnergyLoss), i, weight * mass, part)
+    accumulate_led(field(w.nodes.fields, RigidSums), i, weight, led, v)
     accumulate_optional(field(w.nodes.fields, Centre), i, scale(weight * mass, x))
     accumulate_optional(field(w.nodes.fields, Normal), i, scale(mass, leading(gradient, v)))
-    accumulate_optional(field(w.nodes.fields, SeenMass), i, (weight * mass * mass,))
+    accumulate_optional(field(w.nodes.fields, SquaredMass), i, (weight * mass * mass,))
 
 
 @point_function(otherwise=True)

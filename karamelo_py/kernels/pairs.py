@@ -19,7 +19,7 @@ from karamelo_py.points.laws import initial_state, jacobian, specific_volume
 from karamelo_py.points.pairs import force_between, radius
 
 
-class Bodies(NamedTuple):
+class TwoBodies(NamedTuple):
     """The points of two bodies by id, those of the second (from `first2` on) behind the others."""
 
     x: np.ndarray  # (n, d)

@@ -12,9 +12,8 @@ from numba import types
 from karamelo_py.compiler.addresses import caller_of
 from karamelo_py.compiler.loops import entered
 from karamelo_py.kernels import totals
-from karamelo_py.kernels.passes import sweep_all, sweep_blocks
 from karamelo_py.kernels.sums import given
-from karamelo_py.kernels.sweep import sweep_points, sweep_shares
+from karamelo_py.kernels.sweep import context_of, sweep_blocks, sweep_points, visit_shares
 
 CALL = types.int64(types.int64, types.int64, types.int64)
 SWEEP, NEXT, GIVE, TAKE, TOTALS, LARGEST, NUMBER = range(7)
@@ -108,21 +107,24 @@ def _take_over_linked(ranks, due):
     _ask_if(due, ranks.address, TAKE, 0, 0)
 
 
-@sweep_all.on(Linked)
-def _sweep_all_linked(ranks, s, mode, visit, then, gathers, scatters, dt):
+@sweep_blocks.on(Linked)
+def _sweep_blocks_linked(ranks, s, mode, visit, then, gathers, scatters, dt):
     address = ranks.address
     _ask(address, SWEEP, 0, 0)
-    sweep_blocks(s, Border(mode, address), visit, then, gathers, scatters, dt)
+    for block in s.blocks:
+        sweep_points(Border(mode, address), visit, s, block, then, gathers, scatters, dt)
     if len(visit.quantities):
         due = scatters & (s.buffers.count[1] == 0)
         _ask_if(due, address, GIVE, s.buffers.number, given(visit.quantities, s.kin))
-    sweep_blocks(s, Inside(mode, address), visit, then, gathers, scatters, dt)
+    for block in s.blocks:
+        sweep_points(Inside(mode, address), visit, s, block, then, gathers, scatters, dt)
 
 
 @sweep_points.on(Border)
 def _sweep_points_border(mode, visit, s, block, then, gathers, scatters, dt):
     border = block.tiling.count[2]
-    sweep_shares(mode.mode, visit, s, block, then, gathers, scatters, dt, 0, border)
+    context = context_of(s, dt)
+    visit_shares(mode.mode, border, visit, context, block, then, gathers, scatters, dt, 0)
     if len(s.blocks) > 1:
         _ask(mode.address, NEXT, 0, 0)
 
@@ -131,6 +133,7 @@ def _sweep_points_border(mode, visit, s, block, then, gathers, scatters, dt):
 def _sweep_points_inside(mode, visit, s, block, then, gathers, scatters, dt):
     border = block.tiling.count[2]
     inside = block.tiling.count[1] - border
-    sweep_shares(mode.mode, visit, s, block, then, gathers, scatters, dt, border, inside)
+    context = context_of(s, dt)
+    visit_shares(mode.mode, inside, visit, context, block, then, gathers, scatters, dt, border)
     if len(s.blocks) > 1:
         _ask(mode.address, NEXT, 0, 0)

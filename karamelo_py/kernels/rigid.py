@@ -1,8 +1,8 @@
 """Rigid bodies on a grid that all solids share: nodes under them take their velocity.
 
-Rigid points give their mass and momentum to sums of their own (`Led`), so that those of the nodes
-are of the other solids alone, whatever the density of a rigid body. Where a node sees rigid points
-its velocity is theirs; what that takes is the force that they put on the others.
+Rigid points give their mass and momentum to sums of their own (`RigidSums`), so that those of the
+nodes are of the other solids alone, whatever the density of a rigid body. Where a node sees rigid
+points its velocity is theirs; what that takes is the force that they put on the others.
 """
 
 from typing import NamedTuple
@@ -15,7 +15,7 @@ from karamelo_py.compiler.loops import entered
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
 from karamelo_py.kernels.clock import kick
-from karamelo_py.kernels.p2g import Led
+from karamelo_py.kernels.p2g import RigidSums
 from karamelo_py.kernels.rows import touch, touch_velocity
 from karamelo_py.kernels.totals import add_to, publish
 from karamelo_py.kernels.visit import place_at
@@ -28,7 +28,7 @@ from karamelo_py.points.laws.rigid import Rigid
 class RigidBodies(NamedTuple):
     """Rigid solids among others on one grid."""
 
-    node_fields = (Led,)
+    node_fields = (RigidSums,)
 
     force: np.ndarray  # (n,) slot of the published force on the solid of each point, by id, or -1
     torque: np.ndarray  # (n,) the same of the torque
@@ -128,7 +128,7 @@ def _publish(slots, control):
 
 @touch.on(RigidBodies)
 def _touch_rigid_bodies(contact, s):
-    led = field(s.nodes.fields, Led)
+    led = field(s.nodes.fields, RigidSums)
     _lead(s.kin, s.nodes, led, s.spans, kick(s), s.control.clock[0].kept)
     _clear(contact.slots, s.control.totals)
     _sum_forces_of_blocks(s, led)
@@ -137,4 +137,4 @@ def _touch_rigid_bodies(contact, s):
 
 @touch_velocity.on(RigidBodies)
 def _touch_velocity_rigid_bodies(contact, s, steps):
-    _lead_velocity(s.kin, s.nodes, field(s.nodes.fields, Led), s.spans)
+    _lead_velocity(s.kin, s.nodes, field(s.nodes.fields, RigidSums), s.spans)

@@ -10,23 +10,22 @@ from karamelo_py.compiler.tuples import clear_first
 from karamelo_py.kernels import arrays, p2g, table
 from karamelo_py.kernels.averaging import FBar
 from karamelo_py.kernels.clock import step_size
-from karamelo_py.kernels.g2p import AverageStress, Move, SeriesTerm
-from karamelo_py.kernels.loss import Lost, Rubbed
-from karamelo_py.kernels.moments import add_work
+from karamelo_py.kernels.g2p import Move, SeriesTerm, SetMeanStress
+from karamelo_py.kernels.hook_loop import add_work
+from karamelo_py.kernels.loss import EnergyLoss, FrictionalHeat
 from karamelo_py.kernels.nodes import (
-    ClearRubbed,
+    ClearFrictionalHeat,
     ExtendSeries,
     KeepLoss,
     MomentumToVelocity,
+    NodalUpdate,
     StartSeries,
     SumsToVelocity,
     TakeMean,
     TakeMeanStress,
-    Update,
     UpdateToVelocity,
 )
-from karamelo_py.kernels.passes import visit_here
-from karamelo_py.kernels.sweep import OldWeights, Visit, sweep_nodes
+from karamelo_py.kernels.sweep import OldWeights, Visit, sweep, sweep_nodes
 from karamelo_py.points.kinematics import Axisymmetric, dimension
 from karamelo_py.points.transfers.xpic import XPIC
 
@@ -92,7 +91,7 @@ def _sum_series_xpic(transfer, s, mode):
     sweep_nodes(mode, StartSeries(), s.kin, s.nodes, s.ranges, dt)
     for k in range(transfer.order - 1):
         visit = Visit((SeriesTerm(k),), (p2g.SeriesBack(),), OldWeights())
-        visit_here(s, mode, visit, dt, True, True)
+        sweep(s, mode, visit, dt, True, True, False)
         sweep_nodes(mode, ExtendSeries(), s.kin, s.nodes, s.ranges, dt)
     hold_axis(s.kin, s)
 
@@ -107,7 +106,8 @@ def average_volumes(averaging, s, mode, dt, trial):
 
 @average_volumes.on(FBar)
 def _average_volumes_f_bar(averaging, s, mode, dt, trial):
-    visit_here(s, mode, Visit((trial,), (p2g.Volumes(),), OldWeights()), dt, True, True)
+    visit = Visit((trial,), (p2g.Volumes(),), OldWeights())
+    sweep(s, mode, visit, dt, True, True, False)
     sweep_nodes(mode, TakeMean(), s.kin, s.nodes, s.ranges, dt)
 
 
@@ -120,17 +120,16 @@ def average_stress(averaging, s, mode):
 def _average_stress_f_bar(averaging, s, mode):
     dt = step_size(s)
     sweep_nodes(mode, TakeMeanStress(), s.kin, s.nodes, s.ranges, dt)
-    visit_here(
-        s, mode, Visit((AverageStress(),), (p2g.AveragedForce(),), OldWeights()), dt, True, True
-    )
+    visit = Visit((SetMeanStress(),), (p2g.AveragedForce(),), OldWeights())
+    sweep(s, mode, visit, dt, True, True, False)
 
 
 @shared
 def sum_loss(s, mode):
     """At the nodes, what they do not keep of kinetic energy, where it becomes heat."""
-    if field(s.nodes.fields, Rubbed) is not None:
-        sweep_nodes(mode, ClearRubbed(), s.kin, s.nodes, s.ranges, step_size(s))
-    if field(s.nodes.fields, Lost) is not None:
+    if field(s.nodes.fields, FrictionalHeat) is not None:
+        sweep_nodes(mode, ClearFrictionalHeat(), s.kin, s.nodes, s.ranges, step_size(s))
+    if field(s.nodes.fields, EnergyLoss) is not None:
         sweep_nodes(mode, KeepLoss(), s.kin, s.nodes, s.ranges, step_size(s))
 
 
@@ -150,10 +149,10 @@ def light_node(s):
 light_node.goes_through = UpdateToVelocity.goes_through
 
 
-def _call(do: Callable, says: Callable[[Any], str | None]) -> table.Call:
+def _call(do: Callable, says: Callable[[Any], str | None]) -> table.SceneTask:
     """A row that does something; `says` tells what in a scene."""
     do.says = says
-    return table.Call(do)
+    return table.SceneTask(do)
 
 
 HEAT = _call(
@@ -168,7 +167,7 @@ LOSS = _call(
     lambda s, mode, hooks: sum_loss(s, mode),
     lambda s: (
         None
-        if field(s.nodes.fields, Lost) is None
+        if field(s.nodes.fields, EnergyLoss) is None
         else "kinetic energy that the nodes do not keep, as heat to the points"
     ),
 )
@@ -199,7 +198,7 @@ SERIES = _call(
 SUMS = table.Scatter((p2g.MassMomentum(), p2g.InternalForce()))
 MASS_AND_MOMENTUM = table.Scatter((p2g.MassMomentum(),))
 # For schemes that strain first.
-VELOCITY_BEFORE = (MASS_AND_MOMENTUM, AXIS, table.Nodes(SumsToVelocity()))
+VELOCITY_BEFORE = (MASS_AND_MOMENTUM, AXIS, table.NodeTask(SumsToVelocity()))
 FORCE = table.Scatter((p2g.InternalForce(),), OldWeights())
 # v* = v + dt f / m, with what the fixes add and prescribe; and heat flows.
 ACCELERATE = (
@@ -208,7 +207,7 @@ ACCELERATE = (
     HEAT,
     table.AtNodes(arrays.POST_PARTICLES_TO_GRID, arrays.ON_SUMS),
     AXIS,
-    table.Nodes(Update()),
+    table.NodeTask(NodalUpdate()),
     table.AtNodes(arrays.POST_UPDATE_GRID_STATE, arrays.ON_UPDATE),
     CONTACT,
     WORK_OF_LOADS,
@@ -222,6 +221,6 @@ MOVE = (
 # The velocity of the moved points, at the nodes once more.
 MOMENTUM_AGAIN = (
     table.Scatter((p2g.MomentumAgain(),), OldWeights()),
-    table.Nodes(MomentumToVelocity()),
+    table.NodeTask(MomentumToVelocity()),
     AXIS,
 )

@@ -35,7 +35,7 @@ class Sight(NamedTuple):
     offset: float  # of the first node that a point sees now, see points.basis.first_node
 
 
-class Order(NamedTuple):
+class SortedOrder(NamedTuple):
     """What is found where n points are sorted by threads, each of which has a part of them."""
 
     width: int  # of groups of points
@@ -153,7 +153,7 @@ def _order_in_tiles(kin, grids, sight, tiles, x, of, ids, found, k):
         for rest in (False, True):
             for c in range(cells):
                 here = bins[k, 0, c]
-                if bins[k, 1, c] < 0 and (here % found.width != 0) == rest:
+                if bins[k, 1, c] < 0 and (rest or here % found.width == 0):
                     bins[k, 0, c] = bins[k, 1, c] = place
                     place += here
         for q in range(begin, end):

@@ -4,7 +4,7 @@ All at once go sums along the arms of a stencil, what is affine, and the corners
 """
 
 from karamelo_py.compiler.compile import in_all, looping, point_function, prefetch_records, shared
-from karamelo_py.compiler.lanes import Eights, Fours
+from karamelo_py.compiler.lanes import EightLanes, FourLanes
 from karamelo_py.kernels.affine import (
     affine_parts,
     gathered_at_once_all,
@@ -19,9 +19,9 @@ from karamelo_py.kernels.corners import (
     shows_corners,
 )
 from karamelo_py.kernels.g2p import empty_all, gathered_all
+from karamelo_py.kernels.lanes import OneByOne
 from karamelo_py.kernels.p2g import scattered_all
 from karamelo_py.kernels.visit import all_records_of
-from karamelo_py.kernels.width import OneByOne
 from karamelo_py.points.basis import entry, support
 from karamelo_py.points.basis.cpdi.block import block_of, is_one_block, is_whole, of_one
 from karamelo_py.points.basis.cpdi.corners import CornerStencil
@@ -60,8 +60,8 @@ def _gather_nodes_one_by_one_stencil(width, stencil, tasks, w, totals):
     return _gather_parts(tasks, w, stencil, totals)
 
 
-@gather_nodes.on(Fours, Stencil)
-@gather_nodes.on(Eights, Stencil)
+@gather_nodes.on(FourLanes, Stencil)
+@gather_nodes.on(EightLanes, Stencil)
 def _gather_nodes_eights_stencil(width, stencil, tasks, w, totals):
     if not _even(w, stencil, len(gathered_by_arms(w))):
         return _gather(tasks, w, stencil, totals)
@@ -79,8 +79,8 @@ def _gather_nodes_one_by_one_corner_stencil(width, stencil, tasks, w, totals):
     return _gather(tasks, w, stencil, totals)
 
 
-@gather_nodes.on(Fours, CornerStencil)
-@gather_nodes.on(Eights, CornerStencil)
+@gather_nodes.on(FourLanes, CornerStencil)
+@gather_nodes.on(EightLanes, CornerStencil)
 def _gather_nodes_eights_corner_stencil(width, stencil, tasks, w, totals):
     by_corners = all_by_corners(tasks, w)
     if by_corners and shows_corners(tasks, w):
@@ -117,8 +117,8 @@ def scatter_nodes(width, stencil, quantities, w, loads):
     _scatter(quantities, w, stencil, loads)
 
 
-@scatter_nodes.on(Fours, Stencil)
-@scatter_nodes.on(Eights, Stencil)
+@scatter_nodes.on(FourLanes, Stencil)
+@scatter_nodes.on(EightLanes, Stencil)
 def _scatter_nodes_eights_stencil(width, stencil, quantities, w, loads):
     parts = affine_parts(quantities, w, stencil, loads)
     if not _even(w, stencil, any(len(part) and len(part[-1]) for part in parts)):
@@ -138,8 +138,8 @@ def _scatter_nodes_one_by_one_corner_stencil(width, stencil, quantities, w, load
         _scatter(quantities, w, stencil, loads)
 
 
-@scatter_nodes.on(Fours, CornerStencil)
-@scatter_nodes.on(Eights, CornerStencil)
+@scatter_nodes.on(FourLanes, CornerStencil)
+@scatter_nodes.on(EightLanes, CornerStencil)
 def _scatter_nodes_eights_corner_stencil(width, stencil, quantities, w, loads):
     block = block_of(w.kin, w.grid, stencil)
     if is_one_block(block):

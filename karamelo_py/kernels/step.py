@@ -18,10 +18,10 @@ from karamelo_py.kernels import table
 from karamelo_py.kernels.arrays import DT, TIME, NoHooks
 from karamelo_py.kernels.clock import common_velocity, finish, kick, last_step_size, step_size
 from karamelo_py.kernels.g2p import STRAINS, TrialStrain, TrialStrainOfLastStep
-from karamelo_py.kernels.moments import at_nodes, at_points
-from karamelo_py.kernels.passes import check_moves, sweep
+from karamelo_py.kernels.hook_loop import at_nodes, at_points
+from karamelo_py.kernels.reports import all_well, check_moves
 from karamelo_py.kernels.rows import average_volumes
-from karamelo_py.kernels.sweep import sweep_nodes
+from karamelo_py.kernels.sweep import sweep, sweep_nodes
 from karamelo_py.kernels.visit import deformation_of
 from karamelo_py.kernels.watch import look, look_at_heat
 from karamelo_py.points.frames import inverse_stretch_squared
@@ -55,9 +55,9 @@ def _take(row, s, mode, hooks, more):
         at_points(hooks, row.stage, row.then, s)
     elif isinstance(row, table.AtNodes):
         at_nodes(hooks, row.stage, row.target, s)
-    elif isinstance(row, table.Call):
+    elif isinstance(row, table.SceneTask):
         row.function(s, mode, hooks)
-    elif isinstance(row, table.Nodes):
+    elif isinstance(row, table.NodeTask):
         task = row.task(s) if callable(row.task) else row.task
         sweep_nodes(mode, task, s.kin, s.nodes, s.ranges, kick(s))
     elif isinstance(row, table.Check):
@@ -75,7 +75,8 @@ def _visit(row, s, mode, more):
         trial = TrialStrainOfLastStep() if row.of_last_step else TrialStrain()
         average_volumes(s.averaging, s, mode, dt, trial)
     scatters = more if row.only_if_more else row.scatters
-    return sweep(s, mode, row.visit, dt, row.gathers, scatters, row.moves)
+    sweep(s, mode, row.visit, dt, row.gathers, scatters, row.moves)
+    return all_well(s)
 
 
 def _take_all(rows, s, mode, hooks, more):

@@ -1,12 +1,24 @@
-"""The loops: over tiles of points (gather, settle, scatter), tiles of nodes and nodes in use.
+"""Sweeps: over the points, tile by tile, and over the nodes in use.
+
+A sweep over the points goes from a scene to a point in five steps:
+
+- `sweep` clears the nodes, goes over the points, and sums at the nodes what they gave;
+- `sweep_blocks` goes over the blocks, one for each law, in the order that other processes need;
+- `sweep_points` goes over one block, in the way of its mode: one thread, several, measured;
+- `visit_share` goes over the tiles of one share of a block: the work of one thread;
+- `visit_tile` gathers, updates and scatters the points of one tile.
 
 The points of a tile give to a buffer of their own: a dense box of the nodes that they may reach.
 Then each tile of nodes sums the boxes that reach it. Threads share out tiles and need no atomics;
 sums are made in one order, whatever the number of threads.
 """
 
+import inspect
+from collections.abc import Callable
 from math import inf
 from typing import NamedTuple
+
+import numpy as np
 
 from karamelo_py.compiler.compile import (
     choose,
@@ -24,13 +36,31 @@ from karamelo_py.compiler.lanes import room_for
 from karamelo_py.compiler.loops import entered, subkernel
 from karamelo_py.compiler.threads import Serial, Threaded, shared_out
 from karamelo_py.compiler.tuples import flat, nested_as, record
-from karamelo_py.kernels.arrays import Places
+from karamelo_py.kernels.arrays import (
+    Block,
+    Index,
+    Nodes,
+    Number,
+    Places,
+    Points,
+    Setup,
+    Tag,
+)
 from karamelo_py.kernels.clock import common_velocity
 from karamelo_py.kernels.g2p import empty_all, settled_all, zero_vector
+from karamelo_py.kernels.lanes import (
+    lanes_of_update,
+    lanes_of_visit,
+    one_loop_each,
+    points_at_once,
+    points_from,
+    zero_of,
+)
 from karamelo_py.kernels.nodes import at_node
 from karamelo_py.kernels.p2g import load_all
 from karamelo_py.kernels.stencils import gathered_by, scatter_nodes
-from karamelo_py.kernels.sums import sum_share
+from karamelo_py.kernels.sums import adds, sum_share
+from karamelo_py.kernels.totals import take_over
 from karamelo_py.kernels.visit import (
     Work,
     ask_ahead,
@@ -38,17 +68,9 @@ from karamelo_py.kernels.visit import (
     place_at,
     present_stencil,
 )
-from karamelo_py.kernels.width import (
-    in_lanes,
-    in_stretches,
-    points_from,
-    settled_width,
-    width_of,
-    zero_of,
-)
 from karamelo_py.points.basis import locate
 from karamelo_py.points.frames import Total, Updated, follows
-from karamelo_py.points.grid import inside, renumbered
+from karamelo_py.points.grid import Grid, inside, renumbered
 
 ROUNDING = 1e-3  # cells by which distances in cells may be rounded
 STRETCH = 64  # points: what they gather, and what they have, stays in the nearest cache
@@ -56,27 +78,27 @@ WHOLE = 1 << 40  # points, more than any tile has
 
 
 class Visit(NamedTuple):
-    """What a visit of the points does: tags of its tasks, then of what it scatters."""
+    """The work of a visit of the points: tags of its tasks, then of the quantities it scatters."""
 
     tasks: tuple
     quantities: tuple
-    weights: NamedTuple  # of the scatter
+    weights: Tag  # of the scatter: `OldWeights` or `PresentWeights`
 
 
 class Context(NamedTuple):
-    """What of a setup a sweep over the points needs."""
+    """The part of a `Setup` that a sweep over the points needs; its type is that of the kernel."""
 
-    frame: NamedTuple
-    kin: NamedTuple
-    basis: NamedTuple
-    transfer: NamedTuple
-    averaging: NamedTuple
-    grids: NamedTuple
-    nodes: NamedTuple
-    buffers: NamedTuple  # nodes that are given to
+    frame: Tag
+    kin: Tag
+    basis: Tag
+    transfer: Tag
+    averaging: Tag
+    grids: Grid
+    nodes: Nodes
+    buffers: Nodes  # nodes that are given to
     now: int
-    room: float  # cells that points may still go before their tile's box does not hold them
-    common: tuple  # velocity that speeds are measured from
+    room: Number  # cells that points may still go before their tile's box does not hold them
+    common: tuple  # (d,) velocity that speeds are measured from
 
 
 class OldWeights(NamedTuple):
@@ -88,8 +110,8 @@ class PresentWeights(NamedTuple):
 
 
 @shared
-def work_of(s, grid, nodes, block, places):
-    """What a visit of points of a block works with; `nodes` are those of `grid`."""
+def work_of(s: Context, grid: Grid, nodes: Nodes, block: Block, places: Places) -> Work:
+    """Return the arrays and tags of a visit to points of a block; `nodes` are those of `grid`."""
     return Work(
         s.frame, s.kin, s.basis, grid, s.transfer, s.averaging, nodes, block.points, block.laws,
         places, s.common,
@@ -97,41 +119,44 @@ def work_of(s, grid, nodes, block, places):
 
 
 @point_function()
-def restencil(weights, w, stencil, p):
-    """The stencil of the scatter."""
+def recompute_stencil(weights: Tag, w: Work, stencil: tuple, p: Index) -> tuple:
+    """Return the stencil of the scatter from that of the gather."""
 
 
-@restencil.on(OldWeights)
-def _restencil_old_weights(weights, w, stencil, p):
+@recompute_stencil.on(OldWeights)
+def _recompute_stencil_old_weights(weights, w, stencil, p):
     return stencil
 
 
-@restencil.on(PresentWeights)
-def _restencil_present_weights(weights, w, stencil, p):
+@recompute_stencil.on(PresentWeights)
+def _recompute_stencil_present_weights(weights, w, stencil, p):
     return present_stencil(w.frame, w, stencil, p)
 
 
 @point_function()
-def fits(weights, room, moved):
-    """Whether points still give to nodes of their tile's box.
+def stays_in_box(weights: Tag, room: Number, moved: Number) -> bool:
+    """Return True while points give to nodes of their tile's box.
 
-    If not, they will be sorted before the next step, and what they would give now is given then.
+    Points that left it are sorted before the next step, and give then what they would give now.
     """
 
 
-@fits.on(OldWeights)
-def _fits_old_weights(weights, room, moved):
+@stays_in_box.on(OldWeights)
+def _stays_in_box_old_weights(weights, room, moved):
     return True
 
 
-@fits.on(PresentWeights)
-def _fits_present_weights(weights, room, moved):
+@stays_in_box.on(PresentWeights)
+def _stays_in_box_present_weights(weights, room, moved):
     return in_all(moved <= room)
 
 
 @point_function()
-def places_of(frame, points, now, then):
-    """Where the weights of a sweep belong, and where the points are before and after it."""
+def places_of(frame: Tag, points: Points, now: int, then: int) -> Places:
+    """Return the places of the weights of a sweep, and of the points before and after it.
+
+    `now` and `then` are rows of `Points.x`.
+    """
 
 
 @places_of.on(Updated)
@@ -148,33 +173,44 @@ def _places_of_total(frame, points, now, then):
 
 
 @shared
-def place_of(w, p):
-    """Where the points of a group are."""
+def position_of(w: Work, p: Index) -> tuple:
+    """Return the position (d,) of a point, or of points in lanes, before the move."""
     return load_vector(w.kin, w.places.x, p)
 
 
 @shared
-def stencil_of(w, p):
-    """What the points of a group see before they move."""
+def stencil_of(w: Work, p: Index) -> tuple:
+    """Return the stencil of a point, or of points in lanes, before the move."""
     return locate(w.basis, w.kin, w.grid, place_at(w.basis, w.kin, w.places.where, p))
 
 
 @shared
-def give(visit, width, w, out, stencil, p, dt):
-    """Scatter the quantities of the points of a group."""
-    stencil = restencil(visit.weights, w, stencil, p)
+def scatter_point(
+    visit: Visit, lanes: Tag, w: Work, out: Work, stencil: tuple, p: Index, dt: Number
+) -> None:
+    """Scatter the quantities of a point, or of points in lanes, to the nodes of `out`."""
+    stencil = recompute_stencil(visit.weights, w, stencil, p)
     loads = load_all(visit.quantities, w, p, dt)
-    scatter_nodes(width, stencil, visit.quantities, out, loads)
+    scatter_nodes(lanes, stencil, visit.quantities, out, loads)
 
 
 @subkernel
-def visit_tile(visit, s, block, then, gathers, scatters, dt, t):
+def visit_tile(
+    visit: Visit,
+    s: Context,
+    block: Block,
+    then: int,
+    gathers: bool,
+    scatters: bool,
+    dt: Number,
+    t: int,
+) -> None:
     """Visit the points of the t-th occupied tile of a block in the context `s`.
 
     With `gathers` the tasks of the visit are done, with `scatters` its quantities scattered: one
     loop serves a scheme's fused and its single stages. `then` says which of the two arrays of
-    places takes the new ones. Points are gathered, settled and scattered group after group, or in
-    stretches (see `in_stretches`).
+    places takes the new ones. Points are gathered, updated and scattered one after another (in
+    lanes: a few at once), or in stretches (see `one_loop_each`).
     """
     s, block = at_hand(s), at_hand(block)
     points, tiling = block.points, block.tiling
@@ -184,9 +220,9 @@ def visit_tile(visit, s, block, then, gathers, scatters, dt, t):
     box = tiling.buffer
     numbered = renumbered(grid, box[t, 2], box[t, 3], box[t, 4])
     out = work_of(s, numbered, s.buffers, block, places)
-    width = in_lanes(visit, s, block)
-    wide = settled_width(width, visit)
-    apart = in_stretches(width, visit)
+    lanes = lanes_of_visit(visit, s, block)
+    wide = lanes_of_update(lanes, visit)
+    apart = one_loop_each(lanes, visit)
     stretch = STRETCH if apart else WHOLE
     like = empty_all(visit.tasks, w, zero_vector(s.kin, dt)) if apart else ()
     room = room_for(STRETCH, flat(like)) if apart else ()
@@ -198,13 +234,13 @@ def visit_tile(visit, s, block, then, gathers, scatters, dt, t):
         first = begin + k * stretch
         last = min(first + stretch, end)
         if apart and gathers:
-            for q in range(first, last, width_of(width)):
-                p = points_from(width, q, last)
-                if (q - first) % width_of(wide) == 0:
+            for q in range(first, last, points_at_once(lanes)):
+                p = points_from(lanes, q, last)
+                if (q - first) % points_at_once(wide) == 0:
                     ask_ahead_of_stretch(w, p, dt)
-                totals = gathered_by(width, visit.tasks, w, stencil_of(w, p), place_of(w, p))
-                store(room, points_from(width, q - first, last - first), flat(totals))
-        for q in range(first, last, width_of(wide)):
+                totals = gathered_by(lanes, visit.tasks, w, stencil_of(w, p), position_of(w, p))
+                store(room, points_from(lanes, q - first, last - first), flat(totals))
+        for q in range(first, last, points_at_once(wide)):
             p = points_from(wide, q, last)
             if not apart:
                 ask_ahead(w, p, dt)
@@ -216,31 +252,41 @@ def visit_tile(visit, s, block, then, gathers, scatters, dt, t):
                     found = load(room, points_from(wide, q - first, last - first), flat(like))
                     totals = nested_as(like, found)
                 else:
-                    totals = gathered_by(width, visit.tasks, w, stencil, place_of(w, p))
+                    totals = gathered_by(lanes, visit.tasks, w, stencil, position_of(w, p))
                 moved, rate = settled_all(visit.tasks, w, stencil, p, dt, totals, fastest)
             elif follows(s.frame):
-                moved = choose(inside(grid, s.kin, place_of(w, p)), moved, real(inf, moved))
+                moved = choose(inside(grid, s.kin, position_of(w, p)), moved, real(inf, moved))
             good = (moved <= 1) & (rate < 1e300)  # so written, NaN counts as wrong too
             if not in_all(good):
                 wrong = q + 1 + first_failing(good)
                 continue
             furthest = max(furthest, moved)
             fastest = rate
-            if not apart and scatters and fits(visit.weights, s.room, moved):
-                give(visit, width, w, out, stencil, p, dt)
+            if not apart and scatters and stays_in_box(visit.weights, s.room, moved):
+                scatter_point(visit, lanes, w, out, stencil, p, dt)
         # From the first point on that has gone wrong, or does not fit, a tile gives nothing more:
         # the run ends, or points are sorted and give all anew.
-        if apart and scatters and wrong == 0 and fits(visit.weights, s.room, furthest):
-            for q in range(first, last, width_of(width)):
-                p = points_from(width, q, last)
-                give(visit, width, w, out, stencil_of(w, p), p, dt)
+        if apart and scatters and wrong == 0 and stays_in_box(visit.weights, s.room, furthest):
+            for q in range(first, last, points_at_once(lanes)):
+                p = points_from(lanes, q, last)
+                scatter_point(visit, lanes, w, out, stencil_of(w, p), p, dt)
     tiling.report[t, 0] = largest(furthest)
     tiling.report[t, 1] = largest(fastest)
     tiling.report[t, 2] = wrong
 
 
 @subkernel
-def visit_share(visit, s, block, then, gathers, scatters, dt, first, k):
+def visit_share(
+    visit: Visit,
+    s: Context,
+    block: Block,
+    then: int,
+    gathers: bool,
+    scatters: bool,
+    dt: Number,
+    first: int,
+    k: int,
+) -> None:
     """Visit the points of the tiles of the k-th share behind the `first`, one thread's work."""
     share, order = block.tiling.share, block.tiling.order
     for t in range(share[first + k], share[first + k + 1]):
@@ -248,8 +294,8 @@ def visit_share(visit, s, block, then, gathers, scatters, dt, first, k):
 
 
 @subkernel
-def visit_nodes(task, kin, nodes, ranges, dt, k):
-    """Do `task` at the nodes of the k-th share."""
+def visit_nodes(task: Tag, kin: Tag, nodes: Nodes, ranges: np.ndarray, dt: Number, k: int) -> None:
+    """Do `task` at the nodes of the k-th share; `ranges` as in `Setup`."""
     nodes = at_hand(nodes)
     for r in range(ranges[k, 0], ranges[k, 1]):
         for n in range(ranges[r, 0], ranges[r, 1]):
@@ -258,69 +304,128 @@ def visit_nodes(task, kin, nodes, ranges, dt, k):
 
 # --- threads ----------------------------------------------------------------------------------
 
-_visit_shares = shared_out(visit_share, "visit, s, block, then, gathers, scatters, dt, first")
-_sum_shares = shared_out(sum_share, "quantities, kin, nodes, buffers")
-_visit_shares_of_nodes = shared_out(visit_nodes, "task, kin, nodes, ranges, dt")
+
+def by_threads(share: Callable) -> Callable:
+    """Make the kernel ``f(mode, count, ...)`` that does ``share(..., k)`` for each k below `count`.
+
+    The threads of `mode` divide these numbers among them.
+    """
+    names = ["mode", "count", *inspect.signature(share).parameters][:-1]
+    loop = shared_out(share, ", ".join(names[2:]))
+
+    def all_shares(*arguments):
+        loop(*arguments)
+
+    kinds = [inspect.Parameter(name, inspect.Parameter.POSITIONAL_OR_KEYWORD) for name in names]
+    all_shares.__signature__ = inspect.Signature(kinds)  # type: ignore[attr-defined]
+    all_shares.__qualname__ = f"{share.__qualname__}s"
+    return entered(all_shares)
+
+
+visit_shares = by_threads(visit_share)
+_sum_shares = by_threads(sum_share)
+_visit_nodes = by_threads(visit_nodes)
 
 
 @point_function()
-def sweep_points(mode, visit, s, block, then, gathers, scatters, dt):
+def sweep_points(
+    mode: Tag,
+    visit: Visit,
+    s: Setup,
+    block: Block,
+    then: int,
+    gathers: bool,
+    scatters: bool,
+    dt: Number,
+) -> None:
     """Sweep over the points of one block of the setup `s`."""
-
-
-@entered
-def _visit_all(mode, visit, s, block, then, gathers, scatters, dt, first, count):
-    _visit_shares(mode, count, visit, s, block, then, gathers, scatters, dt, first)
 
 
 @sweep_points.on(Serial)
 @sweep_points.on(Threaded)
 def _sweep_points_threaded(mode, visit, s, block, then, gathers, scatters, dt):
-    shares = block.tiling.count[1]
-    sweep_shares(mode, visit, s, block, then, gathers, scatters, dt, 0, shares)
+    count = block.tiling.count[1]
+    visit_shares(mode, count, visit, context_of(s, dt), block, then, gathers, scatters, dt, 0)
 
 
 @shared
-def sweep_shares(mode, visit, s, block, then, gathers, scatters, dt, first, count):
-    """Sweep over `count` shares of the points of a block, from the `first` on."""
+def context_of(s: Setup, dt: Number) -> Context:
+    """Return the context of a sweep that begins now."""
     clock = s.control.clock[0]
     # A little more, so that points are sorted next whenever one did not fit (see run.tiles).
     room = clock.drift_limit - clock.drift - clock.move + 0.5 * ROUNDING
-    context = Context(
+    return Context(
         s.frame, s.kin, s.basis, s.transfer, s.averaging, s.grids, s.nodes, s.buffers.nodes,
         clock.now, real(room, dt), common_velocity(s.kin, clock, dt),
     )  # fmt: skip
-    _visit_all(mode, visit, context, block, then, gathers, scatters, dt, first, count)
 
 
 @point_function()
-def sum_buffers(mode, quantities, s, due):
+def sum_buffers(mode: Tag, quantities: tuple, s: Setup, due: bool) -> None:
     """Sum at the nodes what the points gave of the quantities, if that is due."""
-
-
-@entered
-def _sum_all(mode, quantities, kin, nodes, buffers, due):
-    count = buffers.count[0] if due else 0
-    _sum_shares(mode, count, quantities, kin, nodes, buffers)
 
 
 @sum_buffers.on(Serial)
 @sum_buffers.on(Threaded)
 def _sum_buffers_threaded(mode, quantities, s, due):
-    _sum_all(mode, quantities, s.kin, s.nodes, s.buffers, due)
+    count = s.buffers.count[0] if due else 0
+    _sum_shares(mode, count, quantities, s.kin, s.nodes, s.buffers)
 
 
 @point_function()
-def sweep_nodes(mode, task, kin, nodes, ranges, dt):
-    """Do `task` at every node in use."""
-
-
-@entered
-def _visit_all_nodes(mode, task, kin, nodes, ranges, dt):
-    _visit_shares_of_nodes(mode, ranges[0, 0], task, kin, nodes, ranges, dt)
+def sweep_nodes(
+    mode: Tag, task: Tag, kin: Tag, nodes: Nodes, ranges: np.ndarray, dt: Number
+) -> None:
+    """Do `task` at every node in use; `ranges` as in `Setup`."""
 
 
 @sweep_nodes.on(Serial)
 @sweep_nodes.on(Threaded)
 def _sweep_nodes_threaded(mode, task, kin, nodes, ranges, dt):
-    _visit_all_nodes(mode, task, kin, nodes, ranges, dt)
+    _visit_nodes(mode, ranges[0, 0], task, kin, nodes, ranges, dt)
+
+
+# --- whole sweeps -----------------------------------------------------------------------------
+
+
+@point_function(otherwise=True)
+def sweep_blocks(
+    ranks: Tag,
+    s: Setup,
+    mode: Tag,
+    visit: Visit,
+    then: int,
+    gathers: bool,
+    scatters: bool,
+    dt: Number,
+) -> None:
+    """Sweep over the points of all blocks; begin to pass on what they give to other processes."""
+    for block in s.blocks:
+        sweep_points(mode, visit, s, block, then, gathers, scatters, dt)
+
+
+@shared
+def sweep(
+    s: Setup, mode: Tag, visit: Visit, dt: Number, gathers: bool, scatters: bool, moves: bool
+) -> None:
+    """Visit all points and sum at the nodes what they gave.
+
+    With `moves` new places go to the other array. How the points fared is in the reports of the
+    tiles (`reports.read_reports`).
+    """
+    now = s.control.clock[0].now
+    # Where points give to the nodes themselves, these start from zero.
+    direct = s.buffers.count[1]
+    anew = tuple(quantity for quantity in visit.quantities if not adds(quantity))
+    sum_given(mode, anew, s, scatters & (direct == 1))
+    then = 1 - now if moves else now
+    sweep_blocks(s.control.ranks, s, mode, visit, then, gathers, scatters, dt)
+    sum_given(mode, visit.quantities, s, scatters & (direct == 0))
+
+
+@shared
+def sum_given(mode: Tag, quantities: tuple, s: Setup, due: bool) -> None:
+    """Sum at the nodes what the points gave, here and in other processes, if that is due."""
+    if len(quantities):
+        take_over(s.control.ranks, due & (s.buffers.count[1] == 0))
+        sum_buffers(mode, quantities, s, due)

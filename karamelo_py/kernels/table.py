@@ -49,13 +49,13 @@ class Scatter(NamedTuple):
     weights: NamedTuple = PresentWeights()
 
 
-class Nodes(NamedTuple):
+class NodeTask(NamedTuple):
     """A task at every node in use: its tag, or a function of the setup that makes it."""
 
     task: Any
 
 
-class Call(NamedTuple):
+class SceneTask(NamedTuple):
     """A call ``function(s, mode, hooks)`` of what only some scenes have."""
 
     function: Callable
@@ -169,8 +169,8 @@ def says(row: Any, setup: Any) -> str | None:
         parts = [tag.says for tag in row.visit.tasks if row.gathers]
         parts += [tag.says for tag in row.visit.quantities if row.scatters]
         return ", ".join(parts) + (" in one visit of the points" if len(parts) > 1 else "")
-    if isinstance(row, Nodes):
+    if isinstance(row, NodeTask):
         return getattr(row.task, "says", None)
-    if isinstance(row, Call):
+    if isinstance(row, SceneTask):
         return row.function.says(setup)
     return None

@@ -10,7 +10,7 @@ from math import sqrt
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.loops import subkernel
 from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
-from karamelo_py.kernels.loss import Rubbed, warm_node
+from karamelo_py.kernels.loss import FrictionalHeat, warm_node
 from karamelo_py.kernels.totals import add_to, counts
 from karamelo_py.points.kinematics import dimension
 
@@ -51,7 +51,7 @@ def rub(kin, nodes, programs, held, n, mu, dt, kept, control, slot):
     speed = sqrt(along)
     stop = min(max(mu, 0.0) * sqrt(across), speed)
     # The work of friction, with the mean of the speeds before and after; a wall takes no heat.
-    warm_node(field(nodes.fields, Rubbed), n, stop * (speed - 0.5 * stop))
+    warm_node(field(nodes.fields, FrictionalHeat), n, stop * (speed - 0.5 * stop))
     for c in range(d):
         if _is_free(held, programs, n, c):
             taken = nodes.update[n, c] * (stop / speed)

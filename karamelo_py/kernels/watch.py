@@ -19,8 +19,8 @@ from karamelo_py.compiler.threads import shared_out
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels import totals
 from karamelo_py.kernels.arrays import TIMESTEP, known_to_laws
+from karamelo_py.kernels.lanes import lanes_of_law, points_at_once, points_from
 from karamelo_py.kernels.searching import first_from
-from karamelo_py.kernels.width import lanes_of_law, points_from, width_of
 from karamelo_py.points.kinematics import dimension, free_from
 from karamelo_py.points.laws import (
     dissipated_energy,
@@ -82,7 +82,7 @@ def _solid_of(firsts, number):
 def _look_at_share(kin, points, laws, tiling, firsts, k):
     """Energies, mass and momentum of the points of each tile of the k-th share, for its report."""
     points, laws, tiling = at_hand(points), at_hand(laws), at_hand(tiling)
-    width = lanes_of_law(laws, points.mass)
+    lanes = lanes_of_law(laws, points.mass)
     for place in range(tiling.share[k], tiling.share[k + 1]):
         t = tiling.order[place]
         start, end = tiling.range[t, 0], tiling.range[t, 1]
@@ -90,8 +90,8 @@ def _look_at_share(kin, points, laws, tiling, firsts, k):
         begin, behind = firsts[solid], _behind(firsts, solid)
         kinetic = stored = 0.0
         total = _nothing(kin)
-        for q in range(start, end, width_of(width)):
-            p = points_from(width, q, end)
+        for q in range(start, end, points_at_once(lanes)):
+            p = points_from(lanes, q, end)
             law = record(laws, index(points.material[p]))
             own = of_present(p, points.mass[p])
             state = load(points.state, p, initial_state(law, kin, own))

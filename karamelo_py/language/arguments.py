@@ -55,7 +55,7 @@ class Argument:
 
     @property
     def is_null(self) -> bool:
-        """Whether it is the word NULL."""
+        """Tell if it is the word NULL."""
         return self.text == NULL
 
     def word(self) -> str | None:
@@ -131,13 +131,13 @@ class Argument:
         return evaluate(parse_expression(self._raw), self._raw, _Seeds(self._interpreter, seeds))
 
     def behind(self, count: int) -> Argument:
-        """What follows the first `count` characters."""
+        """Cut off the first `count` characters."""
         return Argument(
             Raw(self._raw.source, self._raw.start + count, self._raw.end), self._interpreter
         )
 
     def knows(self, name: str) -> bool:
-        """Whether a name means something where the argument stands."""
+        """Tell if a name means something where the argument stands."""
         return self._interpreter.knows(name)
 
     def part(self, text: str) -> Argument:
@@ -163,7 +163,7 @@ class _Seeds:
         self.seeds = seeds
 
     def name(self, name: str, node: Any, raw: Raw) -> Value:
-        """What a name stands for; one that means nothing is told with those that do here."""
+        """Find the value of a name; the error of an unknown one lists those that are known here."""
         if name in self.seeds:
             return Expression.seed(name)
         try:
@@ -183,7 +183,7 @@ class _Seeds:
         return self.outer.command(node, raw)
 
     def hides(self, name: str) -> bool:
-        """Whether the script uses the name of a function for something else."""
+        """Tell if the script uses the name of a function for something else."""
         return self.outer.hides(name)
 
 

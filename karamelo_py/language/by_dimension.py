@@ -179,6 +179,6 @@ def finite(hub: Scene, value: float, name: str, argument: Any | None = None) -> 
 
 
 def place_of(names: Sequence[str], arguments: Sequence[Any], name: str):
-    """Where in the script the argument called `name` stands (None if it was not given)."""
+    """Find the place in the script of the argument called `name` (None if it was not given)."""
     index = list(names).index(name)
     return arguments[index].place if index < len(arguments) else None

@@ -15,7 +15,7 @@ from karamelo_py.language.unknown import unknown_call
 from karamelo_py.script.errors import Quit, ScriptError, nearest, plural
 from karamelo_py.script.functions import FUNCTIONS
 from karamelo_py.script.other_programs import instead
-from karamelo_py.script.syntax import Assignment, Call, Statement
+from karamelo_py.script.syntax import Assignment, CommandCall, Statement
 
 MOST = 9
 MOST_OF_TEXT = 200  # a script of another program is wrong in every line
@@ -32,22 +32,18 @@ _RUNS = frozenset({"run", "run_time", "run_until", "run_while", "element"})
 
 
 class Dependents:
-    """What depends on statements that went wrong."""
+    """Names and kinds that depend on statements that went wrong."""
 
     def __init__(self) -> None:
-        self._names: set[str] = set()
+        self.names: set[str] = set()
         # Of what kinds something may be missing, under a name that nobody knows.
         self.kinds: set[str] = set()
-
-    def add(self, names: set[str]) -> None:
-        """Note names, too."""
-        self._names |= names
 
     def note(self, statement: Statement) -> bool:
         """Note what `statement` would have defined; False where nothing can be said any more."""
         if isinstance(statement, Assignment):
-            self._names.add(statement.name)
-        if not isinstance(statement, Call):
+            self.names.add(statement.name)
+        if not isinstance(statement, CommandCall):
             return True
         name = statement.name
         if not registry.knows("command", name):
@@ -55,32 +51,32 @@ class Dependents:
         if name in _BASIS:
             return False
         if name in _SCENE:
-            self._names |= _RUNS
+            self.names |= _RUNS
         if name in _SCENE | _NAMED and statement.arguments:
-            self._names.add(statement.arguments[0].code.strip())
+            self.names.add(statement.arguments[0].code.strip())
         return True
 
-    def _meant(self, name: str, statement: Call) -> str:
-        """The command that one nobody knows stands for; else it is noted what it may have made."""
+    def _meant(self, name: str, statement: CommandCall) -> str:
+        """Guess the command that an unknown one stands for; else note what it may have made."""
         other = instead("command", name)
         if other is None and (close := nearest(name, registry.names("command"))):
             return close
         ID = statement.arguments[0].code.strip() if statement.arguments else ""
         self.kinds |= set(re.findall(r"\b(\w+)\(", other or "")) & (_SCENE | _NAMED)
         if other is None and ID.isidentifier():
-            self._names |= {ID, *_RUNS}
+            self.names |= {ID, *_RUNS}
         elif self.kinds & _SCENE:
-            self._names |= _RUNS
+            self.names |= _RUNS
         return name
 
     def includes(self, statement: Statement) -> bool:
-        """Whether a statement names something of that, such as F or F_x of a fix F."""
+        """Tell if a statement names something of that, such as F or F_x of a fix F."""
         words = re.findall(r"\w+", statement.raw.code)
-        return any(w in self._names or w.rpartition("_")[0] in self._names for w in words)
+        return any(w in self.names or w.rpartition("_")[0] in self.names for w in words)
 
 
 def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
-    """Mistakes in the statements behind the one that failed, in their order.
+    """Find mistakes in the statements behind the one that failed, in their order.
 
     Parameters
     ----------
@@ -111,7 +107,7 @@ def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
         if not dependents.note(wrong):
             passed_over += _rest_of(interpreter)
             break
-        dependents.add(interpreter.presets.blamed)
+        dependents.names |= interpreter.presets.blamed
         wrong = None
         while wrong is None and (statement := interpreter.next_statement()) is not None:
             if dependents.includes(statement):
@@ -133,16 +129,15 @@ def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
 
 
 def _given_twice(message: str) -> tuple[str, bool]:
-    """The kind of what a message is about, and whether it says that an ID was given twice."""
+    """Read the kind that a message is about, and if it says that an ID was given twice."""
     kind, found, _ = message.rpartition(" ID '")
     return kind.rpartition(": ")[2], bool(found) and "' is already used" in message
 
 
 def errors_of_text(interpreter: Any, first: ScriptError) -> list[ScriptError]:
-    """Mistakes in a script whose text is wrong somewhere, behind the first of them.
+    """Find further mistakes in a script whose text is wrong somewhere: in its text and in names.
 
-    What is wrong in its text, and names of commands and styles that are not known. Where there are
-    too many to be read, the last one says how many there are besides.
+    Where there are too many to be read, the last one says how many there are besides.
     """
     found = sorted([*first.others, *misnamed(interpreter, first.statements)], key=_order)
     more = len(found) - MOST_OF_TEXT
@@ -151,12 +146,12 @@ def errors_of_text(interpreter: Any, first: ScriptError) -> list[ScriptError]:
 
 
 def misnamed(interpreter: Any, statements: Iterable[Statement]) -> list[ScriptError]:
-    """What is wrong with the names of commands and styles in statements."""
+    """Find wrong names of commands and styles in statements."""
     statements = list(statements)
     variables = {s.name for s in statements if isinstance(s, Assignment)} | {*interpreter.variables}
     found = []
     for statement in statements:
-        if not isinstance(statement, Call) or statement.name in variables:
+        if not isinstance(statement, CommandCall) or statement.name in variables:
             continue
         try:
             _look_up(interpreter, statement, variables)
@@ -166,7 +161,7 @@ def misnamed(interpreter: Any, statements: Iterable[Statement]) -> list[ScriptEr
     return found
 
 
-def _look_up(interpreter: Any, statement: Call, variables: set[str]) -> None:
+def _look_up(interpreter: Any, statement: CommandCall, variables: set[str]) -> None:
     name, arguments = statement.name, statement.arguments
     if name not in FUNCTIONS and not registry.knows("command", name):
         raise unknown_call(interpreter, name, statement.place, statement=True)
@@ -183,7 +178,7 @@ def _look_up(interpreter: Any, statement: Call, variables: set[str]) -> None:
 
 
 def _rest_of(interpreter: Any) -> list[Statement]:
-    """The statements that are left, up to where the script ends."""
+    """List the statements that are left, up to where the script ends."""
     rest = iter(interpreter.next_statement, None)
     return list(takewhile(lambda statement: statement.raw.code.strip() != "quit", rest))
 

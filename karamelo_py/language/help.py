@@ -9,7 +9,7 @@ from karamelo_py.language import docstrings, signature
 
 @dataclass(frozen=True)
 class Help:
-    """What there is to say about a command or style.
+    """The help about a command or style.
 
     Attributes
     ----------

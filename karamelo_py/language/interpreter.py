@@ -103,12 +103,12 @@ class Interpreter(Meanings):
 
     @property
     def waits(self) -> bool:
-        """Whether a script is in the midst of its statements."""
+        """Tell if a script is in the midst of its statements."""
         return bool(self.frames)
 
     @property
     def has_more(self) -> bool:
-        """Whether statements come behind the present one."""
+        """Tell if statements come behind the present one."""
         return any(frame.next < len(frame.statements) for frame in self.frames)
 
     def include(self, name: str) -> None:
@@ -263,7 +263,7 @@ class Interpreter(Meanings):
             ) from None
 
     def _execute_recorded(self, statement: syntax.Statement) -> None:
-        if isinstance(statement, syntax.Call) and registry.knows("command", statement.name):
+        if isinstance(statement, syntax.CommandCall) and registry.knows("command", statement.name):
             command = registry.find("command", statement.name)
             if getattr(command, "may_differ", False):
                 self._execute(statement)
@@ -288,7 +288,7 @@ class Interpreter(Meanings):
     def _execute(self, statement: syntax.Statement) -> None:
         if isinstance(statement, syntax.Assignment):
             self._assign(statement)
-        elif isinstance(statement, syntax.Call):
+        elif isinstance(statement, syntax.CommandCall):
             self._call(statement)
         else:
             assert isinstance(statement, syntax.Evaluation)
@@ -298,7 +298,7 @@ class Interpreter(Meanings):
             if isinstance(node, syntax.Name) and not self.means_something(node.name):
                 raise unknown_statement(self, node.name)
             if (
-                isinstance(node, syntax.Binary)
+                isinstance(node, syntax.BinaryOperation)
                 and node.operator == "=="
                 and isinstance(node.left, syntax.Name)
             ):
@@ -349,7 +349,7 @@ class Interpreter(Meanings):
 
     # -- calls ------------------------------------------------------------------------------------
 
-    def _call(self, statement: syntax.Call) -> None:
+    def _call(self, statement: syntax.CommandCall) -> None:
         name = statement.name
         if self.hides(name):
             raise unknown_call(self, name, statement.place, statement=True)

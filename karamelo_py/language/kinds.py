@@ -27,7 +27,7 @@ _LARGEST_INTEGER = 2**53
 
 @dataclass(frozen=True)
 class Constraint:
-    """What a number has to fulfil: `text` says it, `holds` decides."""
+    """A condition on a number: `text` says it, `holds` decides."""
 
     text: str
     holds: Callable[[float], bool]
@@ -157,7 +157,7 @@ class Unfit(Exception):
 
 @dataclass(frozen=True)
 class Kind:
-    """What an argument has to be: said in words, and how to make it from an argument.
+    """The kind of an argument: its words, and the way to make a value of it.
 
     `words` are the only ones that fit, where there are such; `family` is that of styles that it
     names.
@@ -201,7 +201,7 @@ def _to_number(hub: Any, argument: Argument) -> float:
 
 
 def _suggest_numbers(argument: Argument, error: ScriptError) -> None:
-    """Where a name is unknown: mean no other that changes in a run, which is no number here."""
+    """Suggest for an unknown name no other that changes in a run, which is no number here."""
     name = re.fullmatch(r"unknown name '(\w+)'", error.message)
     close = re.fullmatch(r"did you mean '(\w+)'\?", error.hint or "")
     if not (name and close) or close[1] in CONSTANTS or "value" in argument.text:
@@ -304,7 +304,7 @@ _SIMPLE = {
 
 
 def kind_of(annotation: Any) -> Kind:
-    """What an annotation asks for.
+    """Find the kind that an annotation asks for.
 
     Raises
     ------
@@ -333,7 +333,7 @@ def kind_of(annotation: Any) -> Kind:
 
 
 def is_raw(kind: Kind) -> bool:
-    """Whether arguments of this kind are left to the callee as they are."""
+    """Tell if arguments of this kind are left to the callee as they are."""
     return kind is _SIMPLE[Argument]
 
 

@@ -1,4 +1,4 @@
-"""What names and calls in expressions mean: variables, published values, functions, commands."""
+"""Meanings of names and calls in expressions: variables, published values, functions, commands."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ from karamelo_py.script import evaluation
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import SEEDS, Expression, Value
 from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, WORDS
-from karamelo_py.script.syntax import Function, Name, Node, Raw
+from karamelo_py.script.syntax import FunctionCall, Name, Node, Raw
 from karamelo_py.script.terms import number_text
 
 
@@ -24,21 +24,21 @@ class Meanings:
         self.variables: dict[str, Value] = {}
 
     def evaluate(self, node: Node, raw: Raw) -> Value:
-        """What an expression stands for now: a number, a text or a formula."""
+        """Evaluate an expression now: to a number, a text or a formula."""
         return evaluation.evaluate(node, raw, self)
 
     def knows(self, name: str) -> bool:
-        """Whether a name means something in an expression."""
+        """Tell if a name means something in an expression."""
         return (
             name in self.variables or name in SEEDS or name in CONSTANTS or name in self.hub.values
         )
 
     def hides(self, name: str) -> bool:
-        """Whether a variable has the name of a function or command, which it hides then."""
+        """Tell if a variable has the name of a function or command, which it hides then."""
         return name in self.variables
 
     def name(self, name: str, node: Name, raw: Raw) -> Value:
-        """What a name in an expression stands for."""
+        """Find the value of a name in an expression."""
         if name in SEEDS:
             return Expression.seed(name)
         if name in self.variables:
@@ -50,11 +50,11 @@ class Meanings:
         raise unknown_name(self, name, evaluation.mark(raw, node))
 
     def means_something(self, name: str) -> bool:
-        """Whether a name can stand in a script here, be it as a call or further down."""
+        """Tell if a name can stand in a script here, be it as a call or further down."""
         known = self.knows(name) or name in WORDS or name in FUNCTIONS
-        return known or registry.knows("command", name) or defined_later(self, name) is not None
+        return known or registry.knows("command", name) or bool(defined_later(self, name, None))
 
-    def command(self, node: Function, raw: Raw) -> Value:
+    def command(self, node: FunctionCall, raw: Raw) -> Value:
         """The value of a call inside an expression that is not a function."""
         name = node.name
         begin = raw.start + node.start

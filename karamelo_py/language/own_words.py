@@ -1,17 +1,14 @@
-"""What to write in the place of older forms of Karamelo, in the words of the script at hand."""
+"""Write lines in the place of older forms of Karamelo, in the words of the script at hand."""
 
 from collections.abc import Sequence
 from typing import Any
 
 from karamelo_py.language import registry
-from karamelo_py.script.other_programs import SHORTER
-from karamelo_py.script.syntax import Call
+from karamelo_py.script.other_programs import table
+from karamelo_py.script.syntax import CommandCall
 
 # Words that stood in the place of the style region in 2020, and what fills the same.
-SHAPES = {
-    "block": "block",
-    "box": "block",
-    "rectangle": "block",
+SHAPES = dict.fromkeys(("block", "box", "rectangle"), "block") | {
     "cylinder": "cylinder",
     "sphere": "sphere",
 }
@@ -19,22 +16,16 @@ FLIPS = ("FLIP", "AFLIP", "ASFLIP")
 
 
 def words_of(statement: Any) -> list[str]:
-    """The arguments of a call, as they are written."""
-    arguments = statement.arguments if isinstance(statement, Call) else ()
+    """List the arguments of a call, as they are written."""
+    arguments = statement.arguments if isinstance(statement, CommandCall) else ()
     return [" ".join(argument.code.split()) for argument in arguments]
 
 
 def in_own_words(script: Any, name: str) -> str | None:
-    """What to write for a command of Karamelo that is not one here; None for other words.
-
-    Parameters
-    ----------
-    script
-        The interpreter of a script that has a call of the command.
-    """
-    calls = [s for frame in script.frames for s in frame.statements if isinstance(s, Call)]
+    """Write the line for a command of Karamelo that a script calls and that is not one here."""
+    calls = [s for frame in script.frames for s in frame.statements if isinstance(s, CommandCall)]
     own = next((call for call in calls if call.name == "method"), None)
-    asked = [c for c in (script.statement, *calls) if isinstance(c, Call) and c.name == name]
+    asked = [c for c in (script.statement, *calls) if isinstance(c, CommandCall) and c.name == name]
     before, rest = words_of(own), words_of(asked[0] if asked else None)
     where = f"in the place of line {own.place.line}" if own else "before the first solid"
     if name == "method_modify" and rest:
@@ -54,7 +45,7 @@ def in_own_words(script: Any, name: str) -> str | None:
 
 
 def filled(statement: Any) -> str | None:
-    """A region and a solid for ``solid(ID, block, xlo, ..., ppc, material, h)``."""
+    """Write a region and a solid for ``solid(ID, block, xlo, ..., ppc, material, h)``."""
     ID, shape, *numbers = words_of(statement)
     if len(numbers) < 6 or shape not in SHAPES:
         return None
@@ -63,20 +54,12 @@ def filled(statement: Any) -> str | None:
 
 
 def longer(name: str, given: Sequence[Any]) -> str | None:
-    """The line for a law that was written with fewer arguments, such as ``eos shock``.
-
-    Parameters
-    ----------
-    name
-        Family and style.
-    given
-        What stands behind the style.
-    """
-    forms = SHORTER.get(name)
+    """Write the line of a law (`name`: ``eos shock``) that was `given` fewer arguments."""
+    forms = table()["shorter"].get(name)
     if forms is None or not given:
         return None
     family, style = name.split()
-    says, line = forms.get(len(given), forms[None])
+    says, line = forms.get(str(len(given)), forms["else"])
     ID = words_of(given[0].statement)[:1] or ["ID"]
-    words = ", ".join(line).format(*(argument.text for argument in given))
+    words = line.format(*(argument.text for argument in given))
     return f"{says}{family}({ID[0]}, {style}, {words})"

@@ -12,7 +12,7 @@ from karamelo_py.script.errors import ScriptError, meant
 from karamelo_py.script.expressions import Value
 from karamelo_py.script.parser import parse, parse_text
 from karamelo_py.script.reading import read_script
-from karamelo_py.script.syntax import Assignment, Call, Statement
+from karamelo_py.script.syntax import Assignment, CommandCall, Statement
 
 _WORD = r"[^\W\d]\w*"
 
@@ -134,7 +134,7 @@ class Presets(dict[str, str]):
         for statement in statements:
             if isinstance(statement, Assignment):
                 assigned[statement.name] = None
-            elif isinstance(statement, Call) and statement.name == "include":
+            elif isinstance(statement, CommandCall) and statement.name == "include":
                 if not statement.arguments:
                     return False
                 path = self._script.included(statement.arguments[0].code.strip(' "'), folder)

@@ -64,12 +64,12 @@ def names(family: str) -> list[str]:
 
 
 def knows(family: str, name: str) -> bool:
-    """Whether `family` has a style of this name (which may still be broken)."""
+    """Tell if `family` has a style of this name (which may still be broken)."""
     return name in _families().get(family, {})
 
 
 def name_of(family: str, style: type) -> str:
-    """What a script calls a class, or the style beside it in its file; else the class's name."""
+    """Find the style's name of a class, or of its file; else the class's own name."""
     for value in (f"{style.__module__}:{style.__qualname__}", f"{style.__module__}:"):
         for name, entries in _families().get(family, {}).items():
             if any(entry.value.startswith(value) for entry in entries):

@@ -16,7 +16,7 @@ def spelled(statement: Statement) -> str:
 
 
 class Record:
-    """What a script has done so far.
+    """The statements that a script has done so far.
 
     Commands that only say how a run goes on or what it writes (``may_differ``) are not in it.
 
@@ -61,7 +61,7 @@ class Replay:
 
     @property
     def at_end(self) -> bool:
-        """Whether the present statement is the last of the record."""
+        """Tell if the present statement is the last of the record."""
         return self.number == len(self.record.statements) - 1
 
     def next(self, text: str, place: Place | None) -> None:
@@ -82,7 +82,7 @@ class Replay:
             raise error
 
     def _longer_by(self, before: str, text: str) -> str | None:
-        """How a run that was in progress is given the length that a variable of it now has."""
+        """Give a run that was in progress the length that a variable of it now has."""
         run = self.record.statements[-1]
         name, assigns, value = text.partition("=")
         if not (assigns and name.isidentifier() and before.startswith(f"{name}=") and self.within):
@@ -93,7 +93,7 @@ class Replay:
         return f"leave {before} as it was here, and write {longer} in the place of {run}"
 
     def value(self) -> float:
-        """What the next value(...) of the present statement gave."""
+        """Look up the number that the next value(...) of the present statement gave."""
         return self._values.pop(0) if self._values else nan
 
     def other_script(self, message: str, place: Place | None = None) -> ScriptError:

@@ -1,4 +1,4 @@
-"""What parts below the hub may ask of the scene that they belong to."""
+"""The scene as parts below the hub may ask it."""
 
 from pathlib import Path
 from typing import Any, Protocol

@@ -22,7 +22,7 @@ from typing import Any, Literal, get_type_hints
 
 from karamelo_py.language import registry
 from karamelo_py.language.arguments import NULL, NUMBER, Argument, with_gap
-from karamelo_py.language.faults import told
+from karamelo_py.language.faults import as_script_error
 from karamelo_py.language.kinds import (
     AtLeast,
     Constraint,
@@ -39,7 +39,7 @@ from karamelo_py.language.kinds import (
 )
 from karamelo_py.language.own_words import longer
 from karamelo_py.script.errors import Place, ScriptError, meant, nearest
-from karamelo_py.script.other_programs import OTHERWISE, SURPLUS
+from karamelo_py.script.other_programs import table
 
 __all__ = [
     "Argument", "AtLeast", "Constraint", "In", "InputFile", "NonNegative", "OutputFile", "Positive",
@@ -61,7 +61,7 @@ class Parameter:
 
     @property
     def shown(self) -> str:
-        """How it appears in a line of syntax."""
+        """Write it as in a line of syntax."""
         if self.keyword:
             return f"{self.name}={'|'.join(self.kind.words) or self.name}"
         if len(self.kind.words) == 1:
@@ -96,7 +96,7 @@ def parameters(target: Callable) -> list[Parameter]:
 
 
 def is_record(target: Any) -> bool:
-    """Whether a style is a NamedTuple, a tag that needs no hub.
+    """Tell if a style is a NamedTuple, a tag that needs no hub.
 
     Its fields are its arguments, or those of its classmethod ``given`` where it has one. A method
     ``checked`` returns what is used in its place.
@@ -181,9 +181,9 @@ def make(target: Callable, hub: Any, name: str, *values: Any, **named: Any) -> A
     if not inspect.isclass(target):
         if target.__module__.startswith(registry.PREFIX):
             return target(hub, *values, **named)
-        with told(name, "it", target, getattr(hub, "place", None)):
+        with as_script_error(name, "it", target, getattr(hub, "place", None)):
             return target(hub, *values, **named)
-    with told(name, "__init__", target, getattr(hub, "place", None)):
+    with as_script_error(name, "__init__", target, getattr(hub, "place", None)):
         if not is_record(target):
             return target(hub, *values, **named)
         made = getattr(target, "given", target)(*values, **named)
@@ -220,11 +220,13 @@ def _bind(
     if len(given) < needed or missing or (variadic is None and len(given) > len(slots)):
         surplus = given[len(slots)] if len(given) > len(slots) and not variadic else None
         gap = with_gap(given)
-        hint = longer(name, given) or OTHERWISE.get(name) if len(given) < needed else None
+        hint = (
+            longer(name, given) or table()["otherwise"].get(name) if len(given) < needed else None
+        )
         if surplus is not None:
             values = {word: f"{p.name}={word}" for p in by_name.values() for word in p.kind.words}
             word = surplus.text if surplus.text in values else nearest(surplus.text, values)
-            hint = values.get(word or "", hint) or SURPLUS.get(name)
+            hint = values.get(word or "", hint) or table()["surplus"].get(name)
         if gap:
             hint = f"is a comma missing in '{gap.text}'?"
         left_out = _left_out(slots[:needed], given) if len(given) < needed and not gap else []
@@ -261,7 +263,7 @@ def _left_out(slots: list[Parameter], given: Sequence[Argument]) -> list[Paramet
 
 
 def _named(missing: list[Parameter], slots: list[Parameter]) -> list[str]:
-    """What is missing; the ID of what a word of its own stands before is no second such word."""
+    """List what is missing; an ID behind a word of its own is no second such word."""
     words = {p.shown for p in slots if p.shown != p.name}
     return [f"{p.name}ID" if p.shown == p.name in words else p.shown for p in missing]
 
@@ -269,7 +271,7 @@ def _named(missing: list[Parameter], slots: list[Parameter]) -> list[str]:
 def _filled(
     slots: list[Parameter], given: Sequence[Argument], missing: list[Parameter]
 ) -> tuple[Argument | None, str | None]:
-    """What stands in the place of the first that is missing; all arguments, if words fill them."""
+    """Find what stands in the place of the first that is missing; fill words into all arguments."""
     rest, before = iter(given), next(k for k, slot in enumerate(slots) if slot in missing)
     words = [p.kind.words[0] if p in missing and p.kind.words else p in missing for p in slots]
     if True in words:
@@ -294,7 +296,7 @@ def _unknown_keyword(
 
 
 def convert(hub: Any, parameter: Parameter, argument: Argument, number: int | None = None) -> Any:
-    """What an argument, the one of this number, stands for as the value of a parameter.
+    """Convert an argument, the one of this number, to the value of a parameter.
 
     Raises
     ------
@@ -316,7 +318,7 @@ def convert(hub: Any, parameter: Parameter, argument: Argument, number: int | No
 def _swapped(
     hub: Any, expected: list[Parameter], bound: dict[str, list[Argument]], wrong: Parameter
 ) -> str | None:
-    """What to say where another argument does not fit, either, and each fits in its place."""
+    """Write the hint for two arguments of which each fits in the place of the other."""
 
     def fits(parameter: Parameter, argument: Argument) -> bool:
         kind = parameter.kind

@@ -1,4 +1,4 @@
-"""What the user sees on the terminal: banner, log lines, progress, warnings, the table at the end.
+"""Output on the terminal: banner, log lines, progress, warnings, the table at the end.
 
 On a terminal Rich draws a live bar; into a pipe or a file go the same facts as plain lines. Every
 line is flushed.
@@ -68,7 +68,7 @@ class Console:
 
     @property
     def terminal(self) -> bool:
-        """Whether somebody looks at it live."""
+        """Tell if somebody looks at it live."""
         if self._terminal is None:
             isatty = getattr(self.out, "isatty", None)
             self._terminal = bool(isatty and isatty()) and os.environ.get("TERM") != "dumb"

@@ -118,18 +118,6 @@ class Fields(PointTable):
         """
         return self._simulation.each(part, name, *arguments)
 
-    def counted(self, part: Any, name: str, size: int, *arguments: Any) -> np.ndarray:
-        """How many points of a part's group have each of `size` numbers, which its method says."""
-        return self._simulation.counted_of(part, name, size, *arguments)
-
-    def in_order(self, part: Any, name: str, *arguments: Any) -> Iterator[np.ndarray]:
-        """Rows (k, n) of the points of a part's group in the order of their keys, some at a time.
-
-        Its method says both, keys (n,) and rows, of fields of some of the points. Keys are whole
-        numbers, no two alike. How many come together depends on processes; the first gets them.
-        """
-        return self._simulation.in_order(part, name, *arguments)
-
     def particle_names(self) -> list[str]:
         """Names that `particle` knows."""
         own = [*sorted(self.columns_of_laws()), *self.declared_columns()]

@@ -47,7 +47,7 @@ class Log(Rhythmic):
 
     @property
     def path(self) -> Path:
-        """Where it is written."""
+        """The file of the log."""
         return self.hub.folder / self.file
 
     def default(self) -> None:
@@ -163,7 +163,7 @@ class Log(Rhythmic):
 
 
 def _is_log(path: Path) -> bool:
-    """Whether what is there, if anything, looks like a log: names, then numbers."""
+    """Tell if what is there, if anything, looks like a log: names, then numbers."""
     try:
         with path.open(encoding="utf-8") as file:
             lines = [file.readline(1 << 16) for _ in range(4)]
@@ -206,7 +206,7 @@ def _row(cells: list[str], widths: list[int]) -> str:
 
 
 def begins_anew(path: Path) -> str:
-    """What is said where a run that goes on does not find this file of the one before."""
+    """Write the warning of a run that goes on without this file of the one before."""
     if not path.is_file():
         return f"there is no {path} of the run that is gone on from: it begins anew"
     return f"{path} is not as the run left it that is gone on from: it begins anew"

@@ -1,4 +1,4 @@
-"""What a log line or a plot reads at each output: anything with a name."""
+"""Quantities that a log line or a plot reads at each output: anything with a name."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
 from karamelo_py.script.errors import ScriptError, meant
 from karamelo_py.script.expressions import POINT_SEEDS
-from karamelo_py.script.other_programs import ENERGIES
+from karamelo_py.script.other_programs import table
 
 KEYWORDS = {"step": "Step", "dt": "dt", "time": "Time"}
 LIMIT = "limit"  # the log shows the name of what limits the step
@@ -79,7 +79,9 @@ class Quantity:
             if error.message == f"unknown name '{text}'":
                 error.expected = "one of " + ", ".join(dict.fromkeys(cls.names(hub)))
                 if not (error.hint or "").startswith("did you mean"):
-                    error.hint = ENERGIES.get(text) or meant(text, KEYWORDS) or error.hint
+                    error.hint = (
+                        table()["energies"].get(text) or meant(text, KEYWORDS) or error.hint
+                    )
                 if text in hub.fields.particle_names():
                     error.hint = (
                         f"{text} differs from point to point: dump(...) writes it, and "

@@ -1,4 +1,4 @@
-"""How often something is written: every so many steps, or whenever so much time has passed."""
+"""Rhythms of output: every so many steps, or whenever so much time has passed."""
 
 import re
 from math import ceil, floor, isfinite
@@ -24,7 +24,7 @@ class ByTime:
         self.passed = -1
 
     def now(self, time: float) -> int:
-        """How many multiples there have been at `time`; a sum of steps falls short by round-off."""
+        """Count the multiples up to `time`; a sum of steps falls short by round-off."""
         return floor(time / self.span * (1 + 1e-12) + 1e-9)
 
 
@@ -53,7 +53,7 @@ class Every:
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> int | ByTime:
-        """What the argument says."""
+        """Read the rhythm from an argument."""
         match = _BY_TIME.fullmatch(argument.text)
         if not match:
             return _STEPS.convert(hub, argument)
@@ -66,7 +66,7 @@ class Every:
 
 
 def is_due(every: int | ByTime, step: int, time: float) -> bool:
-    """Whether the present state is one to be written."""
+    """Tell if the present state is one to be written."""
     if isinstance(every, ByTime):
         return every.now(time) > every.passed
     return step % every == 0

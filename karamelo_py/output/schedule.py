@@ -6,7 +6,7 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import Any, Protocol
 
-from karamelo_py.language.faults import told
+from karamelo_py.language.faults import as_script_error
 from karamelo_py.language.scene import Scene
 from karamelo_py.output.log import Log
 from karamelo_py.output.plots import Plots
@@ -188,7 +188,9 @@ class Output:
         style = getattr(item, "style", "")
         if not self.hub.settings.comm.leads:
             what = "take_part" if hasattr(item, "take_part") else what
-        with told(f"dump {style}", what, type(item), item.place) if style else nullcontext():
+        place = getattr(item, "place", None)
+        naming = as_script_error(f"dump {style}", what, type(item), place)
+        with naming if style else nullcontext():
             getattr(item, what)()
 
     def _items(self) -> list[Periodic]:
@@ -207,7 +209,7 @@ def _located(error: ScriptError, item: Any) -> ScriptError:
 
 
 def _may_be(path: Path, other: Path) -> bool:
-    """Whether `path`, whose first ``*`` becomes a number, may come to be the file `other`."""
+    """Tell if `path`, whose first ``*`` becomes a number, may come to be the file `other`."""
     if "*" not in str(path):
         try:
             return path.resolve() == other.resolve() or path.samefile(other)

@@ -11,7 +11,7 @@ from karamelo_py.output.fields import PIECE
 from karamelo_py.run.tiles.distinct import distinct
 
 
-class Motion(NamedTuple):
+class BodyMotion(NamedTuple):
     """A solid with points.
 
     Attributes
@@ -80,7 +80,7 @@ class Motion(NamedTuple):
         return float(np.abs(np.linalg.eigvalsh(gradient + gradient.T)).max()) / 2
 
 
-def motions(simulation: Any) -> list[Motion]:
+def motions(simulation: Any) -> list[BodyMotion]:
     """How all solids with points move, as all processes know it.
 
     Each looks at its own points, so many at a time; sums are without rounding.
@@ -104,7 +104,7 @@ def motions(simulation: Any) -> list[Motion]:
         moments = np.array(sums[2 * d :]).reshape(d, 2 * d) - mass * np.outer(mean[:d], mean)
         high, fast, low, slow = end.reshape(4, d) * [[1], [1], [-1], [-1]]
         found.append(
-            Motion(
+            BodyMotion(
                 k, mass, mean[:d], mean[d:], moments[:, :d], moments[:, d:], low, high, slow, fast
             )
         )

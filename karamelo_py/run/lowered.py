@@ -16,24 +16,15 @@ from karamelo_py.kernels.clock import step_size
 from karamelo_py.kernels.conduction import show_heat
 from karamelo_py.kernels.nodes import SumsToVelocity
 from karamelo_py.kernels.p2g import Force
-from karamelo_py.kernels.passes import sweep
+from karamelo_py.kernels.reports import all_well
 from karamelo_py.kernels.rows import SUMS
-from karamelo_py.kernels.sweep import Visit, sweep_nodes
+from karamelo_py.kernels.sweep import Visit, sweep, sweep_nodes
 from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.plastic_rate import without_rate
 from karamelo_py.run.access.nodes_by_number import ByNumber
 from karamelo_py.run.access.points_by_id import ById
+from karamelo_py.run.checkpoint import arrays as checkpoint
 from karamelo_py.run.checkpoint import part_state
-from karamelo_py.run.checkpoint.arrays import (
-    Stored,
-    changing,
-    copied,
-    go_back,
-    opened,
-    stored,
-    stored_copies,
-    take_arrays,
-)
 from karamelo_py.run.lower.build import State, lower, thread_count, warms_by_friction
 from karamelo_py.run.lower.check_plugins import try_parts
 from karamelo_py.run.lower.memory import check_room, no_room
@@ -238,6 +229,7 @@ class Lowered(ById, ByNumber):
         dt = step_size(s)
         visit = Visit((), SUMS.quantities, SUMS.weights)
         sweep(s, self.mode, visit, dt, False, True, False)
+        all_well(s)
         sweep_nodes(self.mode, SumsToVelocity(), s.kin, s.nodes, s.ranges, dt)
         show_heat(s.heat, s, self.mode)
 
@@ -246,42 +238,47 @@ class Lowered(ById, ByNumber):
 
         The copies of the snapshot `before`, which is lost, are used again where they fit.
         """
-        found = copied(self, before or {})
+        found = checkpoint.copied(self, before or {})
         return found if self.subdomain is None else found | {"owner": self.tiles.owner}
 
     def restore(self, snapshot: dict[str, np.ndarray]) -> None:
         """Return to a snapshot."""
         if self.subdomain is not None:
             self.tiles.owner = snapshot["owner"]
-        go_back(self, snapshot)
+        checkpoint.restore(self, snapshot)
         self.version += 1
 
-    def stored(self) -> Iterator[Stored]:
+    def stored(self) -> Iterator[checkpoint.Stored]:
         """What a file to go on from holds, array by array."""
-        return stored(self) if self.subdomain is None else part_state.stored(self)
+        if self.subdomain is None:
+            return checkpoint.stored(self)
+        return part_state.stored(self)
 
-    def stored_snapshot(self, snapshot: dict[str, np.ndarray]) -> Iterator[Stored]:
+    def stored_snapshot(self, snapshot: dict[str, np.ndarray]) -> Iterator[checkpoint.Stored]:
         """What such a file holds of a snapshot."""
         if self.subdomain is None:
-            return stored_copies(snapshot)
-        return part_state.stored_snapshot(self, snapshot)
+            return checkpoint.in_file(snapshot)
+        return part_state.stored(self, snapshot)
 
     def take_snapshot(self, path: Path) -> dict[str, np.ndarray]:
-        """The snapshot that a file holds."""
-        if self.subdomain is not None:
-            return part_state.take_snapshot(self, path)
-        with opened(path, "good") as found:
+        """The snapshot that a file holds; each process reads its own share."""
+        with checkpoint.opened(path, "good") as found:
+            if self.subdomain is not None:
+                return part_state.own_share(self, found)
             # In the order in which copies are made, and written.
-            names = dict.fromkeys([*(name for name, _ in changing(self)), "values", *found])
-            return {name: found[name][()] for name in names}
+            names = [*(name for name, _ in checkpoint.changing(self)), "values", *found]
+            return {name: found[name][()] for name in dict.fromkeys(names)}
 
     def take_stored(self, path: Path) -> None:
         """Take the state that a file to go on from holds; each process reads its own share."""
-        if self.subdomain is not None:
-            part_state.take_stored(self, path)
-            return
-        with opened(path) as state:
-            take_arrays(self, {name: array[()] for name, array in state.items()})
+        with checkpoint.opened(path) as state, self.comm.joint():
+            shared = self.subdomain is not None
+            # Nothing of the arrays changes where the file is of another scene.
+            for k, block in enumerate(self.setup.blocks):
+                checkpoint.check_points(block.points, state, f"points/{k}/")
+            self.restore(part_state.own_share(self, state) if shared else state)
+            checkpoint.take_known(self, state)
+            (part_state if shared else checkpoint).take_nodes(self, state)
 
     def wrong_points(self) -> Iterator[tuple[Any, int]]:
         """Block and index of points at hand that the last sweep found wrong, one a tile at most."""

@@ -8,31 +8,21 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.kernels.step import DONE, STOPPED
-from karamelo_py.run.advice import known_failures, steps
+from karamelo_py.run.advice import known_failures, large_steps
 from karamelo_py.run.advice.report import bytes_per_point, report
 from karamelo_py.run.advice.resting import warn_about_length
-from karamelo_py.run.checkpoint import restart_file
-from karamelo_py.run.checkpoint.rollback import Marks
-from karamelo_py.run.diagnosis import energy, explain
+from karamelo_py.run.diagnosis import energy
 from karamelo_py.run.lower.build import check_scene
 from karamelo_py.run.mpi.comm import check_same_run, handled_signals
+from karamelo_py.run.recovery import CHUNK, RollBack
 from karamelo_py.run.simulation import Simulation
-from karamelo_py.run.timestep import (
-    own_step_instead,
-    ruling_limit,
-    words_of_own_step,
-    words_of_share,
-)
-from karamelo_py.run.timings import Spent
+from karamelo_py.run.timestep import ruling_limit, words_of_own_step, words_of_share
+from karamelo_py.run.timings import Timings
 from karamelo_py.scene import boundary
-from karamelo_py.scene.blame import blamed
 from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.plugins import attributed
 from karamelo_py.script.errors import Pause, Quit, ScriptError, render_message
 
-CHUNK = 100  # steps between two looks at the run, and between two snapshots, at most
-HALVINGS = 5  # at most, in a run
-RETURNS = 2  # at most, to one state from where energy grows: what two halves do not mend stays
 PATIENCE = 0.3  # seconds between two looks, about: for Ctrl-C and the progress bar
 
 
@@ -40,10 +30,85 @@ class Interrupted(Exception):
     """The user pressed Ctrl-C, or another signal (its number) came; everything is written."""
 
 
-class Runner:
-    """Runs a scene for a number of steps, to a time, or by a condition."""
+def carry_out(hub: Hub, **length: Any) -> None:
+    """Carry out a run command of a `length` (see `Runner`), or what stands for it now.
 
-    remembers = ("halvings", "good", "returns")
+    A rehearsal takes note of it, a program stops in front of it, and ``check`` reports in its
+    place; a run that was over in the file that a script goes on from is passed over.
+    """
+    runner = Runner(hub, **length)
+    check_scene(hub)
+    runner.check_condition()
+    if hub.rehearsing:
+        _note_in_rehearsal(runner)
+        return
+    if hub.pausing:
+        raise Pause
+    hub.begun = True
+    hub.rehearse()
+    if hub.checking:
+        report(hub, runner.end_time)
+        runner.warn(hub.simulation)
+        raise Quit
+    replay = hub.interpreter.replay
+    if replay is not None and not replay.at_end:
+        _pass_over(hub)
+    else:
+        runner.run()
+
+
+def _note_in_rehearsal(runner: "Runner") -> None:
+    """Note what the run asks for, and what acts in it."""
+    hub = runner.hub
+    span = runner.end_time - hub.update.time, inf if runner.steps is None else runner.steps
+    hub.later.append(large_steps.step_of(hub, runner.rollback.halve, span))
+    hub.in_runs += hub.lasting()
+
+
+def _pass_over(hub: Hub) -> None:
+    """Take the values of a run that was over in the file that a script goes on from."""
+    after = hub.restart.runs[len(hub.runs)]
+    for name, value in after.items():
+        if name in hub.values:
+            hub.values.set(name, value)
+    hub.runs.append(after)
+
+
+class ChunkLength:
+    """The number of steps between two looks at a run, at most `longest`."""
+
+    def __init__(self, longest: int = CHUNK):
+        self.longest = longest
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin with single steps."""
+        self.steps = 1
+
+    def end(self, step: int) -> int:
+        """Return where a chunk from `step` on ends: at a state that may be kept, at the latest."""
+        return min(step + self.steps, (step // CHUNK + 1) * CHUNK)
+
+    def next(self, elapsed: float, taken: int) -> None:
+        """Choose the next one, from the seconds that a number of steps took."""
+        steps = PATIENCE * max(taken, 1) / max(elapsed, 1e-9)
+        self.steps = int(min(self.longest, max(1, steps)))
+
+
+class Runner:
+    """Runs a scene for a number of steps, to a time, or by a condition.
+
+    Parameters
+    ----------
+    hub
+        The scene.
+    steps, end_time, condition
+        What ends the run: a number of steps, a time, or a formula.
+    until
+        Whether the run ends where the condition holds; else where it does not.
+    halve
+        Whether to go back and halve the step where it goes wrong.
+    """
 
     def __init__(
         self,
@@ -60,80 +125,28 @@ class Runner:
         self.end_time = end_time
         self.condition = condition
         self.until = until
-        self.halve = halve
-        self.halvings = 0
-        self.returns = 0  # to the last good state, since energy grew from there on
-        self.marks = Marks(hub)  # of that state and of later ones
-        self.memories: restart_file.Memories | None = None  # of that state, from a file
-        self.snapshot: dict[str, np.ndarray] = {}  # of the last good state
-        self.kept = -1  # its step
-        self.begun_at = -1  # the step of the start of this run, where its state is at hand
-        self.smaller = ""  # what to write for a step that was above the stable limit there
+        self.rollback = RollBack(hub, halve=halve)
         self.place = hub.place
-        self.spent = Spent(hub)
+        self.timings = Timings(hub)
         self.signal = 0  # that this process has been sent
         self.interrupted = 0  # the signal that all processes end with
 
     def run(self) -> None:
-        """Do it."""
+        """Take the steps."""
         hub = self.hub
-        check_scene(hub)
-        self._check_condition()
-        if hub.rehearsing:
-            span = self.end_time - hub.update.time, inf if self.steps is None else self.steps
-            hub.later.append(steps.step_of(hub, self.halve, span))
-            hub.in_runs += hub.lasting()
-            return
-        if hub.pausing:
-            raise Pause
-        hub.begun = True
-        hub.rehearse()
-        if hub.checking:
-            report(hub, self.end_time)
-            known_failures.warn(hub, hub.simulation, self.duration, self.halve)
-            warn_about_length(hub, hub.simulation, self.end_time)
-            raise Quit
-        replay = hub.interpreter.replay
-        if replay is not None and not replay.at_end:
-            self._pass_over()
-            return
         hub.running = self
         try:
             check_same_run(hub)
-            with self.spent.telling_of_compilation(), blamed(hub):
+            with self.timings.telling_of_compilation(), attributed(hub):
                 self._run(hub.simulation)
         finally:
             hub.running = None
-        hub.runs.append(self._values())
+        hub.runs.append({name: hub.values.get(name) for name in hub.values.names()})
 
-    def _values(self) -> dict[str, float]:
-        return {name: self.hub.values.get(name) for name in self.hub.values.names()}
-
-    def _pass_over(self) -> None:
-        """A run that was over when the state was written that the script goes on from."""
-        after = self.hub.restart.runs[len(self.hub.runs)]
-        for name, value in after.items():
-            if name in self.hub.values:
-                self.hub.values.set(name, value)
-        self.hub.runs.append(after)
-
-    @property
-    def good(self) -> tuple[int, restart_file.Memories] | None:
-        """The last good state, for files that hold its snapshot, too: a run may go back to it."""
-        if not (self.halve and self.snapshot):
-            return None
-        with self.marks.at(self.kept):
-            return self.kept, restart_file.memories(self.hub)
-
-    @good.setter
-    def good(self, state: tuple[int, restart_file.Memories] | None) -> None:
-        if state is not None:
-            self.kept, self.memories = state
-
-    def _keep(self, simulation: Simulation) -> None:
-        self.snapshot, self.kept = simulation.snapshot(self.snapshot), simulation.step
-        self.returns = 0
-        self.marks.begin()
+    def warn(self, simulation: Simulation) -> None:
+        """Warn of what is known to go wrong in this run, and of one that is very long."""
+        known_failures.warn(self.hub, simulation, self.duration, self.rollback.halve)
+        warn_about_length(self.hub, simulation, self.end_time)
 
     @property
     def duration(self) -> float:
@@ -142,7 +155,8 @@ class Runner:
         steps = inf if self.steps is None else self.steps * simulation.dt
         return min(self.end_time - simulation.time, steps)
 
-    def _check_condition(self) -> None:
+    def check_condition(self) -> None:
+        """Refuse a condition that differs from point to point."""
         names = self.condition.names if self.condition is not None else frozenset()
         per_point = names & {"x", "y", "z", "x0", "y0", "z0"}
         if per_point:
@@ -155,37 +169,26 @@ class Runner:
     def _run(self, simulation: Simulation) -> None:
         hub = self.hub
         started = time.perf_counter()
-        first_step, first_time = simulation.step, simulation.time
-        going_on = hub.restart is not None
+        self.first_step, self.first_time = simulation.step, simulation.time
+        self.last_step = inf if self.steps is None else self.first_step + self.steps
+        ruined, going_on = False, hub.restart is not None
         if going_on:
-            file = hub.restart.path
-            hub.restart.take(hub, outputs=True)
-            hub.restart = hub.interpreter.replay = None
-            ruined = not simulation.control.clock[0].watch_limit and simulation.step > first_step
-            simulation.go_on(self.end_time, self.halvings)
-            if not self.halvings:  # else the step is not that of the script
-                steps.warn_about_steps(hub, simulation, self.halve, again=True)
-            self._tell_of_no_step_left(file, simulation, first_step)
+            ruined = self._take_up(simulation)
         else:
-            ruined = False
             simulation.begin(self.end_time)
-            known_failures.warn(hub, simulation, self.duration, self.halve)
-            warn_about_length(hub, simulation, self.end_time)
-        if not simulation.control.clock[0].watch_limit:
-            # Said of the first state: a later one is ruined, and its limit with it.
-            self.smaller = "a smaller step" if ruined else own_step_instead(hub)
+            self.warn(simulation)
         simulation.compile()
         began = simulation.step
-        # Points that are deleted would not come back.
-        self.begun_at = -1 if ruined or hub.update.boundary == "delete" else began
         self._banner(simulation, going_on)
         with handled_signals(self._note):
-            with self.spent.counted("output"):
+            with self.timings.counted("output"):
                 hub.output.begin(within=going_on)
             hub.console.begin_run(simulation.step, 0.0)
             try:
-                self._loop(simulation, first_step, first_time)
-                with self.spent.counted("output"):
+                looks = self.condition is not None
+                self.rollback.begin(simulation, self.first_step, ruined=ruined, looks_always=looks)
+                self._loop(simulation)
+                with self.timings.counted("output"):
                     hub.console.end_run()
                     if self.interrupted:
                         # Before the last state of this run is written, which a longer one has not.
@@ -199,21 +202,29 @@ class Runner:
         if self.interrupted:
             raise Interrupted(self.interrupted)
 
-    def _tell_of_no_step_left(self, file: Path, simulation: Simulation, first_step: int) -> None:
+    def _take_up(self, simulation: Simulation) -> bool:
+        """Take the state of a file; say whether a step above the limit has spoilt it."""
+        hub, file = self.hub, self.hub.restart.path
+        hub.restart.take(hub, outputs=True)
+        hub.restart = hub.interpreter.replay = None
+        watched = simulation.control.clock[0].watch_limit
+        ruined = not watched and simulation.step > self.first_step
+        simulation.go_on(self.end_time, self.rollback.halvings)
+        if not self.rollback.halvings:  # else the step is not that of the script
+            large_steps.warn_about_steps(hub, simulation, self.rollback.halve, again=True)
+        self._tell_of_no_step_left(file, simulation)
+        return ruined
+
+    def _tell_of_no_step_left(self, file: Path, simulation: Simulation) -> None:
         """Say so where a file holds the end of this run already, or what comes behind it."""
-        step, time = simulation.step, simulation.time
-        last_step = first_step + self.steps if self.steps is not None else inf
+        step, time, last_step = simulation.step, simulation.time, self.last_step
         holds = f"{file} holds step {step}, time {time:.6g}"
         hint = "a longer run, or a file from before its end"
         if step > last_step or time > self.end_time:
             end = f"step {last_step}" if step > last_step else f"time {self.end_time:.6g}"
             message = f"{holds}, which is beyond the end of this run, {end}: it takes no step"
             self.hub.warn(message, hint=hint, place=self.place)
-        elif (
-            step == last_step
-            or time == self.end_time
-            or (self.condition is not None and not self._goes_on())
-        ):
+        elif step == last_step or time == self.end_time or not self._condition_allows():
             message = f"{holds}, the end of this run: it takes no further step"
             self.hub.console.say(render_message("note", message, hint=hint))
 
@@ -227,110 +238,50 @@ class Runner:
             place=self.place,
         )
 
-    def _loop(self, simulation: Simulation, first_step: int, first_time: float) -> None:
-        hub, output, spent = self.hub, self.hub.output, self.spent
-        last_step = first_step + self.steps if self.steps is not None else inf
-        chunk = 1
-        if not self.snapshot:
-            self._keep(simulation)
-        elif self.memories is not None:
-            self.marks.begin_from(self.kept, self.memories)
-        while simulation.step < last_step and simulation.time < self.end_time:
-            if self.condition is not None and not self._goes_on():
-                if simulation.step == first_step:
-                    self._tell_of_no_first_step()
-                break
-            self._agree(simulation)
-            if self.interrupted:
-                break
-            step = simulation.step
-            # When snapshots are taken must not depend on how fast steps are: runs go back to them.
-            look = (step // CHUNK + 1) * CHUNK
-            target = min(output.next_step(step), last_step, step + chunk, look)
-            if self.condition is not None:
-                target = step + 1
-            due = step != self.kept and (step % CHUNK == 0 or step == first_step + 1)
-            if due and not self._keeps_start(simulation) and energy.grown_little(simulation):
-                self._keep(simulation)
-            elif not self._keeps_start(simulation):  # whose rows are not gone back to
-                self.marks.note(always=self.condition is not None)
-            compiled, before = (spent.on[name][0] for name in ("compilation", "steps"))
-            with spent.counted("steps"):
-                status = simulation.advance(int(target) - step)
+    def _loop(self, simulation: Simulation) -> None:
+        hub, rollback, timings = self.hub, self.rollback, self.timings
+        length = ChunkLength(CHUNK if self.condition is None else 1)
+        while self._goes_on(simulation):
+            rollback.before()
+            step, before = simulation.step, timings.passed()
+            end = min(hub.output.next_step(step), self.last_step, length.end(step))
+            with timings.counted("steps"):
+                status = simulation.advance(int(end) - step)
             self._agree(simulation)  # what is written shows steps that no process has failed in
-            elapsed = spent.on["steps"][0] - before
-            if status != DONE:
-                if status == STOPPED and boundary.delete_leaving(hub, simulation, self.snapshot):
-                    self._keep(simulation)
-                elif not self._try_half(simulation, status=status):
-                    start = None
-                    if self.smaller and not simulation.control.clock[0].watch_limit:
-                        start = explain.TooLarge(self.smaller, self.kept == self.begun_at)
-                    good = explain.Good(self.snapshot, self.kept, self.marks, start)
-                    explain.stop(hub, simulation, status, good, self.place)
-                chunk = 1
+            if not rollback.after(status):
+                length.restart()
                 continue
-            found = None if simulation.told_of_growth else energy.growth(hub, simulation)
-            if found is not None:
-                if self.returns < RETURNS and self._try_half(simulation, found[0]):
-                    self.returns += 1
-                    energy.forget_growth(simulation)
-                    chunk = 1
-                    continue
-                hub.warn(found[0], hint=found[1])
-                simulation.told_of_growth = True
             boundary.tell_of_bounces(hub, simulation)
-            if compiled < spent.on["compilation"][0]:
-                # A rate that counts compilation would promise hours.
-                hub.console.end_run()
-                hub.console.begin_run(
-                    simulation.step, self._fraction(simulation, first_step, first_time) or 0.0
-                )
-            taken = max(simulation.step - step, 1)
-            chunk = int(min(CHUNK, max(1, PATIENCE * taken / max(elapsed, 1e-9))))
-            chunk = simulation.comm.bcast(chunk)
-            with self.spent.counted("output"):
-                if simulation.step < last_step and simulation.time < self.end_time:
-                    output.write()
-                hub.console.progress(
-                    simulation.step,
-                    simulation.time,
-                    self._fraction(simulation, first_step, first_time),
-                )
+            elapsed = simulation.comm.bcast(timings.since(before, "steps"))
+            length.next(elapsed, simulation.step - step)
+            with timings.counted("output"):
+                if self._steps_left(simulation):
+                    hub.output.write()
+                self._show_progress(simulation, anew=timings.since(before, "compilation") > 0)
+
+    def _goes_on(self, simulation: Simulation) -> bool:
+        """Whether there is a step to take."""
+        if not self._steps_left(simulation):
+            return False
+        if not self._condition_allows():
+            if simulation.step == self.first_step:
+                self._tell_of_no_first_step()
+            return False
+        self._agree(simulation)
+        return not self.interrupted
 
     def _agree(self, simulation: Simulation) -> None:
         """Learn which signal any of the processes has been sent."""
         self.interrupted = int(simulation.comm.allreduce_max(np.array([self.signal]))[0])
 
-    def _keeps_start(self, simulation: Simulation) -> bool:
-        """Whether no state but the first is a good one: the step was too large from there on."""
-        return self.kept == self.begun_at and not simulation.control.clock[0].watch_limit
+    def _steps_left(self, simulation: Simulation) -> bool:
+        """Whether neither the last step nor the end time is reached."""
+        return simulation.step < self.last_step and simulation.time < self.end_time
 
-    def _try_half(self, simulation: Simulation, message: str = "", status: int = DONE) -> bool:
-        """Go back to the last good state with half the step, where the script asks for that."""
-        if not self.halve or self.halvings == HALVINGS:
-            return False
-        if status == STOPPED and explain.only_leave(self.hub, simulation, self.snapshot):
-            return False
-        message = message or explain.trouble(self.hub, simulation, status)[0]
-        self.halvings += 1
-        simulation.restore(self.snapshot)
-        # Rows of log and dumps that have been written since go with what they show.
-        self.marks.give(self.kept, cut=True)
-        self.marks.begin()
-        simulation.halve_step(self.halvings)
-        while simulation.above_limit() and self.halvings < HALVINGS:
-            # What is above the limit would only come back.
-            self.halvings += 1
-            simulation.halve_step(self.halvings)
-        self.hub.warn(
-            f"{message}. Back to step {simulation.step}, time {simulation.time:.6g}, with "
-            f"1/{2**self.halvings} of the step",
-            place=self.place,
-        )
-        return True
-
-    def _goes_on(self) -> bool:
+    def _condition_allows(self) -> bool:
+        """Whether the condition, if there is one, lets the run go on."""
+        if self.condition is None:
+            return True
         values = self.hub.values
         if self.condition.names - {"time", "timestep", "dt"}:
             self.hub.refresh_values()
@@ -345,11 +296,19 @@ class Runner:
             )
         return bool(holds) != self.until
 
-    def _fraction(self, simulation: Simulation, first_step: int, first_time: float) -> float | None:
+    def _show_progress(self, simulation: Simulation, *, anew: bool) -> None:
+        """Show how far the run is, `anew` where a rate would count compilation, too."""
+        console, fraction = self.hub.console, self._fraction(simulation)
+        if anew:
+            console.end_run()
+            console.begin_run(simulation.step, fraction or 0.0)
+        console.progress(simulation.step, simulation.time, fraction)
+
+    def _fraction(self, simulation: Simulation) -> float | None:
         if self.steps:
-            return (simulation.step - first_step) / self.steps
-        if isfinite(self.end_time) and self.end_time > first_time:
-            return (simulation.time - first_time) / (self.end_time - first_time)
+            return (simulation.step - self.first_step) / self.steps
+        if isfinite(self.end_time) and self.end_time > self.first_time:
+            return (simulation.time - self.first_time) / (self.end_time - self.first_time)
         return None
 
     # --- around the loop ----------------------------------------------------------------------
@@ -389,9 +348,9 @@ class Runner:
 
     def _summary(self, simulation: Simulation, first_step: int, wall: float) -> None:
         steps = simulation.step - first_step
-        stages = [(name, float(passed)) for name, (passed, _) in self.spent.on.items()]
+        stages = [(name, float(passed)) for name, (passed, _) in self.timings.on.items()]
         stages.append(("rest", max(wall - sum(seconds for _, seconds in stages), 0.0)))
-        in_steps, worked = self.spent.on["steps"]
+        in_steps, worked = self.timings.on["steps"]
         rate = steps * simulation.count / in_steps if in_steps > 0 else 0.0
         self.hub.console.summary(
             {

@@ -15,7 +15,7 @@ from karamelo_py.kernels.hooks import POINT_STAGES
 from karamelo_py.kernels.step import DONE, SORT, Fused, Staged, advance, measure, run_steps
 from karamelo_py.kernels.totals import agree_on_heat
 from karamelo_py.kernels.watch import COARSE, ROUND_OFF, begin_to_look, measure_heat, sum_energies
-from karamelo_py.run.body_motion import Motion, motions
+from karamelo_py.run.body_motion import BodyMotion, motions
 from karamelo_py.run.diagnosis.energy import unknown_heat, unknown_work
 from karamelo_py.run.lower.python_hooks import PythonHooks, sets_initial_state, views_of
 from karamelo_py.run.lowered import Lowered
@@ -185,7 +185,7 @@ class Simulation(Lowered):
         own = max((max(a.max() - c, c - a.min()) for a, c in components), default=0.0)
         return float(self.comm.allreduce_max(np.array([own], float))[0])
 
-    def motions(self) -> list[Motion]:
+    def motions(self) -> list[BodyMotion]:
         """How the solids lie and move."""
         return motions(self)
 

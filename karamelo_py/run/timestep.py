@@ -8,21 +8,21 @@ import numpy as np
 from karamelo_py.kernels.arrays import DT
 from karamelo_py.kernels.clock import STILL, STRIDE
 from karamelo_py.kernels.laws import law_on
-from karamelo_py.points.laws import Absent, can, initial_state, law_kind, wave_speed_squared
+from karamelo_py.points.laws import (
+    Absent,
+    can,
+    constrained_velocity,
+    initial_state,
+    wave_speed_squared,
+)
 from karamelo_py.points.laws.eos import taken_heat
-from karamelo_py.points.laws.rigid import Rigid
 from karamelo_py.points.laws.strengths import shear_modulus
-from karamelo_py.points.laws.strengths.drucker_prager import DruckerPrager
-from karamelo_py.points.laws.strengths.fluid import Viscous
-from karamelo_py.points.laws.strengths.mohr_coulomb import MohrCoulomb
-from karamelo_py.points.laws.strengths.mu_i import MuI
 from karamelo_py.points.transfers import Moment
 from karamelo_py.scene.hub import Hub
 
 USUAL = 0.9
 BOXES = 6.0  # weight of a common drift in the steps of boxes
 LOST = 2.05  # times the stable step, beyond which everything is lost that was tried
-FLOWING = Viscous, MuI, DruckerPrager, MohrCoulomb  # strengths of what has no shape of its own
 LONE = 0.9  # of the stable step of a lone point: one that swells is stiffer
 DAMPED = 0.5  # the least, with one point a cell, where a share of the nodal velocity damps
 
@@ -70,14 +70,14 @@ def _keeps_velocities(hub: Hub) -> bool:
 
 def _deforming(hub: Hub) -> list[Any]:
     laws = [solid.material.law for solid in hub.solids.values()]
-    return [law for law in laws if Rigid not in law_kind(law)]
+    return [law for law in laws if not can(law, constrained_velocity)]
 
 
 def _flows(law: Any) -> bool:
     """Whether a body of this law has no shape of its own, as liquids and soils."""
     strength = getattr(law, "strength", None)
     return strength is not None and (
-        isinstance(strength, FLOWING) or not shear_modulus(strength) > 0
+        getattr(strength, "flows", False) or not shear_modulus(strength) > 0
     )
 
 

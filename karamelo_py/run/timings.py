@@ -1,4 +1,4 @@
-"""What a run spends its time on, and a word about compilation, which is most of a first one."""
+"""Timings of a run, and a word about compilation, which is most of a first one."""
 
 import os
 import time
@@ -19,7 +19,7 @@ ANOTHER_FOLDER = "the environment variable KARAMELO_PY_CACHE names another folde
 
 
 def _kind_of_scene(hub: Hub) -> str:
-    """What the loops of a scene depend on, roughly: for how long they take to compile."""
+    """Describe roughly the loops of a scene: for how long they take to compile."""
     parts = {type(material).__name__ for material in hub.materials.values()}
     parts |= {type(fix).__name__ for fix in hub.fixes.values()}
     parts |= {str(hub.settings.precision), f"threads={hub.settings.threads}"}
@@ -27,7 +27,7 @@ def _kind_of_scene(hub: Hub) -> str:
 
 
 def _about(seconds: float) -> str:
-    """How long one processor takes for so many seconds of work; longer where others want it."""
+    """Estimate the time for so many seconds of work; longer where others want the processor."""
     wanted = 1 + (os.getloadavg()[0] if hasattr(os, "getloadavg") else 0)
     longest = seconds * max(1.0, wanted / (os.cpu_count() or 1))
     if longest < 1.5 * seconds or duration(longest) == duration(seconds):
@@ -36,12 +36,12 @@ def _about(seconds: float) -> str:
 
 
 def _clocks() -> np.ndarray:
-    """Seconds that have passed, and that all threads have worked."""
+    """Read the seconds that have passed, and that all threads have worked."""
     return np.array([time.perf_counter(), time.process_time()])
 
 
-class Spent(event.Listener):
-    """Seconds that a run has spent: (2,) those that have passed, and those of all threads.
+class Timings(event.Listener):
+    """Seconds that a run spends: (2,) those that have passed, and those of all threads.
 
     While it tells of compilation it listens to Numba.
     """
@@ -51,6 +51,14 @@ class Spent(event.Listener):
         self.on = {name: np.zeros(2) for name in ("compilation", "steps", "output")}
         self._depth = 0  # of compilation in the midst of compilation
         self._begun = np.zeros(2)
+
+    def passed(self) -> dict[str, float]:
+        """Return the seconds that have passed so far."""
+        return {name: float(seconds[0]) for name, seconds in self.on.items()}
+
+    def since(self, before: dict[str, float], name: str) -> float:
+        """Return those that have passed since then, for one thing."""
+        return float(self.on[name][0]) - before[name]
 
     @contextmanager
     def counted(self, name: str) -> Iterator[None]:

@@ -7,14 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from karamelo_py.language import registry
-from karamelo_py.language.faults import told
+from karamelo_py.language.faults import as_script_error
 from karamelo_py.language.unknown import line_below
 from karamelo_py.output.console import Console
 from karamelo_py.output.fields import Fields
 from karamelo_py.output.schedule import Output
-from karamelo_py.scene.blame import blamed
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.lattice import Lattice
+from karamelo_py.scene.plugins import attributed
 from karamelo_py.scene.update import Update
 from karamelo_py.script.errors import Place, ScriptError, meant, render_message
 from karamelo_py.script.values import Values
@@ -200,7 +200,7 @@ class Hub:
         """The arrays of the scene as it is now, made when first asked for."""
         if self._simulation is None or not self._simulation.fits(self):
             engine = registry.find("engine", self.settings.engine)
-            with blamed(self):
+            with attributed(self):
                 self._simulation = engine(self, self._simulation)
         return self._simulation
 
@@ -229,7 +229,8 @@ class Hub:
         """Let computes and fixes measure the present state."""
         for catalogue in (self.computes, self.fixes):
             for item in catalogue.values():
-                with told(f"{catalogue.kind} {item.style}", "refresh", type(item), item.place):
+                name = f"{catalogue.kind} {item.style}"
+                with as_script_error(name, "refresh", type(item), item.place):
                     item.refresh()
         # A compute of a plug-in may draw lots: all processes go on with the numbers of the first.
         self.values.array[:] = self.settings.comm.bcast(self.values.array)

@@ -9,7 +9,7 @@ from karamelo_py.language.arguments import Argument, look_up
 from karamelo_py.language.scene import Scene
 
 
-class Part:
+class MaterialPart:
     """A part of a law, or a whole one, under a name.
 
     Parameters
@@ -44,7 +44,7 @@ class Part:
         return self.laws[self.kind]
 
 
-class Material(Part):
+class Material(MaterialPart):
     """A material."""
 
     script_kind = "the ID of a material"

@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.kernels.hooks import STAGES, CompiledHook, heat_hook, node_hook, point_hook
-from karamelo_py.language.faults import told
+from karamelo_py.language.faults import as_script_error
 from karamelo_py.language.scene import Scene
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.views import NodesView, PointsView
@@ -68,6 +68,10 @@ class Fix:
     point_fields
         The fields of points that it declares (:mod:`karamelo_py.compiler.fields`); `Force` if it
         sets forces on points in ``initial_integrate``.
+    leads_points
+        Whether it leads points against their forces, by work that no sum at nodes knows.
+    accelerates
+        Whether its formulas are forces per mass, as of weight.
     conserves
         Whether its hooks in Python bring no energy: what they do to points and nodes stores it,
         passes it on or takes it away. Otherwise the energy of the scene is not watched.
@@ -92,6 +96,8 @@ class Fix:
     wall_friction: Any = None
     point_fields: tuple[type, ...] = ()
     node_fields: tuple[type, ...] = ()
+    leads_points = False
+    accelerates = False
     acts_last = False
     conserves = False
     friction: float | None = None
@@ -141,7 +147,7 @@ class Fix:
 
         @wraps(hook)
         def call(view: Any) -> None:
-            with told(f"fix {self.style}", name, type(self), self.place):
+            with as_script_error(f"fix {self.style}", name, type(self), self.place):
                 hook(view)
                 view.write_back()
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.scene.cut import Pieces, cut, join
+from karamelo_py.scene.clipping import Pieces, clip, join
 from karamelo_py.scene.domain import Domain
 from karamelo_py.scene.lattice import Lattice, chunks, positions
 from karamelo_py.scene.region import Region
@@ -274,7 +274,7 @@ def fill(
     for k, (begin, _) in enumerate(x0.chunks):
         x = x0.candidates(k)
         if rule == "cut":
-            left.append(cut(region, x, h / ppc, begin * len(places)))
+            left.append(clip(region, x, h / ppc, begin * len(places)))
         if rule == "cut" and not counted:
             continue
         kept = region.inside(x)

@@ -35,10 +35,14 @@ class Region:
     ----------
     unknown : bool
         Whether its place depends on results that a rehearsal does not have (NaN).
+    axis : tuple or None
+        Direction (0, 1, 2) and centre of the axis that a region in space is round about at the
+        same `radius` all along; None of others.
     box_lo, box_hi : ndarray (3,)
         Box around the region, infinite where it is open; 0 in unused directions.
     """
 
+    axis: tuple | None = None
     id: str = ""
     place: Place | None = None
 

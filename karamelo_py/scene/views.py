@@ -13,8 +13,8 @@ from karamelo_py.compiler.fields import field, name_of
 from karamelo_py.kernels import arrays
 from karamelo_py.kernels.export import export_velocity_moment, impose_stress
 from karamelo_py.kernels.heat import Supply, Temperature
+from karamelo_py.kernels.hook_loop import corners_that_move
 from karamelo_py.kernels.laws import elastic_law
-from karamelo_py.kernels.moments import corners_that_move
 from karamelo_py.kernels.p2g import Force
 from karamelo_py.points.laws import can, with_stress
 from karamelo_py.points.transfers import Moment

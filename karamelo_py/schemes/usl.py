@@ -6,9 +6,11 @@ from karamelo_py.compiler.compile import real, shared
 from karamelo_py.kernels.arrays import FINAL_INTEGRATE, INITIAL_INTEGRATE, MASS
 from karamelo_py.kernels.g2p import Strain
 from karamelo_py.kernels.nodes import UpdateToVelocity
-from karamelo_py.kernels.p2g import SeenMass
+from karamelo_py.kernels.p2g import SquaredMass
 from karamelo_py.kernels.rows import ACCELERATE, MOVE, SERIES, SUMS, light_node
-from karamelo_py.kernels.table import AtPoints, Gather, Nodes
+from karamelo_py.kernels.table import AtPoints, Gather, NodeTask
+from karamelo_py.language.rules import known_failure
+from karamelo_py.points.transfers import gradient_weight
 
 
 class USL(NamedTuple):
@@ -30,17 +32,35 @@ class USL(NamedTuple):
     """
 
     courant = (0.65, 0.4)
-    node_fields = (SeenMass,)
+    damps = True  # what vibrates, with two points a cell and direction
+    node_fields = (SquaredMass,)
     rows = (
         AtPoints(INITIAL_INTEGRATE, 0),
         SUMS,
         *ACCELERATE,
-        Nodes(light_node),
+        NodeTask(light_node),
         SERIES,
         *MOVE,
         Gather(Strain()),
         AtPoints(FINAL_INTEGRATE, 1),
     )
+
+
+def _thin_edges(scheme, scene):
+    """Whether boxes have edges that moments push."""
+    boxes = scene.basis.steep_edge and scene.basis.cells > 1
+    return scene.moments and boxes and not gradient_weight.defined(type(scene.transfer))
+
+
+known_failure(
+    USL,
+    "affine noise",
+    when=_thin_edges,
+    reason="{scene.transfer_name} with {scene.basis_name} functions and usl: in some places of the "
+    "grid the moments of points at an edge push nodes with next to no mass, and a body breaks "
+    "within two periods",
+    cure="scheme(musl), or a spline in the place of the basis",
+)
 
 
 @shared
@@ -64,4 +84,4 @@ class USLUnlimited(NamedTuple):
     """
 
     courant = USL.courant
-    rows = tuple(Nodes(any_node) if row == Nodes(light_node) else row for row in USL.rows)
+    rows = tuple(NodeTask(any_node) if row == NodeTask(light_node) else row for row in USL.rows)

@@ -1,4 +1,4 @@
-"""What goes wrong in a script, said with its place in the text and a remedy."""
+"""Errors of a script, with their place in the text and a remedy."""
 
 import difflib
 import re
@@ -10,7 +10,7 @@ _WIDEST_LINE = 160
 
 
 class Place(NamedTuple):
-    """Where in a script: `line` and `column` count from 1, `text` is the whole source line."""
+    """A place in a script: `line` and `column` count from 1, `text` is the whole source line."""
 
     file: str
     line: int
@@ -20,7 +20,7 @@ class Place(NamedTuple):
 
 
 class NoItem(KeyError):
-    """What is not there in brackets; its text is the whole message."""
+    """An item that is not there in brackets; its text is the whole message."""
 
     def __str__(self) -> str:
         return self.args[0]

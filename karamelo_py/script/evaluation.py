@@ -11,39 +11,39 @@ from karamelo_py.script.functions import FUNCTIONS, TAIL, compute
 from karamelo_py.script.terms import REWRITTEN, applied
 
 
-class Scope(Protocol):
-    """Where names and calls of commands get their meaning: the interpreter."""
+class NameScope(Protocol):
+    """The scope that gives names and calls of commands their meaning: the interpreter."""
 
     def name(self, name: str, node: syntax.Name, raw: syntax.Raw) -> Value:
-        """What a name stands for."""
+        """Find the value of a name."""
 
-    def command(self, node: syntax.Function, raw: syntax.Raw) -> Value:
+    def command(self, node: syntax.FunctionCall, raw: syntax.Raw) -> Value:
         """The value of a call that is not a function."""
 
     def hides(self, name: str) -> bool:
-        """Whether the script uses the name of a function for something else."""
+        """Tell if the script uses the name of a function for something else."""
 
 
-def evaluate(node: syntax.Node, raw: syntax.Raw, scope: Scope) -> Value:
-    """What the tree of `raw` stands for: a number, a text or a formula.
+def evaluate(node: syntax.Node, raw: syntax.Raw, scope: NameScope) -> Value:
+    """Evaluate the tree of `raw`: to a number, a text or a formula.
 
     Raises
     ------
     ScriptError
         With the place of the operand to blame.
     """
-    if isinstance(node, (syntax.Number, syntax.Text)):
+    if isinstance(node, (syntax.NumberLiteral, syntax.TextLiteral)):
         return node.value
     if isinstance(node, syntax.Name):
         return scope.name(node.name, node, raw)
-    if isinstance(node, syntax.Unary):
+    if isinstance(node, syntax.UnaryOperation):
         operand = _numeric(node.operand, raw, scope, f"'{node.operator}'")
         if node.operator == "+":
             return operand
         return _apply("not" if node.operator == "!" else "neg", node, (operand,), raw)
-    if isinstance(node, syntax.Binary):
+    if isinstance(node, syntax.BinaryOperation):
         return _binary(node, raw, scope)
-    assert isinstance(node, syntax.Function)
+    assert isinstance(node, syntax.FunctionCall)
     if node.name not in FUNCTIONS or scope.hides(node.name):
         return scope.command(node, raw)
     return _function(node, raw, scope)
@@ -54,7 +54,7 @@ def mark(raw: syntax.Raw, node: syntax.Node) -> Any:
     return raw.source.place(raw.start + node.start, raw.start + node.end)
 
 
-def _binary(node: syntax.Binary, raw: syntax.Raw, scope: Scope) -> Value:
+def _binary(node: syntax.BinaryOperation, raw: syntax.Raw, scope: NameScope) -> Value:
     left = evaluate(node.left, raw, scope)
     logical = node.operator in ("&&", "||") and isinstance(left, float) and not math.isnan(left)
     if logical and (left != 0) == (node.operator == "||"):
@@ -66,7 +66,7 @@ def _binary(node: syntax.Binary, raw: syntax.Raw, scope: Scope) -> Value:
     return _apply(node.operator, node, (left, right), raw)
 
 
-def _texts(node: syntax.Binary, left: Value, right: Value, raw: syntax.Raw) -> Value:
+def _texts(node: syntax.BinaryOperation, left: Value, right: Value, raw: syntax.Raw) -> Value:
     if isinstance(left, str) and isinstance(right, str):
         if node.operator == "+":
             return left + right
@@ -82,7 +82,7 @@ def _texts(node: syntax.Binary, left: Value, right: Value, raw: syntax.Raw) -> V
     )
 
 
-def _numeric(node: syntax.Node, raw: syntax.Raw, scope: Scope, user: str) -> float | Expression:
+def _numeric(node: syntax.Node, raw: syntax.Raw, scope: NameScope, user: str) -> float | Expression:
     value = evaluate(node, raw, scope)
     if isinstance(value, str):
         raise ScriptError(
@@ -93,7 +93,7 @@ def _numeric(node: syntax.Node, raw: syntax.Raw, scope: Scope, user: str) -> flo
     return value
 
 
-def _function(node: syntax.Function, raw: syntax.Raw, scope: Scope) -> Value:
+def _function(node: syntax.FunctionCall, raw: syntax.Raw, scope: NameScope) -> Value:
     signature = FUNCTIONS[node.name]
     count = len(node.operands)
     if not signature.least <= count <= signature.most:
@@ -126,7 +126,7 @@ def _function(node: syntax.Function, raw: syntax.Raw, scope: Scope) -> Value:
 
 
 def usage(name: str) -> str:
-    """How a function is called."""
+    """Write how a function is called."""
     operands = {"if": "condition, a, b", "atan2": "y, x", "min": "a, b, ...", "max": "a, b, ..."}
     return f"{name}({operands.get(name) or ('a, b' if FUNCTIONS[name].least == 2 else 'a')})"
 
@@ -156,7 +156,8 @@ def _impossible(
         guilty = operands[0] if operation in ("^", "pow") else operands[-1]
         code = raw.code[guilty.start : guilty.end]
         return ScriptError(
-            "division by zero" + ("" if isinstance(guilty, syntax.Number) else f": {code} is 0"),
+            "division by zero"
+            + ("" if isinstance(guilty, syntax.NumberLiteral) else f": {code} is 0"),
             place=mark(raw, guilty),
             expected="a number other than 0",
         )
@@ -195,9 +196,9 @@ def _spelled(operation: str, shown: str) -> str:
 
 
 def _operands(node: syntax.Node) -> tuple[syntax.Node, ...]:
-    if isinstance(node, syntax.Unary):
+    if isinstance(node, syntax.UnaryOperation):
         return (node.operand,)
-    if isinstance(node, syntax.Binary):
+    if isinstance(node, syntax.BinaryOperation):
         return node.left, node.right
-    assert isinstance(node, syntax.Function)
+    assert isinstance(node, syntax.FunctionCall)
     return node.operands

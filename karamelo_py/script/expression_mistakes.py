@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from karamelo_py.script.lammps import line_of, with_name
 from karamelo_py.script.mistakes import CLOSES_NOTHING, Mistake, open_parenthesis, open_quote
-from karamelo_py.script.other_programs import OTHERWISE, instead
+from karamelo_py.script.other_programs import instead, table
 
 _REMEDIES = {
     ";": "one statement per line, without ;",
@@ -46,7 +46,7 @@ _ENDS = ("NUMBER", "NAME", "STRING", "RPAR")
 
 
 class _Stop(NamedTuple):
-    """Where the parser stopped: tokens before and at that place, and what it held.
+    """The place at which the parser stopped: tokens before and there, and what it held.
 
     `here` is a character that begins no token, a token, or None at the end.
     """
@@ -73,12 +73,12 @@ class _Stop(NamedTuple):
 
     @property
     def opened(self) -> list[int]:
-        """Where parentheses are open."""
+        """List the places of open parentheses."""
         return [t.start_pos for t in self.stack if getattr(t, "type", "") == "LPAR"]
 
     @property
     def after_call(self) -> bool:
-        """Whether all before is one call."""
+        """Tell if all before is one call."""
         types = [getattr(part, "type", "") for part in self.stack]
         call = types[:2] == ["NAME", "LPAR"] and types[-1] == "RPAR"
         return call and types.count("LPAR") == 1
@@ -108,7 +108,7 @@ def _stop(parser: Any, code: str) -> _Stop:
 
 
 def in_expression(parser: Any, code: str) -> Mistake:
-    """What is wrong with `code`, which Lark's `parser` refuses."""
+    """Find the mistake in `code`, which Lark's `parser` refuses."""
     at = _stop(parser, code)
     if at.here is None:
         return _at_end(at)
@@ -262,12 +262,12 @@ NO_BLOCKS = "there are no loops and blocks; if(condition, a, b) chooses a value"
 
 
 def _block_or_call(name: str, words: list[str]) -> str:
-    """What to write instead of ``name word word``."""
+    """Write the line to stand instead of ``name word word``."""
     if name in BLOCKS:
         return NO_BLOCKS
     if own := line_of(name, words):
         return own
-    if other := OTHERWISE.get(name) or instead("command", name):
+    if other := table()["otherwise"].get(name) or instead("command", name):
         return other
     if name in ("fix", "compute") and len(words) > 2:
         other = instead(name, words[2]) or ""

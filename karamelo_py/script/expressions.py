@@ -1,4 +1,4 @@
-"""What expressions stand for: numbers, texts, and formulas that are evaluated again and again.
+"""Values of expressions: numbers, texts, and formulas that are evaluated again and again.
 
 An operation on numbers is done at once. As soon as something that changes takes part (a position,
 the time, a published value), the result is a formula, with the numbers folded in.
@@ -70,7 +70,7 @@ class Expression:
 
     @property
     def is_constant(self) -> bool:
-        """Whether it is one number for ever."""
+        """Tell if it is one number for ever."""
         return not self._term.names
 
     @property
@@ -91,7 +91,7 @@ class Expression:
         return f"Expression({self.text})"
 
     def is_like(self, other: Expression) -> bool:
-        """Whether it is the same number as another everywhere, for all that can be seen."""
+        """Tell if it is the same number as another everywhere, for all that can be seen."""
         return alike(self._term, other._term)
 
     def evaluate(self, values: Values) -> float:

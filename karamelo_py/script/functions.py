@@ -19,7 +19,7 @@ TAIL = 1e-10
 
 
 class Signature(NamedTuple):
-    """How many operands a function takes, and how to compute it."""
+    """The number of operands of a function, and the code that computes it."""
 
     least: int
     most: int

@@ -2,240 +2,187 @@
 
 import math
 import re
-from collections.abc import Callable
 
-from karamelo_py.script.lammps_formula import formula_of, free_name
-from karamelo_py.script.other_programs import instead
+from karamelo_py.script import syntax
+from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, WORDS
+from karamelo_py.script.other_programs import instead, of_karamelo, table
 
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
-_ENDED = {"unfix": "delete_fix", "uncompute": "delete_compute", "undump": "delete_dump"}
-_NAMED = ("region", "group", "fix", "compute", "dump", *_ENDED)
-_SAID_ANYWAY = ("id", "type")  # columns of a dump
-_SAME = ("x", "y", "z", "vx", "vy", "vz", "mass")
+_UNSIGNED = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?[0-2]?\d?\d)?"
+_ZERO = r"[+-]?(?=[.0]*0)[.0]+(?:[eE][+-]?\d+)?"
+_NUMBER = rf"[+-]?{_UNSIGNED}"
+# What may stand in a pattern of the table, longest names first where one holds another.
+_MACROS = {
+    "ID": r"\w+",
+    "number": _NUMBER,
+    "zero": _ZERO,
+    "positive": rf"\+?(?!{_ZERO}(?:\s|$)){_UNSIGNED}",
+    "end": rf"(?:{_NUMBER}|INF)",
+    "lower": rf"(?:-{_UNSIGNED}|{_ZERO}|INF)",
+    "upper": rf"(?:\+?{_UNSIGNED}|{_ZERO}|INF)",
+    "component": rf"(?:{_NUMBER}|NULL)",
+    "units": "(?P<options> units box)?",
+    "options": "(?P<options>(?: side (?:in|out)| units box)*)",
+}
+_NAMED = ("region", "group", "fix", "compute", "dump", "unfix", "uncompute", "undump")
 # LAMMPS counts in units of a lattice where a line does not say otherwise.
-_LENGTHS = "with numbers in units of length, not of a lattice"
-_NEVER = 10**9  # steps: more than a run has
-_SHAPES = {"block": 6, "sphere": 4, "cylinder": 6}  # and how many words say where they are
-_PUT_TOGETHER = {"union": "union", "intersect": "intersection"}
-_NO_SHAPES = ("cone", "plane", "prism", "ellipsoid")
-_REGION = f"region(ID, block, xlo, xhi, ylo, yhi), or cylinder, or sphere, {_LENGTHS}"
-_GROUP = "group(ID, particles, region, regionID, all), or with solid, solidID for all"
-_GROUPED_BY = (
-    "clear", "delete", "dynamic", "empty", "id", "include", "intersect", "molecule", "static",
-    "subtract", "type", "union", "variable",
-)  # fmt: skip
+_LENGTHS = ", with numbers in units of length, not of a lattice"
+_COLUMNS, _SAID_ANYWAY = ("x", "y", "z", "vx", "vy", "vz", "mass"), ("id", "type")
+# LAMMPS's log is that of base 10. Its round takes halves away from zero, and % the sign of the
+# first operand: these are not the same.
+_SAME = "abs acos asin atan atan2 ceil cos exp floor sin sqrt tan"
+_FUNCTIONS = {"ln": "log", "log": "log10"} | {name: name for name in _SAME.split()}
+_TAKEN = {
+    *FUNCTIONS, *CONSTANTS, *WORDS, "time", "timestep", "dt", "x", "y", "z", "x0", "y0", "z0",
+    "and", "or", "not",
+}  # fmt: skip
+_COMPARISON = r"[=!<>]=|[<>]"
+_TOKEN = re.compile(rf"\s*({_UNSIGNED}|[A-Za-z_]\w*|{_COMPARISON}|&&|\|\||[-+*/^(),])", re.ASCII)
 
 
 def line_of(name: str, words: list[str]) -> str | None:
-    """What to write for ``name word word``; None where more has to be known than this line."""
-    rule = _RULES.get(name)
-    return rule(with_name(name, words)) if rule is not None else None
+    """Write ``name word word`` as it is here; None where more has to be known than this line."""
+    given = with_name(name, words)
+    if name == "dump":
+        return _dump(given)
+    if name == "variable":
+        return _variable(given)
+    if name == "region":
+        given[1:] = ["INF" if word == "EDGE" else word for word in given[1:]]
+    line = " ".join([name, *given])
+    for rule in table()["line"]:
+        pattern = re.sub("(?<!P)<(ID|[a-z]+)>", lambda macro: _MACROS[macro[1]], rule["lammps"])
+        if match := re.fullmatch(pattern, line, re.ASCII):
+            return _filled(rule["here"], match)
+    return None
 
 
 def with_name(command: str, words: list[str]) -> list[str]:
-    """The words with an ID that is a name in the place of a number."""
-    return [_name(words[0]), *words[1:]] if command in _NAMED and words else words
+    """Put a name in the place of a number, where it is an ID."""
+    return [_name(words[0]), *words[1:]] if command in _NAMED and words else [*words]
 
 
 def _name(ID: str) -> str:
     return f"n{ID}" if re.fullmatch(r"\d\w*", ID) else ID
 
 
-def _are_names(*words: str) -> bool:
-    return all(re.fullmatch(r"[A-Za-z_]\w*", word, re.ASCII) for word in words)
+class _WordList(str):
+    """Words that a template writes with commas between them, as IDs where it asks for these."""
+
+    def __format__(self, spec: str) -> str:
+        return ", ".join(map(_name, self.split()) if spec == "ID" else self.split())
 
 
-def _numbers(words: list[str], *others: str) -> bool:
-    """Whether the words are numbers, or some of the `others`."""
-    return all(
-        word in others or (_NUMBER.fullmatch(word) and math.isfinite(float(word))) for word in words
-    )
-
-
-def _count(words: list[str]) -> int | None:
-    return int(words[0]) if len(words) == 1 and re.fullmatch("[0-9]{1,18}", words[0]) else None
-
-
-def _lengths_of(options: list[str]) -> str | None:
-    """What to add for the unit of length that the options name, None if it is a lattice's."""
-    return {"": f", {_LENGTHS}", "units box": ""}.get(" ".join(options))
-
-
-def _timestep(words: list[str]) -> str | None:
-    right = len(words) == 1 and _numbers(words) and float(words[0]) > 0
-    return f"set_dt({words[0]})" if right else None
-
-
-def _thermo(words: list[str]) -> str | None:
-    every = _count(words)
-    if every == 0:
-        return f"set_output({_NEVER}): the first and the last state are logged in any case"
-    return None if every is None else f"set_output({every})"
-
-
-def _dimension(words: list[str]) -> str | None:
-    forms = {
-        "2": "dimension(2, xlo, xhi, ylo, yhi, h)",
-        "3": "dimension(3, xlo, xhi, ylo, yhi, zlo, zhi, h)",
+def _filled(template: str, match: re.Match) -> str | None:
+    """Fill the groups of a line into what is written here."""
+    found = match.groupdict()
+    options, given = found.get("options") or "", (found.get("given") or "").split()
+    axes = "".join(axis for axis, word in zip("xyz", given, strict=False) if word != "NULL")
+    more = {
+        "outside": ", exterior" if "side out" in options else "",
+        "lengths": "" if "units box" in options else _LENGTHS,
+        "axes": axes if axes != "xyz" else "",  # a name for each line that another does not undo
     }
-    form = forms.get(" ".join(words))
-    return form and f"{form}, with the ends of the domain and the size of its cells"
-
-
-def _boundary(words: list[str]) -> str | None:
-    if not all(re.fullmatch("[pfsm]{1,2}", word) for word in words):
+    if "pull" in found:
+        more["pull"] = _pull(*(float(word) for word in found["pull"].split() if word != "vector"))
+    if more.get("pull", "") is None:
         return None
-    none = "no end is periodic here; " if any("p" in word for word in words[:2]) else ""
-    return (
-        f"{none}leave it out: points end the run at an edge; or boundary(reflect), boundary(delete)"
-    )
+    return template.format(*map(_WordList, match.groups(default="")), **more) or None
 
 
-def _region(words: list[str]) -> str | None:
-    if len(words) < 3 or not _are_names(words[0]):
+def _pull(size: float, *direction: float) -> str | None:
+    length = math.hypot(*direction)
+    if not 0 < length < math.inf:
         return None
-    ID, style, *rest = words
-    if style in _NO_SHAPES:
-        return _REGION
-    if style in _PUT_TOGETHER:
-        return _regions_together(ID, style, rest)
-    if style not in _SHAPES:
-        return None
-    where, options = rest[: _SHAPES[style]], rest[_SHAPES[style] :]
-    said = dict(zip(options[::2], options[1::2], strict=False))
-    exterior = ["exterior"] if said.pop("side", "in") == "out" else []
-    lengths = _lengths_of([word for pair in said.items() for word in pair])
-    forms = _forms(style, [re.sub("^EDGE$", "INF", word) for word in where])
-    if len(options) % 2 == 0 and lengths is not None and forms:
-        lines = (
-            f"region({', '.join([ID, *form, *exterior])}) in {d}D" for d, form in forms.items()
-        )
-        return ", ".join(lines) + lengths
-    # A line of this language without its parentheses is that of few words.
-    own = len(where) < _SHAPES[style] or options == ["exterior"]
-    return None if own and _numbers(where, "INF", "EDGE", *"xyz") else _REGION
+    pull = [size * a / length + 0.0 for a in direction]
+    return ", ".join(f"{a:.15g}" for a in pull) + ")" + (" in 3D" if pull[2] else "")
 
 
-def _forms(style: str, where: list[str]) -> dict[int, list[str]]:
-    """The arguments of a region, by the number of dimensions; in a plane z is 0."""
-    if len(where) != _SHAPES[style]:
-        return {}
-    along = where[:1] if style == "cylinder" else []
-    if not set(along) <= set("xyz") or not _numbers(where[len(along) :], "INF"):
-        return {}
-    space = {3: [style, *where]}
-    if style == "block":
-        return {2: ["block", *where[:4]], **space} if _ends(where[4:]) else space
-    *centre, radius = where[1:4] if style == "cylinder" else where
-    if not _numbers([*centre, radius]) or float(radius) <= 0:
-        return {}
-    plane = {2: ["cylinder", *centre[:2], radius]}
-    if style == "sphere":
-        return {**plane, **space} if float(centre[2]) == 0 else space
-    return {**plane, **space} if where[0] == "z" and _ends(where[4:]) else space
-
-
-def _ends(words: list[str]) -> bool:
-    """Whether these are a lower and an upper end with 0 between them."""
-    lo = -math.inf if words[0] == "INF" else float(words[0])
-    hi = math.inf if words[1] == "INF" else float(words[1])
-    return lo <= 0 <= hi
-
-
-def _regions_together(ID: str, style: str, rest: list[str]) -> str:
-    count, parts = _count(rest[:1]), [_name(word) for word in rest[1:]]
-    if count is None or count < 2 or len(parts) != count or not _are_names(*parts):
-        return f"region(ID, {_PUT_TOGETHER[style]}, regionID, regionID)"
-    return f"region({', '.join([ID, _PUT_TOGETHER[style], *parts])})"
-
-
-def _group(words: list[str]) -> str | None:
-    numbered = len(words) == 3 and words[1] == "region" and not _are_names(words[2])
-    if numbered and _are_names(words[0], _name(words[2])):
-        return f"group({words[0]}, particles, region, {_name(words[2])}, all)"
-    return _GROUP if words[1:2] and words[1] in _GROUPED_BY else None
-
-
-def _fix(words: list[str]) -> str | None:
-    if len(words) < 3 or not _are_names(words[0], _name(words[1])):
-        return None
-    ID, group, style, *rest = words
-    group = _name(group)
-    vector = style == "gravity" and rest[1:2] == ["vector"] and len(rest) == 5
-    if vector and _numbers([rest[0], *rest[2:]]):
-        direction = [float(word) for word in rest[2:]]
-        length = math.hypot(*direction)
-        if not 0 < length < math.inf:
-            return None
-        pull = [float(rest[0]) * a / length + 0.0 for a in direction]
-        space = " in 3D" if pull[2] else ""
-        return f"fix({ID}, body_force, {group}, {', '.join(f'{a:.15g}' for a in pull)}){space}"
-    lengths = _lengths_of(rest[4:])
-    moves = style == "move" and rest[:1] == ["linear"] and len(rest) > 3
-    if moves and lengths is not None and _numbers(rest[1:4], "NULL"):
-        return f"fix({ID}, velocity_particles, {group}, {', '.join(rest[1:4])}){lengths}"
-    return None
-
-
-def _velocity(words: list[str]) -> str | None:
-    lengths = _lengths_of(words[5:])
-    if len(words) < 5 or words[1] != "set" or lengths is None:
-        return None
-    group, set_to = _name(words[0]), words[2:5]
-    if not _are_names(group) or not _numbers(set_to, "NULL"):
-        return None
-    # A name for each line that another does not undo.
-    given = "".join(axis for axis, word in zip("xyz", set_to, strict=True) if word != "NULL")
-    ID = f"v{given if given != 'xyz' else ''}_{group}"
-    return f"fix({ID}, initial_velocity_particles, {group}, {', '.join(set_to)}){lengths}"
-
-
-def _dump(words: list[str]) -> str | None:
-    own = (instead("dump", words[2]) or "").removeprefix("the style ") if words[2:] else ""
+def _dump(given: list[str]) -> str | None:
+    own = (instead("dump", given[2]) or "").removeprefix("the style ") if given[2:] else ""
     if not own:
         return None
-    ID, group, _, every, file, *columns = [*words, "", ""] if len(words) < 5 else words
-    if re.search(r"\.gz$", file) and own == "particle":  # LAMMPS goes by the ending
+    ID, group, _, every, file, *columns = [*given, "", ""] if len(given) < 5 else given
+    if file.endswith(".gz") and own == "particle":  # LAMMPS goes by the ending
         own = "particle/gz"
-    whole = own.startswith("particle") and _are_names(ID) and re.fullmatch(r"[\w./*+-]+", file)
-    if not whole or not _count([every]) or re.search(r"\.(bin|zst)$", file):
+    whole = own.startswith("particle") and re.fullmatch(r"[A-Za-z_]\w*", ID, re.ASCII)
+    readable = re.fullmatch(r"[\w./*+-]+(?<!\.bin)(?<!\.zst)", file)
+    if not (whole and readable and re.fullmatch("[0-9]{1,18}", every) and int(every)):
         return f"dump(ID, all, {own}, every, file, ...)"
-    shown = [c for c in columns if c in _SAME] or ["x", "y", "z"]
-    unknown = [c for c in columns if c not in (*_SAME, *_SAID_ANYWAY)]
+    shown = [c for c in columns if c in _COLUMNS] or ["x", "y", "z"]
+    unknown = [c for c in columns if c not in (*_COLUMNS, *_SAID_ANYWAY)]
     without = f", without {' '.join(unknown)}" if unknown else ""
     points = "" if group == "all" else ", of all points"
     return f"dump({', '.join([ID, 'all', own, every, file, *shown])}){without}{points}"
 
 
-def _variable(words: list[str]) -> str | None:
-    if len(words) < 3 or not free_name(words[0]):
+def _variable(given: list[str]) -> str | None:
+    if len(given) < 3 or not _is_free(given[0]):
         return None
-    name, style, *rest = words
+    name, style, *rest = given
+    text = " ".join(rest)
     if style in ("index", "string"):
-        return f"{name} = {rest[0]}" if len(rest) == 1 and _numbers(rest) else None
+        return f"{name} = {text}" if re.fullmatch(_NUMBER, text, re.ASCII) else None
     if style not in ("equal", "atom"):
         return None
-    text = formula_of(" ".join(rest), of_points=style == "atom")
-    return text and f"{name} = {text}"
+    formula = _formula(re.sub(r"\A([\"'])([^\"']*)\1\Z", r"\2", text), of_points=style == "atom")
+    return formula and f"{name} = {formula}"
 
 
-def _ended(command: str) -> Callable[[list[str]], str | None]:
-    def rule(words: list[str]) -> str | None:
-        return f"{command}({words[0]})" if len(words) == 1 and _are_names(words[0]) else None
+def _is_free(name: str) -> bool:
+    """Tell if a variable may have this name."""
+    known = name in _TAKEN or of_karamelo(name)
+    return bool(re.fullmatch(r"[A-Za-z_]\w*", name, re.ASCII)) and not known
 
-    return rule
+
+def _formula(text: str, *, of_points: bool) -> str | None:
+    """Write a formula of LAMMPS as it is here; None where something in it may not be the same.
+
+    Of the style atom (`of_points`) x, y and z are positions.
+    """
+    from karamelo_py.script.parser import parse_text
+
+    same = {"PI", "time", "dt", *("xyz" if of_points else "")}
+    tokens = _TOKEN.findall(text)
+    compared = [token for token in tokens if re.fullmatch(_COMPARISON, token)]
+    mixed = len(compared) > 1 and {"==", "!="} & {*compared}
+    if mixed or _TOKEN.sub("", text).strip() or re.search(r"[\w.]\s+[\w.]", text):
+        return None
+    ours = ""
+    for token, after in zip(tokens, [*tokens[1:], ""], strict=True):
+        word: str | None = token
+        if after == "(" and (token[0].isalpha() or token[0] == "_"):
+            word = _FUNCTIONS.get(token)
+        elif token.startswith("v_"):
+            word = token[2:] if _is_free(token[2:]) else None
+        elif token[0].isalpha() or token[0] == "_":
+            word = token if token in same else None
+        if word is None:
+            return None
+        spaced = re.fullmatch(rf"{_COMPARISON}|&&|\|\|", word)
+        ours += f" {word} " if spaced else f"{word} " if word == "," else word
+    try:
+        return ours if "**" not in ours and _one_order(parse_text(ours)[1]) else None
+    except ScriptError:
+        return None
 
 
-_RULES = {
-    "timestep": _timestep,
-    "thermo": _thermo,
-    "dimension": _dimension,
-    "boundary": _boundary,
-    "region": _region,
-    "group": _group,
-    "fix": _fix,
-    "velocity": _velocity,
-    "dump": _dump,
-    "variable": _variable,
-    **{name: _ended(command) for name, command in _ENDED.items()},
-}
+def _one_order(node: syntax.Node) -> bool:
+    """Tell if both programs carry out the operations of a formula in the same order.
+
+    LAMMPS takes signs before powers, powers from left to right, and ``<`` before ``==``.
+    """
+
+    def power(operand: syntax.Node) -> bool:
+        bare = isinstance(operand, syntax.BinaryOperation) and operand.end == operand.right.end
+        return bare and operand.operator == "^"
+
+    if isinstance(node, syntax.UnaryOperation):
+        return not power(node.operand) and _one_order(node.operand)
+    if isinstance(node, syntax.BinaryOperation):
+        chained = node.operator == "^" and power(node.right)
+        return not chained and _one_order(node.left) and _one_order(node.right)
+    if isinstance(node, syntax.FunctionCall):
+        takes, given = FUNCTIONS[node.name], len(node.operands)
+        return takes.least <= given <= takes.most and all(map(_one_order, node.operands))
+    return True

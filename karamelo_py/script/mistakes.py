@@ -79,7 +79,7 @@ def check_characters(text: str) -> None:
 
 
 def in_script(text: str) -> Mistake:
-    """What is wrong with the quotes or parentheses of a script."""
+    """Find the mistake in the quotes or parentheses of a script."""
     opened: list[int] = []
     for match in _PUNCTUATION.finditer(text):
         word, start = match[0], match.start()

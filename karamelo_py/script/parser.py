@@ -1,15 +1,17 @@
 """From text to statements. The grammars are in script.lark and expression.lark."""
 
+import functools
 import math
+import platform
 import re
+from contextlib import suppress
 from dataclasses import replace
-from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
+from karamelo_py.compiler import cache
 from karamelo_py.script import expression_mistakes, mistakes, syntax
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.script.kept import kept_parser
 from karamelo_py.script.mistakes import Mistake
 
 # Trees are walked by recursion; this keeps well below Python's limit.
@@ -74,7 +76,7 @@ def parse_text(text: str, file: str = "<text>") -> tuple[syntax.Raw, syntax.Node
     return raw, parse_expression(raw)
 
 
-@lru_cache(maxsize=4096)
+@functools.lru_cache(maxsize=4096)
 def _tree(code: str) -> syntax.Node:
     """The tree of `code`; its offsets count from the start of `code`."""
     word = code.strip()
@@ -84,7 +86,7 @@ def _tree(code: str) -> syntax.Node:
         return syntax.Name(start, start + len(word), 1, word)
     if word.isascii() and word.isdigit():
         start = code.index(word)
-        return syntax.Number(start, start + len(word), 1, _number(word, start))
+        return syntax.NumberLiteral(start, start + len(word), 1, _number(word, start))
     if not word:
         raise Mistake("there is nothing here", 0, len(code), expected="an expression")
     try:
@@ -120,7 +122,7 @@ def _statement(
             )
         return syntax.Assignment(place, whole, name, right, parse_expression(right))
     if kind == "call":
-        return syntax.Call(place, whole, name, tuple(_arguments(source, name, parts)))
+        return syntax.CommandCall(place, whole, name, tuple(_arguments(source, name, parts)))
     node = parse_expression(whole)
     return syntax.Evaluation(source.place(start, end), whole, node)
 
@@ -163,24 +165,28 @@ def _refused() -> type[Exception]:
     return UnexpectedInput
 
 
-@cache
+@functools.cache
 def _lark(start: str) -> Any:
-    """The parser of statements, or that of expressions, which knows no other tokens."""
-    from lark import Lark
+    """Make the parser of statements, or that of expressions, which knows no other tokens.
 
-    grammar = Path(__file__).with_name(f"{start}.lark").read_text(encoding="utf-8")
+    Lark needs 0.06 s for each, and 0.01 s to read one that it has kept; what it cannot read or
+    write there is no matter.
+    """
+    import lark
 
-    def made() -> Lark:
-        return Lark(
-            grammar,
-            parser="lalr",
-            start=start,
-            transformer=_Builder(),
-            keep_all_tokens=True,
-            maybe_placeholders=False,
-        )
-
-    return kept_parser(start, grammar, made)
+    folder = cache.folder().with_name("parsers")
+    with suppress(OSError):
+        folder.mkdir(parents=True, exist_ok=True)
+    versions = f"{lark.__version__}-{platform.python_version()}"
+    return lark.Lark(
+        Path(__file__).with_name(f"{start}.lark").read_text(encoding="utf-8"),
+        parser="lalr",
+        start=start,
+        transformer=_TreeBuilder(),
+        keep_all_tokens=True,
+        maybe_placeholders=False,
+        cache=str(folder / f"{start}-{versions}.parser"),
+    )
 
 
 def _span(part: Any) -> tuple[int, int]:
@@ -204,7 +210,7 @@ def _deeper(start: int, end: int, *below: syntax.Node) -> int:
     return depth
 
 
-class _Builder:
+class _TreeBuilder:
     """Makes spans of statements and trees of expressions while Lark parses.
 
     Each method is named after a rule of the grammar and gets what the rule matched.
@@ -238,10 +244,10 @@ class _Builder:
 
     def number(self, parts: list) -> syntax.Node:
         start, end = _span(parts[0])
-        return syntax.Number(start, end, 1, _number(str(parts[0]), start))
+        return syntax.NumberLiteral(start, end, 1, _number(str(parts[0]), start))
 
     def text(self, parts: list) -> syntax.Node:
-        return syntax.Text(*_span(parts[0]), 1, str(parts[0])[1:-1])
+        return syntax.TextLiteral(*_span(parts[0]), 1, str(parts[0])[1:-1])
 
     def name(self, parts: list) -> syntax.Node:
         return syntax.Name(*_span(parts[0]), 1, str(parts[0]))
@@ -250,13 +256,15 @@ class _Builder:
         sign, operand = parts
         operator = _SPELLINGS.get(str(sign), str(sign))
         start, end = sign.start_pos, operand.end
-        return syntax.Unary(start, end, _deeper(start, end, operand), operator, operand)
+        return syntax.UnaryOperation(start, end, _deeper(start, end, operand), operator, operand)
 
     def binary(self, parts: list) -> syntax.Node:
         left, sign, right = parts
         operator = _SPELLINGS.get(str(sign), str(sign))
         start, end = left.start, right.end
-        return syntax.Binary(start, end, _deeper(start, end, left, right), operator, left, right)
+        return syntax.BinaryOperation(
+            start, end, _deeper(start, end, left, right), operator, left, right
+        )
 
     def operands(self, parts: list) -> list:
         return parts[::2]
@@ -264,7 +272,9 @@ class _Builder:
     def function(self, parts: list) -> syntax.Node:
         operands = tuple(parts[2]) if len(parts) == 4 else ()
         start, end = parts[0].start_pos, parts[-1].end_pos
-        return syntax.Function(start, end, _deeper(start, end, *operands), str(parts[0]), operands)
+        return syntax.FunctionCall(
+            start, end, _deeper(start, end, *operands), str(parts[0]), operands
+        )
 
     def parenthesis(self, parts: list) -> syntax.Node:
         # The same tree, but marked and quoted with its parentheses.

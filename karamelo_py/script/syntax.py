@@ -1,4 +1,4 @@
-"""What a script looks like once it is read: statements, raw arguments, expression trees."""
+"""A script once it is read: statements, raw arguments, expression trees."""
 
 import re
 from bisect import bisect_right
@@ -55,14 +55,14 @@ class Node:
 
 
 @dataclass(frozen=True, slots=True)
-class Number(Node):
+class NumberLiteral(Node):
     """A literal number."""
 
     value: float
 
 
 @dataclass(frozen=True, slots=True)
-class Text(Node):
+class TextLiteral(Node):
     """A literal text, without its quotes."""
 
     value: str
@@ -76,7 +76,7 @@ class Name(Node):
 
 
 @dataclass(frozen=True, slots=True)
-class Unary(Node):
+class UnaryOperation(Node):
     """`operator` (``-``, ``+`` or ``!``) in front of `operand`."""
 
     operator: str
@@ -84,7 +84,7 @@ class Unary(Node):
 
 
 @dataclass(frozen=True, slots=True)
-class Binary(Node):
+class BinaryOperation(Node):
     """`left` `operator` `right`; the operators are spelled ``^ && ||`` whatever the script says."""
 
     operator: str
@@ -93,7 +93,7 @@ class Binary(Node):
 
 
 @dataclass(frozen=True, slots=True)
-class Function(Node):
+class FunctionCall(Node):
     """A call of a function or of a command that gives a value."""
 
     name: str
@@ -118,7 +118,7 @@ class Raw:
 
     @property
     def place(self) -> Place:
-        """Where it stands."""
+        """The place in the script."""
         return self.source.place(self.start, self.end)
 
 
@@ -140,7 +140,7 @@ class Assignment(Statement):
 
 
 @dataclass(frozen=True, slots=True)
-class Call(Statement):
+class CommandCall(Statement):
     """``name(arguments)`` alone on a line."""
 
     name: str

@@ -128,7 +128,7 @@ def _inverse_normal(p: Term) -> Term:
 
 
 def alike(one: Term, other: Term) -> bool:
-    """Whether two terms are the same number everywhere: those of + and * may change places."""
+    """Tell if two terms are the same number everywhere: those of + and * may change places."""
     known: dict[tuple, int] = {}
     kinds: dict[int, int] = {}
     for term in (*in_order(one), *in_order(other)):
@@ -158,7 +158,7 @@ def number_of(text: str) -> float | None:
 
 
 def is_short(root: Term) -> bool:
-    """Whether a term can be written down, where what is shared is written again and again."""
+    """Tell if a term can be written down, where what is shared is written again and again."""
     levels: dict[int, int] = {}
     sizes: dict[int, int] = {}
     for term in in_order(root):

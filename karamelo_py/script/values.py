@@ -59,7 +59,7 @@ class Values:
         self._others[ID] = others
 
     def slot(self, name: str) -> int:
-        """Where in the array `name` is kept.
+        """Find the place of `name` in the array.
 
         Raises
         ------

@@ -1,8 +1,9 @@
 """One of several workloads measured by a process of its own: karamelo-py bench.
 
 What workloads before it leave in memory has no part in its speed then. This module is the program
-of that process, too: ``python -m karamelo_py.app.bench.apart``, which takes a `Part` from its input
-and gives what it finds to its output, in JSON. It ends with the process that has started it.
+of that process, too: ``python -m karamelo_py.app.bench.apart``, which takes a `Measurement` from
+its input and gives what it finds to its output, in JSON. It ends with the process that has started
+it.
 """
 
 import json
@@ -25,7 +26,7 @@ _SIGNALS = {one.value: one.name for one in signal.Signals}
 COMMAND = (sys.executable, "-m", "karamelo_py.app.bench.apart")
 
 
-class Part(NamedTuple):
+class Measurement(NamedTuple):
     """What is to be measured; `triad` is the bandwidth of the memory (bytes/s)."""
 
     workload: str
@@ -36,14 +37,14 @@ class Part(NamedTuple):
     debug: bool
 
 
-def measured(part: Part) -> Measured:
+def measured(part: Measurement) -> Measured:
     """Measure a workload in this process."""
     workload = WORKLOADS[part.workload]
     simulation = measure.build(workload, part.threads, part.presets)
     return measure.measured(simulation, part.seconds, part.triad, workload.lead)
 
 
-def measured_apart(part: Part) -> Measured | Outcome:
+def measured_apart(part: Measurement) -> Measured | Outcome:
     """Measure a workload in a process of its own; how that has ended where it went wrong.
 
     Raises
@@ -76,7 +77,7 @@ def measured_apart(part: Part) -> Measured | Outcome:
 def main() -> None:
     """Measure what the input says, and give what is found to the output."""
     answers, sys.stdout = sys.stdout, sys.stderr
-    part = Part(*json.loads(sys.stdin.readline()))
+    part = Measurement(*json.loads(sys.stdin.readline()))
     threading.Thread(target=_end_with_the_other, daemon=True).start()
     found: dict[str, Any] = {}
 

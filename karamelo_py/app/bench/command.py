@@ -92,7 +92,9 @@ def measure_all(options: Namespace) -> int:
             found["workloads"][name] = record.scaled(rows, workload.title, presets)
         else:
             act = apart.measured_apart if len(chosen) > 1 else apart.measured
-            one = act(apart.Part(name, threads, presets, options.seconds, triad, options.debug))
+            one = act(
+                apart.Measurement(name, threads, presets, options.seconds, triad, options.debug)
+            )
             if isinstance(one, Outcome):
                 sys.stdout.flush()
                 print(one.text, file=sys.stderr, flush=True)

@@ -1,7 +1,7 @@
 """Speeds with several processes, and with as many threads: karamelo-py bench --ranks 1,2,4.
 
 Each is measured by processes of its own, started as those of a run. This module is their program,
-too: ``python -m karamelo_py.app.bench.scaling`` with a `Part` in JSON.
+too: ``python -m karamelo_py.app.bench.scaling`` with a `ScalingRun` in JSON.
 """
 
 import json
@@ -40,7 +40,7 @@ HEADING = (
 )
 
 
-class Part(NamedTuple):
+class ScalingRun(NamedTuple):
     """What one measurement is to be, and the file for what it finds."""
 
     workload: str
@@ -83,12 +83,12 @@ def scaled(
     """Measure a workload with one process, then with several, or as many threads; then grown."""
     counts = sorted({1, *ranks})
     for n in counts:
-        yield _measured(Part(name, n, threads, dict(presets), seconds))
+        yield _measured(ScalingRun(name, n, threads, dict(presets), seconds))
         if n > 1 and n * threads <= available:
-            yield _measured(Part(name, 1, n * threads, dict(presets), seconds))
+            yield _measured(ScalingRun(name, 1, n * threads, dict(presets), seconds))
     for n in counts[1:]:
         larger = dict(presets) | grown(WORKLOADS[name].script, presets, n)
-        yield _measured(Part(name, n, threads, larger, seconds), weak=True)
+        yield _measured(ScalingRun(name, n, threads, larger, seconds), weak=True)
 
 
 def grown(script: str, presets: Mapping[str, str], times: int) -> dict[str, str]:
@@ -101,7 +101,7 @@ def grown(script: str, presets: Mapping[str, str], times: int) -> dict[str, str]
     return {name: repr(value / times ** (1 / d))}
 
 
-def _measured(part: Part, *, weak: bool = False) -> Scaled:
+def _measured(part: ScalingRun, *, weak: bool = False) -> Scaled:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "found.json"
         words = [json.dumps(part._replace(file=str(file)))]
@@ -118,7 +118,7 @@ def _measured(part: Part, *, weak: bool = False) -> Scaled:
     return Scaled(part.ranks, part.threads, weak, **found)
 
 
-def measure(part: Part, comm: MpiComm | None = None) -> int:
+def measure(part: ScalingRun, comm: MpiComm | None = None) -> int:
     """Measure as one of the processes; the first writes what is found."""
     hub = Hub(Console(quiet=True))
     hub.settings.threads = part.threads
@@ -128,7 +128,7 @@ def measure(part: Part, comm: MpiComm | None = None) -> int:
     workload = WORKLOADS[part.workload]
     hub.interpreter.run_text(workload.script, "bench")
     simulation = hub.simulation
-    hub.running = SimpleNamespace(halve=False)
+    hub.running = SimpleNamespace(rollback=None)
     simulation.begin(inf)
     simulation.compile()
     timed_steps(simulation, workload.lead)
@@ -167,7 +167,7 @@ def line(row: Scaled, one: Scaled) -> str:
 
 def main() -> int:
     """Measure what the command line says, as one of several processes or alone."""
-    part = Part(*json.loads(sys.argv[1]))
+    part = ScalingRun(*json.loads(sys.argv[1]))
     keep_to_oneself()
     if part.ranks > 1:
         return together(part.ranks, lambda comm: measure(part, comm), outcome_of)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.app import studies
+from karamelo_py.app.studies import histories, keeping, look, page, pictures, records, versus
 from karamelo_py.app.studies.curves import Family, missing, order
 from karamelo_py.app.studies.options import add_axes, along, new_parser, out_file, split
 from karamelo_py.app.studies.study import shown, terminal
@@ -87,7 +87,7 @@ def run(options: Any) -> int:
         raise ScriptError(f"no run has a value of '{options.accuracy}' above 0")
     out = out_file(options.o, *SUFFIXES) if options.o else None
     if out is not None and out.suffix.lower() == ".html":
-        studies.page.require_plotly()
+        page.require_plotly()
     title = options.title if options.title is not None else Path(made.get("script", "")).name
     axes = [name.strip() for name in (options.heat or "").split(",") if name.strip()]
     for name in axes:
@@ -97,7 +97,7 @@ def run(options: Any) -> int:
         raise ScriptError(f"-heat {options.heat}", expected="two variables: -heat N,ppc")
     if not options.x and not axes and not any(line.shown(line.cost).any() for line in family.lines):
         raise ScriptError(f"no run has a value of '{options.cost}' above 0")
-    first = family.along if options.x else studies.look.label(family.cost)
+    first = family.along if options.x else look.label(family.cost)
     words = along(options, *(axes or (first, family.error_label)))
     tell(family, made, costs=costs)
     if out is None:
@@ -105,14 +105,14 @@ def run(options: Any) -> int:
     if out.suffix.lower() == ".html":
         if axes:
             raise ScriptError("-heat is a picture", expected="-o heat.png, .svg or .pdf")
-        studies.page.write(
+        page.write(
             family, rows, out, convergence=bool(options.x), title=title or "runs", made=made,
             words=words,
         )  # fmt: skip
     elif axes:
-        studies.pictures.heat(family, rows, *axes, out, title, words=words)
+        pictures.heat(family, rows, *axes, out, title, words=words)
     else:
-        studies.pictures.lines(family, out, convergence=bool(options.x), title=title, words=words)
+        pictures.lines(family, out, convergence=bool(options.x), title=title, words=words)
     print(f"drawn: {out}")
     return 0
 
@@ -125,8 +125,8 @@ def read(path: Path, where: Sequence[str]) -> tuple[list, list[str], dict]:
     ScriptError
         If it does not say which columns are variables, or no row is left.
     """
-    rows = studies.records.read(path)
-    made = {"table": path.name, **studies.records.beside(path)}
+    rows = records.read(path)
+    made = {"table": path.name, **records.beside(path)}
     if "folder" not in rows[0] and "variables" not in made:
         raise ScriptError(
             f"{path} does not say which columns are variables",
@@ -149,7 +149,7 @@ def side_by_side(options: Any) -> int:
     found, known = [], []
     for path in options.tables:
         rows, variables, made = read(path, options.where)
-        some, values = studies.versus.pairs(
+        some, values = versus.pairs(
             rows, made, variables, options.versus, options.accuracy, options.cost
         )
         if known and values != known:
@@ -157,15 +157,13 @@ def side_by_side(options: Any) -> int:
                               expected=", ".join(known) + ", as in the first table")  # fmt: skip
         known = values
         found += some
-    studies.versus.tell(found, known, options.accuracy, options.cost)
+    versus.tell(found, known, options.accuracy, options.cost)
     if out is not None:
-        cost = studies.look.label(options.cost).removesuffix(" (s)")
+        cost = look.label(options.cost).removesuffix(" (s)")
         words = along(
-            options,
-            studies.look.label(options.accuracy),
-            f"{cost},\n{known[1]} over {known[0]} (1)",
+            options, look.label(options.accuracy), f"{cost},\n{known[1]} over {known[0]} (1)"
         )
-        studies.versus.draw(found, known, out, words, options.accuracy, options.title or "")
+        versus.draw(found, known, out, words, options.accuracy, options.title or "")
         print(f"drawn: {out}")
     return 0
 
@@ -177,8 +175,8 @@ def curves(options: Any, rows: list, by: list[str], made: dict) -> int:
     over = options.x or "Time"
     names = [name for name in split(options.names) if name]
 
-    def read(column: str) -> list[studies.histories.History]:
-        return studies.histories.histories(
+    def read(column: str) -> list[histories.History]:
+        return histories.histories(
             rows, differing, options.table.parent, options.log, over, column, names
         )
 
@@ -189,7 +187,7 @@ def curves(options: Any, rows: list, by: list[str], made: dict) -> int:
     title = options.title if options.title is not None else Path(made.get("script", "")).name
     found = read(options.curve)
     x, y = along(options, over, options.curve)
-    studies.histories.draw(found, out, x=x, y=y, title=title, exact=exact)
+    histories.draw(found, out, x=x, y=y, title=title, exact=exact)
     for each in found:
         print(f"{each.label}: {options.curve} {shown(float(each.y[-1]))} at the end")
     print(f"drawn: {out}")
@@ -203,10 +201,10 @@ def keeps(options: Any, rows: list, by: list[str], variables: list[str], made: d
         if name not in variables:
             raise missing("-by", name, variables)
     over, folder = options.x or "Time", options.table.parent
-    what = over, options.keeps, studies.keeping.WITHIN, made.get("computes", ())
-    kept = [studies.keeping.look_at(row, folder, *what) for row in rows]
-    found = studies.keeping.table(rows, kept, by, variables)
-    text = studies.keeping.markdown(found)
+    what = over, options.keeps, keeping.WITHIN, made.get("computes", ())
+    kept = [keeping.look_at(row, folder, *what) for row in rows]
+    found = keeping.table(rows, kept, by, variables)
+    text = keeping.markdown(found)
     print(text)
     for word in dict.fromkeys(one.word for one in kept):
         print(f"{word}: {sum(one.word == word for one in kept)} of {len(kept)}")

@@ -11,7 +11,7 @@ from karamelo_py.script.errors import ScriptError, meant, plural
 from karamelo_py.script.evaluation import evaluate
 from karamelo_py.script.functions import CONSTANTS
 from karamelo_py.script.parser import parse, parse_text
-from karamelo_py.script.syntax import Assignment, Call
+from karamelo_py.script.syntax import Assignment, CommandCall
 from karamelo_py.script.terms import number_of
 
 VALUES = "NAME=value,value,... or NAME=first:last:count"
@@ -199,9 +199,9 @@ def logged(path: Path) -> list[str] | None:
     """The headings of the log columns that a script names; None if it is not known beforehand."""
     headings = ["Step", "dt", "Time"]
     for statement in parse(path.read_text(encoding="utf-8", errors="replace"), str(path)):
-        if isinstance(statement, Call) and statement.name == "include":
+        if isinstance(statement, CommandCall) and statement.name == "include":
             return None
-        if isinstance(statement, Call) and statement.name == "log_modify":
+        if isinstance(statement, CommandCall) and statement.name == "log_modify":
             words = ["".join(raw.code.split()).strip('"') for raw in statement.arguments[1:]]
             headings += [KEYWORDS.get(word, word) for word in words]
     return headings
@@ -213,7 +213,9 @@ def computes(path: Path) -> list[str]:
         statement.arguments[0].code.strip()
         for text in texts(path)
         for statement in parse(text, str(path))
-        if isinstance(statement, Call) and statement.name == "compute" and statement.arguments
+        if isinstance(statement, CommandCall)
+        and statement.name == "compute"
+        and statement.arguments
     ]
 
 
@@ -228,7 +230,7 @@ def _collect(path: Path, read: set[str], assigned: set[str], seen: set[Path]) ->
         if isinstance(statement, Assignment):
             assigned.add(statement.name)
             code = statement.right.code
-        elif isinstance(statement, Call):
+        elif isinstance(statement, CommandCall):
             code = ", ".join(raw.code for raw in statement.arguments)
             if statement.name == "include":
                 other = path.parent / code.strip().strip('"')

@@ -15,7 +15,14 @@ Only compiled kernels know lanes; interpreted ones take the points one by one.
 """
 
 from karamelo_py.compiler.lanes import apart, records  # noqa: F401
-from karamelo_py.compiler.lanes.arrays import Eights, Fours, group, lanes_for, room_for, spread
+from karamelo_py.compiler.lanes.arrays import (
+    EightLanes,
+    FourLanes,
+    group,
+    lanes_for,
+    room_for,
+    spread,
+)
 from karamelo_py.compiler.lanes.registers import Lanes
 
-__all__ = ["Eights", "Fours", "Lanes", "group", "lanes_for", "room_for", "spread"]
+__all__ = ["EightLanes", "FourLanes", "Lanes", "group", "lanes_for", "room_for", "spread"]

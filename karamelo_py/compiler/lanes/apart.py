@@ -8,7 +8,6 @@ from typing import Any
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.core.errors import TypingError
 from numba.extending import intrinsic
 
 from karamelo_py.compiler.compile import (
@@ -22,6 +21,7 @@ from karamelo_py.compiler.compile import (
     largest,
 )
 from karamelo_py.compiler.lanes.registers import I64, Lanes, element, known, lane, vector_of
+from karamelo_py.compiler.values import Untraceable
 
 
 def _of_leaves(kind: Any, change: Callable) -> Any:
@@ -191,7 +191,7 @@ for _function in (
 @by_type(bool)
 def _branch(value):
     if lanes_of(value):
-        raise TypingError(
+        raise Untraceable(
             "several points are computed at once, which a branch cannot tell apart: take choose, "
             "in_all or in_any, or name the point function in one_by_one"
         )

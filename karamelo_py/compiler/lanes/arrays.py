@@ -37,17 +37,17 @@ from karamelo_py.compiler.lanes.registers import (
 AHEAD = 256  # bytes by which arrays of points are asked of the memory ahead of their use
 
 
-class Group(types.Type):
+class LaneGroup(types.Type):
     """The numbers of up to `width` points that lie one after another."""
 
     def __init__(self, width: int):
         self.width = width
-        super().__init__(name=f"Group({width})")
+        super().__init__(name=f"LaneGroup({width})")
 
 
-@register_model(Group)
+@register_model(LaneGroup)
 class _GroupModel(models.StructModel):
-    def __init__(self, manager: Any, group: Group):
+    def __init__(self, manager: Any, group: LaneGroup):
         super().__init__(manager, group, [("first", types.int64), ("count", types.int64)])
 
 
@@ -65,13 +65,13 @@ class _BesideModel(models.StructModel):
         super().__init__(manager, beside, [("nodes", beside.nodes), ("steps", types.intp)])
 
 
-class Fours(NamedTuple):
+class FourLanes(NamedTuple):
     """Four points at once."""
 
     width = 4
 
 
-class Eights(NamedTuple):
+class EightLanes(NamedTuple):
     """Eight points at once."""
 
     width = 8
@@ -79,13 +79,13 @@ class Eights(NamedTuple):
 
 def lanes_for(bits: int) -> type:
     """How many points are visited at once, of numbers with so many bits; kept sorted for that."""
-    return {64: Fours, 32: Eights}[bits]
+    return {64: FourLanes, 32: EightLanes}[bits]
 
 
 @intrinsic
 def group(typing_context, tag, first, count):
     """The `count` points from `first` on, as many as the tag says at most."""
-    made = Group(tag.instance_class.width)
+    made = LaneGroup(tag.instance_class.width)
 
     def codegen(context, builder, sig, arguments):
         out = cgutils.create_struct_proxy(made)(context, builder)
@@ -154,7 +154,7 @@ def _present(typing_context, p):
 
 @by_type(of_present)
 def _of_present(p, value):
-    if isinstance(p, Group):
+    if isinstance(p, LaneGroup):
         return lambda p, value: select(_present(p), value, real(0, value))
     return None
 
@@ -308,7 +308,7 @@ def _prefetch(typing_context, array, at):
 
 @by_type(prefetch)
 def _prefetch_by_type(array, at):
-    return (lambda array, at: _prefetch(array, at)) if isinstance(_last(at), Group) else None
+    return (lambda array, at: _prefetch(array, at)) if isinstance(_last(at), LaneGroup) else None
 
 
 @intrinsic
@@ -366,7 +366,7 @@ def _head(at: Any) -> Any:
 
 @by_type(operator.getitem)
 def _get(array, at):
-    if isinstance(array, types.Array) and isinstance(_last(at), Group):
+    if isinstance(array, types.Array) and isinstance(_last(at), LaneGroup):
         return lambda array, at: _load_points(array, at)
     if isinstance(array, types.Array) and isinstance(_head(at), Lanes | Beside):
         return lambda array, at: _gather(array, at)
@@ -375,7 +375,7 @@ def _get(array, at):
 
 @by_type(operator.setitem)
 def _set(array, at, value):
-    if isinstance(array, types.Array) and isinstance(_last(at), Group):
+    if isinstance(array, types.Array) and isinstance(_last(at), LaneGroup):
         return lambda array, at, value: _store_points(array, at, value)
     return None
 

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 from karamelo_py.compiler.compile import real
 from karamelo_py.compiler.tuples import scale
+from karamelo_py.language.rules import known_failure
 from karamelo_py.points.basis import mapped_again
 from karamelo_py.points.basis.product import Along, along, register, spacing
 from karamelo_py.points.grid import cells_along, in_cells
@@ -27,6 +28,16 @@ class BernsteinQuadratic(NamedTuple):
     steep_edge = True
     in_lanes = True
     gradient_jumps = True
+
+
+known_failure(
+    BernsteinQuadratic,
+    "points that cross cells",
+    when=lambda basis, scene: scene.moves,
+    reason="the gradients of Bernstein-quadratic functions jump at cell faces, and points that "
+    "cross one feel false forces as large as their stress",
+    cure="method tlmpm, or quadratic-spline in the place of the basis",
+)
 
 
 @along.on(BernsteinQuadratic)

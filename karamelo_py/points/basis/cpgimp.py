@@ -8,10 +8,12 @@ from karamelo_py.compiler.compile import Weighted, choose, index, real, shared
 from karamelo_py.compiler.powers import power
 from karamelo_py.compiler.symbols import Symbol, call
 from karamelo_py.compiler.tuples import scale
+from karamelo_py.language.rules import known_failure
 from karamelo_py.points import kinematics
 from karamelo_py.points.basis import carried, carrier, carry, deformed, mapped_again
 from karamelo_py.points.basis.product import along, node_number, register
 from karamelo_py.points.basis.ugimp import averaged_hats, box
+from karamelo_py.points.basis.wide import wide
 from karamelo_py.points.frames import stretched_share
 from karamelo_py.points.grid import cells_along
 from karamelo_py.points.kinematics.components import Number, Tensor, Vector, formula
@@ -30,6 +32,9 @@ class _Box(NamedTuple):
     steady_moment = True
     steep_edge = True
     in_lanes = True
+
+
+wide(_Box)
 
 
 class CPGIMPDet(_Box):
@@ -59,6 +64,16 @@ class CPGIMPDiagonal(_Box):
     __slots__ = ()
     steady_moment = False  # D of the affine transfers all but vanishes with the box
     shape = ("half_size", "half_size", "deformation")  # half sizes now and at the start, F
+
+
+known_failure(
+    CPGIMPDiagonal,
+    "boxes in a turn",
+    when=lambda basis, scene: scene.turns,
+    reason="bodies will turn by about {scene.turn:.2g} rad, and boxes of the size |F_ii| shrink "
+    "with the cosine of that",
+    cure="the variant stretch in the place of diagonal",
+)
 
 
 class CPGIMPStretch(_Box):

@@ -3,7 +3,9 @@
 from typing import NamedTuple
 
 from karamelo_py.compiler.compile import choose, in_all, real, shared
+from karamelo_py.points.basis.noise import CUBIC
 from karamelo_py.points.basis.product import Along, along, register
+from karamelo_py.points.basis.wide import wide
 from karamelo_py.points.grid import cells_along, in_cells
 
 
@@ -36,6 +38,10 @@ class CubicSpline(NamedTuple):
     # measured again.
     courant_strained_first = 1.0
     bears_drift = True
+    borne = CUBIC
+
+
+wide(CubicSpline)
 
 
 @along.on(CubicSpline)

@@ -4,9 +4,13 @@ from typing import NamedTuple
 
 from karamelo_py.compiler.compile import real
 from karamelo_py.compiler.tuples import scale
+from karamelo_py.language.rules import known_failure
 from karamelo_py.points.basis import mapped_again
 from karamelo_py.points.basis.product import Along, along, register
 from karamelo_py.points.grid import cells_along, in_cells
+
+STRETCH = 0.3  # strain beyond which points that lie a cell apart come loose
+SMALL_SHARE = 0.3  # of the stable step, with which impacts keep the energy
 
 
 class Linear(NamedTuple):
@@ -24,6 +28,44 @@ class Linear(NamedTuple):
     steep_edge = True
     gradient_jumps = True
     in_lanes = True
+
+
+known_failure(
+    Linear,
+    "bodies that break without reason",
+    when=lambda basis, scene: scene.moves and scene.elastic and scene.strain > STRETCH,
+    reason="bodies will strain by about {scene.strain:.1g} (from their speed and weight), and with "
+    "linear functions points that lie a cell apart no longer hold together",
+    cure="method tlmpm or ulcpdi, or a spline in the place of the basis",
+)
+
+
+def _meet_again(basis, scene):
+    """Whether bodies have the time to fly through the domain, and meet or bounce again."""
+    domain, share = scene.hub.domain, scene.hub.update.dt_factor
+    far = max(domain.hi[: scene.d] - domain.lo[: scene.d])
+    small = share is not None and share <= SMALL_SHARE
+    kept = scene.moves and getattr(scene.transfer, "alpha", 0.0) > 0.9 and not small
+    return kept and len(scene.elastic) > 1 and scene.fastest * scene.duration > far
+
+
+known_failure(
+    Linear,
+    "repeated contact",
+    when=_meet_again,
+    reason="{scene.transfer_name} with linear functions gains energy at each impact of elastic "
+    "bodies, and these have the time to meet again and again (two disks in a box for 50 impacts: "
+    "up to 1.1 times the energy, with a share of 0.99 two to four times)",
+    cure=f"quadratic-spline in the place of the basis, or dt_factor({SMALL_SHARE:g})",
+)
+known_failure(
+    Linear,
+    "hourglasses",
+    when=lambda basis, scene: not scene.moves and scene.d > 1 and bool(scene.single),
+    reason="one point a cell (solid '{scene.single[0]}') with linear functions that never move "
+    "feels no hourglass: its nodes may go to and fro without any force",
+    cure="{scene.corners} points a cell, or Bernstein-quadratic in the place of the basis",
+)
 
 
 @along.on(Linear)

@@ -6,6 +6,7 @@ from typing import NamedTuple
 from karamelo_py.compiler.compile import real, shared
 from karamelo_py.compiler.symbols import Symbol, call, written
 from karamelo_py.points.basis.product import Along, along, register
+from karamelo_py.points.basis.wide import wide
 from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.points.kinematics import dimension
 
@@ -91,3 +92,4 @@ def _along_ugimp(basis, kin, grid, place, direction):
 
 
 register(UGIMP, 3)
+wide(UGIMP)

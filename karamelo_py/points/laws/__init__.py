@@ -14,6 +14,9 @@ A law that says ``in_lanes``, as all its parts do, is computed for several point
 functions do not branch over numbers of a point, but `choose`; those that do are named in
 ``one_by_one``. Points of other laws are visited one by one.
 
+A law that says ``rebounds`` bears tension and gives back all the work that it was given; of a
+composed law its strength says so.
+
 What dumps and plots can show of a law is declared beside it (`column`).
 """
 

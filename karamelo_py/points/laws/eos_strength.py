@@ -8,15 +8,17 @@ remembers (`Memory`), and the dissipated energy where there is any. Parts of oth
 a plug-in's, are chained (`karamelo_py.points.laws.further`).
 """
 
-from math import log
+from math import inf, isinf, log
 from typing import Any, NamedTuple
 
 from karamelo_py.compiler.compile import choose
 from karamelo_py.compiler.tuples import added, increased, only
+from karamelo_py.language.rules import saving
 from karamelo_py.points.kinematics import tensors
 from karamelo_py.points.laws import (
     Absent,
     advance,
+    can,
     cauchy_stress,
     column,
     composed,
@@ -122,6 +124,40 @@ class EosStrength(NamedTuple):
 
 
 column(EosStrength, "dissipated", dissipated_energy)
+
+
+# --- parts that never act, told by `check` ------------------------------------------------------
+
+
+def _idle_damage(law, scene):
+    yields = can(law.strength, plastic_strain) or any(
+        name in law.strength._fields for name in ("yield_stress", "A", "cohesion", "phi")
+    )
+    return not isinstance(law.damage, Absent) and not yields
+
+
+def _idle_heat(law, scene):
+    """Whether neither the strength nor the pressure nor the damage depends on the temperature."""
+    softening = getattr(law.strength, "softening", Absent())
+    softens = not isinstance(softening, Absent) or not isinf(getattr(law.strength, "Tm", inf))
+    pressures = getattr(law.eos, "thermal", 0), getattr(law.temperature, "alpha", 1)
+    presses = any(number != 0 for number in pressures)
+    wears = getattr(law.damage, "D5", 0) != 0
+    return not (isinstance(law.temperature, Absent) or softens or presses or wears)
+
+
+saving(
+    EosStrength,
+    when=_idle_damage,
+    cost="material {owner.id} has a damage by plastic strain, and never yields",
+    instead="leave the damage out",
+)
+saving(
+    EosStrength,
+    when=_idle_heat,
+    cost="the temperature of material {owner.id} changes nothing but its column T",
+    instead="leave the temperature out",
+)
 
 
 @initial_state.on(EosStrength)

@@ -3,6 +3,7 @@
 from typing import Annotated, Any, Literal, NamedTuple
 
 from karamelo_py.compiler.compile import point_function
+from karamelo_py.language.rules import gain
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import tensors
@@ -51,6 +52,7 @@ class LinearElastic(NamedTuple):
     """
 
     in_lanes = True
+    rebounds = True
 
     specific_volume: float  # reference volume per mass
     lam: float  # Lame's first parameter
@@ -83,6 +85,16 @@ class FixedFrame(NamedTuple):
     specific_volume: float  # reference volume per mass
     lam: float  # Lame's first parameter
     G: float  # shear modulus
+
+
+for _law in (LinearElastic, FixedFrame):
+    gain(
+        _law,
+        when=lambda law, scene: scene.shear_stress > 0.25 * law.G,
+        cause="material linear at large strain: it adds up stress by rates, and gives back another "
+        "work than it took",
+        cure="material neo-hookean, which stores what it is given",
+    )
 
 
 class State(NamedTuple):

@@ -47,6 +47,7 @@ class NeoHookean(NamedTuple):
     """
 
     in_lanes = True
+    rebounds = True
 
     specific_volume: float  # reference volume per mass
     lam: float  # Lame's first parameter

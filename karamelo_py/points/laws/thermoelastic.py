@@ -2,6 +2,7 @@
 
 from typing import Any, NamedTuple
 
+from karamelo_py.language.rules import saving
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics.tensors import I, symmetric_tensor
 from karamelo_py.points.laws.elasticity import LameParameters
@@ -25,9 +26,18 @@ class Thermoelastic(NamedTuple):
     """An elastic law and its temperature; the state is that of the elastic law, then T."""
 
     in_lanes = True
+    rebounds = True
 
     elastic: Any
     heat: Any
+
+
+saving(
+    Thermoelastic,
+    when=lambda law, scene: not scene.hub.update.thermal,
+    cost="material {owner.id} has a temperature, and no heat flows",
+    instead="leave cp, kappa and alpha out, or method(..., thermo-mechanical)",
+)
 
 
 def expanding(

@@ -4,9 +4,11 @@ from types import MappingProxyType
 from typing import Annotated, NamedTuple
 
 from karamelo_py.language.kinds import Constraint
-from karamelo_py.points.transfers import lost_shares, updated_velocity
+from karamelo_py.language.rules import known_failure
+from karamelo_py.points.transfers import lost_shares, noise, updated_velocity
 
 Share = Constraint("from 0 (PIC) to 1 (pure FLIP)", lambda value: 0 <= value <= 1)
+SWING = 0.05  # strain of vibrations that bodies do not bear for long
 
 
 class FLIP(NamedTuple):
@@ -49,4 +51,27 @@ def blended(transfer: type) -> None:
         return (1 - alpha) * (1 + alpha), (1 - alpha) * (1 - alpha)
 
 
+def swings(transfer: type) -> None:
+    """Let large vibrations with `transfer` be judged: nothing lasts there but usl, which damps."""
+    known_failure(
+        transfer,
+        "large vibrations",
+        when=lambda transfer, scene: (
+            scene.moves
+            and transfer.alpha > 0.9
+            and scene.elastic
+            and not (getattr(scene.scheme, "damps", False) and not scene.sparse)
+            and scene.vibration.strain > SWING
+            and scene.vibration.periods > 2
+        ),
+        reason="a body will vibrate by about {scene.vibration.strain:.1g} of strain for about "
+        "{scene.vibration.periods:.0f} periods, and with {scene.transfer_name} elastic bodies that "
+        "do so while they move through the grid break after 2 to 50 periods (by 0.14, drifting)",
+        cure="method tlmpm, or scheme(usl) with two points a cell and direction, which damps",
+    )
+
+
 blended(FLIP)
+swings(FLIP)
+noise.drifts(FLIP)
+noise.turns(FLIP)

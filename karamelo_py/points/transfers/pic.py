@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+from karamelo_py.language.rules import known_failure
 from karamelo_py.points.transfers import take_nodal_velocity
 
 
@@ -19,5 +20,13 @@ class PIC(NamedTuple):
     inverts_spread = False
     in_lanes = True
 
+
+known_failure(
+    PIC,
+    "angular momentum",
+    when=lambda pic, scene: scene.turns,
+    reason="PIC takes a per cent or more of the angular momentum of a turning body in every step",
+    cure="APIC, or FLIP, in the place of PIC",
+)
 
 take_nodal_velocity(PIC)

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from functools import cached_property
-from itertools import pairwise
 from math import inf
 from typing import Any, NamedTuple
 
@@ -20,8 +19,6 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
 LAST = 2**62  # behind all numbers of points
-FIRST, LAST_KEY = -(2**63), 2**63 - 1  # before all keys of points, and behind them
-SAMPLES = 256  # keys of all processes, by which a piece of points is cut
 
 
 class ById:
@@ -159,30 +156,6 @@ class ById:
         found = (say(some, *arguments) for some in self.some(part.group))
         return (one for one in found if one is not None)
 
-    def counted_of(self, part: Any, name: str, size: int, *arguments: Any) -> np.ndarray:
-        """How many points of a part's group have each of `size` numbers, which its method says."""
-        counts = np.zeros(size, np.int64)
-        for numbers in self._said(part, name, *arguments):
-            counts += np.bincount(numbers, minlength=size)
-        return self.comm.allreduce(counts)
-
-    def in_order(self, part: Any, name: str, *arguments: Any) -> Iterator[np.ndarray]:
-        """Rows (k, n) of the points of a part's group in the order of keys that it says, too.
-
-        Of several processes the first gets them, so many at a time.
-        """
-        keys, rows = _ordered(*zip(*self._said(part, name, *arguments), strict=True))
-        if self.comm.size == 1:
-            yield rows
-            return
-        samples = self.comm.allgather(keys[:: max(PIECE // SAMPLES, 1)])
-        cuts = np.sort(np.concatenate(samples))[SAMPLES::SAMPLES].tolist()
-        for cut in pairwise([FIRST, *cuts, LAST_KEY]):
-            own = slice(*np.searchsorted(keys, cut))
-            found = self.comm.gather((keys[own], rows[:, own]))
-            if found is not None:
-                yield _ordered(*zip(*found, strict=True))[1]
-
     def seen(self, say: Callable, *arguments: Any) -> list:
         """What a function says of the points at hand, of each process."""
         return self.comm.allgather(say(self, *arguments))
@@ -260,13 +233,6 @@ class ById:
             parts = [Part(block, None, block.points.id - first) for block in blocks]
             ids = np.arange(first, end)
             yield PointTable(self.hub, Rows(s, parts, ids, self.present[first:end]))
-
-
-def _ordered(keys: Sequence[np.ndarray], rows: Sequence[np.ndarray]) -> tuple:
-    """Keys (n,), ascending, and rows (k, n) in their order."""
-    of_all = np.concatenate(keys)
-    order = np.argsort(of_all)
-    return of_all[order], np.concatenate(rows, axis=1)[:, order]
 
 
 def _largest(points: ById, of: Callable[[PointTable], np.ndarray]) -> tuple[float, int]:

@@ -16,9 +16,9 @@ from karamelo_py.run.lower.sizes import memory_of, node_fields, nodes_in_use, po
 from karamelo_py.run.mpi.plan import told
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.timestep import ruling_limit, words_of_share
+from karamelo_py.scene import machine_memory
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
-from karamelo_py.scene.room import free_bytes
 
 
 def report(hub: Hub, end_time: float = inf) -> None:
@@ -61,8 +61,9 @@ def report(hub: Hub, end_time: float = inf) -> None:
     memory = memory_of(simulation, s, tiles.box_bytes(s))
     say(f"memory         {_size(sum(memory))} in a run, of which")
     say(f"               {_size(memory.copied)} are a copy of the last good state")
-    if (free := free_bytes()) is not None:
-        say(f"               {_size(free)} are free on this machine, beside what check has taken")
+    if (there := machine_memory.machine_memory()) is not None:
+        free = _size(there.free)
+        say(f"               {free} are free on this machine, beside what check has taken")
     if hub.settings.ranks > 1:
         say("")
         for line in told(simulation, hub.settings.ranks):

@@ -2,24 +2,20 @@
 
 import re
 from collections.abc import Callable, Iterator
-from math import isinf
+from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.points.laws import Absent, can, plastic_strain
-from karamelo_py.points.laws.strengths.johnson_cook import JohnsonCook
-from karamelo_py.points.laws.thermoelastic import Thermoelastic
+from karamelo_py.run.advice.facts import SceneFacts
 from karamelo_py.run.timestep import own_step
 from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
-from karamelo_py.styles.regions.cylinder import Cylinder
 
 AXES = "xyz"
 SMALL_STEP = 0.4  # of the stable one; scripts with moderate reserve are left alone
 NEARLY_INCOMPRESSIBLE = 0.4  # Poisson's ratio from where on linear functions lock
 MANY_POINTS = 4  # a cell and direction
-WIDE = {"cubic-spline", "ugimp", "cpgimp"}
 
 
 class Saving(NamedTuple):
@@ -38,9 +34,15 @@ class Saving(NamedTuple):
 
 
 def savings(hub: Hub, simulation: Any) -> list[Saving]:
-    """All that is known to be paid for without need, before anything has run."""
-    rules = (_step, _unread, _unused, _idle_parts, _averaging, _flat, _round, _basis, _points)
+    """Find all that is known to be paid for without need, before anything has run."""
+    rules = (_step, _unread, _unused, _of_parts, _averaging, _flat, _round, _points)
     return [saving for rule in rules for saving in rule(hub, simulation)]
+
+
+def _of_parts(hub: Hub, simulation: Any) -> Iterator[Saving]:
+    """What parts say by their rules."""
+    said = SceneFacts(hub, simulation, inf).advice("saving")
+    return (Saving(one.reason, one.cure) for one in said)
 
 
 # --- the step ------------------------------------------------------------------------------------
@@ -106,62 +108,6 @@ def _script(hub: Hub) -> str:
     files = dict.fromkeys(getattr(hub.interpreter, "files", []))
     lines = [line for path in files for line in path.read_text("utf-8").splitlines()]
     return "\n".join(line.partition("#")[0] for line in lines)
-
-
-# --- parts of laws that never act ----------------------------------------------------------------
-
-
-def _idle_parts(hub: Hub, simulation: Any) -> Iterator[Saving]:
-    for material in dict.fromkeys(solid.material for solid in hub.solids.values()):
-        law = material.law
-        if isinstance(law, Thermoelastic):
-            if not hub.update.thermal:
-                yield Saving(
-                    f"material {material.id} has a temperature, and no heat flows",
-                    "leave cp, kappa and alpha out, or method(..., thermo-mechanical)",
-                )
-            continue
-        named = law._asdict()
-        strength, heat = named.get("strength"), named.get("temperature")
-        if strength is None:
-            continue
-        if not isinstance(named.get("damage", Absent()), Absent) and not _yields(strength):
-            yield Saving(
-                f"material {material.id} has a damage by plastic strain, and never yields",
-                "leave the damage out",
-            )
-        if heat is not None and not isinstance(heat, Absent) and not _feels_heat(named):
-            yield Saving(
-                f"the temperature of material {material.id} changes nothing but its column T",
-                "leave the temperature out",
-            )
-        if isinstance(strength, JohnsonCook) and strength.B == 0 and not any(_factors(strength)):
-            yield Saving(
-                f"the strength of {material.id} neither hardens nor depends on rate or heat",
-                f"strength(..., plastic, {strength.G:g}, {strength.A:g})",
-            )
-
-
-def _yields(strength: NamedTuple) -> bool:
-    return can(strength, plastic_strain) or any(
-        name in strength._fields for name in ("yield_stress", "A", "cohesion", "phi")
-    )
-
-
-def _factors(strength: NamedTuple) -> tuple[bool, bool]:
-    """Whether a strength has factors of the rate and of the temperature."""
-    names = ("rate", "softening")
-    return tuple(not isinstance(getattr(strength, n, Absent()), Absent) for n in names)
-
-
-def _feels_heat(parts: dict[str, Any]) -> bool:
-    """Whether the strength, the pressure or the damage depends on the temperature."""
-    strength = parts["strength"]
-    softens = _factors(strength)[1] or not isinf(getattr(strength, "Tm", np.inf))
-    pressures = getattr(parts["eos"], "thermal", 0), getattr(parts["temperature"], "alpha", 1)
-    presses = any(number != 0 for number in pressures)
-    damage = parts.get("damage", Absent())
-    return softens or presses or getattr(damage, "D5", 0) != 0
 
 
 def _averaging(hub: Hub, simulation: Any) -> Iterator[Saving]:
@@ -313,10 +259,8 @@ def _round(hub: Hub, simulation: Any) -> Iterator[Saving]:
     if hub.domain.dimension != 3:
         return
     regions = [getattr(solid, "region", None) for solid in hub.solids.values()]
-    if not all(isinstance(region, Cylinder) for region in regions):
-        return
-    axes = {(region.along, region.centre) for region in regions}
-    if len(axes) > 1:
+    axes = {getattr(region, "axis", None) for region in regions}
+    if len(axes) > 1 or None in axes:
         return
     along, middle = axes.pop()
     across = [axis for axis in range(3) if axis != along]
@@ -343,22 +287,6 @@ def _round(hub: Hub, simulation: Any) -> Iterator[Saving]:
         f"{np.pi * radius / h:.3g} times the points of the plane of radius and axis",
         f"dimension(2, 0, {max(hub.domain.hi[axis] for axis in across):g}, {lo:g}, {hi:g}, {h:g}) "
         "and axisymmetric(true), y along the axis, and the nodes at x = 0 held in x",
-    )
-
-
-# --- basis and points ----------------------------------------------------------------------------
-
-
-def _basis(hub: Hub, simulation: Any) -> Iterator[Saving]:
-    method = hub.update.method
-    if method.frame.moves or method.basis_name not in WIDE:
-        return
-    d = hub.domain.dimension
-    cells = type(method.basis).cells + 1
-    yield Saving(
-        f"{method.basis_name} sees {cells**d} nodes a point; in a total Lagrangian method no point "
-        f"crosses cells, and linear functions, which see {2**d}, are of the same order",
-        "linear in method(...); karamelo-py sweep shows the errors of both",
     )
 
 

@@ -1,4 +1,4 @@
-"""All arrays of a simulation that a step changes, by name: to return to, to write, to read."""
+"""The state of a simulation as arrays by name: to return to, to write, to read."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.compiler.fields import as_rows_of_points, name_of
-from karamelo_py.kernels.arrays import Block, Nodes, Points, Tiling, arrays_of
+from karamelo_py.kernels.arrays import Nodes, Points, Tiling, arrays_of
 from karamelo_py.kernels.totals import WORK, carry
 from karamelo_py.run.tiles.boxes import numbers, used
 from karamelo_py.run.tiles.tiles import in_use
@@ -22,7 +22,7 @@ Stored = tuple[str, tuple[int, ...], Any, np.ndarray]
 
 
 def changing(simulation: Any) -> Iterator[tuple[str, np.ndarray]]:
-    """Every array that a step changes and the next one needs, as far as it is in use."""
+    """Yield every array that a step changes and the next one needs, as far as it is in use."""
     s = simulation.setup
     for name, array, rows in simulation.tiles.in_use(s):
         yield name, array[:rows]
@@ -36,10 +36,10 @@ def changing(simulation: Any) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def copied(simulation: Any, before: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Copies of all that `changing` has, of the published values, and where contact acted last.
+    """Copy the state of a simulation, and the published values.
 
-    Those `before`, which are lost, are used again. One array after another: where points have come
-    or gone none is there twice.
+    Copies of the state `before`, which is lost, are used again. One array after another: where
+    points have come or gone none is there twice.
     """
     found = {}
     for name, array in (*changing(simulation), ("values", simulation.setup.control.values)):
@@ -53,58 +53,44 @@ def copied(simulation: Any, before: dict[str, np.ndarray]) -> dict[str, np.ndarr
 
 
 def touched(simulation: Any) -> dict[str, np.ndarray]:
-    """The nodes in use where contact acted in the last step, and what it remembers of them."""
+    """List the nodes in use where contact acted in the last step, and what it remembers of them."""
     spans = simulation.setup.spans
     memory = remembered_at(simulation, used(spans)[1:])
     if not memory:
         return {}
-    rows = latest(np.concatenate(memory), simulation.step)
+    rows = np.concatenate(memory)
+    # What touched before the last step is of no use.
+    rows = np.where(np.abs(rows) == simulation.step, rows, 0)
     there = np.flatnonzero(rows.any(axis=1))
     return {"touched/nodes": numbers(spans)[there], "touched/rows": rows[there]}
 
 
-def arrays_by_name(simulation: Any) -> dict[str, np.ndarray]:
-    """Views and copies of them, and of what else a file holds; of nodes, the rows in use."""
+def stored(simulation: Any) -> Iterator[Stored]:
+    """Yield what a file to go on from holds: the state, what is known of it, nodes as they are."""
+    yield from in_file(dict(changing(simulation)) | touched(simulation))
     s = simulation.setup
-    carry(s.control.totals[WORK])  # so that a sum is always the same digits
-    found = dict(changing(simulation))
-    found["clock"] = s.control.clock.view(np.ndarray)
-    found |= {f"points/{k}/x": block.points.x for k, block in enumerate(s.blocks)}
-    if memory := remembered_at(simulation, used(s.spans)[1:]):
-        found["contact"] = latest(np.concatenate(memory), simulation.step)
-    found |= known(simulation)
     nodes = numbers(s.spans)
     # Of zeros without a sign: which nodes beside a body are visited depends on who has its tiles.
-    return found | {name: array[nodes] + 0 for name, array in of_nodes(s)}
+    yield from wholes(known(simulation) | {name: array[nodes] + 0 for name, array in of_nodes(s)})
 
 
-def known(simulation: Any) -> dict[str, np.ndarray]:
-    """What all processes know."""
-    shown = np.array([getattr(simulation, name) for name in SHOWN])
-    return {"present": simulation.present, "shown": shown}
-
-
-def latest(memory: np.ndarray, step: int) -> np.ndarray:
-    """What contact remembers, without what touched before the last step: it is of no use."""
-    return np.where(np.abs(memory) == step, memory, 0)
-
-
-def stored(simulation: Any) -> Iterator[Stored]:
-    """What a file to go on from holds, array by array."""
-    yield from wholes(arrays_by_name(simulation))
-
-
-def stored_copies(kept: dict[str, np.ndarray]) -> Iterator[Stored]:
-    """What a file holds of what `copied` has given."""
-    work = kept["work"].copy()
+def in_file(state: dict[str, np.ndarray]) -> Iterator[Stored]:
+    """Yield a state as files hold it, the digits of a sum always the same."""
+    work = state["work"].copy()
     carry(work)
-    yield from wholes(kept | {"clock": kept["clock"].view(np.ndarray), "work": work})
+    yield from wholes(state | {"clock": state["clock"].view(np.ndarray), "work": work})
 
 
 def wholes(arrays: Mapping[str, np.ndarray]) -> Iterator[Stored]:
-    """Arrays that are written at once."""
+    """Yield arrays that are written at once."""
     for name, array in arrays.items():
         yield name, array.shape, ..., array
+
+
+def known(simulation: Any) -> dict[str, np.ndarray]:
+    """Return what all processes know."""
+    shown = np.array([getattr(simulation, name) for name in SHOWN])
+    return {"present": simulation.present, "shown": shown}
 
 
 class InFile:
@@ -161,8 +147,15 @@ def reading() -> Iterator[None]:
         ) from error
 
 
-def take_arrays(simulation: Any, found: Mapping[str, np.ndarray]) -> None:
-    """Put a simulation into the state that `arrays_by_name` has given.
+def restore(simulation: Any, state: Mapping[str, Any]) -> None:
+    """Put the arrays of a simulation into a state.
+
+    Parameters
+    ----------
+    simulation
+        With a setup, tiles and a hub; also the own part of one of several processes.
+    state
+        As `copied` or a file has it; without published values these stay.
 
     Raises
     ------
@@ -170,65 +163,47 @@ def take_arrays(simulation: Any, found: Mapping[str, np.ndarray]) -> None:
         If arrays are missing, or of another kind than those of this scene.
     """
     s = simulation.setup
-    blocks = tuple(
-        Block(
-            take_points(block.points, found, f"points/{k}/"),
-            block.laws,
-            take_tiling(simulation.tiles.empty_tiling(), found, f"tiling/{k}/"),
-        )
-        for k, block in enumerate(s.blocks)
-    )
-    s = simulation.setup = s._replace(blocks=blocks)
-    simulation.tiles.lay_out(s)
-    take_known(simulation, found)
-    nodes = numbers(s.spans)
-    for name, array in of_nodes(s):
-        array[nodes] = _checked(found, name, array[nodes])
-    if memory := remembered_at(simulation, used(s.spans)[1:]):
-        own = _checked(found, "contact", np.concatenate(memory))
-        for rows, some in zip(memory, np.split(own, np.cumsum([*map(len, memory)])), strict=False):
-            rows[...] = some
-
-
-def take_known(simulation: Any, found: Mapping[str, np.ndarray]) -> None:
-    """Take what all processes know, and the work done."""
-    control = simulation.control
-    clock, before = control.clock, found["clock"]
-    if set(clock.dtype.names) != set(before.dtype.names):
-        raise _misfit("clock")
-    for name in clock.dtype.names:
-        clock[name] = before[name]
-    control.totals[WORK] = _checked(found, "work", control.totals[WORK])
-    simulation.present[:] = _checked(found, "present", simulation.present)
-    for name, known in zip(SHOWN, _checked(found, "shown", np.ones(len(SHOWN), bool)), strict=True):
-        setattr(simulation, name, bool(known))
-
-
-def go_back(simulation: Any, kept: Mapping[str, np.ndarray]) -> None:
-    """Put a simulation into the state of which `changing` has given all arrays, and its values."""
-    s = simulation.setup
+    for k, block in enumerate(s.blocks):
+        check_points(block.points, state, f"points/{k}/")
     # Nodes that were not in use then have to be empty, as they were.
     simulation.tiles.empty_nodes(s)
     blocks = []
     for k, block in enumerate(s.blocks):
         stem = f"points/{k}/"
-        points, tiling = block.points, take_tiling(block.tiling, kept, f"tiling/{k}/")
-        if points.mass.size != kept[stem + "mass"].size:
-            own = {name: np.copy(array) for name, array in kept.items()}
-            own[stem + "x"] = np.stack([kept[stem + "x"]] * 2)
+        points, tiling = block.points, take_tiling(block.tiling, state, f"tiling/{k}/")
+        if points.mass.size != state[stem + "mass"].size:
+            own = {name: np.array(state[name]) for name in state if name.startswith(stem)}
             points = take_points(points, own, stem)
         blocks.append(block._replace(points=points, tiling=tiling))
     s = simulation.setup = s._replace(blocks=tuple(blocks))
     simulation.tiles.lay_out(s)
     for name, array in changing(simulation):
-        array[...] = kept[name]
+        if not name.startswith(
+            "tiling/"
+        ):  # of which the lay-out has put those first others wait for
+            array[...] = _checked(state, name, array)
     for block in s.blocks:
         block.points.x[:] = block.points.x[s.control.clock[0].now]
-    s.control.values[:] = kept["values"]
-    for marks in remembered_at(simulation, np.array([[0, simulation.hub.fields.node_count]])):
-        marks[marks != 0] = 0
-        if "touched/nodes" in kept:  # a process that has no points has no nodes in use, either
-            marks[kept["touched/nodes"]] = kept["touched/rows"]
+    if "values" in state:
+        s.control.values[:] = state["values"]
+    for memory in remembered_at(simulation, np.array([[0, simulation.hub.fields.node_count]])):
+        memory[memory != 0] = 0
+        if "touched/nodes" in state:  # a process that has no points has no nodes in use, either
+            memory[state["touched/nodes"][()]] = state["touched/rows"]
+
+
+def take_known(simulation: Any, state: Mapping[str, Any]) -> None:
+    """Take what all processes know."""
+    simulation.present[:] = _checked(state, "present", simulation.present)
+    for name, known in zip(SHOWN, _checked(state, "shown", np.ones(len(SHOWN), bool)), strict=True):
+        setattr(simulation, name, bool(known))
+
+
+def take_nodes(simulation: Any, state: Mapping[str, Any]) -> None:
+    """Let the nodes in use show what they did."""
+    nodes = numbers(simulation.setup.spans)
+    for name, array in of_nodes(simulation.setup):
+        array[nodes] = _checked(state, name, array[nodes])
 
 
 def of_nodes(s: Any) -> Iterator[tuple[str, np.ndarray]]:
@@ -256,14 +231,16 @@ def _fill(array: np.ndarray, found: Mapping[str, np.ndarray], name: str) -> None
     array[: len(found[name])] = found[name]
 
 
-def take_points(points: Points, found: Mapping[str, np.ndarray], stem: str) -> Points:
-    """Points in the order and number of the file, with arrays of their own."""
+def take_points(points: Points, found: Mapping[str, Any], stem: str) -> Points:
+    """Return points in the order and number of the arrays, which they keep where these fit."""
     check_points(points, found, stem)
     own = {
         name: None if array is None else as_rows_of_points(found[stem + name])
         for name, array in points._asdict().items()
         if name != "fields"
     }
+    if own["x"].ndim < points.x.ndim:
+        own["x"] = as_rows_of_points(np.stack([own["x"]] * len(points.x)))
     declared = (
         type(one)(as_rows_of_points(found[stem + name_of(type(one))])) for one in points.fields
     )
@@ -271,25 +248,25 @@ def take_points(points: Points, found: Mapping[str, np.ndarray], stem: str) -> P
 
 
 def check_points(points: Points, found: Mapping[str, Any], stem: str) -> None:
-    """Refuse arrays that are none of such points."""
+    """Refuse arrays that are none of such points; places may be those of now alone."""
     likes = dict(arrays_of(points))
     there = {n.removeprefix(stem): array for n, array in found.items() if n.startswith(stem)}
     for name in likes.keys() ^ there.keys():
         raise _misfit(f"{name} of points")
     for name, like in likes.items():
         array = there[name]
-        shape = *like.shape[:-1], there["id"].size
-        if array.dtype != like.dtype or array.shape != shape:
+        like = like[0] if name == "x" and len(array.shape) == 2 else like
+        if array.dtype != like.dtype or array.shape != (*like.shape[:-1], there["id"].size):
             raise _misfit(f"{name} of points")
 
 
 def remembered_at(simulation: Any, spans: np.ndarray) -> list[np.ndarray]:
-    """What contact remembers at the nodes of these spans (k, 2)."""
+    """Return what contact remembers at the nodes of these spans (k, 2)."""
     method = simulation.hub.update.method
     return method.remembered(simulation.setup.contact, spans)
 
 
-def _checked(found: Mapping[str, np.ndarray], name: str, like: np.ndarray) -> np.ndarray:
+def _checked(found: Mapping[str, Any], name: str, like: np.ndarray) -> np.ndarray:
     there = found.get(name)
     if there is None or there.shape != like.shape or there.dtype != like.dtype:
         raise _misfit(name)

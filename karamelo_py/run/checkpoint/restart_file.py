@@ -1,8 +1,8 @@
 """Files to go on from: the whole scene at one moment, in HDF5.
 
 Everything in them follows from what the parts of a scene declare: the arrays from their fields, the
-rest from what they remember (:mod:`karamelo_py.run.checkpoint.memory`). The set-up is not in
-them: the script makes it once more, and a file knows which statements had been carried out.
+rest from what they remember (:mod:`karamelo_py.run.checkpoint.parts`). The set-up is not in them:
+the script makes it once more, and a file knows which statements had been carried out.
 """
 
 import json
@@ -19,15 +19,16 @@ from karamelo_py.language.replay import Record, Replay
 from karamelo_py.output.files import whole
 from karamelo_py.output.rhythm import ByTime, Rhythmic
 from karamelo_py.run.checkpoint.arrays import Stored, reading
-from karamelo_py.run.checkpoint.memory import carried, memory_of, remember, remembered
+from karamelo_py.run.checkpoint.parts import PartStates, for_json, parts_of
+from karamelo_py.run.checkpoint.rollback import RollbackPoint
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
-FORMAT, VERSION = "karamelo-py restart", 6
+FORMAT, VERSION = "karamelo-py restart", 7
 OURS = "a file that restart or write_restart of karamelo-py has written"
 CONTENT = (
     "within", "statements", "values of statements", "presets", "variables", "runs", "scene",
-    "values", "begun", "parts",
+    "values", "begun", "parts", "run",
 )  # fmt: skip
 FLAT = {"track_times": False}
 
@@ -76,23 +77,29 @@ def write(hub: Hub, file: Path, *, within: bool) -> Path:
     else:
         for _ in simulation.stored():
             pass
-        for _ in _good(hub):
-            pass
+        if point := _good(hub):
+            for _ in simulation.stored_snapshot(point.arrays):
+                pass
     comm.barrier()
     return path
 
 
-def _good(hub: Hub) -> Iterator[Stored]:
-    """Yield the last good state, where a run may go back to it."""
-    if hub.running is not None and hub.running.halve and hub.running.snapshot:
-        yield from hub.simulation.stored_snapshot(hub.running.snapshot)
+def _good(hub: Hub) -> RollbackPoint | None:
+    """Find the last good state, where the run in progress may go back to it."""
+    run = hub.running and hub.running.rollback
+    return run.point if run and run.halve and run.point.arrays else None
 
 
 def _write(hub: Hub, path: Path, within: bool) -> None:
     import h5py
 
-    arrays: list[np.ndarray] = []
-    interpreter = hub.interpreter
+    for _, part in parts_of(hub):
+        if hasattr(part, "filed"):
+            part.filed()
+    interpreter, states = hub.interpreter, {"parts": PartStates.of(hub)}
+    run, point = hub.running and hub.running.rollback, _good(hub)
+    if point:
+        states["good parts"] = point.parts
     content = {
         "within": within,
         "statements": interpreter.record.statements,
@@ -103,19 +110,21 @@ def _write(hub: Hub, path: Path, within: bool) -> None:
         "scene": described(hub),
         "values": {name: hub.values.get(name) for name in hub.values.names()},
         "begun": hub.simulation.begun,
-        "parts": [[*key, memory_of(part, arrays)] for key, part in parts(hub)],
+        "run": run and [run.halvings, run.returns, point and point.step],
+        **{name: [[*key, of] for key, of in one.parts.items()] for name, one in states.items()},
     }
     with whole(path) as out, h5py.File(out, "w") as root:
         root.attrs["format"], root.attrs["version"] = FORMAT, VERSION
         root.attrs["program"] = __version__
         root.attrs["step"], root.attrs["time"] = hub.update.step, hub.update.time
-        text = np.frombuffer(json.dumps(content).encode(), np.uint8)
+        text = np.frombuffer(json.dumps(content, default=for_json).encode(), np.uint8)
         root.create_dataset("content", data=text, **FLAT)
-        for k, array in enumerate(arrays):
-            root.create_dataset(f"memory/{k}", data=array, **FLAT)
+        for name, one in states.items():
+            for k, array in enumerate(one.arrays):
+                root.create_dataset(f"{name}/{k}", data=array, **FLAT)
         _put(root.create_group("state"), hub.simulation.stored())
-        if hub.running is not None and hub.running.good is not None:
-            _put(root.create_group("good"), _good(hub))
+        if point:
+            _put(root.create_group("good"), hub.simulation.stored_snapshot(point.arrays))
 
 
 def _put(group: Any, found: Iterator[Stored]) -> None:
@@ -222,89 +231,31 @@ class Restart:
         ScriptError
             If the file was written by another scene.
         """
-        import h5py
-
         check(hub, self)
-        simulation = hub.simulation
+        simulation, content = hub.simulation, self.content
         try:
             simulation.take_stored(self.path)
-            with reading(), h5py.File(self.path, "r", locking=False) as root:
-                arrays = root.get("memory", ())
-                arrays = [arrays[str(k)][()] for k in range(len(arrays))]
-                good = "good" in root
+            states = self._parts("parts", content["values"])
         except ScriptError as error:
             error.message = f"{self.path}: {error.message}"
             raise
-        for name, value in self.content["values"].items():
-            if name in hub.values:
-                hub.values.set(name, value)
-        simulation.begun = self.content["begun"]
-        kept = {tuple(key): memory for *key, memory in self.content["parts"]}
-        for key, part in parts(hub):
-            if key not in kept:
-                continue
-            if outputs or key[0] not in OUTPUTS:
-                remember(part, kept[key], arrays)
-                resume(hub, part)
-            else:
-                memory = kept[key]
-                remember(part, {k: memory[k] for k in carried(part) if k in memory}, arrays)
-        if good and hub.running is not None and hub.running.halve:
-            hub.running.snapshot = simulation.take_snapshot(self.path)
+        simulation.begun = content["begun"]
+        states.give(hub, cut=outputs, anew=not outputs)
+        if hub.running is None or content["run"] is None:
+            return
+        run = hub.running.rollback
+        run.halvings, run.returns, good = content["run"]
+        if run.halve and good is not None:
+            run.point.take(simulation.take_snapshot(self.path), good, self._parts("good parts", {}))
 
+    def _parts(self, name: str, values: dict[str, float]) -> PartStates:
+        import h5py
 
-def resume(hub: Hub, part: Any) -> None:
-    """Let a part go on from what it remembers now; the first process alone has files."""
-    outputs = [hub.output.log, *hub.dumps.values()]
-    if hasattr(part, "resumed") and (
-        hub.settings.comm.leads or not any(part is one for one in outputs)
-    ):
-        part.resumed()
-
-
-Memories = tuple[list, list[np.ndarray]]
-
-
-def memories(hub: Hub) -> Memories:
-    """What all parts of a scene but its run remember now, for `give_back`, as files take it."""
-    arrays: list[np.ndarray] = []
-    found = [
-        [list(key), memory_of(part, arrays)] for key, part in parts(hub) if part is not hub.running
-    ]
-    return found, [array.copy() for array in arrays]
-
-
-def give_back(hub: Hub, kept: Memories) -> None:
-    """Let all parts remember what they did then; files of outputs stay as they are."""
-    there = {tuple(key): memory for key, memory in kept[0]}
-    for key, part in parts(hub):
-        if key in there:
-            remember(part, there[key], kept[1])
-
-
-OUTPUTS = ("dump", "log", "curve", "restart")
-
-
-def parts(hub: Hub) -> Iterator[tuple[tuple[str, str, str], Any]]:
-    """All that remembers something: family, ID and style of each, and the part."""
-    return ((key, part) for key, part in _all_parts(hub) if remembered(part))
-
-
-def _all_parts(hub: Hub) -> Iterator[tuple[tuple[str, str, str], Any]]:
-    yield ("update", "", ""), hub.update
-    yield ("method", "", ""), hub.update.method
-    if hub.running is not None:
-        yield ("run", "", ""), hub.running
-    for catalogue in hub.catalogues:
-        for ID, part in catalogue.items():
-            kind = getattr(part, "style", "") or type(part).__name__
-            yield (catalogue.kind, ID, kind), part
-    for curve in hub.output.plots:
-        yield ("curve", curve.id, ""), curve
-    for item in hub.output.last:
-        yield ("restart", str(item.file), ""), item
-    # The last one: what it shows is what the others remember.
-    yield ("log", "", ""), hub.output.log
+        with reading(), h5py.File(self.path, "r", locking=False) as root:
+            there = root.get(name, ())
+            arrays = [there[str(k)][()] for k in range(len(there))]
+        kept = {tuple(key): state for *key, state in self.content[name]}
+        return PartStates(kept, arrays, values)
 
 
 def _latest(path: Path) -> Path:

@@ -9,15 +9,11 @@ from karamelo_py.kernels.watch import BORNE, FEW, unit_of
 from karamelo_py.language import registry
 from karamelo_py.output.fields import Fields
 from karamelo_py.points.laws import can, constrained_velocity
-from karamelo_py.points.laws.linear import FixedFrame, LinearElastic
 from karamelo_py.points.laws.temperatures import initial_heat
 from karamelo_py.run import timestep
-from karamelo_py.run.advice.facts import Foreseen
-from karamelo_py.run.advice.noise import noises
+from karamelo_py.run.advice.facts import SceneFacts
 from karamelo_py.run.lower.build import warms_by_friction
 from karamelo_py.scene.hub import Hub
-from karamelo_py.styles.fixes.pairs import PairContact
-from karamelo_py.styles.fixes.velocity_particles import VelocityParticles
 
 TOLD = 2  # windows of growth one after another, of which a run tells
 WHOLE = "more points a cell, a finer grid, cpgimp or ulcpdi, or method tlmpm"
@@ -37,9 +33,7 @@ def unknown_work(hub: Hub) -> str:
     """
     for fix in hub.fixes.values():
         acts = any(not isinstance(hook, CompiledHook) for hook in fix.hooks().values())
-        # What leads points against their forces does work that no sum at nodes knows.
-        leads = isinstance(fix, VelocityParticles)
-        if leads or (acts and not fix.first_step_only and not fix.conserves):
+        if fix.leads_points or (acts and not fix.first_step_only and not fix.conserves):
             return f"fix {fix.style} '{fix.id}'"
     for solid in hub.solids.values():
         if can(solid.material.law, constrained_velocity):
@@ -84,8 +78,9 @@ def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
         )
     if moves and jumps and update.transfer.inverts_spread:
         return f"{transfer} with {functions} in the updated frame", f"FLIP, or {smooth}"
-    if moves and jumps and transfer == "TPIC":
-        return "TPIC with linear functions grows where a body moves through the grid", smooth
+    gradients = SceneFacts(hub, simulation, simulation.time).moments
+    if jumps and gradients and not hasattr(update.transfer, "alpha"):
+        return f"{transfer} with linear functions grows where a body moves through the grid", smooth
     if update.anti_locking and moves:
         return "averaged volumes (F-bar) in the updated frame", "leave anti_volumetric_locking out"
     if keeping < timestep.USUAL and share > keeping * (1 + 1e-9):
@@ -100,18 +95,10 @@ def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
             "points that are further apart than a cell (numerical fracture)",
             WHOLE,
         )
-    if hub.fixes and any(isinstance(fix, PairContact) for fix in hub.fixes.values()):
-        return "contact between points", "a smaller step, or method ulmpm/contacts"
-    if _strained_by_rates(simulation):
-        return (
-            "material linear at large strain: it adds up stress by rates, and gives back another "
-            "work than it took",
-            "material neo-hookean, which stores what it is given",
-        )
-    told = noises(Foreseen(hub, simulation, simulation.time))
-    fed = max(told, key=lambda noise: noise.share, default=None)
+    said = SceneFacts(hub, simulation, simulation.time).advice("gain")
+    fed = max(said, key=lambda one: one.share, default=None)
     if fed is not None and fed.share > 0:
-        return fed.cause, fed.words[2]
+        return fed.reason, fed.cure
     if moves and jumps:
         return f"points that go from cell to cell: the gradients of {functions} jump", smooth
     if share > 0.3 and (hub.update.fixed_dt or hub.update.dt_factor):
@@ -133,20 +120,6 @@ def _step_of(hub: Hub, simulation: Any, share: float) -> str:
     if hub.update.fixed_dt is not None:
         return f"set_dt({share * simulation.limit:.3g})"
     return f"dt_factor({share:g})"
-
-
-def _strained_by_rates(simulation: Any) -> bool:
-    """Whether a law in rate form bears stresses of a quarter of its shear modulus."""
-    rates = LinearElastic | FixedFrame
-    softest = min(
-        (float(np.min(b.laws.G)) for b in simulation.blocks if isinstance(b.laws, rates)),
-        default=np.inf,
-    )
-    return simulation.largest(_stress)[0] > 0.25 * softest
-
-
-def _stress(points: Fields) -> np.ndarray:
-    return points.particle("seq")
 
 
 def swelling(points: Fields) -> np.ndarray:

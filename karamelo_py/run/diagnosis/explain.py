@@ -13,9 +13,10 @@ from karamelo_py.kernels.step import ABOVE_LIMIT, DONE, GAINED, HEATED, SHRUNK, 
 from karamelo_py.kernels.watch import GROWTH, LOOK, unit_of
 from karamelo_py.output.fields import Fields
 from karamelo_py.points.basis import carried, extent
-from karamelo_py.run.advice.steps import step_was_told
+from karamelo_py.run.advice.large_steps import step_was_told
 from karamelo_py.run.checkpoint import restart_file
-from karamelo_py.run.checkpoint.rollback import Mark, Marks
+from karamelo_py.run.checkpoint.parts import OUTPUTS, PartStates
+from karamelo_py.run.checkpoint.rollback import RollbackPoint
 from karamelo_py.run.diagnosis import energy
 from karamelo_py.run.diagnosis.nonfinite import culprit
 from karamelo_py.run.simulation import Simulation
@@ -34,6 +35,10 @@ LOOSE = 1.5  # cells: points of an unstrained solid are at most one apart
 APART = "no other point of it within a cell"
 
 
+class OthersWait(Exception):
+    """This process cannot write a file, and others go on to give it what belongs there."""
+
+
 class Trouble(NamedTuple):
     """What went wrong, what can be done, and the line of the script at fault where one is known."""
 
@@ -47,15 +52,6 @@ class TooLarge(NamedTuple):
 
     smaller: str  # what to write instead, by that limit
     at_hand: bool  # whether the last good state is that of the start
-
-
-class Good(NamedTuple):
-    """What is known of the last good state."""
-
-    snapshot: dict
-    step: int
-    marks: Marks  # what parts remembered at that step and later ones
-    too_large: TooLarge | None = None
 
 
 def trouble(hub: Hub, simulation: Simulation, status: int) -> Trouble:
@@ -81,37 +77,42 @@ def stop(
     hub: Hub,
     simulation: Simulation,
     status: int,
-    good: Good,
+    good: RollbackPoint,
+    start: TooLarge | None,
     place: Place | None,
 ) -> NoReturn:
     """Return to the last good state, write it, and raise what the user should know.
 
     Where energy has grown before, that is the last state in which it had not; log and dumps end
-    with the last state that has no trouble of its own. Of a step that was too large from the start
-    on it is the state of the start.
+    with the last state that has no trouble of its own. Where the step was too large from the
+    `start` on it is the state of the start.
     """
     message, hint, at_fault = trouble(hub, simulation, status)
-    keep = _keep_good if good.too_large is None else _keep_start
     with suppress(OthersWait):
-        hint += keep(hub, simulation, status, good)
+        if start is None:
+            hint += _keep_good(hub, simulation, status, good)
+        else:
+            hint += _keep_start(hub, simulation, status, good, start)
     error = ScriptError(message, place=at_fault or place, hint=hint)
     error.complete = at_fault is not None
     raise error
 
 
-def _keep_start(hub: Hub, simulation: Simulation, status: int, good: Good) -> str:
+def _keep_start(
+    hub: Hub, simulation: Simulation, status: int, good: RollbackPoint, start: TooLarge
+) -> str:
     """Write the state that the run began with, end the outputs, and say how to begin anew."""
-    step, path, too_large = simulation.step, None, good.too_large
-    simulation.restore(good.snapshot)
-    if too_large.at_hand:
-        with good.marks.at(good.step):
+    step, path = simulation.step, None
+    simulation.restore(good.arrays)
+    if start.at_hand:
+        with good.remembered():
             path = _write_last_good(hub)
     back = step - simulation.step - (status in (GAINED, HEATED))
     if back <= FAR:
         if back > 0:
             simulation.advance(back)
         _end_outputs(hub)
-    words = f". Begin anew with {too_large.smaller}"
+    words = f". Begin anew with {start.smaller}"
     if path is None:
         return words
     name = os.path.relpath(path)
@@ -121,30 +122,29 @@ def _keep_start(hub: Hub, simulation: Simulation, status: int, good: Good) -> st
     )
 
 
-def _keep_good(hub: Hub, simulation: Simulation, status: int, good: Good) -> str:
+def _keep_good(hub: Hub, simulation: Simulation, status: int, good: RollbackPoint) -> str:
     """Return to the last good state, write it, end the outputs, and say how to go on from it."""
-    step, present = simulation.step, Mark.of_outputs(hub)
+    step, present = simulation.step, PartStates.of(hub, OUTPUTS)
     grown = not energy.grown_little(simulation)
     if grown:
-        _go_back(simulation, good, step)
+        _return_before_growth(simulation, good, step)
     else:
-        simulation.restore(good.snapshot)
-        good.marks.give(good.step)
+        good.return_to(simulation)
         if status not in (GAINED, HEATED, STOPPED):
             # What nodes have depends on how many steps ran at once: here always on as many.
-            good.marks.again(simulation.advance, step)
+            good.again(simulation.advance, step)
     path = _write_last_good(hub) if grown else None
     if status not in (GAINED, HEATED) and step > simulation.step:
         before = simulation.energy()
-        good.marks.again(simulation.advance, step)
+        good.again(simulation.advance, step)
         if path is None and simulation.energy() - before > energy.IN_ALL * max(
             abs(before), float(simulation.control.clock[0].energy_floor)
         ):
             # The watch looks at means of a hundred steps, and has not seen it yet.
             grown = True
-            _go_back(simulation, good, step)
+            _return_before_growth(simulation, good, step)
             path = _write_last_good(hub)
-            good.marks.again(simulation.advance, step)
+            good.again(simulation.advance, step)
     path = path or _write_last_good(hub)
     if simulation.step < step:
         present.give(hub)  # their files stay as they are, with later rows
@@ -156,26 +156,22 @@ def _keep_good(hub: Hub, simulation: Simulation, status: int, good: Good) -> str
     return f". {which} is in {name}; {GOES_ON.format(name)}"
 
 
-def _go_back(simulation: Simulation, good: Good, end: int) -> None:
+def _return_before_growth(simulation: Simulation, good: RollbackPoint, end: int) -> None:
     """Return to the last state before step `end` whose energy has not grown since the good one.
 
     These steps are taken once more, from one look at the energy to the next.
     """
-    snapshot, kept, marks = good.snapshot, good.step, good.marks
-    simulation.restore(snapshot)
-    marks.give(kept)
+    good.return_to(simulation)
     clock = simulation.control.clock[0]
     before = float(clock.balance)
     while clock.watch_energy and simulation.step + LOOK < end:
         look = simulation.step + LOOK - (simulation.step - 1) % LOOK
-        healthy = marks.again(simulation.advance, look) == DONE
+        healthy = good.again(simulation.advance, look) == DONE
         if not (healthy and energy.grown_little(simulation)):
             break
         if clock.balance - before < GROWTH * unit_of(clock):
-            snapshot, kept = simulation.snapshot(snapshot), look
-            marks.note(always=True)
-    simulation.restore(snapshot)
-    marks.give(kept)
+            good.move(simulation)
+    good.return_to(simulation)
 
 
 def only_leave(hub: Hub, simulation: Simulation, snapshot: dict) -> bool:
@@ -276,10 +272,6 @@ def no_number(hub: Hub, simulation: Simulation, message: str, hint: str) -> Trou
         "if(condition, a, b)",
         found.fix.place,
     )
-
-
-class OthersWait(Exception):
-    """This process cannot write a file, and others go on to give it what belongs there."""
 
 
 class Wrong(NamedTuple):

@@ -27,7 +27,7 @@ from karamelo_py.kernels.arrays import (
 from karamelo_py.kernels.averaging import NodalMean
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.laws import elastic_law, law_in, law_on, law_table
-from karamelo_py.kernels.loss import Lost, Rubbed
+from karamelo_py.kernels.loss import EnergyLoss, FrictionalHeat
 from karamelo_py.kernels.rows import Insulated
 from karamelo_py.language.scene import Scene
 from karamelo_py.points.basis import carried, deformed
@@ -219,9 +219,9 @@ def lower(
         if getattr(kind, "needed", lambda basis: True)(basis)
     ]
     if returns_loss(hub):
-        kinds.append(Lost)
+        kinds.append(EnergyLoss)
     if warms_by_friction(hub):
-        kinds.append(Rubbed)
+        kinds.append(FrictionalHeat)
     at_nodes = lower_nodes(kinds, kin, count, real)
     setup = Setup(
         frame=method.frame,

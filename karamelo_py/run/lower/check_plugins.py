@@ -19,8 +19,8 @@ from karamelo_py.points.basis.product import Along, along
 from karamelo_py.points.kinematics import zero_symmetric
 from karamelo_py.points.kinematics.tensors import tensor
 from karamelo_py.points.transfers import updated_velocity
-from karamelo_py.scene.blame import Part, blamed, foreign_parts, is_foreign, part_of_law
 from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.plugins import PartInUse, attributed, foreign_parts, is_foreign
 
 TENSORS = (laws.cauchy_stress, laws.kirchhoff_stress, laws.elastic_strain)
 NUMBERS = (laws.jacobian, laws.wave_speed_squared, laws.energy_density)
@@ -52,16 +52,16 @@ def _one(setup: Any) -> Any:
 
 
 @contextmanager
-def _trial(hub: Hub, part: Part) -> Iterator[None]:
+def _trial(hub: Hub, part: PartInUse) -> Iterator[None]:
     """Faults are told; numbers that one point happens not to stand are not what this is about."""
-    with blamed(hub, part), np.errstate(all="ignore"):
+    with attributed(hub, part), np.errstate(all="ignore"):
         try:
             yield
         except (ArithmeticError, ValueError):
             return
 
 
-def _expect(part: Part, function: Any, given: Any, count: int) -> None:
+def _expect(part: PartInUse, function: Any, given: Any, count: int) -> None:
     got = len(given) if isinstance(given, tuple) else type(given).__name__
     if got != count:
         what = f"{function.__name__} has to return a tuple of {count}, not {got}"
@@ -69,7 +69,9 @@ def _expect(part: Part, function: Any, given: Any, count: int) -> None:
 
 
 def _try_law(hub: Hub, setup: Any, solid: Any) -> None:
-    part = part_of_law(hub, solid.material)
+    material, kinds = solid.material, laws.law_kind(solid.material.law)
+    usual = PartInUse(f"material {material.style}", kinds[0], material.place)
+    part = next((part for part in foreign_parts(hub) if part.kind in kinds), usual)
     kin, one = setup.kin, _one(setup)
     law = law_in(law_on(solid.material.law, solid.h, solid.T0), type(one))
     size = len(zero_symmetric(kin, one))

@@ -11,7 +11,7 @@ from karamelo_py.kernels import arrays
 from karamelo_py.kernels.hooks import STAGES, CompiledHook
 from karamelo_py.kernels.totals import LIMBS
 from karamelo_py.kernels.walls import FRICTION
-from karamelo_py.language.faults import told
+from karamelo_py.language.faults import as_script_error
 from karamelo_py.run.tiles.distinct import distinct
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.expressions import FIRST, POINT_SEEDS
@@ -84,7 +84,7 @@ class _Builder:
             # Components lie one after another, from x on; a total without direction stands alone.
             first = "x" if "x" in fix.published else fix.published[0]
             slot = self.hub.values.slot(f"{fix.id}_{first}")
-        with told(f"fix {fix.style}", moment, hook.function, fix.place):
+        with as_script_error(f"fix {fix.style}", moment, hook.function, fix.place):
             address = address_of(hook.function, hook.signature)
         uses = (
             int(hook.uses_before),
@@ -129,6 +129,10 @@ class _Builder:
     def _program(self, formula: Any) -> tuple:
         if formula is None:
             return NO_PROGRAM
+        if formula.is_constant:  # without code: the number
+            first = sum(len(p) for p in self.constants)
+            self.constants.append(np.array([formula.constant]))
+            return 0, 0, first, first + 1
         program = formula.program(self.hub.values)
         ranges = []
         for pieces, piece in ((self.code, program.code), (self.constants, program.constants)):

@@ -11,7 +11,12 @@ from karamelo_py.kernels.arrays import SUMS_WIDTH, UPDATE_WIDTH, VELOCITY_WIDTH,
 from karamelo_py.run.lower.build import PRECISIONS, check_scene, lower_points, part_of, point_kinds
 from karamelo_py.run.lower.sizes import point_fields
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.room import TooLarge, machine_memory, on_machine, share_of_machine
+from karamelo_py.scene.machine_memory import (
+    MemoryShortage,
+    machine_memory,
+    on_machine,
+    share_of_machine,
+)
 from karamelo_py.scene.solid import Solid, own_grids
 from karamelo_py.script.errors import ScriptError, plural
 
@@ -45,7 +50,7 @@ def check_room(hub: Hub, *, copied: bool) -> None:
         there = machine_memory(on_machine(hub)) or there
     if need <= there.free:
         return
-    found = TooLarge(
+    found = MemoryShortage(
         plural(count, "point"),
         need,
         hub.domain.dimension,
@@ -59,9 +64,9 @@ def check_room(hub: Hub, *, copied: bool) -> None:
 
 
 def least_bytes(hub: Hub, real: type, copied: bool) -> float:
-    """The least that points, their copy, and the nodes of the cells that they fill take together.
+    """Count the bytes that points, their copy, and the nodes of the cells that they fill take.
 
-    Boxes of tiles, groups and what the program itself takes come on top.
+    It is the least: boxes of tiles, groups and what the program itself takes come on top.
     """
     kin = hub.update.method.kinematics(hub)
     kinds = point_kinds(hub, real)
@@ -82,18 +87,18 @@ def least_bytes(hub: Hub, real: type, copied: bool) -> float:
 
 
 def _largest(hub: Hub) -> Solid:
-    """The solid with most points."""
+    """Find the solid with most points."""
     return max(hub.solids.values(), key=lambda solid: solid.count)
 
 
 def _cells(solid: Solid) -> float:
-    """How many cells a solid fills at least."""
+    """Count the cells that a solid fills at least."""
     ppc = getattr(solid, "ppc", 0)
     return solid.count / ppc**solid.domain.dimension if ppc else 0.0
 
 
 def no_room(hub: Hub, error: MemoryError) -> ScriptError:
-    """The error for a scene whose arrays the system does not give, whoever would use them."""
+    """Make the error for a scene whose arrays the system does not give, whoever would use them."""
     nodes = sum(lattice.node_count for lattice in hub.lattices)
     count = sum(solid.count for solid in hub.solids.values())
     of_grid = nodes > count

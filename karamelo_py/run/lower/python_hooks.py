@@ -7,8 +7,8 @@ import numpy as np
 
 from karamelo_py.kernels.arrays import INITIAL_INTEGRATE, ON_VELOCITY, SUPPLY_HEAT, Setup
 from karamelo_py.kernels.conduction import at_heat_nodes, at_heated_points
+from karamelo_py.kernels.hook_loop import at_nodes, at_points
 from karamelo_py.kernels.hooks import STAGES, CompiledHook
-from karamelo_py.kernels.moments import at_nodes, at_points
 from karamelo_py.run.lower.hook_tables import lower_hooks
 from karamelo_py.scene.views import NodesView, PieceView, PointsView
 from karamelo_py.script.errors import ScriptError

@@ -1,4 +1,4 @@
-"""What a scene, or the share of a process, takes of memory."""
+"""Memory that a scene, or the share of a process, takes."""
 
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -12,10 +12,10 @@ from karamelo_py.run.mpi.partition import occupied
 from karamelo_py.scene.hub import Hub
 
 LARGE, PAGE = 1 << 22, 1 << 21  # bytes from which on NumPy asks for large pages, and of these
-THERE = 1  # bytes of each point of the whole scene: whether it was deleted
+THERE = 1  # bytes of each point of the whole scene, for those that were deleted
 
 
-class Memory(NamedTuple):
+class MemoryTaken(NamedTuple):
     """Bytes touched by the steps, of a copy of the last good state, and known to each process.
 
     Of places, the copy has only those of the present.
@@ -26,11 +26,11 @@ class Memory(NamedTuple):
     known: int
 
 
-def memory_of(simulation: Any, s: Setup, boxes: int) -> Memory:
-    """What the points in the tiles of `s`, its nodes in use, and boxes of so many bytes take.
+def memory_of(simulation: Any, s: Setup, boxes: int) -> MemoryTaken:
+    """Count what the points in the tiles of `s`, its nodes in use, and boxes of so many bytes take.
 
     Places before the first step and members of groups, where fixes act on points by them, and
-    whether points are there, are known of the whole scene.
+    the marks of deleted points are known of the whole scene.
     """
     counts = [int(occupied(block.tiling)[1].sum()) for block in s.blocks]
     of_point = [{name: size for name, _, size in point_fields(block)} for block in s.blocks]
@@ -40,11 +40,11 @@ def memory_of(simulation: Any, s: Setup, boxes: int) -> Memory:
     nodes = sum(bytes_in(spans, array) for _, array in node_fields(simulation.setup))
     hooks = sum(getattr(simulation.hooks, name, np.empty(0)).nbytes for name in ("x0", "members"))
     whole = known(simulation.hub) + hooks
-    return Memory(points + nodes + boxes, points - moved, whole)
+    return MemoryTaken(points + nodes + boxes, points - moved, whole)
 
 
 def known(hub: Hub) -> int:
-    """What each process knows of the whole scene: solids, regions, groups, and who is there."""
+    """Count the bytes of what each process knows of the whole scene, such as solids and groups."""
     seen = {id(hub)}
     parts = (part for all in (hub.solids, hub.regions, hub.groups) for part in all.values())
     there = THERE * sum(solid.count for solid in hub.solids.values())
@@ -52,7 +52,7 @@ def known(hub: Hub) -> int:
 
 
 def _held(thing: Any, seen: set[int]) -> int:
-    """Bytes of the arrays that a thing and its parts hold, each once."""
+    """Count the bytes of the arrays that a thing and its parts hold, each once."""
     if isinstance(thing, np.ndarray) and isinstance(thing.base, np.ndarray):
         thing = thing.base
     if id(thing) in seen:
@@ -66,7 +66,7 @@ def _held(thing: Any, seen: set[int]) -> int:
 
 
 def bytes_in(spans: np.ndarray, array: np.ndarray) -> int:
-    """What rows of an array take, from each of ascending spans (k, 2) to before its end.
+    """Count what rows of an array take, from each of ascending spans (k, 2) to before its end.
 
     Of large arrays Linux gives pages of 2 MiB: what lies between the nodes in use is there, too.
     """
@@ -78,13 +78,13 @@ def bytes_in(spans: np.ndarray, array: np.ndarray) -> int:
 
 
 def nodes_in_use(s: Setup) -> int:
-    """How many nodes points may give to before they are sorted again."""
+    """Count the nodes that points may give to before they are sorted again."""
     spans = s.spans[1 : 1 + s.spans[0, 0]]
     return int(np.sum(spans[:, 1] - spans[:, 0]))
 
 
 def node_fields(s: Any) -> list[tuple[str, np.ndarray]]:
-    """The arrays of the nodes, and of those that heat flows through, with their names."""
+    """List the arrays of the nodes, and of those that heat flows through, with their names."""
     found = list(_arrays_of_nodes(s.nodes))
     if isinstance(s.heat, Conducting):
         found += [(f"{name} (heat)", array) for name, array in _arrays_of_nodes(s.heat.nodes)]
@@ -99,7 +99,7 @@ def _arrays_of_nodes(nodes: Any) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def point_fields(block: Any) -> list[tuple[str, str, int]]:
-    """Name, shape and bytes of each field that a point of this block carries."""
+    """List name, shape and bytes of each field that a point of this block carries."""
     found = [("x", block.points.x[0]), ("x moved", block.points.x[1])]
     found += [(name, array) for name, array in arrays_of(block.points) if name != "x"]
     sizes = [(name, len(array) if array.ndim > 1 else 1, array) for name, array in found]

@@ -24,8 +24,8 @@ from karamelo_py.kernels.arrays import (
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.sorting import (
     Cut,
-    Order,
     Sight,
+    SortedOrder,
     find_rows,
     find_tiles,
     sort_points,
@@ -237,7 +237,7 @@ class Tiles:
         else:
             mode = self.mode
         scratch = np.empty((4, x.shape[1]), np.int64)
-        found = Order(
+        found = SortedOrder(
             lanes_for(8 * x.itemsize).width,
             np.empty((parts, self.count), np.int64),
             np.empty(parts + 1, np.int64),

@@ -62,8 +62,8 @@ SHAPES = {
 }
 
 
-class Elements(NamedTuple):
-    """Elements of one shape.
+class MeshElements(NamedTuple):
+    """MeshElements of one shape.
 
     Attributes
     ----------
@@ -79,17 +79,17 @@ class Elements(NamedTuple):
     numbers: np.ndarray
     corners: np.ndarray
 
-    def mirrored(self, which: np.ndarray) -> Elements:
+    def mirrored(self, which: np.ndarray) -> MeshElements:
         """With the orientation of `which` (n,) of them reversed."""
         order = list(self.shape.mirrored)
         numbers, corners = self.numbers.copy(), self.corners.copy()
         numbers[which], corners[which] = numbers[which][:, order], corners[which][:, order]
-        return Elements(self.shape, numbers, corners)
+        return MeshElements(self.shape, numbers, corners)
 
 
 def elements_of(
     mesh: meshio.Mesh, dimension: int, group: str | int | None = None, *, lower: bool = False
-) -> list[Elements]:
+) -> list[MeshElements]:
     """The elements of `dimension` in a mesh, one item for each shape.
 
     Parameters
@@ -135,7 +135,7 @@ def elements_of(
     found = []
     for name in dict.fromkeys(name for name, _ in wanted):
         numbers = _once(np.concatenate([nodes for other, nodes in wanted if other == name]))
-        found.append(Elements(SHAPES[name], numbers, positions[numbers]))
+        found.append(MeshElements(SHAPES[name], numbers, positions[numbers]))
     return found
 
 
@@ -162,7 +162,7 @@ def _check_plane(positions: np.ndarray, dimension: int) -> None:
         )
 
 
-def measured(elements: Elements) -> tuple[Elements, np.ndarray, np.ndarray]:
+def measured(elements: MeshElements) -> tuple[MeshElements, np.ndarray, np.ndarray]:
     """The elements with positive orientation, their volumes (n,) and their centroids (n, d).
 
     Volume and centroid are those of the region that the map of the element covers, faces that are

@@ -3,7 +3,7 @@
 import numpy as np
 
 from karamelo_py.scene.meshes.bins import Bins
-from karamelo_py.scene.meshes.elements import Elements, measured
+from karamelo_py.scene.meshes.elements import MeshElements, measured
 
 # Faces of a hexahedron, seen from outside counter-clockwise.
 _FACES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
@@ -59,7 +59,7 @@ class Simplices:
         return inside
 
 
-def split(elements: Elements) -> np.ndarray:
+def split(elements: MeshElements) -> np.ndarray:
     """The simplices (m, k + 1, d) that the elements are made of.
 
     A hexahedron becomes 12 tetrahedra about its middle. Faces that are not plane are split along

@@ -28,7 +28,7 @@ def column(points: Fields, name: str) -> np.ndarray:
     return points.particle(name)
 
 
-class Field:
+class PointField:
     """A field of points, by the columns it has.
 
     Attributes
@@ -50,7 +50,7 @@ class Field:
         self.weights = [2.0 if shear and k >= 3 else 1.0 for k in range(len(columns))]
 
     @classmethod
-    def from_script(cls, hub: Scene, argument: Argument) -> Field:
+    def from_script(cls, hub: Scene, argument: Argument) -> PointField:
         """The field that `argument` names."""
         known = [*hub.fields.particle_names(), *DISPLACEMENTS, *VECTORS, *TENSORS]
         name = argument.words(known)

@@ -10,7 +10,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Compute
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
-from karamelo_py.styles.computes.columns import Compared, Field, Norm, column, refuse_absent
+from karamelo_py.styles.computes.columns import Compared, Norm, PointField, column, refuse_absent
 
 
 class Error(Compared, Compute):
@@ -57,7 +57,7 @@ class Error(Compared, Compute):
         self,
         hub: Hub,
         group: ParticleGroup,
-        field: Field,
+        field: PointField,
         *expression: Literal["L1", "L2", "max", "absolute", "relative"] | Expression | None,
     ):
         super().__init__(hub, group)

@@ -1,4 +1,4 @@
-"""What every dump has: a rhythm, a file name with the step in it, checked columns."""
+"""The base of dumps: a rhythm, a file name with the step in it, checked columns."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -45,7 +45,7 @@ class Dump(Rhythmic):
 
     @property
     def one_file_per_step(self) -> bool:
-        """Whether the name has a ``*``."""
+        """Tell if the name has a ``*``."""
         return "*" in str(self.file)
 
     def path(self) -> Path:

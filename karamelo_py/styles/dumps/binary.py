@@ -11,7 +11,7 @@ ENDIAN, REVISION = 1, 2
 SHRUNK, AT_LEAST = 2, 3
 
 
-class Binary:
+class BinaryRows:
     """Mixed into a text dump: the same rows as numbers in double precision, little-endian.
 
     Parameters

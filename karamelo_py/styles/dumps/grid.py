@@ -4,7 +4,7 @@ from karamelo_py.styles.dumps.lammps import LammpsDump
 from karamelo_py.styles.dumps.table import OfNodes
 
 
-class Grid(OfNodes, LammpsDump):
+class GridDump(OfNodes, LammpsDump):
     """Write the nodes of the background grids in LAMMPS text format, which OVITO opens.
 
     Each row begins with the node's number (``id``, from 0, z fastest, then y, then x) and the

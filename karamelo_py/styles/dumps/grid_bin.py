@@ -1,10 +1,10 @@
 """dump grid/bin: the nodes of the grid, as binary numbers."""
 
-from karamelo_py.styles.dumps.binary import Binary
-from karamelo_py.styles.dumps.grid import Grid
+from karamelo_py.styles.dumps.binary import BinaryRows
+from karamelo_py.styles.dumps.grid import GridDump
 
 
-class GridBin(Binary, Grid):
+class GridBin(BinaryRows, GridDump):
     """Write the nodes of the background grid in the binary format of LAMMPS, which OVITO opens.
 
     Numbers keep all their digits, and files are written faster than text. Everything else is as in

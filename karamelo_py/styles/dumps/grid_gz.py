@@ -1,10 +1,10 @@
 """dump grid/gz: the nodes, as gzipped text."""
 
-from karamelo_py.styles.dumps.grid import Grid
+from karamelo_py.styles.dumps.grid import GridDump
 from karamelo_py.styles.dumps.lammps import Gzipped
 
 
-class GridGz(Gzipped, Grid):
+class GridGz(Gzipped, GridDump):
     """Write the nodes of the background grids in LAMMPS text format, gzipped.
 
     Everything else is as in dump grid.

@@ -12,7 +12,7 @@ import numpy as np
 from karamelo_py.output.fields import PIECE
 from karamelo_py.output.files import whole
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.styles.dumps.table import OfPoints, Table, TableDump
+from karamelo_py.styles.dumps.table import OfPoints, TableDump, TableRows
 
 # The least compression: with the bytes of like order together, more takes twice the time for a few
 # per cent.
@@ -20,13 +20,13 @@ STORED = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
 CHUNK = 1 << 16
 
 
-class Snapshot(NamedTuple):
+class SnapshotRows(NamedTuple):
     """The rows of one moment, in pieces; `last` is the largest id."""
 
     time: float
     step: int
     last: int
-    tables: Iterable[Table]
+    tables: Iterable[TableRows]
 
 
 class Hdf5Dump(TableDump):
@@ -45,11 +45,11 @@ class Hdf5Dump(TableDump):
     def write(self) -> None:
         """Write one snapshot."""
         update = self.hub.update
-        snapshot = Snapshot(update.time, update.step, self.extent()[1], self.tables())
+        snapshot = SnapshotRows(update.time, update.step, self.extent()[1], self.tables())
         self._add(self.path(), self._snapshots, snapshot)
         self._snapshots += 1
 
-    def _add(self, path: Path, k: int, snapshot: Snapshot) -> None:
+    def _add(self, path: Path, k: int, snapshot: SnapshotRows) -> None:
         """Write snapshot `k`: to a file of its own, or after those before it."""
         import h5py
 
@@ -66,7 +66,7 @@ class Hdf5Dump(TableDump):
             return
         self._go_on(path, k, snapshot)
 
-    def _go_on(self, path: Path, k: int, snapshot: Snapshot) -> None:
+    def _go_on(self, path: Path, k: int, snapshot: SnapshotRows) -> None:
         """Write snapshot `k` into a file, after those before it."""
         with _reported(path), _opened_to_append(path) as root:
             try:
@@ -100,21 +100,21 @@ class Hdf5Dump(TableDump):
             self.warn_of_absence()
             self._snapshots = 0
 
-    def _past(self, old: Any, k: int) -> Snapshot:
-        """Snapshot `k` of a file; rows that hold NaN alone were not there."""
+    def _past(self, old: Any, k: int) -> SnapshotRows:
+        """Read snapshot `k` of a file; rows that hold NaN alone were not there."""
 
-        def tables(begins: Iterable[int]) -> Iterator[Table]:
+        def tables(begins: Iterable[int]) -> Iterator[TableRows]:
             for begin in begins:
                 own = slice(begin, begin + PIECE)
                 columns = [old[name][k, own] for name in self.columns]
                 at = np.flatnonzero(~np.isnan(columns).all(axis=0))
                 ids, types = old["id"][own][at], old["type"][own][at]
-                yield Table(ids, types, [column[at] for column in columns])
+                yield TableRows(ids, types, [column[at] for column in columns])
 
         begins = range(0, len(old["id"]), PIECE)
         there = (int(table.ids[-1]) for table in tables(reversed(begins)) if len(table.ids))
         time, step = float(old["time"][k]), int(old["step"][k])
-        return Snapshot(time, step, next(there, self._first - 1), tables(begins))
+        return SnapshotRows(time, step, next(there, self._first - 1), tables(begins))
 
     @property
     def _first(self) -> int:
@@ -149,7 +149,7 @@ class Hdf5Dump(TableDump):
             for axis, scale in enumerate(scales):
                 root[name].dims[axis].attach_scale(root[scale])
 
-    def _append(self, root: Any, k: int, snapshot: Snapshot) -> None:
+    def _append(self, root: Any, k: int, snapshot: SnapshotRows) -> None:
         """Write snapshot `k`. Rows go by their id."""
         first = self._first
         count = max(snapshot.last + 1 - first, len(root["id"]))

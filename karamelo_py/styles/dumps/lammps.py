@@ -59,7 +59,7 @@ class LammpsDump(TableDump):
     _encoder: Encoder | None = None
 
     def encoder(self) -> Encoder:
-        """What the text goes through on its way to a new file."""
+        """Make the encoder of the text of a new file."""
         return Plain()
 
     def write(self) -> None:

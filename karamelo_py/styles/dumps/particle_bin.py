@@ -1,10 +1,10 @@
 """dump particle/bin: the material points, as binary numbers."""
 
-from karamelo_py.styles.dumps.binary import Binary
+from karamelo_py.styles.dumps.binary import BinaryRows
 from karamelo_py.styles.dumps.particle import Particle
 
 
-class ParticleBin(Binary, Particle):
+class ParticleBin(BinaryRows, Particle):
     """Write the material points in the binary format of LAMMPS, which OVITO opens.
 
     Numbers keep all their digits, and files are written faster than text. Everything else is as in

@@ -1,9 +1,7 @@
 """dump pyplot: pictures of the points, drawn with Matplotlib."""
 
 import re
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from functools import cached_property
+from collections.abc import Iterator
 from typing import Annotated, Any, BinaryIO
 
 import numpy as np
@@ -14,12 +12,11 @@ from karamelo_py.output.columns import check_columns
 from karamelo_py.output.fields import Fields
 from karamelo_py.output.files import picture_format, savefig, unwarned, whole
 from karamelo_py.output.rhythm import Every
+from karamelo_py.output.snapshots import Snapshot
 from karamelo_py.output.units import labelled
-from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError, meant
 from karamelo_py.styles.dumps.base import Dump
-from karamelo_py.styles.dumps.look import Extent, Look, extent, in_pieces, joined
 
 DPI = 100
 # Above this, a width or height is meant in pixels.
@@ -104,7 +101,6 @@ class PyPlot(Dump):
                 argument="vmax",
                 expected="a number above vmin",
             )
-        self.group = ParticleGroup(hub, everything=True)
         self.field = field
         self.limits = (vmin, vmax)
         self.title = title
@@ -117,7 +113,7 @@ class PyPlot(Dump):
 
     @property
     def seen(self) -> tuple[Any, ...]:
-        """The limits of the field so far, and of what they are those."""
+        """Limits of the field so far, and what they are those of."""
         limits = self._picture.limits if self._picture is not None else self._limits
         return limits, self._label(), *self.limits
 
@@ -130,7 +126,7 @@ class PyPlot(Dump):
                 self._picture.begin_with(limits)
 
     def check_format(self) -> str:
-        """The format that the file name asks for."""
+        """Read the format that the file name asks for."""
         return picture_format(self.file)
 
     def write(self) -> None:
@@ -140,30 +136,14 @@ class PyPlot(Dump):
                 with whole(self.path()) as file:
                     self.draw(file)
             else:
-                with self._asking():
-                    self._draw()
-                    savefig(self._picture.figure, self.path())
+                self._draw()
+                savefig(self._picture.figure, self.path())
 
     def draw(self, file: BinaryIO) -> None:
         """Draw the present state as PNG into an open file."""
-        with unwarned(), self._asking():
+        with unwarned():
             self._draw()
             self._picture.save_png(file, PNG_COMPRESSION)
-
-    @contextmanager
-    def _asking(self) -> Iterator[None]:
-        """Within this, the first of several processes draws, and asks the others for points."""
-        try:
-            yield
-        finally:
-            self.hub.settings.comm.bcast()
-
-    def take_part(self) -> None:
-        """Say of the own points what the first process asks for while it draws."""
-        scene = Scene(self)
-        while (asked := self.hub.settings.comm.bcast()) is not None:
-            question, *arguments = asked
-            question(scene, *arguments)
 
     def _draw(self) -> None:
         update = self.hub.update
@@ -174,15 +154,17 @@ class PyPlot(Dump):
             title += f" {self.hub.output.units.time}"
         if self.title:
             title = f"{self.title}: {title}"
-        self._picture.show(Scene(self), title)
+        snapshot = self.snapshot()
+        self._picture.show(snapshot, self.side(snapshot), title)
 
     def _make(self) -> Any:
         # Matplotlib takes a third of a second to import: only scenes with pictures pay it.
-        from karamelo_py.styles.dumps import picture, projections
+        from karamelo_py.output import pictures
 
         units = self.hub.output.units
         label = self._label()
-        options = picture.Options(
+        options = pictures.Options(
+            label,
             labelled(label, units.of_column(label)) if units else label,
             tuple(self.hub.solids) if label == "type" else (),
             self.limits,
@@ -191,32 +173,35 @@ class PyPlot(Dump):
             lengths=f" [{units.length}]" if units else "",
             **self.look,
         )
-        made = projections.make(self.hub.domain, self.size, DPI, options)
+        made = pictures.make(self.hub.domain, self.size, DPI, options)
         made.begin_with(self._limits)
         return made
 
-    # What each process says of some of its points after others.
+    def snapshot(self) -> Snapshot:
+        """Take what a picture needs of all points, some of them after others."""
+        label, domain, update = self._label(), self.hub.domain, self.hub.update
+        names = dict.fromkeys(["id", "x", "y", "z", "volume", label])
+        pieces = [[piece.particle(name) for name in names] for piece in self._pieces()]
+        columns = dict(zip(names, map(np.concatenate, zip(*pieces, strict=True)), strict=True))
+        return Snapshot(update.step, update.time, columns, domain.lo, domain.hi)
 
-    def extent(self, points: Fields) -> Extent | None:
-        """What these fill."""
-        return extent(_places(points), points.particle(self._label()))
+    def _pieces(self) -> Iterator[Fields]:
+        return self.hub.fields.pieces(to_first=True)
 
-    def volumes(self, points: Fields, every: int) -> np.ndarray:
-        """Volumes of those of these whose id is a multiple of `every`."""
-        volume = points.particle("volume")
-        if self.hub.domain.axisymmetric:
-            x = points.particle("x")
+    def take_part(self) -> None:
+        """Give the first of several processes the own points."""
+        for _ in self._pieces():
+            pass
+
+    def side(self, snapshot: Snapshot) -> float:
+        """Measure the side length of a typical point."""
+        columns, domain = snapshot.columns, self.hub.domain
+        volume = columns["volume"]
+        if domain.axisymmetric:
+            x = columns["x"]
             volume = volume / np.maximum(x, 1e-3 * x.max(initial=0.0))  # of a ring, per radian
-        return volume[points.particle("id") % every == 0]
-
-    def cells(self, points: Fields, look: Look) -> np.ndarray:
-        """The cells of these."""
-        return look.cells_of(_places(points))
-
-    def marks(self, points: Fields, look: Look) -> tuple:
-        """What shows of these."""
-        ids = points.particle("id")
-        return look.marks(ids, _places(points), points.particle(self._label()))
+        some = volume[columns["id"] % -(-self.hub.fields.count // SAMPLE) == 0]
+        return float(np.median(some)) ** (1 / domain.dimension) if len(some) else 0.0
 
     def _label(self) -> str:
         if self.field is not None:
@@ -224,59 +209,10 @@ class PyPlot(Dump):
         return "vx" if self.hub.domain.dimension == 1 else "type"
 
 
-class Scene:
-    """The points of a scene that a picture shows, wherever they are.
-
-    The first of several processes draws them, and tells the others what it asks for.
-    """
-
-    def __init__(self, dump: PyPlot):
-        self.dump, self.fields = dump, dump.hub.fields
-        self.comm = dump.hub.settings.comm
-
-    def _ask(self, question: Callable, *arguments: Any) -> Any:
-        self.comm.bcast((question, *arguments))
-        return question(self, *arguments)
-
-    def extent(self) -> Extent:
-        """Find what the points fill."""
-        return joined(self._ask(Scene._extents))
-
-    @cached_property
-    def side(self) -> float:
-        """Side length of a typical point."""
-        every = -(-self.fields.count // SAMPLE)
-        volumes = np.concatenate(self._ask(Scene._volumes, every))
-        dimension = self.dump.hub.domain.dimension
-        return float(np.median(volumes)) ** (1 / dimension) if len(volumes) else 0.0
-
-    def counts(self, look: Look) -> np.ndarray:
-        """Count the points in each cell."""
-        return self._ask(Scene._cells, look)
-
-    def marks(self, look: Look) -> Iterator[np.ndarray]:
-        """Yield rows of what shows of the points."""
-        self.comm.bcast((Scene._give_marks, look))
-        return in_pieces(self.fields.in_order(self.dump, "marks", look))
-
-    def _extents(self) -> list:
-        return self.fields.each(self.dump, "extent")
-
-    def _volumes(self, every: int) -> list:
-        return self.fields.each(self.dump, "volumes", every)
-
-    def _cells(self, look: Look) -> np.ndarray:
-        return self.fields.counted(self.dump, "cells", look.cells, look)
-
-    def _give_marks(self, look: Look) -> None:
-        for _ in self.fields.in_order(self.dump, "marks", look):
-            pass
-
-
 def colours_of(
     column: str, limits: tuple[float | None, float | None], cmap: str | None
 ) -> tuple[bool, str]:
-    """Whether limits that grow lie about 0, and the colour map, for a column.
+    """Choose for a column if limits that grow lie about 0, and the colour map.
 
     Raises
     ------
@@ -308,8 +244,3 @@ def _inches(argument: str, value: float) -> float:
             f"from {LEAST_PIXELS} to {MOST_PIXELS} pixels",
         )
     return inches
-
-
-def _places(points: Fields) -> np.ndarray:
-    """(n, 3) positions."""
-    return np.column_stack([points.particle(name) for name in "xyz"])

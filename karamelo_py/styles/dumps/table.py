@@ -18,7 +18,7 @@ POSITIONS = ("x", "y", "z")
 LEADING = ("id", "type", "tag")
 
 
-class Table(NamedTuple):
+class TableRows(NamedTuple):
     """Some rows, in the order of their ids: identities and types, (n,) whole numbers; columns."""
 
     ids: np.ndarray
@@ -81,7 +81,7 @@ class TableDump(Dump):
         """Number of rows, and the largest id."""
         raise NotImplementedError
 
-    def tables(self) -> Iterator[Table]:
+    def tables(self) -> Iterator[TableRows]:
         """All rows in the order of their ids, in pieces whose columns fit into memory."""
         raise NotImplementedError
 
@@ -95,11 +95,11 @@ class TableDump(Dump):
         for _ in self.tables():
             pass
 
-    def table(self) -> Table:
+    def table(self) -> TableRows:
         """All rows."""
         ids, types, columns = zip(*self.tables(), strict=True)
         joined = (np.concatenate(same) for same in zip(*columns, strict=True))
-        return Table(np.concatenate(ids), np.concatenate(types), list(joined))
+        return TableRows(np.concatenate(ids), np.concatenate(types), list(joined))
 
 
 class OfPoints:
@@ -129,11 +129,11 @@ class OfPoints:
         count = int(np.count_nonzero(present))
         return count, len(present) - int(present[::-1].argmax()) if count else 0
 
-    def tables(self) -> Iterator[Table]:
+    def tables(self) -> Iterator[TableRows]:
         """Number and solid of each point, and its columns."""
         for fields in self.hub.fields.pieces(to_first=self.to_first):
             ids, types = (fields.particle(name).astype(np.int64) for name in ("id", "type"))
-            yield Table(ids, types, [fields.particle(name) for name in self.columns])
+            yield TableRows(ids, types, [fields.particle(name) for name in self.columns])
 
 
 class OfNodes:
@@ -180,11 +180,11 @@ class OfNodes:
             fields.occupied_nodes if self.occupied else (fields.node_count, fields.node_count - 1)
         )
 
-    def tables(self) -> Iterator[Table]:
+    def tables(self) -> Iterator[TableRows]:
         """Number and grid of each node, and its columns."""
         for nodes in self.hub.fields.node_pieces(self.columns, to_first=self.to_first):
             rows = np.flatnonzero(nodes.node("mass") > 0) if self.occupied else slice(None)
-            yield Table(
+            yield TableRows(
                 *(nodes.node(name)[rows] for name in ("id", "type")),
                 [nodes.node(name)[rows] for name in self.columns],
             )

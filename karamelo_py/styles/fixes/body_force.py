@@ -37,6 +37,7 @@ class BodyForce(Fix):
 
     syntax = "group, bx[, by[, bz]]"
     published = ("x", "y", "z")
+    accelerates = True
 
     post_particles_to_grid = node_hook(accelerate)
 

@@ -6,6 +6,7 @@ from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix, PointsView
 from karamelo_py.script.expressions import FIRST, Expression
+from karamelo_py.styles.fixes import conflicts
 from karamelo_py.styles.fixes.formulas import evaluated, gradient, per_direction
 
 
@@ -54,3 +55,6 @@ class InitialVelocityParticles(Fix):
                 v[:, k] = evaluated(formula, self.hub, x, x0)
                 points.set_velocity_gradient(k, partial(gradient, formula, self.hub, x, x0))
         points.velocity = v
+
+
+conflicts.register(InitialVelocityParticles)

@@ -36,7 +36,7 @@ class Measuring(Fix):
         self.formulas = (Expression(0.0),) * hub.domain.dimension
 
 
-class InternalForce(Measuring):
+class ForceBeforeFixes(Measuring):
     """Force of nodes before other fixes add to it."""
 
     comes_first = True

@@ -9,6 +9,7 @@ from karamelo_py.compiler.fields import field
 from karamelo_py.kernels import pairs
 from karamelo_py.kernels.arrays import Block
 from karamelo_py.kernels.p2g import Force
+from karamelo_py.language.rules import gain
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
@@ -122,9 +123,17 @@ class PairContact(Fix):
         n, total = len(order), np.zeros(3)
         _, mass, radius, *both = np.ascontiguousarray(of_all[order].T)
         x, v = (np.stack(part, axis=1) for part in (both[:d], both[d:]))
-        bodies = pairs.Bodies(x, v, mass, radius, np.zeros((n, d)), n - int(second.sum()))
+        bodies = pairs.TwoBodies(x, v, mass, radius, np.zeros((n, d)), n - int(second.sum()))
         pairs.push_apart(self.law(), kin, bodies, pairs.cells_for(n), self._reach, dt, kick, total)
         force = np.empty((n, d))
         force[order] = bodies.force
         ends = np.cumsum([len(one) for one in found])[:-1]
         return [(own, total) for own in np.split(force, ends)]
+
+
+gain(
+    PairContact,
+    when=lambda fix, scene: True,
+    cause="contact between points",
+    cure="a smaller step, or method ulmpm/contacts",
+)

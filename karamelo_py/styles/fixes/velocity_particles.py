@@ -4,6 +4,7 @@ from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix, point_hook
 from karamelo_py.script.expressions import Expression
+from karamelo_py.styles.fixes import conflicts
 from karamelo_py.styles.fixes.formulas import per_direction
 
 
@@ -43,6 +44,7 @@ class VelocityParticles(Fix):
 
     syntax = "group, vx[, vy[, vz]]"
     published = ("x", "y", "z")
+    leads_points = True
 
     initial_integrate = point_hook(start, uses_before=True)
     post_advance_particles = point_hook(carry, publishes=True)
@@ -50,3 +52,6 @@ class VelocityParticles(Fix):
     def __init__(self, hub: Hub, group: ParticleGroup, *velocity: Expression | None):
         super().__init__(hub, group)
         self.formulas = per_direction(hub, "v", velocity)
+
+
+conflicts.register(VelocityParticles)

@@ -18,7 +18,7 @@ FORMS = Forms(
 )
 
 
-class Block(Region):
+class BlockRegion(Region):
     """A box with faces along the axes; its faces belong to it.
 
     Parameters

@@ -60,6 +60,7 @@ class Cylinder(region.Region):
             self.along = "xyz".index(values["axis"])
             self.across = tuple(axis for axis in range(3) if axis != self.along)
             self.centre = (values["c1"], values["c2"])
+            self.axis = self.along, self.centre
             self.ends = (values["lo"], values["hi"])
             region.check_order(*self.ends, ("lo", "hi"), place_of(names, given, "lo"))
         lo, hi = np.empty(dimension), np.empty(dimension)

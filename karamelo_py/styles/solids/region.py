@@ -6,10 +6,10 @@ from typing import Annotated, Literal
 from karamelo_py.language.signature import AtLeast, Positive
 from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.machine_memory import most_points
 from karamelo_py.scene.material import Material
 from karamelo_py.scene.placement import fill, lattice_of
 from karamelo_py.scene.region import Region
-from karamelo_py.scene.room import room_for
 from karamelo_py.scene.solid import Solid, own_grids
 from karamelo_py.script.errors import ScriptError
 
@@ -98,7 +98,7 @@ class RegionSolid(Solid):
                 argument="points",
                 hint="points=regular, a solid from a mesh, or another basis",
             )
-        room = partial(room_for, hub, self.first_id, domain.dimension)
+        room = partial(most_points, hub, self.first_id, domain.dimension)
         placement = fill(region, domain, lattice, ppc, points, room)
         self.put(hub, placement, may_be_empty=region.unknown)
         if placement.missed:

@@ -27,7 +27,7 @@ class Element(NamedTuple):
     box: tuple[tuple[int, ...], ...] = ()  # corners of the box of side 2 around 0, where it is one
 
 
-class Domain(NamedTuple):
+class ConvectedDomain(NamedTuple):
     """What all these bases are; they add `dimension`, `shape` and, for `corners`, `element`."""
 
     cells = 3

@@ -29,7 +29,7 @@ from karamelo_py.points.kinematics.tags import TAGS
 WIDTH = 3  # nodes along each direction
 
 
-class Block(NamedTuple):
+class NodeBlock(NamedTuple):
     """The nodes next to a point, and what it sees of them. Nobody computes what nobody reads."""
 
     first: tuple[int, ...]  # number of the first of them, along each direction
@@ -40,7 +40,7 @@ class Block(NamedTuple):
 
 
 class InBlock(NamedTuple):
-    """In the place of a basis: the point sees a :class:`Block`."""
+    """In the place of a basis: the point sees a :class:`NodeBlock`."""
 
     basis: NamedTuple
 
@@ -70,7 +70,7 @@ def block_of(kin, grid, stencil):
     hats = list(zip(*ahead, strict=True))
     weights = _spread_out(hats, stencil.weights)
     slopes = [_spread_out(hats, component) for component in zip(*stencil.gradients, strict=True)]
-    return Block(tuple(first), weights, tuple(zip(*slopes, strict=True)), holds, stencil)
+    return NodeBlock(tuple(first), weights, tuple(zip(*slopes, strict=True)), holds, stencil)
 
 
 @shared
@@ -91,7 +91,7 @@ def is_one_block(block):
 @shared
 def of_one(block):
     """The block of points that see the same nodes: their numbers have no lanes."""
-    return Block(tuple([first_lane(number) for number in block.first]), *block[1:])
+    return NodeBlock(tuple([first_lane(number) for number in block.first]), *block[1:])
 
 
 def _spread_out(hats: Iterable, values: Iterable) -> tuple:

@@ -3,7 +3,7 @@
 from karamelo_py.compiler.compile import real, shared
 from karamelo_py.compiler.symbols import call
 from karamelo_py.compiler.tuples import add, scale
-from karamelo_py.points.basis.cpdi import CUBE, Domain, Element, domain, upright
+from karamelo_py.points.basis.cpdi import CUBE, ConvectedDomain, Element, domain, upright
 from karamelo_py.points.basis.cpdi.corners import register_carried
 from karamelo_py.points.kinematics import Space
 from karamelo_py.points.kinematics.components import Number, Vector, formula
@@ -12,7 +12,7 @@ from karamelo_py.points.kinematics.components import Number, Vector, formula
 NEAR, FAR = (1 + 3**-0.5) / 2, (1 - 3**-0.5) / 2
 
 
-class H8(Domain):
+class H8(ConvectedDomain):
     """Trilinear hexahedra of eight corners, which neighbouring points move alike.
 
     Weights and gradients are the exact means over the hexahedron: 2 x 2 x 2 Gauss points integrate

@@ -2,13 +2,13 @@
 
 from karamelo_py.compiler.symbols import Symbol, call, cofactor, determinant
 from karamelo_py.points.basis import deformed, extent
-from karamelo_py.points.basis.cpdi import CUBE, LEAST, SQUARE, Domain, domain
+from karamelo_py.points.basis.cpdi import CUBE, LEAST, SQUARE, ConvectedDomain, domain
 from karamelo_py.points.basis.cpdi.corners import register, tags_of
 from karamelo_py.points.kinematics import Axisymmetric, PlaneStrain, Space
 from karamelo_py.points.kinematics.components import Number, Tensor, Vector, formula
 
 
-class R4(Domain):
+class R4(ConvectedDomain):
     """Parallelograms: x and two half edges r, which turn and stretch with the point.
 
     Neighbouring domains may overlap or part a little where the strain is not uniform
@@ -24,7 +24,7 @@ class R4(Domain):
     shape = ("half_edges",)
 
 
-class R8(Domain):
+class R8(ConvectedDomain):
     """Parallelepipeds: x and three half edges r, which turn and stretch with the point.
 
     Example

@@ -1,12 +1,12 @@
 """CPDI2: quadrilaterals (Q4) whose corners go with the velocity of the grid."""
 
 from karamelo_py.compiler.compile import real
-from karamelo_py.points.basis.cpdi import SQUARE, Domain, Element, domain, upright
+from karamelo_py.points.basis.cpdi import SQUARE, ConvectedDomain, Element, domain, upright
 from karamelo_py.points.basis.cpdi.corners import register_carried
 from karamelo_py.points.kinematics import Axisymmetric, PlaneStrain
 
 
-class Q4(Domain):
+class Q4(ConvectedDomain):
     """Quadrilaterals of four corners, which neighbouring points move alike.
 
     Domains go on tiling the body without gaps (Sadeghirad, Brannon & Guilkey 2013). In strong shear

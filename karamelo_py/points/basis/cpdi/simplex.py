@@ -4,13 +4,13 @@ from functools import reduce
 from operator import sub
 
 from karamelo_py.compiler.symbols import Symbol, cofactor, determinant
-from karamelo_py.points.basis.cpdi import Domain, Element, domain, upright
+from karamelo_py.points.basis.cpdi import ConvectedDomain, Element, domain, upright
 from karamelo_py.points.basis.cpdi.corners import register_carried, tags_of
 from karamelo_py.points.kinematics import Axisymmetric, PlaneStrain, Space
 from karamelo_py.points.kinematics.components import Vector, formula
 
 
-class T3(Domain):
+class T3(ConvectedDomain):
     """Triangles of a mesh: three corners, each with a third of the weight.
 
     Example
@@ -24,7 +24,7 @@ class T3(Domain):
     element = Element("triangle", 3, ((0, 1), (0, 2)), (0, 2, 1))
 
 
-class Tet4(Domain):
+class Tet4(ConvectedDomain):
     """Tetrahedra of a mesh: four corners, each with a quarter of the weight.
 
     The choice of Sinaie et al. 2017 for the cantilever.

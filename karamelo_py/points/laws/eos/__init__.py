@@ -4,7 +4,12 @@ An equation of state is a NamedTuple of parameters (its class is the tag), a par
 (`karamelo_py.points.laws.eos_strength`). Pressure is positive in compression; `j` = det F is
 the volume over the reference volume, `heat` the temperature (`Warm`), or () where the law has none.
 What it remembers of the past is its memory, a flat tuple, nothing for most. It also has a
-`specific_volume`, as a law does.
+`specific_volume`, as a law does. Where these are not usual, a class has
+
+any_speed
+    whether bodies bear to move many times as fast as waves;
+least_density
+    below which, in kg/m^3, units are likely wrong.
 """
 
 from karamelo_py.compiler.compile import point_function

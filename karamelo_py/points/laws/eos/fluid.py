@@ -47,6 +47,7 @@ class Tait(NamedTuple):
     """
 
     in_lanes = True
+    any_speed = True
     one_by_one = ("compression_energy",)
 
     specific_volume: float  # reference volume per mass

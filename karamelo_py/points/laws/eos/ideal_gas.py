@@ -55,6 +55,8 @@ class IdealGas(NamedTuple):
     """
 
     in_lanes = True
+    any_speed = True
+    least_density = 1e-3  # kg/m^3
 
     specific_volume: float  # reference volume per mass
     gamma: float  # ratio of specific heats

@@ -7,7 +7,15 @@ the like) is its memory, a flat tuple with as many numbers as it needs, none at 
 
 Strengths that depend on pressure, and change the volume, have `pressure_response` in the place of
 `shear_response` (`karamelo_py.points.laws.strengths.frictional`). What is not defined for a class
-is that of an elastic strength with a shear modulus ``G`` that remembers nothing.
+is that of an elastic strength with a shear modulus ``G`` that remembers nothing. Where these are
+not usual, a class has
+
+rebounds
+    True: it never yields;
+flows
+    True: a body of it has no shape of its own, as liquids and soils;
+rings
+    False: nor does it vibrate.
 """
 
 from typing import NamedTuple

@@ -71,6 +71,7 @@ class DruckerPrager(NamedTuple):
     """
 
     in_lanes = True
+    flows = True
     one_by_one = ("respond",)
 
     G: float  # shear modulus

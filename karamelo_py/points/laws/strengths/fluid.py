@@ -34,6 +34,7 @@ class Viscous(NamedTuple):
     """
 
     in_lanes = True
+    flows = True
 
     mu: float  # dynamic viscosity
     cell_size: float  # h, known when the scene is lowered

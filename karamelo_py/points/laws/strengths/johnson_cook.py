@@ -12,6 +12,7 @@ from karamelo_py.compiler.compile import (
     shared,
 )
 from karamelo_py.compiler.powers import logarithm, power
+from karamelo_py.language.rules import saving
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.laws import Absent
 from karamelo_py.points.laws.checks import check_temperatures, reference_rate
@@ -90,6 +91,14 @@ class JohnsonCook(NamedTuple):
         epsdot0 = reference_rate(epsdot0, C, "C")
         rate = RateFactor(epsdot0, C) if C > 0 else Absent()
         return cls(G, A, B, n, rate, Softening(m, Tr, Tm) if m > 0 else Absent())
+
+
+saving(
+    JohnsonCook,
+    when=lambda s, scene: s.B == 0 and all(isinstance(f, Absent) for f in (s.rate, s.softening)),
+    cost="the strength of {owner.id} neither hardens nor depends on rate or heat",
+    instead="strength(..., plastic, {part.G:g}, {part.A:g})",
+)
 
 
 class RateFactor(NamedTuple):

@@ -30,6 +30,7 @@ class Elastic(NamedTuple):
     """
 
     in_lanes = True
+    rebounds = True
 
     G: Annotated[float, Positive]
 

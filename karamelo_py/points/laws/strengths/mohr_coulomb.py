@@ -52,6 +52,7 @@ class MohrCoulomb(NamedTuple):
     """
 
     in_lanes = True
+    flows = True
     one_by_one = ("respond",)
 
     G: float  # shear modulus

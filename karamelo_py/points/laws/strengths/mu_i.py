@@ -53,6 +53,8 @@ class MuI(NamedTuple):
     """
 
     in_lanes = True
+    flows = True
+    rings = False
 
     G: Annotated[float, Positive]
     mu_s: Annotated[float, Positive]

@@ -3,6 +3,7 @@
 from typing import Annotated, NamedTuple
 
 from karamelo_py.compiler.tuples import add, scale
+from karamelo_py.language.rules import known_failure
 from karamelo_py.language.signature import AtLeast, In
 from karamelo_py.points.transfers import updated_velocity
 
@@ -27,6 +28,16 @@ class Growing(NamedTuple):
     times: Annotated[int, AtLeast(1)] = 1
 
     inverts_spread = False  # only the affine transfers do
+
+
+known_failure(
+    Growing,
+    "growing velocities",
+    when=lambda growing, scene: growing.factor > 1 and scene.fastest > 0,
+    reason="with {scene.basis_name} functions points at {scene.fastest:.3g} are {part.factor:g} "
+    "times as fast after each step",
+    cure="a factor of 1 at most",
+)
 
 
 @updated_velocity.on(Growing)

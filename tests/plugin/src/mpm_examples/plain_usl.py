@@ -7,7 +7,7 @@ from karamelo_py.kernels.arrays import FINAL_INTEGRATE, INITIAL_INTEGRATE, MASS
 from karamelo_py.kernels.g2p import Strain
 from karamelo_py.kernels.nodes import UpdateToVelocity
 from karamelo_py.kernels.rows import ACCELERATE, MOVE, SERIES, SUMS
-from karamelo_py.kernels.table import AtPoints, Gather, Nodes
+from karamelo_py.kernels.table import AtPoints, Gather, NodeTask
 
 
 @shared
@@ -32,7 +32,7 @@ class PlainUSL(NamedTuple):
         AtPoints(INITIAL_INTEGRATE, 0),
         SUMS,  # mass, momentum and force to the nodes
         *ACCELERATE,  # their update, and the fixes on nodes
-        Nodes(updated),
+        NodeTask(updated),
         SERIES,
         *MOVE,  # velocities back to the points, which move
         Gather(Strain()),  # their stress, from the same velocity of the nodes

@@ -58,7 +58,7 @@ class Pieces(NamedTuple):
         return size / 2**HALVED if mostly or self.rough.max(initial=0) > ROUGH else 0.0
 
 
-class Boxes(Protocol):
+class CellBoxes(Protocol):
     """Boxes in rows, numbered."""
 
     def beside(self, number: np.ndarray, step: np.ndarray) -> np.ndarray:
@@ -68,7 +68,7 @@ class Boxes(Protocol):
         """Their middles, (n, d)."""
 
 
-def cut(region: Region, x: np.ndarray, size: float, first: int) -> tuple[np.ndarray, Pieces]:
+def clip(region: Region, x: np.ndarray, size: float, first: int) -> tuple[np.ndarray, Pieces]:
     """Of which boxes of edge length `size` around `x` (n, d) something is left; what, at the edge.
 
     They are numbered from `first`. What is left lies in `region` and in the domain. Boxes end at
@@ -98,7 +98,7 @@ def cut(region: Region, x: np.ndarray, size: float, first: int) -> tuple[np.ndar
     return kept, Pieces(first + edge[left], middle[left], share[left], rough)
 
 
-def join(region: Region, boxes: Boxes, pieces: Pieces) -> Pieces:
+def join(region: Region, boxes: CellBoxes, pieces: Pieces) -> Pieces:
     """Give what is little to the nearest piece that is not, if one is in a box beside it.
 
     What has been given away has the share 0; whole boxes that took something are added.

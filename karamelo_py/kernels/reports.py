@@ -1,28 +1,16 @@
-"""Visits of all points, and what their tiles report."""
+"""The reports of tiles: how far points went, at what rate, and which one went wrong."""
 
-from karamelo_py.compiler.compile import over_blocks, point_function, shared
+from karamelo_py.compiler.compile import over_blocks, shared
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import entered, subkernel
 from karamelo_py.compiler.threads import shared_out
 from karamelo_py.compiler.tuples import record, subtract
-from karamelo_py.kernels.sums import adds
-from karamelo_py.kernels.sweep import sum_buffers, sweep_points
-from karamelo_py.kernels.totals import agree_on_reports, take_over
+from karamelo_py.kernels.arrays import Setup, Tag
+from karamelo_py.kernels.totals import agree_on_reports
 from karamelo_py.points.frames import follows
 from karamelo_py.points.grid import inside
 from karamelo_py.points.kinematics import largest_component
-
-
-@over_blocks
-def sweep_blocks(block, s, mode, visit, then, gathers, scatters, dt):
-    sweep_points(mode, visit, s, block, then, gathers, scatters, dt)
-
-
-@point_function(otherwise=True)
-def sweep_all(ranks, s, mode, visit, then, gathers, scatters, dt):
-    """Sweep over the points of all blocks; begin to pass on what they give to other processes."""
-    sweep_blocks(s, mode, visit, then, gathers, scatters, dt)
 
 
 @entered
@@ -45,8 +33,8 @@ def _survey_blocks(block, s):
 
 
 @shared
-def read_reports(s):
-    """Gather what the tiles reported: largest rate and move, and whether a point went wrong."""
+def read_reports(s: Setup) -> None:
+    """Gather the reports of all tiles in the clock: largest rate and move, and any wrong point."""
     clock = s.control.clock[0]
     clock.new_rate = 0.0
     clock.new_move = 0.0
@@ -55,35 +43,9 @@ def read_reports(s):
 
 
 @shared
-def _visit(s, mode, visit, then, gathers, scatters, dt):
-    # Where points give to the nodes themselves, these start from zero.
-    direct = s.buffers.count[1]
-    anew = tuple(quantity for quantity in visit.quantities if not adds(quantity))
-    sum_all(mode, anew, s, scatters & (direct == 1))
-    sweep_all(s.control.ranks, s, mode, visit, then, gathers, scatters, dt)
-    sum_all(mode, visit.quantities, s, scatters & (direct == 0))
-
-
-@shared
-def sum_all(mode, quantities, s, due):
-    """Sum at the nodes what the points gave, if they did."""
-    if len(quantities):
-        take_over(s.control.ranks, due & (s.buffers.count[1] == 0))
-        sum_buffers(mode, quantities, s, due)
-
-
-@shared
-def visit_here(s, mode, visit, dt, gathers, scatters):
-    """Visit all points at their places now, where nothing can go wrong."""
-    _visit(s, mode, visit, s.control.clock[0].now, gathers, scatters, dt)
-
-
-@shared
-def sweep(s, mode, visit, dt, gathers, scatters, moves):
-    """Visit all points; whether all went well. With `moves` new places go to the other array."""
+def all_well(s: Setup) -> bool:
+    """Take over the reports of a sweep of a step; return True if no point went wrong."""
     clock = s.control.clock[0]
-    then = 1 - clock.now if moves else clock.now
-    _visit(s, mode, visit, then, gathers, scatters, dt)
     read_reports(s)
     # Points move in one sweep of a step, and their domains may grow in another.
     clock.move += clock.new_move
@@ -94,7 +56,7 @@ def sweep(s, mode, visit, dt, gathers, scatters, moves):
 
 @subkernel
 def _check_share(frame, kin, grids, points, tiling, now, k):
-    """How far the points of the tiles of the k-th share have gone, and who went wrong."""
+    """Report the largest move of the points of the k-th share, and the point that went wrong."""
     grids, points, tiling = at_hand(grids), at_hand(points), at_hand(tiling)
     for place in range(tiling.share[k], tiling.share[k + 1]):
         t = tiling.order[place]
@@ -131,7 +93,7 @@ def _check_blocks(block, s, mode):
 
 
 @shared
-def check_moves(s, mode):
+def check_moves(s: Setup, mode: Tag) -> bool:
     """Look at the new positions again, after hooks that may have changed them."""
     _check_blocks(s, mode)
     agree_on_reports(s.control.ranks, s.control)

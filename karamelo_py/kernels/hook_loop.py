@@ -1,0 +1,715 @@
+"""The loop of compiled hooks of fixes over the members of their groups, at nodes and at points.
+
+What hooks act on is a tuple (`AtNodes`, `Motion`, `Warmth`), whose class says how the next members
+are chosen and what is done with a block of them. The functions of the hooks are described in
+`karamelo_py.kernels.hooks`.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from karamelo_py.compiler.addresses import caller_of
+from karamelo_py.compiler.compile import over_blocks, point_function, shared
+from karamelo_py.compiler.fields import load_vector
+from karamelo_py.compiler.formula import BLOCK, call_evaluate
+from karamelo_py.compiler.held import hold
+from karamelo_py.compiler.loops import entered, subkernel
+from karamelo_py.compiler.threads import Serial, Threaded, shared_out
+from karamelo_py.compiler.tuples import record
+from karamelo_py.kernels import arrays, totals
+from karamelo_py.kernels import hooks as kinds
+from karamelo_py.kernels.clock import kick, step_size
+from karamelo_py.kernels.loss import FrictionalHeat
+from karamelo_py.kernels.searching import first_from
+from karamelo_py.kernels.walls import FRICTION, rub, stick
+from karamelo_py.points.basis import placed
+from karamelo_py.points.frames import follows
+from karamelo_py.points.grid import node_position
+from karamelo_py.points.heat import face
+from karamelo_py.points.kinematics import dimension, planar
+
+NONE = np.int64(0)  # a bare 0 would be a type of its own
+END = np.iinfo(np.int64).max  # behind the last of the members
+TURN = 4 * BLOCK  # points that a thread takes at a time
+COUNT, ACT, RUB = 0, 1, 2  # what is done with the members of a hook
+LOADS = 3  # and with all nodes, as a target
+DONE = -1  # in the place of a stage
+
+_call_node_function = caller_of(kinds.NODE_FUNCTION)
+_call_point_function = caller_of(kinds.POINT_FUNCTION)
+_call_heat_function = caller_of(kinds.HEAT_FUNCTION)
+
+
+class AtNodes(NamedTuple):
+    """What node functions change, those of heat too.
+
+    `kept` is the share of its own velocity that a point keeps, and changes by what nodes change by.
+    """
+
+    target: int  # where in the arrays of nodes they act
+    kin: NamedTuple
+    grids: np.ndarray
+    nodes: NamedTuple
+    ranges: np.ndarray
+    kept: float
+
+
+class Motion(NamedTuple):
+    """What point functions change: velocity, and the places y that follow from x.
+
+    Behind the d coordinates of a point, `y` has those of `corners` corners of its domain.
+    """
+
+    ids: np.ndarray
+    v: np.ndarray  # (d, n)
+    mass: np.ndarray
+    x: np.ndarray  # (w, n)
+    y: np.ndarray
+    corners: int
+
+
+class Warmth(NamedTuple):
+    """What heat functions change: the heat that points get."""
+
+    ids: np.ndarray
+    kin: NamedTuple
+    capacity: np.ndarray  # (1, n)
+    temperature: np.ndarray
+    volume: np.ndarray
+    supply: np.ndarray
+    share: np.ndarray
+    x: np.ndarray  # (w, n)
+
+
+# --- the loop ---------------------------------------------------------------------------------
+
+
+@point_function()
+def turns(what, k, parts):
+    """Where the turns of thread `k` of so many begin, end, and how far it is to the next."""
+
+
+@point_function()
+def bounds(what, turn, parts):
+    """From where to before where members are chosen in a turn."""
+
+
+@point_function()
+def choose(what, hooks, h, place, end, member):
+    """Choose the next members, up to a block: how many, and where to go on."""
+
+
+@point_function()
+def act(what, task, hooks, control, dt, h, count, share):
+    """Do `task` with the chosen members, add to the totals; the number of those that count."""
+
+
+@subkernel
+def _act_on_part(what, task, hooks, control, dt, h, share, k, parts):
+    """Do `task` with the members of hook `h` in the part of thread `k`; how many count."""
+    found = 0
+    hooks.scratch[:6] = 0.0
+    first, last, step = turns(what, k, parts)
+    for turn in range(first, last, step):
+        place, end = bounds(what, turn, parts)
+        count, member = BLOCK, NONE
+        while count == BLOCK:
+            count, place, member = choose(what, hooks, h, place, end, member)
+            if count > 0:
+                found += act(what, task, hooks, control, dt, h, count, share)
+    return found
+
+
+@subkernel
+def _act_apart(what, task, hooks, control, dt, h, share, k):
+    """The part of thread `k`, with a scratch and totals of its own: totals do not round."""
+    own = record(hooks.apart, k)
+    for i in range(control.values.size):
+        own.values[i] = control.values[i]
+    clock, there = control.clock[0], own.clock[0]
+    there.last_dt, there.kick = clock.last_dt, clock.kick
+    there.set_low, there.set_high = clock.set_low, clock.set_high
+    there.rise, there.fall = clock.rise, clock.fall
+    there.coldest, there.hottest = clock.coldest, clock.hottest
+    here, mine = hold(_with_items_of(hooks, own)), hold(_with_items_of(control, own))
+    _act_on_part(what, task, here, mine, dt, h, share, k, hooks.apart.chosen.shape[0])
+    totals.hand_over(own.totals, control.totals, totals.WORK)
+    # Of nodes that others have held before, their totals change, too.
+    several = hooks.held.size > 0
+    for other in range(0 if several else h, len(hooks.table) if several else h + 1):
+        slot = hooks.table[other].slot
+        for row in range(max(slot, 0), min(slot + 3, own.totals.shape[0]) if slot >= 0 else 0):
+            totals.hand_over(own.totals, control.totals, row)
+
+
+@shared
+def _with_items_of(values, others):
+    """A NamedTuple with the items of another in the place of those with their names."""
+    new = dict(zip(others._fields, others, strict=True))
+    items = zip(values._fields, values, strict=True)
+    return type(values)(*(new.get(name, item) for name, item in items))
+
+
+_act_on_parts = shared_out(_act_apart, "what, task, hooks, control, dt, h, share")
+
+
+@point_function()
+def act_on_all(mode, what, task, hooks, control, dt, h, share):
+    """Do `task` with all members of a hook."""
+
+
+@act_on_all.on(Serial)
+def _act_on_all_serial(mode, what, task, hooks, control, dt, h, share):
+    _act_on_part(what, task, hooks, control, dt, h, share, NONE, NONE + 1)
+
+
+@act_on_all.on(Threaded)
+def _act_on_all_threaded(mode, what, task, hooks, control, dt, h, share):
+    parts = hooks.apart.chosen.shape[0]
+    _act_on_parts(mode, parts, what, task, hooks, control, dt, h, share)
+    clock = control.clock[0]
+    for k in range(parts):
+        own = hooks.apart.clock[k, 0]
+        clock.set_low, clock.set_high = (
+            min(clock.set_low, own.set_low),
+            max(clock.set_high, own.set_high),
+        )
+        clock.rise, clock.fall = max(clock.rise, own.rise), min(clock.fall, own.fall)
+        clock.coldest = min(clock.coldest, own.coldest)
+        clock.hottest = max(clock.hottest, own.hottest)
+
+
+# --- formulas and totals ----------------------------------------------------------------------
+
+
+@shared
+def directions(hooks):
+    """How many there are: a number that is read, so that no loop over them is unrolled."""
+    return hooks.x0.shape[1]
+
+
+@subkernel
+def evaluate(hooks, h, component, count, control, result, shift):
+    """Formula of one component over the chosen members, at the present time plus `shift`.
+
+    The results go to the row `result` of the scratch. A formula without code is a number.
+    """
+    program = hooks.programs[h, component]
+    if program.begin == program.end:
+        number = hooks.constants[program.first]
+        for q in range(count):
+            hooks.scratch[result, q] = number
+        return
+    time = control.values[arrays.TIME]
+    control.values[arrays.TIME] = time + shift
+    call_evaluate(
+        hooks.evaluate,
+        hooks.code,
+        hooks.constants,
+        control.values,
+        hooks.scratch,
+        program.begin,
+        program.end,
+        program.first,
+        program.last,
+        count,
+        result,
+    )
+    control.values[arrays.TIME] = time
+
+
+@subkernel
+def _published(hooks, h):
+    """The first of the totals of a hook, and how many it publishes."""
+    slot = hooks.table[h].slot
+    rubs = hooks.programs[h, FRICTION].begin >= 0
+    first, last = 3, -1
+    for c in range(3):
+        if slot >= 0 and (rubs or hooks.programs[h, c].begin >= 0):
+            first, last = min(first, c), c
+    return slot + first, last - first + 1
+
+
+@subkernel
+def _clear_total(hooks, h, control):
+    """The totals of a hook start from zero."""
+    first, count = _published(hooks, h)
+    for row in range(first, first + count):
+        control.totals[row] = 0
+
+
+@subkernel
+def _publish_total(hooks, h, control):
+    """Publish the totals of a hook."""
+    totals.carry(control.totals[totals.WORK])  # it grows from step to step
+    first, count = _published(hooks, h)
+    if count > 0:
+        totals.publish(control, first, count)
+
+
+# --- nodes ------------------------------------------------------------------------------------
+
+
+@turns.on(AtNodes)
+def _turns_of_nodes(what, k, parts):
+    shares = what.ranges[0, 0]
+    return shares * k // parts, shares * (k + 1) // parts, NONE + 1
+
+
+@bounds.on(AtNodes)
+def _bounds_of_nodes(what, turn, parts):
+    return what.ranges[turn, 0], what.ranges[turn, 1]
+
+
+@choose.on(AtNodes)
+def _choose_nodes(what, hooks, h, row, end, member):
+    """Those in use, with mass. Members ascend as rows do: a wall may have more than are in use."""
+    ranges, sums = what.ranges, what.nodes.sums
+    of_all = what.target == LOADS or hooks.table[h].begin < 0
+    behind = hooks.table[h].end
+    member = max(member, NONE if of_all else hooks.table[h].begin)
+    count = 0
+    while row < end:
+        low, high = ranges[row, 0], ranges[row, 1]
+        if of_all:
+            member = max(member, low)
+        elif member < behind and hooks.members[member] < low:
+            member = first_from(hooks.members, member, behind, low)
+        n = member if of_all else _node(hooks, h, member)
+        while n < high:
+            member += 1
+            if sums[n, arrays.MASS] > 0:
+                hooks.chosen[count] = n
+                count += 1
+                if count == BLOCK:
+                    return count, row, member
+            n = member if of_all else _node(hooks, h, member)
+        row += 1
+    return count, row, member
+
+
+@subkernel
+def _node(hooks, h, m):
+    """The number of a member of the group."""
+    return hooks.members[m] if m < hooks.table[h].end else END
+
+
+@act.on(AtNodes)
+def _act_at_nodes(what, task, hooks, control, dt, h, count, share):
+    if task == COUNT:
+        found = 0
+        for q in range(count):
+            found += totals.counts(control.ranks, hooks.chosen[q])
+        return found
+    if what.target == LOADS:
+        _work_at_nodes(what, hooks, control, dt, count)
+        return 0
+    if hooks.table[h].uses_place:
+        _locate_nodes(what.grids, hooks, count)
+    if task == RUB:
+        _rub_at_nodes(what, hooks, control, dt, h, count)
+    else:
+        _change_nodes(what, hooks, control, dt, h, count, share)
+    return 0
+
+
+@subkernel
+def _locate_nodes(grids, hooks, count):
+    """Positions of the chosen nodes."""
+    where = hooks.scratch
+    for q in range(count):
+        n = hooks.chosen[q]
+        g = 0
+        while g + 1 < grids.first.size and n >= grids.first[g + 1]:
+            g += 1
+        x = node_position(record(grids, g), n)
+        for axis in range(3):
+            where[axis, q] = x[axis]
+            where[3 + axis, q] = x[axis]
+
+
+@subkernel
+def _clear_held(what, held):
+    """Nobody holds a node yet."""
+    kin, ranges = what.kin, what.ranges
+    if held.size > 0:
+        for r in range(ranges[0, 0], ranges[ranges[0, 0] - 1, 1]):
+            for n in range(ranges[r, 0], ranges[r, 1]):
+                for c in range(dimension(kin)):
+                    held[n, c].slot = 0
+
+
+@subkernel
+def _take_over(hooks, control, h, n, c, force):
+    """Hook `h` holds node `n` by `force`: what those had of it that held it before."""
+    before = 0.0
+    if hooks.held.size > 0 and hooks.table[h].holds:
+        held = hooks.held[n, c]
+        if held.slot > 0:
+            before = held.force
+            if totals.counts(control.ranks, n):
+                totals.add_to(control.totals, held.slot - 1, -before)
+        held.slot = 1 + hooks.table[h].slot + c
+        held.force = before + force
+    return before
+
+
+@subkernel
+def _change_nodes(what, hooks, control, dt, h, count, share):
+    """Act on the chosen nodes; add to the totals, and to the work that is done."""
+    target, kin, nodes, kept = what.target, what.kin, what.nodes, what.kept
+    step_back = min(
+        control.clock[0].last_dt, control.values[arrays.TIME]
+    )  # nothing was before time 0
+    slot = hooks.table[h].slot
+    stage = hooks.table[h].stage
+    remaps = target == arrays.ON_VELOCITY and stage == arrays.POST_VELOCITIES_TO_GRID
+    # What is strained by before the forces belongs to the last step, and to what held it then.
+    strains_first = target == arrays.ON_VELOCITY and stage == arrays.POST_UPDATE_GRID_STATE
+    strains_first = strains_first and hooks.table[h].holds > 0
+    given = arrays.BEFORE if strains_first and hooks.table[h].uses_before else arrays.VALUE
+    for c in range(directions(hooks)):
+        if hooks.programs[h, c].begin < 0:
+            continue
+        evaluate(hooks, h, c, count, control, np.int64(arrays.VALUE), 0.0)
+        if hooks.table[h].uses_before:
+            evaluate(hooks, h, c, count, control, np.int64(arrays.BEFORE), -step_back)
+        for q in range(count):
+            n = hooks.chosen[q]
+            work = before = 0.0
+            mass = nodes.sums[n, arrays.MASS]
+            if target == arrays.ON_SUMS:
+                v = nodes.sums[n, arrays.of_momentum(kin) + c] / mass
+                star = v
+            elif target == arrays.ON_UPDATE:
+                star = nodes.update[n, c]
+                v = star - nodes.update[n, arrays.of_change(kin) + c]
+            else:
+                v = nodes.velocity[n, c]
+                star = v
+                last = nodes.update[n, c]  # before the forces, that of the step before
+                if remaps or (strains_first and last == hooks.scratch[given, q]):
+                    star = last
+            old, old_star = v, star
+            old_force = nodes.sums[n, arrays.of_force(kin) + c]
+            v, star, force, total = _call_node_function(
+                hooks.table[h].address,
+                mass,
+                v,
+                star,
+                old_force,
+                hooks.scratch[given, q],
+                hooks.scratch[arrays.BEFORE, q],
+                dt,
+                share,
+            )
+            if target == arrays.ON_UPDATE:
+                # Points that keep their velocity take the change v* - v: another v is an impulse.
+                total += kept * mass * (old - v) / dt
+                if star == hooks.scratch[arrays.VALUE, q]:
+                    before = _take_over(hooks, control, h, n, c, total)
+            if target == arrays.ON_SUMS:
+                hooks.loads[n, c] += force - old_force  # see _work_of_loads
+                nodes.sums[n, arrays.of_force(kin) + c] = force
+            elif target == arrays.ON_UPDATE:
+                # Impulse times the mean of the velocities before and after it.
+                work = 0.5 * mass * (star - old_star + kept * (old - v)) * (v + star)
+                clock = control.clock[0]
+                clock.set_low, clock.set_high = min(clock.set_low, star), max(clock.set_high, star)
+                nodes.update[n, c] = star
+                nodes.update[n, arrays.of_change(kin) + c] = star - v
+            else:
+                nodes.velocity[n, c] = star if strains_first else v
+            # Formulas have been taken: their rows hold what is to be added up.
+            own = totals.counts(control.ranks, n)
+            hooks.scratch[arrays.VALUE, q] = total if own else 0.0
+            hooks.scratch[arrays.BEFORE, q] = work if own else 0.0
+            if own and before != 0:
+                totals.add_to(control.totals, slot + c, before)
+        totals.add_many(control.totals, totals.WORK, hooks.scratch[arrays.BEFORE], count)
+        if slot >= 0:
+            totals.add_many(control.totals, slot + c, hooks.scratch[arrays.VALUE], count)
+
+
+@subkernel
+def _rub_at_nodes(what, hooks, control, dt, h, count):
+    """Friction of the chosen nodes along their wall."""
+    target, kin, nodes, kept = what.target, what.kin, what.nodes, what.kept
+    programs = hooks.programs[h]
+    if target == arrays.ON_VELOCITY:
+        if (
+            hooks.table[h].stage == arrays.POST_VELOCITIES_TO_GRID
+        ):  # else v* is that of the step before
+            for q in range(count):
+                stick(kin, nodes, programs, hooks.chosen[q])
+        return
+    evaluate(hooks, h, FRICTION, count, control, np.int64(arrays.VALUE), 0.0)
+    slot = hooks.table[h].slot
+    for q in range(count):
+        n, mu = hooks.chosen[q], hooks.scratch[arrays.VALUE, q]
+        rub(kin, nodes, programs, hooks.held, n, mu, dt, kept, control, slot)
+
+
+@subkernel
+def _work_at_nodes(what, hooks, control, dt, count):
+    """Add up what loads on the chosen nodes have done, and forget them; v* is that of the points.
+
+    Force times the mean of the velocities before and after the step: what stress and holders of a
+    node do to it in the same step counts, or the work would be of first order.
+    """
+    update, change = what.nodes.update, arrays.of_change(what.kin)
+    terms = hooks.scratch[arrays.VALUE]
+    for c in range(dimension(what.kin)):
+        for q in range(count):
+            n = hooks.chosen[q]
+            load = hooks.loads[n, c]
+            hooks.loads[n, c] = 0
+            counts = load != 0 and totals.counts(control.ranks, n)
+            terms[q] = dt * load * (update[n, c] - 0.5 * update[n, change + c]) if counts else 0.0
+        totals.add_many(control.totals, totals.WORK, terms, count)
+
+
+@shared
+def _rubbed_alone(nodes):
+    """The nodes with that of their declared fields which walls know."""
+    fields = tuple([one for one in nodes.fields if type(one) is FrictionalHeat])
+    return arrays.Nodes(nodes.sums, nodes.update, nodes.velocity, fields)
+
+
+@shared
+def node_hooks(stage, target, kin, grids, nodes, ranges, hooks, control, dt, kept):
+    """Call the node functions of `stage` on the members that have mass.
+
+    `kept` is the share of its own velocity that a point keeps, and changes by what nodes change by.
+    Of `LOADS` the work is added up: here, so that the way through the nodes is compiled once.
+    """
+    _node_hooks(
+        stage, target, planar(kin), grids, _rubbed_alone(nodes), ranges, hooks, control, float(dt),
+        kept,
+    )  # fmt: skip
+
+
+@entered
+def _node_hooks(stage, target, kin, grids, nodes, ranges, hooks, control, dt, kept):
+    what = hold(AtNodes(target, kin, grids, nodes, ranges, kept))
+    if target == LOADS:
+        if hooks.loads.size > 0:
+            act_on_all(hooks.mode, what, ACT, hooks, control, dt, NONE, 1.0)
+            totals.carry(control.totals[totals.WORK])
+        return
+    if target == arrays.ON_UPDATE:
+        _clear_held(what, hooks.held)
+    for h in range(len(hooks.table)):
+        if hooks.table[h].stage != stage:
+            continue
+        _clear_total(hooks, h, control)
+        share = 1.0
+        if hooks.table[h].uses_share:
+            heavy = _act_on_part(what, COUNT, hooks, control, dt, h, share, NONE, NONE + 1)
+            share = 1.0 / max(totals.number_of_all(control.ranks, control, heavy), 1)
+        act_on_all(hooks.mode, what, ACT, hooks, control, dt, h, share)
+        _publish_total(hooks, h, control)
+    # Walls rub when it is known which of them hold a node.
+    for h in range(len(hooks.table)):
+        if hooks.table[h].stage != stage:
+            continue
+        rubs = hooks.programs[h, FRICTION].begin >= 0
+        if rubs:
+            act_on_all(hooks.mode, what, RUB, hooks, control, dt, h, 1.0)
+        if rubs or (hooks.table[h].holds and hooks.held.size > 0):
+            _publish_total(hooks, h, control)
+
+
+@point_function(otherwise=True)
+def at_nodes(hooks, stage, target, s):
+    """Let the fixes act on the nodes."""
+
+
+@at_nodes.on(arrays.Hooks)
+def _at_nodes_hooks(hooks, stage, target, s):
+    clock = s.control.clock[0]
+    node_hooks(
+        stage, target, s.kin, s.grids, s.nodes, s.ranges, hooks, s.control, kick(s), clock.kept
+    )
+    clock.set_low = clock.set_high = 0.0  # of temperatures only
+
+
+@point_function(otherwise=True)
+def add_work(hooks, s):
+    """Add up the work of the loads on nodes."""
+
+
+@add_work.on(arrays.Hooks)
+def _add_work_hooks(hooks, s):
+    node_hooks(NONE, LOADS, s.kin, s.grids, s.nodes, s.ranges, hooks, s.control, kick(s), 0.0)
+
+
+# --- points -----------------------------------------------------------------------------------
+
+
+@shared
+def _turns_of_points(what, k, parts):
+    # By turns: members may lie beside each other.
+    size = TURN if parts > 1 else max(what.ids.size, 1)
+    return k * size, what.ids.size, parts * size
+
+
+@shared
+def _bounds_of_points(what, turn, parts):
+    return turn, min(turn + TURN, what.ids.size) if parts > 1 else what.ids.size
+
+
+@shared
+def _choose_points(what, hooks, h, p, end, member):
+    """Those from `p` to before `end`; where they are before the step."""
+    begin, ids, where = hooks.table[h].begin, what.ids, hooks.scratch
+    count = 0
+    while p < end and count < BLOCK:
+        if begin < 0 or hooks.members[begin + (ids[p] >> 6)] >> (ids[p] & 63) & 1 != 0:
+            hooks.chosen[count] = p
+            if hooks.table[h].uses_place:
+                for c in range(directions(hooks)):
+                    where[c, count] = what.x[c, p]
+                    if hooks.x0.shape[0] > 0:
+                        where[3 + c, count] = hooks.x0[ids[p], c]
+            count += 1
+        p += 1
+    return count, p, member
+
+
+for kind in (Motion, Warmth):
+    turns.on(kind)(_turns_of_points)
+    bounds.on(kind)(_bounds_of_points)
+    choose.on(kind)(_choose_points)
+
+
+@act.on(Motion)
+def _act_on_motion(what, task, hooks, control, dt, h, count, share):
+    v, y = what.v, what.y
+    step_back = min(control.clock[0].last_dt, control.values[arrays.TIME])
+    d = directions(hooks)
+    for c in range(d):
+        if hooks.programs[h, c].begin < 0:
+            continue
+        evaluate(hooks, h, c, count, control, np.int64(arrays.VALUE), 0.0)
+        if hooks.table[h].uses_before:
+            evaluate(hooks, h, c, count, control, np.int64(arrays.BEFORE), -step_back)
+        slot = hooks.table[h].slot
+        for q in range(count):
+            p = hooks.chosen[q]
+            velocity, place, total = _call_point_function(
+                hooks.table[h].address,
+                what.mass[p],
+                v[c, p],
+                what.x[c, p],
+                y[c, p],
+                hooks.scratch[arrays.VALUE, q],
+                hooks.scratch[arrays.BEFORE, q],
+                dt,
+                control.clock[0].kick,
+            )
+            speed = float(v[c, p])
+            work = 0.5 * float(what.mass[p]) * (velocity * velocity - speed * speed)
+            totals.add_to(control.totals, totals.WORK, work)
+            v[c, p] = velocity
+            # As far as a point moves, its corners do.
+            for corner in range(what.corners):
+                y[d + d * corner + c, p] += place - y[c, p]
+            y[c, p] = place
+            if slot >= 0:
+                totals.add_to(control.totals, slot + c, total)
+    return 0
+
+
+@act.on(Warmth)
+def _act_on_warmth(what, task, hooks, control, dt, h, count, share):
+    evaluate(hooks, h, 0, count, control, np.int64(arrays.VALUE), 0.0)
+    if hooks.programs[h, 1].begin >= 0:
+        evaluate(hooks, h, 1, count, control, np.int64(arrays.BEFORE), 0.0)
+    slot = hooks.table[h].slot
+    clock = control.clock[0]
+    for q in range(count):
+        p = hooks.chosen[q]
+        before = what.supply[0, p]
+        share, supply, T = _call_heat_function(
+            hooks.table[h].address,
+            what.capacity[0, p],
+            what.temperature[0, p],
+            face(what.kin, what.volume[0, p], load_vector(what.kin, what.x, p)),
+            before,
+            hooks.scratch[arrays.VALUE, q],
+            hooks.scratch[arrays.BEFORE, q],
+            dt,
+        )
+        what.share[0, p] = min(what.share[0, p], share)
+        what.supply[0, p] = supply
+        what.temperature[0, p] = T
+        if slot >= 0:
+            totals.add_to(control.totals, slot, supply - before)
+        # What a temperature is led to bounds it: what it has come to be says nothing.
+        if hooks.table[h].holds > 0:
+            T = hooks.scratch[arrays.BEFORE, q]
+        elif what.capacity[0, p] > 0:
+            # What the fastest point takes, another may have got before.
+            rate = supply / what.capacity[0, p]
+            clock.rise, clock.fall = max(clock.rise, rate), min(clock.fall, rate)
+        if share == 0 or hooks.table[h].holds > 0:
+            clock.coldest, clock.hottest = min(clock.coldest, T), max(clock.hottest, T)
+    return 0
+
+
+@entered
+def _point_hooks(stage, what, hooks, control, dt):
+    for h in range(len(hooks.table)):
+        if hooks.table[h].stage == stage:
+            act_on_all(hooks.mode, what, ACT, hooks, control, dt, h, 1.0)
+
+
+@shared
+def point_hooks(stage, what, hooks, control, dt):
+    """Call the point functions of `stage` on the members in a block."""
+    _point_hooks(stage, what, hooks, control, float(dt))
+
+
+@entered
+def clear_totals(stage, hooks, control):
+    """Totals of point functions start from zero: they are summed over the blocks."""
+    for h in range(len(hooks.table)):
+        if hooks.table[h].stage == stage:
+            _clear_total(hooks, h, control)
+
+
+@entered
+def publish_totals(stage, hooks, control):
+    """Publish the totals of point functions."""
+    for h in range(len(hooks.table)):
+        if hooks.table[h].stage == stage:
+            _publish_total(hooks, h, control)
+
+
+@shared
+def corners_that_move(s):
+    """How many corners stand behind the position of a point, and move with it."""
+    return placed(s.basis, s.kin) if follows(s.frame) else 0
+
+
+@over_blocks
+def _hook_points(block, s, hooks, stage, now, then):
+    points = block.points
+    corners = corners_that_move(s)
+    motion = Motion(points.id, points.v, points.mass, points.x[now], points.x[then], corners)
+    point_hooks(stage, motion, hooks, s.control, step_size(s))
+
+
+@point_function(otherwise=True)
+def at_points(hooks, stage, then, s):
+    """Let the fixes act on the points; `then` is 1 when their new positions are known, else 0."""
+
+
+@at_points.on(arrays.Hooks)
+def _at_points_hooks(hooks, stage, then, s):
+    clear_totals(stage, hooks, s.control)
+    now = s.control.clock[0].now
+    _hook_points(s, hooks, stage, now, 1 - now if then else now)
+    publish_totals(stage, hooks, s.control)

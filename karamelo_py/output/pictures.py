@@ -1,0 +1,489 @@
+"""Pictures of the points of a snapshot, on a line, in the plane and in space, drawn by Matplotlib.
+
+Axes, labels and the bar of colours are a background that is drawn once and then reused.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import Any, BinaryIO, NamedTuple
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.artist import Artist
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize, to_rgba_array
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Polygon
+from matplotlib.ticker import FuncFormatter, MaxNLocator
+from matplotlib.transforms import Transform
+from PIL import Image
+
+from karamelo_py.output.snapshots import Snapshot
+
+# Colour-blind safe (Okabe and Ito 2008); solids take them in turn.
+SOLIDS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E442", "#000000")
+MOST_IN_LEGEND = 16
+MARGIN = 4  # pixels at both sides of a long title
+MARKS = 1 << 16  # points that are drawn together
+# A circle of this diameter has the area of a unit square.
+ROUND = np.sqrt(4 / np.pi)
+STEPS = (1, 2, 2.5, 5, 10)  # between ticks
+# Towards the light, in a frame of right, up and towards the eye.
+LIGHT = np.array([-0.35, 0.6, 0.72])
+AMBIENT = 0.5  # light from all sides
+LIT = 8  # points, from which on they have a surface
+
+
+class Options(NamedTuple):
+    """Options of a picture.
+
+    Attributes
+    ----------
+    column
+        The column that colours the points, or is drawn over x in 1D.
+    label
+        Text beside the colours (or, in 1D, at the ordinate).
+    solids
+        Names of the solids that colour the points, if a column does not.
+    limits
+        Ends of the colours; None for ends that grow with what has been seen.
+    symmetric
+        True for limits that grow about 0.
+    cmap
+        A colour map of Matplotlib.
+    azimuth, elevation
+        Angles of view in 3D, in degrees.
+    axes
+        False for none.
+    lengths
+        Text behind the names of the axes: the unit.
+    """
+
+    column: str
+    label: str
+    solids: tuple[str, ...] = ()
+    limits: tuple[float | None, float | None] = (None, None)
+    symmetric: bool = False
+    cmap: str = "viridis"
+    azimuth: float = -60.0
+    elevation: float = 30.0
+    axes: bool = True
+    lengths: str = ""
+
+
+class DrawnPoints(Artist):
+    """The points of one state: some of them are drawn after others."""
+
+    def __init__(self, picture: Picture):
+        super().__init__()
+        self.picture = picture
+        self.rows = np.empty((3, 0))  # places on paper, a value, and the cell where there is light
+        self.set_zorder(picture.artist.get_zorder())
+        picture.artist.set_visible(False)  # but when this draws
+
+    def draw(self, renderer: Any) -> None:
+        """Draw them."""
+        if not self.get_visible():
+            return
+        artist = self.picture.artist
+        artist.set_visible(True)
+        for first in range(0, self.rows.shape[1], MARKS):
+            self.picture.place(self.rows[:, first : first + MARKS])
+            artist.draw(renderer)
+        artist.set_visible(False)
+
+
+class Picture:
+    """Axes, labels and colour bar as a background, and on it the points of one state.
+
+    Drawing axes with their ticks takes most of Matplotlib's time. They only change when the limits
+    of the field do, so their pixels are kept, and a new state costs the points and the title.
+    """
+
+    def __init__(self, domain: Any, size: tuple[float, float], dpi: int, options: Options):
+        self.domain = domain
+        self.options = options
+        self.figure = Figure(figsize=size, dpi=dpi, layout="constrained")
+        self.canvas = FigureCanvasAgg(self.figure)
+        self.axes = self.figure.add_subplot()
+        self.limits: tuple[float, float] | None = None
+        self.beyond = (False, False)
+        # The axis whose labels change with the limits of the field.
+        self.scale: Any = None
+        self._laid_out = False
+        self._widest = 0.0  # of the titles, in pixels
+        self._background: Any = None
+        self.axes.tick_params(labelsize=8)
+        self.title = self.axes.set_title("step 0, time 0", fontsize=9)
+        self.artist = self._prepare()
+        self.marks = DrawnPoints(self)
+        self.axes.add_artist(self.marks)
+        if not options.axes:
+            self.axes.set_axis_off()
+        self._add_legend()
+
+    def _prepare(self) -> Any:
+        """Set up axes; return the artist that shows the points."""
+        raise NotImplementedError
+
+    def _rows(self, ids: np.ndarray, x: np.ndarray, values: np.ndarray, side: float) -> np.ndarray:
+        """List what shows of points at x (n, 3), in the order in which they are drawn."""
+        raise NotImplementedError
+
+    def place(self, rows: np.ndarray) -> None:
+        """Hand what shows of some points to the artist."""
+        raise NotImplementedError
+
+    def _apply_limits(self, lo: float, hi: float) -> None:
+        """Take new limits of the field."""
+        raise NotImplementedError
+
+    def _apply_beyond(self, below: bool, above: bool) -> None:
+        """Mark the ends of the colours beyond which there are values."""
+
+    def _add_legend(self) -> None:
+        """Names of the solids, beside the picture."""
+        names = self.options.solids[:MOST_IN_LEGEND]
+        if len(names) < 2:
+            return
+        dots = [
+            Line2D([], [], marker="o", linestyle="", color=SOLIDS[k % len(SOLIDS)], label=name)
+            for k, name in enumerate(names)
+        ]
+        self.figure.legend(handles=dots, loc="outside right upper", frameon=False, fontsize=8)
+
+    def show(self, snapshot: Snapshot, side: float, title: str) -> None:
+        """Set the points and the title to draw; `side` is the length of a typical point."""
+        if not self._laid_out:
+            self._lay_out()
+        columns = snapshot.columns
+        values = columns[self.options.column]
+        if not self.options.solids:
+            limits = self._limits(values)
+            if limits != self.limits:
+                self.limits = limits
+                self._apply_limits(*limits)
+                self._background = None
+            finite = values[np.isfinite(values)]
+            beyond = bool((finite < limits[0]).any()), bool((finite > limits[1]).any())
+            if beyond != self.beyond:
+                self.beyond = beyond
+                self._apply_beyond(*beyond)
+                self._background = None
+        self._entitle(title)
+        x = np.column_stack([columns[name] for name in "xyz"])
+        self.marks.rows = self._rows(columns["id"], x, values, side)
+
+    def _entitle(self, text: str) -> None:
+        """Write the title above the axes, and where that is too narrow within the picture."""
+        self.title.set_text(text)
+        whole = self.figure.bbox.width - 2 * MARGIN
+        wide = self.title.get_window_extent(self.canvas.get_renderer()).width
+        if wide > whole:
+            self.title.set_fontsize(self.title.get_fontsize() * whole / wide)
+        self._widest = max(self._widest, min(wide, whole))  # what is shorter does not jump back
+        box = self.axes.get_window_extent()
+        half = self._widest / 2 + MARGIN
+        at = np.clip(box.x0 + box.width / 2, half, max(half, self.figure.bbox.width - half))
+        self.title.set_x((at - box.x0) / box.width)
+
+    def begin_with(self, limits: tuple[float, float] | None) -> None:
+        """Let limits that grow begin with those that a picture had before."""
+        self.limits = limits
+        if limits is not None:
+            if not self._laid_out:
+                self._lay_out()
+            self._apply_limits(*limits)
+            self._background = None
+
+    def _limits(self, values: np.ndarray) -> tuple[float, float]:
+        grown_to = grown(self.limits, values)
+        if self.options.symmetric:
+            furthest = max(-grown_to[0], grown_to[1])
+            grown_to = -furthest, furthest
+        lo, hi = (
+            own if fixed is None else fixed
+            for own, fixed in zip(grown_to, self.options.limits, strict=True)
+        )
+        return (lo, hi) if hi > lo else (min(lo, hi), min(lo, hi) + (abs(lo) or 1.0))
+
+    def save_png(self, file: BinaryIO, compression: int) -> None:
+        """Draw the state over the kept background and write it as PNG."""
+        if self._background is None:
+            self.title.set_animated(True)
+            self.marks.set_animated(True)
+            self.canvas.draw()
+            self._background = self.canvas.copy_from_bbox(self.figure.bbox)
+        self.canvas.restore_region(self._background)
+        self.axes.draw_artist(self.title)
+        self.axes.draw_artist(self.marks)
+        # Opaque everywhere, so three channels do.
+        pixels = np.asarray(self.canvas.buffer_rgba())[:, :, :3]
+        image = Image.fromarray(np.ascontiguousarray(pixels))
+        image.save(file, format="PNG", compress_level=compression)
+
+    def _lay_out(self) -> None:
+        """Find room for the widest labels, once: nothing moves between the pictures of a run."""
+        if self.scale is not None:
+            self._apply_limits(-2.5e-5, 2.5e-5)
+        for _ in range(2):  # a second time where the aspect of the axes has moved them
+            self.figure.draw_without_rendering()
+        self.figure.set_layout_engine("none")
+        self._make_room_at_left()
+        if self.scale is not None:
+            axes = self.scale.axes
+            if axes is not self.axes:  # a colour bar, no higher than the axes
+                own, beside = axes.get_position(), self.axes.get_position()
+                high = min(own.height, beside.height)
+                low = beside.y0 + (beside.height - high) / 2
+                axes.set_box_aspect(None)
+                axes.set_position((own.x0, low, own.width, high))
+            at = axes.transAxes.inverted().transform((self.scale.label.get_position()[0], 0))
+            self.scale.set_label_coords(at[0], 0.5)
+        self._laid_out = True
+
+    def _make_room_at_left(self) -> None:
+        """Narrow axes of equal units may be laid out with the name of y outside the picture."""
+        label = self.axes.yaxis.label
+        out = MARGIN - label.get_window_extent(self.canvas.get_renderer()).x0
+        if out <= MARGIN or not self.axes.axison or not label.get_text():
+            return
+        box, share = self.axes.get_position(), out / self.figure.bbox.width
+        self.axes.set_position((box.x0 + share, box.y0, box.width - share, box.height))
+        self.figure.draw_without_rendering()
+
+    def _pixels_per_unit(self) -> float:
+        """Points (1/72 inch) on paper per unit of x."""
+        box = self.axes.get_position()
+        lo, hi = self.axes.get_xlim()
+        return box.width * self.figure.get_figwidth() * 72 / (hi - lo)
+
+
+def grown(limits: tuple[float, float] | None, values: np.ndarray) -> tuple[float, float]:
+    """Limits that hold the old ones and the finite values.
+
+    They are rounded outwards to eighths of a power of two, so that they change rarely while a field
+    grows and the pictures of a run stay comparable.
+    """
+    finite = values[np.isfinite(values)]
+    lo, hi = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
+    if limits is not None:
+        if limits[0] <= lo and hi <= limits[1]:
+            return limits
+        lo, hi = min(lo, limits[0]), max(hi, limits[1])
+    span = hi - lo
+    if span <= 1e-12 * max(abs(lo), abs(hi)):
+        span = abs(hi) or 1.0
+    unit = 2.0 ** (np.ceil(np.log2(span)) - 3)
+    lo, hi = np.floor(lo / unit) * unit, np.ceil(hi / unit) * unit
+    return float(lo), float(hi if hi > lo else lo + unit)
+
+
+def make(domain: Any, size: tuple[float, float], dpi: int, options: Options) -> Picture:
+    """The picture that suits the domain's dimension."""
+    kind = {1: LinePicture, 2: PlanePicture, 3: SpacePicture}[domain.dimension]
+    return kind(domain, size, dpi, options)
+
+
+def _number(value: float, _: Any = None) -> str:
+    return f"{value:.8g}"
+
+
+def _arrows(shown: ScalarMappable, of_bar: Transform) -> list[Polygon]:
+    """Arrows at the lower and the upper end of a bar of colours, not to be seen yet."""
+    looks = {"transform": of_bar, "clip_on": False, "edgecolor": "black", "linewidth": 0.8}
+    return [
+        Polygon(
+            [(0, end), (0.5, end + 0.06 * way), (1, end)],
+            facecolor=shown.get_cmap()(float(end)),
+            visible=False,
+            **looks,
+        )
+        for end, way in ((0, -1), (1, 1))
+    ]
+
+
+class PlanePicture(Picture):
+    """2D: the points where they are."""
+
+    def _prepare(self) -> Any:
+        lo, hi = self.domain.lo, self.domain.hi
+        self.axes.set_xlim(lo[0], hi[0])
+        self.axes.set_ylim(lo[1], hi[1])
+        self.axes.set_aspect("equal")
+        self.axes.set_xlabel("x" + self.options.lengths, fontsize=9)
+        self.axes.set_ylabel("y" + self.options.lengths, fontsize=9)
+        return self._scatter()
+
+    def _scatter(self) -> Any:
+        self.colours = to_rgba_array(SOLIDS)
+        self.norm = Normalize(0.0, 1.0)
+        if not self.options.solids:
+            shown = ScalarMappable(self.norm, self.options.cmap)
+            bar = self.figure.colorbar(
+                shown,
+                ax=self.axes,
+                shrink=0.8,
+                label=self.options.label,
+                ticks=MaxNLocator(7, steps=STEPS),
+                format=FuncFormatter(_number),
+            )
+            bar.ax.tick_params(labelsize=8)
+            self.scale = bar.ax.yaxis
+            self.arrows = [bar.ax.add_patch(arrow) for arrow in _arrows(shown, bar.ax.transAxes)]
+        return self.axes.scatter([], [], lw=0)
+
+    def _apply_limits(self, lo: float, hi: float) -> None:
+        self.norm.vmin, self.norm.vmax = lo, hi
+
+    def _apply_beyond(self, below: bool, above: bool) -> None:
+        for arrow, shows in zip(self.arrows, (below, above), strict=True):
+            arrow.set_visible(shows)
+
+    def _rows(self, ids: np.ndarray, x: np.ndarray, values: np.ndarray, side: float) -> np.ndarray:
+        # As large as the material it stands for, and never invisible: least where they are few.
+        least = 0.8 + 4 / np.sqrt(max(len(x), 1))
+        size = max(ROUND * side * self._pixels_per_unit(), least)
+        self.artist.set_sizes([size**2])
+        if not self.options.solids:
+            values = (values - self.limits[0]) / (self.limits[1] - self.limits[0])
+        return np.array([*x.T[:2], values], np.float32)[:, np.argsort(ids)]
+
+    def place(self, rows: np.ndarray) -> None:
+        """Hand what shows of some points to the artist."""
+        self.artist.set_offsets(rows[:2].T)
+        self.artist.set_facecolors(self._colours_of(rows))
+
+    def _colours_of(self, rows: np.ndarray) -> np.ndarray:
+        """(n, 4) colours."""
+        if self.options.solids:
+            return self.colours[(rows[2].astype(int) - 1) % len(SOLIDS)]
+        return colormaps[self.options.cmap](rows[2])
+
+
+class SpacePicture(PlanePicture):
+    """3D: the points seen from outside, the farthest first, in the frame of the domain."""
+
+    def _prepare(self) -> Any:
+        self.lo, self.hi = np.asarray(self.domain.lo, float), np.asarray(self.domain.hi, float)
+        a, e = np.radians([self.options.azimuth, self.options.elevation])
+        ca, sa, ce, se = np.cos(a), np.sin(a), np.cos(e), np.sin(e)
+        # Rows: right, up and towards the eye.
+        self.view = np.array([[-sa, ca, 0.0], [-se * ca, -se * sa, ce], [ce * ca, ce * sa, se]])
+        self.middle = 0.5 * (self.lo + self.hi)
+        seen = self._project(np.array(list(product(*zip(self.lo, self.hi, strict=True)))))[:, :2]
+        if self.options.axes:
+            for axis in range(3):
+                self._draw_edges(axis, abs(seen).max())
+        reach = abs(seen).max(axis=0) * 1.04
+        self.axes.set_xlim(-reach[0], reach[0])
+        self.axes.set_ylim(-reach[1], reach[1])
+        self.axes.set_aspect("equal")
+        self.axes.set_axis_off()
+        return self._scatter()
+
+    def _project(self, x: np.ndarray) -> np.ndarray:
+        return (x - self.middle) @ self.view.T
+
+    def _draw_edges(self, axis: int, reach: float) -> None:
+        """The four edges along an axis; ticks at the lowest one, of z at the leftmost."""
+        others = [k for k in range(3) if k != axis]
+        edges = []
+        for low_high in product(*((self.lo[k], self.hi[k]) for k in others)):
+            ends = np.array([self.lo, self.hi])
+            ends[:, others] = low_high
+            edges.append((ends, self._project(ends)[:, :2]))
+            self.axes.plot(*edges[-1][1].T, color="0.75", linewidth=0.7)
+        ends, seen = min(edges, key=lambda edge: edge[1][:, 0 if axis == 2 else 1].sum())
+        along = seen[1] - seen[0]
+        if np.hypot(*along) < 0.1 * reach:
+            return  # seen from its end
+        outward = np.array([along[1], -along[0]]) / np.hypot(*along)
+        outward *= np.sign(outward @ seen.mean(axis=0)) or 1.0
+        aligned = {
+            "ha": "right" if outward[0] < -0.4 else "left" if outward[0] > 0.4 else "center",
+            "va": "top" if outward[1] < -0.4 else "bottom" if outward[1] > 0.4 else "center",
+            "textcoords": "offset points",
+            "fontsize": 8,
+        }
+        lo, hi = self.lo[axis], self.hi[axis]
+        ticks = MaxNLocator(4, steps=STEPS).tick_values(lo, hi)
+        # Those of two edges would cover each other at their common end.
+        for tick in ticks[abs(ticks - 0.5 * (lo + hi)) < 0.48 * (hi - lo)]:
+            at = seen[0] + along * (tick - lo) / (hi - lo)
+            self.axes.plot(*np.array([at, at + 0.02 * reach * outward]).T, color="0.5", lw=0.7)
+            self.axes.annotate(_number(tick), at, xytext=tuple(6 * outward), **aligned)
+        self.axes.annotate(
+            "xyz"[axis] + self.options.lengths,
+            seen.mean(axis=0),
+            xytext=tuple(28 * outward),
+            **aligned,
+            rotation=90 if axis == 2 else 0,
+        )
+
+    def _rows(self, ids: np.ndarray, x: np.ndarray, values: np.ndarray, side: float) -> np.ndarray:
+        places = self._project(x)
+        # From far to near, and by id: bits of negative numbers are in the order of magnitudes.
+        bits = places[:, 2].astype(np.float32).view(np.int32).astype(np.int64)
+        keys = np.where(bits < 0, -0x80000000 - bits, bits) << 32 | ids.astype(np.int64)
+        rows = super()._rows(keys, places, values, side)
+        self.light = None
+        if len(x) < LIT:
+            return rows
+        lo, size = x.min(axis=0), np.ptp(x, axis=0)
+        cell = max(1.5 * side, size.max() / 120, np.finfo(float).tiny)
+        shape = tuple(((size / cell).astype(int) + 5).tolist())
+        cells = np.ravel_multi_index(tuple(((x - lo) / cell).astype(int).T + 2), shape)
+        counts = np.bincount(cells, minlength=int(np.prod(shape)))
+        self.light = self._light(counts.reshape(shape))
+        return np.vstack([rows, cells[np.argsort(keys)].astype(np.float32)])
+
+    def _colours_of(self, rows: np.ndarray) -> np.ndarray:
+        colours = super()._colours_of(rows)
+        if self.light is not None:
+            colours[:, :3] *= self.light[rows[3].astype(int)][:, None]
+        return colours
+
+    def _light(self, counts: np.ndarray) -> np.ndarray:
+        """Measure the light on each cell: a surface looks where there are fewer points."""
+        density = counts.astype(float)
+        for axis in range(3):
+            for _ in range(2):
+                density = 0.5 * density + 0.25 * (
+                    np.roll(density, 1, axis) + np.roll(density, -1, axis)
+                )
+        there = np.flatnonzero(counts)
+        normal = -np.column_stack([slope.ravel()[there] for slope in np.gradient(density)])
+        length = np.linalg.norm(normal, axis=1)
+        facing = (normal @ self.view.T) @ (LIGHT / np.linalg.norm(LIGHT))
+        facing = np.divide(facing, length, out=np.ones(len(there)), where=length > 0)
+        light = np.zeros(counts.size)
+        light[there] = AMBIENT + (1 - AMBIENT) * np.clip(facing, 0, 1)
+        return light
+
+
+class LinePicture(Picture):
+    """1D: the field over x."""
+
+    def _prepare(self) -> Any:
+        self.axes.set_xlim(self.domain.lo[0], self.domain.hi[0])
+        self.axes.set_xlabel("x" + self.options.lengths, fontsize=9)
+        self.axes.set_ylabel(self.options.label, fontsize=9)
+        self.scale = self.axes.yaxis
+        self.scale.set_major_formatter(FuncFormatter(_number))
+        self.axes.grid(True, color="0.9", linewidth=0.7)
+        (artist,) = self.axes.plot([], [], ".", color=SOLIDS[0], markersize=3)
+        return artist
+
+    def _apply_limits(self, lo: float, hi: float) -> None:
+        self.axes.set_ylim(lo, hi)
+
+    def _rows(self, ids: np.ndarray, x: np.ndarray, values: np.ndarray, side: float) -> np.ndarray:
+        return np.array([*x.T[:2], values])[:, np.argsort(ids)]
+
+    def place(self, rows: np.ndarray) -> None:
+        """Hand what shows of some points to the artist."""
+        self.artist.set_data(rows[0], rows[2])

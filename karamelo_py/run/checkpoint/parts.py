@@ -1,0 +1,235 @@
+"""What parts of a scene remember from state to state, to go back to and to write.
+
+A part names the attributes in which it keeps what it has seen or added up::
+
+    class Dose(Compute):
+        remembers = ("total",)
+
+Numbers, texts, bytes, arrays, generators of random numbers of NumPy, lists, tuples, sets and
+dictionaries of these can be kept, and objects whose class says in the same way what they remember.
+Classes add to what their bases name. After a part has got back what it remembers, its method
+``resumed()`` is called where it has one; before a file takes that, ``filed()``. What writes files,
+such as a dump, begins them anew in another script (read_restart), and gets back there only what it
+names in ``carries``, too.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from karamelo_py.language.faults import fault
+from karamelo_py.scene.hub import Hub
+from karamelo_py.script.errors import ScriptError
+
+OUTPUTS = ("dump", "log", "curve", "restart")
+CLOCK = ("time", "timestep", "dt")  # values that belong to the arrays of a state
+
+Key = tuple[str, str, str]  # family, ID and style of a part
+
+
+class PartStates(NamedTuple):
+    """What parts remembered at one state, as JSON knows it, and the values published then."""
+
+    parts: dict[Key, dict[str, Any]]
+    arrays: list[np.ndarray]  # by the numbers that they have in it
+    values: dict[str, float]
+
+    @classmethod
+    def of(cls, hub: Hub, families: tuple[str, ...] = ()) -> PartStates:
+        """Return the present states of all parts, or of those of some families."""
+        arrays: list[np.ndarray] = []
+        parts = {
+            key: state_of(part, arrays, grows=key[0] in OUTPUTS)
+            for key, part in parts_of(hub)
+            if not families or key[0] in families
+        }
+        names = (name for name in hub.values.names() if not families and name not in CLOCK)
+        return cls(parts, arrays, {name: hub.values.get(name) for name in names})
+
+    def give(self, hub: Hub, *, cut: bool = False, anew: bool = False) -> None:
+        """Let all parts remember that.
+
+        With `cut` outputs go on from there in their files. Those that begin them `anew` get what
+        they carry into other files.
+        """
+        for name, value in self.values.items():
+            if name in hub.values:
+                hub.values.set(name, value)
+        for key, part in parts_of(hub):
+            if key not in self.parts:
+                continue
+            state, begins = self.parts[key], anew and key[0] in OUTPUTS
+            if begins:
+                state = {name: state[name] for name in named(part, "carries") if name in state}
+            give_state(part, state, self.arrays)
+            has_file = hub.settings.comm.leads or key[0] not in OUTPUTS
+            if (cut or anew) and not begins and has_file and hasattr(part, "resumed"):
+                part.resumed()
+
+
+def named(part: Any, where: str = "remembers") -> tuple[str, ...]:
+    """List the attributes that a part and its bases name in ``remembers`` or ``carries``."""
+    names = (name for c in reversed(type(part).__mro__) for name in vars(c).get(where, ()))
+    return tuple(dict.fromkeys(names))
+
+
+def parts_of(hub: Hub) -> Iterator[tuple[Key, Any]]:
+    """Yield all parts of a scene that remember something."""
+    return ((key, part) for key, part in _all_parts(hub) if named(part))
+
+
+def _all_parts(hub: Hub) -> Iterator[tuple[Key, Any]]:
+    yield ("update", "", ""), hub.update
+    yield ("method", "", ""), hub.update.method
+    for catalogue in hub.catalogues:
+        for ID, part in catalogue.items():
+            kind = getattr(part, "style", "") or type(part).__name__
+            yield (catalogue.kind, ID, kind), part
+    for curve in hub.output.plots:
+        yield ("curve", curve.id, ""), curve
+    for item in hub.output.last:
+        yield ("restart", str(item.file), ""), item
+    # The last one: what it shows is what the others remember.
+    yield ("log", "", ""), hub.output.log
+
+
+def state_of(part: Any, arrays: list[np.ndarray], *, grows: bool = False) -> dict[str, Any]:
+    """Return what a part remembers as JSON knows it; arrays are copied and numbered.
+
+    Where lists are only ever added to (`grows`), nothing of them is copied before a file takes it.
+    """
+    found: dict[str, Any] = {}
+    for name in named(part):
+        value = getattr(part, name)
+        if named(value):
+            found[name] = {"part": state_of(value, arrays, grows=grows)}
+        elif grows and type(value) is list:
+            found[name] = Grown(value, len(value), arrays)
+        else:
+            try:
+                found[name] = plain(value, arrays)
+            except TypeError as error:
+                who, place = type(part).__name__, getattr(part, "place", None)
+                why = fault(who, f"remembers: {name} is {error}", place)
+                found[name] = Unwritable(_copied(value), why)
+    return found
+
+
+def give_state(part: Any, state: dict[str, Any], arrays: list[np.ndarray]) -> None:
+    """Give a part back what it remembered."""
+    for name in named(part):
+        kept, there = state.get(name, part), getattr(part, name)
+        if isinstance(kept, dict) and "part" in kept:
+            if named(there):
+                give_state(there, kept["part"], arrays)
+        elif kept is not part and not named(there):
+            setattr(part, name, value_of(kept, arrays))
+
+
+class Grown:
+    """A list that is only ever added to, and how long it was."""
+
+    def __init__(self, items: list, length: int, arrays: list[np.ndarray]):
+        self.items, self.length, self.arrays = items, length, arrays
+
+    def value(self) -> list:
+        """Return the items of then."""
+        return self.items[: self.length]
+
+    def plain(self) -> Any:
+        """Return them as JSON knows it."""
+        return plain(self.value(), self.arrays)
+
+
+class Unwritable:
+    """A copy of what a function in Python keeps and no file takes, and what is said of it."""
+
+    def __init__(self, kept: Any, fault: ScriptError):
+        self.kept, self.fault = kept, fault
+
+    def value(self) -> Any:
+        """Return a copy of it."""
+        return _copied(self.kept)
+
+    def plain(self) -> Any:
+        """Refuse to write it."""
+        raise self.fault
+
+
+def for_json(late: Grown | Unwritable) -> Any:
+    """Return what JSON knows of a value that is turned into that in a file alone."""
+    return late.plain()
+
+
+def _copied(value: Any) -> Any:
+    try:
+        return copy.deepcopy(value)
+    except Exception:  # an object of anybody
+        return value
+
+
+def _generator(kind: str, state: dict) -> np.random.Generator:
+    source = getattr(np.random, kind)()
+    source.state = state
+    return np.random.Generator(source)
+
+
+def _random_state(state: dict) -> np.random.RandomState:
+    found = np.random.RandomState()
+    found.set_state(state)
+    return found
+
+
+# Kinds of data that JSON does not know: as arguments that it does, and what makes them anew.
+KINDS: dict[type, tuple[Callable, Callable]] = {
+    tuple: (list, lambda *items: items),
+    set: (list, lambda *items: set(items)),
+    dict: (lambda found: [list(item) for item in found.items()], lambda *items: dict(items)),
+    complex: (lambda z: [z.real, z.imag], complex),
+    bytes: (lambda text: [np.frombuffer(text, np.uint8)], np.ndarray.tobytes),
+    bytearray: (lambda text: [np.array(text)], bytearray),
+    np.generic: (lambda x: [x.dtype.str, x.item()], lambda kind, x: np.dtype(kind).type(x)),
+    np.random.Generator: (
+        lambda of: [type(of.bit_generator).__name__, of.bit_generator.state],
+        _generator,
+    ),
+    np.random.RandomState: (lambda of: [of.get_state(legacy=False)], _random_state),
+}
+MADE = {kind.__name__: make for kind, (_, make) in KINDS.items()}
+
+
+def plain(value: Any, arrays: list[np.ndarray]) -> Any:
+    """Return a value as JSON knows it; arrays are copied into `arrays` and numbered.
+
+    Raises
+    ------
+    TypeError
+        If no file takes it.
+    """
+    kind = np.generic if isinstance(value, np.generic) else type(value)
+    if value is None or (isinstance(value, (bool, int, float, str)) and kind is not np.generic):
+        return value
+    if isinstance(value, np.ndarray):
+        arrays.append(value.copy())
+        return {"array": len(arrays) - 1}
+    if kind is list:
+        return [plain(item, arrays) for item in value]
+    if kind not in KINDS:
+        raise TypeError(f"a {kind.__name__}, which no file takes")
+    return {kind.__name__: plain(KINDS[kind][0](value), arrays)}
+
+
+def value_of(kept: Any, arrays: list[np.ndarray]) -> Any:
+    """Return the value of which `plain` has given this."""
+    if isinstance(kept, (Grown, Unwritable)):
+        return kept.value()
+    if isinstance(kept, list):
+        return [value_of(item, arrays) for item in kept]
+    if not isinstance(kept, dict):
+        return kept
+    ((kind, content),) = kept.items()
+    return arrays[content].copy() if kind == "array" else MADE[kind](*value_of(content, arrays))

@@ -1,0 +1,189 @@
+"""Memory of this machine, and what is said where a scene needs more."""
+
+from math import ceil, inf
+from pathlib import Path
+from typing import NamedTuple
+
+try:
+    import resource
+except ImportError:  # Windows
+    resource = None
+
+from karamelo_py.language.scene import Scene
+from karamelo_py.script.errors import Place, ScriptError
+
+# Of all memory: what the system keeps for itself and gives back when it has to.
+SLACK = 0.03
+GIB = 2**30
+
+# Files of a group of processes, of version 2 and 1: its limit, what it has, and what of that is
+# in caches that can be dropped, as memory.stat calls it.
+_OF_GROUPS = (
+    ("memory.max", "memory.current", ("active_file", "inactive_file", "slab_reclaimable")),
+    (
+        "memory.limit_in_bytes", "memory.usage_in_bytes",
+        ("total_active_file", "total_inactive_file"),
+    ),
+)  # fmt: skip
+
+
+class MachineMemory(NamedTuple):
+    """Bytes that a machine, or a job on it, has yet, and has in all; swap is among them.
+
+    More than `free` may be had where the system does not tell of all that it can give back (caches
+    of ZFS); more than `whole` may not.
+    """
+
+    free: float
+    whole: float
+
+
+def machine_memory(processes: int = 1, root: Path = Path("/")) -> MachineMemory | None:
+    """Count what can be had at most: free, or held by caches and swap; None where no one tells.
+
+    The machine's, or less where the processes of a container or of a batch job have a limit
+    (cgroup, of either version), or each of its own (ulimit -v).
+
+    Parameters
+    ----------
+    processes
+        How many share the scene on this machine: so many limits of a process are there.
+    root
+        For tests.
+    """
+    import psutil
+
+    try:
+        machine, swap = psutil.virtual_memory(), psutil.swap_memory()
+    except (OSError, RuntimeError):
+        return None
+    left = machine.available + swap.free + SLACK * machine.total
+    found = [MachineMemory(left, machine.total + swap.total), *_of_groups(root, swap)]
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0] if resource else -1
+    if limit >= 0:
+        left = (1 + SLACK) * limit - psutil.Process().memory_info().vms
+        found.append(MachineMemory(processes * left, processes * limit))
+    return MachineMemory(*map(min, zip(*found, strict=True)))
+
+
+def _of_groups(root: Path, swap: MachineMemory) -> list[MachineMemory]:
+    """Read the limits of the groups of processes (cgroup) that this one is in."""
+    found = []
+    for line in _lines(root / "proc/self/cgroup"):
+        _, controllers, path = line.split(":", 2)
+        if controllers and "memory" not in controllers.split(","):
+            continue
+        top = root / "sys/fs/cgroup" / ("memory" if controllers else "")
+        limit_file, used_file, dropped = _OF_GROUPS[bool(controllers)]
+        # In a container the path may be that outside; its own limit stands at the top then.
+        inner = top / path.strip("/")
+        for folder in (inner, *inner.parents[: len(inner.parts) - len(top.parts)]):
+            limit, used = (_number(folder / name) for name in (limit_file, used_file))
+            if limit is None or used is None:
+                continue
+            most, out = (_number(folder / f"memory.swap.{name}") for name in ("max", "current"))
+            free, whole = swap.free, swap.total
+            if most is not None and out is not None:
+                free, whole = min(free, most - out), min(whole, most)
+            stat = dict(line.split(maxsplit=1) for line in _lines(folder / "memory.stat"))
+            cached = sum(float(stat.get(name, 0)) for name in dropped)
+            found.append(MachineMemory((1 + SLACK) * limit - used + cached + free, limit + whole))
+    return found
+
+
+def _lines(path: Path) -> list[str]:
+    """Read the lines of a file; none where there is no file."""
+    try:
+        return path.read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return []
+
+
+def _number(path: Path) -> float | None:
+    """Read the number in a file; None where there is no file, or no limit."""
+    try:
+        return float(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+
+
+def on_machine(hub: Scene) -> int:
+    """Count the processes that share the scene on this machine."""
+    return hub.settings.comm.on_machine
+
+
+def share_of_machine(hub: Scene) -> float:
+    """Tell which part of a scene is on this machine, where several share it."""
+    comm = hub.settings.comm
+    return comm.on_machine / comm.size
+
+
+def most_points(hub: Scene, already: int, dimension: int) -> float:
+    """Count the points there may be beside those that are there `already`, whatever their fields.
+
+    Two places, a velocity and a mass in single precision, and three numbers that are whole.
+    """
+    of_one = 4 * (3 * dimension + 1) + 16
+    found = machine_memory(on_machine(hub))
+    whole = inf if found is None else found.whole
+    return max(whole / share_of_machine(hub) / of_one - already, 0.0)
+
+
+def in_words(count: float) -> str:
+    """Write a number of bytes."""
+    size = count / GIB
+    return f"{size:.0f} GiB" if size >= 100 else f"{size:.3g} GiB"
+
+
+class MemoryShortage(NamedTuple):
+    """A scene that needs more than is there.
+
+    Attributes
+    ----------
+    what
+        What it has, such as ``400000000 points``.
+    need
+        Bytes, at least.
+    dimension
+        Of the scene: bytes go with that power of the number of cells along a side.
+    place
+        Of the solid.
+    beside
+        What else is to be said of the need, such as of how many processes it is.
+    single
+        What single precision would need; 0 where nobody asks.
+    """
+
+    what: str
+    need: float
+    dimension: int
+    place: Place | None
+    beside: str = ""
+    single: float = 0.0
+
+    @property
+    def words(self) -> str:
+        """Write what it needs."""
+        need = in_words(self.need)
+        return f"the scene has {self.what}, which take at least {need} of memory{self.beside}"
+
+    def ways(self, there: float) -> str:
+        """Write what would bring it down to what is `there`."""
+        # Two digits, rounded up.
+        larger = ceil(10 * (self.need / max(there, 1.0)) ** (1 / self.dimension)) / 10
+        ways = [f"cells {max(larger, 1.1):g} times as large, or fewer points per cell"]
+        if 0 < self.single < there:
+            ways.append(f"precision(single), which needs at least {in_words(self.single)}")
+        ways.append("processes on several machines (mpiexec), which share the points out")
+        return "; ".join(ways)
+
+    def error(self, there: MachineMemory) -> ScriptError:
+        """Make the error for more than there ever is."""
+        message = f"{self.words}; this machine has {in_words(there.whole)} in all"
+        error = ScriptError(message, place=self.place, hint=self.ways(there.whole))
+        error.command = "solid"
+        return error
+
+    def warning(self, there: MachineMemory) -> str:
+        """Write the warning of more than is free: who may have it the system knows alone."""
+        return f"{self.words}; this machine has {in_words(there.free)} free: it may not fit"

@@ -1,0 +1,293 @@
+"""Checks of parts of a scene as a script asks for them, and the part that an exception comes from.
+
+Built-in parts go through the same checks as those of plug-ins.
+"""
+
+import inspect
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from karamelo_py.compiler.fields import columns_of
+from karamelo_py.compiler.trace import Undefined, places_of
+from karamelo_py.kernels import table
+from karamelo_py.kernels.hooks import ACTS_ON, STAGES, CompiledHook
+from karamelo_py.language import faults, registry
+from karamelo_py.language.scene import Scene
+from karamelo_py.output.fields import ABSENT_AT_POINTS, PARTICLE_NAMES
+from karamelo_py.points import laws
+from karamelo_py.points.kinematics import KINEMATICS
+from karamelo_py.points.transfers import updated_velocity
+from karamelo_py.scene.modify import Fix
+from karamelo_py.script.errors import FAILURES
+
+# Attributes that the class of a part must have.
+SAID = {
+    "basis": ("cells", "nodes_per_cell", "least_nodes", "steady_moment", "steep_edge"),
+    "transfer": ("inverts_spread",),
+    "scheme": ("rows",),
+}
+ROWS = (
+    table.AtPoints, table.AtNodes, table.Gather, table.Scatter, table.NodeTask, table.SceneTask,
+    table.Check,
+)  # fmt: skip
+HOOKS_BEGIN = ("initial_", "post_", "final_", "supply_")
+ALIKE = 0.85  # so much of a name has to be that of a hook
+
+
+def check_fix(hub: Scene, fix: Fix) -> None:
+    """Refuse a fix whose hooks or fields cannot be what its author meant.
+
+    Raises
+    ------
+    ScriptError
+        Naming the fix, its package and its place in the script.
+    """
+    name = f"fix {fix.style}"
+    for what in _wrong_hooks(fix):
+        raise faults.fault(name, what, fix.place)
+    check_fields(hub, name, fix, fix.place)
+    hooks = fix.hooks()
+    for method in dir(type(fix)):
+        other = hasattr(Fix, method) or method in STAGES or method.startswith("_")
+        own = getattr(type(fix), method)
+        if other or not (callable(own) or isinstance(own, CompiledHook)):
+            continue
+        least = 0.0 if method.startswith(HOOKS_BEGIN) else ALIKE
+        for close in get_close_matches(method, STAGES, 1, least):
+            hub.warn(
+                f"{name} has a method {method}, which is no hook and is never called by a step",
+                hint=f"its author meant {close}, or begins the name with _",
+            )
+    measures = type(fix).refresh is not Fix.refresh
+    if not (fix.for_method or hooks or measures):
+        hub.warn(f"{name} has no hook and no refresh: it does nothing")
+    said = type(fix).published is not Fix.published and fix.published
+    silent = all(isinstance(hook, CompiledHook) and not hook.publishes for hook in hooks.values())
+    if hooks and silent and said and not measures:
+        hub.warn(
+            f"{name} says in `published` that it publishes, and none of its hooks does: "
+            f"{fix.id}_{fix.published[0]} will stay 0".replace("_ ", " "),
+            hint="its author writes publishes=True to the hook, or published = ()",
+        )
+
+
+def _wrong_hooks(fix: Fix) -> Iterator[str]:
+    """Say what is wrong with the hooks of a fix."""
+    hooks = {moment: getattr(fix, moment) for moment in STAGES if hasattr(fix, moment)}
+    if hooks and fix.group is None and not fix.for_method:
+        yield (
+            f"{next(iter(hooks))} acts on a group, and the fix has none: its __init__ has to call "
+            f"super().__init__(hub, group){faults.place_of(type(fix).__init__)}"
+        )
+    compiled = {m: hook for m, hook in hooks.items() if isinstance(hook, CompiledHook)}
+    for moment, hook in hooks.items():
+        if moment in compiled:
+            continue
+        if not callable(hook):
+            yield f"{moment} is neither a method nor a compiled hook"
+        elif not _takes(hook, 1):
+            yield f"{moment} has to take one argument, the view of the group"
+    for moment, hook in compiled.items():
+        own = ACTS_ON[moment]
+        if hook.where != own:
+            yield f"{moment} is a moment of {own}, and its hook was made for {hook.where}"
+        function, takes = hook.function, len(hook.signature.args)
+        if not _takes(function, takes):
+            given = ", ".join(inspect.signature(function).parameters)
+            yield (
+                f"{moment}: {function.__name__} has to take the {takes} arguments of a hook on "
+                f"{hook.where}: {given} is what it takes"
+            )
+        gives = len(hook.signature.return_type)
+        with faults.as_script_error(f"fix {fix.style}", moment, function, fix.place):
+            try:
+                given = function(*[1.0] * takes)
+            except (ArithmeticError, ValueError):  # of a number that this is not about
+                continue
+        if not isinstance(given, tuple) or len(given) != gives:
+            yield f"{moment}: {function.__name__} has to return {gives} numbers, not {given!r}"
+    if compiled and not fix.formulas:
+        yield (
+            f"it has no formulas, so {next(iter(compiled))} would act in no direction: its author "
+            "sets self.formulas, one for each direction"
+        )
+    if compiled and len(fix.formulas) > 3:
+        yield "it has more formulas than there are directions, three"
+
+
+def _takes(function: Callable, count: int) -> bool:
+    """Tell if a function can be called with so many arguments."""
+    try:
+        inspect.signature(getattr(function, "py_func", function)).bind(*range(count))
+    except TypeError:
+        return False
+    except ValueError:  # it has no signature
+        return True
+    return True
+
+
+def check_part(hub: Scene, name: str, part: Any) -> None:
+    """Refuse a transfer, basis, method or scheme (`name`: ``basis smooth``) that is not whole."""
+    family, kind = name.partition(" ")[0], type(part)
+    missing = [attribute for attribute in SAID.get(family, ()) if not hasattr(kind, attribute)]
+    what = f"{kind.__name__} has no attribute {', '.join(missing)}" if missing else ""
+    if family == "transfer" and not updated_velocity.defined(kind):
+        what = what or f"updated_velocity is not defined for {kind.__name__}"
+    if family == "scheme" and not what:
+        strange = [row for row in kind.rows if not isinstance(row, ROWS)]
+        if strange:
+            what = f"{strange[0]!r} in its rows is not a row of a scheme"
+        elif not any(isinstance(row, table.Scatter) for row in kind.rows):
+            what = "none of its rows is a Scatter: nothing reaches the grid"
+    if what:
+        raise faults.fault(name, what, hub.place)
+    check_fields(hub, name, part, hub.place)
+
+
+def check_fields(hub: Scene, name: str, owner: Any, place: Any) -> None:
+    """Refuse fields that are declared wrongly, or whose columns mean something else."""
+    for attribute in ("point_fields", "node_fields"):
+        kinds = getattr(owner, attribute, ())
+        if not isinstance(kinds, tuple):
+            what = f"{attribute} has to be a tuple of classes, as in ({_shown(kinds)},)"
+            raise faults.fault(name, what, place)
+        for kind in kinds:
+            field = f"the field {_shown(kind)}"
+            with faults.as_script_error(name, field, kind, place):
+                what = _wrong_field(kind) or _wrong_size(kind, hub.domain)
+            if what:
+                raise faults.fault(name, f"{field}{what}", place)
+    for kind in getattr(owner, "point_fields", ()):
+        for column in columns_of(kind):
+            if shows := _shows(hub, column, kind):
+                raise faults.fault(
+                    name, f"{kind.__name__}: the column '{column}' is {shows}", place
+                )
+
+
+def check_columns(hub: Scene, name: str, law: Any) -> None:
+    """Refuse a law, or a part of one, that shows a number under a name that is in use."""
+    for column in laws.columns_of(law):
+        if shows := _shows(hub, column, None):
+            raise faults.fault(name, f"the column '{column}' is {shows}", hub.place)
+
+
+def _wrong_field(kind: Any) -> str:
+    if not (inspect.isclass(kind) and issubclass(kind, tuple) and hasattr(kind, "_fields")):
+        return " is not a NamedTuple class"
+    if kind._fields != ("array",):
+        return " has to have one member, array: Any"
+    if not callable(getattr(kind, "shape", None)):
+        return " has no shape: scalar, vector, tensor or planar"
+    columns = columns_of(kind)
+    if not isinstance(columns, tuple):
+        return f" has columns that are no tuple of words, as in ({columns!r},)"
+    return ""
+
+
+def _wrong_size(kind: type, domain: Any) -> str:
+    """Say if the number of components is wrong, in the dimensions that the scene may have."""
+    for dimension in [domain.dimension] if domain else KINEMATICS:
+        kin = KINEMATICS[dimension]()
+        size, start = kind.shape(kin), getattr(kind, "start", 0.0)
+        if not isinstance(size, int) or size < 1:
+            return f": its shape gives {size!r}, not a number of components"
+        if callable(start) and len(start(kin)) != size:
+            return f": it starts from {len(start(kin))} numbers and has {size} components"
+    return ""
+
+
+def _shows(hub: Scene, column: str, kind: type | None) -> str:
+    """Say what a column shows already, if that is not this field (None: a law)."""
+    if column in PARTICLE_NAMES and column not in ABSENT_AT_POINTS:
+        return "one of every scene"
+    if kind is not None and column in hub.fields.columns_of_laws():
+        return "one of a material"
+    other = hub.fields.declared_columns().get(column, (kind, 0))[0]
+    return "" if other is kind else f"one of the field {other.__name__}"
+
+
+def _shown(kind: Any) -> str:
+    return getattr(kind, "__name__", repr(kind))
+
+
+# ---- the part at fault --------------------------------------------------------------------------
+
+
+class PartInUse(NamedTuple):
+    """A style in use: family and name, its class, and where the script asks for it."""
+
+    name: str
+    kind: type
+    place: Any
+
+
+def is_foreign(kind: type) -> bool:
+    """Tell if a class does not come with the program."""
+    return not kind.__module__.startswith(registry.PREFIX)
+
+
+def foreign_parts(hub: Scene) -> list[PartInUse]:
+    """List the parts of a scene that plug-ins brought."""
+    update, method = hub.update, hub.update.method
+    parts = [
+        PartInUse(f"{family} {item.style}", type(item), item.place)
+        for family, items in (("fix", hub.fixes), ("compute", hub.computes), ("dump", hub.dumps))
+        for item in items.values()
+    ]
+    for named in (hub.materials, *hub.parts.values()):
+        parts += [PartInUse(f"{p.kind} {p.style}", type(p.law), p.place) for p in named.values()]
+    tags = [("scheme", update.scheme, update.scheme_place)]
+    if method is not None:
+        own = {"transfer": update.transfer, "basis": method.basis, "method": method}
+        tags = [*((family, tag, method.place) for family, tag in own.items()), *tags]
+    parts += [
+        PartInUse(f"{family} {registry.name_of(family, type(tag))}", type(tag), place)
+        for family, tag, place in tags
+        if is_foreign(type(tag))
+    ]
+    return [part for part in parts if is_foreign(part.kind)]
+
+
+@contextmanager
+def attributed(hub: Scene, usual: PartInUse | None = None) -> Iterator[None]:
+    """Turn an exception in the code of a plug-in into an error of the script that names its part.
+
+    The part is `usual` where the exception does not show one.
+    """
+    try:
+        yield
+    except faults.KNOWN:
+        raise
+    except FAILURES as error:
+        own = foreign_parts(hub)
+        if isinstance(error, Undefined):
+            found = [(part, "") for part in own if part.kind in error.classes]
+        else:
+            places = [(_owner(own, f), f" ({Path(f).name}:{k})") for f, k in places_of(error)]
+            found = [(part, place) for part, place in places if part is not None]
+        found += [(usual, "")] if usual else []
+        if not found:
+            raise
+        part, place = found[0]
+        what = f"{faults.cause_of(error)}{place}"
+        raise faults.fault(part.name, what, part.place, faults.TRACEBACK) from error
+
+
+def _owner(parts: list[PartInUse], file: str) -> PartInUse | None:
+    """Find the part whose file it is, or else one of whose package it is."""
+    path = Path(file).resolve()
+    for part in parts:
+        own = getattr(sys.modules.get(part.kind.__module__), "__file__", None)
+        if own and Path(own).resolve() == path:
+            return part
+    for part in parts:
+        package = sys.modules.get(part.kind.__module__.partition(".")[0])
+        folders = getattr(package, "__path__", ())
+        if any(path.is_relative_to(Path(folder).resolve()) for folder in folders):
+            return part
+    return None
