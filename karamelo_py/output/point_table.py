@@ -32,12 +32,13 @@ class Part(NamedTuple):
     """Points of a block, and their places in a table."""
 
     block: Block
-    rows: np.ndarray | None  # None: all of the block
+    rows: np.ndarray | None  # ascending; None: all of the block
     places: Any  # indices or a slice
 
     def taken(self, array: np.ndarray) -> np.ndarray:
         """Return the numbers (..., k) of these points, from those of all of the block."""
-        return array if self.rows is None else fields.some_points(array, self.rows)
+        whole = self.rows is None or len(self.rows) == array.shape[-1]
+        return array if whole else fields.some_points(array, self.rows)
 
     @property
     def points(self) -> Points:
@@ -68,6 +69,11 @@ class Rows(NamedTuple):
         for places, array in self.of_all(own):
             found[..., places] = array
         return found.T
+
+    def put(self, of: Callable[[Points], np.ndarray], values: np.ndarray) -> None:
+        """Write a field (n, ...), which `of` takes from `Points`."""
+        for block, rows, places in self.parts:
+            of(block.points)[..., slice(None) if rows is None else rows] = values[places].T
 
     def declared(self, kind: type) -> np.ndarray | None:
         """Gather (n, components) a declared field, None where the scene does not have it.

@@ -4,7 +4,8 @@ A view hands out arrays with a row for each node or point of the group. What a h
 by assignment or in place, is written back when it returns; what cannot be changed is read-only.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from karamelo_py.kernels.heat import Supply, Temperature
 from karamelo_py.kernels.hook_loop import corners_that_move
 from karamelo_py.kernels.laws import elastic_law
 from karamelo_py.kernels.p2g import Force
+from karamelo_py.output.point_table import Part, PointTable, Rows
 from karamelo_py.points.laws import can, with_stress
 from karamelo_py.points.transfers import Moment
 from karamelo_py.scene.view import Shown, View
@@ -59,7 +61,7 @@ class NodesView(View):
         return self._simulation.summed(terms[own])
 
     def _part(self, array: np.ndarray, first: int) -> tuple:
-        """Where in an array of the nodes a vector of those of the view lies."""
+        """Return where in an array of the nodes a vector of those of the view lies."""
         return self.index, slice(first, first + self._d)
 
     @Shown
@@ -139,13 +141,14 @@ class PointsView(View):
 
     _fields = ("dt", "kick", "time", "ids", "moved")
 
-    def __init__(self, simulation: Any, group: Any, then: bool):
+    def __init__(self, simulation: Any, ids: np.ndarray, then: bool):
         super().__init__()
         self._simulation = simulation
         self._then = then
         self._take_times(simulation.control)
-        self.ids = simulation.members(group)
+        self.ids = ids
         self.moved = False
+        self._found: Rows | None = None
         self._declared: dict[type, tuple[np.ndarray, np.ndarray]] = {}
 
     def total(self, terms: Any) -> np.ndarray:
@@ -157,27 +160,28 @@ class PointsView(View):
 
     def column(self, name: str) -> np.ndarray:
         """(n,) a column of the dumps for these points."""
-        found = np.empty(len(self.ids))
-        for block, rows, own in self._at_hand():
-            found[own] = self._simulation.column(name, block, rows)
-        return found
+        return PointTable(self._simulation.hub, self._rows).particle(name)
 
-    def _gather(self, of: Callable) -> np.ndarray:
-        full = self._simulation.by_id(of)
-        return full.T if len(self.ids) == full.shape[-1] else full[..., self.ids].T
-
-    def _scatter(self, of: Callable, value: np.ndarray) -> None:
-        full = self._simulation.by_id(of)
-        full[..., self.ids] = value.T
-        for block in self._simulation.setup.blocks:
-            of(block.points)[...] = full[..., block.points.id]
+    @property
+    def _rows(self) -> Rows:
+        """The points of the view, as they lie in the arrays of the scene."""
+        if self._found is None:
+            s, parts = self._simulation.setup, []
+            place = np.full(self._simulation.count, -1)
+            place[self.ids] = np.arange(len(self.ids))
+            for block in s.blocks:
+                of_block = place[block.points.id]
+                rows = np.flatnonzero(of_block >= 0)
+                parts.append(Part(block, rows, of_block[rows]))
+            self._found = Rows(s, parts, self.ids, np.ones(len(self.ids), np.bool_))
+        return self._found
 
     def __getitem__(self, kind: type) -> np.ndarray:
         """(n, components) of a field that a fix declares in its ``point_fields``."""
         if isinstance(kind, str):
             raise self._no_column(kind)
         if kind not in self._declared:
-            array = np.array(self._gather(self._of(kind)))
+            array = np.array(self._rows.take(self._of(kind)))
             self._declared[kind] = array, array.copy()
         return self._declared[kind][0]
 
@@ -189,7 +193,7 @@ class PointsView(View):
         super().write_back()
         for kind, (array, before) in self._declared.items():
             if not np.array_equal(array, before, equal_nan=True):
-                self._scatter(self._of(kind), array)
+                self._rows.put(self._of(kind), array)
 
     @staticmethod
     def _of(kind: type) -> Callable:
@@ -213,29 +217,28 @@ class PointsView(View):
     @Shown
     def position(self) -> np.ndarray:
         """(n, d) positions; the corners of convected domains go with the points."""
-        return self._gather(self._place)
+        return self._rows.take(self._place)
 
     @position.writer
     def _write_position(self, value: np.ndarray) -> None:
-        s = self._simulation.setup
-        before = self._simulation.by_id(self._place)
-        self._scatter(self._place, value)
-        step = self._simulation.by_id(self._place) - before
-        d, corners = s.kin.dimension, corners_that_move(s)
-        for block in s.blocks:
-            if corners:
-                behind = self._places(block.points)[d : d + d * corners]
-                behind += np.tile(step[:, block.points.id], (corners, 1))
+        s, d = self._simulation.setup, self._simulation.kin.dimension
+        before = self._rows.take(self._place)
+        self._rows.put(self._place, value)
+        step = self._rows.take(self._place) - before
+        corners = corners_that_move(s)
+        for block, rows, own in self._rows.parts if corners else ():
+            behind = self._places(block.points)[d : d + d * corners]
+            behind[:, rows] += np.tile(step[own].T, (corners, 1))
         self.moved = True
 
     @Shown
     def velocity(self) -> np.ndarray:
         """(n, d) velocities."""
-        return self._gather(lambda points: points.v)
+        return self._rows.take(lambda points: points.v)
 
     @velocity.writer
     def _write_velocity(self, value: np.ndarray) -> None:
-        self._scatter(lambda points: points.v, value)
+        self._rows.put(lambda points: points.v, value)
 
     def set_velocity_gradient(self, component: int, gradient: Callable) -> None:
         """Let points whose transfer keeps it (APIC, TPIC ...) know how their velocity changes.
@@ -252,7 +255,7 @@ class PointsView(View):
         simulation, slopes = self._simulation, None
         s, d = simulation.setup, simulation.kin.dimension
         here = slice(component * d, component * d + d)
-        for block, rows, own in self._at_hand():
+        for block, rows, own in self._rows.parts:
             points, kept = block.points, field(block.points.fields, Moment)
             if kept is None:
                 continue
@@ -269,19 +272,10 @@ class PointsView(View):
                 export_velocity_moment(s.basis, s.kin, s.grids, grid, where, shown, given)
             kept[here, rows] = given[here]
 
-    def _at_hand(self) -> Iterator[tuple]:
-        """The points of the view: blocks, rows of them, and which of the view these are."""
-        place = np.full(self._simulation.count, -1)
-        place[self.ids] = np.arange(len(self.ids))
-        for block in self._simulation.setup.blocks:
-            of_block = place[block.points.id]
-            rows = np.flatnonzero(of_block >= 0)
-            yield block, rows, of_block[rows]
-
     @Shown
     def mass(self) -> np.ndarray:
         """(n,) masses; read only."""
-        return self._gather(lambda points: points.mass)
+        return self._rows.take(lambda points: points.mass)
 
     @Shown
     def force(self) -> np.ndarray:
@@ -289,25 +283,25 @@ class PointsView(View):
 
         Only for fixes with ``point_fields = (Force,)``. It is zero before the first of them.
         """
-        return self._gather(self._of(Force))
+        return self._rows.take(self._of(Force))
 
     @force.writer
     def _write_force(self, value: np.ndarray) -> None:
-        self._scatter(self._of(Force), value)
+        self._rows.put(self._of(Force), value)
 
     @Shown
     def temperature(self) -> np.ndarray:
         """(n,) temperatures, where heat flows; read only."""
-        return self._gather(self._heat(Temperature))[:, 0]
+        return self._rows.take(self._heat(Temperature))[:, 0]
 
     @Shown
     def heat_supply(self) -> np.ndarray:
         """(n,) heat per time that fixes bring; add to it in ``supply_heat``."""
-        return self._gather(self._heat(Supply))[:, 0]
+        return self._rows.take(self._heat(Supply))[:, 0]
 
     @heat_supply.writer
     def _write_heat_supply(self, value: np.ndarray) -> None:
-        self._scatter(self._heat(Supply), value[:, None])
+        self._rows.put(self._heat(Supply), value[:, None])
 
     @staticmethod
     def _heat(kind: type) -> Callable:
@@ -327,7 +321,7 @@ class PointsView(View):
         values = np.stack(
             [np.broadcast_to(given.get(name, 0.0), len(self.ids)) for name in names], axis=1
         ).astype(s.nodes.sums.dtype)
-        for block, rows, own in self._at_hand():
+        for block, rows, own in self._rows.parts:
             points = arrays.known_to_laws(block.points)
             if len(rows) and can(elastic_law(block.laws), with_stress):
                 chosen = np.zeros(len(points.id), np.bool_)
@@ -346,38 +340,34 @@ class PieceView(PointsView):
     """Points of a group that are at hand, in the order in which they are stored.
 
     For hooks that look at each point on its own (`Fix.point_by_point`). Positions are read-only.
+    Before the steps (`in_steps` False) they are some of them: others come after them.
     """
 
-    def __init__(self, simulation: Any, parts: list[tuple], then: bool = False):
-        View.__init__(self)
-        self._simulation = simulation
-        self._then = then
-        self._parts = parts or [(simulation.blocks[0], np.empty(0, np.int64))]
-        self._ends = np.cumsum([0, *(len(rows) for _, rows in self._parts)])
-        self._take_times(simulation.control)
-        self.ids = np.concatenate([block.points.id[rows] for block, rows in self._parts])
-        self.moved = False
-        self._declared = {}
+    def __init__(self, simulation: Any, parts: list[tuple], then: bool, *, in_steps: bool):
+        parts = parts or [(simulation.blocks[0], np.empty(0, np.int64))]
+        ids = [block.points.id[rows] for block, rows in parts]
+        super().__init__(simulation, np.concatenate(ids), then)
+        own = pairwise(np.cumsum([0, *map(len, ids)]).tolist())
+        found = [Part(*part, slice(*places)) for part, places in zip(parts, own, strict=True)]
+        present = np.ones(len(self.ids), np.bool_)
+        self._found = Rows(simulation.setup, found, self.ids, present)
+        self._in_steps = in_steps
 
-    def _gather(self, of: Callable) -> np.ndarray:
-        return np.concatenate([of(block.points)[..., rows].T for block, rows in self._parts])
-
-    def _scatter(self, of: Callable, value: np.ndarray) -> None:
-        for block, rows, own in self._at_hand():
-            of(block.points)[..., rows] = value[own].T
+    def total(self, terms: Any) -> np.ndarray:
+        """The sum of terms (n,) or (n, k) over all points of the group, rounded once."""
+        if self._in_steps:
+            return super().total(terms)
+        raise ValueError(
+            "points.total(terms) is known in steps alone; before the first, points come in pieces "
+            "where point_by_point is True"
+        )
 
     @Shown
     def position(self) -> np.ndarray:
         """(n, d) positions; read only."""
-        return self._gather(self._place)
+        return self._rows.take(self._place)
 
     @Shown
     def reference_position(self) -> np.ndarray:
         """(n, d) positions before the first step; read only."""
         return self._simulation.x0_of(self.ids)
-
-    def _at_hand(self) -> Iterator[tuple]:
-        for (block, rows), begin, end in zip(
-            self._parts, self._ends[:-1], self._ends[1:], strict=True
-        ):
-            yield block, rows, slice(begin, end)

@@ -142,10 +142,6 @@ class ById:
         of_all = sum(self.everyone("a total", limbs))
         return np.array([rounded(of) for of in of_all]).reshape(terms.shape[1:])
 
-    def column(self, name: str, block: Block, rows: np.ndarray) -> np.ndarray:
-        """A column of the dumps for points that are at hand."""
-        return self._some(block, rows).particle(name)
-
     def each(self, part: Any, name: str, *arguments: Any) -> list:
         """What a method of a part says of some points of its group after others, where it does."""
         own = list(self._said(part, name, *arguments))

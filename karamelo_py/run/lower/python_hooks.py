@@ -1,7 +1,7 @@
 """Fixes that act from Python in a step: their hooks, beside the compiled ones."""
 
 from collections.abc import Callable, Iterator
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from karamelo_py.script.errors import ScriptError
 
 
 def sets_initial_state(fix: Any) -> bool:
-    """Whether all a fix does is a hook in Python before the first step."""
+    """Tell whether all a fix does is a hook in Python before the first step."""
     hooks = fix.hooks()
     return set(hooks) == {"initial_integrate"} and not isinstance(
         hooks["initial_integrate"], CompiledHook
@@ -71,17 +71,6 @@ def _agree(simulation: Any, fix: Any) -> None:
                 hint=f"tell the author of {fix.style}: point_by_point, each has a part of the "
                 "points; points.total(terms) and nodes.total(terms) are sums over all",
             )
-
-
-class Piece(PieceView):
-    """Some of the points before a step: the others come after them."""
-
-    def total(self, terms: Any) -> NoReturn:
-        """There is none."""
-        raise ValueError(
-            "points.total(terms) is known in steps alone; before the first, points come in pieces "
-            "where point_by_point is True"
-        )
 
 
 def _on_nodes(hooks: PythonHooks, s: Setup, stage: int, target: int) -> None:
@@ -140,16 +129,16 @@ def _at_heated_points_python_hooks(hooks, s):
 
 
 def view_of(simulation: Any, fix: Any, *, then: bool) -> PointsView:
-    """The points of a fix, or those of them that are at hand."""
+    """Show the points of a fix, or those of them that are at hand."""
     if fix.point_by_point:
-        return PieceView(simulation, list(simulation.rows_of(fix.group)), then)
-    return PointsView(simulation, fix.group, then)
+        return PieceView(simulation, list(simulation.rows_of(fix.group)), then, in_steps=True)
+    return PointsView(simulation, simulation.members(fix.group), then)
 
 
 def views_of(simulation: Any, fix: Any) -> Iterator[PointsView]:
-    """The points of a fix before a step, in pieces where it looks at each on its own."""
+    """Yield the points of a fix before a step, in pieces where it looks at each on its own."""
     if not fix.point_by_point:
         yield view_of(simulation, fix, then=False)
         return
     for part in simulation.rows_of(fix.group):
-        yield Piece(simulation, [part])
+        yield PieceView(simulation, [part], False, in_steps=False)
