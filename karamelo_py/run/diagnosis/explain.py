@@ -366,8 +366,8 @@ def _others(simulation: Simulation, number: int, x: np.ndarray, reach: float) ->
     """Count the other points of the solid of a point, at hand and near it."""
     solid, others, near = solid_with(simulation.hub, number), 0, 0
     for some in simulation.some(None):
-        own = (some.solid_of == solid.index) & (some.ids != number)
-        apart = np.abs(some.x[own] - x).max(axis=1, initial=0.0)
+        own = (some.solid == solid.index) & (some.ids != number)
+        apart = np.abs(some.position[own] - x).max(axis=1, initial=0.0)
         others, near = others + len(apart), near + int(np.sum(~(apart > reach)))
     return others, near
 
