@@ -56,9 +56,9 @@ class Fields(PointTable):
         simulation = self.hub.simulation
         key = (id(simulation), simulation.step, simulation.version)
         if key != self._key:
-            self._key, self._all = key, simulation.rows()
+            self._key = key
             self._cache.clear()
-        return self._all
+        return simulation.rows()
 
     @property
     def count(self) -> int:
