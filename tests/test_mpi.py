@@ -489,7 +489,10 @@ PART_OF_ALL = """
     ],
 )
 def test_a_plug_in_looks_at_its_part_alone(tmp_path, line, says):
-    """A fix that looks at each point on its own, and asks for more than that."""
+    """A fix that looks at each point on its own, and asks for more than that.
+
+    A compute and a dump ask for all points.
+    """
     site = install(tmp_path / "site")
     (site / "sitecustomize.py").write_text(SMALL_TILES, encoding="utf-8")
     drag = site / "mpm_examples" / "drag.py"
@@ -497,9 +500,14 @@ def test_a_plug_in_looks_at_its_part_alone(tmp_path, line, says):
     text = text.replace("published =", "point_by_point = True\n    published =")
     drag.write_text(f"import os\n{text}{PART_OF_ALL.format(line=line)}", encoding="utf-8")
     folders = os.pathsep.join([str(site), os.environ["PYTHONPATH"]])
-    path = moving(tmp_path, "fix(air, drag, all, 0.5)", "set_output(1)", "run(9)")
+    lines = "compute(p, momentum, all)", "log_modify(custom, step, p_x)"
+    lines += "fix(air, drag, all, 0.5)", "dump(d, all, csv, 5, d.*.csv, x, vx)"
+    path = moving(tmp_path, *lines, "set_output(1)", "run(9)")
     status, _, err = by_ranks(tmp_path / "two", path, 2, PYTHONPATH=folders)
     assert status == bool(says) and err.count("error: ") == bool(says)
+    if not says:
+        assert by_ranks(tmp_path / "one", path, 1, PYTHONPATH=folders)[0] == 0
+        same_files(tmp_path / "one", tmp_path / "two")
     assert says in err and ("| fix(air, drag, all, 0.5)" in err) == bool(says)
 
 

@@ -12,7 +12,7 @@ from karamelo_py.run.tiles.distinct import distinct
 
 
 class BodyMotion(NamedTuple):
-    """A solid with points.
+    """Motion of a solid with points.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ class BodyMotion(NamedTuple):
 
 
 def motions(simulation: Any) -> list[BodyMotion]:
-    """How all solids with points move, as all processes know it.
+    """Measure how all solids with points move; all processes know it.
 
     Each looks at its own points, so many at a time; sums are without rounding.
     """

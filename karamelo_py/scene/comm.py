@@ -74,10 +74,12 @@ class SerialComm:
 
     def gather_rows(self, own: np.ndarray, out: np.ndarray | None, counts: Sequence[int]) -> None:
         """Put the numbers of all processes, one after another, into `out` of the first."""
+        assert out is not None
         out[:] = own
 
     def scatter(self, things: Sequence | None) -> Any:
         """Hand out what the first process has for each."""
+        assert things is not None
         return things[0]
 
     def exchange(self, things: dict[int, Any]) -> dict[int, Any]:
