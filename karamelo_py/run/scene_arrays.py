@@ -11,7 +11,7 @@ import numpy as np
 from karamelo_py.compiler import fields
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.threads import Serial, Threaded, new_team
-from karamelo_py.kernels.arrays import DT, TIME, TIMESTEP
+from karamelo_py.kernels.arrays import DT, TIME, TIMESTEP, some_of
 from karamelo_py.kernels.clock import step_size
 from karamelo_py.kernels.conduction import show_heat
 from karamelo_py.kernels.nodes import SumsToVelocity
@@ -25,7 +25,7 @@ from karamelo_py.run.access.nodes_by_number import ByNumber
 from karamelo_py.run.access.points_by_id import ById
 from karamelo_py.run.checkpoint import arrays as checkpoint
 from karamelo_py.run.checkpoint import part_state
-from karamelo_py.run.lower.build import State, chosen, lower, thread_count, warms_by_friction
+from karamelo_py.run.lower.build import State, lower, thread_count, warms_by_friction
 from karamelo_py.run.lower.check_plugins import try_parts
 from karamelo_py.run.lower.memory import check_room, no_room
 from karamelo_py.run.mpi.subdomain import Subdomain
@@ -126,7 +126,7 @@ class SceneArrays(ById, ByNumber):
         for block in self.setup.blocks:
             state = block.points.state
             rows = np.zeros((len(state), self.count), state.dtype)
-            for ids, own in self._of_all_blocks([(block.points.id, state)]):
+            for ids, own in self.rows().of_all([(block.points.id, state)]):
                 rows[:, ids] = own
             laws[without_rate(law_kind(block.laws))] = rows
         kept = [kind for kind in self.point_fields if fields.is_kept(kind)]
@@ -164,7 +164,7 @@ class SceneArrays(ById, ByNumber):
         """Take points out of the run; the ids of the others stay."""
         self.present[ids] = False
         blocks = tuple(
-            chosen(block, np.flatnonzero(self.present[block.points.id]))
+            some_of(block, np.flatnonzero(self.present[block.points.id]))
             for block in self.setup.blocks
         )
         self.setup = self.setup._replace(blocks=blocks)
