@@ -8,6 +8,7 @@ import numpy as np
 
 from karamelo_py.output.console import Console
 from karamelo_py.output.fields import ABSENT_AT_NODES, ABSENT_AT_POINTS
+from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.lattice import Lattice
 
 
@@ -54,7 +55,7 @@ class FakeFields:
     def present(self):
         return np.ones(len(self.points["id"]), np.bool_)
 
-    def pieces(self):
+    def pieces(self, *, to_first=False):
         yield self
 
     def each(self, part, name, *arguments):
@@ -73,7 +74,7 @@ class FakeFields:
     def node(self, name):
         return self.nodes[name].copy()
 
-    def node_pieces(self, names):
+    def node_pieces(self, names, *, to_first=False):
         yield self
 
     @property
@@ -109,6 +110,7 @@ class FakeHub:
         self.computes = {}
         self.solids = {"left": None, "right": None}
         self.refreshed = []
+        self.settings = SimpleNamespace(comm=SerialComm())
         self.output = Output(self)
 
     def refresh_values(self):

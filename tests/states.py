@@ -60,7 +60,7 @@ def state_of(hub: Hub) -> dict[str, np.ndarray]:
         "v": state.v.T,
         "time": np.array([hub.update.time, hub.update.step]),
     }
-    arrays["mass"] = hub.simulation.mass
+    arrays["mass"] = hub.fields.mass
     nodes = hub.fields.node("mass")
     arrays["nodal mass"] = nodes.sum()
     arrays |= {"-".join(k.__name__ for k in kind): a.T for kind, a in state.laws.items()}

@@ -8,7 +8,7 @@ import pytest
 
 from karamelo_py.app.cli import main
 from karamelo_py.app.studies import records
-from karamelo_py.app.studies.advise import Adviser, Series, carry_out
+from karamelo_py.app.studies.advise import Adviser, ChoiceRuns, carry_out
 from karamelo_py.app.studies.forecast import forecast
 
 INPUTS = Path(__file__).parent.parent / "inputs"
@@ -184,7 +184,7 @@ def follow(rows, target, capsys):
     """What advise -run ends with where the runs are those of a table: its status and its choice."""
     study = Recorded(rows)
     fine = list(dict.fromkeys(row["refine"] for row in rows))
-    choices = [Series({"basis": basis}) for basis in BASES]
+    choices = [ChoiceRuns({"basis": basis}) for basis in BASES]
     adviser = Adviser(study, ("refine", fine), choices, ERROR, COST, target)
     adviser.pilot(3)
     status = carry_out(adviser, adviser.best(), Path("in.scene"))

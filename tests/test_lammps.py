@@ -4,7 +4,9 @@ import re
 
 import pytest
 
+from karamelo_py.language import registry
 from karamelo_py.script.lammps import line_of
+from karamelo_py.script.other_programs import table
 
 SCRIPT = """\
 units           si
@@ -161,6 +163,12 @@ def test_what_a_line_is_here(run_interpreted, line):
             run_interpreted(f"{head}{ours}\nset_dt(1e-4)\nrun(1)\n", folder=f"in_{d}")
             ran += 1
     assert ran
+
+
+def test_the_table_writes_commands_that_there_are():
+    for rule in table()["line"]:
+        for command in re.findall(r"(\w+)\(", rule["here"]):
+            assert registry.knows("command", command), rule
 
 
 def test_lines_for_velocities_do_not_replace_each_other():

@@ -445,6 +445,20 @@ def test_the_first_fails(tmp_path, line, says):
     assert not list((tmp_path / "run").glob("*.part"))
 
 
+@needs_mpi
+def test_a_run_that_goes_wrong(tmp_path):
+    """All processes know what is wrong: one message, and the files of one."""
+    (tmp_path / "sitecustomize.py").write_text(SMALL_TILES, encoding="utf-8")
+    folders = os.pathsep.join([str(tmp_path), os.environ["PYTHONPATH"]])
+    lines = "dump(d, all, movie, 5, d.gif, 2, 2, vx)", "set_dt(0.004)", "run(60)"
+    path = moving(tmp_path, "fix(w, initial_velocity_particles, all, 10+3*y0, 0)", *lines)
+    for ranks in (1, 2):
+        status, _, err = by_ranks(tmp_path / str(ranks), path, ranks, PYTHONPATH=folders)
+        assert status == 1 and err.count("error: ") == 1 and "leaves the domain" in err
+        assert "in process" not in err
+    same_files(tmp_path / "1", tmp_path / "2")
+
+
 ONE_FAILS = """
 import os
 from karamelo_py.styles.fixes.python import Python
@@ -489,7 +503,10 @@ PART_OF_ALL = """
     ],
 )
 def test_a_plug_in_looks_at_its_part_alone(tmp_path, line, says):
-    """A fix that looks at each point on its own, and asks for more than that."""
+    """A fix that looks at each point on its own, and asks for more than that.
+
+    A compute and a dump ask for all points.
+    """
     site = install(tmp_path / "site")
     (site / "sitecustomize.py").write_text(SMALL_TILES, encoding="utf-8")
     drag = site / "mpm_examples" / "drag.py"
@@ -497,9 +514,14 @@ def test_a_plug_in_looks_at_its_part_alone(tmp_path, line, says):
     text = text.replace("published =", "point_by_point = True\n    published =")
     drag.write_text(f"import os\n{text}{PART_OF_ALL.format(line=line)}", encoding="utf-8")
     folders = os.pathsep.join([str(site), os.environ["PYTHONPATH"]])
-    path = moving(tmp_path, "fix(air, drag, all, 0.5)", "set_output(1)", "run(9)")
+    lines = "compute(p, momentum, all)", "log_modify(custom, step, p_x)"
+    lines += "fix(air, drag, all, 0.5)", "dump(d, all, csv, 5, d.*.csv, x, vx)"
+    path = moving(tmp_path, *lines, "set_output(1)", "run(9)")
     status, _, err = by_ranks(tmp_path / "two", path, 2, PYTHONPATH=folders)
     assert status == bool(says) and err.count("error: ") == bool(says)
+    if not says:
+        assert by_ranks(tmp_path / "one", path, 1, PYTHONPATH=folders)[0] == 0
+        same_files(tmp_path / "one", tmp_path / "two")
     assert says in err and ("| fix(air, drag, all, 0.5)" in err) == bool(says)
 
 

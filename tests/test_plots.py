@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from fakes import FakeHub
 
-from karamelo_py.output.plots import Curve
+from karamelo_py.output.plots import PlottedCurve
 from karamelo_py.output.quantity import Quantity
 from karamelo_py.output.units import Units
 
@@ -22,7 +22,7 @@ def hub(tmp_path):
 
 
 def add(hub, ID, every, x, y):
-    hub.output.plots.add(ID, Curve(every, Quantity(hub, x), Quantity(hub, y)))
+    hub.output.plots.add(ID, PlottedCurve(every, Quantity(hub, x), Quantity(hub, y)))
 
 
 def test_points_of_both_runs_are_collected_once(hub):
@@ -61,7 +61,7 @@ def test_two_axes_and_units(hub):
     hub.output.units = Units("mm", "g", "ms")
     hub.computes["Ek"] = SimpleNamespace(style="kinetic_energy", published=("s",))
     quantities = Quantity(hub, "time"), Quantity(hub, "Es_s")
-    hub.output.plots.add("stored", Curve(1, *quantities, side="right", scale="log"))
+    hub.output.plots.add("stored", PlottedCurve(1, *quantities, side="right", scale="log"))
     hub.run(5)
     svg = (hub.folder / "energies.svg").read_text()
     for word in ("time [ms]", "Ek_s [mJ]", "Es_s", "Ek", "stored (right)"):

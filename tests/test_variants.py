@@ -13,7 +13,6 @@ from karamelo_py.kernels.export import export, export_state
 from karamelo_py.kernels.sorting import sort_points
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
-from karamelo_py.output.fields import Fields
 from karamelo_py.scene.hub import Hub
 
 SCENE = """
@@ -67,7 +66,7 @@ def test_no_points_compile_nothing():
     """As they are asked for to learn what a column would be of."""
     simulation = sorted_scene()
     known = set(export_state.entries), set(export.entries)
-    fields = Fields(simulation.hub, next(reversed([*simulation.some(None)])))
+    fields = next(reversed([*simulation.some(None)]))
     for name in ("volume", "s11", "strain_energy"):
         assert fields.particle(name).shape == (0,)
     assert (set(export_state.entries), set(export.entries)) == known

@@ -81,7 +81,7 @@ def launch(ranks: int, arguments: Sequence[str], module: str = "karamelo_py.app.
 
 @contextmanager
 def _folder() -> Iterator[str]:
-    """A folder for a socket, whose name may not be long."""
+    """Make a folder for a socket, whose name may not be long."""
     usual = tempfile.gettempdir()
     place = usual if len(usual) < LONGEST_NAME - 20 else "/tmp"
     with tempfile.TemporaryDirectory(prefix="karamelo-", dir=place) as folder:
@@ -206,7 +206,7 @@ class Launcher:
     # --- when they have ended ---------------------------------------------------------------------
 
     def _outcome(self) -> int:
-        """The exit status; what no process could say is said."""
+        """Find the exit status, and say what no process could say."""
         first = self.reports.get(0)
         failed = [one for _, one in sorted(self.reports.items()) if one["status"]]
         if first is not None and first["status"]:

@@ -7,7 +7,7 @@ from typing import Any
 
 from karamelo_py.app.logs import read_rows
 from karamelo_py.output.files import picture_format
-from karamelo_py.output.plots import Curve, Plots
+from karamelo_py.output.plots import Plots, PlottedCurve
 from karamelo_py.script.errors import ScriptError, nearest_few
 
 SUMMARY = "Draw columns of a log."
@@ -62,7 +62,7 @@ def run(options: argparse.Namespace) -> int:
     scale = "log" if options.log_scale else "linear"
     for side, names in (("left", options.columns), ("right", options.right)):
         for name in names:
-            curve = Curve(
+            curve = PlottedCurve(
                 1, SimpleNamespace(name=options.x), SimpleNamespace(name=name), side, scale
             )
             curve.points = [

@@ -161,6 +161,8 @@ def together(
         patience = LONGER if rank else PATIENCE
         if status == INTERRUPTED or comm.failed_within:
             patience = 0.0
+        if comm.at_end:
+            patience = inf
     words = comm.agree(FAILED if status else WELL, patience)
     alone = words is None
     return end(status, text, tells=alone or rank == int(words.argmin()), stays=not alone)

@@ -8,7 +8,7 @@ from karamelo_py.language.arguments import NUMBER
 from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument, OutputFile
 from karamelo_py.output.files import picture_format
-from karamelo_py.output.plots import Curve
+from karamelo_py.output.plots import PlottedCurve
 from karamelo_py.output.quantity import Logged, Quantity
 from karamelo_py.output.rhythm import Every
 from karamelo_py.output.units import LENGTHS, MASSES, TIMES, Units
@@ -238,7 +238,7 @@ def plot(
     plots = hub.output.plots
     if ID in plots.ids():
         raise ScriptError(f"plot ID '{ID}' is already used", argument="ID", expected="another ID")
-    curve = Curve(every, x, y, axis, scale)
+    curve = PlottedCurve(every, x, y, axis, scale)
     curve.place = hub.place
     plots.add(ID, curve)
 

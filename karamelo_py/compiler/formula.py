@@ -14,6 +14,7 @@ import numpy as np
 from numba import config, types
 
 from karamelo_py.compiler.addresses import caller_of
+from karamelo_py.compiler.compile import implements
 from karamelo_py.compiler.loops import entered, loop, subkernel
 from karamelo_py.compiler.operations import (
     ABS,
@@ -67,9 +68,54 @@ class Program(NamedTuple):
     constants: np.ndarray
 
 
-@subkernel
+# Rows of numbers: in Python by NumPy, in kernels by loops.
+
+
+def _copy(n, a, b):
+    """Copy the first `n` numbers of `b` to `a`."""
+    a[:n] = b[:n]
+
+
+@implements(_copy)
+def _copy_in_kernels(n, a, b):
+    for i in range(n):
+        a[i] = b[i]
+
+
+def _fill(n, a, value):
+    """Give the first `n` numbers of `a` a value."""
+    a[:n] = value
+
+
+@implements(_fill)
+def _fill_in_kernels(n, a, value):
+    for i in range(n):
+        a[i] = value
+
+
+def _select(n, a, b, c):
+    """Replace the first `n` numbers of `a` by those of `b`, or of `c` where they are 0."""
+    a[:n] = np.where(a[:n] != 0.0, b[:n], c[:n])
+
+
+@implements(_select)
+def _select_in_kernels(n, a, b, c):
+    for i in range(n):
+        a[i] = b[i] if a[i] != 0.0 else c[i]
+
+
 def _unary(op, n, a):
     """Replace the first `n` numbers of `a` by a function of them."""
+    a[:n] = IN_NUMPY[op](a[:n])
+
+
+def _binary(op, n, a, b):
+    """Replace the first `n` numbers of `a` by what `op` makes of them and those of `b`."""
+    a[:n] = IN_NUMPY[op](a[:n], b[:n])
+
+
+@subkernel
+def _unary_in_kernels(op, n, a):
     if op == NEG:
         for i in range(n):
             a[i] = -a[i]
@@ -97,8 +143,7 @@ def _unary(op, n, a):
 
 
 @subkernel
-def _binary(op, n, a, b):
-    """Replace the first `n` numbers of `a` by what `op` makes of them and those of `b`."""
+def _binary_in_kernels(op, n, a, b):
     if op == ADD:
         for i in range(n):
             a[i] += b[i]
@@ -137,8 +182,11 @@ def _binary(op, n, a, b):
             a[i] = operation_of(op, a[i], b[i])
 
 
-@entered
-def _evaluate_compiled(program, globals_, points, count, out, stack):
+implements(_unary)(lambda op, n, a: _unary_in_kernels(op, n, a))
+implements(_binary)(lambda op, n, a, b: _binary_in_kernels(op, n, a, b))
+
+
+def _evaluate(program, globals_, points, count, out, stack):
     """Evaluate `program` at `count` points.
 
     Parameters
@@ -175,61 +223,35 @@ def _evaluate_compiled(program, globals_, points, count, out, stack):
             stack[top, 0] = globals_[operand]
         elif op == POINT:
             top += 1
-            for i in range(n):
-                stack[top, i] = points[operand, i]
+            _copy(n, stack[top], points[operand])
         elif op == SPREAD:
-            value = stack[top - operand, 0]
-            for i in range(n):
-                stack[top - operand, i] = value
+            _fill(n, stack[top - operand], stack[top - operand, 0])
         elif op < FIRST_BINARY:
             _unary(op, n, stack[top])
         elif op < SELECT:
             top -= 1
             _binary(op, n, stack[top], stack[top + 1])
         elif op == KEEP:
-            for i in range(n):
-                stack[MAX_DEPTH + operand, i] = stack[top, i]
+            _copy(n, stack[MAX_DEPTH + operand], stack[top])
             top -= 1
         elif op == KEPT:
             top += 1
-            for i in range(n):
-                stack[top, i] = stack[MAX_DEPTH + operand, i]
+            _copy(n, stack[top], stack[MAX_DEPTH + operand])
         else:
             top -= 2
-            for i in range(n):
-                stack[top, i] = stack[top + 1, i] if stack[top, i] != 0.0 else stack[top + 2, i]
+            _select(n, stack[top], stack[top + 1], stack[top + 2])
     if uniform:
-        value = stack[0, 0]
-        for i in range(count):
-            out[i] = value
+        _fill(count, out, stack[0, 0])
     else:
-        for i in range(count):
-            out[i] = stack[0, i]
+        _copy(count, out, stack[0])
 
 
-def _evaluate_numpy(program, globals_, points, count, out, stack):
-    values: list = []
-    kept: dict = {}
+def _evaluate_in_python(*arguments):
     with np.errstate(all="ignore"):
-        for op, operand in program.code:
-            op = int(op) % UNIFORM
-            if op == CONSTANT:
-                values.append(np.full(count, program.constants[operand]))
-            elif op == GLOBAL:
-                values.append(np.full(count, globals_[operand]))
-            elif op == POINT:
-                values.append(np.array(points[operand, :count]))
-            elif op == KEEP:
-                kept[operand] = values.pop()
-            elif op == KEPT:
-                values.append(kept[operand])
-            elif op != SPREAD:
-                takes = 1 if op < FIRST_BINARY else 2 if op < SELECT else 3
-                values[-takes:] = [np.asarray(IN_NUMPY[op](*values[-takes:]), dtype=float)]
-    out[:count] = values[0]
+        _evaluate(*arguments)
 
 
-evaluate = _evaluate_numpy if config.DISABLE_JIT else _evaluate_compiled
+evaluate = _evaluate_in_python if config.DISABLE_JIT else entered(_evaluate)
 
 
 # How kernels of hooks call the evaluator: by address, so that none of them has to contain it, and

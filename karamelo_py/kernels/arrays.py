@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from karamelo_py.compiler.compile import shared
-from karamelo_py.compiler.fields import name_of
+from karamelo_py.compiler.fields import as_rows_of_points, name_of, some_points
 from karamelo_py.compiler.tuples import row
 from karamelo_py.kernels.totals import LIMBS, Alone
 from karamelo_py.points.grid import Grid
@@ -185,6 +185,12 @@ class Block(NamedTuple):
     points: Points
     laws: NamedTuple  # the law's NamedTuple with an array (m,) for each parameter
     tiling: Tiling
+
+
+def some_of(block: Block, rows: np.ndarray) -> Block:
+    """Return the block with the points in these rows, in this order; they are to be sorted anew."""
+    arrays = (some_points(array, rows) for _, array in arrays_of(block.points))
+    return block._replace(points=made_of(block.points, map(as_rows_of_points, arrays)))
 
 
 class NoHooks(NamedTuple):

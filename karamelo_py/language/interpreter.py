@@ -113,11 +113,6 @@ class Interpreter:
         """Tell if a script is in the midst of its statements."""
         return bool(self.frames)
 
-    @property
-    def has_more(self) -> bool:
-        """Tell if statements come behind the present one."""
-        return any(frame.next < len(frame.statements) for frame in self.frames)
-
     def include(self, name: str) -> None:
         """Run another script at this place; the name is relative to the script that asks."""
         path = self.included(name, self.folder)

@@ -1,36 +1,23 @@
 """Fields of points and nodes for output, in the order of their ids."""
 
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from karamelo_py.compiler import fields
 from karamelo_py.kernels.arrays import MASS, known_to_laws
-from karamelo_py.kernels.averaging import FBar
-from karamelo_py.kernels.export import (
-    ENERGY,
-    EXPORTED,
-    JACOBIAN,
-    STRAIN,
-    export,
-    export_state,
-    export_velocity_moment,
-)
-from karamelo_py.kernels.heat import Conducting
+from karamelo_py.kernels.export import export
 from karamelo_py.kernels.laws import elastic_law
 from karamelo_py.language.scene import Scene
 from karamelo_py.output.node_columns import ABSENT_AT_NODES, BROUGHT, NODE_NAMES, NodeFields
-from karamelo_py.points.boundary import Bounces, ReflectingGrid
-from karamelo_py.points.laws import can, columns_of, dissipated_energy, energy_density
+from karamelo_py.output.point_table import AXES, COMPONENTS, PointTable, Rows
+from karamelo_py.points.boundary import Bounces
+from karamelo_py.points.laws import can, dissipated_energy, energy_density
 from karamelo_py.points.laws.eos import initial_energy, taken_heat
 from karamelo_py.points.laws.plastic_rate import has_rate
-from karamelo_py.points.transfers import Moment
 
 PIECE = 1 << 17  # points that are looked at together
-AXES = "xyz"
-COMPONENTS = ("11", "22", "33", "12", "13", "23")
 PARTICLE_NAMES = (
     ["id", "type"]
     + list(AXES)
@@ -48,44 +35,30 @@ ABSENT_AT_POINTS = (
 )  # fmt: skip
 
 
-class Fields:
-    """Named fields of the running scene; arrays are copies that are safe to keep.
+class Fields(PointTable):
+    """The points and nodes of the running scene: columns of all points, sums over them, names.
 
-    N counts all points there have ever been: deleted ones (boundary delete) have zeros. `members`
-    and `particle` leave them out. Those of a `piece` are some of the points, one id after another.
+    N counts all points there have ever been. `members` leaves deleted ones out.
     """
 
-    def __init__(self, hub: Scene, piece: Any = None):
+    def __init__(self, hub: Scene):
         self.hub = hub
-        self._piece = piece
         self._key: Any = None
         self._cache: dict[str, Any] = {}
 
     @property
-    def _simulation(self):
-        """The simulation; the cache of derived fields is forgotten when it has gone on."""
-        if self._piece is not None:
-            return self._piece
+    def _simulation(self) -> Any:
+        return self.hub.simulation
+
+    @property
+    def _rows(self) -> Rows:
+        """All points; the cache of what was made of them is forgotten when they have gone on."""
         simulation = self.hub.simulation
         key = (id(simulation), simulation.step, simulation.version)
         if key != self._key:
             self._key = key
             self._cache.clear()
-        return simulation
-
-    def pieces(self, *, to_first: bool = False) -> Iterator["Fields"]:
-        """The fields of all points, so many points at a time, in the order of their ids.
-
-        With `to_first`, of several processes the first alone gets them.
-        """
-        for piece in self._simulation.pieces(to_first=to_first):
-            yield Fields(self.hub, piece)
-
-    def _cached(self, name: str, make) -> Any:
-        simulation = self._simulation
-        if name not in self._cache:
-            self._cache[name] = make(simulation)
-        return self._cache[name]
+        return simulation.rows()
 
     @property
     def count(self) -> int:
@@ -97,68 +70,17 @@ class Fields:
         """(N,) False for points that were deleted."""
         return self._simulation.present
 
+    def pieces(self, *, to_first: bool = False) -> Iterator[PointTable]:
+        """The points, so many at a time, in the order of their ids.
+
+        With `to_first`, of several processes the first alone gets them.
+        """
+        return self._simulation.pieces(to_first=to_first)
+
     @property
     def node_count(self) -> int:
         """Number of nodes."""
         return sum(lattice.node_count for lattice in self.hub.lattices)
-
-    @property
-    def position(self) -> np.ndarray:
-        """(N, d) positions."""
-        return self._cached("x", lambda s: s.x)
-
-    @property
-    def velocity(self) -> np.ndarray:
-        """(N, d) velocities."""
-        return self._cached("v", lambda s: s.v)
-
-    @property
-    def mass(self) -> np.ndarray:
-        """(N,) masses."""
-        return self._cached("mass", lambda s: s.mass)
-
-    @property
-    def reference_position(self) -> np.ndarray:
-        """(N, d) positions before the first step."""
-        return self._simulation.x0
-
-    @property
-    def reference_volume(self) -> np.ndarray:
-        """(N,) volumes before the first step."""
-        return self._simulation.volume0
-
-    @property
-    def velocity_moment(self) -> np.ndarray | None:
-        """(N, d d) moment of velocity, sum N v (X - x), of transfers that keep it, or None."""
-        simulation = self._simulation
-        if simulation.declared(Moment) is None:
-            return None
-        return simulation.by_id(self._velocity_moment).T
-
-    def _velocity_moment(self, points: Any) -> np.ndarray:
-        s = self._simulation.setup
-        kept = fields.field(points.fields, Moment)
-        if not getattr(s.transfer, "keeps_gradient", False):
-            return kept
-        where = points.x[self._simulation.now] if points.home is None else points.home
-        moment = np.zeros_like(kept)
-        export_velocity_moment(s.basis, s.kin, s.grids, points.grid, where, kept, moment)
-        return moment
-
-    def declared_columns(self) -> dict[str, tuple[type, int]]:
-        """Column -> the declared field of the points that shows it, and the component."""
-        update = self.hub.update
-        basis = getattr(update.method, "basis", None)
-        owners = [*self.hub.fixes.values(), update.method, update.transfer, basis, update.scheme]
-        owners += [getattr(update.method, "frame", None)]
-        owners += [Conducting] if update.thermal else []
-        owners += [ReflectingGrid] if update.boundary == "reflect" else []
-        owners += [FBar] if update.anti_locking else []
-        found: dict[str, tuple[type, int]] = {}
-        for kind in fields.declared(owners, "point_fields"):
-            for k, column in enumerate(fields.columns_of(kind)):
-                found.setdefault(column, (kind, k))
-        return found
 
     def members(self, group: Any) -> np.ndarray:
         """Ids (0-based) of a particle group."""
@@ -205,11 +127,6 @@ class Fields:
         """Names that `node` knows."""
         return list(NODE_NAMES)
 
-    def columns_of_laws(self) -> set[str]:
-        """Names of what the laws of the materials declare."""
-        laws = [material.law for material in self.hub.materials.values()]
-        return {name for law in laws for name in columns_of(law)}
-
     def rate_is_asked_for(self) -> bool:
         """Tell whether a dump or a compute has the column ``epdot``, which points keep for it."""
         askers = [*self.hub.dumps.values(), *self.hub.computes.values()]
@@ -226,46 +143,6 @@ class Fields:
         """Names that `node` knows, but that are 0 in this scene."""
         present = {"T"} if self.hub.update.thermal else set()
         return [name for name in ABSENT_AT_NODES if name not in present]
-
-    def particle(self, name: str) -> np.ndarray:
-        """A field of the points that there are, (n,), by id.
-
-        What the scene does not have is zero, as in Karamelo. Deleted points are left out.
-        """
-        values = self._particle(name)
-        present = self._simulation.present
-        return values if present.all() else values[present]
-
-    def _particle(self, name: str) -> np.ndarray:
-        simulation = self._simulation
-        if name == "id":
-            return simulation.ids + 1
-        if name == "type":
-            return simulation.solid_of + 1
-        if name in AXES:
-            return _column(self.position, AXES.index(name))
-        if name[:1] in AXES and name[1:] == "0":
-            return _column(self.reference_position, AXES.index(name[0]))
-        if name in ("vx", "vy", "vz"):
-            return _column(self.velocity, AXES.index(name[1]))
-        if name == "mass":
-            return self.mass.astype(float)
-        if name == "volume":
-            return self.reference_volume * self._exported[:, JACOBIAN]
-        if name == "ienergy":
-            return self._exported[:, ENERGY].copy()
-        if name in self.columns_of_laws() or name == "epdot":
-            return self._cached(name, lambda s: _shown(s, name)).copy()
-        if name == "seq":
-            return _von_mises(self._exported[:, :STRAIN])
-        if name[:1] in "se" and name[1:] in COMPONENTS:
-            first = 0 if name[0] == "s" else STRAIN
-            return self._exported[:, first + COMPONENTS.index(name[1:])].copy()
-        if name in (shown := self.declared_columns()):
-            kind, k = shown[name]
-            if (array := simulation.declared(kind)) is not None:
-                return _column(array, k)
-        return np.zeros(simulation.count)
 
     def node_pieces(self, names: Sequence[str], *, to_first: bool = False) -> Iterator[NodeFields]:
         """Fields of all nodes, of which `names` are asked for, so many nodes at a time.
@@ -290,32 +167,6 @@ class Fields:
     def node(self, name: str) -> np.ndarray:
         """A field of all nodes, (n,); nodes without mass are at rest."""
         return np.concatenate([piece.node(name) for piece in self.node_pieces([name])])
-
-    @property
-    def _exported(self) -> np.ndarray:
-        return self._cached("exported", _exported_state)
-
-
-def _of_points(simulation: Any, filler: Callable, *columns: int) -> np.ndarray:
-    """Collect what `filler(laws)(kin, like, points, laws, rows)` says of all points, (N, *columns).
-
-    Points are left at 0 where their laws do not have it, and `filler(laws)` is false.
-    """
-    s = simulation.setup
-    out = np.zeros((simulation.count, *columns))
-    for block in s.blocks:
-        points = known_to_laws(block.points)
-        # Arrays without points are of another type, for which all would be compiled once more.
-        if len(points.id) and (fill := filler(block.laws)):
-            rows = np.zeros((len(points.id), *columns))
-            fill(s.kin, s.nodes.sums[0, MASS], points, block.laws, rows)
-            out[points.id - simulation.first] = rows
-    return out
-
-
-def _exported_state(simulation: Any) -> np.ndarray:
-    # A kinematics fills its own components: in the plane the fourth is 12, as in space.
-    return _of_points(simulation, lambda laws: export_state, EXPORTED)
 
 
 def _kinetic(s: Any, block: Any) -> np.ndarray:
@@ -364,25 +215,3 @@ SUMMED = {
     "born with": _born_with,
     "bounces": _bounces,
 }
-
-
-def _shown(simulation: Any, name: str) -> np.ndarray:
-    """A number of each point that its law declares, 0 of laws that do not."""
-
-    def fill(laws: Any) -> Callable | None:
-        what = columns_of(laws).get(name)
-        return None if what is None else partial(export, what, False)
-
-    return _of_points(simulation, fill)
-
-
-def _column(field: np.ndarray, k: int) -> np.ndarray:
-    if k >= field.shape[1]:
-        return np.zeros(len(field))
-    return field[:, k].astype(float)
-
-
-def _von_mises(s: np.ndarray) -> np.ndarray:
-    xx, yy, zz, xy, xz, yz = s.T
-    normal = (xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2
-    return np.sqrt(0.5 * normal + 3 * (xy**2 + xz**2 + yz**2))

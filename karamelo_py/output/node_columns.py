@@ -13,6 +13,7 @@ from karamelo_py.kernels.export import EXPORTED, JACOBIAN, export_state, export_
 from karamelo_py.kernels.hooks import CompiledHook
 from karamelo_py.kernels.p2g import Force
 from karamelo_py.language.scene import Scene
+from karamelo_py.output.point_table import volumes_before
 from karamelo_py.points.laws import can, constrained_velocity
 
 AXES = "xyz"
@@ -175,7 +176,7 @@ def _volume(simulation: Any, block: Any) -> np.ndarray:
     points = known_to_laws(block.points)
     rows = np.zeros((len(points.id), EXPORTED))
     export_state(s.kin, s.nodes.sums[0, MASS], points, block.laws, rows)
-    return simulation.volume0_of(points.id) * rows[:, JACOBIAN]
+    return volumes_before(simulation.hub, points.id) * rows[:, JACOBIAN]
 
 
 def _rigid(simulation: Any, block: Any) -> np.ndarray | None:

@@ -29,7 +29,7 @@ def real_ticks(axis: Any) -> None:
     """Real numbers at the ticks of a linear axis, no power of ten and no sum beside it."""
     from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
-    class Whole(ScalarFormatter):
+    class WholeNumbers(ScalarFormatter):
         def __call__(self, x: float, pos: int | None = None) -> str:
             largest = abs(self.axis.get_view_interval()).max()
             if largest == 0 or 1e-3 <= largest < 1e5:
@@ -37,7 +37,7 @@ def real_ticks(axis: Any) -> None:
             return tick_text(float(f"{x / largest:.12f}") * largest)
 
     if type(axis.get_major_formatter()) is ScalarFormatter:
-        whole = Whole(useOffset=False)
+        whole = WholeNumbers(useOffset=False)
         whole.set_scientific(False)
         axis.set_major_formatter(whole)
         axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10]))  # few digits

@@ -12,10 +12,10 @@ from karamelo_py.output.rhythm import Rhythmic
 from karamelo_py.output.units import labelled
 from karamelo_py.script.errors import Place
 
-__all__ = ["FORMATS", "Curve", "Plots"]
+__all__ = ["FORMATS", "Plots", "PlottedCurve"]
 
 
-class Curve(Rhythmic):
+class PlottedCurve(Rhythmic):
     """One curve: `y` against `x`, a point at every `every` steps.
 
     `side` is that of the axis of y, left or right; `scale` is linear or log.
@@ -52,9 +52,9 @@ class Plots:
         self.hub = hub
         self.file: Path | None = None
         self.place: Place | None = None  # of save_plot
-        self._curves: dict[str, Curve] = {}
+        self._curves: dict[str, PlottedCurve] = {}
 
-    def __iter__(self) -> Iterator[Curve]:
+    def __iter__(self) -> Iterator[PlottedCurve]:
         return iter(self._curves.values())
 
     def __contains__(self, item: object) -> bool:
@@ -63,7 +63,7 @@ class Plots:
     def __len__(self) -> int:
         return len(self._curves)
 
-    def add(self, ID: str, curve: Curve) -> None:
+    def add(self, ID: str, curve: PlottedCurve) -> None:
         """File a curve under `ID`, which must be new."""
         curve.id = ID
         self._curves[ID] = curve
@@ -76,7 +76,7 @@ class Plots:
         """Draw every curve that has points to the file; without file or points do nothing."""
         if self.file is None or not any(curve.points for curve in self):
             return
-        by_x: dict[str, list[Curve]] = {}
+        by_x: dict[str, list[PlottedCurve]] = {}
         for curve in self:
             if curve.points:
                 by_x.setdefault(curve.x.name, []).append(curve)
@@ -100,7 +100,7 @@ class Plots:
             )
         savefig(figure, self.hub.folder / self.file)
 
-    def _draw(self, axes: Any, side: str, curves: list[Curve], first: int) -> list:
+    def _draw(self, axes: Any, side: str, curves: list[PlottedCurve], first: int) -> list:
         """Draw curves over one axis of y; return their lines."""
         tidy(axes)
         if side == "right":

@@ -8,11 +8,11 @@ import numpy as np
 
 from karamelo_py.kernels.totals import LIMBS, add_all, rounded
 from karamelo_py.output.fields import PIECE
-from karamelo_py.run.tiles.distinct import distinct
+from karamelo_py.run.tiles.unique import unique
 
 
 class BodyMotion(NamedTuple):
-    """A solid with points.
+    """Motion of a solid with points.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ class BodyMotion(NamedTuple):
 
 
 def motions(simulation: Any) -> list[BodyMotion]:
-    """How all solids with points move, as all processes know it.
+    """Measure how all solids with points move; all processes know it.
 
     Each looks at its own points, so many at a time; sums are without rounding.
     """
@@ -119,7 +119,7 @@ def _pieces(simulation: Any, d: int) -> Iterator[tuple[int, np.ndarray, np.ndarr
         for begin in range(0, len(points.id), PIECE):
             own = slice(begin, begin + PIECE)
             solid = np.searchsorted(firsts, points.id[own], side="right") - 1
-            for k in distinct(solid):
+            for k in unique(solid):
                 here = solid == k
                 x, v = points.x[simulation.now, :d, own], points.v[:, own]
                 yield k, *(a[..., here].astype(float) for a in (points.mass[own], x, v))

@@ -12,6 +12,7 @@ from karamelo_py.run.advice import known_failures, large_steps
 from karamelo_py.run.advice.report import bytes_per_point, report
 from karamelo_py.run.advice.resting import warn_about_length
 from karamelo_py.run.diagnosis import energy
+from karamelo_py.run.diagnosis.explain import Stopped
 from karamelo_py.run.lower.build import check_scene
 from karamelo_py.run.mpi.comm import check_same_run, handled_signals
 from karamelo_py.run.recovery import CHUNK, RollBack
@@ -194,12 +195,15 @@ class Runner:
                         # Before the last state of this run is written, which a longer one has not.
                         hub.output.write_last()
                     hub.output.end()
-            except BaseException:
+            except BaseException as error:
                 hub.console.end_run()
                 hub.output.abort()
+                if isinstance(error, Stopped):
+                    simulation.comm.end_together()
                 raise
         self._summary(simulation, began, time.perf_counter() - started)
         if self.interrupted:
+            simulation.comm.end_together()
             raise Interrupted(self.interrupted)
 
     def _take_up(self, simulation: Simulation) -> bool:

@@ -18,8 +18,8 @@ from karamelo_py.kernels.watch import COARSE, ROUND_OFF, begin_to_look, measure_
 from karamelo_py.run.body_motion import BodyMotion, motions
 from karamelo_py.run.diagnosis.energy import unknown_heat, unknown_work
 from karamelo_py.run.lower.python_hooks import PythonHooks, sets_initial_state, views_of
-from karamelo_py.run.lowered import Lowered
 from karamelo_py.run.mpi.whole import PointsMoved, Whole
+from karamelo_py.run.scene_arrays import SceneArrays
 from karamelo_py.run.tiles.tiles import DIRECT_UP_TO, in_tiles
 from karamelo_py.run.timestep import (
     common_velocity,
@@ -33,8 +33,8 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
 
-class Simulation(Lowered):
-    """The arrays of a scene, and how they go forward in time."""
+class Simulation(SceneArrays):
+    """Take the steps of a scene, or of the share of a process, beside others that do the same."""
 
     def __init__(self, hub: Hub, previous: Simulation | None = None):
         super().__init__(hub, previous)
@@ -51,7 +51,7 @@ class Simulation(Lowered):
 
     @property
     def processes(self) -> dict[str, str]:
-        """What a banner says of those that share the scene."""
+        """Words of a banner for the processes that share the scene."""
         if self.comm.size == 1:
             return {}
         alone = f", one has all points: up to {DIRECT_UP_TO} are not shared out"
@@ -162,7 +162,7 @@ class Simulation(Lowered):
         choose_dt(self.control)
 
     def rate_with(self, weight: float) -> float:
-        """The rate of the fastest point, if the common drift of all had this weight."""
+        """Measure the rate of the fastest point, if the common drift of all had this weight."""
         clock = self.control.clock[0]
         common, rate = clock.common.copy(), float(clock.rate)
         clock.common[:] = common_velocity(self, weight)
@@ -178,7 +178,7 @@ class Simulation(Lowered):
         clock.rate = self.comm.allreduce_max(np.array([clock.rate]))[0]
 
     def fastest(self, common: Sequence[float] = (0.0, 0.0, 0.0)) -> float:
-        """The largest component of the velocities of all points, less that of a common one."""
+        """Find the largest component of the velocities of all points, less that of a common one."""
         velocities = (block.points.v for block in self.setup.blocks)
         # No copy of them: there may be millions.
         components = ((a, c) for v in velocities if v.size for a, c in zip(v, common, strict=False))
@@ -186,32 +186,32 @@ class Simulation(Lowered):
         return float(self.comm.allreduce_max(np.array([own], float))[0])
 
     def motions(self) -> list[BodyMotion]:
-        """How the solids lie and move."""
+        """Measure how the solids lie and move."""
         return motions(self)
 
     @property
     def limit(self) -> float:
-        """The stable step of the present state."""
+        """Stable step of the present state."""
         return float(self.control.clock[0].limit)
 
     @property
     def ruling_limit(self) -> str:
-        """The name of what limits the step now."""
+        """Name of what limits the step now."""
         return ruling_limit(self)
 
     @property
     def limit_moving(self) -> float:
-        """The stable step of points that go from cell to cell: steps of a script are its shares."""
+        """Stable step of points that go from cell to cell: steps of a script are its shares."""
         clock = self.control.clock[0]
         waves = clock.courant_moving * clock.spacing / clock.rate if clock.rate > 0 else np.inf
         return float(min(waves, clock.heat_limit))
 
     def above_limit(self) -> bool:
-        """Whether the step is above the stable limit."""
+        """Tell whether the step is above the stable limit."""
         return self.control.values[DT] > self.limit * (1 + 1e-12)
 
     def _watch_limit(self) -> None:
-        """A step that is above its limit from the start is what the user wants."""
+        """Watch the limit, unless the step is above it from the start, as the user wants."""
         clock = self.control.clock[0]
         clock.watch_limit = int(not self.above_limit())
         clock.over_limit = 0
@@ -336,7 +336,7 @@ class Simulation(Lowered):
         self.comm.in_turn(lambda: advance.compile(*arguments))
 
     def _make_ready(self) -> None:
-        """The threads, the hooks of the fixes, and contact, as a run needs them."""
+        """Prepare threads, the hooks of the fixes, and contact for a run."""
         if self.threads > 1:
             numba.set_num_threads(self.threads)
         self._prepare_hooks()

@@ -24,12 +24,14 @@ class SerialComm:
         Seconds in which this process waited for others, or for what they sent, in steps.
     failed_within
         Whether this process has failed in the midst of what all do together.
+    at_end
+        Whether all processes have come to the same end of a run that does not go on.
     """
 
     rank, size = 0, 1
     beside = on_machine = 1
     waited = 0.0
-    failed_within = False
+    failed_within = at_end = False
 
     @property
     def leads(self) -> bool:
@@ -47,6 +49,11 @@ class SerialComm:
 
     def barrier(self) -> None:
         """Wait for all processes."""
+
+    def end_together(self) -> None:
+        """Wait for all processes at the end of a run, which each tells in the same words."""
+        self.barrier()
+        self.at_end = True
 
     def agree(self, word: int, patience: float = np.inf) -> np.ndarray | None:
         """Gather a word of each process (size,), or None if one has not come in time.
@@ -74,10 +81,12 @@ class SerialComm:
 
     def gather_rows(self, own: np.ndarray, out: np.ndarray | None, counts: Sequence[int]) -> None:
         """Put the numbers of all processes, one after another, into `out` of the first."""
+        assert out is not None
         out[:] = own
 
     def scatter(self, things: Sequence | None) -> Any:
         """Hand out what the first process has for each."""
+        assert things is not None
         return things[0]
 
     def exchange(self, things: dict[int, Any]) -> dict[int, Any]:

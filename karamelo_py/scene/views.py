@@ -17,6 +17,7 @@ from karamelo_py.kernels.heat import Supply, Temperature
 from karamelo_py.kernels.hook_loop import corners_that_move
 from karamelo_py.kernels.laws import elastic_law
 from karamelo_py.kernels.p2g import Force
+from karamelo_py.output.point_table import Part, PointTable, Rows
 from karamelo_py.points.laws import can, with_stress
 from karamelo_py.points.transfers import Moment
 from karamelo_py.scene.view import Shown, View
@@ -147,7 +148,7 @@ class PointsView(View):
         self._take_times(simulation.control)
         self.ids = ids
         self.moved = False
-        self._parts: list[tuple] | None = None
+        self._found: Rows | None = None
         self._declared: dict[type, tuple[np.ndarray, np.ndarray]] = {}
 
     def total(self, terms: Any) -> np.ndarray:
@@ -159,41 +160,28 @@ class PointsView(View):
 
     def column(self, name: str) -> np.ndarray:
         """(n,) a column of the dumps for these points."""
-        found = np.empty(len(self.ids))
-        for block, rows, own in self._at_hand():
-            found[own] = self._simulation.column(name, block, rows)
-        return found
+        return PointTable(self._simulation.hub, self._rows).particle(name)
 
-    def _at_hand(self) -> list[tuple]:
-        """List the points of the view: blocks, rows of them, and which of the view these are."""
-        if self._parts is None:
+    @property
+    def _rows(self) -> Rows:
+        """The points of the view, as they lie in the arrays of the scene."""
+        if self._found is None:
+            s, parts = self._simulation.setup, []
             place = np.full(self._simulation.count, -1)
             place[self.ids] = np.arange(len(self.ids))
-            blocks = [(block, place[block.points.id]) for block in self._simulation.setup.blocks]
-            rows = [np.flatnonzero(own >= 0) for _, own in blocks]
-            self._parts = [(b, r, own[r]) for (b, own), r in zip(blocks, rows, strict=True)]
-        return self._parts
-
-    def _gather(self, of: Callable) -> np.ndarray:
-        """Gather a field (n, ...), which a function takes from `Points`."""
-        parts = self._at_hand()
-        first = of(parts[0][0].points)
-        found = np.empty((len(self.ids), *first.shape[:-1]), first.dtype)
-        for block, rows, own in parts:
-            array = of(block.points)
-            found[own] = (array if len(rows) == array.shape[-1] else array[..., rows]).T
-        return found
-
-    def _scatter(self, of: Callable, value: np.ndarray) -> None:
-        for block, rows, own in self._at_hand():
-            of(block.points)[..., rows] = value[own].T
+            for block in s.blocks:
+                of_block = place[block.points.id]
+                rows = np.flatnonzero(of_block >= 0)
+                parts.append(Part(block, rows, of_block[rows]))
+            self._found = Rows(s, parts, self.ids, np.ones(len(self.ids), np.bool_))
+        return self._found
 
     def __getitem__(self, kind: type) -> np.ndarray:
         """(n, components) of a field that a fix declares in its ``point_fields``."""
         if isinstance(kind, str):
             raise self._no_column(kind)
         if kind not in self._declared:
-            array = np.array(self._gather(self._of(kind)))
+            array = np.array(self._rows.take(self._of(kind)))
             self._declared[kind] = array, array.copy()
         return self._declared[kind][0]
 
@@ -205,7 +193,7 @@ class PointsView(View):
         super().write_back()
         for kind, (array, before) in self._declared.items():
             if not np.array_equal(array, before, equal_nan=True):
-                self._scatter(self._of(kind), array)
+                self._rows.put(self._of(kind), array)
 
     @staticmethod
     def _of(kind: type) -> Callable:
@@ -229,16 +217,16 @@ class PointsView(View):
     @Shown
     def position(self) -> np.ndarray:
         """(n, d) positions; the corners of convected domains go with the points."""
-        return self._gather(self._place)
+        return self._rows.take(self._place)
 
     @position.writer
     def _write_position(self, value: np.ndarray) -> None:
         s, d = self._simulation.setup, self._simulation.kin.dimension
-        before = self._gather(self._place)
-        self._scatter(self._place, value)
-        step = self._gather(self._place) - before
+        before = self._rows.take(self._place)
+        self._rows.put(self._place, value)
+        step = self._rows.take(self._place) - before
         corners = corners_that_move(s)
-        for block, rows, own in self._at_hand() if corners else ():
+        for block, rows, own in self._rows.parts if corners else ():
             behind = self._places(block.points)[d : d + d * corners]
             behind[:, rows] += np.tile(step[own].T, (corners, 1))
         self.moved = True
@@ -246,11 +234,11 @@ class PointsView(View):
     @Shown
     def velocity(self) -> np.ndarray:
         """(n, d) velocities."""
-        return self._gather(lambda points: points.v)
+        return self._rows.take(lambda points: points.v)
 
     @velocity.writer
     def _write_velocity(self, value: np.ndarray) -> None:
-        self._scatter(lambda points: points.v, value)
+        self._rows.put(lambda points: points.v, value)
 
     def set_velocity_gradient(self, component: int, gradient: Callable) -> None:
         """Let points whose transfer keeps it (APIC, TPIC ...) know how their velocity changes.
@@ -267,7 +255,7 @@ class PointsView(View):
         simulation, slopes = self._simulation, None
         s, d = simulation.setup, simulation.kin.dimension
         here = slice(component * d, component * d + d)
-        for block, rows, own in self._at_hand():
+        for block, rows, own in self._rows.parts:
             points, kept = block.points, field(block.points.fields, Moment)
             if kept is None:
                 continue
@@ -287,7 +275,7 @@ class PointsView(View):
     @Shown
     def mass(self) -> np.ndarray:
         """(n,) masses; read only."""
-        return self._gather(lambda points: points.mass)
+        return self._rows.take(lambda points: points.mass)
 
     @Shown
     def force(self) -> np.ndarray:
@@ -295,25 +283,25 @@ class PointsView(View):
 
         Only for fixes with ``point_fields = (Force,)``. It is zero before the first of them.
         """
-        return self._gather(self._of(Force))
+        return self._rows.take(self._of(Force))
 
     @force.writer
     def _write_force(self, value: np.ndarray) -> None:
-        self._scatter(self._of(Force), value)
+        self._rows.put(self._of(Force), value)
 
     @Shown
     def temperature(self) -> np.ndarray:
         """(n,) temperatures, where heat flows; read only."""
-        return self._gather(self._heat(Temperature))[:, 0]
+        return self._rows.take(self._heat(Temperature))[:, 0]
 
     @Shown
     def heat_supply(self) -> np.ndarray:
         """(n,) heat per time that fixes bring; add to it in ``supply_heat``."""
-        return self._gather(self._heat(Supply))[:, 0]
+        return self._rows.take(self._heat(Supply))[:, 0]
 
     @heat_supply.writer
     def _write_heat_supply(self, value: np.ndarray) -> None:
-        self._scatter(self._heat(Supply), value[:, None])
+        self._rows.put(self._heat(Supply), value[:, None])
 
     @staticmethod
     def _heat(kind: type) -> Callable:
@@ -333,7 +321,7 @@ class PointsView(View):
         values = np.stack(
             [np.broadcast_to(given.get(name, 0.0), len(self.ids)) for name in names], axis=1
         ).astype(s.nodes.sums.dtype)
-        for block, rows, own in self._at_hand():
+        for block, rows, own in self._rows.parts:
             points = arrays.known_to_laws(block.points)
             if len(rows) and can(elastic_law(block.laws), with_stress):
                 chosen = np.zeros(len(points.id), np.bool_)
@@ -359,10 +347,10 @@ class PieceView(PointsView):
         parts = parts or [(simulation.blocks[0], np.empty(0, np.int64))]
         ids = [block.points.id[rows] for block, rows in parts]
         super().__init__(simulation, np.concatenate(ids), then)
-        ends = np.cumsum([0, *map(len, ids)]).tolist()
-        self._parts = [
-            (*part, slice(*own)) for part, own in zip(parts, pairwise(ends), strict=True)
-        ]
+        own = pairwise(np.cumsum([0, *map(len, ids)]).tolist())
+        found = [Part(*part, slice(*places)) for part, places in zip(parts, own, strict=True)]
+        present = np.ones(len(self.ids), np.bool_)
+        self._found = Rows(simulation.setup, found, self.ids, present)
         self._in_steps = in_steps
 
     def total(self, terms: Any) -> np.ndarray:
@@ -377,7 +365,7 @@ class PieceView(PointsView):
     @Shown
     def position(self) -> np.ndarray:
         """(n, d) positions; read only."""
-        return self._gather(self._place)
+        return self._rows.take(self._place)
 
     @Shown
     def reference_position(self) -> np.ndarray:

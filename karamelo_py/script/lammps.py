@@ -11,7 +11,7 @@ from karamelo_py.script.other_programs import instead, of_karamelo, table
 _UNSIGNED = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?[0-2]?\d?\d)?"
 _ZERO = r"[+-]?(?=[.0]*0)[.0]+(?:[eE][+-]?\d+)?"
 _NUMBER = rf"[+-]?{_UNSIGNED}"
-# What may stand in a pattern of the table, longest names first where one holds another.
+# What <names> stand for in the patterns of the table.
 _MACROS = {
     "ID": r"\w+",
     "number": _NUMBER,

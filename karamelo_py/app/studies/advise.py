@@ -40,7 +40,7 @@ and it is told whether it met the target."""
 
 
 @dataclass
-class Series:
+class ChoiceRuns:
     """A choice of words and what is known of its runs, coarse ones first."""
 
     values: dict[str, str]
@@ -56,7 +56,7 @@ class Series:
 class Candidate:
     """A variant that may meet the target."""
 
-    choice: Series
+    choice: ChoiceRuns
     step: int
     cost: float
     error: float
@@ -81,7 +81,7 @@ class Adviser:
     """
 
     def __init__(
-        self, study: Study, along: tuple[str, list[str]], choices: list[Series],
+        self, study: Study, along: tuple[str, list[str]], choices: list[ChoiceRuns],
         accuracy: str, cost: str, target: float,
     ):  # fmt: skip
         self.study = study
@@ -90,7 +90,7 @@ class Adviser:
         self.choices = choices
         self.accuracy, self.cost, self.target = accuracy, cost, target
 
-    def go_on(self, choice: Series) -> None:
+    def go_on(self, choice: ChoiceRuns) -> None:
         """Run the next finer variant of a choice."""
         case = {**choice.values, self.name: self.values[len(choice.rows)]}
         choice.rows += self.study.run([{name: case[name] for name in self.study.names}])
@@ -102,12 +102,12 @@ class Adviser:
                 if self._met(choice) is None:
                     self.go_on(choice)
 
-    def _met(self, choice: Series) -> int | None:
+    def _met(self, choice: ChoiceRuns) -> int | None:
         """The first of its runs that meets the target."""
         errors = column(choice.rows, self.accuracy)
         return next((k for k, e in enumerate(errors) if e <= self.target), None)
 
-    def candidates(self, choice: Series, hope: bool = False) -> Iterator[Candidate]:
+    def candidates(self, choice: ChoiceRuns, hope: bool = False) -> Iterator[Candidate]:
         """The cheapest variant of a choice that meets the target, known or expected.
 
         With `hope` by the lower bound of the error.
@@ -195,7 +195,7 @@ def run(options: Any) -> int:
     if any(name in group for group in together):
         raise ScriptError(f"-zip: {name} makes the scene finer", expected="choices in step")
     combined = cases(others, together, options.where) if others else [{}]
-    choices = [Series(case) for case in combined]
+    choices = [ChoiceRuns(case) for case in combined]
     study = Study(
         launch, out.with_suffix(""), items, jobs, again=options.again, strict=True,
         most=len(choices) * len(values[name]),

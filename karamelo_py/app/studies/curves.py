@@ -57,7 +57,7 @@ def usable(a: float | None) -> bool:
 
 
 @dataclass
-class Curve:
+class GroupedRuns:
     """Runs that differ in one variable only.
 
     Attributes
@@ -145,11 +145,11 @@ class Family:
         self.lines = self._lines(rows)
         self.without = [row for row in rows if not usable(value(row, accuracy))]
 
-    def _lines(self, rows: Sequence[Mapping[str, str]]) -> list[Curve]:
-        found: dict[tuple[str, ...], Curve] = {}
+    def _lines(self, rows: Sequence[Mapping[str, str]]) -> list[GroupedRuns]:
+        found: dict[tuple[str, ...], GroupedRuns] = {}
         for row in rows:
             key = tuple(row[name] for name in self.by)
-            line = found.setdefault(key, Curve(dict(zip(self.by, key, strict=True))))
+            line = found.setdefault(key, GroupedRuns(dict(zip(self.by, key, strict=True))))
             line.rows.append(row)
         for line in found.values():
             if self.along:

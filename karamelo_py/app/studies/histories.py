@@ -8,7 +8,7 @@ import numpy as np
 
 from karamelo_py.app.logs import read_log
 from karamelo_py.app.studies import look
-from karamelo_py.app.studies.curves import Curve
+from karamelo_py.app.studies.curves import GroupedRuns
 from karamelo_py.output.files import savefig
 from karamelo_py.output.plot_style import blank_figure, tidy
 from karamelo_py.script.errors import ScriptError, unknown
@@ -72,7 +72,7 @@ def histories(
         for name in (over, curve):
             if name not in columns:
                 raise unknown(f"{log} has no column '{name}'", name, columns)
-        label = names[k] if k < len(names) else Curve({name: row[name] for name in by}).label
+        label = names[k] if k < len(names) else GroupedRuns({name: row[name] for name in by}).label
         stopped = row.get("status", "done") != "done"
         kept = forward(columns["Time"], stopped) if "Time" in columns else slice(None)
         found.append(History(columns[over][kept], columns[curve][kept], label, stopped))

@@ -146,17 +146,12 @@ def heat(
         axes.set_visible(False)
     figure.supxlabel(words[0], fontsize=10)
     figure.supylabel(words[1], fontsize=10)
-    ticks = look.log_ticks(*norm_ends(norm))
+    ticks = look.log_ticks(float(norm.vmin), float(norm.vmax))
     bar = figure.colorbar(mesh, ax=list(all_axes), label=family.error_label)
     bar.set_ticks(ticks, labels=[tick_text(tick) for tick in ticks])
     bar.minorticks_off()
     figure.suptitle(title, fontsize=10, x=0.02, ha="left")
     savefig(figure, path)
-
-
-def norm_ends(norm: Any) -> tuple[float, float]:
-    """The ends of a colour bar."""
-    return float(norm.vmin), float(norm.vmax)
 
 
 def _sorted(rows: Sequence[Any], name: str) -> list[str]:

@@ -40,7 +40,7 @@ known_failure(
 
 
 def _meet_again(basis, scene):
-    """Whether bodies have the time to fly through the domain, and meet or bounce again."""
+    """Tell whether bodies have the time to fly through the domain, and meet or bounce again."""
     domain, share = scene.hub.domain, scene.hub.update.dt_factor
     far = max(domain.hi[: scene.d] - domain.lo[: scene.d])
     small = share is not None and share <= SMALL_SHARE

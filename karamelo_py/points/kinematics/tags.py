@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import define, point_function
+from karamelo_py.compiler.compile import point_function
 
 
 class Line(NamedTuple):
@@ -71,7 +71,12 @@ def planar(kin):
     """
 
 
+def _give_constants(tag: type) -> None:
+    number, first, flat = tag.dimension, int(tag is Axisymmetric), KINEMATICS[tag.dimension]
+    dimension.on(tag)(lambda kin: number)
+    free_from.on(tag)(lambda kin: first)
+    planar.on(tag)(lambda kin: flat())
+
+
 for _tag in TAGS:
-    dimension.on(_tag)(define("kin", f"return {_tag.dimension}"))
-    free_from.on(_tag)(define("kin", f"return {int(_tag is Axisymmetric)}"))
-    planar.on(_tag)(define("kin", "return flat()", flat=KINEMATICS[_tag.dimension]))
+    _give_constants(_tag)

@@ -142,7 +142,7 @@ def _idle_damage(law, scene):
 
 
 def _idle_heat(law, scene):
-    """Whether neither the strength nor the pressure nor the damage depends on the temperature."""
+    """Tell that neither the strength nor the pressure nor the damage depends on the temperature."""
     softening = getattr(law.strength, "softening", Absent())
     softens = not isinstance(softening, Absent) or not isinf(getattr(law.strength, "Tm", inf))
     pressures = getattr(law.eos, "thermal", 0), getattr(law.temperature, "alpha", 1)

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.language import registry, rules
-from karamelo_py.output.fields import Fields
+from karamelo_py.output.point_table import PointTable
 from karamelo_py.points.transfers import Moment
 from karamelo_py.run import timestep
 from karamelo_py.run.advice.noise import Noise, drift_of, turn_of
@@ -182,7 +182,7 @@ class SceneFacts:
         return self.simulation.largest(_equivalent_stress)[0]
 
 
-def _equivalent_stress(points: Fields) -> np.ndarray:
+def _equivalent_stress(points: PointTable) -> np.ndarray:
     return points.particle("seq")
 
 

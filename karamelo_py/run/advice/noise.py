@@ -9,7 +9,6 @@ from karamelo_py.points.basis.noise import borne
 from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.strengths import shear_modulus
 from karamelo_py.run.body_motion import BodyMotion
-from karamelo_py.run.timestep import sparse
 
 SLOW = 0.01  # of the speed of waves, up to where nothing is fed in any time that was tried
 TORN = 9.0, 14.0  # angle, in radian, that a body bears with one point a cell: FLIP, moments
@@ -75,7 +74,7 @@ def drift_of(s: Any) -> Noise | None:
     if not (_feeds(s) and s.moves and s.kept > 0.9):
         return None
     known, spacing = borne(s.basis), float(s.simulation.control.clock[0].spacing)
-    bound = (known.averaged if _averages(s) else known.drift)[sparse(s.hub)]
+    bound = (known.averaged if _averages(s) else known.drift)[s.sparse]
     bound /= known.line if s.d == 1 else 1
     speed = cells = 0.0
     for one, law in _bodies(s):
@@ -97,7 +96,7 @@ def turn_of(s: Any) -> Noise | None:
     if not (_feeds(s) and turns and s.d > 1) or s.hub.domain.axisymmetric:
         return None
     known, spacing = borne(s.basis), float(s.simulation.control.clock[0].spacing)
-    dt, one_point, most = s.simulation.dt, sparse(s.hub), None
+    dt, one_point, most = s.simulation.dt, s.sparse, None
     bound = (known.rim_averaged if _averages(s) else known.rim)[one_point]
     for one, _ in _bodies(s):
         speed, angle = one.spin * one.reach / s.waves, one.spin * s.duration

@@ -13,7 +13,7 @@ from karamelo_py.run.advice.known_failures import refuse_endless_speeds
 from karamelo_py.run.advice.suggestions import suggestions
 from karamelo_py.run.diagnosis.energy import not_watched, unknown_work
 from karamelo_py.run.lower.sizes import memory_of, node_fields, nodes_in_use, point_fields
-from karamelo_py.run.mpi.plan import told
+from karamelo_py.run.mpi.plan import report_lines
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.timestep import ruling_limit, words_of_share
 from karamelo_py.scene import machine_memory
@@ -66,7 +66,7 @@ def report(hub: Hub, end_time: float = inf) -> None:
         say(f"               {free} are free on this machine, beside what check has taken")
     if hub.settings.ranks > 1:
         say("")
-        for line in told(simulation, hub.settings.ranks):
+        for line in report_lines(simulation, hub.settings.ranks):
             say(line)
     say("")
     say(f"stages of a step, {'one by one' if simulation.staged else 'fused'}")

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.output.fields import COMPONENTS, Fields
+from karamelo_py.output.point_table import COMPONENTS, PointTable
 from karamelo_py.points.laws import can, constrained_velocity, law_kind
 from karamelo_py.run.timestep import fastest_wave, ruling_limit
 from karamelo_py.scene.hub import Hub
@@ -49,7 +49,7 @@ def _zero(fix: Any) -> bool:
     )
 
 
-def _stress(points: Fields) -> np.ndarray:
+def _stress(points: PointTable) -> np.ndarray:
     return np.max([np.abs(points.particle("s" + c)) for c in COMPONENTS], axis=0)
 
 

@@ -178,9 +178,8 @@ def restore(simulation: Any, state: Mapping[str, Any]) -> None:
     s = simulation.setup = s._replace(blocks=tuple(blocks))
     simulation.tiles.lay_out(s)
     for name, array in changing(simulation):
-        if not name.startswith(
-            "tiling/"
-        ):  # of which the lay-out has put those first others wait for
+        # The lay-out has put the tiles first that other processes wait for.
+        if not name.startswith("tiling/"):
             array[...] = _checked(state, name, array)
     for block in s.blocks:
         block.points.x[:] = block.points.x[s.control.clock[0].now]

@@ -8,7 +8,7 @@ from karamelo_py.kernels import growth
 from karamelo_py.kernels.hooks import HEAT_STAGES, CompiledHook
 from karamelo_py.kernels.watch import BORNE, FEW, unit_of
 from karamelo_py.language import registry
-from karamelo_py.output.fields import Fields
+from karamelo_py.output.point_table import PointTable
 from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.points.laws.temperatures import initial_heat
 from karamelo_py.run import timestep
@@ -122,7 +122,7 @@ def _step_of(hub: Hub, simulation: Any, share: float) -> str:
     return f"dt_factor({share:g})"
 
 
-def swelling(points: Fields) -> np.ndarray:
+def swelling(points: PointTable) -> np.ndarray:
     """(n,) volumes over those before the first step."""
     return points.particle("volume") / points.reference_volume
 

@@ -12,7 +12,7 @@ from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels import growth
 from karamelo_py.kernels.step import ABOVE_LIMIT, DONE, GAINED, HEATED, SHRUNK, STOPPED
 from karamelo_py.kernels.watch import GROWTH, LOOK, unit_of
-from karamelo_py.output.fields import Fields
+from karamelo_py.output.point_table import PointTable
 from karamelo_py.points.basis import carried, extent
 from karamelo_py.run.advice.large_steps import step_was_told
 from karamelo_py.run.checkpoint import restart_file
@@ -34,6 +34,10 @@ GOES_ON = (
 FAR = 100  # steps, more of which are not taken once more for the last rows of log and dumps
 LOOSE = 1.5  # cells: points of an unstrained solid are at most one apart
 APART = "no other point of it within a cell"
+
+
+class Stopped(ScriptError):
+    """A run has ended at a fault; all processes know, and its last good state is written."""
 
 
 class OthersWait(Exception):
@@ -89,12 +93,14 @@ def stop(
     `start` on it is the state of the start.
     """
     message, hint, at_fault = trouble(hub, simulation, status)
+    kind = ScriptError
     with suppress(OthersWait):
         if start is None:
             hint += _keep_good(hub, simulation, status, good)
         else:
             hint += _keep_start(hub, simulation, status, good, start)
-    error = ScriptError(message, place=at_fault or place, hint=hint)
+        kind = Stopped
+    error = kind(message, place=at_fault or place, hint=hint)
     error.complete = at_fault is not None
     raise error
 
@@ -203,11 +209,11 @@ def _above_limit(hub: Hub, simulation: Simulation) -> tuple[str, str]:
     return message, own_step_instead(hub)
 
 
-def _speeds(points: Fields) -> np.ndarray:
+def _speeds(points: PointTable) -> np.ndarray:
     return np.abs(points.velocity).max(axis=1, initial=0.0)
 
 
-def _no_number(points: Fields) -> np.ndarray:
+def _no_number(points: PointTable) -> np.ndarray:
     return 1.0 * ~np.isfinite(points.particle("ienergy"))
 
 
@@ -366,8 +372,8 @@ def _others(simulation: Simulation, number: int, x: np.ndarray, reach: float) ->
     """Count the other points of the solid of a point, at hand and near it."""
     solid, others, near = solid_with(simulation.hub, number), 0, 0
     for some in simulation.some(None):
-        own = (some.solid_of == solid.index) & (some.ids != number)
-        apart = np.abs(some.x[own] - x).max(axis=1, initial=0.0)
+        own = (some.solid == solid.index) & (some.ids != number)
+        apart = np.abs(some.position[own] - x).max(axis=1, initial=0.0)
         others, near = others + len(apart), near + int(np.sum(~(apart > reach)))
     return others, near
 

@@ -83,5 +83,5 @@ def _places(simulation: Simulation, group: Any, formula: Expression) -> Iterator
         yield nodes, x, x
     else:
         for some in simulation.some(group):
-            there = np.isfinite(some.x).all(axis=1)
-            yield some.ids[there], some.x[there], some.x0[there]
+            there = np.isfinite(some.position).all(axis=1)
+            yield some.ids[there], some.position[there], some.reference_position[there]

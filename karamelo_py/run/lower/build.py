@@ -21,9 +21,8 @@ from karamelo_py.kernels.arrays import (
     Nodes,
     Points,
     Setup,
-    arrays_of,
-    made_of,
     new_control,
+    some_of,
 )
 from karamelo_py.kernels.averaging import NodalMean
 from karamelo_py.kernels.heat import Conducting
@@ -405,12 +404,4 @@ def resumed(block: Block, previous: State) -> Block:
         take(one.array, previous.fields.get(type(one)))
     present = np.ones(len(points.id), np.bool_)
     present[old] = previous.present[ids]
-    return block if present.all() else chosen(block, np.flatnonzero(present))
-
-
-def chosen(block: Block, rows: np.ndarray) -> Block:
-    """The block with the points in these rows, in this order; they are to be sorted anew."""
-    points = block.points
-    arrays = (fields.some_points(array, rows) for _, array in arrays_of(points))
-    found = map(fields.as_rows_of_points, arrays)
-    return block._replace(points=made_of(points, found))
+    return block if present.all() else some_of(block, np.flatnonzero(present))

@@ -12,7 +12,7 @@ from karamelo_py.kernels.hooks import STAGES, CompiledHook
 from karamelo_py.kernels.totals import LIMBS
 from karamelo_py.kernels.walls import FRICTION
 from karamelo_py.language.faults import as_script_error
-from karamelo_py.run.tiles.distinct import distinct
+from karamelo_py.run.tiles.unique import unique
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.expressions import FIRST, POINT_SEEDS
 
@@ -111,7 +111,7 @@ class _Builder:
             return 0
         if not any(fix.group.all for fix in fixes):
             nodes = np.concatenate([fix.nodes for fix in fixes])
-            if len(distinct(nodes)) == len(nodes):
+            if len(unique(nodes)) == len(nodes):
                 return 0
         return fixes[0].group.total()
 
@@ -119,7 +119,7 @@ class _Builder:
         if fix.group.all:
             return -1, -1
         if hook.on_nodes:
-            members = distinct(fix.nodes)
+            members = unique(fix.nodes)
         else:
             members = fix.group.bits(self.points).view("<i8").astype(np.int64, copy=False)
         begin = sum(len(m) for m in self.members)

@@ -4,7 +4,7 @@ import numpy as np
 
 
 def bisected(places: np.ndarray, work: np.ndarray, parts: int, rows: float = 1) -> np.ndarray:
-    """The part that each tile belongs to: halves across the longest direction, and halves of these.
+    """Cut tiles into parts: halves across the longest direction, and halves of these.
 
     After Berger, M. J. and Bokhari, S. H. (1987), "A partitioning strategy for nonuniform problems
     on multiprocessors", IEEE Transactions on Computers C-36, 570-580. Where the work of a layer of

@@ -12,7 +12,7 @@ ROWS = ("number", "range", "grid", "box", "rows")  # of a tiling
 
 
 def share_of(s: Setup, own: np.ndarray) -> dict[str, np.ndarray]:
-    """The points and tiles of `s` in tiles of which `own` says so, by name."""
+    """Pack the points and tiles of `s` in tiles of which `own` says so, by name."""
     found = {}
     for k, block in enumerate(s.blocks):
         found |= share_of_block(k, block, own)
@@ -20,7 +20,7 @@ def share_of(s: Setup, own: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def share_of_block(k: int, block: Block, own: np.ndarray) -> dict[str, np.ndarray]:
-    """The points and tiles of the k-th block in tiles of which `own` says so, by name."""
+    """Pack the points and tiles of the k-th block in tiles of which `own` says so, by name."""
     points, found = share_of_tiling(k, block.tiling, own)
     return found | {
         f"points/{k}/{name}": some_points(array, points) for name, array in arrays_of(block.points)
@@ -30,7 +30,7 @@ def share_of_block(k: int, block: Block, own: np.ndarray) -> dict[str, np.ndarra
 def share_of_tiling(
     k: int, tiling: Tiling, own: np.ndarray
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Which points are in tiles of which `own` says so, and these tiles."""
+    """Find the points in tiles of which `own` says so, and pack these tiles."""
     which = np.flatnonzero(own[occupied(tiling)[0]])
     ranges = tiling.range[which]
     points = between(*ranges.T)
@@ -48,23 +48,23 @@ def tilings_in_use(s: Setup) -> list[dict[str, np.ndarray]]:
 
 
 def stripped(found: dict[str, np.ndarray], stem: str) -> dict[str, np.ndarray]:
-    """What has a name that begins so, without that."""
+    """Choose the arrays whose names begin so, and name them without that."""
     return {n.removeprefix(stem): array for n, array in found.items() if n.startswith(stem)}
 
 
 def _joint(tilings: list[dict[str, np.ndarray]], name: str) -> np.ndarray:
-    """Rows of the tiles of all processes, one process after another."""
+    """Join rows of the tiles of all processes, one process after another."""
     return np.concatenate([part[name][: part["count"][0]] for part in tilings])
 
 
 def by_tile(tilings: list[dict[str, np.ndarray]]) -> np.ndarray:
-    """The order of tiles for points that stand one process after another."""
+    """Find the order of tiles for points that stand one process after another."""
     ranges = one_after_another(_joint(tilings, "range"))
     return between(*ranges[np.argsort(_joint(tilings, "number"))].T)
 
 
 def join_tilings(tiling: Tiling, tilings: list[dict[str, np.ndarray]]) -> None:
-    """The tiles of all processes, in the order of their numbers."""
+    """Join the tiles of all processes, in the order of their numbers."""
     order = np.argsort(_joint(tilings, "number"))
     tiling.count[0] = len(order)
     names = [name for name in (*ROWS, "report") if name in tilings[0]]

@@ -14,8 +14,8 @@ from karamelo_py.kernels.arrays import Block, Points, Setup, Tiling, arrays_of, 
 from karamelo_py.run.mpi.bisection import bisected
 from karamelo_py.run.tiles.boxes import Boxes, Reached, between, extents, ragged, rows_of, steps_of
 from karamelo_py.run.tiles.buffers import buffers_of, chosen_of, give_up
-from karamelo_py.run.tiles.distinct import distinct
 from karamelo_py.run.tiles.tiles import SHARES, Tiles, one_after_another, shares_of
+from karamelo_py.run.tiles.unique import unique
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.lattice import Lattice
 
@@ -147,7 +147,7 @@ class SharedTiles(Tiles):
     def _with(
         self, k: int, points: Points, stay: np.ndarray, come: list[list[np.ndarray]]
     ) -> Points:
-        """Those of the points of block `k` that stay, and what has come.
+        """Join those of the points of block `k` that stay, and what has come.
 
         They take the place of what was there at the sort before: fresh memory for all of them would
         cost more than all else that a sort does.
@@ -219,7 +219,7 @@ class SharedTiles(Tiles):
                 tiling.share[k * SHARES : (k + 1) * SHARES + 1] = share
 
     def own_boxes(self, s: Setup) -> Boxes:
-        """The boxes of the own tiles, with their place in the order of one process."""
+        """List the boxes of the own tiles, with their place in the order of one process."""
         order = [k * self.count + occupied(block.tiling)[0] for k, block in enumerate(s.blocks)]
         return super()._boxes(s)._replace(order=np.concatenate(order))
 
@@ -231,7 +231,7 @@ class SharedTiles(Tiles):
         return found
 
     def near(self, boxes: Boxes, hulls: list[np.ndarray]) -> dict[int, Boxes]:
-        """Those of own boxes that may reach tiles of nodes of others with these hulls, by rank."""
+        """Choose own boxes that may reach tiles of nodes of others with these hulls, by rank."""
         grid, low, high = self._around(boxes)
         d, of_all = self.dimension, np.array(hulls)
         own = of_all[self.comm.rank]
@@ -245,22 +245,22 @@ class SharedTiles(Tiles):
         return found
 
     def _around(self, boxes: Boxes) -> tuple[np.ndarray, ...]:
-        """The grids of boxes, or one for all at a place; the first and last tiles of nodes."""
+        """Find the grids of boxes, or one for all at a place; the first and last tiles of nodes."""
         grid = np.zeros_like(boxes.grid) if self.one_place else boxes.grid
         return grid, boxes.lo // self.node_size, boxes.hi // self.node_size
 
     def _place(self, tile: np.ndarray) -> np.ndarray:
-        """The number of the place of a tile of nodes."""
+        """Number the place of a tile of nodes."""
         return tile % int(self._first_of_nodes[1]) if self.one_place else tile
 
     def _reached(self, boxes: Boxes) -> tuple[Boxes, Reached]:
-        """What own boxes reach, and what of others' is at nodes in use here, as more boxes."""
+        """Find what own boxes reach, and what of others' is at nodes in use here, as more boxes."""
         _, reached = super()._reached(boxes)
         of, place = self._of[reached.box], self._place(reached.tile)
         me = self.comm.rank
         self._needs = {
             int(rank): _needs(place[here], reached.begin[here], reached.end[here])
-            for rank in distinct(of)
+            for rank in unique(of)
             for here in [of == rank]
         }
         own, others = np.flatnonzero(of == me), np.flatnonzero(of != me)
@@ -296,7 +296,7 @@ class SharedTiles(Tiles):
         ends = np.append(0, np.cumsum(np.prod(boxes.hi - boxes.lo + 1, axis=1)))
         own = len(ends) - 1 - len(self._from)
         self._taken = {}
-        for rank in distinct(self._from):
+        for rank in unique(self._from):
             begin, end = np.searchsorted(self._from, [rank, rank + 1])
             self._taken[int(rank)] = slice(int(ends[own + begin]), int(ends[own + end]))
         return first, steps
@@ -344,7 +344,7 @@ class SharedTiles(Tiles):
         self.comm.finish(self._under_way)
 
     def _link(self, arrays: list[np.ndarray]) -> tuple[list, Any]:
-        """What is packed of these arrays of the buffers, and the requests that pass it on."""
+        """Make room for packed rows of the buffers, and the requests that pass them on."""
         packed, given, taken = [], [], []
         for array in arrays:
             for rank, rows in self.given.items():
@@ -361,7 +361,7 @@ def work_of(loads: np.ndarray, costs: np.ndarray) -> np.ndarray:
 
 
 def nodes_of(tiling: Tiling) -> np.ndarray:
-    """How many nodes the points of each occupied tile may reach."""
+    """Count the nodes that the points of each occupied tile may reach."""
     count = tiling.count[0]
     if tiling.rows.shape[1]:
         return np.maximum(np.diff(tiling.rows[:count]) + 1, 0).sum(axis=(1, 2), dtype=np.int64)
@@ -370,7 +370,7 @@ def nodes_of(tiling: Tiling) -> np.ndarray:
 
 
 def occupied(tiling: Tiling) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers of the occupied tiles of a block, and how many points they have."""
+    """List the occupied tiles of a block, and how many points they have."""
     count = tiling.count[0]
     return tiling.number[:count], np.diff(tiling.range[:count], axis=1)[:, 0]
 
@@ -393,7 +393,7 @@ def joined(points: Points, parts: list[list[np.ndarray]]) -> Points:
 
 
 def _needs(place: np.ndarray, begin: np.ndarray, end: np.ndarray) -> Needs:
-    """The least and largest nodes of boxes (m, d) at each place (m,)."""
+    """Find the least and largest nodes of boxes (m, d) at each place (m,)."""
     order = np.argsort(place, kind="stable")
     starts = np.flatnonzero(np.diff(place[order], prepend=-1))
     return Needs(place[order][starts], *extents(starts, begin[order], end[order]))

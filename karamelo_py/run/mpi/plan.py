@@ -1,4 +1,4 @@
-"""What several processes would have of a scene, and pass on in a step: their plan, made by one."""
+"""The plan of several processes, made by one: what they would have, and pass on in a step."""
 
 from typing import Any, NamedTuple
 
@@ -21,8 +21,8 @@ from karamelo_py.styles.fixes.pairs import SENT
 MAY_CHANGE = 1.25  # largest share of the points over the mean that is no waste yet
 
 
-class Share(NamedTuple):
-    """What one process has.
+class ProcessShare(NamedTuple):
+    """Share of one process.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ def _sum_buffers_sums(mode, quantities, s, due):
         mode.found.append((given(quantities, s.kin), s.nodes))
 
 
-class _Pretended(SerialComm):
+class _PretendedComm(SerialComm):
     """One of several processes that are not there."""
 
     def __init__(self, rank: int, size: int, others: list[tuple[SharedTiles, Boxes]] | None = None):
@@ -84,7 +84,7 @@ class _Pretended(SerialComm):
 
 
 def bytes_of_node(simulation: Simulation) -> int:
-    """Bytes that are passed on in a step of each node that tiles of another process reach."""
+    """Count the bytes passed on in a step of each node that tiles of another process reach."""
     s, sums = simulation.setup, _Sums([])
     control = s.control
     kept = control.values.copy(), control.clock.copy(), control.totals.copy()
@@ -97,8 +97,8 @@ def bytes_of_node(simulation: Simulation) -> int:
     return total
 
 
-def plan(simulation: Simulation, ranks: int) -> list[Share]:
-    """The shares of so many processes in a scene whose points are sorted."""
+def plan(simulation: Simulation, ranks: int) -> list[ProcessShare]:
+    """Plan the shares of so many processes in a scene whose points are sorted."""
     s, hub = simulation.setup, simulation.hub
     method = hub.update.method
     lattices, one_place = method.lattices(hub), method.fields_per_solid
@@ -109,7 +109,7 @@ def plan(simulation: Simulation, ranks: int) -> list[Share]:
             comm, lattices, s.basis, simulation.count, sparse(simulation.hub), one_place=one_place
         )
 
-    of_all = [tiles_of(_Pretended(rank, ranks)) for rank in range(ranks)]
+    of_all = [tiles_of(_PretendedComm(rank, ranks)) for rank in range(ranks)]
     of_all[0].share_out(of_all[0].loads(s.blocks)[:-1].sum(axis=0))
     parts = [_part(s, of_all[0].owner == rank) for rank in range(ranks)]
     boxes = [(tiles, tiles.own_boxes(part)) for tiles, part in zip(of_all, parts, strict=True)]
@@ -120,7 +120,7 @@ def plan(simulation: Simulation, ranks: int) -> list[Share]:
     ]
 
 
-def _share(simulation: Simulation, s: Setup, tiles: SharedTiles, per_node: int) -> Share:
+def _share(simulation: Simulation, s: Setup, tiles: SharedTiles, per_node: int) -> ProcessShare:
     none = s.nodes._replace(
         sums=s.nodes.sums[:, :0], velocity=s.nodes.velocity[:, :0], fields=()
     )  # boxes of nothing: only their places matter
@@ -135,11 +135,11 @@ def _share(simulation: Simulation, s: Setup, tiles: SharedTiles, per_node: int) 
     nodes = len(numbers(s.spans))
     memory = memory_of(simulation, s, boxes)
     given = rows * per_node
-    return Share(points, count, nodes, len(tiles.given), given, sum(memory), memory.known)
+    return ProcessShare(points, count, nodes, len(tiles.given), given, sum(memory), memory.known)
 
 
 def _part(s: Setup, own: np.ndarray) -> Setup:
-    """Those tiles of which `own` says so."""
+    """Choose the tiles of which `own` says so."""
     blocks = []
     for block in s.blocks:
         tiling = block.tiling
@@ -153,8 +153,8 @@ def _part(s: Setup, own: np.ndarray) -> Setup:
     return s._replace(blocks=tuple(blocks), **no_nodes(), heat=None)
 
 
-def told(simulation: Simulation, ranks: int) -> list[str]:
-    """Lines that say what so many processes would have, and pass on."""
+def report_lines(simulation: Simulation, ranks: int) -> list[str]:
+    """Say in lines what so many processes would have, and pass on."""
     shares = plan(simulation, ranks)
     columns = np.array(shares)
     mean = columns[:, 0].mean()

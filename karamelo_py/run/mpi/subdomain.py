@@ -17,7 +17,7 @@ LEARN_EVERY = 100  # steps from output to output, after which it is seen how wor
 
 
 class Subdomain:
-    """The tiles of this process, and what it passes on of its points.
+    """Keep the share of this process in balance with those of others.
 
     Attributes
     ----------

@@ -21,7 +21,7 @@ from karamelo_py.script.errors import Quit
 
 
 class PointsMoved(Exception):
-    """A fix in Python has moved points at the start of a step: other processes have them now."""
+    """Begin the step anew: a fix in Python has moved points, and other processes have them now."""
 
 
 class Whole:

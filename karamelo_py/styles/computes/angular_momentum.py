@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from karamelo_py.output.fields import Fields
+from karamelo_py.output.point_table import PointTable
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Compute
@@ -51,7 +51,7 @@ class AngularMomentum(Compute):
         self.publish_components(np.array(total))
         self.publish("drift", self._drift(np.array(total), scale))
 
-    def terms(self, points: Fields) -> np.ndarray:
+    def terms(self, points: PointTable) -> np.ndarray:
         """Angular momenta of points, and what they are without their direction."""
         d = self.hub.domain.dimension
         arm, v = np.zeros((2, points.count, 3))

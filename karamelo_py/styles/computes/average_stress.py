@@ -1,6 +1,6 @@
 """compute average_stress."""
 
-from karamelo_py.output.fields import COMPONENTS, Fields
+from karamelo_py.output.point_table import COMPONENTS, PointTable
 from karamelo_py.scene.modify import Compute
 
 
@@ -30,7 +30,7 @@ class AverageStress(Compute):
         for component, of_all in zip(COMPONENTS, total, strict=True):
             self.publish(component, of_all / volume if volume > 0 else 0.0)
 
-    def terms(self, points: Fields) -> list:
+    def terms(self, points: PointTable) -> list:
         """Volumes of points, and these times their stress."""
         volume = points.particle("volume")
         return [volume, *(volume * points.particle("s" + c) for c in COMPONENTS)]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from karamelo_py.output.fields import Fields
+from karamelo_py.output.point_table import PointTable
 from karamelo_py.scene.modify import Compute
 
 
@@ -28,6 +28,6 @@ class AverageTemperature(Compute):
         count, total = self.hub.fields.added_up(self)
         self.publish("", total / max(count, 1))
 
-    def terms(self, points: Fields) -> list[np.ndarray]:
+    def terms(self, points: PointTable) -> list[np.ndarray]:
         """One, and the temperature, of each point."""
         return [np.ones(points.count), points.particle("T")]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from karamelo_py.output.fields import Fields
+from karamelo_py.output.point_table import PointTable
 from karamelo_py.scene.modify import Compute
 
 
@@ -23,6 +23,6 @@ class AverageVelocity(Compute):
         # Without points, 0, as the sums of other computes.
         self.publish_components(np.array(total) / max(count, 1))
 
-    def terms(self, points: Fields) -> list[np.ndarray]:
+    def terms(self, points: PointTable) -> list[np.ndarray]:
         """One, and the velocity, of each point."""
         return [np.ones(points.count), *points.velocity.T]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from karamelo_py.output.fields import Fields
+from karamelo_py.output.point_table import PointTable
 from karamelo_py.scene.group import AnyGroup, ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Compute
@@ -41,7 +41,7 @@ class CenterOfMass(Compute):
         total, *moments = fields.added_up(self) if on_points else fields.mass_at_nodes(self.group)
         self.publish_components(np.array(moments) / total if total > 0 else np.zeros(3))
 
-    def terms(self, points: Fields) -> list[np.ndarray]:
+    def terms(self, points: PointTable) -> list[np.ndarray]:
         """Masses of points, and these times where they are."""
         mass = points.mass.astype(float)
         return [mass, *(mass * points.position.T)]

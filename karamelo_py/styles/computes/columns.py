@@ -11,7 +11,7 @@ import numpy as np
 
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
-from karamelo_py.output.fields import AXES, COMPONENTS, Fields
+from karamelo_py.output.point_table import AXES, COMPONENTS, PointTable
 from karamelo_py.scene.domain import require_domain
 from karamelo_py.script.errors import ScriptError, unknown
 from karamelo_py.script.terms import number_of
@@ -21,7 +21,7 @@ TENSORS = {"stress": "s", "strain": "e"}
 DISPLACEMENTS = ("ux", "uy", "uz")
 
 
-def column(points: Fields, name: str) -> np.ndarray:
+def column(points: PointTable, name: str) -> np.ndarray:
     """A column of points, (n,), displacements too."""
     if name in DISPLACEMENTS:
         return points.particle(name[1]) - points.particle(name[1] + "0")
@@ -154,12 +154,12 @@ class Compared:
         largest = self.hub.fields.each(self, "largest") if self.norm.kind == "max" else []
         return self.norm.moment(sums, largest), sums[3:]
 
-    def terms(self, points: Fields) -> np.ndarray:
+    def terms(self, points: PointTable) -> np.ndarray:
         """Return the terms of the points for sums."""
         sizes, weight, *rest = self.sizes(points)
         return np.vstack([self.norm.terms(sizes, weight), *rest])
 
-    def largest(self, points: Fields) -> np.ndarray | None:
+    def largest(self, points: PointTable) -> np.ndarray | None:
         """The largest difference and exact value of points."""
         sizes = self.sizes(points)[0]
         return sizes.max(axis=1) if sizes.size else None

@@ -4,7 +4,7 @@ from typing import Literal
 
 import numpy as np
 
-from karamelo_py.output.fields import Fields
+from karamelo_py.output.point_table import PointTable
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Compute
@@ -81,7 +81,7 @@ class Error(Compared, Compute):
         self.publish("max", self.norm.largest)
         self.publish("history", self.norm.history)
 
-    def sizes(self, points: Fields) -> tuple[np.ndarray, np.ndarray]:
+    def sizes(self, points: PointTable) -> tuple[np.ndarray, np.ndarray]:
         """Sizes (2, n) of the differences and of the exact values at points, and their weights."""
         x, x0 = points.position, points.reference_position
         squares = np.zeros((2, points.count))

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from karamelo_py.output.fields import Fields
+from karamelo_py.output.point_table import PointTable
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Compute
@@ -40,7 +40,7 @@ class LinearMomentum(Compute):
         self.publish_components(np.array(total))
         self.publish("drift", self._drift(np.array(total), scale))
 
-    def terms(self, points: Fields) -> np.ndarray:
+    def terms(self, points: PointTable) -> np.ndarray:
         """Momenta of points, and what they are without their direction."""
         mass, v = points.mass.astype(float), points.velocity.astype(float)
         return mass * np.vstack([v.T, np.linalg.norm(v, axis=1)])

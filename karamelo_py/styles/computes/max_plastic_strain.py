@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from karamelo_py.output.fields import Fields
+from karamelo_py.output.point_table import PointTable
 from karamelo_py.scene.modify import Compute
 
 
@@ -29,6 +29,6 @@ class MaxPlasticStrain(Compute):
         for published, value in zip(self.published, found, strict=True):
             self.publish(published, float(value))
 
-    def largest(self, points: Fields) -> list[float]:
+    def largest(self, points: PointTable) -> list[float]:
         """The largest strain and temperature of points."""
         return [points.particle(name).max(initial=0) for name in ("ep", "T")]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from karamelo_py.output.fields import Fields
+from karamelo_py.output.point_table import PointTable
 from karamelo_py.scene.modify import Compute
 
 
@@ -23,6 +23,6 @@ class MaxPosition(Compute):
         # Without points, 0, as the sums of other computes.
         self.publish_components(np.max(found, axis=0) if found else np.zeros(3))
 
-    def largest(self, points: Fields) -> np.ndarray | None:
+    def largest(self, points: PointTable) -> np.ndarray | None:
         """The largest coordinates of points."""
         return points.position.max(axis=0) if points.count else None

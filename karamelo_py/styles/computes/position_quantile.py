@@ -5,7 +5,7 @@ from typing import Annotated
 import numpy as np
 
 from karamelo_py.language.signature import In
-from karamelo_py.output.fields import Fields
+from karamelo_py.output.point_table import PointTable
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Compute
@@ -66,7 +66,7 @@ class PositionQuantile(Compute):
                 first[axis] = first[axis] << BITS | int(own)
         self.publish_components(_numbers(np.array(first, np.uint64)))
 
-    def masses(self, points: Fields, shift: int, first: list[int]) -> tuple:
+    def masses(self, points: PointTable, shift: int, first: list[int]) -> tuple:
         """Masses of points whose coordinates begin with these bits, by the next ones."""
         found = []
         for axis, begin in enumerate(first):

@@ -6,7 +6,7 @@ import numpy as np
 
 from karamelo_py.language.signature import Positive
 from karamelo_py.output.columns import check_columns
-from karamelo_py.output.fields import Fields
+from karamelo_py.output.point_table import PointTable
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Compute
@@ -73,12 +73,12 @@ class Probe(Compute):
         for end, value in zip(self.published, values, strict=True):
             self.publish(end, value)
 
-    def terms(self, points: Fields) -> list[np.ndarray]:
+    def terms(self, points: PointTable) -> list[np.ndarray]:
         """Volumes of points, and these times their columns."""
         volume = points.particle("volume")
         return [volume, *(volume * points.particle(name) for name in self.columns)]
 
-    def nearest(self, points: Fields) -> list[float] | None:
+    def nearest(self, points: PointTable) -> list[float] | None:
         """Distance, id and columns of the point that is asked for, or of the nearest of these."""
         ids = points.particle("id")
         if self.point is not None:

@@ -6,7 +6,7 @@ import numpy as np
 
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument, TableFile
-from karamelo_py.output.fields import Fields
+from karamelo_py.output.point_table import PointTable
 from karamelo_py.output.quantity import Quantity
 from karamelo_py.scene.group import ALL, ParticleGroup
 from karamelo_py.scene.hub import Hub
@@ -131,7 +131,7 @@ class Reference(Compared, Compute):
             self.publish("now", difference)
         self.publish("curve", exact[0] if within.any() else 0.0)
 
-    def sizes(self, points: Fields) -> tuple[np.ndarray, ...]:
+    def sizes(self, points: PointTable) -> tuple[np.ndarray, ...]:
         """Sizes (2, n) of differences and of the curve at points, weights; the curve, and one."""
         within, exact = self._exact(column(points, self.along))
         difference = column(points, self.column)[within] - exact

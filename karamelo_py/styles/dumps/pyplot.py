@@ -9,8 +9,8 @@ import numpy as np
 from karamelo_py.language.kinds import In
 from karamelo_py.language.signature import OutputFile, Positive
 from karamelo_py.output.columns import check_columns
-from karamelo_py.output.fields import Fields
 from karamelo_py.output.files import picture_format, savefig, unwarned, whole
+from karamelo_py.output.point_table import PointTable
 from karamelo_py.output.rhythm import Every
 from karamelo_py.output.snapshots import Snapshot
 from karamelo_py.output.units import labelled
@@ -185,7 +185,7 @@ class PyPlot(Dump):
         columns = dict(zip(names, map(np.concatenate, zip(*pieces, strict=True)), strict=True))
         return Snapshot(update.step, update.time, columns, domain.lo, domain.hi)
 
-    def _pieces(self) -> Iterator[Fields]:
+    def _pieces(self) -> Iterator[PointTable]:
         return self.hub.fields.pieces(to_first=True)
 
     def take_part(self) -> None:

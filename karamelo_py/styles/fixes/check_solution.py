@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from karamelo_py.output.fields import Fields
+from karamelo_py.output.point_table import PointTable
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
@@ -53,7 +53,7 @@ class CheckSolution(Fix):
         total = values.get(f"{self.id}_y")
         self.publish("z", np.sqrt(values.get(f"{self.id}_x") / total) if total > 0 else 0.0)
 
-    def terms(self, points: Fields) -> np.ndarray:
+    def terms(self, points: PointTable) -> np.ndarray:
         """Squares of the error and of the displacement at points times their volume, and this."""
         x, x0 = points.position, points.reference_position
         squares = np.zeros((2, points.count))

@@ -104,7 +104,7 @@ def _within(simulation: Any, held: Any, driven: Any) -> np.ndarray:
     caught = np.zeros(len(ids), np.bool_)
     for solid in hub.solids.values():
         lattice = hub.lattices[method.lattice_of(hub, solid)]
-        own = np.flatnonzero(simulation.solid_of[ids] == solid.index)
+        own = np.flatnonzero(hub.fields.solid[ids] == solid.index)
         per_cell = lattice.nodes_per_cell
         cell = np.floor((x[own] - lattice.lo[:d]) / lattice.h).astype(np.int64)
         cell = np.clip(cell, 0, np.array(lattice.cells[:d]) - 1) * per_cell

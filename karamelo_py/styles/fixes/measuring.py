@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from karamelo_py.output.fields import Fields
+from karamelo_py.output.point_table import PointTable
 from karamelo_py.scene.group import Group
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix, node_hook, point_hook
@@ -72,6 +72,6 @@ class PointForce(Fix):
         """Measure and publish."""
         self.publish_components(self.hub.fields.added_up(self))
 
-    def terms(self, points: Fields) -> list[np.ndarray]:
+    def terms(self, points: PointTable) -> list[np.ndarray]:
         """Components of the forces on points."""
         return [points.particle("b" + axis) for axis in "xyz"]

@@ -11,7 +11,7 @@ import numpy as np
 from karamelo_py.compiler import fields
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.threads import Serial, Threaded, new_team
-from karamelo_py.kernels.arrays import DT, TIME, TIMESTEP
+from karamelo_py.kernels.arrays import DT, TIME, TIMESTEP, some_of
 from karamelo_py.kernels.clock import step_size
 from karamelo_py.kernels.conduction import show_heat
 from karamelo_py.kernels.nodes import SumsToVelocity
@@ -25,7 +25,7 @@ from karamelo_py.run.access.nodes_by_number import ByNumber
 from karamelo_py.run.access.points_by_id import ById
 from karamelo_py.run.checkpoint import arrays as checkpoint
 from karamelo_py.run.checkpoint import part_state
-from karamelo_py.run.lower.build import State, chosen, lower, thread_count, warms_by_friction
+from karamelo_py.run.lower.build import State, lower, thread_count, warms_by_friction
 from karamelo_py.run.lower.check_plugins import try_parts
 from karamelo_py.run.lower.memory import check_room, no_room
 from karamelo_py.run.mpi.subdomain import Subdomain
@@ -33,7 +33,7 @@ from karamelo_py.scene.hub import Hub
 
 
 def scene_key(hub: Hub) -> tuple:
-    """What the arrays of a simulation depend on: while it stays the same, so do they."""
+    """Return what arrays depend on: while it stays the same, so do they."""
     update = hub.update
     return (
         hub.domain,
@@ -56,10 +56,10 @@ def scene_key(hub: Hub) -> tuple:
     )
 
 
-class Lowered(ById, ByNumber):
-    """The arrays of a scene, and the threads that work on them."""
+class SceneArrays(ById, ByNumber):
+    """Hold the arrays of a scene, or of the share of a process, and the threads at work on them."""
 
-    def __init__(self, hub: Hub, previous: Lowered | None = None):
+    def __init__(self, hub: Hub, previous: SceneArrays | None = None):
         self.hub = hub
         self.comm = comm = hub.settings.comm
         self.key = scene_key(hub)
@@ -89,16 +89,16 @@ class Lowered(ById, ByNumber):
 
     @property
     def contact(self) -> Any:
-        """How solids touch."""
+        """Return how solids touch."""
         return self.setup.contact
 
     def fits(self, hub: Hub) -> bool:
-        """Whether the arrays are still those of the scene."""
+        """Tell whether the arrays are still those of the scene."""
         return self.key == scene_key(hub)
 
     @property
     def dt(self) -> float:
-        """The next step."""
+        """Length of the next step."""
         return float(self.control.values[DT])
 
     @property
@@ -113,7 +113,7 @@ class Lowered(ById, ByNumber):
 
     @property
     def point_fields(self) -> tuple[type, ...]:
-        """The declared fields of the points, of all blocks."""
+        """Declared fields of the points, of all blocks."""
         return tuple(
             dict.fromkeys(type(one) for block in self.setup.blocks for one in block.points.fields)
         )
@@ -126,7 +126,7 @@ class Lowered(ById, ByNumber):
         for block in self.setup.blocks:
             state = block.points.state
             rows = np.zeros((len(state), self.count), state.dtype)
-            for ids, own in self._of_all_blocks([(block.points.id, state)]):
+            for ids, own in self.rows().of_all([(block.points.id, state)]):
                 rows[:, ids] = own
             laws[without_rate(law_kind(block.laws))] = rows
         kept = [kind for kind in self.point_fields if fields.is_kept(kind)]
@@ -164,7 +164,7 @@ class Lowered(ById, ByNumber):
         """Take points out of the run; the ids of the others stay."""
         self.present[ids] = False
         blocks = tuple(
-            chosen(block, np.flatnonzero(self.present[block.points.id]))
+            some_of(block, np.flatnonzero(self.present[block.points.id]))
             for block in self.setup.blocks
         )
         self.setup = self.setup._replace(blocks=blocks)
@@ -175,7 +175,7 @@ class Lowered(ById, ByNumber):
 
     @property
     def measured(self) -> bool:
-        """Whether the rate of the fastest point is that of the present state."""
+        """Tell whether the rate of the fastest point is that of the present state."""
         return self._measured == self.version
 
     @measured.setter
@@ -185,7 +185,7 @@ class Lowered(ById, ByNumber):
 
     @property
     def followed(self) -> bool:
-        """Whether the clock tells how the balance of energy has gone up to the present state."""
+        """Tell whether the clock knows the balance of energy up to the present state."""
         return self._watched == self.version
 
     @followed.setter
@@ -194,7 +194,7 @@ class Lowered(ById, ByNumber):
 
     @property
     def bounces(self) -> int:
-        """How often points were reflected at the edge of the domain."""
+        """Number of times that points were reflected at the edge of the domain."""
         return int(self.total("bounces"))
 
     def clear_forces(self) -> None:
@@ -234,7 +234,7 @@ class Lowered(ById, ByNumber):
         show_heat(s.heat, s, self.mode)
 
     def snapshot(self, before: dict[str, np.ndarray] | None = None) -> dict[str, np.ndarray]:
-        """Copies of every array that a step changes, and of the published values.
+        """Copy every array that a step changes, and the published values.
 
         The copies of the snapshot `before`, which is lost, are used again where they fit.
         """
@@ -249,19 +249,19 @@ class Lowered(ById, ByNumber):
         self.version += 1
 
     def stored(self) -> Iterator[checkpoint.Stored]:
-        """What a file to go on from holds, array by array."""
+        """Yield what a file to go on from holds, array by array."""
         if self.subdomain is None:
             return checkpoint.stored(self)
         return part_state.stored(self)
 
     def stored_snapshot(self, snapshot: dict[str, np.ndarray]) -> Iterator[checkpoint.Stored]:
-        """What such a file holds of a snapshot."""
+        """Yield what such a file holds of a snapshot."""
         if self.subdomain is None:
             return checkpoint.in_file(snapshot)
         return part_state.stored(self, snapshot)
 
     def take_snapshot(self, path: Path) -> dict[str, np.ndarray]:
-        """The snapshot that a file holds; each process reads its own share."""
+        """Read the snapshot that a file holds; each process reads its own share."""
         with checkpoint.opened(path, "good") as found:
             if self.subdomain is not None:
                 return part_state.own_share(self, found)
