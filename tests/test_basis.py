@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from numba import njit
 from tensors import ALL_KINEMATICS, every_kinematics, flat
 
+from karamelo_py.compiler.compile import shared
 from karamelo_py.points.basis import (
     affine_weight,
     blank,
@@ -433,6 +434,11 @@ def test_boxes_stay_single(basis, kin):
 
 
 def after_box(basis, kin, grid, place, dl):
+    return moved_box(basis, kin, grid, place, dl)
+
+
+@shared
+def moved_box(basis, kin, grid, place, dl):
     new = deformed(basis, kin, place, dl)
     if carried(basis, kin) > 0:
         stencil = locate(basis, kin, grid, place)

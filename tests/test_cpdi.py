@@ -230,8 +230,8 @@ def nearby_displacements(kin, d, angle):
     """The increment dl of a turn in the plane of x and y."""
     dl = np.zeros((d, d))
     dl[:2, :2] = [[np.cos(angle) - 1, -np.sin(angle)], [np.sin(angle), np.cos(angle) - 1]]
-    flat = tuple(dl.ravel())
-    return (*flat, 0.0) if isinstance(kin, Axisymmetric) else flat
+    around = (0.0,) if isinstance(kin, Axisymmetric) else ()
+    return kin.Tensor._make([*dl.ravel(), *around])
 
 
 @pytest.mark.parametrize("basis, kin", [(R4, PlaneStrain()), (R8, Space())])
