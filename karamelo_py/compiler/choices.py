@@ -1,4 +1,4 @@
-"""What was chosen by type for compiled code: that is in the key of a kernel, and nothing else."""
+"""Choices by type that compiled code has made: the key of a kernel has these, and no others."""
 
 import functools
 import sys

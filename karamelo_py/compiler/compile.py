@@ -1,4 +1,4 @@
-"""How the package compiles: kernels, and point functions that are chosen by type."""
+"""Decorators that compile kernels, and point functions that are chosen by type."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple

@@ -95,7 +95,7 @@ def name_of(kind: type) -> str:
 
 
 def is_kept(kind: type) -> bool:
-    """Whether a field outlives a step."""
+    """Check that a field outlives a step."""
     return getattr(kind, "kept", True)
 
 

@@ -1,4 +1,4 @@
-"""What a compiled kernel was made of, as a hash: while it stays the same, so does the kernel.
+"""Hash of all that a compiled kernel was made of: while it stays the same, so does the kernel.
 
 Numba does not notice when a function in another file changes. Here everything that a kernel's code
 can depend on is followed from the living functions: what it calls through its globals and closure
@@ -124,7 +124,7 @@ def fingerprint(
 
 
 def _look(thing: Any) -> tuple[str, list]:
-    """What one thing is, in words, and the other things that it consists of."""
+    """Describe a thing in words, and list the other things that it consists of."""
     kind = type(thing).__name__
     if isinstance(thing, python.ModuleType):
         return f"module {thing.__name__}", []
@@ -189,7 +189,7 @@ def _function(function: Callable) -> tuple[str, list]:
 
 
 def _from_module(value: Any, names: tuple[str, ...], above: tuple) -> list:
-    """What a function may take from a module, or from modules in it, by the names in its code."""
+    """List the things in a module, and in modules of it, that a function's code names."""
     if not isinstance(value, python.ModuleType) or value in above:
         return []
     if value.__name__.partition(".")[0] in _OPAQUE:
@@ -203,7 +203,7 @@ _NOWHERE = object()
 
 
 def _choosers(function: Callable) -> list:
-    """What decides on the code of a function that is chosen by type."""
+    """List the choosers that decide on the code of a function that is chosen by type."""
     return [inspect.unwrap(chooser) for chooser in choosers.get(function, ())]
 
 

@@ -384,7 +384,7 @@ def traced(dispatch: Callable, chooser: Callable, last: bool = False) -> None:
 
 
 def _call(function: Callable, arguments: tuple) -> Any:
-    """What a function gives that is chosen by the types of its arguments, if one is chosen."""
+    """Call the function that is chosen by the types of the arguments, if one is chosen."""
     if function not in choosers:
         return NotImplemented
     lowering = now()
@@ -403,5 +403,5 @@ Lowering.dispatch = staticmethod(_call)
 
 
 def write_into(builder: Any) -> Lowering:
-    """What writes code with this builder."""
+    """Make a lowering that writes code with this builder."""
     return Lowering(_seen, builder)

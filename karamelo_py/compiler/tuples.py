@@ -30,7 +30,7 @@ def nested_as(like, numbers):
 
 @shared
 def count_in(nested):
-    """How many numbers nested tuples have."""
+    """Count the numbers in nested tuples."""
     if type(nested) is tuple and not nested:
         return 0
     return sum([count_in(item) if isinstance(item, tuple) else 1 for item in nested])

@@ -1,4 +1,4 @@
-"""What stands for a number, lanes, an array or a held tuple where a kernel is written down.
+"""Traced values: numbers, lanes, arrays and references to tuples while a kernel is written down.
 
 See :mod:`karamelo_py.compiler.trace`: Python runs a function on these, and every operation that
 meets one becomes code of the function that is compiled.

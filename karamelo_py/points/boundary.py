@@ -6,7 +6,7 @@ from karamelo_py.points.grid import Grid, in_cells, pick
 
 
 class Bounces(Field):
-    """How often the edge of the domain has reflected a point, in each direction."""
+    """Count of a point's reflections at the edge of the domain, in each direction."""
 
     shape = vector
 

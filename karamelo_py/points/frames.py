@@ -32,7 +32,7 @@ class DeformationGradient(Field):
 
     @staticmethod
     def needed(law: NamedTuple) -> bool:
-        """Whether a law has no F of its own."""
+        """Check that a law has no F of its own."""
         return not deformation.defined(type(law))
 
 
@@ -45,7 +45,7 @@ class Total(NamedTuple):
 
 @point_function(otherwise=True)
 def follows(frame):
-    """Whether weights follow the points; constant at compile time."""
+    """Check that weights follow the points; constant at compile time."""
     return True
 
 

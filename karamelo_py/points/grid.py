@@ -58,7 +58,7 @@ def cells_along(grid, direction):
 
 @shared
 def inside(grid, kin, x):
-    """Whether the position `x` lies on the grid."""
+    """Check that the position `x` lies on the grid."""
     within = x[0] == x[0]
     for k in range(dimension(kin)):
         a = in_cells(grid, k, x[k])

@@ -1,4 +1,4 @@
-"""How the solids of a scene lie and move: sums over their points, without the points."""
+"""Positions and motion of the solids of a scene: sums over their points, without the points."""
 
 from collections.abc import Iterator
 from itertools import product

@@ -1,4 +1,4 @@
-"""How a lowered scene goes forward in time: chunks of compiled steps, watched from Python."""
+"""Advance of a lowered scene in time: chunks of compiled steps, watched from Python."""
 
 from __future__ import annotations
 

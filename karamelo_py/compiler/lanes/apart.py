@@ -106,7 +106,7 @@ def _all_lanes(lowering: Any, function: Callable, unrolled: bool, arguments: tup
 
 
 def _lane_by_lane(function: Callable, unrolled: bool, arguments: tuple) -> Any:
-    """What a function of numbers gives for one lane after another."""
+    """Call a function of numbers for one lane after another."""
     raise NotImplementedError
 
 

@@ -74,7 +74,7 @@ class EightLanes(NamedTuple):
 
 
 def lanes_for(bits: int) -> type:
-    """How many points are visited at once, of numbers with so many bits; kept sorted for that."""
+    """Choose the lanes for numbers of so many bits: the points visited at once, sorted for that."""
     return {64: FourLanes, 32: EightLanes}[bits]
 
 
@@ -101,7 +101,7 @@ def spread(tag, value):
 
 
 def _masked(builder: Any, p: Any, width: int) -> Any:
-    """Which lanes of a group have a point."""
+    """Make the mask of the lanes of a group that have a point."""
     count = splat(builder, builder.extract_value(p, 1), Lanes(types.int64, width))
     numbers = constant(list(range(width)), ir.IntType(64))
     return builder.icmp_signed("<", numbers, count)
@@ -132,7 +132,7 @@ def room_for(points, numbers):
 
 @intrinsic
 def _present(p):
-    """Which lanes have a point."""
+    """Make the mask of the lanes that have a point."""
     mask = Lanes(types.boolean, p.width)
 
     def codegen(builder, sig, arguments):
@@ -161,7 +161,7 @@ def at_lane(builder, kind, array, of, at, k, *rest):
 
 
 def _load(builder, array, pointer, p, lanes):
-    """What lies from `pointer` on, for the points there are; the first's for the other lanes."""
+    """Load the numbers from `pointer` on, one a point; lanes without a point get the first's."""
     vector = vector_of(lanes)
     size = lanes.scalar.bitwidth // 8
     at = builder.bitcast(pointer, vector.as_pointer())
@@ -199,14 +199,14 @@ def _first_everywhere(builder: Any, value: Any) -> Any:
 
 
 def all_same(builder: Any, lanes: Lanes, value: Any) -> Any:
-    """Whether all lanes have the same whole number."""
+    """Check that all lanes have the same whole number."""
     same = builder.icmp_signed("==", value, _first_everywhere(builder, value))
     bits = builder.bitcast(same, ir.IntType(lanes.width))
     return builder.icmp_signed("==", bits, ir.Constant(bits.type, -1))
 
 
 def _is_full(builder: Any, p: Any, lanes: Lanes) -> Any:
-    """Whether all lanes of a group have a point, as nearly all groups do."""
+    """Check that all lanes of a group have a point, as nearly all groups do."""
     return builder.icmp_signed("==", builder.extract_value(p, 1), ir.Constant(I64, lanes.width))
 
 

@@ -24,7 +24,7 @@ class Lanes(types.Type):
 
 
 def element(scalar: types.Type) -> ir.Type:
-    """How a number lies in a register."""
+    """Return LLVM's type of a number in a register."""
     if isinstance(scalar, types.Boolean):
         return ir.IntType(1)
     if isinstance(scalar, types.Integer):
@@ -63,7 +63,7 @@ def pack(builder: Any, values: list, lanes: Lanes) -> Any:
 
 
 def shape(lanes: Lanes) -> str:
-    """What LLVM's intrinsics call a vector: v4f64."""
+    """Return the name of a vector in LLVM's intrinsics: v4f64."""
     kind = "f" if isinstance(lanes.scalar, types.Float) else "i"
     return f"v{lanes.width}{kind}{lanes.scalar.bitwidth}"
 

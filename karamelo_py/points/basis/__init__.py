@@ -93,7 +93,7 @@ def mapped_again(basis, grid, moment):
 
 @point_function(otherwise=True)
 def first_node(basis, like):
-    """What is added to a position in cells, so that its whole part tells which nodes are seen."""
+    """Return the offset of a position in cells after which its whole part is its first node."""
     return 0
 
 
@@ -101,7 +101,7 @@ def first_node(basis, like):
 
 
 def shape_size(basis: type, d: int) -> int:
-    """How many numbers a place has behind the position, in `d` dimensions."""
+    """Count the numbers that a place has behind the position, in `d` dimensions."""
     shape = getattr(basis, "shape", ())
     corners = basis.element.corners if "corners" in shape else 0
     sizes = {"half_size": d, "half_edges": d * d, "deformation": d * d, "corners": corners * d}
@@ -122,7 +122,7 @@ def deformed(basis, kin, place, dl):
 
 @point_function(otherwise=True)
 def extent(basis, kin, grid, place):
-    """How far from the point the corners of its domain reach, in cells; 0 where none are kept.
+    """Return the reach of the corners of the point's domain, in cells; 0 where none are kept.
 
     Or how far the nodes lie that they may give to, if that is further.
     """
@@ -131,13 +131,13 @@ def extent(basis, kin, grid, place):
 
 @point_function(otherwise=True)
 def carried(basis, kin):
-    """How many corners of the domain go with the velocity of the grid; constant at compile time."""
+    """Count the corners of the domain that move with the grid; constant at compile time."""
     return 0
 
 
 @point_function(otherwise=True)
 def placed(basis, kin):
-    """How many corners a place keeps by their positions, right behind the point's own."""
+    """Count the corners that a place keeps by their positions, right behind the point's own."""
     return 0
 
 

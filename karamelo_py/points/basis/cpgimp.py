@@ -19,7 +19,7 @@ MOST = 1.0
 
 
 class _Box(NamedTuple):
-    """What all these bases are."""
+    """Base of these bases."""
 
     cells = 3
     nodes_per_cell = 1

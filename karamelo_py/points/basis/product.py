@@ -38,7 +38,7 @@ class Stencil(NamedTuple):
 
 @shared
 def sees_same_nodes(stencil):
-    """Whether the points in all lanes see the same nodes."""
+    """Check that the points in all lanes see the same nodes."""
     first, *rest = (is_one(line.first) for line in stencil.lines)
     for same in rest:
         first = first & same
@@ -77,7 +77,7 @@ def inverse_spread(basis, grid):
 
 @point_function(otherwise=True)
 def evenly(basis, grid, stencil):
-    """Whether D^-1 of a point is `inverse_spread`."""
+    """Check that D^-1 of a point is `inverse_spread`."""
     return True
 
 

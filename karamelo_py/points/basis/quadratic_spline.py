@@ -60,7 +60,7 @@ def at_wall(grid, a, last):
 
 
 def in_bulk(grid, line, direction):
-    """Whether these are the splines, and not the functions at a wall."""
+    """Check that these are the splines, and not the functions at a wall."""
     return (cells_along(grid, direction) > 1) & (line.r >= 0.5) & (line.r < 1.5)
 
 

@@ -1,4 +1,4 @@
-"""Where the surface of a body is, from what a node knows of the body's points."""
+"""Surface of a body, from the sums over the body's points at a node."""
 
 from typing import NamedTuple
 

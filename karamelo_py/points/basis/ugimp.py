@@ -36,7 +36,7 @@ def box(grid, kin, place, direction, least, most):
 
 
 def in_cell(lo, hi, j):
-    """How much of [lo, hi] lies in the cell between nodes j and j + 1, and its share of node j + 1.
+    """Integrate over the part of [lo, hi] in the cell between nodes j and j + 1.
 
     The integrals over the cell of 1 and of the hat function of node j + 1.
     """

@@ -47,7 +47,7 @@ def law_kind(law: NamedTuple) -> tuple[type, ...]:
 
 
 def can(law: NamedTuple, function: Callable) -> bool:
-    """Whether a point function is defined for a law, or for one of its parts."""
+    """Check that a point function is defined for a law, or for one of its parts."""
     return any(function.defined(kind) for kind in law_kind(law))
 
 
@@ -131,7 +131,7 @@ def wave_speed_squared(law, kin, state):
 
 @point_function(otherwise=True)
 def wave_speed_bound(law, kin, state):
-    """What `wave_speed_squared` is not above, where that is cheaper: most points are slower yet."""
+    """Bound `wave_speed_squared` from above, where that is cheaper: most points are slower yet."""
     return wave_speed_squared(law, kin, state)
 
 

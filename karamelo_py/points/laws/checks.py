@@ -1,4 +1,4 @@
-"""What parameters of several laws have to fulfil."""
+"""Checks of parameters that several laws have."""
 
 from karamelo_py.script.errors import ScriptError
 

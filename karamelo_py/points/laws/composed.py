@@ -1,4 +1,4 @@
-"""What the parts of a law remember at a point, and what they are to each other.
+"""State of a law made of parts, and the quantities that follow from several parts.
 
 `law` is a record with the parts of `karamelo_py.points.laws.eos_strength`. Pressure, speed of sound
 and damage need more than one of them.
@@ -29,7 +29,7 @@ from karamelo_py.points.laws.viscosity import (
 
 
 class Memory(NamedTuple):
-    """What the parts of a law remember at one point: tuples, empty for parts without."""
+    """States of the parts of a law at one point: tuples, empty for parts without."""
 
     energy: Any  # of the equation of state
     viscous: Any  # viscous pressure

@@ -237,7 +237,7 @@ def _wave_speed_squared_eos_strength(law, kin, state):
 
 @energy_density.on(EosStrength)
 def _energy_density_eos_strength(law, kin, state):
-    """What unloading gives back at this temperature: plastic work is not stored."""
+    """Return the energy that unloading at this temperature frees: plastic work is not stored."""
     J, s, m = state
     elastic = strengths.elastic_ratio(law.strength, m.strength, J)
     volume = compression_energy(law.eos, elastic, m.energy)

@@ -29,7 +29,7 @@ laws.column(PlasticRate, "epdot", Smoothed())
 
 
 class RateMemory(NamedTuple):
-    """What a point remembers."""
+    """State of a point."""
 
     rate: Any
     ep: Any  # plastic strain, -1 where none is known yet
@@ -60,7 +60,7 @@ def last_memory(memories):
 
 
 def has_rate(law: NamedTuple) -> bool:
-    """Whether a law has plastic strain, so that it has a rate."""
+    """Check that a law has plastic strain, so that it has a rate."""
     return isinstance(law, EosStrength) and "ep" in laws.columns_of(law)
 
 

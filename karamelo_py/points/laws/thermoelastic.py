@@ -124,7 +124,7 @@ def _wave_speed_bound_thermoelastic(law, kin, state):
 
 @laws.energy_density.on(Thermoelastic)
 def _energy_density_thermoelastic(law, kin, state):
-    """What unloading gives back at this temperature."""
+    """Return the energy that unloading at this temperature frees."""
     j = laws.jacobian(law, kin, state)
     elastic = laws.energy_density(law.elastic, kin, state.elastic)
     return elastic + expansion_pressure(law, state) * (1 - j)

@@ -38,7 +38,7 @@ def updated_velocity(transfer, v, v_pic, dv):
 
 @point_function()
 def lost_shares(transfer, like):
-    """How much of the kinetic energy is lost that mapping to the nodes, and back, takes.
+    """Return the lost shares of the kinetic energy that mapping to the nodes, and back, takes.
 
     Two numbers. What is not lost comes back with what the points keep. Left out where nobody knows:
     the energy then goes without trace.
@@ -86,7 +86,7 @@ def affine_velocity(transfer, moment, inverse_d):
 
 @point_function(otherwise=True)
 def zero_moment(transfer, kin, like):
-    """What a point at rest keeps, as a tuple: empty for transfers that keep nothing."""
+    """Return the moment of a point at rest, as a tuple: empty for transfers that keep nothing."""
     return ()
 
 
@@ -107,19 +107,19 @@ def by_arms(transfer, inverse_d):
 
 @point_function(otherwise=True)
 def gradient_weight(transfer, basis, kin, grid, stencil, k, gradient):
-    """What stands for the gradient of the k-th node in strains and forces: `gradient` itself."""
+    """Return the weight of the k-th node in strains and forces: here its `gradient`."""
     return gradient
 
 
 @point_function(tags=2, otherwise=True)
 def forces_by_arms(transfer, kin):
-    """Whether N_I D^-1 (X_I - x) is all of `gradient_weight`; constant at compile time."""
+    """Check that N_I D^-1 (X_I - x) is all of `gradient_weight`; constant at compile time."""
     return False
 
 
 @point_function(tags=2, otherwise=True)
 def straining(transfer, kin, gradient):
-    """What a gather of velocity and gradient sums up for the strain: `gradient`, or nothing."""
+    """Return the strain's term in a gather of velocity and gradient: `gradient`, or nothing."""
     return gradient
 
 

@@ -1,4 +1,4 @@
-"""What the affine transfers share: the moment of velocity B that a point keeps.
+"""Base of the affine transfers: the moment of velocity B that a point keeps.
 
 B_p = sum_I N_I v*_I (X_I - x_p)^T, and the point gives the node
 m_p (N_I v_p + B_p N_I D^-1 (X_I - x_p)). Keeping B rather than C = B D^-1 conserves angular

@@ -1,4 +1,4 @@
-"""What the Taylor transfers share: the gradient of velocity that a point keeps.
+"""Base of the Taylor transfers: the gradient of velocity that a point keeps.
 
 The point gives the node m_p N_I (v_p + L_p (X_I - x_p)), with L_p = sum_I v*_I (x) grad N_I: no D
 is inverted, so that every basis will do. Where D^-1 N_I (X_I - x) is the gradient (linear,

@@ -25,7 +25,7 @@ class Reflected(StepField):
 
     @staticmethod
     def needed(law: NamedTuple) -> bool:
-        """Whether points of a law take as heat what a transfer takes."""
+        """Check that points of a law take the transfer's loss of energy as heat."""
         return can(law, taken_heat)
 
 

@@ -99,7 +99,7 @@ class ByNumber:
         return x
 
     def occupied_nodes(self) -> tuple[int, int]:
-        """How many nodes have mass, and the last of them."""
+        """Count the nodes that have mass, and find the last of them."""
         there = self.nodes_with_mass()
         count = self.comm.allreduce(np.array([len(there)]))
         return int(count[0]), int(

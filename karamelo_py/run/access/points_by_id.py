@@ -83,7 +83,7 @@ class ById:
         return PointTable(self.hub, self.rows()).position
 
     def total(self, name: str, group: Any = None) -> float:
-        """What all points, or those of a group, have together of `SUMMED`; without rounding."""
+        """Sum a quantity of `SUMMED` over all points, or those of a group; without rounding."""
         limbs = np.zeros((1, LIMBS), np.int64)
         for block in self.setup.blocks:
             values = SUMMED[name](self.setup, block)
@@ -143,7 +143,7 @@ class ById:
         return np.array([rounded(of) for of in of_all]).reshape(terms.shape[1:])
 
     def each(self, part: Any, name: str, *arguments: Any) -> list:
-        """What a method of a part says of some points of its group after others, where it does."""
+        """Collect the answers of a part's method for some points of its group after others."""
         own = list(self._said(part, name, *arguments))
         return [one for of_rank in self.comm.allgather(own) for one in of_rank]
 
@@ -153,7 +153,7 @@ class ById:
         return (one for one in found if one is not None)
 
     def seen(self, say: Callable, *arguments: Any) -> list:
-        """What a function says of the points at hand, of each process."""
+        """Gather a function's answer for the points of each process."""
         return self.comm.allgather(say(self, *arguments))
 
     def largest(self, of: Callable[[PointTable], np.ndarray]) -> tuple[float, int]:
@@ -162,7 +162,7 @@ class ById:
         return value, -number
 
     def everyone(self, what: str, thing: Any) -> list:
-        """What each process has, where all ask for the same (in words).
+        """Gather the things of all processes, which have to ask for the same (in words).
 
         Raises
         ------
@@ -180,12 +180,12 @@ class ById:
         return list(found)
 
     def at_first(self, make: Callable[[list], list], thing: Any) -> Any:
-        """What the first process makes of what each has: for each its own."""
+        """Gather things at the first process, make an answer for each, and scatter the answers."""
         found = self.comm.gather(thing)
         return self.comm.scatter(None if found is None else make(found))
 
     def counts(self) -> list[int]:
-        """How many points each block has."""
+        """Count the points of each block."""
         own = [len(block.points.id) for block in self.setup.blocks]
         return self.comm.allreduce(np.array(own)).tolist()
 

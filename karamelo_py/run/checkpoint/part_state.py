@@ -1,4 +1,4 @@
-"""What a file to go on from holds, from the parts of all processes, so many points at a time."""
+"""State for a restart file, from the parts of all processes, so many points at a time."""
 
 from collections.abc import Iterator, Mapping
 from itertools import pairwise

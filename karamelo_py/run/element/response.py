@@ -1,4 +1,4 @@
-"""What a point answers: a table of its strains, stresses and energies, and a picture of it."""
+"""Response of a point: a table of its strains, stresses and energies, and a picture of it."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -27,7 +27,7 @@ def von_mises_stress(point: Point) -> float:
 
 
 def columns(point: Point) -> dict[str, Callable[[], float]]:
-    """What is written of a point, by the name of the column."""
+    """Return the columns that are written of a point, by name."""
     law, kin = point.law, point.kin
     count = len(kin.symmetric_names)
     found: dict[str, Callable[[], float]] = {"time": lambda: point.time}

@@ -63,7 +63,7 @@ SERIAL_UP_TO = 20_000  # points; below, waking threads costs more than they save
 
 
 class State(NamedTuple):
-    """What outlives a run, of all points in the order of their ids; arrays (components, N)."""
+    """State of all points after a run, in the order of their ids; arrays (components, N)."""
 
     count: int  # number of points, N
     present: np.ndarray  # (N,) bool, False for points that were deleted
@@ -250,7 +250,7 @@ def lower(
 
 
 def returns_loss(hub: Hub) -> bool:
-    """Whether kinetic energy that the transfer takes heats points of the scene.
+    """Check that kinetic energy that the transfer takes heats points of the scene.
 
     FLIP with a share of 1 takes none that does not vanish with the step, unless it keeps moments.
     XPIC has its own way (`kernels.loss.reflect`).
@@ -265,7 +265,7 @@ def returns_loss(hub: Hub) -> bool:
 
 
 def warms_by_friction(hub: Hub) -> bool:
-    """Whether friction on the grid heats points of the scene."""
+    """Check that friction on the grid heats points of the scene."""
     on_grid = hub.update.method.fields_per_solid
     rubs = any(
         fix.wall_friction is not None or (on_grid and fix.friction) for fix in hub.fixes.values()

@@ -67,7 +67,7 @@ def extents(starts: np.ndarray, begin: np.ndarray, end: np.ndarray) -> tuple[np.
 
 
 def used(spans: np.ndarray) -> np.ndarray:
-    """What of an array of spans is in use, the first row with their number."""
+    """Return the rows of an array of spans that are in use, the first row with their number."""
     return spans[: 1 + spans[0, 0]]
 
 

@@ -131,7 +131,7 @@ class Tiles:
         self._layout = np.zeros(2, np.int64), np.zeros(1, np.int64), np.zeros((0, 10), np.int64)
 
     def _by_rows(self, shaped: bool) -> bool:
-        """Whether it is known of each row of a box what of it points may reach.
+        """Check that the part that points may reach is known of each row of a box.
 
         Rows of nodes are tiles of nodes then. Of the boxes around a bar that has spread at one end
         points reach little at the other.
@@ -179,7 +179,7 @@ class Tiles:
         ]
 
     def empty_nodes(self, s: Setup) -> None:
-        """What points gave to the nodes in use becomes zero."""
+        """Set the sums of points at the nodes in use to zero."""
         _empty(s, used(s.spans)[1:])
         if not self.direct:
             for one in buffers_of(s):
@@ -204,7 +204,7 @@ class Tiles:
         self.sorts += 1
 
     def _reach(self, s: Setup, block: Block, x: np.ndarray) -> float:
-        """How many cells from where points lie now what gives to nodes may lie."""
+        """Bound the distance of points' contributions from their present positions, in cells."""
         far = 0.0
         if len(x) > self.dimension:
             far = widest(s.kin, s.basis, s.grids, x, block.points.grid)
@@ -386,7 +386,7 @@ class Tiles:
         return Boxes(np.arange(len(box)), grid, box[:, :d], box[:, d:], rows)
 
     def _reached(self, boxes: Boxes) -> tuple[Boxes, Reached]:
-        """What the boxes reach."""
+        """Find the tiles of nodes that the boxes reach."""
         size = self.node_size
         low = boxes.lo // size
         across = boxes.hi // size - low + 1
@@ -458,7 +458,7 @@ class Tiles:
 
 
 def _empty(s: Setup, spans: np.ndarray) -> None:
-    """What points gave to the nodes of spans (k, 2) becomes zero."""
+    """Set the sums of points at the nodes of spans (k, 2) to zero."""
     of = [s.nodes] + ([s.heat.nodes] if isinstance(s.heat, Conducting) else [])
     arrays = [array for nodes in of for array in summed(nodes)]
     for begin, end in spans.tolist():

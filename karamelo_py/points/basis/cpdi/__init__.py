@@ -28,7 +28,7 @@ class Element(NamedTuple):
 
 
 class ConvectedDomain(NamedTuple):
-    """What all these bases are; they add `dimension`, `shape` and, for `corners`, `element`."""
+    """Base of these bases; they add `dimension`, `shape` and, for `corners`, `element`."""
 
     cells = 3
     nodes_per_cell = 1
@@ -54,4 +54,4 @@ def domain(basis, kin, place):
 
 @point_function()
 def upright(basis, kin, place):
-    """Whether the domain is nowhere folded over: the Jacobian is positive at every corner."""
+    """Check that the domain is nowhere folded over: the Jacobian is positive at every corner."""

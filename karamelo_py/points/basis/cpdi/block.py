@@ -62,13 +62,13 @@ def block_of(kin, grid, stencil):
 
 @shared
 def is_whole(block):
-    """Whether all that the points in all lanes see lies in their blocks."""
+    """Check that the points in all lanes see only nodes of their blocks."""
     return len(block) > 0 and all_lanes(block.holds)
 
 
 @shared
 def is_one_block(block):
-    """Whether, besides, they see the same block."""
+    """Check that the points in all lanes see only nodes of one block."""
     if len(block) == 0:
         return False
     row, line = block.first

@@ -1,4 +1,4 @@
-"""What all domains share: from corners, their weights and gradients to nodes."""
+"""Stencils of domains: from corners, their weights and gradients to nodes."""
 
 from math import inf
 from typing import Any, NamedTuple
@@ -32,7 +32,7 @@ from karamelo_py.points.kinematics.tensors import cofactor, determinant, total
 
 
 class Corner(NamedTuple):
-    """Where a corner lies on the grid."""
+    """Position of a corner on the grid."""
 
     cell: tuple[int, ...]  # its cell, along each direction
     fractions: tuple[float, ...]  # how far into the cell, along each direction
@@ -40,7 +40,7 @@ class Corner(NamedTuple):
 
 
 class CornerStencil(NamedTuple):
-    """What the nodes that a point sees are made of. Nobody computes what nobody reads of it."""
+    """Corners of a domain, from which its nodes follow. Fields that nobody reads cost nothing."""
 
     corners: tuple[Corner, ...]
     weights: tuple[float, ...]  # of the corners, and their gradients

@@ -34,7 +34,7 @@ def _dot(a, b):
 
 
 def _at_gauss(a, b, c, d):
-    """What a bilinear function with these values at (-,-), (+,-), (-,+), (+,+) is at Gauss points.
+    """Interpolate values at (-,-), (+,-), (-,+), (+,+) to the Gauss points, bilinearly.
 
     Also, since the weights are symmetric, what values at the Gauss points give to the corners.
     """
@@ -111,7 +111,7 @@ def _domain_h8_space(basis, kin, place):
 
 
 def _at(a: int, b: int) -> int:
-    """Which of the four in the order of `_at_gauss`."""
+    """Return the index of one of the four in the order of `_at_gauss`."""
     return (a > 0) + 2 * (b > 0)
 
 

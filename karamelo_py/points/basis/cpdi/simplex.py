@@ -60,7 +60,7 @@ def domain_of(basis, kin, place):
 
 
 def upright_simplex(basis, kin, place):
-    """Whether the volume is positive."""
+    """Check that the volume is positive."""
     return determinant(corners_and_edges(kin, place)[1], kin.dimension) > 0
 
 

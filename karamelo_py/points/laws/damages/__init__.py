@@ -30,4 +30,4 @@ def integrity(damage, memory):
 
 @point_function()
 def initiation(damage, memory):
-    """What grows to 1 before damage begins."""
+    """Return the initiation of damage: it grows to 1 before damage begins."""

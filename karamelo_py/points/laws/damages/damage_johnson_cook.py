@@ -86,7 +86,7 @@ column(JohnsonCookDamage, "damage_init", damage_initiation)
 
 
 class Accumulated(NamedTuple):
-    """What a point remembers."""
+    """State of a point."""
 
     w: Any  # sum of plastic strain over failure strain
 

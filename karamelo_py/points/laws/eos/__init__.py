@@ -38,7 +38,7 @@ def taken_heat(eos, memory, heat):
 
 @point_function(otherwise=True)
 def stored_heat(eos, loss):
-    """How much of the dissipated energy is in the memory and so in `compression_energy`."""
+    """Return the dissipated energy that is in the memory and so in `compression_energy`."""
     return loss - loss
 
 

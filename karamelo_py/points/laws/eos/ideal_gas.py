@@ -91,7 +91,7 @@ class IdealGas(NamedTuple):
 
 
 class InternalEnergy(NamedTuple):
-    """What a point remembers."""
+    """State of a point."""
 
     E: Any  # per reference volume
 

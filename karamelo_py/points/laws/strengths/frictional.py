@@ -1,4 +1,4 @@
-"""What strengths that depend on pressure share: cohesion and friction, perhaps softening; memory.
+"""Base of strengths that depend on pressure: cohesion and friction, perhaps softening; memory.
 
 The memory is the equivalent plastic strain ep, the plastic volume ratio Jp, and Js, that of
 separation.

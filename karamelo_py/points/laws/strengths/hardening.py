@@ -1,4 +1,4 @@
-"""What strengths of von Mises share: the radial return to a flow stress that hardens as it will."""
+"""Base of strengths of von Mises: the radial return to a flow stress with any hardening."""
 
 from math import sqrt
 

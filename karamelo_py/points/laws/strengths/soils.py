@@ -1,4 +1,4 @@
-"""What the strengths of soils share: their angles, and softening to a residual strength."""
+"""Base of the strengths of soils: their angles, and softening to a residual strength."""
 
 from math import radians
 from typing import NamedTuple
