@@ -105,9 +105,9 @@ STRESS = "fix(s, initial_stress, all, 5*cos(9*x0), 3, 0, 0, 0, 2*sin(50*x0*y0))"
 
 
 @pytest.mark.parametrize("stress", ["", STRESS], ids=["unstressed", "stressed"])
-def test_apic_conserves_angular_momentum(run_interpreted, stress):
+def test_apic_conserves_angular_momentum(run_script, stress):
     """To round-off (ten digits are logged), stressed or not (Jiang, Schroeder & Teran 2017)."""
-    log = run_interpreted(spinning("APIC", stress=stress)).log
+    log = run_script(spinning("APIC", stress=stress)).log
     # sum m r^2 of the points, by NumPy: 4 points a cell, offsets of a quarter of a cell
     places = 0.025 + 0.05 * np.arange(24)
     x, y = np.meshgrid(places - 0.6, places - 0.6)

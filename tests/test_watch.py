@@ -369,11 +369,11 @@ def test_a_drift_that_loads_give_does_not_hide_what_vibrates(run_script):
     assert log.E[log.Step <= int(step)][-1] - drift < 2 * log.E[0] < 0.015 * drift
 
 
-def test_points_that_drift_out_are_no_matter_of_the_step(run_interpreted):
+def test_points_that_drift_out_are_no_matter_of_the_step(run_script):
     """A free bar at constant speed: half the step brings it to the same edge."""
     lines = ["fix(v, initial_velocity_particles, all, 0.2)", "set_output(50)"]
     scene = DRIFTING.split("fix(v")[0].format(v=0, words="") + "\n".join(lines)
-    said = run_interpreted(scene + "\nrun_time(400, on_trouble=halve)", status=1).err
+    said = run_script(scene + "\nrun_time(400, on_trouble=halve)", status=1).err
     assert "leaves the domain" in said and "Back to step" not in said
 
 
