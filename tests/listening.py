@@ -1,16 +1,30 @@
-"""What Numba compiles, listened to."""
+"""What is compiled, listened to."""
 
-from numba.core import event
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from karamelo_py.compiler.loops import compilation
 
 
-class Compiled(event.Listener):
-    """The names of the functions that Numba compiles."""
+class Compiled:
+    """The names of the functions that are compiled."""
 
     def __init__(self):
         self.names = []
 
-    def on_start(self, event):
-        self.names.append(event.data["dispatcher"].py_func.__name__)
+    def on_start(self, name):
+        self.names.append(name)
 
-    def on_end(self, event):
+    def on_end(self):
         """Nothing more."""
+
+
+@contextmanager
+def listening() -> Iterator[list[str]]:
+    """The names of what is compiled meanwhile."""
+    listener = Compiled()
+    compilation.listeners.append(listener)
+    try:
+        yield listener.names
+    finally:
+        compilation.listeners.remove(listener)

@@ -291,10 +291,16 @@ class Forgetful(NamedTuple):
     G: float
 
 
+class Less(NamedTuple):
+    """One of the two numbers that a point remembers at first."""
+
+    ep: Any
+
+
 remembers(Forgetful, ep=0.0, R=0.0)
 shear_response.on(Forgetful)(radial_return)
 flow_stress.on(Forgetful)(lambda strength, memory, *others: (strength.G, strength.G))
-updated_memory.on(Forgetful)(lambda strength, memory, increment, dt: (memory[0],))
+updated_memory.on(Forgetful)(lambda strength, memory, increment, dt: Less(memory.ep))
 
 
 # --- parts of a step

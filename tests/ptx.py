@@ -1,21 +1,19 @@
 """One point of a scene as a thread of a GPU would visit it, compiled to PTX and machine code.
 
-Needs numba-cuda and NVIDIA's compiler libraries, but neither a GPU nor a driver.
+Needs NVIDIA's linker, but neither a GPU nor a driver.
 """
 
 import re
 from collections.abc import Callable
-from types import SimpleNamespace
 from typing import Any, NamedTuple
-from unittest.mock import patch
 
 import numpy as np
 from cuda.bindings import nvjitlink
-from numba import njit, typeof, types
-from numba.cuda import dispatcher
-from numba.cuda.compiler import compile as compile_for_gpu
+from numba import typeof
 
-from karamelo_py.compiler.compile import define, index
+from karamelo_py.compiler import loops, machine
+from karamelo_py.compiler.argument_buffer import ArgumentBuffer
+from karamelo_py.compiler.compile import define, index, shared
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Nodes, Setup
@@ -46,7 +44,6 @@ from karamelo_py.run.lower.build import lower
 from karamelo_py.scene.hub import Hub
 
 CAPABILITY = (9, 0)  # of an H100 or H200
-DEVICE = SimpleNamespace(compute_capability=CAPABILITY)
 
 
 class Compiled(NamedTuple):
@@ -113,12 +110,15 @@ def visits_of(setup: Setup, scheme: Any, in_stages: bool = False) -> list[Visit]
 
 def compiled(function: Any, *arguments: Any) -> Compiled:
     """A kernel for arguments of these types."""
-    signature = types.void(*map(typeof, arguments))
-    # The one place where Numba asks the driver when it compiles.
-    with patch.object(dispatcher, "get_current_device", lambda: DEVICE):
-        ptx, _ = compile_for_gpu(
-            function, signature, device=False, abi="numba", cc=CAPABILITY, output="ptx"
-        )
+    kinds = ArgumentBuffer(arguments).plan(arguments).types
+    module, _ = loops.written(shared(function), kinds)
+    main = module.globals[loops.NAME]
+    main.linkage = "internal"
+    main.attributes.discard("noinline")
+    main.attributes.add("alwaysinline")
+    module.globals[loops.NAME + loops.ENTRY].calling_convention = "ptx_kernel"
+    text = str(module).replace(loops.NAME, "kernel").replace(loops.ENTRY, "_entry")
+    ptx = machine.assembly(text, "nvptx64-nvidia-cuda", f"sm_{CAPABILITY[0]}{CAPABILITY[1]}")
     options = [f"-arch=sm_{CAPABILITY[0]}{CAPABILITY[1]}", "-verbose"]
     code = ptx.encode()
     linker = nvjitlink.create(len(options), options)
@@ -145,7 +145,7 @@ def calling(function: Callable, count: int) -> Callable:
     return define(
         f"out, {names}",
         f"for k, value in enumerate(function({names})): out[k] = value",
-        function=njit(function),
+        function=shared(function),
     )
 
 

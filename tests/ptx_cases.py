@@ -19,9 +19,8 @@ from karamelo_py.kernels.nodes import KeepLoss
 from karamelo_py.language import registry
 from karamelo_py.language.help import sections_of
 
-REASON = "needs numba-cuda and NVIDIA's compiler libraries: pip install 'karamelo-py[gpu]'"
+REASON = "needs NVIDIA's linker: pip install 'karamelo-py[gpu]'"
 pathfinder = pytest.importorskip("cuda.pathfinder", reason=REASON)
-pytest.importorskip("numba_cuda", reason=REASON)
 try:
     pathfinder.load_nvidia_dynamic_lib("nvvm")
     pathfinder.load_nvidia_dynamic_lib("nvJitLink")

@@ -12,11 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from numba import config, prange
+from numba import config
 
-from karamelo_py.compiler import cache, choices, fingerprint
-from karamelo_py.compiler.compile import point_function
+from karamelo_py.compiler import cache, choices, fingerprint, loops
+from karamelo_py.compiler.compile import point_function, shared
 from karamelo_py.compiler.loops import kernel
+from karamelo_py.compiler.threads import Threaded, shared_out
 from karamelo_py.kernels.step import step
 from karamelo_py.output.console import Console
 from karamelo_py.run.timings import Timings, _about
@@ -119,20 +120,20 @@ FILES = {
         """,
     "program.py": """
         import warnings
-        from numba.core import event
+        from karamelo_py.compiler.loops import compilation
         from loops import Pair, total
         from disks import Disk
         from squares import Square
         from strips import Strip
 
-        class Compiled(event.Listener):
+        class Compiled:
             names = []
-            def on_start(self, event):
-                if event.data["dispatcher"].py_func.__name__ == "total":
+            def on_start(self, name):
+                if name == "total":
                     self.names.append(type(shape).__name__)
-            def on_end(self, event): ...
+            def on_end(self): ...
 
-        event.register("numba:compile", Compiled())
+        compilation.listeners.append(Compiled())
         values = []
         with warnings.catch_warnings(record=True) as told:
             warnings.simplefilter("always")
@@ -395,16 +396,17 @@ def test_what_threads_do_is_followed(tmp_path, monkeypatch):
     """Loops over threads are compiled apart from the function that they stand in."""
     monkeypatch.setenv("KARAMELO_PY_CACHE", str(tmp_path))
 
-    def asked(tag, out):
-        for i in prange(out.size):
-            out[i] = answer(tag)
+    def put(tag, out, i):
+        out[i] = answer(tag)
 
-    threaded = kernel(asked, parallel=True)
+    put_all = shared_out(shared(put), "tag, out")
+    found = []
+    contents = choices.contents
+    monkeypatch.setattr(loops, "contents", lambda parts: found.append(contents(parts)) or found[-1])
     out = np.zeros(3)
-    threaded(Tag(), out)
+    kernel(lambda mode, tag, out: put_all(mode, out.size, tag, out))(Threaded(), Tag(), out)
     assert out.tolist() == [42, 42, 42]
-    (compiled,) = threaded.overloads.values()
-    chosen, codes = choices.contents(compiled.library)
+    chosen, codes = found[-1]
     name = f"{__name__}:answer"
     assert choices.Choice(name, (f"{__name__}:Tag",)) in chosen
     assert forty_two.__code__ in codes

@@ -1,5 +1,6 @@
 """Convected domains: weights and gradients, how domains move, what is refused."""
 
+import inspect
 from textwrap import dedent
 from types import SimpleNamespace
 
@@ -8,10 +9,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numba import njit
 from states import final_hub, same_bits, state_of
 
 from karamelo_py.compiler.compile import accumulate
+from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.tuples import row
 from karamelo_py.points.basis import (
     affine_weight,
@@ -230,8 +231,8 @@ def nearby_displacements(kin, d, angle):
     """The increment dl of a turn in the plane of x and y."""
     dl = np.zeros((d, d))
     dl[:2, :2] = [[np.cos(angle) - 1, -np.sin(angle)], [np.sin(angle), np.cos(angle) - 1]]
-    flat = tuple(dl.ravel())
-    return (*flat, 0.0) if isinstance(kin, Axisymmetric) else flat
+    around = (0.0,) if isinstance(kin, Axisymmetric) else ()
+    return kin.Tensor._make([*dl.ravel(), *around])
 
 
 @pytest.mark.parametrize("basis, kin", [(R4, PlaneStrain()), (R8, Space())])
@@ -274,7 +275,7 @@ def test_corners_go_with_the_grid(basis, kin):
     assert not np.isfinite(extent(basis(), kin, grid, (*place[:-1], np.nan)))
 
 
-@njit
+@kernel
 def sums(basis, kin, grid, place):
     stencil = locate(basis, kin, grid, place)
     weight = slope = arm = nodes = 0.0
@@ -293,7 +294,7 @@ def test_compiled_is_the_same(basis, kin):
     grid = lattice(kin).numbers(float)
     place = tuple(float(a) for a in a_place(basis, kin, 5))
     compiled = sums(basis(), kin, grid, place)
-    assert compiled == pytest.approx(sums.py_func(basis(), kin, grid, place), rel=1e-12)
+    assert compiled == pytest.approx(inspect.unwrap(sums)(basis(), kin, grid, place), rel=1e-12)
 
 
 # --- scenes -----------------------------------------------------------------------------------

@@ -13,7 +13,7 @@ from states import same_bits
 from comparisons.results import read_dump
 from karamelo_py.points.frames import Total, pulled_back
 from karamelo_py.points.heat import face
-from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
+from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space, tensor, vector
 
 # Heat capacity per volume and conductivity are one: the diffusivity is.
 SLAB = """
@@ -217,10 +217,11 @@ def test_flux_in_the_total_frame():
     for kin, d in ((PlaneStrain(), 2), (Space(), 3)):
         F = np.eye(d) + 0.3 * rng.normal(size=(d, d))
         g = rng.normal(size=d)
-        found = pulled_back(Total(), kin, tuple(g), tuple(F.ravel()))
+        found = pulled_back(Total(), kin, vector(kin, g), tensor(kin, F.ravel()))
         assert found == pytest.approx(np.linalg.inv(F.T @ F) @ g)
-    F = (2.0, 0.0, 0.0, 0.5, 1.7)  # the last is the stretch around the axis
-    assert pulled_back(Total(), Axisymmetric(), (1.0, 1.0), F) == pytest.approx((0.25, 4.0))
+    kin = Axisymmetric()
+    F = tensor(kin, (2.0, 0.0, 0.0, 0.5, 1.7))  # the last is the stretch around the axis
+    assert pulled_back(Total(), kin, vector(kin, (1.0, 1.0)), F) == pytest.approx((0.25, 4.0))
 
 
 def test_face_of_a_point():

@@ -2,17 +2,23 @@
 
 from typing import Any, NamedTuple
 
-import numba
 import numpy as np
 import pytest
+from llvmlite import binding as llvm
 from numba import config, typeof
-from numba.core.registry import cpu_target
 
-from karamelo_py.compiler import packed
+from karamelo_py.compiler import argument_buffer, code, machine
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.held import at_hand, held_type, hold, is_held
-from karamelo_py.compiler.loops import entered, kernel, loop, subkernel
-from karamelo_py.compiler.threads import Serial, Threaded, by_team, new_team, shared_out
+from karamelo_py.compiler.loops import kernel, noinline
+from karamelo_py.compiler.threads import (
+    Serial,
+    Threaded,
+    by_team,
+    new_team,
+    set_threads,
+    shared_out,
+)
 
 
 class Pair(NamedTuple):
@@ -36,7 +42,7 @@ class Setup(NamedTuple):
     fields: tuple
 
 
-@subkernel
+@noinline
 def _filled(s, k):
     s = at_hand(s)
     if s.on:
@@ -53,7 +59,7 @@ def _held_once(s):
     return _filled(hold(held), 1.0) and first
 
 
-@entered
+@kernel
 def _from_anywhere(s):
     return _filled(s, 0.0)
 
@@ -95,7 +101,7 @@ class Mixed(NamedTuple):
     inner: tuple
 
 
-@loop
+@kernel
 def _of_python(mixed, whole, out):
     out[0] = mixed.half if mixed.on else 0.0
     out[1] = mixed.pair[0] + 10 * mixed.pair[1][1]
@@ -129,7 +135,7 @@ def test_memory_that_moves_is_noticed():
     if not config.DISABLE_JIT:
         with pytest.raises(ValueError, match="resize"):
             out.resize(100_000, refcheck=False)
-    packed.forget(out)
+    argument_buffer.forget(out)
     out.resize(100_000, refcheck=False)
     out[:] = 0.0
     assert _of_python(mixed, 1, out)[1] == 100_000
@@ -149,30 +155,29 @@ def test_an_array_in_the_place_of_another():
         assert out[6] == k
         del out
     assert len(numbers) < 50  # Python has used numbers again
-    assert not numbers & packed._arrays.keys()
+    assert not numbers & argument_buffer._arrays.keys()
     one, other = np.zeros(8), np.zeros(8)
     _of_python(mixed, 1, one)
-    packed._arrays[id(other)] = packed._arrays[id(one)]  # as if nobody had told
+    argument_buffer._arrays[id(other)] = argument_buffer._arrays[id(one)]  # as if nobody had told
     _of_python(mixed, 2, other)
     assert (one[6], other[6]) == (1, 2)
-    known = len(_of_python.entries)
+    known = len(_of_python.kernel.units)
     other.shape = (8, 1)
     _of_python(mixed, 3, other)
     assert other[6] == 3
-    assert len(_of_python.entries) == known + 1  # a table is no row of numbers
+    assert len(_of_python.kernel.units) == known + 1  # a table is no row of numbers
 
 
 @pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
 def test_types_are_laid_as_llvm_lays_them():
-    target = cpu_target.target_context
-    data = target.codegen().target_data
+    data = llvm.create_target_data(str(machine._target().target_data))
     inner = (Pair(np.full(1, 0.5), np.zeros(0)),)
     values = Mixed(True, np.float32(1), (3, (1, 2.0)), np.eye(2), None, np.int32(0), inner)
     for value in (values, setup(), (True, (True, 1.5)), (np.float32(1), np.int8(2))):
         for kind in (typeof(value), held_type(typeof(value))):
-            model = target.data_model_manager[kind].get_data_type()
+            model = code.memory_type(kind)
             model = getattr(model, "pointee", model)
-            end, aligned = packed._lay(model, 0, [])
+            end, aligned = argument_buffer._lay(model, 0, [])
             size = -(-end // aligned) * aligned
             assert size == model.get_abi_size(data)
 
@@ -181,10 +186,10 @@ def _count_up(out, factor, k):
     out.a[k] += factor * k
 
 
-_counted = shared_out(subkernel(_count_up), "out, factor")
+_counted = shared_out(noinline(_count_up), "out, factor")
 
 
-@entered
+@kernel
 def _count_all(mode, out, factor):
     _counted(mode, out.a.size, out, factor)
 
@@ -192,7 +197,7 @@ def _count_all(mode, out, factor):
 @pytest.mark.parametrize("mode", [Serial(), Threaded()], ids=["serial", "threaded"])
 def test_each_number_is_done_once(mode):
     """By one thread or by several, with the same arguments."""
-    numba.set_num_threads(min(2, config.NUMBA_NUM_THREADS))
+    set_threads(min(2, config.NUMBA_NUM_THREADS))
     out = Pair(np.zeros(1000), np.zeros(1))
     _count_all(mode, out, 2.0)
     assert out.a.tolist() == [2.0 * k for k in range(1000)]
@@ -211,7 +216,7 @@ def _count_often(mode, out, factor, times):
 _often = by_team(_count_often, "out, factor, times")
 
 
-@loop
+@kernel
 def _often_from_python(mode, out, factor, times):
     return _often(mode, out, factor, times)
 
@@ -219,7 +224,7 @@ def _often_from_python(mode, out, factor, times):
 @pytest.mark.parametrize("threads", [1, 2, 5])
 def test_a_team_does_each_number_of_each_loop_once(threads):
     """Also where a thread of the team never begins, since there are fewer than it has."""
-    numba.set_num_threads(min(2, config.NUMBA_NUM_THREADS))
+    set_threads(min(2, config.NUMBA_NUM_THREADS))
     team = new_team(threads)
     for mode in (Threaded(team.ctypes.data), Threaded(), Serial()):
         out = Pair(np.zeros(500), np.zeros(1))

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from karamelo_py.compiler.fields import rows_of_points
-from karamelo_py.compiler.items import addresses_of_rows, pick_items, put_items
-from karamelo_py.compiler.loops import loop
+from karamelo_py.compiler.loops import kernel
+from karamelo_py.compiler.rows import addresses_of_rows, pick_items, put_items
 
 SMALL, LARGE = np.int32(0), np.int64(0)
 
@@ -16,7 +16,7 @@ def in_order(row, like, order, room, begin, end):
     put_items(row, like, room, 1, begin, end)
 
 
-@loop
+@kernel
 def in_order_compiled(row, like, order, room, begin, end):
     """The same, compiled."""
     in_order(row, like, order, room, begin, end)

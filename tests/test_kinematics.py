@@ -3,11 +3,13 @@
 Tolerances of 1e-12 are round-off of a dozen operations on numbers of order one.
 """
 
+import inspect
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numba import njit, typeof
+from numba import typeof
 from tensors import (
     ALL_KINEMATICS,
     deformations,
@@ -25,6 +27,7 @@ from tensors import (
 )
 
 from karamelo_py.compiler.compile import shared
+from karamelo_py.compiler.loops import kernel
 from karamelo_py.points.frames import Total, Updated, of_places_before
 from karamelo_py.points.kinematics import (
     Axisymmetric,
@@ -348,7 +351,7 @@ def of_all(kin, f, dl, s, a, g):
     )
 
 
-@njit
+@kernel
 def everything(kin, f, dl, s, a, g):
     return of_all(kin, f, dl, s, a, g)
 
@@ -360,7 +363,7 @@ def test_compiled_is_the_same(kin, data):
     f, dl = data.draw(deformations(kin)), data.draw(tensors(kin))
     s, a = data.draw(symmetric_tensors(kin)), data.draw(vectors(kin))
     g = data.draw(gradients(kin))
-    assert close(everything(kin, f, dl, s, a, g), everything.py_func(kin, f, dl, s, a, g))
+    assert close(everything(kin, f, dl, s, a, g), inspect.unwrap(everything)(kin, f, dl, s, a, g))
 
 
 @shared
@@ -381,7 +384,7 @@ def made(kin, f, dl, s, a, g):
     )
 
 
-@njit
+@kernel
 def all_tensors(kin, f, dl, s, a, g):
     return made(kin, f, dl, s, a, g)
 
@@ -397,8 +400,8 @@ def test_single_precision_stays_single(kin):
     s, a = single(kin.Symmetric, range(6)), single(kin.Vector, range(3))
     arguments = kin, f, dl, s, a, single(kin.Gradient, (0.1, 0.2, 0.3))
     results = all_tensors(*arguments)
-    (compiled,) = [c for types, c in all_tensors.overloads.items() if types[0] == typeof(kin)]
-    assert "float64" not in str(compiled.signature.return_type)
-    for found, exact in zip(results, all_tensors.py_func(*arguments), strict=True):
+    (unit,) = [u for k, u in all_tensors.kernel.units.items() if k[0] == typeof(kin)]
+    assert "float64" not in str(unit.result)
+    for found, exact in zip(results, inspect.unwrap(all_tensors)(*arguments), strict=True):
         assert all(type(a) in (np.float32, int) for a in exact)
         assert np.allclose(found, exact, rtol=1e-5, atol=1e-6)

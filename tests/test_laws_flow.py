@@ -5,11 +5,11 @@ from math import exp, log, sqrt
 import numpy as np
 import pytest
 from laws import isochoric, mises, pressure_of, start, stress, stretched
-from numba import njit
 from tensors import every_kinematics, flat
 
 from comparisons.results import read_log
 from karamelo_py.compiler.formula import CONSTANT, POINT
+from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.operations import OPERATIONS
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.laws import law_in, law_on, law_table
@@ -275,7 +275,7 @@ def test_compiled_laws_give_the_same_numbers():
         assert result == pytest.approx(advance(law, Space(), state, shear, 1e-3), rel=1e-12)
 
 
-@njit(error_model="numpy")
+@kernel
 def _advanced(tables, states, dl):
     return (
         advance(record(tables[0], 0), Space(), states[0], dl, 1e-3),

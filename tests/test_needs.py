@@ -14,7 +14,6 @@ import pytest
 from conftest import INPUTS, ROOT
 
 from karamelo_py.app.cli import main
-from karamelo_py.compiler.choices import contents
 from karamelo_py.compiler.fields import name_of, rows_of_points, some_points
 from karamelo_py.compiler.fingerprint import classes_in
 from karamelo_py.kernels.averaging import NodalMean
@@ -148,10 +147,9 @@ def test_a_kernel_has_the_code_of_what_is_there_and_no_other(run_script):
     text = (INPUTS / "in.two_disks").read_text(encoding="utf-8")
     run_script(text.replace("run_time(3.5)", "run(2)"))
     found = []
-    for held, entry in advance.entries.items():
-        (compiled,) = entry.overloads.values()
-        classes = {one.__name__ for one in classes_in(held)}
-        kinds = {name for c in contents(compiled.library).choices for name in c.classes}
+    for types, unit in advance.kernel.units.items():
+        classes = {one.__name__ for held in types for one in classes_in(held)}
+        kinds = {name for c in unit.choices for name in c.classes}
         words = {name.rpartition(":")[2] for name in kinds if name}
         if {"PlaneStrain", "FLIP", "MUSL", "Linear", "Insulated", "NoContact"} <= classes:
             found.append(words)

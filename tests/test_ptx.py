@@ -1,8 +1,4 @@
-"""That everything compiles for a GPU (tests/ptx_cases.py), in a process of its own.
-
-Numba keeps one way of lowering an intrinsic for all targets: a process that has compiled for a GPU
-may not find that of the processor any more.
-"""
+"""That everything compiles for a GPU (tests/ptx_cases.py), in a process of its own."""
 
 import subprocess
 import sys

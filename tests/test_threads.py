@@ -5,7 +5,7 @@ import pytest
 from numba import config
 
 from karamelo_py.compiler.compile import shared
-from karamelo_py.compiler.loops import entered, loop
+from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.threads import Serial, Threaded, by_team, new_team, shared_out
 
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
@@ -22,7 +22,7 @@ def put(out, limit, k):
 _put_all = shared_out(put, "out, limit")
 
 
-@entered
+@kernel
 def squares(mode, out, limit):
     """The squares of numbers."""
     _put_all(mode, out.size, out, limit)
@@ -50,7 +50,7 @@ def several(mode, out, limit, times):
 _by_team = by_team(several, "out, limit, times")
 
 
-@loop
+@kernel
 def by_several(mode, out, limit, times):
     """By a team of threads."""
     return _by_team(mode, out, limit, times)

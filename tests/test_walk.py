@@ -4,14 +4,12 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from listening import Compiled
+from listening import listening
 from numba import config
-from numba.core import event
-from numba.core.caching import NullCache
 
 from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.held import hold
-from karamelo_py.compiler.loops import kernel, subkernel
+from karamelo_py.compiler.loops import kernel, noinline
 from karamelo_py.compiler.trace import CannotCompile
 
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
@@ -184,19 +182,17 @@ def in_a_kernel(function):
         return function(n, x)
 
     made = kernel(caller)
-    made._cache = NullCache()
 
     def call(n, x):
-        listener = Compiled()
-        with event.install_listener("numba:compile", listener):
+        with listening() as names:
             result = made(n, x)
-        assert function.__name__ not in listener.names
+        assert function.__name__ not in names
         return result
 
     return call
 
 
-@pytest.mark.parametrize("mark", [shared, subkernel])
+@pytest.mark.parametrize("mark", [shared, noinline])
 @pytest.mark.parametrize("function", FUNCTIONS, ids=lambda f: f.__name__)
 def test_as_python_does(function, mark):
     expected = [function(n, x) for n in range(1, 12) for x in (1.75, -3.0)]
@@ -210,7 +206,7 @@ def lambda_of(function):
     return made
 
 
-@subkernel
+@noinline
 def put(arrays, n):
     """Twice the numbers that are larger than n; how many."""
     found = 0
@@ -257,7 +253,6 @@ def test_what_is_raised():
         return checked(n)
 
     made = kernel(caller)
-    made._cache = NullCache()
     assert made(2) == 2
     with pytest.raises(ValueError, match="three"):
         made(3)

@@ -1,25 +1,23 @@
 """Functions that kernels call by their address, and do not contain."""
 
 import ctypes
-import inspect
 from collections.abc import Callable
 from typing import Any
 
-import numba
-from llvmlite import ir
-from numba import config
-from numba.core.ccallback import CFunc
-from numba.extending import intrinsic
+from numba import config, types
 
-from karamelo_py.compiler.cache import KernelCache
-from karamelo_py.compiler.compile import define, shared
+from karamelo_py.compiler import code
+from karamelo_py.compiler.compile import define
+from karamelo_py.compiler.intrinsics import intrinsic
+from karamelo_py.compiler.loops import address_in_memory
+from karamelo_py.compiler.lowering import function_type
 
 _uncompiled: list[Callable] = []
 _addresses: dict[Callable, int] = {}
 _keep_alive: list = []
 
 
-def address_of(function: Callable, signature: numba.types.Type) -> int:
+def address_of(function: Callable, signature: types.Type) -> int:
     """Compile `function` (cached on disk) and return the address that kernels call it by.
 
     Whoever calls by address does not contain the function: it need not be compiled anew for
@@ -30,26 +28,13 @@ def address_of(function: Callable, signature: numba.types.Type) -> int:
             _uncompiled.append(function)
             _addresses[function] = len(_uncompiled) - 1
         else:
-            options = {"error_model": "numpy"}
-            entry = _entry_of(function)
-            compiled = CFunc(entry, (signature.args, signature.return_type), {}, options)
-            compiled._cache = KernelCache(entry, options)
-            compiled.compile()
-            _keep_alive.append(compiled)
-            _addresses[function] = compiled.address
+            kinds, result = signature.args, signature.return_type
+            _addresses[function] = address_in_memory(function, kinds, result)
     return _addresses[function]
 
 
-def _entry_of(function: Callable) -> Callable:
-    """A function of the same name that calls it, so that it is traced."""
-    names = ", ".join(inspect.signature(function).parameters)
-    entry = define(names, f"return inner({names})", inner=shared(function))
-    entry.__module__, entry.__qualname__ = function.__module__, function.__qualname__
-    return entry
-
-
-def address_of_python(function: Callable, signature: numba.types.Type) -> int:
-    """The address by which kernels call a function of Python, of whole numbers.
+def address_of_python(function: Callable, signature: types.Type) -> int:
+    """Give the address by which kernels call a function of Python, of whole numbers.
 
     Nothing may be raised in it.
     """
@@ -68,18 +53,17 @@ def caller_of(signature: Any) -> Callable:
     if config.DISABLE_JIT:
         return lambda address, *arguments: _uncompiled[address](*arguments)
 
-    def codegen(context, builder, _, arguments):
-        kind = ir.FunctionType(
-            context.get_value_type(result), [context.get_value_type(p) for p in parameters]
-        )
+    def codegen(builder, _, arguments):
+        kind = function_type(parameters, result)
         pointer = builder.inttoptr(arguments[0], kind.as_pointer())
-        return builder.call(pointer, arguments[1:])
+        made = builder.call(pointer, arguments[1:])
+        return code.nothing() if result == types.none else made
 
     names = ", ".join(f"a{k}" for k in range(len(parameters)))
     call = define(
-        f"typing_context, address, {names}",
+        f"address, {names}",
         "return typed, codegen",
-        typed=result(numba.types.int64, *parameters),
+        typed=result(types.int64, *parameters),
         codegen=codegen,
     )
     return intrinsic(call)

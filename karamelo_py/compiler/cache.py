@@ -17,21 +17,16 @@ import tempfile
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import llvmlite
 import numba
 import numpy as np
 import platformdirs
-from numba.core import config, sigutils
-from numba.core.caching import _Cache
-from numba.core.compiler import CompileResult
-from numba.core.serialize import dumps
 
-from karamelo_py.compiler import held, inlining
-from karamelo_py.compiler.choices import WHOLE, Choice, Unknown, contents, keep_choices, name_of
+from karamelo_py.compiler import compile_lock, machine
+from karamelo_py.compiler.choices import WHOLE, Choice, Unknown, name_of
 from karamelo_py.compiler.fingerprint import describe, fingerprint
-from karamelo_py.compiler.turns import Turns, giving
 
 VARIANTS = 4  # of a kernel for the same types: as many states of the sources are kept
 ROOM = 400e6  # bytes; of what takes more, the files that were used least recently are forgotten
@@ -39,11 +34,10 @@ ROOM = 400e6  # bytes; of what takes more, the files that were used least recent
 _ENDING, _LOCK = ".kernel", ".lock"
 _OURS = re.compile(r"[\w.]+-[0-9a-f]{24}-[0-9a-f]{24}\.kernel")
 _TIMES = "times.json"
-_turns = Turns()
 
 
 def folder() -> Path:
-    """Where kernels are kept."""
+    """Give the folder where kernels are kept."""
     home = os.environ.get("KARAMELO_PY_CACHE") or platformdirs.user_cache_dir("karamelo-py")
     return Path(home) / "kernels"
 
@@ -72,7 +66,7 @@ def _say(text: str) -> None:
 
 @contextlib.contextmanager
 def telling(tell: Callable[[str], None]) -> Iterator[None]:
-    """Within this, `tell` is given what is wrong with the folder, once."""
+    """Tell by `tell` what is wrong with the folder meanwhile, once."""
     global _tell, _warned
     before = _tell, _warned
     _tell, _warned = tell, False
@@ -85,80 +79,68 @@ def telling(tell: Callable[[str], None]) -> Iterator[None]:
 # --- kernels ------------------------------------------------------------------------------------
 
 
-class KernelCache(_Cache):
-    """The files of one function, for Numba's dispatchers and callbacks.
+class Place(NamedTuple):
+    """Hold a kernel on disk, or None; and what keeps one that was compiled."""
+
+    found: Any
+    keep: Callable | None
+
+
+class KernelFiles:
+    """Keep the kernels of one function in files.
 
     Parameters
     ----------
     function
         What is compiled.
-    options
-        How: two ways are two kernels.
     """
 
-    def __init__(self, function: Callable, options: dict):
+    def __init__(self, function: Callable):
         self._function = function
-        self._options = repr(sorted(options.items()))
 
-    @property
-    def cache_path(self) -> str:
-        """The folder."""
-        return str(folder())
-
-    def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
-        """The kernel for these argument types, or None where it has to be compiled."""
-        target_context.refresh()
+    @contextlib.contextmanager
+    def for_types(self, kinds: tuple, result: Any) -> Iterator["Place"]:
+        """Look for a kernel on disk; others wait where this process will compile it."""
         try:
-            arguments, key = self._key(sig, target_context.codegen())
-        except Unknown:
-            return None
-        found = self._found(arguments, key, target_context)
-        if found is None:
-            lock = folder() / f"{key}{_LOCK}"
-            _turns.take(lock)
+            key = self._key(kinds, result)
+        except Unknown as error:
+            what = error
+            yield Place(None, lambda unit, codes: self._tell_of_unknown(what))
+            return
+        found = self._found(kinds, key)
+        if found is not None:
+            yield Place(found, None)
+            return
+        with compile_lock.lock(folder() / f"{key}{_LOCK}"):
             # Another process may have compiled it since the first look.
-            found = self._found(arguments, key, target_context)
-            if found is not None:
-                _turns.give(lock)
-        return found
+            found = self._found(kinds, key)
+            yield Place(found, lambda unit, codes: self._save(kinds, key, unit, codes))
 
-    def _found(self, arguments: tuple, key: str, target_context: Any) -> CompileResult | None:
-        """The kernel in a file."""
+    def _found(self, kinds: tuple, key: str) -> Any:
+        """Read the kernel in a file."""
         for path in self._files(key):
             choices, data = _read(path)
-            if choices is None or self._stamp(arguments, choices) != path.stem.rpartition("-")[2]:
+            if choices is None or self._stamp(kinds, choices) != path.stem.rpartition("-")[2]:
                 continue
             try:
-                compiled = CompileResult._rebuild(target_context, *pickle.loads(data))
+                unit = pickle.loads(data)
             except Exception:
                 _discard(path)
                 continue
-            keep_choices(compiled.library, choices)
             with contextlib.suppress(OSError):
                 os.utime(path)
-            return compiled
+            return unit
         return None
 
-    def save_overload(self, sig: Any, data: CompileResult) -> None:
-        """Keep a kernel that was compiled just now, if that can be done."""
+    def _save(self, kinds: tuple, key: str, unit: Any, codes: Any) -> None:
         try:
-            arguments, key = self._key(sig, data.codegen)
+            if isinstance(codes, Unknown):
+                raise codes
+            stamp = fingerprint([self._function], kinds, unit.choices, codes)
         except Unknown as what:
             self._tell_of_unknown(what)
             return
-        with giving(_turns, folder() / f"{key}{_LOCK}"):
-            self._save(arguments, key, data)
-
-    def _save(self, arguments: tuple, key: str, data: CompileResult) -> None:
-        if data.library.has_dynamic_globals or data.lifted:
-            return
-        try:
-            choices, codes = contents(data.library)
-            stamp = fingerprint([self._function, self._options], arguments, choices, codes)
-        except Unknown as what:
-            self._tell_of_unknown(what)
-            return
-        content = dumps((tuple(sorted(choices)), dumps(data._reduce())))
+        content = pickle.dumps((tuple(sorted(unit.choices)), pickle.dumps(unit)))
         try:
             path = folder() / f"{key}-{stamp[:24]}{_ENDING}"
             write(path, hashlib.sha256(content).digest() + content)
@@ -170,32 +152,20 @@ class KernelCache(_Cache):
         # Never without a word: somebody would wait for it in every run.
         _say(f"the loop {self._name()} is compiled in every run: {what} cannot be followed")
 
-    def enable(self) -> None:
-        """It always is."""
-
-    def disable(self) -> None:
-        """It never is."""
-
-    def flush(self) -> None:
-        """Forget all files of the function."""
-        for path in self._files(self._name() + "-"):
-            path.unlink(missing_ok=True)
-
     def _name(self) -> str:
         return re.sub(r"[^\w.]", "", f"{self._function.__module__}.{self._function.__qualname__}")
 
-    def _key(self, sig: Any, codegen: Any) -> tuple[tuple, str]:
-        """Argument types, and the name of the function with a hash of these and of the machine."""
-        arguments, result = sigutils.normalize_signature(sig)
-        words = [name_of(self._function), *(describe(a) for a in arguments)]
-        words += [describe(result) if result is not None else "", repr(codegen.magic_tuple())]
+    def _key(self, kinds: tuple, result: Any) -> str:
+        """Give the name of the function with a hash of the types and of the machine."""
+        words = [name_of(self._function), *map(describe, kinds)]
+        words += [describe(result) if result is not None else "", repr(machine.describe())]
         words += [_SETTING]
         digest = hashlib.sha256("|".join(words).encode()).hexdigest()
-        return tuple(arguments), f"{self._name()}-{digest[:24]}"
+        return f"{self._name()}-{digest[:24]}"
 
-    def _stamp(self, arguments: tuple, choices: frozenset[Choice]) -> str | None:
+    def _stamp(self, kinds: tuple, choices: frozenset[Choice]) -> str | None:
         try:
-            return fingerprint([self._function, self._options], arguments, choices)[:24]
+            return fingerprint([self._function], kinds, choices)[:24]
         except Unknown:
             return None
 
@@ -229,28 +199,11 @@ class KernelCache(_Cache):
             path.unlink(missing_ok=True)
 
 
-# What chooses code by type, and what is in every kernel.
-_MAKERS = (
-    "compile",
-    "loops",
-    "trace",
-    "statements",
-    "expressions",
-    "source",
-    "flow",
-    "lowering",
-    "values",
-)
-_BESIDE = [Path(__file__).with_name(f"{name}.py") for name in (*_MAKERS, "fields")]
-WHOLE_FILES = [inlining.__file__, held.__file__, *WHOLE, *_BESIDE]
-
-
 def _setting() -> str:
-    """What all kernels depend on."""
+    """Name what all kernels depend on."""
     versions = (platform.python_version(), numba.__version__, llvmlite.__version__, np.__version__)
-    how = (config.OPT, config.BOUNDSCHECK, config.LOOP_VECTORIZE, config.SLP_VECTORIZE)
-    whole = [Path(file).read_bytes() for file in WHOLE_FILES]
-    return repr((versions, [str(h) for h in how], whole))
+    whole = [Path(file).read_bytes() for file in WHOLE]
+    return repr((versions, whole))
 
 
 _SETTING = _setting()
@@ -270,7 +223,7 @@ def write(path: Path, content: bytes) -> None:
 
 
 def _read(path: Path) -> tuple[frozenset[Choice] | None, bytes]:
-    """The choices and the code in a file; None where it is not whole."""
+    """Read the choices and the code in a file; None where it is not whole."""
     try:
         data = path.read_bytes()
     except FileNotFoundError:

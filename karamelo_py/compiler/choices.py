@@ -7,16 +7,15 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
-from weakref import WeakKeyDictionary
-
-from numba.core import event
 
 # Known by name: their versions are part of every key.
 _OPAQUE = {"numba", "llvmlite", "numpy", *sys.stdlib_module_names}
-# What Numba's own functions do with lanes cannot be followed from them: all of it is in every key.
-WHOLE = [str(path) for path in sorted(Path(__file__).with_name("lanes").glob("*.py"))]
-# Nor are methods of tensors, which belong to objects and not to names.
-WHOLE.append(str(Path(__file__).parents[1] / "points" / "kinematics" / "tensors.py"))
+# What writes code is in every key as a whole, and so are methods of tensors, which belong to
+# objects and not to names.
+_HERE = Path(__file__).parent
+WHOLE = sorted(
+    map(str, [*_HERE.rglob("*.py"), _HERE.parent / "points" / "kinematics" / "tensors.py"])
+)
 SPELLED = "<spelled>"  # the file of functions that are written at compile time
 
 
@@ -92,75 +91,18 @@ def class_name(tag: type | None) -> str:
     return name
 
 
-class Contents(NamedTuple):
-    """List what is in compiled code: choices, and the Python functions that it was made of."""
-
-    choices: frozenset[Choice]
-    codes: frozenset[python.CodeType]
-
-
-_contents: WeakKeyDictionary[Any, Contents] = WeakKeyDictionary()
-_unfit: WeakKeyDictionary[Any, bool] = WeakKeyDictionary()
-
-
-class _Watch(event.Listener):
-    """Note what each piece of compiled code consists of."""
-
-    def on_start(self, event: Any) -> None:
-        """Begin to note what is chosen."""
-        _noted.append(set())
-
-    def on_end(self, event: Any) -> None:
-        """Keep what was noted of a function, if it was compiled."""
-        noted = _noted.pop()
-        dispatcher, arguments = event.data["dispatcher"], tuple(event.data["args"])
-        compiled = dispatcher.overloads.get(arguments)
-        if compiled is None:
-            return
-        function = dispatcher.py_func
-        run = {part for part in noted if isinstance(part, python.CodeType)}
-        try:
-            choices = frozenset(map(_choice, noted - run))
-        except Unknown:
-            _unfit[compiled.library] = True
-            return
-        if not is_opaque(function):
-            run.add(function.__code__)
-        # What was spelled out at compile time was spelled by a function that is followed itself.
-        codes = frozenset(code for code in run if code.co_filename not in (SPELLED, *WHOLE))
-        _contents[compiled.library] = Contents(choices, codes)
-
-
-event.register("numba:compile", _Watch())
+def contents(parts: Iterable) -> tuple[frozenset[Choice], frozenset[python.CodeType]]:
+    """Sort what code consists of: choices, and the Python functions that it was made of."""
+    codes = {part for part in parts if isinstance(part, python.CodeType)}
+    choices = {part if isinstance(part, Choice) else _choice(part) for part in {*parts} - codes}
+    # What was spelled out at compile time was spelled by a function that is followed itself.
+    own = (code for code in codes if code.co_filename not in (SPELLED, *WHOLE))
+    return frozenset(choices), frozenset(own)
 
 
 def _choice(part: tuple[Callable, tuple]) -> Choice:
     dispatch, classes = part
     return Choice(name_of(dispatch), tuple(class_name(c) for c in classes))
-
-
-def contents(library: Any) -> Contents:
-    """List what is in the code of a compiled function, and of all that it calls."""
-    choices: set[Choice] = set()
-    codes: set[python.CodeType] = set()
-    ahead, seen = [library], set()
-    while ahead:
-        one = ahead.pop()
-        if one in seen:
-            continue
-        seen.add(one)
-        if one in _unfit:
-            raise Unknown(one.name)
-        if one in _contents:
-            choices |= _contents[one].choices
-            codes |= _contents[one].codes
-        ahead += [*one._linking_libraries, *one.needs]
-    return Contents(frozenset(choices), frozenset(codes))
-
-
-def keep_choices(library: Any, choices: frozenset[Choice]) -> None:
-    """Note the choices in code that was not compiled here, but loaded."""
-    _contents[library] = Contents(choices, frozenset())
 
 
 def is_opaque(thing: Any) -> bool:

@@ -5,7 +5,6 @@ from typing import Any, NamedTuple
 
 import numba
 from numba import config
-from numba.extending import intrinsic
 
 from karamelo_py.compiler.choices import (
     SPELLED,
@@ -14,6 +13,7 @@ from karamelo_py.compiler.choices import (
     note,
     tag_class,
 )
+from karamelo_py.compiler.intrinsics import intrinsic
 from karamelo_py.compiler.trace import INSTEAD, Undefined, forget, run_for_kernel, traced
 from karamelo_py.compiler.values import OF_REALS, at_work, now
 
@@ -191,8 +191,8 @@ def fma(a: float, b: float, c: float) -> float:
 
 
 @intrinsic
-def _fused(typing_context, a, b, c):
-    def codegen(context, builder, signature, arguments):
+def _fused(a, b, c):
+    def codegen(builder, signature, arguments):
         return builder.fma(*arguments)
 
     return a(a, b, c), codegen

@@ -32,12 +32,8 @@ from math import prod
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import types
-from numba.core.imputils import impl_ret_borrowed
-from numba.extending import lower_builtin, type_callable
 
 from karamelo_py.compiler.compile import shared
-from karamelo_py.compiler.held import is_held, item_of
 from karamelo_py.compiler.tuples import count_in, flat, nested_as
 
 LINE = 64  # bytes that caches get at once
@@ -185,45 +181,13 @@ def at_nodes(kind: type, kin: Any, count: int, real: type) -> NamedTuple:
     return kind(records(count, width if width < 3 else -(-(width + 1) // 4) * 4, real))
 
 
+@shared
 def field(fields: tuple, kind: type) -> Any:
     """The array of the field of this class, or None where the scene does not have it."""
     for one in fields:
         if type(one) is kind:
             return one.array
     return None
-
-
-def _place_of(kind: Any, fields: Any) -> int | None:
-    """Where in a tuple of fields that of a class stands."""
-    for k, one in enumerate(fields):
-        if one.instance_class is kind.instance_class:
-            return k
-    return None
-
-
-# Not by_type: functions that return arrays are not for kernels without reference counting.
-@type_callable(field)
-def _type_field(context):
-    def typed(fields, kind):
-        k = _place_of(kind, fields)
-        return types.none if k is None else tuple(fields)[k][0]
-
-    return typed
-
-
-def _item_of_value(context, builder, numba_type, value, k):
-    return builder.extract_value(value, k)
-
-
-@lower_builtin(field, types.BaseTuple, types.Any)
-def _lower_field(context, builder, signature, arguments):
-    fields, kind = signature.args
-    k = _place_of(kind, fields)
-    if k is None:
-        return context.get_dummy_value()
-    read = item_of if is_held(fields) else _item_of_value
-    array = read(context, builder, fields[k], read(context, builder, fields, arguments[0], k), 0)
-    return impl_ret_borrowed(context, builder, signature.return_type, array)
 
 
 # --- rows of arrays that may be absent --------------------------------------------------------

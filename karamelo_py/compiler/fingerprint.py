@@ -17,10 +17,10 @@ from typing import Any
 
 import numpy as np
 from numba import types
-from numba.core.registry import cpu_target
 
 from karamelo_py.compiler.choices import (
     _OPAQUE,
+    WHOLE,
     Choice,
     Unknown,
     choosers,
@@ -30,7 +30,9 @@ from karamelo_py.compiler.choices import (
     name_of,
     point_functions,
 )
+from karamelo_py.compiler.intrinsics import Intrinsic
 
+_HERE = f"{__package__}."  # the text of all these modules is in every key
 _PLAIN = (type(None), bool, int, float, complex, str, bytes, type(Ellipsis), range, slice)
 
 
@@ -98,7 +100,6 @@ def fingerprint(
             raise Unknown(choice.point_function)
         ahead += [repr(choice), *(dispatch.find(classes) for dispatch in dispatches)]
     digest = hashlib.sha256()
-    cpu_target.typing_context.refresh()
     order: dict[int, int] = {}
     alive = []  # so that no id is used twice
     ahead.reverse()
@@ -131,8 +132,6 @@ def _look(thing: Any) -> tuple[str, list]:
         return _function(thing)
     if isinstance(thing, type):
         return _class(thing)
-    if hasattr(thing, "py_func"):  # of Numba's dispatchers
-        return kind, [thing.py_func, repr(sorted(thing.targetoptions.items()))]
     if isinstance(thing, types.Type):
         return f"type {describe(thing)}", list(classes_in(thing))
     if isinstance(thing, (np.ndarray, np.generic)):
@@ -154,8 +153,8 @@ def _look(thing: Any) -> tuple[str, list]:
         return kind, [thing.__wrapped__]
     if isinstance(thing, functools.partial):
         return kind, [thing.func, thing.args, thing.keywords]
-    if hasattr(thing, "_defn"):  # of Numba's intrinsics
-        return kind, [thing._defn]
+    if isinstance(thing, Intrinsic):
+        return kind, [thing.definition]
     if hasattr(thing, "__name__") and is_opaque(thing):
         return f"{kind} {getattr(thing, '__module__', '')} {thing.__name__}", []
     try:
@@ -175,7 +174,7 @@ def _function(function: Callable) -> tuple[str, list]:
     code = function.__code__
     digest, names = _code(code)
     parts = [function.__defaults__, function.__kwdefaults__]
-    for name in names:
+    for name in () if code.co_filename in WHOLE else names:
         value = function.__globals__.get(name, _NOWHERE)
         if value is _NOWHERE:
             continue
@@ -239,7 +238,7 @@ def _codes(code: python.CodeType) -> set[python.CodeType]:
 
 def _class(one: type) -> tuple[str, list]:
     name = name_of(one)
-    if is_opaque(one):
+    if is_opaque(one) or one.__module__.startswith(_HERE):
         return f"class {name}", []
     fields = getattr(one, "_fields", ())
     parts: list = [*one.__bases__, fields]

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
+from karamelo_py.compiler import failing
 from karamelo_py.compiler.values import HeldValue, Untraceable, Value, counting, emit, words
 
 _PLAIN = (bool, int, float, str, np.generic, type(None))
@@ -78,6 +79,14 @@ class Grows(Untraceable):
 
     def __init__(self, place: int, kind: types.Type):
         self.place, self.kind = place, kind
+
+
+def _counter(kinds: tuple) -> types.Integer:
+    """The type of the numbers of a range."""
+    if not all(isinstance(kind, types.Integer) for kind in kinds):
+        raise Untraceable("the ends of a range are no whole numbers")
+    alike = all(kind == kinds[0] for kind in kinds)
+    return kinds[0] if alike and kinds[0] in (types.int32, types.uint64) else types.int64
 
 
 class Flow:
@@ -175,7 +184,7 @@ class Flow:
         ):
             kind = real[0]  # literals have no precision of their own
         elif any(k != kind for k in kinds):
-            kind = self.lowering.typing.unify_types(*kinds)
+            kind = self.lowering.unify(*kinds)
         if kind is None or isinstance(kind, types.Optional | types.UnicodeType):
             return _DROPPED
         made = (HeldValue if isinstance(first, HeldValue) else Value)(kind, None)
@@ -185,7 +194,7 @@ class Flow:
     def fail(self, kind: type, arguments: tuple) -> None:
         """Let the kernel raise an exception."""
         if self.builder:
-            self.lowering.context.call_conv.return_user_exc(self.builder, kind, arguments)
+            failing.fail(self.builder, kind, arguments)
 
     # --- loops
 
@@ -239,7 +248,7 @@ class Flow:
                 and isinstance(getattr(kind, "scalar", kind), types.Float)
             ):
                 raise Grows(len(values), kind)
-            both = self.lowering.typing.unify_types(kind, before._kind)
+            both = self.lowering.unify(kind, before._kind)
             if both != before._kind:
                 if isinstance(both, types.Integer):
                     raise Grows(len(values), both)
@@ -257,8 +266,7 @@ class Flow:
         """Count the turns of a loop over a range."""
         lowering, builder = self.lowering, self.builder
         kinds = tuple(types.unliteral(lowering.kind_of(bound)) for bound in bounds)
-        typed = lowering.typing.resolve_value_type(range)
-        kind = lowering.typing.resolve_function_type(typed, kinds, {}).return_type.dtype
+        kind = _counter(kinds)
         start, stop, step = {1: (0, *bounds, 1), 2: (*bounds, 1)}.get(len(bounds), bounds)
         known = step if isinstance(step, int) else None
         if known == 0:

@@ -15,7 +15,7 @@ from numba import config, types
 
 from karamelo_py.compiler.addresses import caller_of
 from karamelo_py.compiler.compile import implements
-from karamelo_py.compiler.loops import entered, loop, subkernel
+from karamelo_py.compiler.loops import kernel, noinline
 from karamelo_py.compiler.operations import (
     ABS,
     ADD,
@@ -114,7 +114,7 @@ def _binary(op, n, a, b):
     a[:n] = IN_NUMPY[op](a[:n], b[:n])
 
 
-@subkernel
+@noinline
 def _unary_in_kernels(op, n, a):
     if op == NEG:
         for i in range(n):
@@ -142,7 +142,7 @@ def _unary_in_kernels(op, n, a):
             a[i] = function_of(op, a[i])
 
 
-@subkernel
+@noinline
 def _binary_in_kernels(op, n, a, b):
     if op == ADD:
         for i in range(n):
@@ -251,7 +251,7 @@ def _evaluate_in_python(*arguments):
         _evaluate(*arguments)
 
 
-evaluate = _evaluate_in_python if config.DISABLE_JIT else entered(_evaluate)
+evaluate = _evaluate_in_python if config.DISABLE_JIT else kernel(_evaluate)
 
 
 # How kernels of hooks call the evaluator: by address, so that none of them has to contain it, and
@@ -275,7 +275,7 @@ def evaluate_in_table(code, constants, globals_, scratch, begin, end, first, las
     evaluate(program, globals_, scratch[:6], count, scratch[result], scratch[STACK:])
 
 
-@loop
+@kernel
 def evaluate_all(program, globals_, x, x0, out, scratch):
     """Evaluate `program` at any number of positions.
 

@@ -9,19 +9,19 @@ point functions are chosen by its class); tuples without arrays stay values.
 """
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
-from numba.core.imputils import lower_builtin, lower_getattr_generic
-from numba.core.types.containers import _HeterogeneousTuple
-from numba.extending import intrinsic, models, register_model, type_callable
+
+from karamelo_py.compiler import code
+from karamelo_py.compiler.intrinsics import builtin, intrinsic
+from karamelo_py.compiler.values import HeldValue, Value
 
 
 def _words(numba_type: Any) -> str:
-    """A type in words, with the modules of the classes in it; Numba's leave them out."""
+    """Name a type, with the modules of the classes in it; Numba's names leave them out."""
     if isinstance(numba_type, types.BaseTuple) and not isinstance(numba_type, _Held):
         kind = getattr(numba_type, "instance_class", tuple)
         inner = ", ".join(_words(item) for item in numba_type)
@@ -29,7 +29,7 @@ def _words(numba_type: Any) -> str:
     return str(numba_type)
 
 
-class _Held(_HeterogeneousTuple):
+class _Held(types.BaseTuple):
     """Numba type of a pointer to the items of a tuple."""
 
     def __init__(self, items: tuple, word: str):
@@ -39,9 +39,18 @@ class _Held(_HeterogeneousTuple):
         # Short, for it is part of the names of functions.
         super().__init__(f"Held{word}_{hashlib.sha256(text.encode()).hexdigest()[:16]}")
 
-    @property
-    def iterator_type(self):
-        raise NotImplementedError
+    def register_type(self) -> ir.Type:
+        """LLVM's type: a pointer to a structure of the items."""
+        return ir.LiteralStructType(map(code.memory_type, self.types)).as_pointer()
+
+    def __getitem__(self, k: int) -> types.Type:
+        return self.types[k]
+
+    def __len__(self) -> int:
+        return len(self.types)
+
+    def __iter__(self) -> Iterator:
+        return iter(self.types)
 
 
 class HeldTuple(_Held):
@@ -68,16 +77,6 @@ class HeldNamedTuple(_Held, types.BaseNamedTuple):
         return self.instance_class, self.types
 
 
-@register_model(HeldTuple)
-@register_model(HeldNamedTuple)
-class _HeldModel(models.PrimitiveModel):
-    """A pointer to a structure of the items."""
-
-    def __init__(self, manager: Any, held: _Held):
-        items = models.StructModel(manager, held, [(f"f{k}", t) for k, t in enumerate(held)])
-        super().__init__(manager, held, items.get_data_type().as_pointer())
-
-
 def _has_arrays(numba_type: Any) -> bool:
     if isinstance(numba_type, types.BaseTuple):
         return isinstance(numba_type, _Held) or any(_has_arrays(item) for item in numba_type)
@@ -85,7 +84,7 @@ def _has_arrays(numba_type: Any) -> bool:
 
 
 def held_type(numba_type: Any) -> Any:
-    """The type of a value when it is held; its own where it has no tuple with arrays in it."""
+    """Give the type of a value when it is held; its own where no tuple with arrays is in it."""
     if (
         not isinstance(numba_type, types.BaseTuple)
         or isinstance(numba_type, _Held)
@@ -98,57 +97,6 @@ def held_type(numba_type: Any) -> Any:
     return HeldTuple(items)
 
 
-def _hold(context: Any, builder: Any, numba_type: Any, value: Any) -> Any:
-    """Code that holds a value."""
-    held = held_type(numba_type)
-    if held == numba_type:
-        return value
-    place = cgutils.alloca_once(builder, context.data_model_manager[held].get_data_type().pointee)
-    for k, item in enumerate(numba_type):
-        part = _hold(context, builder, item, builder.extract_value(value, k))
-        _put(context, builder, held, place, k, part)
-    return place
-
-
-def _put(context: Any, builder: Any, held: _Held, place: Any, k: int, part: Any) -> None:
-    at = cgutils.gep_inbounds(builder, place, 0, k)
-    if part.type == at.type.pointee:
-        builder.store(part, at)
-    else:  # of truth values
-        context.pack_value(builder, held[k], part, at)
-
-
-def item_of(context: Any, builder: Any, held: _Held, place: Any, k: int) -> Any:
-    """Code that reads item `k` of a held tuple."""
-    at = cgutils.gep_inbounds(builder, place, 0, k)
-    if at.type.pointee == context.get_value_type(held[k]):
-        return builder.load(at)
-    return context.unpack_value(builder, held[k], at)
-
-
-def _copy(builder: Any, held: _Held, there: Any) -> Any:
-    """Code that copies a held tuple, and those in it."""
-    place = cgutils.alloca_once(builder, there.type.pointee)
-    builder.store(builder.load(there), place)
-    for k, item in enumerate(held):
-        if is_held(item):
-            at = cgutils.gep_inbounds(builder, place, 0, k)
-            builder.store(_copy(builder, item, builder.load(at)), at)
-    return place
-
-
-@lower_getattr_generic(HeldNamedTuple)
-def _by_name(context, builder, held, place, attribute):
-    return item_of(context, builder, held, place, held.fields.index(attribute))
-
-
-@lower_builtin("static_getitem", _Held, types.IntegerLiteral)
-def _by_number(context, builder, signature, arguments):
-    place, number = arguments
-    held = signature.args[0]
-    return item_of(context, builder, held, place, number % len(held))
-
-
 def hold(value: Any) -> Any:
     """`value`, in a kernel as a held tuple; what is not a tuple with arrays stays as it is.
 
@@ -157,61 +105,79 @@ def hold(value: Any) -> Any:
     return value
 
 
+@builtin(hold)
+def _hold(lowering: Any, thing: Any) -> Any:
+    kind = types.unliteral(lowering.kind_of(thing))
+    held = held_type(kind)
+    if held == kind:
+        return thing
+    builder = lowering.builder
+    items = [_hold(lowering, item) for item in thing]
+    place = builder and code.room(builder, held.register_type().pointee)
+    if builder:
+        for k, (item, part) in enumerate(zip(held, items, strict=True)):
+            code.put(builder, item, lowering.lowered(part, item), code.at(builder, place, 0, k))
+    return HeldValue(held, place)
+
+
+def item_of(builder: Any, held: _Held, place: Any, k: int) -> Any:
+    """Write what reads item `k` of a held tuple."""
+    return code.get(builder, held[k], code.at(builder, place, 0, k))
+
+
 def at_hand(held: Any) -> Any:
-    """A copy of a held tuple that nobody else knows: what is read of it stays in registers.
+    """Copy a held tuple, so that nobody else knows it: what is read of it stays in registers.
 
     For kernels with loops, before them; inside, LLVM cannot know that a pointer's items stay.
     """
     return held
 
 
-# Not by_type: the memory must be that of the caller.
-@type_callable(hold)
-def _type_hold(context):
-    return lambda value: held_type(value)
+@builtin(at_hand)
+def _at_hand(lowering: Any, held: Any) -> Any:
+    if not isinstance(held, HeldValue) or lowering.builder is None:
+        return held
+    return HeldValue(held._kind, _copy(lowering.builder, held._kind, held._value))
 
 
-@lower_builtin(hold, types.Any)
-def _lower_hold(context, builder, signature, arguments):
-    return _hold(context, builder, signature.args[0], arguments[0])
-
-
-@type_callable(at_hand)
-def _type_at_hand(context):
-    return lambda held: held
-
-
-@lower_builtin(at_hand, types.Any)
-def _lower_at_hand(context, builder, signature, arguments):
-    held = signature.args[0]
-    return _copy(builder, held, arguments[0]) if is_held(held) else arguments[0]
+def _copy(builder: Any, held: _Held, there: Any) -> Any:
+    """Write what copies a held tuple, and those in it."""
+    place = code.room(builder, there.type.pointee)
+    builder.store(builder.load(there), place)
+    for k, item in enumerate(held):
+        if is_held(item):
+            at = code.at(builder, place, 0, k)
+            builder.store(_copy(builder, item, builder.load(at)), at)
+    return place
 
 
 # --- threads take numbers and arrays only -------------------------------------------------------
 
 
 def is_held(numba_type: Any) -> bool:
-    """Whether a Numba type is that of a held tuple."""
+    """Tell whether a type is that of a held tuple."""
     return isinstance(numba_type, _Held)
 
 
-@intrinsic
-def address(typing_context, held):
-    """Where the items of a held tuple are, as a number."""
+def address(held: Any) -> int:
+    """Give the address of the items of a held tuple."""
+    raise NotImplementedError
 
-    def codegen(context, builder, signature, arguments):
-        return builder.ptrtoint(arguments[0], ir.IntType(64))
 
-    return types.intp(held), codegen
+@builtin(address)
+def _address(lowering: Any, held: Any) -> Value:
+    builder = lowering.builder
+    return Value(types.intp, builder and builder.ptrtoint(held._value, code.I64))
 
 
 def at_address(held: _Held) -> Callable:
     """Make the function that takes such a number to the held tuple."""
 
-    def codegen(context, builder, signature, arguments):
-        return builder.inttoptr(arguments[0], context.get_value_type(held))
+    @intrinsic
+    def typed(number: types.Type) -> Any:
+        def codegen(builder: Any, signature: Any, values: list) -> Any:
+            return builder.inttoptr(values[0], held.register_type())
 
-    def typed(typing_context, number):
         return held(types.intp), codegen
 
-    return intrinsic(typed)
+    return typed

@@ -1,150 +1,262 @@
-"""Kernels: loops that Python and other loops call, kept on disk."""
+"""Kernels: loops that Python and other kernels call, traced as a whole and kept on disk.
 
+A kernel is one function of LLVM for arguments of some types, with a name that nothing else has: the
+hash of its text is in it. Python writes the arguments into memory (`argument_buffer`) and calls its
+entry with their address; kernels that call it refer to its name, and do not contain it.
+"""
+
+import ctypes
 import functools
 import gc
-import inspect
-import os
-from collections.abc import Callable
-from typing import Any
+import hashlib
+import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, NamedTuple
 
-import numba
-from numba import config, njit
-from numba.core import event
+from llvmlite import ir
+from numba import config, types
 
-from karamelo_py.compiler import inlining
-from karamelo_py.compiler.cache import KernelCache
-from karamelo_py.compiler.compile import by_type, define, shared
-from karamelo_py.compiler.held import at_address, hold
-from karamelo_py.compiler.packed import Packed
-from karamelo_py.compiler.trace import alone
+from karamelo_py.compiler import cache, code, compile_lock, machine
+from karamelo_py.compiler.argument_buffer import ArgumentBuffer, reader
+from karamelo_py.compiler.choices import Choice, Unknown, choosers, contents, note, parts_noted
+from karamelo_py.compiler.compile import shared
+from karamelo_py.compiler.failing import raise_noted
+from karamelo_py.compiler.held import HeldTuple, hold, item_of
+from karamelo_py.compiler.intrinsics import builtin
+from karamelo_py.compiler.lowering import function_type
+from karamelo_py.compiler.trace import alone, formula, write_into
+
+_CALL = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64)  # free of the interpreter lock
+NAME, ENTRY = "$kernel", ".entry"  # what functions of a module are called until it has a name
 
 
-class _NoCollections(event.Listener):
-    """While Numba compiles, Python's collector of cycles would walk its many objects in vain."""
+class Unit(NamedTuple):
+    """Hold the machine code of a function for arguments of some types.
 
-    depth = 0
-    was_on = False
+    Attributes
+    ----------
+    name
+        Of the function; that of its entry for Python has an ending more.
+    result
+        The type of what it gives.
+    code
+        An object file.
+    needs
+        The units that it calls.
+    choices
+        What its point functions were asked for, and those of its needs.
+    raises
+        Whether something in it raises exceptions.
+    """
 
-    def on_start(self, event: Any) -> None:
-        if self.depth == 0:
-            self.was_on = gc.isenabled()
-        self.depth += 1
-        gc.disable()
+    name: str
+    result: types.Type
+    code: bytes
+    needs: tuple
+    choices: frozenset[Choice]
+    raises: bool
 
-    def on_end(self, event: Any) -> None:
-        self.depth -= 1
-        if self.depth == 0 and self.was_on:
+
+_loaded: dict[str, list[int]] = {}
+
+
+def load(unit: Unit) -> list[int]:
+    """Give the addresses of a unit's function and of its entry, in memory from then on."""
+    if unit.name not in _loaded:
+        for needed in unit.needs:
+            load(needed)
+        found = machine.load(unit.code, unit.name, unit.name + ENTRY)
+        machine.publish(unit.name, found[0])
+        _loaded[unit.name] = found
+    return _loaded[unit.name]
+
+
+# --- compilation ----------------------------------------------------------------------------------
+
+
+class Compilation:
+    """Tell of compilation: `listeners` have ``on_start(name)`` and ``on_end()``."""
+
+    def __init__(self) -> None:
+        self.listeners: list = []
+
+    @contextmanager
+    def __call__(self, name: str = "") -> Iterator[None]:
+        """Tell that a kernel is compiled meanwhile, or that another process does it."""
+        for listener in self.listeners:
+            listener.on_start(name)
+        try:
+            yield
+        finally:
+            for listener in self.listeners:
+                listener.on_end()
+
+
+compilation = Compilation()
+compile_lock.waiting = compilation
+
+
+@contextmanager
+def _no_collections() -> Iterator[None]:
+    """Python's collector of cycles would walk the many objects of a trace in vain."""
+    was_on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_on:
             gc.enable()
 
 
-event.register("numba:compile", _NoCollections())
+def written(
+    function: Callable, kinds: tuple, result: types.Type | None = None
+) -> tuple[ir.Module, types.Type]:
+    """Write a function down for arguments of these types; the module, and the type of its result.
 
-# Threads that wait for each other spin a little, then sleep (GNU OpenMP). Where another program
-# takes a core, waiting at full speed makes two threads twenty times slower than one; sleeping at
-# once costs a fifth where none does.
-os.environ.setdefault("GOMP_SPINCOUNT", "500")
-
-
-_HOW = {
-    "nogil": True,
-    "error_model": "numpy",
-    "_nrt": False,
-    "forceinline": False,
-    "no_cfunc_wrapper": True,
-}
-
-
-def _compiled(function: Callable, options: dict) -> Callable:
-    """Numba's dispatcher, which compiles nothing anew for the value of a number that is written."""
-    compiled = njit(**options)(function)
-    if not config.DISABLE_JIT:
-        template = compiled.get_call_template
-        compiled.get_call_template = lambda args, kws: template(
-            tuple(map(numba.types.unliteral, args)),
-            {name: numba.types.unliteral(kind) for name, kind in kws.items()},
-        )
-    return compiled
+    Attributes of the module are `needs`, the units that it calls, and `raises`, as in `Unit`.
+    """
+    found = formula(function, kinds)
+    result = found.result if result is None else result
+    module = ir.Module(NAME)
+    module.needs = {}
+    main = ir.Function(module, function_type(kinds, result), NAME)
+    main.attributes.add("noinline")
+    main.attributes.add("nounwind")
+    lowering = write_into(ir.IRBuilder(main.append_basic_block("entry")))
+    lowering.give_back(found.run, kinds, main.args, result)
+    _write_entry(module, main, kinds, result)
+    module.raises = hasattr(main, "raises")
+    return module, result
 
 
-def kernel(function: Callable | None = None, **options: Any) -> Callable:
-    """Compile a loop over points or nodes; cached on disk, free of the interpreter lock.
+def _compiled(function: Callable, kinds: tuple, result: types.Type | None) -> tuple[Unit, Any]:
+    """Compile a function; the unit, and the Python functions that it was made of."""
+    with compilation(function.__name__), _no_collections(), parts_noted() as parts:
+        module, result = written(function, kinds, result)
+        text = str(module)
+        readable = re.sub(r"[^\w.]", "_", function.__qualname__)
+        name = f"{readable}.{hashlib.sha256(text.encode()).hexdigest()[:32]}"
+        made = machine.compile_text(text.replace(NAME, name))
+    unit = Unit(name, result, made, tuple(module.needs.values()), frozenset(), module.raises)
+    try:
+        choices, codes = contents(parts)
+    except Unknown as what:
+        return unit, what
+    return unit._replace(choices=choices), codes
+
+
+def _write_entry(module: ir.Module, main: ir.Function, kinds: tuple, result: types.Type) -> None:
+    """Write what calls a function with arguments in memory, and puts there what it gives."""
+    held = HeldTuple(kinds)
+    entry = ir.Function(module, ir.FunctionType(ir.VoidType(), [code.I64] * 2), NAME + ENTRY)
+    builder = ir.IRBuilder(entry.append_basic_block("entry"))
+    place = builder.inttoptr(entry.args[0], held.register_type())
+    full = (k for k, kind in enumerate(kinds) if not code.is_empty(kind))
+    given = builder.call(main, [item_of(builder, held, place, k) for k in full])
+    if not code.is_empty(result):
+        room = builder.inttoptr(entry.args[1], code.memory_type(result).as_pointer())
+        code.put(builder, result, given, room, 1)
+    builder.ret_void()
+
+
+class Kernel:
+    """Compile a function for the types of its arguments, and keep it on disk.
+
+    Parameters
+    ----------
+    function
+        What is traced.
+    """
+
+    def __init__(self, function: Callable):
+        self.function = function
+        self.files = cache.KernelFiles(function)
+        self.units: dict[tuple, Unit] = {}
+        self._plans: dict[tuple, tuple] = {}
+
+    @property
+    def made_of(self) -> tuple:
+        """Name what code that calls it depends on (:mod:`karamelo_py.compiler.fingerprint`)."""
+        return (self.function,)
+
+    def unit(self, kinds: tuple, result: types.Type | None = None) -> Unit:
+        """Give the machine code for arguments of these types."""
+        if kinds not in self.units:
+            with self.files.for_types(kinds, result) as place:
+                unit = place.found
+                if unit is None:
+                    unit, codes = _compiled(self.function, kinds, result)
+                    place.keep(unit, codes)
+            self.units[kinds] = unit
+        return self.units[kinds]
+
+    def __call__(self, *arguments: Any) -> Any:
+        written = ArgumentBuffer(arguments)
+        kinds = tuple(written.kinds)
+        if kinds not in self._plans:
+            plan = written.plan(arguments)
+            unit = self.unit(plan.types)
+            self._plans[kinds] = plan, _CALL(load(unit)[1]), unit.raises, *reader(unit.result)
+        plan, entry, raises, size, read = self._plans[kinds]
+        _memory, address = written.in_memory(plan)
+        result = bytearray(size)
+        entry(address, ctypes.addressof(ctypes.c_char.from_buffer(result)))
+        if raises:
+            raise_noted()
+        return read(result)
+
+    def compile(self, *arguments: Any) -> None:
+        """Have it compiled for arguments of these types."""
+        load(self.unit(ArgumentBuffer(arguments).plan(arguments).types))
+
+
+def kernel(function: Callable) -> Callable:
+    """Make a kernel for Python and for other kernels, which takes its tuples by reference.
 
     No fast mathematics: where products and sums contract would depend on what a loop is inlined
-    into, so that results would differ between one thread and two, or a run in pieces and a whole.
-    `fma` says where. Kernels allocate nothing, so Numba's reference counting is left out.
+    into. `fma` says where.
     """
-    if function is None:
-        return lambda f: kernel(f, **options)
-    options = _HOW | options
-    compiled = _compiled(function, options)
-    if not config.DISABLE_JIT:
-        compiled._cache = KernelCache(function, options)
-    return compiled
+    if config.DISABLE_JIT:
+        return function
+    made = Kernel(shared(function))
+
+    @functools.wraps(function)
+    def enter(*arguments: Any) -> Any:
+        return made(*arguments)
+
+    enter.kernel, enter.compile = made, made.compile
+
+    @builtin(enter)
+    def call(lowering: Any, *arguments: Any) -> Any:
+        held = [lowering.call(hold, (argument,)) for argument in arguments]
+        kinds = tuple(types.unliteral(lowering.kind_of(one)) for one in held)
+        unit = made.unit(kinds)
+        note(unit.choices)
+        note([function.__code__])
+        if lowering.builder is None:
+            return lowering.wrapped(unit.result, None)
+        module = lowering.builder.module
+        module.needs[unit.name] = unit
+        known = module.globals.get(unit.name)
+        called = known or ir.Function(module, function_type(kinds, unit.result), unit.name)
+        if unit.raises:
+            called.raises = True
+        return lowering.call_function(called, kinds, unit.result, held)
+
+    return enter
 
 
-def subkernel(function: Callable) -> Callable:
-    """A function that kernels call, too large to be written into each place that calls it.
-
-    Python must not call it: there is nothing of it that Python could call.
-    """
+def noinline(function: Callable) -> Callable:
+    """Mark a function that kernels call, too large to be written into each place that calls it."""
     if not config.DISABLE_JIT:
         alone(function)
         shared(function)
     return function
 
 
-def left(function: Callable) -> Callable:
-    """A function whose machine code is made with that of the kernel that knows its address."""
-    inlining.claim(function.__qualname__, "left")
-    return _compiled(function, _HOW | {"no_cpython_wrapper": True})
-
-
-def entered(function: Callable) -> Callable:
-    """A kernel for Python and for other kernels, which takes its tuples held.
-
-    What other kernels call is kept on disk for all of them.
-    """
-    if config.DISABLE_JIT:
-        return function
-    inlining.claim(function.__qualname__, "kept")
-    names = inspect.signature(function).parameters
-    body = define(", ".join(names), f"return inner({', '.join(names)})", inner=shared(function))
-    body.__module__, body.__qualname__ = function.__module__, function.__qualname__
-    inner = kernel(body, no_cpython_wrapper=True)
-    call = define(
-        ", ".join(names),
-        f"return inner({', '.join(f'hold({name})' for name in names)})",
-        inner=inner,
-        hold=hold,
-    )
-    enter = _packed(function, inner)
-    by_type(enter)(lambda *arguments: call)
-    return enter
-
-
-def loop(function: Callable) -> Callable:
-    """A kernel for Python alone, which takes its tuples held."""
-    return function if config.DISABLE_JIT else _packed(function, shared(function))
-
-
-def _packed(function: Callable, inner: Callable) -> Callable:
-    """What Python calls `inner` by, the compiled `function`."""
-
-    def make(held: Any, name: str) -> Callable:
-        items = ", ".join(f"a[{k}]" for k in range(len(held)))
-        lines = "a = at(number)", f"return inner({items})"
-        call = define("number", *lines, at=at_address(held), inner=inner)
-        call.__module__, call.__qualname__ = (
-            function.__module__,
-            f"{function.__qualname__}.entry.{name}",
-        )
-        return kernel(call)
-
-    packed = Packed(inner, make)
-
-    @functools.wraps(function)
-    def enter(*arguments: Any) -> Any:
-        return packed(*arguments)
-
-    enter.compile, enter.entries = packed.compile, packed.entries
-    return enter
+def address_in_memory(function: Callable, kinds: tuple, result: types.Type) -> int:
+    """Compile a function of these types; give its address."""
+    if function not in choosers:
+        shared(function)
+    return load(Kernel(function).unit(kinds, result))[0]

@@ -1,20 +1,26 @@
-"""Code of what meets a value: what an operation on numbers, lanes and arrays is, Numba says."""
+"""Code of what meets a value, by the table of operations and by intrinsics."""
 
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import types
-from numba.core import cgutils
-from numba.core.errors import TypingError
-from numba.core.typing.templates import fold_arguments
+from numba import typeof, types
 
+from karamelo_py.compiler import arithmetic, code, failing, indexing
 from karamelo_py.compiler.held import _Held, item_of
+from karamelo_py.compiler.intrinsics import BUILTINS, Intrinsic
 from karamelo_py.compiler.values import Emitted, HeldValue, Untraceable, Value, words, writing
 
 MOST_OPERATIONS = 10_000  # of one formula; beyond, a loop is better left to the compiler
-LONGEST = 1000  # range that is gone through
+
+
+class FunctionType(types.Type):
+    """Stand for a function, or a class, that is known."""
+
+    def __init__(self, function: Callable):
+        self.function = function
+        super().__init__(f"Function({getattr(function, '__qualname__', function)}, {id(function)})")
 
 
 class Lowering:
@@ -24,8 +30,8 @@ class Lowering:
     ----------
     seen
         What takes the place of a function in functions that are run.
-    typing, context, builder
-        Numba's.
+    builder
+        LLVM's.
 
     Attributes
     ----------
@@ -33,19 +39,25 @@ class Lowering:
         Of the tuples that were met.
     read
         What was read of held tuples on the way to here.
+    regardless
+        Whether the function goes on where one that it calls raises an exception.
     """
 
     spread: Callable  # what makes lanes of a number
     converted: Callable  # what makes lanes of real numbers of lanes of whole ones
+    dispatch: Callable  # what calls functions that are chosen by type
 
-    def __init__(self, seen: Callable, typing: Any, context: Any = None, builder: Any = None):
-        self.seen, self.typing, self.context, self.builder = seen, typing, context, builder
+    def __init__(self, seen: Callable, builder: ir.IRBuilder | None = None):
+        self.seen, self.builder = seen, builder
         self.classes: set[type] = set()
         self.operations = 0
+        self.regardless = False
         self.read: dict[tuple, Any] = {}
 
+    # --- what point functions see, and its types
+
     def wrapped(self, kind: types.Type, value: Any) -> Any:
-        """Wrap a value as point functions see it."""
+        """Give what point functions see of a value."""
         if isinstance(kind, types.Literal):
             return kind.literal_value
         if isinstance(kind, types.NoneType):
@@ -63,143 +75,181 @@ class Lowering:
             return made(*inner) if made else tuple(inner)
         if isinstance(kind, types.NamedTupleClass):
             return kind.instance_class
-        if isinstance(kind, types.Function | types.Dispatcher):
-            function = kind.typing_key if isinstance(kind, types.Function) else kind.dispatcher
-            return self.seen(function)
+        if isinstance(kind, FunctionType):
+            return self.seen(kind.function)
         return Value(kind, value)
 
     def kind_of(self, thing: Any) -> types.Type:
-        """Find the Numba type of what point functions see; whole numbers keep their value in it."""
+        """Give the type of what point functions see; whole numbers keep their value in it."""
         if isinstance(thing, Value | HeldValue):
             return thing._kind
         if isinstance(thing, int):
             return types.literal(thing)
+        if isinstance(thing, float):
+            return types.float64
         if isinstance(thing, tuple):
             kinds = tuple(types.unliteral(self.kind_of(item)) for item in thing)
             made = type(thing) if hasattr(thing, "_fields") else None
             if made:
                 self.classes.add(made)
             return types.BaseTuple.from_types(kinds, made)
+        if thing is None:
+            return types.none
+        if isinstance(thing, np.generic):
+            return typeof(thing)
         if isinstance(thing, Emitted):
-            thing = thing.seen
-        elif not isinstance(thing, float | np.generic | type | None):
-            raise Untraceable(f"{thing!r} is nothing that a kernel knows")
-        return self.typing.resolve_value_type(thing)
+            return FunctionType(thing.seen)
+        if isinstance(thing, type) and issubclass(thing, tuple) and hasattr(thing, "_fields"):
+            return types.NamedTupleClass(thing)
+        raise Untraceable(f"{thing!r} is nothing that a kernel knows")
+
+    def number_type(self, number: Any) -> types.Type:
+        """Give the type of the numbers of a class."""
+        made = arithmetic.OPERATIONS.get(getattr(number, "seen", number))
+        return made(types.int64).result
 
     def lowered(self, thing: Any, wanted: types.Type) -> Any:
-        """Write code that gives what point functions see, in the type `wanted`."""
-        kind = self.kind_of(thing)
+        """Give code of what point functions see, in the type `wanted`."""
         if isinstance(thing, Value | HeldValue):
-            return self.context.cast(self.builder, thing._value, kind, wanted)
+            return code.cast(self.builder, thing._value, thing._kind, wanted)
         if isinstance(thing, tuple):
             items = [self.lowered(a, k) for a, k in zip(thing, wanted, strict=True)]
-            return self.context.make_tuple(self.builder, wanted, items)
-        number = isinstance(thing, int | float | np.generic)
-        if number and hasattr(wanted, "width"):
-            made = self.context.get_constant_generic(self.builder, wanted.scalar, thing)
-            return self.spread(self.builder, made, wanted)
-        if number and not isinstance(wanted, types.Literal):
-            kind = types.unliteral(kind)
-            made = self.context.get_constant_generic(self.builder, kind, thing)
-            return self.context.cast(self.builder, made, kind, wanted)
-        return self.context.get_dummy_value()
+            return code.make_tuple(self.builder, wanted, items)
+        if isinstance(thing, int | float | np.generic):
+            if hasattr(wanted, "width"):
+                made = code.constant(self.builder, wanted.scalar, thing)
+                return self.spread(self.builder, made, wanted)
+            if isinstance(types.unliteral(wanted), types.Number | types.Boolean):
+                return code.constant(self.builder, types.unliteral(wanted), thing)
+        return code.nothing()
 
     def constant(self, array: np.ndarray) -> Value:
-        """Make an array part of the code."""
-        kind = self.typing.resolve_value_type(array)
-        return Value(
-            kind, self.builder and self.context.get_constant_generic(self.builder, kind, array)
-        )
+        """Give an array that is part of the code."""
+        kind = typeof(array)
+        return Value(kind, self.builder and code.constant(self.builder, kind, array))
+
+    def unify(self, *kinds: types.Type) -> types.Type | None:
+        """Give the type of what is of one of several types; None where there is none."""
+        first = kinds[0]
+        if all(kind == first for kind in kinds):
+            return first
+        if all(isinstance(kind, types.Number | types.Boolean) for kind in kinds):
+            return arithmetic.common(*kinds)
+        if all(isinstance(kind, types.Array) for kind in kinds):
+            alike = all((k.dtype, k.ndim) == (first.dtype, first.ndim) for k in kinds)
+            return first.copy(layout="A", readonly=True) if alike else None
+        return None
+
+    # --- operations
 
     def call(self, function: Callable, arguments: tuple) -> Any:
-        """Write a call of `function`."""
+        """Give what `function` gives for these arguments."""
+        if function in BUILTINS:
+            return BUILTINS[function](self, *arguments)
+        if function is slice:
+            return slice(*arguments)
+        if function in _OF_ITEMS and _has_slice(arguments[1]):
+            return self.of_item(function, *arguments)
+        found = self.dispatch(function, arguments)
+        if found is not NotImplemented:
+            return found
         self.operations += 1
-        if self.operations > MOST_OPERATIONS:
+        if self.operations > MOST_OPERATIONS and self.builder is None:
             raise Untraceable(f"it has more than {MOST_OPERATIONS} operations: take a loop")
+        if function in _OF_ITEMS:
+            return self.of_item(function, *arguments)
         kinds = tuple(map(self.kind_of, arguments))
-        if hasattr(function, "py_func"):
-            kinds = tuple(map(types.unliteral, kinds))
-        resolved = _resolved(self.typing, function, kinds)
-        called = resolved.called
-        if any(isinstance(kind, types.Omitted) for kind in called.args):
-            raise Untraceable(f"an argument of {name_of(function)} is left out")
+        operation = self.operation(function, kinds)
+        if operation is None:
+            return self.other(function, arguments, kinds)
         if self.builder is None:
-            return self.wrapped(called.return_type, None)
-        if called.pysig is not None:  # with *arguments in a tuple
-            arguments = fold_arguments(called.pysig, arguments, {}, _as_is, _as_is, _as_is)
-        values = [self.lowered(a, k) for a, k in zip(arguments, called.args, strict=True)]
-        made = resolved.made(self.context)
-        return self.wrapped(called.return_type, made(self.builder, values))
+            return self.wrapped(operation.result, None)
+        values = [self.lowered(a, k) for a, k in zip(arguments, operation.arguments, strict=True)]
+        return self.wrapped(operation.result, operation.code(self.builder, values))
+
+    def operation(self, function: Callable, kinds: tuple) -> arithmetic.Operation | None:
+        """Give the operation that a function is for arguments of these types."""
+        key = function, numbers_of(kinds)
+        if key not in _operations:
+            if isinstance(function, Intrinsic):
+                _operations[key] = _of_intrinsic(function, kinds)
+            else:
+                _operations[key] = arithmetic.operation(function, kinds)
+        return _operations[key]
+
+    def other(self, function: Callable, arguments: tuple, kinds: tuple) -> Any:
+        """Give what a function gives that is no operation on numbers."""
+        if function is len and isinstance(kinds[0], types.Array):
+            return self.attribute(arguments[0], "shape")[0]
+        if function is bool and isinstance(kinds[0], types.BaseTuple | types.NoneType):
+            return bool(len(kinds[0])) if isinstance(kinds[0], types.BaseTuple) else False
+        raise Untraceable(
+            f"{name_of(function)} is not defined for ({', '.join(map(words, kinds))})"
+        )
+
+    def of_item(self, function: Callable, things: Any, place: Any, *value: Any) -> Any:
+        """Read or write an item of an array or of a tuple."""
+        if isinstance(things, Value) and isinstance(things._kind, types.Array):
+            do = indexing.put if value else indexing.get
+            return do(self, things, place, *value)
+        if isinstance(things, tuple) and isinstance(place, Value) and not value:
+            return indexing.item_of_tuple(self, things, place)
+        raise Untraceable(f"{self.kind_of(things)} has no items")
 
     def in_type_of(self, thing: Any, like: Any) -> Any:
-        """Make a whole number a real one of the type of `like`."""
+        """Give a whole number as a real one of the type of `like`."""
         if hasattr(thing._kind, "width"):
             return self.call(self.converted, (thing, like))
         kind = getattr(like._kind, "scalar", like._kind)
-        value = self.builder and self.context.cast(self.builder, thing._value, thing._kind, kind)
+        value = self.builder and code.cast(self.builder, thing._value, thing._kind, kind)
         return Value(kind, value)
 
-    def call_bound(self, method: Value, arguments: tuple) -> Any:
-        """Write a call of a method of a number or an array."""
-        if not isinstance(method._kind, types.BoundFunction):
-            raise Untraceable(f"{words(method._kind)} cannot be called")
-        kinds = tuple(map(self.kind_of, arguments))
-        called = _typed(self.typing, method._kind, kinds, str(method._kind))
-        if self.builder is None:
-            return self.wrapped(called.return_type, None)
-        values = [self.lowered(a, k) for a, k in zip(arguments, called.args, strict=True)]
-        made = self.context.get_function(method._kind, called)
-        return self.wrapped(called.return_type, made(self.builder, [method._value, *values]))
-
     def attribute(self, thing: Value, name: str) -> Any:
-        """Read an attribute of an array or a record."""
-        kind = self.typing.resolve_getattr(thing._kind, name)
-        if kind is None:
-            raise AttributeError(f"{words(thing._kind)} has no attribute '{name}'")
-        if self.builder is None or isinstance(kind, types.BoundFunction):  # of what it is bound to
-            return self.wrapped(kind, thing._value)
-        read = self.context.get_getattr(thing._kind, name)
-        value = read(self.context, self.builder, thing._kind, thing._value, name)
-        return self.wrapped(kind, value)
+        """Give an attribute of an array, a record or a number."""
+        return indexing.attribute(self, thing, name)
 
     def set_attribute(self, thing: Value, name: str, value: Any) -> None:
         """Set an attribute of a record."""
-        called = self.typing.resolve_setattr(thing._kind, name, self.kind_of(value))
-        if called is None:
-            raise AttributeError(f"{words(thing._kind)} has no attribute '{name}' of that type")
-        if self.builder is not None:
-            write = self.context.get_setattr(name, called)
-            write(self.builder, (thing._value, self.lowered(value, called.args[1])))
+        indexing.set_attribute(self, thing, name, value)
 
     def item(self, held: HeldValue, k: int) -> Any:
-        """Read an item of a held tuple."""
+        """Give an item of a held tuple."""
         key = id(held), k
         if key not in self.read:
-            value = self.builder and item_of(self.context, self.builder, held._kind, held._value, k)
+            value = self.builder and item_of(self.builder, held._kind, held._value, k)
             self.read[key] = self.wrapped(held._kind[k], value), held  # so that its id stays its
         return self.read[key][0]
 
-    def function(self, name: str, run: Callable, kinds: tuple, result: types.Type) -> ir.Function:
-        """Write what `run` does as a function of its own in the module."""
-        module = self.builder.module
-        if name in module.globals:
-            return module.globals[name]
-        convention = self.context.call_conv
-        made = ir.Function(module, convention.get_function_type(result, kinds), name)
-        made.linkage = "internal"
-        convention.decorate_function(made, [f"a{k}" for k in range(len(kinds))], kinds)
-        builder = ir.IRBuilder(made.append_basic_block("entry"))
-        inner = Lowering(self.seen, self.typing, self.context, builder)
-        values = convention.decode_arguments(builder, kinds, made)
-        inner.give_back(run, kinds, values, result)
-        return made
+    # --- functions of their own
 
-    def give_back(self, run: Callable, kinds: tuple, values: list, result: types.Type) -> None:
+    def function(self, name: str, run: Callable, kinds: tuple, result: types.Type) -> ir.Function:
+        """Give the function of the module that is written that does what `run` does."""
+        module = self.builder.module
+        own = vars(module).setdefault("own", {})
+        if (run, kinds) not in own:
+            made = ir.Function(module, function_type(kinds, result), f"{name}.{len(own)}")
+            made.linkage = "internal"
+            made.attributes.add("nounwind")
+            own[run, kinds] = made
+            Lowering(self.seen, ir.IRBuilder(made.append_basic_block("entry"))).give_back(
+                run, kinds, made.args, result
+            )
+        return own[run, kinds]
+
+    def give_back(self, run: Callable, kinds: tuple, values: Any, result: types.Type) -> None:
         """Return what `run` gives from the function that is written."""
+        given = iter(values)
         with writing(self):
-            given = run(*(self.wrapped(k, v) for k, v in zip(kinds, values, strict=True)))
-            value = self.context.get_return_value(self.builder, result, self.lowered(given, result))
-            self.context.call_conv.return_value(self.builder, value)
+            found = run(
+                *(
+                    self.wrapped(k, _undefined(k) if code.is_empty(k) else next(given))
+                    for k in kinds
+                )
+            )
+            if code.is_empty(result):
+                self.builder.ret_void()
+            else:
+                self.builder.ret(self.lowered(found, result))
 
     def call_own(
         self, name: str, run: Callable, kinds: tuple, result: types.Type, arguments: tuple
@@ -208,63 +258,56 @@ class Lowering:
         if self.builder is None:
             return self.wrapped(result, None)
         function = self.function(name, run, kinds, result)
-        values = [self.lowered(a, k) for a, k in zip(arguments, kinds, strict=True)]
-        convention = self.context.call_conv
-        status, value = convention.call_function(self.builder, function, result, kinds, values)
-        with cgutils.if_unlikely(self.builder, status.is_error):
-            convention.return_status_propagate(self.builder, status)
-        return self.wrapped(result, value)
+        return self.call_function(function, kinds, result, arguments)
+
+    def call_function(
+        self, function: Any, kinds: tuple, result: types.Type, arguments: tuple
+    ) -> Any:
+        """Call a function of LLVM's."""
+        pairs = zip(arguments, kinds, strict=True)
+        values = [self.lowered(a, k) for a, k in pairs if not code.is_empty(k)]
+        made = self.builder.call(function, values)
+        made = _undefined(result) if code.is_empty(result) else made
+        failing.go_on(self.builder, function, self.regardless)
+        return self.wrapped(result, made)
 
 
-def _as_is(index: int, parameter: Any, argument: Any) -> Any:
-    return argument
+def function_type(kinds: tuple, result: types.Type) -> ir.FunctionType:
+    """Give LLVM's type of a function of values of these types; empty ones are not passed."""
+    gives = ir.VoidType() if code.is_empty(result) else code.register_type(result)
+    return ir.FunctionType(gives, [code.register_type(k) for k in kinds if not code.is_empty(k)])
 
 
-class _Resolved:
-    """Numba's type of a function, its signature for arguments of some types, and its code."""
-
-    __slots__ = ("_made", "called", "typed")
-
-    def __init__(self, typed: types.Type, called: Any):
-        self.typed, self.called, self._made = typed, called, None
-
-    def made(self, context: Any) -> Callable:
-        """Find what makes code of it; Numba looks for that in all its registries, often twice."""
-        if self._made is None:
-            self._made = context.get_function(self.typed, self.called)
-        return self._made
+def _undefined(kind: types.Type) -> ir.Constant:
+    return ir.Constant(code.register_type(kind), ir.Undefined)
 
 
-resolutions: dict[tuple, _Resolved] = {}
+_OF_ITEMS = {indexing.GET, indexing.PUT}
+_operations: dict[tuple, arithmetic.Operation | None] = {}
 
 
-def numbers_of(kinds: tuple) -> tuple[int, ...]:
-    """Numba's numbers of types, which are faster to compare."""
-    return tuple([kind._code for kind in kinds])
+def _has_slice(place: Any) -> bool:
+    return any(isinstance(one, slice) for one in (place if isinstance(place, tuple) else (place,)))
 
 
-def _resolved(typing: Any, function: Callable, kinds: tuple) -> _Resolved:
-    """Look up what Numba knows of a function for arguments of these types."""
-    key = typing, function, numbers_of(kinds)
-    if key not in resolutions:
-        typed = typing.resolve_value_type(function)
-        resolutions[key] = _Resolved(typed, _typed(typing, typed, kinds, name_of(function)))
-    return resolutions[key]
+def _of_intrinsic(function: Intrinsic, kinds: tuple) -> arithmetic.Operation | None:
+    plain = tuple(map(types.unliteral, kinds))
+    found = function.definition(*plain) or function.definition(*kinds)
+    if found is None:
+        return None
+    signature, codegen = found
 
+    def write(builder: Any, values: list) -> Any:
+        return codegen(builder, signature, values)
 
-def _typed(typing: Any, typed: types.Type, kinds: tuple, name: str) -> Any:
-    """Find the signature of a function for arguments of these types."""
-    try:
-        called = typing.resolve_function_type(typed, kinds, {})
-    except TypingError as error:
-        if "raised a specific error" in str(error):
-            raise
-        called = None
-    if called is None:
-        raise Untraceable(f"{name} is not defined for ({', '.join(map(words, kinds))})")
-    return called
+    return arithmetic.Operation(signature.return_type, signature.args, write)
 
 
 def name_of(function: Callable) -> str:
     """Name a function in a text."""
     return getattr(function, "__name__", str(function))
+
+
+def numbers_of(kinds: tuple) -> tuple[int, ...]:
+    """Give Numba's numbers of types, which are faster to compare."""
+    return tuple([kind._code for kind in kinds])

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from karamelo_py.compiler.compile import implements
-from karamelo_py.compiler.loops import subkernel
+from karamelo_py.compiler.loops import noinline
 
 # fmt: off
 UNARY = (
@@ -37,7 +37,7 @@ OPERATIONS = (
 (AND, OR, MIN, MAX, ATAN2, HYPOT) = range(76, 82)
 
 
-@subkernel
+@noinline
 def _whole(op, a):
     """A number without its fraction; by sums, which every target of Numba knows."""
     if not abs(a) < 2.0**52:
@@ -51,7 +51,7 @@ def _whole(op, a):
     return math.copysign(near, a)  # -0.0 too
 
 
-@subkernel
+@noinline
 def function_of(op, a):
     """Any function of one number: one chain of choices, where a loop for each would be too much."""
     if op == NEG:
@@ -115,7 +115,7 @@ def function_of(op, a):
     return math.log1p(a)
 
 
-@subkernel
+@noinline
 def operation_of(op, a, b):
     """Any operation on two numbers: comparisons and logical ones give 1.0 or 0.0."""
     if op == ADD:

@@ -12,9 +12,10 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic
 
+from karamelo_py.compiler import code
 from karamelo_py.compiler.compile import all_lanes, by_type, fma, implements, real, shared, where
+from karamelo_py.compiler.intrinsics import intrinsic
 from karamelo_py.compiler.lanes.registers import Lanes, element, vector_of
 from karamelo_py.compiler.values import OF_REALS
 
@@ -66,11 +67,11 @@ def _constant(whole: ir.Type, value: int) -> ir.Constant:
 
 
 @intrinsic
-def _taken_apart(typing_context, x):
+def _taken_apart(x):
     """m between the roots of 1/2 and of 2, and e as a real number, with x = m 2^e."""
     made = types.UniTuple(x, 2)
 
-    def codegen(context, builder, sig, arguments):
+    def codegen(builder, sig, arguments):
         number, whole, mantissa, _bias = _bits(x)
         root = 0x3FE6A09E667F3BCD if mantissa == 52 else 0x3F3504F3  # of 1/2
         bits = builder.bitcast(arguments[0], whole)
@@ -79,16 +80,16 @@ def _taken_apart(typing_context, x):
         m = builder.bitcast(builder.sub(bits, builder.shl(e, shift)), number)
         if mantissa == 52:
             e = builder.trunc(e, _short(whole))
-        return context.make_tuple(builder, made, [m, builder.sitofp(e, number)])
+        return code.make_tuple(builder, made, [m, builder.sitofp(e, number)])
 
     return made(x), codegen
 
 
 @intrinsic
-def _scaled(typing_context, x, n):
+def _scaled(x, n):
     """x 2^n, n a whole number in the type of x, up to 2000 in size."""
 
-    def codegen(context, builder, sig, arguments):
+    def codegen(builder, sig, arguments):
         number, whole, mantissa, bias = _bits(x)
         narrow = _short(whole)
         n = builder.fptosi(arguments[1], narrow)

@@ -11,20 +11,25 @@ and takes those of a thread that does not go on. The leader waits for numbers th
 for threads: one that another program keeps from running holds nobody up.
 """
 
+import ctypes
+import functools
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 from typing import Any, NamedTuple
 
-import numba
 import numpy as np
-from numba import config, prange, types
-from numba.core import cgutils
-from numba.extending import intrinsic
+from llvmlite import ir
+from numba import config, types
 
-from karamelo_py.compiler import inlining
-from karamelo_py.compiler.compile import by_type, define
+from karamelo_py.compiler import code, machine
+from karamelo_py.compiler.atomics import I64, add, pause, read, replaced, write
+from karamelo_py.compiler.compile import by_type, define, shared
 from karamelo_py.compiler.held import HeldTuple, address, at_address, held_type, hold
-from karamelo_py.compiler.loops import kernel, left, subkernel
-from karamelo_py.compiler.words import I64, add, pause, read, replaced, word, write
+from karamelo_py.compiler.intrinsics import builtin, intrinsic
+from karamelo_py.compiler.loops import noinline
+from karamelo_py.compiler.trace import formula
+from karamelo_py.compiler.values import Value
 
 
 class Serial(NamedTuple):
@@ -32,96 +37,116 @@ class Serial(NamedTuple):
 
 
 class Threaded(NamedTuple):
-    """All threads that Numba was given; `team` is where what a team shares lies (`new_team`)."""
+    """All threads that there are; `team` is where what a team shares lies (`new_team`)."""
 
     team: int = 0
 
 
-_TASK = types.none(types.intp, types.intp)  # where its arguments are, and a number
+# --- threads ----------------------------------------------------------------------------------
+
+_TASK = ir.FunctionType(ir.VoidType(), [I64, I64])  # where its arguments are, and a number
+_PART = ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 4)
+_threads = config.NUMBA_NUM_THREADS
+
+
+def set_threads(count: int) -> None:
+    """Let loops take so many threads from now on."""
+    global _threads
+    _threads = count
+
+
+@functools.cache
+def _pool(count: int) -> ThreadPoolExecutor:
+    """Start so many threads, beside the one at work."""
+    return ThreadPoolExecutor(count)
+
+
+def _share_out(count: int, part: int, task: int, arguments: int) -> None:
+    """Do a task for each number below `count`, by `part`, a function of a range of these."""
+    do = _PART(part)
+    size = min(count, _threads)
+    ends = [count * k // size for k in range(size + 1)] if size else [0, 0]
+    pairs = pairwise(ends[1:])
+    others = [_pool(_threads - 1).submit(do, task, arguments, *pair) for pair in pairs]
+    do(task, arguments, *ends[:2])
+    for other in others:
+        other.result()
+
+
+machine.publish_python("karamelo_share_out", _PART, _share_out)
+
+
+def _address_of(function: Callable, *like: int) -> int:
+    """Give the address of a function of as many whole numbers."""
+    raise NotImplementedError
+
+
+@builtin(_address_of)
+def _address_of_code(lowering: Any, function: Any, count: int) -> Value:
+    kinds = (types.intp,) * count
+    found = formula(function.seen, kinds)
+    if lowering.builder is None:
+        return Value(types.intp, None)
+    made = lowering.function(found.name, found.run, kinds, types.none)
+    if getattr(made, "raises", False):
+        lowering.builder.function.raises = True
+    return Value(types.intp, lowering.builder.ptrtoint(made, I64))
 
 
 @intrinsic
-def _address_of(typing_context, function):
-    """Where the code of a function of this signature is."""
-    dispatcher = function.dispatcher
-    dispatcher.compile(_TASK.args)
+def _call(task, arguments, number):
+    """Call the task at an address."""
 
-    def codegen(context, builder, signature, arguments):
-        compiled = dispatcher.overloads[_TASK.args]
-        context.active_code_library.add_linking_library(compiled.library)
-        function = context.declare_function(builder.module, compiled.fndesc)
-        return builder.ptrtoint(function, context.get_value_type(types.intp))
-
-    return types.intp(function), codegen
-
-
-def _call_at(context: Any, builder: Any, values: list) -> Any:
-    """Code that calls the task at an address; its status."""
-    convention = context.call_conv
-    kind = convention.get_function_type(_TASK.return_type, _TASK.args)
-    function = builder.inttoptr(values[0], kind.as_pointer())
-    return convention.call_function(builder, function, _TASK.return_type, _TASK.args, values[1:])[0]
-
-
-@intrinsic
-def _call(typing_context, task, arguments, number, failed):
-    """Call the task at an address. Where it fails, one more than its number goes to `failed`."""
-
-    def codegen(context, builder, signature, values):
-        status = _call_at(context, builder, values[:3])
-        with cgutils.if_unlikely(builder, status.is_error):
-            builder.store(builder.add(values[2], I64(1)), word(builder, values[3]))
-        return context.get_dummy_value()
-
-    return types.none(types.intp, types.intp, types.intp, types.intp), codegen
-
-
-@intrinsic
-def _nothing(typing_context):
-    """The address of a word of the function that calls this, 0 by now."""
-
-    def codegen(context, builder, signature, values):
-        place = cgutils.alloca_once(builder, I64)
-        builder.store(I64(0), place)
-        return builder.ptrtoint(place, I64)
-
-    return types.intp(), codegen
-
-
-@intrinsic
-def _fail(typing_context, task, arguments, failed):
-    """Fail as the task did whose number is one less than what is at `failed`, if that is not 0.
-
-    A thread cannot raise what Python is to see: the task is done once more, by who shared it out.
-    """
-
-    def codegen(context, builder, signature, values):
-        first = builder.load(word(builder, values[2]))
-        with cgutils.if_unlikely(builder, builder.icmp_signed("!=", first, I64(0))):
-            status = _call_at(context, builder, [*values[:2], builder.sub(first, I64(1))])
-            with cgutils.if_likely(builder, status.is_error):
-                context.call_conv.return_status_propagate(builder, status)
-            text = "one of several threads failed, and did not when it was asked again"
-            context.call_conv.return_user_exc(builder, RuntimeError, (text,))
-        return context.get_dummy_value()
+    def codegen(builder, signature, values):
+        builder.call(builder.inttoptr(values[0], _TASK.as_pointer()), values[1:])
+        return code.nothing()
 
     return types.none(types.intp, types.intp, types.intp), codegen
 
 
-def _in_parallel(count, task, arguments, failed):
-    for number in prange(count):
-        _call(task, arguments, number, failed)
+@intrinsic
+def _call_python(count, part, task, arguments):
+    """Call `_share_out`."""
+
+    def codegen(builder, signature, values):
+        function = code.external(builder, "karamelo_share_out", ir.VoidType(), [I64] * 4)
+        builder.call(function, values)
+        return code.nothing()
+
+    return types.none(*[types.intp] * 4), codegen
 
 
-inlining.claim(_in_parallel.__qualname__, "kept")
-_in_parallel = kernel(_in_parallel, parallel=True, no_cpython_wrapper=True)
+def _regardless(function: Callable, *arguments: Any) -> Any:
+    """Call a function; an exception in it is left to who called this one."""
+    raise NotImplementedError
+
+
+@builtin(_regardless)
+def _call_regardless(lowering: Any, function: Callable, *arguments: Any) -> Any:
+    lowering.regardless = True
+    try:
+        return function(*arguments)
+    finally:
+        lowering.regardless = False
+
+
+@shared
+def _do_part(task, arguments, begin, end):
+    for number in range(begin, end):
+        _call(task, arguments, number)
+
+
+@noinline
+def _in_parallel(count, task, arguments):
+    """Do a task for each number below `count`, by threads that begin for it."""
+    _call_python(count, _address_of(_do_part, 4), task, arguments)
 
 
 # --- teams ------------------------------------------------------------------------------------
 
 # Words, each in a line of the caches of its own.
 _STATE, _SIZE, _TASK_AT, _ARGUMENTS, _COUNT, _DONE, _EPOCH = range(0, 7 * 64, 64)
-_FAILED, _LED, _RESULT, _TICKETS = range(7 * 64, 11 * 64, 64)
+_RESULT, _TICKETS = range(7 * 64, 9 * 64, 64)
 _WAITS, _LEADS, _ENDED = range(3)  # in _STATE
 _SHORT = 8000  # pauses, some 0.3 ms; then threads sleep, since others may need their cores
 _APART, _LOOKS = 10, 64  # pauses between looks at what is left of another's part; looks, 30 us
@@ -130,15 +155,13 @@ _LEFT = (1 << 32) - 1  # of a ticket: how many numbers are left; above them the 
 
 
 def new_team(threads: int) -> np.ndarray:
-    """What a team of so many threads shares; its address is that in `Threaded`."""
-    if not config.DISABLE_JIT:
-        numba.get_num_threads()  # which starts what loops from the cache need before being loaded
+    """Make what a team of so many threads shares; its address is that in `Threaded`."""
     words = np.zeros((_TICKETS // 64 + threads, 8), np.int64)
     words[_SIZE // 64, 0] = threads
     return words
 
 
-@subkernel
+@noinline
 def _take_part(team, k):
     """Do what thread `k` gets of the loop of now, its own part first; how many numbers.
 
@@ -170,12 +193,12 @@ def _take_part(team, k):
             # As long as a number is not done, the loop stays that of now.
             end = read(team + _COUNT) * (part + 1) // size
             task, arguments = read(team + _TASK_AT), read(team + _ARGUMENTS)
-            _call(task, arguments, end - left, team + _FAILED)
+            _call(task, arguments, end - left)
             mine += 1
             seen = word - 1
 
 
-@subkernel
+@noinline
 def _share(team, count, task, arguments):
     """Let the team do a loop; its leader calls this."""
     size = read(team + _SIZE)
@@ -183,7 +206,6 @@ def _share(team, count, task, arguments):
     write(team + _ARGUMENTS, arguments)
     write(team + _COUNT, count)
     write(team + _DONE, 0)
-    write(team + _FAILED, 0)
     epoch = read(team + _EPOCH) + 1
     for part in range(size):
         numbers = count * (part + 1) // size - count * part // size
@@ -196,7 +218,7 @@ def _share(team, count, task, arguments):
         pauses += 1
 
 
-@subkernel
+@noinline
 def _serve(team, k):
     """Take part in loops until the leader ends, if there is one."""
     seen = -1
@@ -216,35 +238,29 @@ def _serve(team, k):
         pauses += 1
 
 
-@subkernel
+@noinline
 def _distribute(team, count, task, arguments):
     """Do a loop: by the team that is at work, if one is, else by threads that begin for it."""
-    failed = _nothing()
     if team == 0 or read(team + _STATE) != _LEADS:
-        _in_parallel(count, task, arguments, failed)
+        _in_parallel(count, task, arguments)
     elif count > 1:
         _share(team, count, task, arguments)
-        write(failed, read(team + _FAILED))
     elif count == 1:
-        _call(task, arguments, 0, failed)
-    _fail(task, arguments, failed)
+        _call(task, arguments, 0)
 
 
-@subkernel
-def _begin_and_end(team, body, leads, arguments):
-    """Let threads do `body`: one of them leads, by doing `leads`."""
-    _in_parallel(read(team + _SIZE), body, arguments, team + _LED)
-    _fail(leads, arguments, team + _LED)
+@noinline
+def _begin_and_end(team, body, arguments):
+    """Let threads do `body`: one of them leads."""
+    _in_parallel(read(team + _SIZE), body, arguments)
 
 
 def _task_of(name: str, items: Any, lines: tuple, **names: Any) -> Callable:
-    """A function of the address of these items, `a` in its lines, and of a number k."""
+    """Make a function of the address of these items, `a` in its lines, and of a number k."""
     held = HeldTuple(tuple(map(held_type, items)))
     task = define("arguments, k", "a = at(arguments)", *lines, at=at_address(held), **names)
-    # Another for other arguments: their types are not in the type of a task, and code of one name
-    # that other processes have kept is taken to be the same.
     task.__qualname__ = f"{name}.task.{held.name}"
-    return left(task)
+    return shared(task)
 
 
 def shared_out(function: Callable, parameters: str) -> Callable:
@@ -267,7 +283,7 @@ def shared_out(function: Callable, parameters: str) -> Callable:
         call = (f"function({items}, k)",)
         return define(
             names,
-            f"distribute(mode.team, count, address_of(body), address(hold(({parameters},))))",
+            f"distribute(mode.team, count, address_of(body, 2), address(hold(({parameters},))))",
             distribute=_distribute, address_of=_address_of, address=address, hold=hold,
             body=_task_of(function.__qualname__, arguments, call, function=function),
         )  # fmt: skip
@@ -284,7 +300,7 @@ def by_team(function: Callable, parameters: str) -> Callable:
     def run(mode, *arguments):
         return function(mode, *arguments)
 
-    inner = subkernel(function)
+    inner = noinline(function)
 
     @by_type(run)
     def _run_by_type(mode, *arguments):
@@ -293,36 +309,31 @@ def by_team(function: Callable, parameters: str) -> Callable:
             return define(names, f"return function({names})", function=inner)
         items = ", ".join(f"a[{k}]" for k in range(1 + len(arguments)))
         names_of_words = {
-            "LED": _LED, "STATE": _STATE, "LEADS": _LEADS, "ENDED": _ENDED, "RESULT": _RESULT,
+            "STATE": _STATE, "LEADS": _LEADS, "ENDED": _ENDED, "RESULT": _RESULT,
             "SIZE": _SIZE, "WAITS": _WAITS, "read": read, "write": write, "function": inner,
         }  # fmt: skip
-        leads = _task_of(
-            f"{function.__qualname__}.leads", (mode, *arguments),
-            (f"write(a[0].team + RESULT, function({items}))",), **names_of_words,
-        )  # fmt: skip
         lines = (
             "team = a[0].team",
             "if k > 0:",
             "    serve(team, k)",
             "else:",
             "    write(team + STATE, LEADS)",
-            "    call(address_of(leads), arguments, 0, team + LED)",
+            f"    write(team + RESULT, regardless(function, {items}))",
             "    write(team + STATE, ENDED)",
         )
         body = _task_of(
-            function.__qualname__, (mode, *arguments), lines, serve=_serve, call=_call,
-            address_of=_address_of, leads=leads, **names_of_words,
+            function.__qualname__, (mode, *arguments), lines, serve=_serve, regardless=_regardless,
+            **names_of_words,
         )  # fmt: skip
         return define(
             names,
             "team = mode.team",
             f"if team == 0: return function({names})",
             "write(team + STATE, WAITS)",
-            "write(team + LED, 0)",
-            f"begin_and_end(team, address_of(body), address_of(leads), address(hold(({names}))))",
+            f"begin_and_end(team, address_of(body, 2), address(hold(({names}))))",
             "return read(team + RESULT)",
             begin_and_end=_begin_and_end, address_of=_address_of, address=address, hold=hold,
-            body=body, leads=leads, **names_of_words,
+            body=body, **names_of_words,
         )  # fmt: skip
 
     return run

@@ -19,8 +19,6 @@ a closure, as methods do, are refused.
 import dis
 import functools
 import inspect
-import itertools
-import re
 import types as python
 from collections.abc import Callable, Hashable, Iterable, Iterator
 from traceback import walk_tb
@@ -28,15 +26,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
-from numba.core.errors import NumbaError, TypingError
-from numba.core.extending import _Intrinsic
-from numba.core.imputils import impl_ret_borrowed, lower_builtin
-from numba.core.registry import cpu_target
-from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 
+from karamelo_py.compiler.arithmetic import OPERATIONS
 from karamelo_py.compiler.choices import choosers, note, parts_noted, tag_class
 from karamelo_py.compiler.flow import Flow
-from karamelo_py.compiler.lowering import Lowering, name_of, numbers_of, resolutions
+from karamelo_py.compiler.intrinsics import BUILTINS, Intrinsic
+from karamelo_py.compiler.lowering import Lowering, name_of, numbers_of
 from karamelo_py.compiler.methods import refuse_methods
 from karamelo_py.compiler.statements import AstFunction, place_in_text
 from karamelo_py.compiler.values import (
@@ -82,16 +77,10 @@ class Undefined(TypeError):
 
 
 def _reason(error: BaseException) -> str:
-    """Say what is wrong, in one line; of Numba, the cause that it gives."""
+    """Tell what is wrong, in one line."""
     if isinstance(error, Untraceable):
         return str(error)
-    if not isinstance(error, NumbaError):
-        return ": ".join(filter(None, (type(error).__name__, str(error))))
-    text = re.sub(r"\x1b\[[\d;]*m", "", str(error))
-    inner = text.rpartition("raised a specific error:")[2] or text
-    lines = (line.strip() for line in inner.splitlines())
-    causes = (line for line in lines if line and not re.match(r"(\w+: )?Failed in ", line))
-    return next(causes, type(error).__name__)
+    return ": ".join(filter(None, (type(error).__name__, str(error))))
 
 
 def places_of(error: BaseException) -> Iterator[tuple[str, int]]:
@@ -130,18 +119,7 @@ class _Dispatched(Emitted):
         made = implemented(self.seen, arguments)
         if made is not None:
             return _seen(made)(*arguments)
-        if self.seen in OF_REALS:
-            arguments = alike(arguments)
-        lowering = now()
-        kinds = _kinds_of(self.seen, map(lowering.kind_of, arguments))
-        found = _formula(self.seen, lowering.typing, kinds)
-        if found is None:
-            return emit(self.seen, *arguments)
-        if self.seen in _own:
-            return lowering.call_own(found.name, found.run, kinds, found.result, arguments)
-        if lowering.builder is None and found.plain:
-            return lowering.wrapped(found.result, None)
-        return found.run(*arguments)
+        return emit(self.seen, *(alike(arguments) if self.seen in OF_REALS else arguments))
 
     def defined(self, *classes: type) -> bool:
         """Tell whether a point function has an implementation for these classes."""
@@ -231,6 +209,8 @@ def _copy(thing: Any) -> Any:
         return INSTEAD[thing]
     if thing in _SAFE:
         return thing
+    if thing in BUILTINS or isinstance(thing, Intrinsic):
+        return Emitted(thing)
     if thing in choosers:
         return _Dispatched(thing)
     number = isinstance(thing, type) and issubclass(thing, np.generic)
@@ -238,17 +218,11 @@ def _copy(thing: Any) -> Any:
         return Emitted(thing)
     if isinstance(thing, type) and issubclass(thing, tuple):
         return thing
-    if hasattr(thing, "py_func") or _numba_knows(thing):
+    if thing in OPERATIONS or isinstance(thing, type):
         return Emitted(thing)
     if isinstance(thing, python.FunctionType):
         return _copied(thing)
     raise Untraceable(f"kernels do not know {getattr(thing, '__name__', repr(thing))}")
-
-
-def _numba_knows(thing: Any) -> bool:
-    """Tell whether Numba has a version of its own; also before it compiled anything."""
-    cpu_target.typing_context.refresh()
-    return bool(cpu_target.typing_context._lookup_global(thing))
 
 
 @functools.cache
@@ -293,12 +267,11 @@ class _Formula(NamedTuple):
     result: types.Type
     parts: frozenset
     plain: bool  # whether the type says all that is known of the result
-    name: str  # that nothing else has
+    name: str
 
 
 _formulas: dict[tuple, _Formula | None] = {}
 MOST_FORMULAS = 4000  # that are kept: some 12 kB each, 800 for a scene with contact
-_numbers = itertools.count()
 _begun: set[tuple] = set()  # of what is written now
 _own: set[Callable] = set()  # functions that are not written into what calls them
 
@@ -314,16 +287,16 @@ def _is_plain(thing: Any) -> bool:
     return thing is None or isinstance(thing, Value | HeldValue)
 
 
-def _written(dispatch: Callable, typing: Any, kinds: tuple) -> _Formula | None:
-    """Find by a run what :func:`_formula` gives."""
+def _written(dispatch: Callable, kinds: tuple) -> _Formula | None:
+    """Find by a run what :func:`formula` gives."""
     chosen = dispatch
     try:
-        lowering = Lowering(_seen, typing)
+        lowering = Lowering(_seen)
         with writing(lowering), parts_noted() as parts:
             chosen = _chosen(dispatch, kinds)
             if chosen is None:
                 return None
-            run = _seen(chosen) if isinstance(chosen, _Intrinsic) else _copied(chosen)
+            run = _seen(chosen) if isinstance(chosen, Intrinsic) else _copied(chosen)
             note([run.__code__] if hasattr(run, "__code__") else ())
             found = run(*(lowering.wrapped(kind, None) for kind in kinds))
             result = types.unliteral(lowering.kind_of(found))
@@ -331,17 +304,16 @@ def _written(dispatch: Callable, typing: Any, kinds: tuple) -> _Formula | None:
         refuse_methods(codes, lowering.classes)
         if hasattr(dispatch, "tags"):
             parts.add((dispatch, tuple(map(tag_class, kinds[: dispatch.tags]))))
-        name = f"{dispatch.__qualname__}.{next(_numbers)}"
-        return _Formula(run, result, frozenset(parts), _is_plain(found), name)
+        return _Formula(run, result, frozenset(parts), _is_plain(found), dispatch.__qualname__)
     except (DataDependentBranch, CannotCompile, Undefined):
         raise
     except (Exception, Untraceable) as why:
         raise CannotCompile(_reason(why), chosen or dispatch) from why
 
 
-def _formula(dispatch: Callable, typing: Any, kinds: tuple) -> _Formula | None:
-    """Find what to run for arguments of these types; None if Numba has it."""
-    key = typing, dispatch, numbers_of(kinds)
+def formula(dispatch: Callable, kinds: tuple) -> _Formula | None:
+    """Find what to run for arguments of these types; None if nothing is chosen."""
+    key = dispatch, numbers_of(kinds)
     if len(_formulas) > MOST_FORMULAS and not at_work():
         forget()
     while key not in _formulas:
@@ -349,7 +321,7 @@ def _formula(dispatch: Callable, typing: Any, kinds: tuple) -> _Formula | None:
             raise CannotCompile("it calls itself", dispatch)
         _begun.add(key)
         try:
-            _formulas[key] = _written(dispatch, typing, kinds)
+            _formulas[key] = _written(dispatch, kinds)
         except DataDependentBranch:
             # Once more, and through the text of the function that asks.
             _copies.clear()
@@ -364,7 +336,6 @@ def _formula(dispatch: Callable, typing: Any, kinds: tuple) -> _Formula | None:
 def forget() -> None:
     """Find anew what is run: a point function has another implementation than was known."""
     _formulas.clear()
-    resolutions.clear()
 
 
 def _number_types(kinds: Iterable[types.Type]) -> Iterator[type]:
@@ -378,7 +349,7 @@ def _number_types(kinds: Iterable[types.Type]) -> Iterator[type]:
 
 
 def _chosen(dispatch: Callable, kinds: tuple) -> Callable | None:
-    """Find what a function is for arguments of some types; None if Numba has it."""
+    """Find what a function is for arguments of some types; None if nothing is chosen."""
     for one in _number_types(kinds):
         if dispatch in one.implements:
             return one.implements[dispatch]
@@ -411,26 +382,26 @@ def traced(dispatch: Callable, chooser: Callable, last: bool = False) -> None:
         return
     choosers[dispatch] = [chooser]
 
-    class Template(AbstractTemplate):
-        key = dispatch
 
-        def generic(self, arguments: tuple, keywords: dict) -> Any:
-            kinds = _kinds_of(dispatch, arguments)
-            found = None if keywords else _formula(dispatch, self.context, kinds)
-            return found and signature(found.result, *kinds)
+def _call(function: Callable, arguments: tuple) -> Any:
+    """What a function gives that is chosen by the types of its arguments, if one is chosen."""
+    if function not in choosers:
+        return NotImplemented
+    lowering = now()
+    kinds = _kinds_of(function, map(lowering.kind_of, arguments))
+    found = formula(function, kinds)
+    if found is None:
+        return NotImplemented
+    if function in _own:
+        return lowering.call_own(found.name, found.run, kinds, found.result, arguments)
+    if lowering.builder is None and found.plain:
+        return lowering.wrapped(found.result, None)
+    return found.run(*arguments)
 
-        def get_impl_key(self, called: Any) -> Any:
-            return Template
 
-    infer_global(dispatch, types.Function(Template))
+Lowering.dispatch = staticmethod(_call)
 
-    @lower_builtin(Template, types.VarArg(types.Any))
-    def lower(context: Any, builder: Any, called: Any, values: list) -> Any:
-        lowering = Lowering(_seen, context.typing_context, context, builder)
-        with writing(lowering):
-            arguments = [lowering.wrapped(k, v) for k, v in zip(called.args, values, strict=True)]
-            result = _Dispatched(dispatch)(*arguments)
-            if types.unliteral(lowering.kind_of(result)) != called.return_type:
-                raise TypingError(f"{dispatch.__qualname__} has changed while it was compiled")
-            value = lowering.lowered(result, called.return_type)
-            return impl_ret_borrowed(context, builder, called.return_type, value)
+
+def write_into(builder: Any) -> Lowering:
+    """What writes code with this builder."""
+    return Lowering(_seen, builder)

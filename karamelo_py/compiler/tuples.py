@@ -1,40 +1,10 @@
-"""Algebra on flat tuples of any length: sums, multiples, products.
+"""Records of arrays, nested tuples and their numbers, one after another; parts that may be absent.
 
 Comprehensions, which Numba does not know of tuples: kernels run them (`compiler/trace.py`). They
 are of lists, which Python makes in two thirds of the time where all is interpreted.
 """
 
-from karamelo_py.compiler.compile import Weighted, fma, shared, where
-
-
-@shared
-def add(a, b):
-    """a + b, component by component."""
-    return tuple([x + y for x, y in zip(a, b, strict=True)])
-
-
-@shared
-def subtract(a, b):
-    """a - b, component by component."""
-    return tuple([x - y for x, y in zip(a, b, strict=True)])
-
-
-@shared
-def scale(factor, a):
-    """factor * a."""
-    return tuple([factor * x for x in a])
-
-
-@shared
-def add_scaled(a, factor, b):
-    """a + factor * b."""
-    return tuple([fma(factor, y, x) for x, y in zip(a, b, strict=True)])
-
-
-@shared
-def multiply_each(a, b):
-    """a b, component by component."""
-    return tuple([x * y for x, y in zip(a, b, strict=True)])
+from karamelo_py.compiler.compile import Weighted, fma, shared
 
 
 @shared
@@ -77,10 +47,11 @@ def put_at(array, i, first, values):
 def row(array, i, first, like):
     """(array[i, first], ..., array[i, first + len(like) - 1])."""
     if isinstance(i, Weighted):
-        total = subtract(like, like)
+        total = [a - a for a in like]
         for one, weight in zip(i.rows, i.weights, strict=True):
-            total = add_scaled(total, weight, row(array, one, first, like))
-        return total
+            found = row(array, one, first, like)
+            total = [fma(weight, x, t) for x, t in zip(found, total, strict=True)]
+        return tuple(total)
     return tuple([array[i, first + k] for k in range(len(like))])
 
 
@@ -94,46 +65,10 @@ def record(table, i):
 
 
 @shared
-def add_optional(a, factor, b):
-    """a + factor * b, where an empty `b` counts as zero."""
-    return add_scaled(a, factor, b) if len(b) else a
-
-
-@shared
 def clear_first(array, i):
     """Set the first number of row `i` of an array that may be absent (None) to zero."""
     if array is not None:
         array[i, 0] = 0
-
-
-@shared
-def add_row(a, first, b):
-    """`a` with b[k] added to a[first + k]."""
-
-    def sum_at(k, x):
-        for j in range(min(len(b), k + 1)):
-            x = where(first == k - j, a[k] + b[j], x)
-        return x
-
-    return tuple([sum_at(k, x) for k, x in enumerate(a)])
-
-
-@shared
-def leading(values, like):
-    """The first of the numbers in `values`, as `like` is."""
-    return nested_as(like, flat(values)[: count_in(like)])
-
-
-@shared
-def following(values, like):
-    """The numbers in `values` after those that are in `like`, perhaps none."""
-    return flat(values)[count_in(like) :]
-
-
-@shared
-def plus(number, present):
-    """number + present[0], or the number alone where `present` is empty."""
-    return number + present[0] if len(present) else number
 
 
 def only(present):

@@ -16,8 +16,6 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from karamelo_py.compiler.held import _Held
-
 
 class Untraceable(BaseException):
     """Say why a function cannot become code of a kernel; no function may catch that."""
@@ -240,7 +238,7 @@ class HeldValue:
 
     __slots__ = ("_kind", "_value")
 
-    def __init__(self, kind: _Held, value: Any):
+    def __init__(self, kind: types.BaseTuple, value: Any):
         self._kind, self._value = kind, value
 
     def __len__(self) -> int:

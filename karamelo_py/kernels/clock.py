@@ -4,7 +4,7 @@ from math import inf
 from typing import Any
 
 from karamelo_py.compiler.compile import real, shared
-from karamelo_py.compiler.loops import entered
+from karamelo_py.compiler.loops import kernel
 from karamelo_py.kernels.arrays import DT, MASS, TIME, TIMESTEP, Control, Number, Setup, Tag
 from karamelo_py.points.kinematics import vector
 
@@ -52,7 +52,7 @@ STILL = 0.25
 STRIDE = 0.65
 
 
-@entered
+@kernel
 def choose_dt(control: Control) -> None:
     """dt of the next step, from the rate of the fastest point or as fixed; shortened at the end.
 
@@ -85,7 +85,7 @@ def choose_dt(control: Control) -> None:
     clock.kick = 0.5 * (clock.last_dt + dt)
 
 
-@entered
+@kernel
 def finish(control: Control) -> None:
     """End of a step: the points are where they moved to, time goes on, the next dt is chosen."""
     clock = control.clock[0]

@@ -23,7 +23,7 @@ import numpy as np
 
 from karamelo_py.compiler.compile import point_function
 from karamelo_py.compiler.fields import field
-from karamelo_py.compiler.loops import entered, subkernel
+from karamelo_py.compiler.loops import kernel, noinline
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels import contact_pairs
 from karamelo_py.kernels.arrays import DT, MASS, TIMESTEP, of_change, of_momentum
@@ -62,7 +62,7 @@ class SeparateFields(NamedTuple):
     change: np.ndarray  # (F, d) scratch: of the velocity of each of them
 
 
-@subkernel
+@noinline
 def _take(contact, control, a, i, n, k, impulse, per_mass, x):
     """A node takes a component of an impulse; a fix that prescribes its velocity takes it over."""
     slot = contact.prescribed[n, k]
@@ -79,7 +79,7 @@ def _take(contact, control, a, i, n, k, impulse, per_mass, x):
         add_to(control.totals, slot - 1 + k, -force)
 
 
-@subkernel
+@noinline
 def _meet(contact, nodes, n):
     """Put the fields that have mass at the place of node `n` into `meeting`; their number.
 
@@ -99,13 +99,13 @@ def _meet(contact, nodes, n):
     return count
 
 
-@subkernel
+@noinline
 def _node(contact, place, i):
     """The node at a place of the `i`-th of the fields that meet there."""
     return place + contact.meeting[i] * contact.stride
 
 
-@subkernel
+@noinline
 def _clear_change(contact, d, count):
     for i in range(count):
         for k in range(d):
@@ -144,7 +144,7 @@ def _belongs_touched(which, contact, d, nodes, n, m, b):
     return abs(contact.touched[n, b]) == which.step
 
 
-@subkernel
+@noinline
 def _count_partners(which, contact, d, nodes, place, count):
     """Note in how many such pairs each of the fields that meet is; whether any is."""
     found = False
@@ -160,12 +160,12 @@ def _count_partners(which, contact, d, nodes, place, count):
     return found
 
 
-@subkernel
+@noinline
 def _share(contact, i, j):
     return 1.0 / max(contact.partners[i], contact.partners[j], 1)
 
 
-@subkernel
+@noinline
 def _touch_pair(contact, d, nodes, control, i, j, place, share, where):
     """`share` of the impulse between the `i`-th and the `j`-th of the fields that meet."""
     a, b = contact.meeting[i], contact.meeting[j]
@@ -207,7 +207,7 @@ def _touch_pair(contact, d, nodes, control, i, j, place, share, where):
             add_to(control.totals, contact.pair[b, a] + k, force)
 
 
-@subkernel
+@noinline
 def _touch_place(contact, kin, nodes, control, place, count, where):
     """Resolve contact where `count` fields meet."""
     d = dimension(kin)
@@ -227,7 +227,7 @@ def _touch_place(contact, kin, nodes, control, place, count, where):
                 nodes.update[n, of_change(kin) + k] += contact.change[i, k]
 
 
-@entered
+@kernel
 def _keep_rigid(contact, kin, nodes, spans):
     """Rigid bodies have their velocity, whatever acts on the nodes."""
     for s in range(1, 1 + spans[0, 0]):
@@ -239,7 +239,7 @@ def _keep_rigid(contact, kin, nodes, spans):
                     nodes.update[n, of_change(kin) + k] = 0
 
 
-@subkernel
+@noinline
 def touch_node(contact, kin, grids, nodes, control, n):
     """Resolve contact at the place of node `n`, if its field is the first of those that meet."""
     count = _meet(contact, nodes, n)
@@ -249,7 +249,7 @@ def touch_node(contact, kin, grids, nodes, control, n):
         _touch_place(contact, kin, nodes, control, n % contact.stride, count, where)
 
 
-@entered
+@kernel
 def _touch_nodes(contact, kin, grids, nodes, spans, control):
     """Resolve contact in v* and the change of velocity of this step; publish the forces."""
     d = dimension(kin)
@@ -277,7 +277,7 @@ def _touch_nodes(contact, kin, grids, nodes, spans, control):
             values[contact.copies[c, 1] + k] = values[contact.copies[c, 0] + k]
 
 
-@subkernel
+@noinline
 def _stay_pair(contact, d, nodes, i, j, pair, share, sticks):
     """Take `share` of the relative velocity across the surface, or of all where the pair sticks."""
     v = nodes.velocity
@@ -301,7 +301,7 @@ def _stay_pair(contact, d, nodes, i, j, pair, share, sticks):
             contact.change[j, k] += impulse * pair.per_b
 
 
-@subkernel
+@noinline
 def _stay_place(contact, d, nodes, place, count, step):
     if not _count_partners(Touched(step), contact, d, nodes, place, count):
         return
@@ -321,7 +321,7 @@ def _stay_place(contact, d, nodes, place, count, step):
                 nodes.velocity[n, k] += contact.change[i, k]
 
 
-@subkernel
+@noinline
 def stay_node(contact, kin, nodes, step, n):
     """The same for the velocity that deforms, where contact acted in `step`."""
     count = _meet(contact, nodes, n)
@@ -329,7 +329,7 @@ def stay_node(contact, kin, nodes, step, n):
         _stay_place(contact, dimension(kin), nodes, n % contact.stride, count, step)
 
 
-@entered
+@kernel
 def _stay_nodes(contact, kin, nodes, spans, step):
     """Keep the velocity that deforms from opening or closing contact that acted in `step`.
 

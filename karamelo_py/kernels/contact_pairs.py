@@ -4,7 +4,7 @@ from math import sqrt
 from typing import NamedTuple
 
 from karamelo_py.compiler.fields import field
-from karamelo_py.compiler.loops import subkernel
+from karamelo_py.compiler.loops import noinline
 from karamelo_py.kernels.arrays import MASS
 from karamelo_py.kernels.p2g import Centre, Normal
 from karamelo_py.points.basis.surface import ENTRIES
@@ -29,13 +29,13 @@ class NodePair(NamedTuple):
     share_b: float
 
 
-@subkernel
+@noinline
 def immovable(contact, n, k):
     """Return True if contact cannot move a node in direction k."""
     return contact.prescribed[n, k] != 0 or contact.rigid[n // contact.stride]
 
 
-@subkernel
+@noinline
 def _shares(contact, d, nodes, n, m):
     """Weights of the two bodies' outward sums in their common normal.
 
@@ -61,14 +61,14 @@ def _shares(contact, d, nodes, n, m):
     return share**4, (1 - share) ** 4
 
 
-@subkernel
+@noinline
 def pair_of(contact, d, nodes, n, m):
     per_a, per_b = 1.0 / nodes.sums[n, MASS], 1.0 / nodes.sums[m, MASS]
     share_a, share_b = _shares(contact, d, nodes, n, m)
     return NodePair(n, m, per_a, per_b, share_a, share_b)
 
 
-@subkernel
+@noinline
 def yielding_of(contact, pair, k):
     """Change of the relative velocity with an impulse along direction k."""
     of_n = 0.0 if immovable(contact, pair.n, k) else pair.per_a
@@ -76,14 +76,14 @@ def yielding_of(contact, pair, k):
     return of_n + of_m
 
 
-@subkernel
+@noinline
 def outward_of(nodes, pair, k):
     """Component k of the common normal, not normalised, from the first body to the second."""
     normal = field(nodes.fields, Normal)
     return pair.share_a * normal[pair.n, k] - pair.share_b * normal[pair.m, k]
 
 
-@subkernel
+@noinline
 def _left(contact, nodes, pair, k, push):
     """Component of the relative velocity once the impulse `push` m grad N has been given."""
     along = push * outward_of(nodes, pair, k)
@@ -91,7 +91,7 @@ def _left(contact, nodes, pair, k, push):
     return relative - along * yielding_of(contact, pair, k)
 
 
-@subkernel
+@noinline
 def approach_left(contact, d, nodes, pair, push, size):
     """Return the rest of the approach velocity after `push`, over the length of m grad N.
 
@@ -103,13 +103,13 @@ def approach_left(contact, d, nodes, pair, push, size):
     return across / (size * size)
 
 
-@subkernel
+@noinline
 def slide_of(contact, nodes, pair, k, push, across):
     """Component of the relative velocity along the surface, once `push` has been given."""
     return _left(contact, nodes, pair, k, push) - across * outward_of(nodes, pair, k)
 
 
-@subkernel
+@noinline
 def length_of(d, nodes, pair):
     """Length of the common normal."""
     size = 0.0
@@ -119,7 +119,7 @@ def length_of(d, nodes, pair):
     return sqrt(size)
 
 
-@subkernel
+@noinline
 def _reach(contact, d, nodes, pair, n, where, side):
     """Return the distance from node `n` to the surface of its body, along the normal out of it.
 
@@ -137,7 +137,7 @@ def _reach(contact, d, nodes, pair, n, where, side):
     return where.h * (table[low] + share * (table[low + 1] - table[low]))
 
 
-@subkernel
+@noinline
 def excess_of(contact, d, nodes, pair, where):
     """Return the excess of the approach velocity over the one that closes the gap in a step."""
     size = length_of(d, nodes, pair)
@@ -154,7 +154,7 @@ def excess_of(contact, d, nodes, pair, where):
     return approach / size - max(gap, 0.0) / where.dt
 
 
-@subkernel
+@noinline
 def compliance_of(contact, d, nodes, pair, size):
     """Change of the relative velocity along the normal, of length `size`, with an impulse."""
     compliance = 0.0
@@ -164,7 +164,7 @@ def compliance_of(contact, d, nodes, pair, size):
     return compliance
 
 
-@subkernel
+@noinline
 def friction_of(contact, d, nodes, pair, friction, push, size, across, share):
     """Impulse along the surface over the speed of sliding, and whether it stops all sliding."""
     compliance = 0.0
@@ -180,7 +180,7 @@ def friction_of(contact, d, nodes, pair, friction, push, size, across, share):
     return min(stop, friction * push) / slip, stop <= friction * push
 
 
-@subkernel
+@noinline
 def work_of_friction(contact, d, nodes, pair, push, across, rub):
     """Return the energy that friction dissipates: impulse times mean of the sliding speeds."""
     work = 0.0

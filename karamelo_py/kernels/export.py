@@ -3,7 +3,7 @@
 from karamelo_py.compiler.compile import index
 from karamelo_py.compiler.fields import load, store
 from karamelo_py.compiler.held import at_hand
-from karamelo_py.compiler.loops import loop
+from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.tuples import put_at, record, row
 from karamelo_py.kernels.visit import place_at
 from karamelo_py.points.basis import entry, locate, reach, support
@@ -23,7 +23,7 @@ STRAIN, JACOBIAN, ENERGY = 6, 12, 13
 EXPORTED = 14  # columns: stress, elastic strain (6 each), det F, stored energy of the point
 
 
-@loop
+@kernel
 def export_state(kin, like, points, laws, out):
     """Fill ``out`` (n, EXPORTED) in the order of the points."""
     points, laws = at_hand(points), at_hand(laws)
@@ -37,7 +37,7 @@ def export_state(kin, like, points, laws, out):
         out[p, ENERGY] = volume * energy_density(law, kin, state)
 
 
-@loop
+@kernel
 def export(what, times_volume, kin, like, points, laws, out):
     """One number ``out`` (n,) of each point, declared by laws that have it (`columns_of`).
 
@@ -51,7 +51,7 @@ def export(what, times_volume, kin, like, points, laws, out):
         out[p] = points.mass[p] * specific_volume(law) * number if times_volume else number
 
 
-@loop
+@kernel
 def impose_stress(kin, like, points, laws, chosen, given, stress):
     """Set the Cauchy stress of the chosen points, where ``given`` (6,) says so.
 
@@ -70,7 +70,7 @@ def impose_stress(kin, like, points, laws, chosen, given, stress):
         store(points.state, p, with_stress(law, kin, state, row(stress, p, 0, old)))
 
 
-@loop
+@kernel
 def export_to_nodes(basis, kin, grids, grid_of, where, values, unit, out):
     """Add sum N value of the points to ``out`` (nodes, 2); ``values`` (n,) of at most 2^36 units.
 
@@ -90,7 +90,7 @@ def export_to_nodes(basis, kin, grids, grid_of, where, values, unit, out):
             out[n, 1] += ((value - units) + fine) - fine
 
 
-@loop
+@kernel
 def export_velocity_moment(basis, kin, grids, grid_of, where, gradients, out):
     """The moments ``out`` (d d, n) sum N v (X - x) of velocity fields with these gradients.
 

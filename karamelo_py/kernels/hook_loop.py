@@ -14,7 +14,7 @@ from karamelo_py.compiler.compile import over_blocks, point_function, shared
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.formula import BLOCK, call_evaluate
 from karamelo_py.compiler.held import hold
-from karamelo_py.compiler.loops import entered, subkernel
+from karamelo_py.compiler.loops import kernel, noinline
 from karamelo_py.compiler.threads import Serial, Threaded, shared_out
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels import arrays, totals
@@ -106,7 +106,7 @@ def act(what, task, hooks, control, dt, h, count, share):
     """Do `task` with the chosen members, add to the totals; return how many count."""
 
 
-@subkernel
+@noinline
 def _act_on_part(what, task, hooks, control, dt, h, share, k, parts):
     """Do `task` with the members of hook `h` in the part of thread `k`; how many count."""
     found = 0
@@ -122,7 +122,7 @@ def _act_on_part(what, task, hooks, control, dt, h, share, k, parts):
     return found
 
 
-@subkernel
+@noinline
 def _act_apart(what, task, hooks, control, dt, h, share, k):
     """Act in the part of thread `k`, with a scratch and totals of its own: totals do not round."""
     own = record(hooks.apart, k)
@@ -188,7 +188,7 @@ def directions(hooks):
     return hooks.x0.shape[1]
 
 
-@subkernel
+@noinline
 def evaluate(hooks, h, component, count, control, result, shift):
     """Evaluate the formula of a component for the chosen members, at the present time plus `shift`.
 
@@ -209,7 +209,7 @@ def evaluate(hooks, h, component, count, control, result, shift):
     control.values[arrays.TIME] = time
 
 
-@subkernel
+@noinline
 def _evaluate_now_and_before(hooks, h, c, count, control):
     """Evaluate the formula of direction `c`, and that of one step earlier where it is used."""
     evaluate(hooks, h, c, count, control, VALUE, 0.0)
@@ -219,7 +219,7 @@ def _evaluate_now_and_before(hooks, h, c, count, control):
         evaluate(hooks, h, c, count, control, BEFORE, -step_back)
 
 
-@subkernel
+@noinline
 def _published(hooks, h):
     """Return the first of the totals of a hook, and how many it publishes."""
     slot = hooks.table[h].slot
@@ -231,7 +231,7 @@ def _published(hooks, h):
     return slot + first, last - first + 1
 
 
-@subkernel
+@noinline
 def _clear_total(hooks, h, control):
     """Let the totals of a hook start from zero."""
     first, count = _published(hooks, h)
@@ -239,7 +239,7 @@ def _clear_total(hooks, h, control):
         control.totals[row] = 0
 
 
-@subkernel
+@noinline
 def _publish_total(hooks, h, control):
     """Publish the totals of a hook."""
     totals.carry(control.totals[totals.WORK])  # it grows from step to step
@@ -289,7 +289,7 @@ def _choose_nodes(what, hooks, h, row, end, member):
     return count, row, member
 
 
-@subkernel
+@noinline
 def _node(hooks, h, m):
     """Return the number of a member of the group."""
     return hooks.members[m] if m < hooks.table[h].end else END
@@ -314,7 +314,7 @@ def _act_at_nodes(what, task, hooks, control, dt, h, count, share):
     return 0
 
 
-@subkernel
+@noinline
 def _locate_nodes(grids, hooks, count):
     """Find the positions of the chosen nodes."""
     where = hooks.scratch
@@ -329,7 +329,7 @@ def _locate_nodes(grids, hooks, count):
             where[3 + axis, q] = x[axis]
 
 
-@subkernel
+@noinline
 def _clear_held(what, held):
     """Forget who has held nodes."""
     kin, ranges = what.kin, what.ranges
@@ -340,7 +340,7 @@ def _clear_held(what, held):
                     held[n, c].slot = 0
 
 
-@subkernel
+@noinline
 def _take_over(hooks, control, h, n, c, force):
     """Let hook `h` hold node `n` by `force`; return what those had of it that held it before."""
     before = 0.0
@@ -355,7 +355,7 @@ def _take_over(hooks, control, h, n, c, force):
     return before
 
 
-@subkernel
+@noinline
 def _change_nodes(what, hooks, control, dt, h, count, share):
     """Act on the chosen nodes; add to the totals, and to the work that is done."""
     target, kin, nodes, kept = what.target, what.kin, what.nodes, what.kept
@@ -420,7 +420,7 @@ def _change_nodes(what, hooks, control, dt, h, count, share):
             totals.add_many(control.totals, slot + c, hooks.scratch[VALUE], count)
 
 
-@subkernel
+@noinline
 def _rub_at_nodes(what, hooks, control, dt, h, count):
     """Rub the chosen nodes along their wall."""
     target, kin, nodes, kept = what.target, what.kin, what.nodes, what.kept
@@ -438,7 +438,7 @@ def _rub_at_nodes(what, hooks, control, dt, h, count):
         rub(kin, nodes, programs, hooks.held, n, mu, dt, kept, control, slot)
 
 
-@subkernel
+@noinline
 def _work_at_nodes(what, hooks, control, dt, count):
     """Add up what loads on the chosen nodes have done, and forget them; v* is that of the points.
 
@@ -477,7 +477,7 @@ def node_hooks(stage, target, kin, grids, nodes, ranges, hooks, control, dt, kep
     )  # fmt: skip
 
 
-@entered
+@kernel
 def _node_hooks(stage, target, kin, grids, nodes, ranges, hooks, control, dt, kept):
     what = hold(HookedNodes(target, kin, grids, nodes, ranges, kept))
     if target == LOADS:
@@ -631,7 +631,7 @@ def _act_on_warmth(what, task, hooks, control, dt, h, count, share):
     return 0
 
 
-@entered
+@kernel
 def point_hooks(stage, what, hooks, control, dt):
     """Call the point functions of `stage` on the members in a block."""
     dt = float(dt)
@@ -640,7 +640,7 @@ def point_hooks(stage, what, hooks, control, dt):
             act_on_all(hooks.mode, what, ACT, hooks, control, dt, h, 1.0)
 
 
-@entered
+@kernel
 def clear_totals(stage, hooks, control):
     """Let totals of point functions start from zero: they are summed over the blocks."""
     for h in range(len(hooks.table)):
@@ -648,7 +648,7 @@ def clear_totals(stage, hooks, control):
             _clear_total(hooks, h, control)
 
 
-@entered
+@kernel
 def publish_totals(stage, hooks, control):
     """Publish the totals of point functions."""
     for h in range(len(hooks.table)):

@@ -12,7 +12,7 @@ import numpy as np
 from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.fields import load, load_vector
 from karamelo_py.compiler.held import at_hand
-from karamelo_py.compiler.loops import loop, subkernel
+from karamelo_py.compiler.loops import kernel, noinline
 from karamelo_py.compiler.tuples import record
 from karamelo_py.points.kinematics import dimension, vector
 from karamelo_py.points.laws import initial_state, jacobian, specific_volume
@@ -50,7 +50,7 @@ def cells_for(points: int) -> Cells:
     )  # fmt: skip
 
 
-@subkernel
+@noinline
 def _body(id, begin1, end1, begin2, end2):
     """Return the body of the point with an id, 0 or 1; -1 where it is of neither."""
     if begin1 <= id < end1:
@@ -67,7 +67,7 @@ def _radius(kin, x, points, laws, p):
     return radius(kin, float(volume), load_vector(kin, x, p))
 
 
-@loop
+@kernel
 def extend(kin, x, points, laws, begin1, end1, begin2, end2, extents):
     """Let the extents of two bodies take in the points of a block.
 
@@ -83,7 +83,7 @@ def extend(kin, x, points, laws, begin1, end1, begin2, end2, extents):
             extents[body, 6] = max(extents[body, 6], _radius(kin, x, points, laws, p))
 
 
-@loop
+@kernel
 def pick(kin, x, points, begin1, end1, begin2, end2, low, high, rows):
     """Find the points of two bodies between two corners; return their number, fill `rows`."""
     points, count = at_hand(points), 0
@@ -97,7 +97,7 @@ def pick(kin, x, points, begin1, end1, begin2, end2, low, high, rows):
     return count
 
 
-@loop
+@kernel
 def collect(kin, x, points, laws, rows, found):
     """Number, mass, radius, position and velocity of points of a block (n, 3 + 2 d)."""
     points, laws, d = at_hand(points), at_hand(laws), dimension(kin)
@@ -110,7 +110,7 @@ def collect(kin, x, points, laws, rows, found):
             found[i, 3 + d + k] = points.v[k, p]
 
 
-@subkernel
+@noinline
 def _range(x, begin, end, k):
     """Least and largest coordinate k of some points."""
     lo, hi = inf, -inf
@@ -120,7 +120,7 @@ def _range(x, begin, end, k):
     return lo, hi
 
 
-@subkernel
+@noinline
 def _largest(values, begin, end):
     largest = 0.0
     for i in range(begin, end):
@@ -128,7 +128,7 @@ def _largest(values, begin, end):
     return largest
 
 
-@subkernel
+@noinline
 def _lay_cells(d, bodies, cells, reach):
     """Cells over all places where the bodies may touch; returns their width, 0 if there are none.
 
@@ -161,7 +161,7 @@ def _lay_cells(d, bodies, cells, reach):
         width *= 2.0
 
 
-@subkernel
+@noinline
 def _find_cells(d, bodies, cells, width):
     """The cell of every point, and those of the second body sorted by it, stably."""
     n, m = bodies.first2, bodies.mass.size
@@ -194,7 +194,7 @@ def vector_at(kin, array, i):
     return vector(kin, [array[i, k] for k in range(kin.dimension)])
 
 
-@subkernel
+@noinline
 def _touch(law, kin, bodies, reach, dt, kick, i, j, total):
     """The force between two points, if they touch; whether they do."""
     x, f = bodies.x, bodies.force
@@ -219,7 +219,7 @@ def _touch(law, kin, bodies, reach, dt, kick, i, j, total):
     return 1
 
 
-@loop
+@kernel
 def push_apart(law, kin, bodies, cells, reach, dt, kick, total):
     """Add the forces of all pairs that touch; returns their number.
 

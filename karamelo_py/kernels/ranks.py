@@ -10,7 +10,7 @@ import numpy as np
 from numba import types
 
 from karamelo_py.compiler.addresses import caller_of
-from karamelo_py.compiler.loops import entered
+from karamelo_py.compiler.loops import kernel
 from karamelo_py.kernels import totals
 from karamelo_py.kernels.sums import given
 from karamelo_py.kernels.sweep import context_of, sweep_blocks, sweep_points, visit_shares
@@ -42,7 +42,7 @@ class Inside(NamedTuple):
     address: int
 
 
-@entered
+@kernel
 def _ask(address, what, a, b):
     return _call(address, what, a, b)
 
@@ -62,7 +62,7 @@ def _number_of_all_linked(ranks, control, number):
     return _ask(ranks.address, NUMBER, number, 0)
 
 
-@entered
+@kernel
 def _agree_on_reports(address, control):
     clock, answer = control.clock[0], control.answer
     answer[0], answer[1], answer[2] = clock.move, clock.new_move, clock.new_rate
@@ -77,7 +77,7 @@ def _agree_on_reports_linked(ranks, control):
     _agree_on_reports(ranks.address, control)
 
 
-@entered
+@kernel
 def _agree_on_heat(address, control):
     clock, answer = control.clock[0], control.answer
     answer[0], answer[1] = -clock.T_low, -clock.coldest
@@ -96,7 +96,7 @@ def _agree_on_heat_linked(ranks, control):
     _agree_on_heat(ranks.address, control)
 
 
-@entered
+@kernel
 def _ask_if(due, address, what, a, b):
     if due:
         _call(address, what, a, b)

@@ -3,7 +3,7 @@
 from karamelo_py.compiler.compile import over_blocks, shared
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.held import at_hand
-from karamelo_py.compiler.loops import entered, subkernel
+from karamelo_py.compiler.loops import kernel, noinline
 from karamelo_py.compiler.threads import shared_out
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Setup, Tag
@@ -12,7 +12,7 @@ from karamelo_py.points.frames import follows
 from karamelo_py.points.grid import inside
 
 
-@entered
+@kernel
 def _read_reports(tiling, control):
     clock = control.clock[0]
     rate = 0.0
@@ -53,7 +53,7 @@ def all_well(s: Setup) -> bool:
     return clock.wrong == 0
 
 
-@subkernel
+@noinline
 def _check_share(frame, kin, grids, points, tiling, now, k):
     """Report the largest move of the points of the k-th share, and the point that went wrong."""
     grids, points, tiling = at_hand(grids), at_hand(points), at_hand(tiling)
@@ -76,7 +76,7 @@ def _check_share(frame, kin, grids, points, tiling, now, k):
 _check_shares = shared_out(_check_share, "frame, kin, grids, points, tiling, now")
 
 
-@entered
+@kernel
 def _check_points(mode, frame, kin, grids, points, tiling, control):
     clock = control.clock[0]
     _check_shares(mode, tiling.count[1], frame, kin, grids, points, tiling, clock.now)

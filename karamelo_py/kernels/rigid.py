@@ -11,7 +11,7 @@ import numpy as np
 
 from karamelo_py.compiler.compile import over_blocks, point_function
 from karamelo_py.compiler.fields import field
-from karamelo_py.compiler.loops import entered
+from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
 from karamelo_py.kernels.clock import kick
@@ -35,7 +35,7 @@ class RigidBodies(NamedTuple):
     slots: np.ndarray  # (r,) slots of forces and torques
 
 
-@entered
+@kernel
 def _lead(kin, nodes, led, spans, dt, kept):
     """Nodes that see rigid points take their velocity; the force of that comes to stand in `led`.
 
@@ -61,7 +61,7 @@ def _lead(kin, nodes, led, spans, dt, kept):
                 nodes.update[n, of_change(kin) + k] = 0
 
 
-@entered
+@kernel
 def _lead_velocity(kin, nodes, led, spans):
     """The same of the velocity that deforms the points."""
     for s in range(1, 1 + spans[0, 0]):
@@ -76,7 +76,7 @@ def sum_forces(laws, contact, s, points, led):
     """Add up the forces on rigid points, and their torques about the origin."""
 
 
-@entered
+@kernel
 def _sum_forces(basis, kin, grids, places, points, led, force, torque, totals):
     d = dimension(kin)
     for p in range(points.mass.size):
@@ -114,13 +114,13 @@ def _sum_forces_of_blocks(block, s, led):
     sum_forces(block.laws, s.contact, s, block.points, led)
 
 
-@entered
+@kernel
 def _clear(slots, totals):
     for slot in slots:
         totals[slot : slot + 3] = 0
 
 
-@entered
+@kernel
 def _publish(slots, control):
     for slot in slots:
         publish(control, slot, 3)

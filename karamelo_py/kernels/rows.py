@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 from karamelo_py.compiler.compile import point_function, real, shared
 from karamelo_py.compiler.fields import field
-from karamelo_py.compiler.loops import entered
+from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.tuples import clear_first
 from karamelo_py.kernels import arrays, p2g, table
 from karamelo_py.kernels.arrays import Number, Setup, Tag
@@ -53,7 +53,7 @@ def touch_velocity(contact: Tag, s: Setup, steps: int) -> None:
     """
 
 
-@entered
+@kernel
 def _clear_radial(kin, nodes, grids):
     for g in range(grids.first.size):
         if abs(grids.x0[g]) > grids.slack[g] * grids.h[g]:

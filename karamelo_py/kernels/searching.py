@@ -1,9 +1,9 @@
 """Places in rows of numbers that ascend."""
 
-from karamelo_py.compiler.loops import subkernel
+from karamelo_py.compiler.loops import noinline
 
 
-@subkernel
+@noinline
 def first_from(ascending, begin, end, x):
     """The first place of these whose number is not below `x`; NumPy's search compiles for 0.4 s."""
     while begin < end:

@@ -6,8 +6,8 @@ import numpy as np
 
 from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.held import at_hand
-from karamelo_py.compiler.items import pick_items, put_items
-from karamelo_py.compiler.loops import loop, subkernel
+from karamelo_py.compiler.loops import kernel, noinline
+from karamelo_py.compiler.rows import pick_items, put_items
 from karamelo_py.compiler.threads import by_team, shared_out
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Number, Tag, Tiling
@@ -69,7 +69,7 @@ def _seen(grid, sight, g, direction, at):
     return min(low, top - sight.least), max(high, sight.least)
 
 
-@subkernel
+@noinline
 def _find_tiles(kin, grids, tiles, x, of, ends, tile, k):
     """The tiles of the k-th part of the points, and how many of these each tile has."""
     grids, tiles = at_hand(grids), at_hand(tiles)
@@ -88,7 +88,7 @@ def _find_tiles(kin, grids, tiles, x, of, ends, tile, k):
         ends[k, number] += 1
 
 
-@subkernel
+@noinline
 def _begin_tiles(found):
     """Set where each part's points begin in each tile; share out the tiles by points."""
     ends, share, points = found.ends, found.share, found.order.size
@@ -106,7 +106,7 @@ def _begin_tiles(found):
     share[shares:] = ends.shape[1]
 
 
-@subkernel
+@noinline
 def _order_part(found, k):
     """Put the k-th part of the points into their places; what begins at `ends` ends there then."""
     ends, tile, order = found.ends, found.tile, found.order
@@ -117,7 +117,7 @@ def _order_part(found, k):
         ends[k, t] += 1
 
 
-@subkernel
+@noinline
 def _order_in_tiles(kin, grids, sight, tiles, x, of, ids, found, k):
     """Sort the points of each tile of the k-th share by the first node that they see, then by id.
 
@@ -168,7 +168,7 @@ def _order_in_tiles(kin, grids, sight, tiles, x, of, ids, found, k):
             order[at] = p
 
 
-@subkernel
+@noinline
 def _find_rows(kin, grids, sight, x, tiling, parts, k):
     """`Tiling.rows` of the k-th part of the tiles, in space."""
     grids, sight, tiling = at_hand(grids), at_hand(sight), at_hand(tiling)
@@ -191,7 +191,7 @@ def _find_rows(kin, grids, sight, x, tiling, parts, k):
                     rows[t, r, 1] = max(rows[t, r, 1], last)
 
 
-@subkernel
+@noinline
 def _pick_rows(rows, first, last, order, room, parts, k):
     """Copy the k-th part of the rows from `first` to `last` to `room`, in order."""
     begin, end = order.size * k // parts, order.size * (k + 1) // parts
@@ -202,7 +202,7 @@ def _pick_rows(rows, first, last, order, room, parts, k):
             pick_items(rows[r, 0], np.int64(0), order, room, r - first, begin, end)
 
 
-@subkernel
+@noinline
 def _put_rows(rows, first, last, room, parts, k):
     """Copy the k-th part of these rows back."""
     begin, end = room.shape[1] * k // parts, room.shape[1] * (k + 1) // parts
@@ -221,7 +221,7 @@ _pick_all_rows = shared_out(_pick_rows, "rows, first, last, order, room, parts")
 _put_all_rows = shared_out(_put_rows, "rows, first, last, room, parts")
 
 
-@subkernel
+@noinline
 def _permute(mode, rows, order, room, parts):
     """Put the items of rows into `order`, a few rows at a time.
 
@@ -248,7 +248,7 @@ def _sort(mode, kin, grids, sight, tiles, x, of, ids, found, rows):
 _sort_by_team = by_team(_sort, "kin, grids, sight, tiles, x, of, ids, found, rows")
 
 
-@loop
+@kernel
 def sort_points(
     mode: Tag,
     kin: Tag,
@@ -264,13 +264,13 @@ def sort_points(
     """Sort points at places `x` (w, n) by tile, and within by the first node that they see.
 
     They are on the grids `of` (n,) and have the numbers `ids` (n,). Of all that they carry, these
-    and the places among it, the addresses of its `rows` are given (:mod:`~.compiler.items`): one
+    and the places among it, the addresses of its `rows` are given (:mod:`~.compiler.rows`): one
     kernel serves all bases and laws in as many dimensions.
     """
     _sort_by_team(mode, kin, grids, sight, tiles, x, of, ids, found, rows)
 
 
-@loop
+@kernel
 def find_tiles(
     mode: Tag,
     kin: Tag,
@@ -288,7 +288,7 @@ def find_tiles(
     _find_all_tiles(mode, ends.shape[0], kin, grids, tiles, x, of, ends, tile)
 
 
-@loop
+@kernel
 def find_rows(
     mode: Tag,
     kin: Tag,
@@ -302,7 +302,7 @@ def find_rows(
     _find_all_rows(mode, parts, kin, grids, sight, x, tiling, parts)
 
 
-@loop
+@kernel
 def widest(kin: Tag, basis: Tag, grids: Grid, x: np.ndarray, of: np.ndarray) -> float:
     """Return the largest distance of a corner of a domain from its point, in cells."""
     grids = at_hand(grids)

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from karamelo_py.compiler.compile import by_type, over_blocks, real, shared
 from karamelo_py.compiler.fields import load, load_vector
 from karamelo_py.compiler.held import at_hand
-from karamelo_py.compiler.loops import loop
+from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.threads import by_team
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels import table
@@ -163,13 +163,13 @@ shared(run_steps)
 _by_team = by_team(_led, "scheme, visits, s, hooks, count")
 
 
-@loop
+@kernel
 def advance(scheme: Tag, visits: Tag, mode: Tag, s: Setup, hooks: Tag, count: int) -> int:
     """`run_steps`, by a team of threads where there are some."""
     return _by_team(mode, scheme, visits, s, hooks, count)
 
 
-@loop
+@kernel
 def _fastest(frame, kin, points, laws, control):
     points, laws = at_hand(points), at_hand(laws)
     clock = control.clock[0]

@@ -12,7 +12,7 @@ from karamelo_py.compiler.compile import index, shared
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.lanes.records import move_record
-from karamelo_py.compiler.loops import subkernel
+from karamelo_py.compiler.loops import noinline
 from karamelo_py.compiler.tuples import put_at
 from karamelo_py.kernels.arrays import ADD, CLEAR, Buffers, Nodes, Tag
 
@@ -68,7 +68,7 @@ def _clear_record(quantities, kin, nodes, n):
             put_at(array, n, first, (0,) * (end - first))
 
 
-@subkernel
+@noinline
 def sum_share(quantities: tuple, kin: Tag, nodes: Nodes, buffers: Buffers, share: int) -> None:
     """Sum the quantities at the nodes of a share, tile after tile, box after box."""
     nodes, buffers = at_hand(nodes), at_hand(buffers)

@@ -33,7 +33,7 @@ from karamelo_py.compiler.compile import (
 from karamelo_py.compiler.fields import load, load_vector, store
 from karamelo_py.compiler.held import at_hand, hold
 from karamelo_py.compiler.lanes import room_for
-from karamelo_py.compiler.loops import entered, subkernel
+from karamelo_py.compiler.loops import kernel, noinline
 from karamelo_py.compiler.threads import Serial, Threaded, shared_out
 from karamelo_py.compiler.tuples import flat, nested_as, record
 from karamelo_py.kernels.arrays import (
@@ -195,7 +195,7 @@ def scatter_point(
     scatter_nodes(lanes, stencil, visit.quantities, out, loads)
 
 
-@subkernel
+@noinline
 def visit_tile(
     visit: Visit,
     s: Context,
@@ -276,7 +276,7 @@ def visit_tile(
     tiling.report[t, 2] = wrong
 
 
-@subkernel
+@noinline
 def visit_share(
     visit: Visit,
     s: Context,
@@ -294,7 +294,7 @@ def visit_share(
         visit_tile(visit, s, block, then, gathers, scatters, dt, order[t])
 
 
-@subkernel
+@noinline
 def visit_nodes(task: Tag, kin: Tag, nodes: Nodes, ranges: np.ndarray, dt: Number, k: int) -> None:
     """Do `task` at the nodes of the k-th share; `ranges` as in `Setup`."""
     nodes = at_hand(nodes)
@@ -320,7 +320,7 @@ def by_threads(share: Callable) -> Callable:
     kinds = [inspect.Parameter(name, inspect.Parameter.POSITIONAL_OR_KEYWORD) for name in names]
     all_shares.__signature__ = inspect.Signature(kinds)  # type: ignore[attr-defined]
     all_shares.__qualname__ = f"{share.__qualname__}s"
-    return entered(all_shares)
+    return kernel(all_shares)
 
 
 visit_shares = by_threads(visit_share)

@@ -16,9 +16,10 @@ from fractions import Fraction
 import numpy as np
 from llvmlite import ir
 from numba import config, types
-from numba.extending import intrinsic
 
+from karamelo_py.compiler import code
 from karamelo_py.compiler.compile import fma, index, shared
+from karamelo_py.compiler.intrinsics import intrinsic
 from karamelo_py.compiler.loops import kernel
 
 ROWS = 1024  # written at a time
@@ -216,15 +217,15 @@ def _without_zeros(word):
 
 
 @intrinsic
-def _put_eight(typing_context, text, at, word):
+def _put_eight(text, at, word):
     """Write the bytes of an integer, wherever they begin."""
 
-    def codegen(context, builder, signature, arguments):
-        array = context.make_array(text)(context, builder, arguments[0])
+    def codegen(builder, signature, arguments):
+        array = code.ArrayParts(builder, text, arguments[0])
         place = builder.bitcast(
             builder.gep(array.data, [arguments[1]]), ir.IntType(64).as_pointer()
         )
         builder.store(arguments[2], place, align=1)
-        return context.get_dummy_value()
+        return code.nothing()
 
     return types.void(text, types.int64, types.int64), codegen

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from karamelo_py.compiler.atomics import add_among
 from karamelo_py.compiler.compile import point_function, shared
-from karamelo_py.compiler.loops import entered, subkernel
-from karamelo_py.compiler.words import add_among
+from karamelo_py.compiler.loops import kernel, noinline
 
 LIMBS = 68
 LOST = LIMBS - 1  # counts terms that are no numbers
@@ -33,7 +33,7 @@ class Alone(NamedTuple):
     """One process has the whole scene."""
 
 
-@subkernel
+@noinline
 def add_to(totals, row, x):
     """Add `x` to a total, without rounding."""
     if x == 0.0:
@@ -57,7 +57,7 @@ def add_to(totals, row, x):
     totals[row, limb + 2] += sign * (high >> 32)
 
 
-@subkernel
+@noinline
 def add_many(totals, row, terms, count):
     """Add the first `count` of `terms`, at most `MANY`, without rounding.
 
@@ -98,7 +98,7 @@ def add_many(totals, row, terms, count):
     add_to(totals, row, (low - (above << 32)) * part)
 
 
-@subkernel
+@noinline
 def hand_over(own, totals, row):
     """Add what a thread's own totals have in a row to those of all, and leave zeros."""
     for k in range(LIMBS):
@@ -107,7 +107,7 @@ def hand_over(own, totals, row):
             own[row, k] = 0
 
 
-@entered
+@kernel
 def carry(total):
     """Digits from 0 to 2^32 - 1, the last one signed."""
     for k in range(LOST - 1):
@@ -116,7 +116,7 @@ def carry(total):
         total[k + 1] += carry
 
 
-@entered
+@kernel
 def rounded(total):
     """The value of a total (LIMBS,), which is left in digits."""
     if total[LOST] > 0:
@@ -136,7 +136,7 @@ def rounded(total):
     return sign * value
 
 
-@entered
+@kernel
 def _round(totals, digits, answer, first, count):
     for k in range(count):
         for limb in range(LIMBS):
@@ -144,14 +144,14 @@ def _round(totals, digits, answer, first, count):
         answer[k] = rounded(digits)
 
 
-@entered
+@kernel
 def add_all(totals, row, terms):
     """Add all `terms` to a total, without rounding."""
     for first in range(0, terms.size, MANY):
         add_many(totals, row, terms[first:], min(MANY, terms.size - first))
 
 
-@entered
+@kernel
 def add_rows(totals, rows, terms):
     """Add each of the `terms` to the total in its row, without rounding."""
     for q in range(terms.size):
@@ -198,7 +198,7 @@ def publish(control, slot, count):
     take_answer(control.values, control.answer, slot, count)
 
 
-@entered
+@kernel
 def take_answer(values, answer, slot, count):
     """The values from `slot` on become the answers."""
     for k in range(count):

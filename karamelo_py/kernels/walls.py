@@ -8,7 +8,7 @@ rest in the directions in which nothing is prescribed.
 from math import sqrt
 
 from karamelo_py.compiler.fields import field
-from karamelo_py.compiler.loops import subkernel
+from karamelo_py.compiler.loops import noinline
 from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
 from karamelo_py.kernels.loss import FrictionalHeat, warm_node
 from karamelo_py.kernels.totals import add_to, counts
@@ -17,13 +17,13 @@ from karamelo_py.points.kinematics import dimension
 FRICTION = 3  # the program of the coefficient, behind those of the components
 
 
-@subkernel
+@noinline
 def _is_free(held, programs, n, c):
     """Return True if no fix holds node `n` in direction `c`, as far as that of `programs` knows."""
     return programs[c].begin < 0 and (held.size == 0 or held[n, c].slot == 0)
 
 
-@subkernel
+@noinline
 def rub(kin, nodes, programs, held, n, mu, dt, kept, control, slot):
     """Give node `n` the friction of its wall; add the force to the totals from `slot` on.
 
@@ -61,7 +61,7 @@ def rub(kin, nodes, programs, held, n, mu, dt, kept, control, slot):
                 add_to(control.totals, slot + c, -mass * taken / dt)
 
 
-@subkernel
+@noinline
 def stick(kin, nodes, programs, n):
     """Nor does the velocity that deforms slide, where friction stopped the node.
 

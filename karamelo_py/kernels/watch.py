@@ -23,7 +23,7 @@ from karamelo_py.compiler.compile import (
 )
 from karamelo_py.compiler.fields import load, load_vector
 from karamelo_py.compiler.held import at_hand
-from karamelo_py.compiler.loops import entered, subkernel
+from karamelo_py.compiler.loops import kernel, noinline
 from karamelo_py.compiler.threads import shared_out
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels import totals
@@ -88,7 +88,7 @@ def _solid_of(firsts, number):
     return first_from(firsts, 0, firsts.size, number + 1) - 1
 
 
-@subkernel
+@noinline
 def _look_at_share(kin, points, laws, tiling, firsts, k):
     """Energies, mass and momentum of the points of each tile of the k-th share, for its report."""
     points, laws, tiling = at_hand(points), at_hand(laws), at_hand(tiling)
@@ -122,7 +122,7 @@ def _look_at_share(kin, points, laws, tiling, firsts, k):
 _look_at_shares = shared_out(_look_at_share, "kin, points, laws, tiling, firsts")
 
 
-@entered
+@kernel
 def _sum_energies(mode, kin, points, laws, tiling, control):
     _look_at_shares(mode, tiling.count[1], kin, points, laws, tiling, control.firsts)
     for t in range(tiling.count[0]):
@@ -136,13 +136,13 @@ def _sum_blocks(block, s, mode):
     _sum_energies(mode, s.kin, points, block.laws, block.tiling, s.control)
 
 
-@entered
+@kernel
 def _clear(control):
     control.totals[totals.KINETIC] = 0
     control.totals[totals.STORED] = 0
 
 
-@entered
+@kernel
 def _take_sums(control):
     clock, answer = control.clock[0], control.answer
     clock.kinetic = answer[totals.KINETIC]
@@ -159,7 +159,7 @@ def sum_energies(s, mode):
     _take_sums(s.control)
 
 
-@entered
+@kernel
 def _add_momenta(d, ids, masses, v, tiling, control):
     """Mass and momentum of each solid, 1 + d, to the totals behind those of published values."""
     firsts, sums = control.firsts, control.answer
@@ -188,7 +188,7 @@ def _behind(firsts, solid):
     return firsts[solid + 1] if solid + 1 < firsts.size else LAST
 
 
-@subkernel
+@noinline
 def _add_momentum(control, solid, d):
     row = control.values.size + solid * (1 + d)
     for k in range(1 + d):
@@ -202,12 +202,12 @@ def _add_blocks(block, s):
     _add_momenta(dimension(s.kin), points.id, points.mass, points.v, block.tiling, s.control)
 
 
-@entered
+@kernel
 def _clear_momenta(control):
     control.totals[control.values.size :] = 0
 
 
-@entered
+@kernel
 def _take_drift(kin, control):
     d, energy = dimension(kin), 0.0
     for k in range(control.firsts.size):
@@ -244,7 +244,7 @@ def unit_of(clock):
     return max(clock.largest_own, DRIFTING * clock.largest_energy, clock.energy_floor)
 
 
-@entered
+@kernel
 def judge(control):
     """Take the present sums into account; whether energy keeps within its bound."""
     clock = control.clock[0]
@@ -292,7 +292,7 @@ def judge(control):
     return balance - clock.first_balance <= max(BOUND * given, clock.energy_floor)
 
 
-@entered
+@kernel
 def _range_of_heat(kin, points, laws, control):
     clock = control.clock[0]
     for p in range(points.mass.size):

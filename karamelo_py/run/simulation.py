@@ -6,9 +6,10 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
 
-import numba
 import numpy as np
+from numba import config
 
+from karamelo_py.compiler.threads import set_threads
 from karamelo_py.kernels.arrays import DT, TIME, Hooks, NoHooks, Setup
 from karamelo_py.kernels.clock import STILL, choose_dt
 from karamelo_py.kernels.hooks import POINT_STAGES
@@ -329,7 +330,7 @@ class Simulation(SceneArrays):
 
         The first process does that, and the others find it on disk.
         """
-        if numba.config.DISABLE_JIT or self._python.by_stage:
+        if config.DISABLE_JIT or self._python.by_stage:
             return
         visits = Staged() if self.staged else Fused()
         arguments = self.hub.update.scheme, visits, self.mode, self.setup, self.hooks, 1
@@ -338,7 +339,7 @@ class Simulation(SceneArrays):
     def _make_ready(self) -> None:
         """Prepare threads, the hooks of the fixes, and contact for a run."""
         if self.threads > 1:
-            numba.set_num_threads(self.threads)
+            set_threads(self.threads)
         self._prepare_hooks()
         self.hub.update.method.begin(self.hub, self.contact)
 

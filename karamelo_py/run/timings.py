@@ -5,13 +5,11 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
-from typing import Any
 
 import numpy as np
-from numba.core import event
 
 from karamelo_py.compiler import cache
-from karamelo_py.compiler.turns import WAITS
+from karamelo_py.compiler.loops import compilation
 from karamelo_py.output.console import duration
 from karamelo_py.scene.hub import Hub
 
@@ -40,10 +38,10 @@ def _clocks() -> np.ndarray:
     return np.array([time.perf_counter(), time.process_time()])
 
 
-class Timings(event.Listener):
+class Timings:
     """Seconds that a run spends: (2,) those that have passed, and those of all threads.
 
-    While it tells of compilation it listens to Numba.
+    While it tells of compilation it is told of it.
     """
 
     def __init__(self, hub: Hub):
@@ -78,20 +76,18 @@ class Timings(event.Listener):
             " (the next run starts at once) ..."
         )
         try:
-            with (
-                event.install_listener("numba:compile", self),
-                event.install_listener(WAITS, self),
-                cache.telling(partial(self.hub.warn, hint=ANOTHER_FOLDER)),
-            ):
+            compilation.listeners.append(self)
+            with cache.telling(partial(self.hub.warn, hint=ANOTHER_FOLDER)):
                 yield
         finally:
+            compilation.listeners.remove(self)
             spent = self.on["compilation"][1]
             # Where most was in the cache already, the time says nothing about the whole.
             if spent > 0.5 * (expected or 0.0):
                 cache.keep_time(scene, spent)
 
-    def on_start(self, _: Any) -> None:
-        """Note that Numba compiles a function, or that this process waits for one that does."""
+    def on_start(self, _: str) -> None:
+        """Note that a kernel is compiled, or another process does, and this one waits for it."""
         self._depth += 1
         if self._depth == 1:
             self._begun = _clocks()
@@ -99,8 +95,8 @@ class Timings(event.Listener):
                 self.hub.console.say(self._words)
                 self._words = ""
 
-    def on_end(self, _: Any) -> None:
-        """Count the time of a compilation that has ended."""
+    def on_end(self) -> None:
+        """It has."""
         self._depth -= 1
         if self._depth == 0:
             self.on["compilation"] += _clocks() - self._begun

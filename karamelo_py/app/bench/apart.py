@@ -82,9 +82,9 @@ def main() -> None:
     found: dict[str, Any] = {}
 
     def act() -> int:
-        import numba
+        from karamelo_py.compiler.threads import set_threads
 
-        numba.set_num_threads(part.threads)
+        set_threads(part.threads)
         found["measured"] = measured(part)._asdict()
         return 0
 

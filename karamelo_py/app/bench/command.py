@@ -70,11 +70,13 @@ def measure_all(options: Namespace) -> int:
             )
     out = out_file(options.o, ".json") if options.o else None
     earlier = record.read(options.against) if options.against else None
-    import numba
+    from numba import config
 
-    available = numba.config.NUMBA_NUM_THREADS
+    from karamelo_py.compiler.threads import set_threads
+
+    available = config.NUMBA_NUM_THREADS
     threads = min(options.threads or available, available)
-    numba.set_num_threads(threads)
+    set_threads(threads)
     triad = measure.bandwidth(threads)
     print(f"threads {threads}, triad bandwidth {triad / 1e9:.1f} GB/s (256 MiB arrays)")
     found = record.head(threads, triad, options.seconds)

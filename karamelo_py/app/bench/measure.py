@@ -8,10 +8,12 @@ from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import prange
+from numba import config
 
 from karamelo_py.app.bench.workloads import MOST_STEPS, Workload
+from karamelo_py.compiler.compile import index, shared
 from karamelo_py.compiler.loops import kernel
+from karamelo_py.compiler.threads import Serial, Threaded, shared_out
 from karamelo_py.kernels.clock import finish
 from karamelo_py.kernels.step import DONE, Fused, begin, step
 from karamelo_py.kernels.sums import columns_of
@@ -325,16 +327,18 @@ def traffic(simulation: Simulation) -> tuple[float, float, int]:
     return total / simulation.count, held, sum(recorder.regions)
 
 
+def _triad_part(a, b, c, factor, parts, k):
+    for i in range(a.size * k // parts, a.size * (k + 1) // parts):
+        a[index(i)] = b[index(i)] + factor * c[index(i)]
+
+
+_triad_parts = shared_out(shared(_triad_part), "a, b, c, factor, parts")
+
+
 @kernel
-def _triad(a, b, c, factor):
-    for i in range(a.size):
-        a[i] = b[i] + factor * c[i]
-
-
-@kernel(parallel=True)
-def _triad_threaded(a, b, c, factor):
-    for i in prange(a.size):
-        a[i] = b[i] + factor * c[i]
+def _triad(mode, a, b, c, factor, parts, times):
+    for _ in range(times):
+        _triad_parts(mode, parts, a, b, c, factor, parts)
 
 
 def _fastest(calls: int, act: Callable, *arguments: Any) -> float:
@@ -353,10 +357,11 @@ def bandwidth(threads: int, size: float = ARRAYS) -> float:
     """
     n = max(1000, int(size / 24))
     a, b, c = np.zeros(n), np.ones(n), np.ones(n)
-    triad: Callable = _triad if threads == 1 else _triad_threaded
-    return 24 * n / _fastest(5 if size >= ARRAYS else 100, triad, a, b, c, 0.5)
+    mode = Serial() if threads == 1 else Threaded()
+    calls, times = (5, 1) if size >= ARRAYS else (20, 100)
+    return 24 * n * times / _fastest(calls, _triad, mode, a, b, c, 0.5, threads, times)
 
 
 def start_of_threads() -> float:
     """Seconds that it takes threads to begin and to wait for each other, for next to no work."""
-    return _fastest(200, _triad_threaded, *np.ones((3, 64)), 0.5)
+    return _fastest(200, _triad, Threaded(), *np.ones((3, 64)), 0.5, config.NUMBA_NUM_THREADS, 1)

@@ -2,14 +2,13 @@
 
 import math
 import operator
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
-from numba.extending import intrinsic
 
+from karamelo_py.compiler import code
 from karamelo_py.compiler.compile import (
     added,
     first_false_lane,
@@ -19,98 +18,99 @@ from karamelo_py.compiler.compile import (
     lanes_of,
     largest,
 )
-from karamelo_py.compiler.lanes.registers import I64, Lanes, element, lane, vector_of
-from karamelo_py.compiler.values import Untraceable
+from karamelo_py.compiler.intrinsics import builtin, intrinsic
+from karamelo_py.compiler.lanes.registers import I64, Lanes, lane, vector_of
+from karamelo_py.compiler.values import Untraceable, Value
 
 
-def _of_leaves(kind: Any, change: Callable) -> Any:
-    """The type of a tuple, or number, with another type for each number in it."""
-    if not isinstance(kind, types.BaseTuple):
-        return change(kind)
-    items = [_of_leaves(item, change) for item in kind]
-    return types.BaseTuple.from_types(items, getattr(kind, "instance_class", None))
+def _changed(thing: Any, change: Callable) -> Any:
+    """Give a tuple, or number, with something else for each number in lanes in it."""
+    if isinstance(thing, tuple):
+        items = [_changed(item, change) for item in thing]
+        return type(thing)(*items) if hasattr(thing, "_fields") else tuple(items)
+    lanes = isinstance(thing, Value) and isinstance(thing._kind, Lanes)
+    return change(thing) if lanes else thing
 
 
-def _one_of(kind: Any) -> Any:
-    """The type of what one lane has."""
-    return _of_leaves(kind, lambda k: k.scalar if isinstance(k, Lanes) else k)
+def _room(builder: Any, lanes: Lanes) -> Any:
+    """Give memory for lanes; truth takes bytes there."""
+    kind = ir.VectorType(code.memory_type(lanes.scalar), lanes.width)
+    return builder and code.room(builder, kind)
 
 
-def _apart(builder: Any, kind: Any, value: Any) -> Iterator[tuple[Any, Any]]:
-    """What is in a tuple that is no tuple itself: type and value of one after another."""
-    if not isinstance(kind, types.BaseTuple):
-        yield kind, value
-        return
-    for k, item in enumerate(kind):
-        yield from _apart(builder, item, builder.extract_value(value, k))
+def _of_lane(lowering: Any, lanes: Lanes, room: Any, k: Any) -> Value:
+    """Read one lane in memory."""
+    builder = lowering.builder
+    if builder is None:
+        return Value(lanes.scalar, None)
+    place = builder.bitcast(room, code.memory_type(lanes.scalar).as_pointer())
+    return Value(lanes.scalar, code.get(builder, lanes.scalar, builder.gep(place, [k])))
 
 
-def _joined(context: Any, builder: Any, kind: Any, values: Iterator) -> Any:
-    """The tuple of this type that has these values."""
-    if not isinstance(kind, types.BaseTuple):
-        return next(values)
-    items = [_joined(context, builder, item, values) for item in kind]
-    return context.make_tuple(builder, kind, items)
+def _all_lanes(lowering: Any, function: Callable, unrolled: bool, arguments: tuple) -> Any:
+    """Do a function of numbers for one lane after another."""
+    builder = lowering.builder
+    width = lanes_of(tuple(map(lowering.kind_of, arguments)))
+    rooms: dict[int, Any] = {}
 
+    def keep(value: Value) -> Value:
+        rooms[id(value)] = room = _room(builder, value._kind)
+        if builder:
+            bits = value._value
+            builder.store(
+                bits if bits.type == room.type.pointee else builder.zext(bits, room.type.pointee),
+                room,
+            )
+        return value
 
-def _room(builder: Any, lanes: Lanes) -> tuple[Any, Any]:
-    """Memory for lanes, as one vector and as numbers; truth takes bytes there."""
-    bits = ir.IntType(8) if isinstance(lanes.scalar, types.Boolean) else element(lanes.scalar)
-    room = cgutils.alloca_once(builder, ir.VectorType(bits, lanes.width))
-    return room, builder.bitcast(room, bits.as_pointer())
+    given = [_changed(argument, keep) for argument in arguments]
+    made: list[tuple[Lanes, Any]] = []
 
-
-@intrinsic(prefer_literal=True)
-def _lane_by_lane(typing_context, function, unrolled, arguments):
-    """What a function of numbers gives for one lane after another."""
-    width = lanes_of(arguments)
-    inner = function.get_call_type(typing_context, tuple(map(_one_of, arguments)), {})
-    result = _of_leaves(inner.return_type, lambda kind: Lanes(kind, width))
-
-    def codegen(context, builder, sig, values):
-        called = context.get_function(function, inner)
-        context.add_linking_libs(getattr(called, "libs", ()))
-        given = []
-        for kind, value in _apart(builder, arguments, values[2]):
-            if isinstance(kind, Lanes):
-                room, place = _room(builder, kind)
-                if isinstance(kind.scalar, types.Boolean):
-                    value = builder.zext(value, room.type.pointee)
-                builder.store(value, room)
-                value = place
-            given.append((kind, value))
-        count = ir.Constant(I64, width)
-        if not unrolled.literal_value:
-            # The loop is to stay one, with one copy of the function: LLVM must not know its count.
-            count = builder.asm(ir.FunctionType(I64, [I64]), "", "=r,0", [count], False)
-        empty = context.get_constant_undef(result)
-        kinds = [kind for kind, _ in _apart(builder, result, empty)]
-        rooms = [_room(builder, kind) for kind in kinds]
-        with cgutils.for_range(builder, count) as loop:
-            numbers = []
-            for kind, value in given:
-                if isinstance(kind, Lanes):
-                    value = builder.load(builder.gep(value, [loop.index]))
-                    if isinstance(kind.scalar, types.Boolean):
-                        value = builder.trunc(value, ir.IntType(1))
-                numbers.append(value)
-            numbers = iter(numbers)
-            of_lane = [_joined(context, builder, kind, numbers) for kind in inner.args]
-            found = called(builder, of_lane)
-            pairs = zip(_apart(builder, inner.return_type, found), rooms, strict=True)
-            for (kind, number), (_, place) in pairs:
-                if isinstance(kind, types.Boolean):
-                    number = builder.zext(number, ir.IntType(8))
-                builder.store(number, builder.gep(place, [loop.index]))
-        vectors = (
-            builder.trunc(builder.load(room), vector_of(kind))
-            if isinstance(kind.scalar, types.Boolean)
-            else builder.load(room)
-            for kind, (room, _) in zip(kinds, rooms, strict=True)
+    def run(k: Any) -> Any:
+        read, lowering.read = lowering.read, dict(lowering.read)
+        found = function(
+            *(_changed(a, lambda v: _of_lane(lowering, v._kind, rooms[id(v)], k)) for a in given)
         )
-        return _joined(context, builder, result, vectors)
+        found = _in_lanes(found, k)
+        lowering.read = read
+        return found
 
-    return result(function, unrolled, arguments), codegen
+    def _in_lanes(thing: Any, k: Any) -> Any:
+        if isinstance(thing, tuple):
+            items = [_in_lanes(item, k) for item in thing]
+            return type(thing)(*items) if hasattr(thing, "_fields") else tuple(items)
+        scalar = types.unliteral(lowering.kind_of(thing))
+        lanes = Lanes(scalar, width)
+        room = _room(builder, lanes)
+        made.append((lanes, room))
+        if builder:
+            place = builder.bitcast(room, code.memory_type(scalar).as_pointer())
+            code.put(builder, scalar, lowering.lowered(thing, scalar), builder.gep(place, [k]))
+        return Value(lanes, room)
+
+    if builder is None:
+        return run(None)
+    count = ir.Constant(I64, width)
+    if not unrolled:
+        # The loop is to stay one, with one copy of the function: LLVM must not know its count.
+        count = builder.asm(ir.FunctionType(I64, [I64]), "", "=r,0", [count], False)
+    with code.counted(builder, count) as k:
+        found = run(k)
+
+    def loaded(value: Value) -> Value:
+        bits = builder.load(value._value)
+        wanted = vector_of(value._kind)
+        return Value(value._kind, bits if bits.type == wanted else builder.trunc(bits, wanted))
+
+    return _changed(found, loaded)
+
+
+def _lane_by_lane(function: Callable, unrolled: bool, arguments: tuple) -> Any:
+    """What a function of numbers gives for one lane after another."""
+    raise NotImplementedError
+
+
+builtin(_lane_by_lane)(_all_lanes)
 
 
 @implements(in_each_lane)
@@ -119,8 +119,8 @@ def _in_each_lane(function, arguments):
 
 
 @intrinsic
-def _largest_lane(typing_context, a):
-    def codegen(context, builder, sig, arguments):
+def _largest_lane(a):
+    def codegen(builder, sig, arguments):
         largest = lane(builder, arguments[0], 0)
         for k in range(1, a.width):
             value = lane(builder, arguments[0], k)
@@ -132,8 +132,8 @@ def _largest_lane(typing_context, a):
 
 
 @intrinsic
-def _first_false(typing_context, mask):
-    def codegen(context, builder, sig, arguments):
+def _first_false(mask):
+    def codegen(builder, sig, arguments):
         found = ir.Constant(ir.IntType(64), 0)
         for k in reversed(range(mask.width)):
             holds = lane(builder, arguments[0], k)
@@ -144,16 +144,16 @@ def _first_false(typing_context, mask):
 
 
 @intrinsic
-def _first(typing_context, a):
-    def codegen(context, builder, sig, arguments):
+def _first(a):
+    def codegen(builder, sig, arguments):
         return lane(builder, arguments[0], 0)
 
     return a.scalar(a), codegen
 
 
 @intrinsic
-def _added_lanes(typing_context, total, a):
-    def codegen(context, builder, sig, arguments):
+def _added_lanes(total, a):
+    def codegen(builder, sig, arguments):
         sum_so_far, values = arguments
         for k in range(a.width):
             sum_so_far = builder.fadd(sum_so_far, lane(builder, values, k))
@@ -181,7 +181,7 @@ for _function in (
 
 
 @intrinsic
-def _branch(typing_context, value):
+def _branch(value):
     raise Untraceable(
         "several points are computed at once, which a branch cannot tell apart: take where, "
         "all_lanes or any_lane, or name the point function in scalarised"

@@ -6,10 +6,8 @@ from typing import Any, NamedTuple
 
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
-from numba.extending import intrinsic, models, register_model
-from numba.np.arrayobj import populate_array
 
+from karamelo_py.compiler import code
 from karamelo_py.compiler.compile import (
     beside,
     by_type,
@@ -21,6 +19,7 @@ from karamelo_py.compiler.compile import (
     prefetch,
     real,
 )
+from karamelo_py.compiler.intrinsics import intrinsic
 from karamelo_py.compiler.lanes.numbers import select
 from karamelo_py.compiler.lanes.registers import (
     I32,
@@ -45,11 +44,9 @@ class LaneGroup(types.Type):
         self.width = width
         super().__init__(name=f"LaneGroup({width})")
 
-
-@register_model(LaneGroup)
-class _GroupModel(models.StructModel):
-    def __init__(self, manager: Any, group: LaneGroup):
-        super().__init__(manager, group, [("first", types.int64), ("count", types.int64)])
+    def register_type(self) -> ir.Type:
+        """LLVM's type: the first, and how many."""
+        return ir.LiteralStructType([I64, I64])
 
 
 class Beside(types.Type):
@@ -59,11 +56,9 @@ class Beside(types.Type):
         self.nodes, self.width = nodes, nodes.width
         super().__init__(name=f"Beside({nodes})")
 
-
-@register_model(Beside)
-class _BesideModel(models.StructModel):
-    def __init__(self, manager: Any, beside: Beside):
-        super().__init__(manager, beside, [("nodes", beside.nodes), ("steps", types.intp)])
+    def register_type(self) -> ir.Type:
+        """LLVM's type: the nodes, and the steps."""
+        return ir.LiteralStructType([vector_of(self.nodes), I64])
 
 
 class FourLanes(NamedTuple):
@@ -84,24 +79,22 @@ def lanes_for(bits: int) -> type:
 
 
 @intrinsic
-def group(typing_context, tag, first, count):
+def group(tag, first, count):
     """The `count` points from `first` on, as many as the tag says at most."""
     made = LaneGroup(tag.instance_class.width)
 
-    def codegen(context, builder, sig, arguments):
-        out = cgutils.create_struct_proxy(made)(context, builder)
-        out.first, out.count = arguments[1], arguments[2]
-        return out._getvalue()
+    def codegen(builder, sig, arguments):
+        return code.make_struct(builder, made.register_type(), arguments[1:])
 
     return made(tag, types.int64, types.int64), codegen
 
 
 @intrinsic
-def spread(typing_context, tag, value):
+def spread(tag, value):
     """The same number in all lanes, as many as the tag says."""
     lanes = Lanes(value, tag.instance_class.width)
 
-    def codegen(context, builder, sig, arguments):
+    def codegen(builder, sig, arguments):
         return splat(builder, arguments[1], lanes)
 
     return lanes(tag, value), codegen
@@ -115,7 +108,7 @@ def _masked(builder: Any, p: Any, width: int) -> Any:
 
 
 @intrinsic
-def room_for(typing_context, points, numbers):
+def room_for(points, numbers):
     """An array (components, points) for a while, for such numbers of so many points.
 
     It lies where a function keeps its variables, and is gone with it.
@@ -125,29 +118,24 @@ def room_for(typing_context, points, numbers):
     array = types.Array(numbers[0], 2, "C")
     shape = len(numbers), points.literal_value
 
-    def codegen(context, builder, sig, arguments):
-        number = context.get_data_type(array.dtype)
-        memory = cgutils.alloca_once(builder, ir.ArrayType(number, shape[0] * shape[1]))
+    def codegen(builder, sig, arguments):
+        number = code.memory_type(array.dtype)
+        memory = code.room(builder, ir.ArrayType(number, shape[0] * shape[1]))
         memory.align = 64  # bytes that caches get at once
         size = array.dtype.bitwidth // 8
-        made = context.make_array(array)(context, builder)
-        populate_array(
-            made, builder.bitcast(memory, number.as_pointer()),
-            [ir.Constant(I64, n) for n in shape],
-            [ir.Constant(I64, n) for n in (shape[1] * size, size)],
-            ir.Constant(I64, size), None,
-        )  # fmt: skip
-        return made._getvalue()
+        data = builder.bitcast(memory, number.as_pointer())
+        strides = shape[1] * size, size
+        return code.make_array(builder, array, data, [*map(I64, shape)], [*map(I64, strides)])
 
     return array(points, numbers), codegen
 
 
 @intrinsic
-def _present(typing_context, p):
+def _present(p):
     """Which lanes have a point."""
     mask = Lanes(types.boolean, p.width)
 
-    def codegen(context, builder, sig, arguments):
+    def codegen(builder, sig, arguments):
         return _masked(builder, arguments[0], p.width)
 
     return mask(p), codegen
@@ -158,34 +146,21 @@ def _of_present(p, value):
     return select(_present(p), value, real(0, value))
 
 
-def pointer_to(context, builder, kind, array, indices, last=None):
-    """Address of an item of an array; `last`, if it is known, is the stride of the last index."""
-    made = context.make_array(kind)(context, builder, array)
-    strides = cgutils.unpack_tuple(builder, made.strides)
-    strides = strides if last is None else [*strides[:-1], last]
-    return cgutils.get_item_pointer2(
-        context, builder, made.data, cgutils.unpack_tuple(builder, made.shape), strides,
-        kind.layout, indices, wraparound=False, boundscheck=False,
-    )  # fmt: skip
-
-
-def at_lane(context, builder, kind, array, of, at, k, *rest):
+def at_lane(builder, kind, array, of, at, k, *rest):
     """Address of an item of an array; its first index is that of lane `k` of nodes `at`."""
     steps = None
     if isinstance(of, Beside):
         of, at, steps = of.nodes, *(builder.extract_value(at, part) for part in (0, 1))
-    first = context.cast(builder, lane(builder, at, k), of.scalar, types.intp)
-    found = pointer_to(context, builder, kind, array, [first, *rest])
+    first = code.cast(builder, lane(builder, at, k), of.scalar, types.intp)
+    found = code.item_pointer(builder, kind, array, [first, *rest])
     if steps is None:
         return found
     # From there on: the place of the first node is found once for all that is beside it.
-    strides = context.make_array(kind)(context, builder, array).strides
-    bytes_on = builder.mul(steps, cgutils.unpack_tuple(builder, strides)[0])
-    place = builder.gep(builder.bitcast(found, ir.IntType(8).as_pointer()), [bytes_on])
-    return builder.bitcast(place, found.type)
+    stride = code.ArrayParts(builder, kind, array).strides[0]
+    return code.byte_pointer(builder, found, builder.mul(steps, stride))
 
 
-def _load(context, builder, array, pointer, p, lanes):
+def _load(builder, array, pointer, p, lanes):
     """What lies from `pointer` on, for the points there are; the first's for the other lanes."""
     vector = vector_of(lanes)
     size = lanes.scalar.bitwidth // 8
@@ -193,11 +168,10 @@ def _load(context, builder, array, pointer, p, lanes):
 
     def partly():
         mask = _masked(builder, p, lanes.width)
-        function = cgutils.get_or_insert_function(
-            builder.module,
-            ir.FunctionType(vector, [vector.as_pointer(), I32, mask.type, vector]),
-            f"llvm.masked.load.{shape(lanes)}.p0",
-        )
+        function = code.external(
+            builder, f"llvm.masked.load.{shape(lanes)}.p0", vector,
+            [vector.as_pointer(), I32, mask.type, vector],
+        )  # fmt: skip
         zero = ir.Constant(vector, None)
         loaded = builder.call(function, [at, ir.Constant(I32, size), mask, zero])
         return builder.select(mask, loaded, _first_everywhere(builder, loaded))
@@ -236,7 +210,7 @@ def _is_full(builder: Any, p: Any, lanes: Lanes) -> Any:
     return builder.icmp_signed("==", builder.extract_value(p, 1), ir.Constant(I64, lanes.width))
 
 
-def _store(context, builder, pointer, p, lanes, value):
+def _store(builder, pointer, p, lanes, value):
     vector = vector_of(lanes)
     size = lanes.scalar.bitwidth // 8
     at = builder.bitcast(pointer, vector.as_pointer())
@@ -245,42 +219,41 @@ def _store(context, builder, pointer, p, lanes, value):
             builder.store(value, at, align=size)
         with otherwise:
             mask = _masked(builder, p, lanes.width)
-            function = cgutils.get_or_insert_function(
-                builder.module,
-                ir.FunctionType(ir.VoidType(), [vector, vector.as_pointer(), I32, mask.type]),
-                f"llvm.masked.store.{shape(lanes)}.p0",
-            )
+            function = code.external(
+                builder, f"llvm.masked.store.{shape(lanes)}.p0", ir.VoidType(),
+                [vector, vector.as_pointer(), I32, mask.type],
+            )  # fmt: skip
             builder.call(function, [value, at, ir.Constant(I32, size), mask])
 
 
 def _indices(at: Any, builder: Any, value: Any) -> tuple[list, list]:
     """Types and values of the indices of an item, one or a tuple of them."""
     if isinstance(at, types.BaseTuple):
-        return list(at), cgutils.unpack_tuple(builder, value)
+        return list(at), code.unpack(builder, value)
     return [at], [value]
 
 
-def _points_at(context, builder, array, at, arguments):
+def _points_at(builder, array, at, arguments):
     """Address of an item whose last index is a group: that of its first point; and the group."""
     kinds, values = _indices(at, builder, arguments[1])
     first = builder.extract_value(values[-1], 0)
     rest = [
-        context.cast(builder, value, kind, types.intp)
+        code.cast(builder, value, kind, types.intp)
         for kind, value in zip(kinds[:-1], values[:-1], strict=True)
     ]
     # Points lie one after another in each row, however far the rows are apart.
     size = ir.Constant(I64, array.dtype.bitwidth // 8)
-    found = pointer_to(context, builder, array, arguments[0], [*rest, first], size)
+    found = code.item_pointer(builder, array, arguments[0], [*rest, first], size)
     return found, values[-1]
 
 
 @intrinsic
-def _load_points(typing_context, array, at):
+def _load_points(array, at):
     lanes = Lanes(array.dtype, lanes_of(at))
 
-    def codegen(context, builder, sig, arguments):
-        pointer, p = _points_at(context, builder, array, at, arguments)
-        return _load(context, builder, array, pointer, p, lanes)
+    def codegen(builder, sig, arguments):
+        pointer, p = _points_at(builder, array, at, arguments)
+        return _load(builder, array, pointer, p, lanes)
 
     return lanes(array, at), codegen
 
@@ -289,18 +262,17 @@ def ask(builder, pointer, ahead):
     """Have the memory bring what lies so many bytes behind an address."""
     byte = ir.IntType(8).as_pointer()
     at = builder.gep(builder.bitcast(pointer, byte), [ahead])
-    kind = ir.FunctionType(ir.VoidType(), [byte, I32, I32, I32])
-    function = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0")
+    function = code.external(builder, "llvm.prefetch.p0", ir.VoidType(), [byte, I32, I32, I32])
     read, near, data = 0, 3, 1
     builder.call(function, [at, *(ir.Constant(I32, k) for k in (read, near, data))])
 
 
 @intrinsic
-def _prefetch(typing_context, array, at):
-    def codegen(context, builder, sig, arguments):
-        pointer, _ = _points_at(context, builder, array, at, arguments)
+def _prefetch(array, at):
+    def codegen(builder, sig, arguments):
+        pointer, _ = _points_at(builder, array, at, arguments)
         ask(builder, pointer, ir.Constant(I32, AHEAD))
-        return context.get_dummy_value()
+        return code.nothing()
 
     return types.void(array, at), codegen
 
@@ -309,36 +281,36 @@ implements(prefetch, LaneGroup)(_prefetch)
 
 
 @intrinsic
-def _store_points(typing_context, array, at, value):
+def _store_points(array, at, value):
     lanes = Lanes(array.dtype, lanes_of(at))
     typed = value if isinstance(value, Lanes) else array.dtype
 
-    def codegen(context, builder, sig, arguments):
-        pointer, p = _points_at(context, builder, array, at, arguments)
+    def codegen(builder, sig, arguments):
+        pointer, p = _points_at(builder, array, at, arguments)
         number = arguments[2]
         if not isinstance(value, Lanes):
             number = splat(builder, number, lanes)
-        _store(context, builder, pointer, p, lanes, number)
-        return context.get_dummy_value()
+        _store(builder, pointer, p, lanes, number)
+        return code.nothing()
 
     return types.void(array, at, typed), codegen
 
 
 @intrinsic
-def _gather(typing_context, array, at):
+def _gather(array, at):
     """Items of an array at numbers in lanes, the first index."""
     lanes = Lanes(array.dtype, lanes_of(at))
 
-    def codegen(context, builder, sig, arguments):
+    def codegen(builder, sig, arguments):
         kinds, values = _indices(at, builder, arguments[1])
         rest = [
-            context.cast(builder, value, kind, types.intp)
+            code.cast(builder, value, kind, types.intp)
             for kind, value in zip(kinds[1:], values[1:], strict=True)
         ]
 
         def of(k):
             return builder.load(
-                at_lane(context, builder, array, arguments[0], kinds[0], values[0], k, *rest)
+                at_lane(builder, array, arguments[0], kinds[0], values[0], k, *rest)
             )
 
         def apart():
@@ -381,8 +353,8 @@ def _set(array, at, value):
 
 
 @intrinsic
-def _is_one(typing_context, nodes):
-    def codegen(context, builder, sig, arguments):
+def _is_one(nodes):
+    def codegen(builder, sig, arguments):
         return all_same(builder, nodes, arguments[0])
 
     return types.boolean(nodes), codegen
@@ -392,13 +364,11 @@ implements(is_one, Lanes)(_is_one)
 
 
 @intrinsic
-def _beside(typing_context, first, steps):
+def _beside(first, steps):
     made = Beside(first)
 
-    def codegen(context, builder, sig, arguments):
-        out = cgutils.create_struct_proxy(made)(context, builder)
-        out.nodes, out.steps = arguments
-        return out._getvalue()
+    def codegen(builder, sig, arguments):
+        return code.make_struct(builder, made.register_type(), arguments)
 
     return made(first, types.intp), codegen
 

@@ -7,10 +7,9 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
-from numba.core.imputils import lower_builtin
-from numba.core.typing.templates import AbstractTemplate, infer_global, signature
-from numba.extending import intrinsic
 
+from karamelo_py.compiler import code
+from karamelo_py.compiler.arithmetic import ON_LANES, Operation
 from karamelo_py.compiler.compile import (
     all_lanes,
     any_lane,
@@ -22,6 +21,7 @@ from karamelo_py.compiler.compile import (
     round_off,
     where,
 )
+from karamelo_py.compiler.intrinsics import intrinsic
 from karamelo_py.compiler.lanes.registers import I32, Lanes, call_vector, splat, vector_of
 from karamelo_py.compiler.lowering import Lowering
 
@@ -45,9 +45,9 @@ def _wider(a: Any, b: Any) -> Lanes | None:
     return lanes
 
 
-def _both(builder: Any, sig: Any, arguments: Any, lanes: Lanes) -> list:
+def _spread_both(builder: Any, kinds: tuple, values: list, lanes: Lanes) -> list:
     out = []
-    for kind, value in zip(sig.args, arguments, strict=True):
+    for kind, value in zip(kinds, values, strict=True):
         if not isinstance(kind, Lanes):
             value = splat(builder, value, lanes)
         elif kind != lanes:
@@ -56,26 +56,23 @@ def _both(builder: Any, sig: Any, arguments: Any, lanes: Lanes) -> list:
     return out
 
 
-def _operator(operation: Any, result: Callable, code: Callable) -> None:
-    """Let an operator know lanes: `result` says of which kind, `code` makes them."""
+def _operator(function: Any, result: Callable, made: Callable) -> None:
+    """Let an operator know lanes: `result` says of which kind, `made` makes them."""
 
-    @infer_global(operation)
-    class Template(AbstractTemplate):
-        def generic(self, arguments, keywords):
-            lanes = _wider(*arguments) if len(arguments) == 2 else None
-            made = None if lanes is None else result(lanes)
-            if made is None:
-                return None
-            return signature(
-                made, *(a if isinstance(a, Lanes) else lanes.scalar for a in arguments)
-            )
+    def operation(*kinds: types.Type) -> Operation | None:
+        kinds = tuple(map(types.unliteral, kinds))
+        lanes = _wider(*kinds)
+        gives = None if lanes is None else result(lanes)
+        if gives is None:
+            return None
+        kinds = tuple(k if isinstance(k, Lanes) else lanes.scalar for k in kinds)
+        return Operation(
+            gives,
+            kinds,
+            lambda builder, v: made(builder, lanes, *_spread_both(builder, kinds, v, lanes)),
+        )
 
-    def lower(context, builder, sig, arguments):
-        lanes = _wider(*sig.args)
-        return code(builder, lanes, *_both(builder, sig, arguments, lanes))
-
-    for a, b in ((Lanes, Lanes), (Lanes, types.Any), (types.Any, Lanes)):
-        lower_builtin(operation, a, b)(lower)
+    ON_LANES[function] = operation
 
 
 def _binary(operation: Any, of_floats: str | None, of_ints: str | None) -> None:
@@ -89,16 +86,11 @@ def _binary(operation: Any, of_floats: str | None, of_ints: str | None) -> None:
     )
 
 
-for _operations, _floats, _ints in (
-    ((operator.add, operator.iadd), "fadd", "add"),
-    ((operator.sub, operator.isub), "fsub", "sub"),
-    ((operator.mul, operator.imul), "fmul", "mul"),
-    ((operator.truediv, operator.itruediv), "fdiv", None),
-    ((operator.and_,), None, "and_"),
-    ((operator.or_,), None, "or_"),
-):
-    for _operation in _operations:
-        _binary(_operation, _floats, _ints)
+for _operation, _floats, _ints in (
+    (operator.add, "fadd", "add"), (operator.sub, "fsub", "sub"), (operator.mul, "fmul", "mul"),
+    (operator.truediv, "fdiv", None), (operator.and_, None, "and_"), (operator.or_, None, "or_"),
+):  # fmt: skip
+    _binary(_operation, _floats, _ints)
 
 
 def _comparison(operation: Any, sign: str) -> None:
@@ -118,16 +110,10 @@ for _operation, _sign in (
     _comparison(_operation, _sign)
 
 
-def _unary(operation: Any, code: Callable) -> None:
-    @infer_global(operation)
-    class Template(AbstractTemplate):
-        def generic(self, arguments, keywords):
-            lanes = arguments[0]
-            return signature(lanes, lanes) if isinstance(lanes, Lanes) else None
-
-    @lower_builtin(operation, Lanes)
-    def lower(context, builder, sig, arguments):
-        return code(builder, sig.args[0].scalar, arguments[0])
+def _unary(function: Any, made: Callable) -> None:
+    ON_LANES[function] = lambda lanes: Operation(
+        lanes, (lanes,), lambda builder, values: made(builder, lanes.scalar, values[0])
+    )
 
 
 def _negated(builder: Any, scalar: types.Type, value: Any) -> Any:
@@ -145,18 +131,18 @@ def _operands(*arguments: Any) -> tuple[Lanes, list]:
 
 
 @intrinsic
-def _fma_lanes(typing_context, a, b, c):
+def _fma_lanes(a, b, c):
     lanes, typed = _operands(a, b, c)
     return lanes(*typed), call_vector("fma", lanes)
 
 
 @intrinsic
-def _sqrt_lanes(typing_context, a):
+def _sqrt_lanes(a):
     return a(a), call_vector("sqrt", a)
 
 
 @intrinsic
-def _abs_lanes(typing_context, a):
+def _abs_lanes(a):
     return a(a), call_vector("fabs", a)
 
 
@@ -166,12 +152,12 @@ implements(abs, Lanes)(_abs_lanes)
 
 
 @intrinsic
-def select(typing_context, condition, a, b):
+def select(condition, a, b):
     lanes, typed = _operands(a, b) if isinstance(a, Lanes) or isinstance(b, Lanes) else (None, None)
     if lanes is None:
         lanes, typed = Lanes(a, condition.width), [a, a]
 
-    def codegen(context, builder, sig, arguments):
+    def codegen(builder, sig, arguments):
         values = [
             value if isinstance(kind, Lanes) else splat(builder, value, lanes)
             for kind, value in zip(sig.args[1:], arguments[1:], strict=True)
@@ -211,8 +197,8 @@ def _truth(function: Callable, sign: str, bits_of: int) -> None:
     """Let a question about all lanes be one about the bits of a mask."""
 
     @intrinsic
-    def asked(typing_context, mask):
-        def codegen(context, builder, sig, arguments):
+    def asked(mask):
+        def codegen(builder, sig, arguments):
             bits = builder.bitcast(arguments[0], ir.IntType(mask.width))
             return builder.icmp_signed(sign, bits, ir.Constant(bits.type, bits_of))
 
@@ -229,12 +215,12 @@ _truth(any_lane, "!=", 0)
 
 
 @intrinsic
-def _truncated(typing_context, a):
+def _truncated(a):
     if not isinstance(a.scalar, types.Float):
         return None
     whole = Lanes(types.int32, a.width)  # every processor has that, and cells are no more
 
-    def codegen(context, builder, sig, arguments):
+    def codegen(builder, sig, arguments):
         return builder.fptosi(arguments[0], vector_of(whole))
 
     return whole(a), codegen
@@ -244,11 +230,11 @@ implements(int, Lanes)(_truncated)
 
 
 @intrinsic
-def _converted(typing_context, value, like):
+def _converted(value, like):
     scalar = like.scalar if isinstance(like, Lanes) else like
     lanes = Lanes(scalar, value.width)
 
-    def codegen(context, builder, sig, arguments):
+    def codegen(builder, sig, arguments):
         if isinstance(value.scalar, types.Integer):
             narrow = arguments[0]
             if value.scalar.bitwidth > 32:
@@ -267,9 +253,9 @@ Lowering.spread = staticmethod(splat)
 
 
 @intrinsic
-def _spread(typing_context, value, like):
-    def codegen(context, builder, sig, arguments):
-        number = context.cast(builder, arguments[0], value, like.scalar)
+def _spread(value, like):
+    def codegen(builder, sig, arguments):
+        number = code.cast(builder, arguments[0], value, like.scalar)
         return splat(builder, number, like)
 
     return like(value, like), codegen
@@ -286,11 +272,11 @@ def _index(i):
 
 
 @intrinsic
-def _round_off(typing_context, like):
+def _round_off(like):
     error = 2.0**-23 if like.scalar == types.float32 else 2.0**-52
 
-    def codegen(context, builder, sig, arguments):
-        return splat(builder, context.get_constant(like.scalar, error), like)
+    def codegen(builder, sig, arguments):
+        return splat(builder, code.constant(builder, like.scalar, error), like)
 
     return like(like), codegen
 

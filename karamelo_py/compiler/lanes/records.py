@@ -5,10 +5,8 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
-from numba.core.codegen import get_host_cpu_features
-from numba.extending import intrinsic
 
+from karamelo_py.compiler import code, machine
 from karamelo_py.compiler.compile import (
     Weighted,
     accumulate,
@@ -18,7 +16,8 @@ from karamelo_py.compiler.compile import (
     prefetch_records,
     tag_class,
 )
-from karamelo_py.compiler.lanes.arrays import Beside, ask, at_lane, pointer_to
+from karamelo_py.compiler.intrinsics import intrinsic
+from karamelo_py.compiler.lanes.arrays import Beside, ask, at_lane
 from karamelo_py.compiler.lanes.registers import (
     I32,
     I64,
@@ -34,7 +33,7 @@ from karamelo_py.compiler.tuples import row
 
 # Bytes of a record that a field is given to at once: a register. Of wider vectors LLVM makes two,
 # and where registers are narrow there are too few of them for that.
-_AT_ONCE = 64 if "+avx512f" in get_host_cpu_features() else 32
+_AT_ONCE = 64 if "+avx512f" in machine.features() else 32
 
 AHEAD = 16  # nodes by which records are asked of the memory ahead of their use
 
@@ -84,37 +83,37 @@ def _lanes_from(builder: Any, rows: list, lanes: Lanes, count: int) -> list:
 
 
 @intrinsic
-def _gather_row(typing_context, array, nodes, first, like):
+def _gather_row(array, nodes, first, like):
     """Components of the records of nodes, as many as `like` has."""
     lanes = Lanes(array.dtype, nodes.width)
     made = types.UniTuple(lanes, len(like))
 
-    def codegen(context, builder, sig, arguments):
+    def codegen(builder, sig, arguments):
         found = []
         for begin, count in _chunks(len(like)):
             column = builder.add(arguments[2], ir.Constant(arguments[2].type, begin))
 
             rows = []
             for k in range(lanes.width):
-                given = context, builder, array, arguments[0], nodes, arguments[1], k, column
+                given = builder, array, arguments[0], nodes, arguments[1], k, column
                 at = _record(builder, array, at_lane(*given), count)
                 rows.append(builder.load(at, align=array.dtype.bitwidth // 8))
             found += _lanes_from(builder, rows, lanes, count)
-        return context.make_tuple(builder, made, found[: len(like)])
+        return code.make_tuple(builder, made, found[: len(like)])
 
     return made(array, nodes, types.int64, like), codegen
 
 
 @intrinsic
-def _gather_weighted(typing_context, array, nodes, first, weights, like):
+def _gather_weighted(array, nodes, first, weights, like):
     """The same of the weighted sum of the records of some nodes: each is read as it lies there."""
     lanes = weights[0]
     made = types.UniTuple(lanes, len(like))
 
-    def codegen(context, builder, sig, arguments):
+    def codegen(builder, sig, arguments):
         size = array.dtype.bitwidth // 8
-        spread = _kept_in_memory(builder, cgutils.unpack_tuple(builder, arguments[3]))
-        at = cgutils.unpack_tuple(builder, arguments[1])
+        spread = _kept_in_memory(builder, code.unpack(builder, arguments[3]))
+        at = code.unpack(builder, arguments[1])
         found = []
         for begin, count in _chunks(len(like)):
             column = builder.add(arguments[2], ir.Constant(arguments[2].type, begin))
@@ -123,28 +122,28 @@ def _gather_weighted(typing_context, array, nodes, first, weights, like):
             for j in range(lanes.width):
                 total = ir.Constant(vector_of(record), None)
                 for k, node in enumerate(at):
-                    given = context, builder, array, arguments[0], nodes[k], node, j, column
+                    given = builder, array, arguments[0], nodes[k], node, j, column
                     pointer = _record(builder, array, at_lane(*given), count)
                     weight = splat(builder, builder.load(spread(k, j), align=size), record)
                     total = _fma(builder, weight, builder.load(pointer, align=size), total)
                 rows.append(total)
             found += _lanes_from(builder, rows, lanes, count)
-        return context.make_tuple(builder, made, found[: len(like)])
+        return code.make_tuple(builder, made, found[: len(like)])
 
     return made(array, nodes, types.int64, weights, like), codegen
 
 
 @intrinsic
-def _prefetch_records(typing_context, array, nodes):
-    def codegen(context, builder, sig, arguments):
-        strides = context.make_array(array)(context, builder, arguments[0]).strides
-        stride = cgutils.unpack_tuple(builder, strides)[0]
+def _prefetch_records(array, nodes):
+    def codegen(builder, sig, arguments):
+        strides = code.ArrayParts(builder, array, arguments[0]).strides
+        stride = strides[0]
         ahead = builder.mul(stride, ir.Constant(stride.type, AHEAD))
         column = ir.Constant(I64, 0)
         for k in range(nodes.width):
-            pointer = at_lane(context, builder, array, arguments[0], nodes, arguments[1], k, column)
+            pointer = at_lane(builder, array, arguments[0], nodes, arguments[1], k, column)
             ask(builder, pointer, ahead)
-        return context.get_dummy_value()
+        return code.nothing()
 
     return types.void(array, nodes), codegen
 
@@ -156,9 +155,7 @@ def _fma(builder: Any, a: Any, b: Any, c: Any) -> Any:
     """a b + c of vectors, with one rounding."""
     kind = a.type
     name = f"llvm.fma.v{kind.count}{kind.element.intrinsic_name}"
-    function = cgutils.get_or_insert_function(
-        builder.module, ir.FunctionType(kind, [kind] * 3), name
-    )
+    function = code.external(builder, name, kind, [kind] * 3)
     return builder.call(function, [a, b, c])
 
 
@@ -172,14 +169,14 @@ def _row(array, i, first, like):
 
 
 @intrinsic
-def _scatter(typing_context, array, nodes, first, values):
+def _scatter(array, nodes, first, values):
     """Add to components of the records of nodes, lane after lane; summed before to one node."""
     width = max(lanes_of(value) for value in values)
     lanes = Lanes(array.dtype, width)
 
-    def codegen(context, builder, sig, arguments):
+    def codegen(builder, sig, arguments):
         size = array.dtype.bitwidth // 8
-        parts = cgutils.unpack_tuple(builder, arguments[3])
+        parts = code.unpack(builder, arguments[3])
         parts = [
             part if isinstance(kind, Lanes) else splat(builder, part, lanes)
             for kind, part in zip(values, parts, strict=True)
@@ -198,15 +195,15 @@ def _scatter(typing_context, array, nodes, first, values):
                 while len(rows) > 1:
                     rows = [builder.fadd(*pair) for pair in zip(rows[::2], rows[1::2], strict=True)]
             for k, number in enumerate(rows):
-                given = context, builder, array, arguments[0]
+                given = builder, array, arguments[0]
                 if lanes_of(nodes):
                     pointer = at_lane(*given, nodes, arguments[1], k, column)
                 else:
-                    pointer = pointer_to(*given, [arguments[1], column])
+                    pointer = code.item_pointer(*given, [arguments[1], column])
                 at = _record(builder, array, pointer, count)
                 total = builder.fadd(builder.load(at, align=size), number)
                 builder.store(total, at, align=size)
-        return context.get_dummy_value()
+        return code.nothing()
 
     at = nodes if lanes_of(nodes) else types.int64
     return types.void(array, at, types.int64, values), codegen
@@ -223,14 +220,14 @@ def move_record(array, i, other, j, first, like, keep):
 
 
 @intrinsic
-def _move_record(typing_context, array, i, other, j, first, like, keep):
-    def codegen(context, builder, sig, arguments):
+def _move_record(array, i, other, j, first, like, keep):
+    def codegen(builder, sig, arguments):
         size = array.dtype.bitwidth // 8
         to, of = (
             _record(
                 builder,
                 kind,
-                pointer_to(context, builder, kind, arguments[k], [arguments[k + 1], arguments[4]]),
+                code.item_pointer(builder, kind, arguments[k], [arguments[k + 1], arguments[4]]),
                 len(like),
             )
             for k, kind in ((0, array), (2, other))
@@ -240,7 +237,7 @@ def _move_record(typing_context, array, i, other, j, first, like, keep):
         kept = builder.select(arguments[6], there, zero)
         builder.store(builder.fadd(kept, builder.load(of, align=size)), to, align=size)
         builder.store(zero, of, align=size)
-        return context.get_dummy_value()
+        return code.nothing()
 
     signature = types.void(array, types.int64, other, types.int64, types.int64, like, types.boolean)
     return signature, codegen
@@ -285,21 +282,18 @@ def accumulate_affine(array, nodes, first, weights, value, slopes):
 
 
 @intrinsic
-def _accumulate_affine(typing_context, array, nodes, first, weights, value, slopes):
+def _accumulate_affine(array, nodes, first, weights, value, slopes):
     """The records of the points, each with one vector; the weights are read one by one.
 
     So the records are made once a point, not at each node.
     """
     lanes = weights[0]
 
-    def codegen(context, builder, sig, arguments):
+    def codegen(builder, sig, arguments):
         size = array.dtype.bitwidth // 8
-        spread = _kept_in_memory(builder, cgutils.unpack_tuple(builder, arguments[3]))
-        values = cgutils.unpack_tuple(builder, arguments[4])
-        growths = [
-            cgutils.unpack_tuple(builder, slope)
-            for slope in cgutils.unpack_tuple(builder, arguments[5])
-        ]
+        spread = _kept_in_memory(builder, code.unpack(builder, arguments[3]))
+        values = code.unpack(builder, arguments[4])
+        growths = [code.unpack(builder, slope) for slope in code.unpack(builder, arguments[5])]
         width = round(len(nodes) ** (1 / max(1, len(growths))))
         widest = min(_AT_ONCE // size, 8)
         for begin in range(0, len(values), widest):
@@ -322,16 +316,16 @@ def _accumulate_affine(typing_context, array, nodes, first, weights, value, slop
                         at[place] = [builder.fadd(*pair) for pair in pairs]
                 return at[place]
 
-            for k, node in enumerate(cgutils.unpack_tuple(builder, arguments[1])):
+            for k, node in enumerate(code.unpack(builder, arguments[1])):
                 place = tuple(k // width**d % width for d in reversed(range(len(grow))))
                 total = pointer = None
                 for j, record in enumerate(field_at(*place)):
                     if total is None or lanes_of(nodes[k]):
-                        given = context, builder, array, arguments[0]
+                        given = builder, array, arguments[0]
                         if lanes_of(nodes[k]):
                             pointer = at_lane(*given, nodes[k], node, j, column)
                         else:
-                            pointer = pointer_to(*given, [node, column])
+                            pointer = code.item_pointer(*given, [node, column])
                         pointer = builder.bitcast(pointer, vector.as_pointer())
                         total = builder.load(pointer, align=size)
                     weight = splat(builder, builder.load(spread(k, j), align=size), one)
@@ -340,7 +334,7 @@ def _accumulate_affine(typing_context, array, nodes, first, weights, value, slop
                         builder.store(total, pointer, align=size)
                 if not lanes_of(nodes[k]):
                     builder.store(total, pointer, align=size)
-        return context.get_dummy_value()
+        return code.nothing()
 
     made = types.void(array, nodes, types.int64, weights, value, slopes)
     return made, codegen
@@ -371,10 +365,10 @@ def _kept_in_memory(builder: Any, vectors: list) -> Callable:
     as a shuffle.
     """
     kind = ir.ArrayType(vectors[0].type, len(vectors))
-    room = cgutils.alloca_once(builder, kind)
+    room = code.room(builder, kind)
     room.align = 64
     for k, vector in enumerate(vectors):
-        builder.store(vector, cgutils.gep_inbounds(builder, room, 0, k))
+        builder.store(vector, code.at(builder, room, 0, k))
     hidden = ir.FunctionType(ir.VoidType(), [room.type])
     builder.asm(hidden, "", "r,~{memory}", [room], side_effect=True)
     scalars = builder.bitcast(room, vectors[0].type.element.as_pointer())

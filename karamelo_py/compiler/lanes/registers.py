@@ -5,8 +5,8 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
-from numba.extending import models, register_model
+
+from karamelo_py.compiler import code
 
 I32, I64 = ir.IntType(32), ir.IntType(64)
 
@@ -17,6 +17,10 @@ class Lanes(types.Type):
     def __init__(self, scalar: types.Type, width: int):
         self.scalar, self.width = scalar, width
         super().__init__(name=f"Lanes({scalar}, {width})")
+
+    def register_type(self) -> ir.VectorType:
+        """LLVM's type of them."""
+        return vector_of(self)
 
 
 def element(scalar: types.Type) -> ir.Type:
@@ -30,12 +34,6 @@ def element(scalar: types.Type) -> ir.Type:
 
 def vector_of(lanes: Lanes) -> ir.VectorType:
     return ir.VectorType(element(lanes.scalar), lanes.width)
-
-
-@register_model(Lanes)
-class _LanesModel(models.PrimitiveModel):
-    def __init__(self, manager: Any, lanes: Lanes):
-        super().__init__(manager, lanes, vector_of(lanes))
 
 
 def constant(values: list[int], bits: ir.Type = I32) -> ir.Constant:
@@ -77,16 +75,14 @@ def shuffle(builder: Any, a: Any, b: Any, order: list[int]) -> Any:
 def call_vector(name: str, lanes: Lanes) -> Callable:
     """Code that calls an LLVM intrinsic of vectors, such as sqrt."""
 
-    def codegen(context, builder, sig, arguments):
+    def codegen(builder, sig, arguments):
         vector = vector_of(lanes)
         values = [
             value if isinstance(kind, Lanes) else splat(builder, value, lanes)
             for kind, value in zip(sig.args, arguments, strict=True)
         ]
-        function = cgutils.get_or_insert_function(
-            builder.module,
-            ir.FunctionType(vector, [vector] * len(values)),
-            f"llvm.{name}.{shape(lanes)}",
+        function = code.external(
+            builder, f"llvm.{name}.{shape(lanes)}", vector, [vector] * len(values)
         )
         return builder.call(function, values)
 

@@ -14,8 +14,8 @@ from zlib import crc32
 
 import numpy as np
 
+from karamelo_py.language.scene import Scene
 from karamelo_py.scene.comm import SerialComm
-from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Quit, ScriptError
 
 INSTALL = "pip install 'karamelo-py[mpi]'"
@@ -217,7 +217,7 @@ class MpiComm(SerialComm):
         self.world.Abort(status)
 
 
-def check_same_run(hub: Hub) -> None:
+def check_same_run(hub: Scene) -> None:
     """See that all processes are about to do the same run.
 
     Raises

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from karamelo_py.compiler.argument_buffer import forget
 from karamelo_py.compiler.fields import records
-from karamelo_py.compiler.packed import forget
 from karamelo_py.kernels.arrays import Buffers, Nodes, Setup
 from karamelo_py.kernels.heat import Conducting
 

@@ -2,7 +2,7 @@
 
 from math import sqrt
 
-from karamelo_py.compiler.compile import any_lane, point_function, round_off, shared, where
+from karamelo_py.compiler.compile import any_lane, point_function, real, round_off, shared, where
 from karamelo_py.points.kinematics import von_mises
 from karamelo_py.points.laws.strengths.linear import elastic_trial
 
@@ -28,7 +28,7 @@ def first_guess(strength, memory, known, q, slope):
     `slope` is 3 G. A change c is followed by about k c^2, or less the further the flow stress has
     hardened: k is the second number.
     """
-    return 0.0, 0.0
+    return real(0, q), real(0, q)
 
 
 @point_function(otherwise=True)

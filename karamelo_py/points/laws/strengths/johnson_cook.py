@@ -200,7 +200,7 @@ def _precompute_johnson_cook(strength, memory, heat):
 @first_guess.on(JohnsonCook)
 def _first_guess_johnson_cook(strength, memory, known, q, slope):
     if not isinstance(strength.rate, Absent):
-        return 0.0, 0.0  # the rate rises with the strain: what is known is for none
+        return real(0, q), real(0, q)  # the rate rises with the strain: what is known is for none
     hard, soft = known
     excess = q - (strength.A + hard) * soft
     return power_law_guess(strength.n, memory.ep, hard * soft, excess, slope)

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any, NamedTuple
 
-from karamelo_py.compiler.compile import where
+from karamelo_py.compiler.compile import real, where
 from karamelo_py.compiler.powers import exponential
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.laws.strengths import remembers, shear_response
@@ -116,7 +116,7 @@ def _flow_stress_zerilli_armstrong(strength, memory, known, increment, heat, dt)
     rate = increment / (dt * strength.epsdot0)
     at_rate = power_of_strain(1, power, rate)
     rate, rate_slope = power_law(1, power, rate, at_rate, 0)
-    rate = where(power > 0, rate, 1)
+    rate = where(power > 0, rate, real(1, rate))
     factor = strength.C1 + root
     slope += known.thermal * (rate * root_slope + factor * rate_slope / (dt * strength.epsdot0))
     return strength.C0 + known.thermal * rate * factor + athermal, slope

@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic
 
+from karamelo_py.compiler import code
 from karamelo_py.compiler.compile import by_type
+from karamelo_py.compiler.intrinsics import intrinsic
 
 
 def addresses_of_rows(arrays: Iterable[np.ndarray]) -> np.ndarray:
@@ -63,19 +64,19 @@ def _pointer(builder: Any, address: Any, k: Any, kind: types.Integer) -> Any:
 
 
 @intrinsic
-def _item_at(typing_context, address, k, like):
-    def codegen(context, builder, signature, values):
+def _item_at(address, k, like):
+    def codegen(builder, signature, values):
         return builder.load(_pointer(builder, *values[:2], like))
 
     return like(types.int64, types.int64, like), codegen
 
 
 @intrinsic
-def _put_item_at(typing_context, address, k, value, like):
-    def codegen(context, builder, signature, values):
-        item = context.cast(builder, values[2], types.int64, like)
+def _put_item_at(address, k, value, like):
+    def codegen(builder, signature, values):
+        item = code.cast(builder, values[2], types.int64, like)
         builder.store(item, _pointer(builder, *values[:2], like))
-        return context.get_dummy_value()
+        return code.nothing()
 
     return types.none(types.int64, types.int64, types.int64, like), codegen
 

@@ -9,12 +9,11 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from numba import config
-from numba.core.errors import NumbaError
 from test_cache import ALL, VALUES, Shapes, Tag, fresh
 
-from karamelo_py.compiler import cache, turns
+from karamelo_py.compiler import cache, compile_lock
 from karamelo_py.compiler.loops import kernel
-from karamelo_py.compiler.turns import Turns
+from karamelo_py.compiler.trace import CannotCompile
 
 fcntl = pytest.importorskip("fcntl")
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
@@ -22,11 +21,10 @@ pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled"
 HOLDS = """
 import sys
 from pathlib import Path
-from karamelo_py.compiler.turns import Turns
-turns = Turns()
-turns.take(Path(sys.argv[1]))
-print("held", flush=True)
-sys.stdin.read()
+from karamelo_py.compiler.compile_lock import lock
+with lock(Path(sys.argv[1])):
+    print("held", flush=True)
+    sys.stdin.read()
 """
 
 
@@ -74,23 +72,22 @@ def test_a_process_that_is_killed_is_not_waited_for(path, holder):
     assert not is_free(path)
     holder.send_signal(getattr(signal, "SIGKILL", signal.SIGTERM))
     holder.wait()
-    own = Turns()
-    own.take(path)
-    assert not is_free(path)
-    own.give(path)
+    with compile_lock.lock(path):
+        assert not is_free(path)
     assert not path.exists()
 
 
 def test_nobody_waits_for_ever(path, holder, monkeypatch):
     """A process that is stopped keeps its lock; others compile for themselves then."""
-    monkeypatch.setattr(turns, "PATIENCE", 0.1)
-    own = Turns()
-    own.take(path)
-    own.give(path)  # what it does not have
+    monkeypatch.setattr(compile_lock, "PATIENCE", 0.1)
+    monkeypatch.setattr(compile_lock, "waits", True)
+    with compile_lock.lock(path):
+        """Another has it."""
     assert path.exists() and not is_free(path)
     # One that is stopped may hold several: nobody waits for each of them.
-    monkeypatch.setattr(turns, "_locked_in_time", lambda file: pytest.fail("it waits again"))
-    own.take(path)
+    monkeypatch.setattr(compile_lock, "_locked_in_time", lambda file: pytest.fail("it waits again"))
+    with compile_lock.lock(path):
+        """Nor now."""
 
 
 @pytest.mark.parametrize(
@@ -109,7 +106,8 @@ def test_where_there_are_no_locks_nobody_waits(tmp_path, monkeypatch, call, why)
     with monkeypatch.context() as patched, cache.telling([].append):
         patched.setattr(call, refuse)
         assert fresh()(Tag()) == 42
-        Turns().take(tmp_path / "another" / "loop.lock")
+        with compile_lock.lock(tmp_path / "another" / "loop.lock"):
+            """Without it."""
     if files:
         assert len(os.listdir("/proc/self/fd")) == files
 
@@ -121,7 +119,6 @@ def test_what_cannot_be_compiled_is_no_lock_for_others(tmp_path, monkeypatch):
     def wrong(x):
         return x + "a text"
 
-    with pytest.raises(NumbaError):
+    with pytest.raises(CannotCompile):
         kernel(wrong)(1.0)
     assert all(map(is_free, (tmp_path / "kernels").glob("*.lock")))
-    assert not cache._turns._held

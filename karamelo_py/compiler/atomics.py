@@ -6,13 +6,11 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
-from numba.extending import intrinsic
 
+from karamelo_py.compiler import code
+from karamelo_py.compiler.code import I64
 from karamelo_py.compiler.compile import by_type
-from karamelo_py.compiler.lanes.arrays import pointer_to
-
-I64 = ir.IntType(64)
+from karamelo_py.compiler.intrinsics import intrinsic
 
 
 def word(builder: Any, place: Any) -> Any:
@@ -21,42 +19,42 @@ def word(builder: Any, place: Any) -> Any:
 
 
 @intrinsic
-def read(typing_context, place):
-    """The word at an address; all is seen that was written before it was."""
+def read(place):
+    """Read the word at an address; all is seen that was written before it was."""
 
-    def codegen(context, builder, signature, values):
+    def codegen(builder, signature, values):
         return builder.load_atomic(word(builder, values[0]), "acquire", 8)
 
     return types.intp(types.intp), codegen
 
 
 @intrinsic
-def write(typing_context, place, value):
+def write(place, value):
     """Write a word; who sees it sees all that was written before."""
 
-    def codegen(context, builder, signature, values):
+    def codegen(builder, signature, values):
         builder.store_atomic(values[1], word(builder, values[0]), "release", 8)
-        return context.get_dummy_value()
+        return code.nothing()
 
     return types.none(types.intp, types.intp), codegen
 
 
 @intrinsic
-def add(typing_context, place, value):
+def add(place, value):
     """Add to a word, which others may do, too."""
 
-    def codegen(context, builder, signature, values):
+    def codegen(builder, signature, values):
         builder.atomic_rmw("add", word(builder, values[0]), values[1], "acq_rel")
-        return context.get_dummy_value()
+        return code.nothing()
 
     return types.none(types.intp, types.intp), codegen
 
 
 @intrinsic
-def replaced(typing_context, place, old, new):
+def replaced(place, old, new):
     """Put `new` in the place of `old`; false if the word was another one."""
 
-    def codegen(context, builder, signature, values):
+    def codegen(builder, signature, values):
         found = builder.cmpxchg(word(builder, values[0]), *values[1:], "acq_rel", "acquire")
         return builder.extract_value(found, 1)
 
@@ -64,14 +62,13 @@ def replaced(typing_context, place, old, new):
 
 
 @intrinsic
-def pause(typing_context, long):
+def pause(long):
     """Wait a moment; if `long`, sleep."""
 
-    def codegen(context, builder, signature, values):
+    def codegen(builder, signature, values):
         def call(name, result, *numbers):
-            kind = ir.FunctionType(result, [ir.IntType(32)] * len(numbers))
-            function = cgutils.get_or_insert_function(builder.module, kind, name)
-            builder.call(function, [ir.Constant(ir.IntType(32), number) for number in numbers])
+            function = code.external(builder, name, result, [code.I32] * len(numbers))
+            builder.call(function, [code.I32(number) for number in numbers])
 
         with builder.if_else(values[0]) as (then, otherwise):
             with then:
@@ -82,7 +79,7 @@ def pause(typing_context, long):
             with otherwise:
                 if platform.machine().lower() in ("x86_64", "amd64"):
                     call("llvm.x86.sse2.pause", ir.VoidType())
-        return context.get_dummy_value()
+        return code.nothing()
 
     return types.none(types.boolean), codegen
 
@@ -93,11 +90,11 @@ def add_among(array, i, j, value):
 
 
 @intrinsic
-def _add_among(typing_context, array, i, j, value):
-    def codegen(context, builder, signature, values):
-        at = pointer_to(context, builder, array, values[0], values[1:3])
+def _add_among(array, i, j, value):
+    def codegen(builder, signature, values):
+        at = code.item_pointer(builder, array, values[0], values[1:3])
         builder.atomic_rmw("add", at, values[3], "acq_rel")
-        return context.get_dummy_value()
+        return code.nothing()
 
     return types.none(array, types.int64, types.int64, types.int64), codegen
 

@@ -6,29 +6,26 @@ hold them (:mod:`karamelo_py.compiler.held`), and a kernel is called with its ad
 """
 
 import ctypes
-import hashlib
 import struct
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
 from llvmlite import ir
 from numba import typeof, types
-from numba.core.registry import cpu_target
 
-from karamelo_py.compiler.choices import Unknown
-from karamelo_py.compiler.fingerprint import describe
+from karamelo_py.compiler import code
 from karamelo_py.compiler.held import HeldTuple, held_type, is_held
 
 
 class _Array(NamedTuple):
-    """What is known of an array as long as it lives. NumPy resizes none that is known in place."""
+    """Keep what is known of an array as long as it lives; NumPy resizes none that is known."""
 
     alive: weakref.ref  # another array may get the number of one that is gone
     shape: tuple[int, ...]
     kind: int  # the same for arrays of one type
-    words: tuple[int, ...]  # as Numba's model of arrays has them
+    words: tuple[int, ...]  # as kernels have them
 
 
 _arrays: dict[int, _Array] = {}
@@ -44,7 +41,7 @@ def _array(array: np.ndarray) -> _Array:
             array.dtype, array.ndim, flags.c_contiguous, flags.f_contiguous, flags.aligned,
             flags.writeable,
         )  # fmt: skip
-        words = (0, 0, array.size, array.itemsize, array.ctypes.data, *array.shape, *array.strides)
+        words = (array.ctypes.data, *array.shape, *array.strides)
         kept = _kinds.setdefault(kind, len(_kinds))
         known = _Array(weakref.ref(array, _gone(number)), array.shape, kept, words)
         _arrays[number] = known
@@ -52,7 +49,7 @@ def _array(array: np.ndarray) -> _Array:
 
 
 def _gone(number: int) -> Callable[[weakref.ref], None]:
-    """What is done when an array is gone that had this number, if no other has it by now."""
+    """Make what is done when an array is gone that had this number, unless another has it."""
 
     def drop(alive: weakref.ref) -> None:
         if number in _arrays and _arrays[number].alive is alive:
@@ -66,8 +63,17 @@ def forget(array: np.ndarray) -> None:
     _arrays.pop(id(array), None)
 
 
-class _Words:
-    """What is written for some arguments: held tuples one after another, inner ones first.
+class Plan(NamedTuple):
+    """Describe how the words for arguments of some types are written."""
+
+    text: struct.Struct
+    tuples: tuple[tuple[int, int], ...]  # which word is a tuple in a tuple, where that begins
+    first: int  # where the arguments themselves begin
+    types: tuple[types.Type, ...]  # of the arguments
+
+
+class ArgumentBuffer:
+    """Collect what is written for some arguments: held tuples one after another, inner first.
 
     Attributes
     ----------
@@ -86,7 +92,7 @@ class _Words:
         self.words += own
 
     def _of(self, items: tuple) -> tuple[list, bool]:
-        """The words of a tuple, and whether there are arrays in it."""
+        """Give the words of a tuple, and whether there are arrays in it."""
         own: list = []
         arrays = False
         kinds = self.kinds
@@ -118,14 +124,19 @@ class _Words:
                 own.append(0)
         return own, arrays
 
+    def plan(self, arguments: tuple) -> Plan:
+        """Lay out memory for arguments of these types."""
+        return _plan(arguments)
 
-class _Plan(NamedTuple):
-    """How the words for arguments of some types are written."""
-
-    text: struct.Struct
-    tuples: tuple[tuple[int, int], ...]  # which word is a tuple in a tuple, where that begins
-    first: int  # where the arguments themselves begin
-    types: HeldTuple
+    def in_memory(self, plan: Plan) -> tuple[bytearray, int]:
+        """Write the arguments into memory; where the items of the outermost tuple are."""
+        memory = bytearray(max(plan.text.size, 1))
+        at = ctypes.addressof(ctypes.c_char.from_buffer(memory))
+        words = self.words
+        for k, begin in plan.tuples:
+            words[k] = at + begin
+        plan.text.pack_into(memory, 0, *words)
+        return memory, at + plan.first
 
 
 _CODES = {8: "b", 16: "h", 32: "i", 64: "q"}
@@ -157,17 +168,16 @@ def _lay(kind: ir.Type, at: int, places: list[tuple[int, str]]) -> tuple[int, in
     return at + size, size
 
 
-def _plan(arguments: tuple) -> _Plan:
-    models = cpu_target.target_context.data_model_manager
+def _plan(arguments: tuple) -> Plan:
     places: list[tuple[int, str]] = []
     tuples: list[tuple[int, int]] = []
     end = 0
 
     def lay(held: Any) -> int:
-        """Where a held tuple begins, behind those in it."""
+        """Give where a held tuple begins, behind those in it."""
         nonlocal end
         inner = [lay(item) if is_held(item) else None for item in held]
-        model = models[held].get_data_type().pointee
+        model = held.register_type().pointee
         at = begin = _aligned(end, 16)
         for k, kind in enumerate(model.elements):
             if inner[k] is not None:
@@ -179,63 +189,29 @@ def _plan(arguments: tuple) -> _Plan:
     held = HeldTuple(tuple(held_type(typeof(argument)) for argument in arguments))
     first = lay(held)
     text, at = "=", 0
-    for place, code in places:
-        text += f"{place - at}x{code}"
-        at = place + struct.calcsize(f"={code}")
-    return _Plan(struct.Struct(text), tuple(tuples), first, held)
+    for place, word in places:
+        text += f"{place - at}x{word}"
+        at = place + struct.calcsize(f"={word}")
+    return Plan(struct.Struct(text), tuple(tuples), first, held.types)
 
 
-class Packed:
-    """A kernel that Python calls with arguments of any types.
+def reader(kind: types.Type) -> tuple[int, Callable[[bytearray], Any]]:
+    """Give how many bytes a result takes, and what reads it."""
+    places: list[tuple[int, str]] = []
+    size, _ = _lay(code.memory_type(kind), 0, places)
 
-    Parameters
-    ----------
-    inner
-        The kernel, which takes held tuples.
-    make
-        ``make(held, name)`` compiles a function of the address of a held tuple of the arguments;
-        `name` is another for others.
-    """
+    def made(kind: types.Type, numbers: Iterator) -> Any:
+        if isinstance(kind, types.BaseTuple):
+            items = [made(item, numbers) for item in kind]
+            named = getattr(kind, "instance_class", None)
+            return named(*items) if named else tuple(items)
+        number = next(numbers)
+        if isinstance(kind, types.NoneType):
+            return None
+        return bool(number) if isinstance(kind, types.Boolean) else number
 
-    def __init__(self, inner: Callable, make: Callable[[HeldTuple, str], Callable]):
-        self._inner, self._make = inner, make
-        self._plans: dict[tuple, tuple[_Plan, Callable]] = {}
-        self.entries: dict[HeldTuple, Callable] = {}
+    def read(memory: bytearray) -> Any:
+        numbers = (struct.unpack_from(f"={text}", memory, place)[0] for place, text in places)
+        return made(kind, numbers)
 
-    @property
-    def made_of(self) -> tuple:
-        """What code that calls it depends on (:mod:`karamelo_py.compiler.fingerprint`)."""
-        return (self._inner,)
-
-    def __call__(self, *arguments: Any) -> Any:
-        written = _Words(arguments)
-        plan, entry = self._known(written, arguments)
-        memory = bytearray(plan.text.size)
-        at = ctypes.addressof(ctypes.c_char.from_buffer(memory))
-        words = written.words
-        for k, begin in plan.tuples:
-            words[k] = at + begin
-        plan.text.pack_into(memory, 0, *words)
-        return entry(at + plan.first)
-
-    def compile(self, *arguments: Any) -> None:
-        """Have the kernel compiled for arguments of these types."""
-        _, entry = self._known(_Words(arguments), arguments)
-        entry.compile((types.intp,))
-
-    def _known(self, written: _Words, arguments: tuple) -> tuple[_Plan, Callable]:
-        kinds = tuple(written.kinds)
-        if kinds not in self._plans:
-            plan = _plan(arguments)
-            self._plans[kinds] = plan, self._entry(plan.types)
-        return self._plans[kinds]
-
-    def _entry(self, held: HeldTuple) -> Callable:
-        if held not in self.entries:
-            try:
-                words = describe(held)
-            except Unknown:  # such are not kept on disk
-                words = repr(held)
-            name = hashlib.sha256(words.encode()).hexdigest()[:16]
-            self.entries[held] = self._make(held, name)
-        return self.entries[held]
+    return max(size, 1), read

@@ -1,0 +1,536 @@
+"""Operations on numbers: the type of the result, and the code."""
+
+import ctypes
+import math
+import operator
+import sys
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+
+from karamelo_py.compiler import code, machine
+
+
+class Operation(NamedTuple):
+    """Describe what a function of numbers of some types is.
+
+    Attributes
+    ----------
+    result
+        The type of what it gives.
+    arguments
+        The types that its arguments are cast to.
+    code
+        ``code(builder, values)`` writes it.
+    """
+
+    result: types.Type
+    arguments: tuple[types.Type, ...]
+    code: Callable
+
+
+_NUMBER = (types.Number, types.Boolean)
+_TYPES = {
+    **{getattr(np, name): getattr(types, name) for name in (
+        "float32", "float64", "int8", "int16", "int32", "int64",
+        "uint8", "uint16", "uint32", "uint64",
+    )},
+    np.bool_: types.boolean,
+}  # fmt: skip
+
+
+def common(*kinds: types.Type) -> types.Type:
+    """Give the type of a sum of numbers of these types."""
+    wide = kinds[0]
+    for kind in kinds[1:]:
+        wide = _wider(wide, kind)
+    return wide
+
+
+def _wider(a: types.Type, b: types.Type) -> types.Type:
+    if a == b and not isinstance(a, types.Boolean) and a.bitwidth >= 32 + 32 * _is_whole(a):
+        return a
+    if _is_whole(a) and _is_whole(b):
+        unsigned = [not isinstance(k, types.Boolean) and not k.signed for k in (a, b)]
+        if all(unsigned):
+            return types.uint64
+        long = any(one and k.bitwidth == 64 for one, k in zip(unsigned, (a, b), strict=True))
+        return types.float64 if long else types.int64
+    singles = all(_is_whole(k) is False and k.bitwidth == 32 for k in (a, b))
+    return types.float32 if singles else types.float64
+
+
+def _is_whole(kind: types.Type) -> bool:
+    return isinstance(kind, types.Integer | types.Boolean)
+
+
+# --- operators --------------------------------------------------------------------------------
+
+
+def _binary(of_reals: str | None, of_whole: str | None, flags: tuple = ()) -> Callable:
+    def operation(a: types.Type, b: types.Type) -> Operation | None:
+        kind = common(a, b)
+        name = of_reals if isinstance(kind, types.Float) else of_whole
+        if name is None:
+            return None
+        more = {"flags": flags} if flags and name == of_whole and kind.signed else {}
+        return Operation(kind, (kind, kind), lambda builder, v: getattr(builder, name)(*v, **more))
+
+    return operation
+
+
+def _true_division(a: types.Type, b: types.Type) -> Operation:
+    kind = common(a, b)
+    kind = kind if isinstance(kind, types.Float) else types.float64
+    return Operation(kind, (kind, kind), lambda builder, v: builder.fdiv(*v))
+
+
+def _bitwise(name: str) -> Callable:
+    def operation(a: types.Type, b: types.Type) -> Operation | None:
+        if not (_is_whole(a) and _is_whole(b)):
+            return None
+        both = isinstance(a, types.Boolean) and isinstance(b, types.Boolean)
+        kind = types.boolean if both else common(a, b)
+        kind = types.int64 if isinstance(kind, types.Float) else kind
+        return Operation(kind, (kind, kind), lambda builder, v: getattr(builder, name)(*v))
+
+    return operation
+
+
+def _shift(left: bool) -> Callable:
+    def operation(a: types.Type, b: types.Type) -> Operation | None:
+        if not (_is_whole(a) and _is_whole(b)):
+            return None
+        kind = common(a, a)
+        name = "shl" if left else "ashr" if kind.signed else "lshr"
+        return Operation(kind, (kind, kind), lambda builder, v: getattr(builder, name)(*v))
+
+    return operation
+
+
+def _comparison(sign: str) -> Callable:
+    def operation(a: types.Type, b: types.Type) -> Operation:
+        kind = common(a, b)
+        if isinstance(kind, types.Float) and _is_whole(a) and _is_whole(b):
+            return Operation(types.boolean, (a, b), _mixed(sign, a.signed))
+
+        def compared(builder: Any, values: list) -> Any:
+            if isinstance(kind, types.Float):
+                compare = builder.fcmp_unordered if sign == "!=" else builder.fcmp_ordered
+            else:
+                compare = builder.icmp_signed if kind.signed else builder.icmp_unsigned
+            return compare(sign, *values)
+
+        return Operation(types.boolean, (kind, kind), compared)
+
+    return operation
+
+
+def _mixed(sign: str, first_signed: bool) -> Callable:
+    """Compare a whole number that may be negative with one that may not, but may be larger."""
+
+    def compared(builder: Any, values: list) -> Any:
+        values = [v if v.type.width == 64 else builder.sext(v, code.I64) for v in values]
+        negative = builder.icmp_signed("<", values[not first_signed], code.I64(0))
+        below = builder.icmp_signed(
+            sign, *((code.I64(-1), code.I64(0))[:: 1 if first_signed else -1])
+        )
+        return builder.select(negative, below, builder.icmp_unsigned(sign, *values))
+
+    return compared
+
+
+def _whole_division(remainder: bool) -> Callable:
+    """Python's division without a fraction; 0 where it is by 0."""
+
+    def operation(a: types.Type, b: types.Type) -> Operation:
+        kind = common(a, b)
+        of = _real_parts if isinstance(kind, types.Float) else _whole_parts
+        return Operation(
+            kind, (kind, kind), lambda builder, values: of(builder, kind, *values)[remainder]
+        )
+
+    return operation
+
+
+def _whole_parts(builder: Any, kind: types.Integer, x: Any, y: Any) -> tuple[Any, Any]:
+    zero, one = x.type(0), x.type(1)
+    known = isinstance(y, ir.Constant) and y.constant not in (0, -1)
+    bad = None
+    if not known:
+        bad = builder.icmp_signed("==", y, zero)
+        if kind.signed:  # the smallest number over -1
+            least = builder.icmp_signed("==", x, x.type(kind.minval))
+            bad = builder.or_(bad, builder.and_(least, builder.icmp_signed("==", y, x.type(-1))))
+        y = builder.select(bad, one, y)
+    if kind.signed:
+        quotient, rest = builder.sdiv(x, y), builder.srem(x, y)
+        other = builder.icmp_signed("<", builder.xor(y, rest), zero)
+        other = builder.and_(builder.icmp_signed("!=", rest, zero), other)
+        quotient = builder.select(other, builder.sub(quotient, one), quotient)
+        rest = builder.select(other, builder.add(rest, y), rest)
+    else:
+        quotient, rest = builder.udiv(x, y), builder.urem(x, y)
+    if known:
+        return quotient, rest
+    return tuple(builder.select(bad, zero, part) for part in (quotient, rest))
+
+
+def _real_parts(builder: Any, kind: types.Float, x: Any, y: Any) -> tuple[Any, Any]:
+    """As Python's floats are divided (Objects/floatobject.c); what is by 0 is that of NumPy."""
+    real = x.type
+    zero, one = real(0.0), real(1.0)
+    rest = builder.frem(x, y)
+    quotient = builder.fdiv(builder.fsub(x, rest), y)
+    below = builder.fcmp_ordered("<", y, zero)
+    other = builder.xor(below, builder.fcmp_ordered("<", rest, zero))
+    left = builder.fcmp_unordered("!=", rest, zero)
+    turn = builder.and_(left, other)
+    quotient = builder.select(turn, builder.fsub(quotient, one), quotient)
+    sign = builder.select(below, real(-0.0), zero)
+    rest = builder.select(left, builder.select(turn, builder.fadd(rest, y), rest), sign)
+    floor = _call(builder, "llvm.floor", real, [quotient])
+    high = builder.fcmp_ordered(">", builder.fsub(quotient, floor), real(0.5))
+    floor = builder.select(high, builder.fadd(floor, one), floor)
+    square = builder.fmul(quotient, quotient)
+    none = builder.fdiv(builder.fmul(square, x), y)
+    floor = builder.select(builder.fcmp_ordered("!=", quotient, zero), floor, none)
+    by_zero = builder.fcmp_ordered("==", y, zero)
+    return (
+        builder.select(by_zero, builder.fdiv(x, y), floor),
+        builder.select(by_zero, builder.frem(x, y), rest),
+    )
+
+
+def _power(a: types.Type, b: types.Type) -> Operation | None:
+    """Give a power; that of a whole number that is known by products."""
+    if isinstance(b, types.IntegerLiteral) and abs(b.literal_value) <= 0x10000:
+        kind, exponent = common(a, a), b.literal_value
+        if exponent < 0 and _is_whole(kind):
+            return None
+        return Operation(kind, (kind, types.int64), _product(kind, exponent))
+    kind = common(types.unliteral(a), types.unliteral(b))
+    if _is_whole(kind):
+        return None
+    return Operation(kind, (kind, kind), _of_library("llvm.pow"))
+
+
+def _product(kind: types.Type, exponent: int) -> Callable:
+    def power(builder: Any, values: list) -> Any:
+        multiply = builder.mul if _is_whole(kind) else builder.fmul
+        factor, left, made = values[0], abs(exponent), None
+        while left:
+            if left & 1:
+                made = factor if made is None else multiply(made, factor)
+            left >>= 1
+            factor = multiply(factor, factor) if left else factor
+        made = values[0].type(1) if made is None else made
+        return builder.fdiv(made.type(1.0), made) if exponent < 0 else made
+
+    return power
+
+
+def _negation(a: types.Type) -> Operation:
+    kind = common(a, a)
+    name = "neg" if _is_whole(kind) else "fneg"
+    return Operation(kind, (kind,), lambda builder, values: getattr(builder, name)(*values))
+
+
+def _inversion(a: types.Type) -> Operation | None:
+    if not _is_whole(a):
+        return None
+    kind = a if isinstance(a, types.Boolean) else common(a, a)
+    return Operation(kind, (kind,), lambda builder, values: builder.not_(*values))
+
+
+def _truth(a: types.Type) -> Operation:
+    return Operation(types.boolean, (types.boolean,), lambda builder, values: values[0])
+
+
+def _untruth(a: types.Type) -> Operation:
+    return Operation(types.boolean, (types.boolean,), lambda builder, values: builder.not_(*values))
+
+
+def _size(a: types.Type) -> Operation:
+    def size(builder: Any, values: list) -> Any:
+        (value,) = values
+        if isinstance(kind, types.Float):
+            return _call(builder, "llvm.fabs", value.type, [value])
+        below = builder.icmp_signed("<", value, value.type(0))
+        return builder.select(below, builder.neg(value), value) if kind.signed else value
+
+    kind = common(a, a) if isinstance(a, types.Boolean) else a
+    return Operation(kind, (kind,), size)
+
+
+def _extreme(sign: str) -> Callable:
+    """Make the first of the largest numbers, as in Python."""
+
+    def operation(*kinds: types.Type) -> Operation | None:
+        if len(kinds) < 2:
+            return None
+        kind = common(*kinds)
+
+        def extreme(builder: Any, values: list) -> Any:
+            best = values[0]
+            for value in values[1:]:
+                if isinstance(kind, types.Float):
+                    better = builder.fcmp_ordered(sign, value, best)
+                else:
+                    compare = builder.icmp_signed if kind.signed else builder.icmp_unsigned
+                    better = compare(sign, value, best)
+                best = builder.select(better, value, best)
+            return best
+
+        return Operation(kind, (kind,) * len(kinds), extreme)
+
+    return operation
+
+
+def _as_it_is(builder: Any, values: list) -> Any:
+    return values[0]
+
+
+def _to(kind: types.Type) -> Callable:
+    return lambda a: Operation(kind, (kind,), _as_it_is)
+
+
+def _to_whole(a: types.Type) -> Operation:
+    kind = a if isinstance(a, types.Integer) else types.int64
+    return Operation(kind, (kind,), _as_it_is)
+
+
+def _to_real(a: types.Type) -> Operation:
+    kind = a if isinstance(a, types.Float) else types.float64
+    return Operation(kind, (kind,), _as_it_is)
+
+
+# --- functions of math ------------------------------------------------------------------------
+
+
+def _call(builder: Any, name: str, result: ir.Type, values: list) -> Any:
+    """Call a function of LLVM's (whose name tells the type), or of the library of C."""
+    kinds = [value.type for value in values]
+    if name.startswith("llvm."):
+        name += f".{kinds[0].intrinsic_name}"
+    elif isinstance(kinds[0], ir.FloatType):
+        name += "f"
+    function = code.external(builder, name, result, kinds)
+    if not name.startswith("llvm."):
+        function.attributes.add("nounwind")
+        if not any(isinstance(kind, ir.PointerType) for kind in kinds):
+            function.attributes.add("readonly")
+    return builder.call(function, values)
+
+
+def _of_library(name: str) -> Callable:
+    return lambda builder, values: _call(builder, name, values[0].type, values)
+
+
+def _of_reals(name: str, count: int = 1) -> Callable:
+    def operation(*kinds: types.Type) -> Operation | None:
+        if len(kinds) != count:
+            return None
+        kind = _to_real(common(*kinds)).result
+        return Operation(kind, (kind,) * count, _of_library(name))
+
+    return operation
+
+
+def _rounding(name: str) -> Callable:
+    def operation(a: types.Type) -> Operation:
+        kind = _to_real(a).result
+
+        def rounded(builder: Any, values: list) -> Any:
+            return builder.fptosi(_call(builder, name, values[0].type, values), code.I64)
+
+        return Operation(types.int64, (kind,), rounded)
+
+    return operation
+
+
+def _question(asked: Callable) -> Callable:
+    def operation(a: types.Type) -> Operation:
+        kind = _to_real(a).result
+        return Operation(types.boolean, (kind,), lambda builder, values: asked(builder, *values))
+
+    return operation
+
+
+def _is_infinite(builder: Any, x: Any) -> Any:
+    size = _call(builder, "llvm.fabs", x.type, [x])
+    return builder.fcmp_ordered("==", size, x.type(math.inf))
+
+
+def _is_finite(builder: Any, x: Any) -> Any:
+    rest = builder.fsub(x, x)
+    return builder.fcmp_ordered("ord", rest, rest)
+
+
+def _frexp(a: types.Type) -> Operation:
+    kind = _to_real(a).result
+    result = types.Tuple((kind, types.int32))
+
+    def parts(builder: Any, values: list) -> Any:
+        place = code.room(builder, code.I32)
+        fraction = _call(builder, "frexp", values[0].type, [*values, place])
+        return code.make_tuple(builder, result, [fraction, builder.load(place)])
+
+    return Operation(result, (kind,), parts)
+
+
+def _ldexp(a: types.Type, b: types.Type) -> Operation:
+    kind = _to_real(a).result
+    return Operation(kind, (kind, types.int32), _of_library("ldexp"))
+
+
+def _scaled(factor: float) -> Callable:
+    def operation(a: types.Type) -> Operation:
+        kind = _to_real(a).result
+        return Operation(kind, (kind,), lambda builder, v: builder.fmul(v[0], v[0].type(factor)))
+
+    return operation
+
+
+def _numpy_extreme(sign: str) -> Callable:
+    """Make the larger or smaller of two numbers; no number where one of them is none."""
+
+    def operation(a: types.Type, b: types.Type) -> Operation:
+        kind = common(a, b)
+        if _is_whole(kind):
+            return _extreme(sign)(a, b)
+
+        def extreme(builder: Any, values: list) -> Any:
+            first, second = values
+            chosen = builder.fcmp_unordered(sign, first, second)
+            known = builder.fcmp_ordered("ord", second, second)
+            return builder.select(builder.and_(chosen, known), first, second)
+
+        return Operation(kind, (kind, kind), extreme)
+
+    return operation
+
+
+def _gamma_of_python(x: float) -> float:
+    try:
+        return math.gamma(x)
+    except OverflowError:
+        return math.inf
+    except ValueError:
+        return math.copysign(math.inf, x) if x == 0 else math.nan
+
+
+_REAL = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)
+machine.publish_python("karamelo_gamma", _REAL, _gamma_of_python)
+
+
+def _gamma(a: types.Type) -> Operation:
+    """Python's function, whose bits do not depend on the library of C."""
+    kind = _to_real(a).result
+
+    def gamma(builder: Any, values: list) -> Any:
+        value = code.cast(builder, values[0], kind, types.float64)
+        found = _call(builder, "karamelo_gamma", value.type, [value])
+        return code.cast(builder, found, types.float64, kind)
+
+    return Operation(kind, (kind,), gamma)
+
+
+_HYPOT = "_hypot" if sys.platform == "win32" else "hypot"
+_IN_LLVM = ("exp", "exp2", "log", "log10", "sin", "cos", "sqrt", "fabs")
+_IN_C = (
+    "log2", "log1p", "expm1", "erf", "erfc", "tan", "asin", "acos", "atan", "asinh", "acosh",
+    "atanh", "sinh", "cosh", "tanh", "lgamma", "cbrt",
+)  # fmt: skip
+
+OPERATIONS: dict[Any, Callable] = {
+    operator.add: _binary("fadd", "add"),
+    operator.sub: _binary("fsub", "sub"),
+    operator.mul: _binary("fmul", "mul"),
+    operator.truediv: _true_division,
+    operator.floordiv: _whole_division(False),
+    operator.mod: _whole_division(True),
+    operator.pow: _power,
+    operator.and_: _bitwise("and_"),
+    operator.or_: _bitwise("or_"),
+    operator.xor: _bitwise("xor"),
+    operator.lshift: _shift(True),
+    operator.rshift: _shift(False),
+    operator.neg: _negation,
+    operator.pos: lambda a: _to(common(a, a))(a),
+    operator.invert: _inversion,
+    operator.not_: _untruth,
+    operator.lt: _comparison("<"),
+    operator.le: _comparison("<="),
+    operator.gt: _comparison(">"),
+    operator.ge: _comparison(">="),
+    operator.eq: _comparison("=="),
+    operator.ne: _comparison("!="),
+    abs: _size,
+    bool: _truth,
+    float: _to_real,
+    int: _to_whole,
+    max: _extreme(">"),
+    min: _extreme("<"),
+    round: lambda *kinds: _rounding("llvm.rint")(*kinds) if len(kinds) == 1 else None,
+    math.floor: _rounding("llvm.floor"),
+    math.ceil: _rounding("llvm.ceil"),
+    math.trunc: _rounding("llvm.trunc"),
+    math.isnan: _question(lambda builder, x: builder.fcmp_unordered("uno", x, x)),
+    math.isinf: _question(_is_infinite),
+    math.isfinite: _question(_is_finite),
+    math.pow: _power,
+    math.copysign: _of_reals("llvm.copysign", 2),
+    math.atan2: _of_reals("atan2", 2),
+    math.hypot: _of_reals(_HYPOT, 2),
+    math.fmod: _of_reals("fmod", 2),
+    math.gamma: _gamma,
+    math.frexp: _frexp,
+    math.ldexp: _ldexp,
+    math.degrees: _scaled(180 / math.pi),
+    math.radians: _scaled(math.pi / 180),
+    **{getattr(math, name): _of_reals(f"llvm.{name}") for name in _IN_LLVM},
+    **{getattr(math, name): _of_reals(name) for name in _IN_C},
+    **{number: _to(kind) for number, kind in _TYPES.items()},
+    **{kind: _to(kind) for kind in _TYPES.values()},
+}
+
+
+# NumPy's names of the same, and of what is rounded to a real number.
+_IN_NUMPY = {
+    "absolute": abs, "add": operator.add, "subtract": operator.sub, "multiply": operator.mul,
+    "true_divide": operator.truediv, "negative": operator.neg, "power": math.pow,
+    "arcsin": math.asin, "arccos": math.acos, "arctan": math.atan, "arctan2": math.atan2,
+    "arcsinh": math.asinh, "arccosh": math.acosh, "arctanh": math.atanh,
+}  # fmt: skip
+_ALIKE = (
+    "sqrt", "exp", "exp2", "log", "log2", "log10", "log1p", "expm1", "sin", "cos", "tan", "sinh",
+    "cosh", "tanh", "cbrt", "fabs", "hypot", "fmod", "copysign", "isnan", "isinf", "isfinite",
+    "degrees", "radians",
+)  # fmt: skip
+OPERATIONS |= {getattr(np, name): OPERATIONS[function] for name, function in _IN_NUMPY.items()}
+OPERATIONS |= {getattr(np, name): OPERATIONS[getattr(math, name)] for name in _ALIKE}
+OPERATIONS |= {
+    getattr(np, name): _of_reals(f"llvm.{name}") for name in ("floor", "ceil", "trunc", "rint")
+}
+OPERATIONS |= {np.minimum: _numpy_extreme("<"), np.maximum: _numpy_extreme(">")}
+
+ON_LANES: dict[Any, Callable] = {}  # the same of numbers in lanes (`karamelo_py.compiler.lanes`)
+
+
+def operation(function: Callable, kinds: tuple[types.Type, ...]) -> Operation | None:
+    """Give what a function of numbers is for these types; None where it is nothing."""
+    if any(hasattr(kind, "width") for kind in kinds):
+        return ON_LANES[function](*kinds) if function in ON_LANES else None
+    made = OPERATIONS.get(function)
+    if made is None or not all(isinstance(k, _NUMBER) for k in map(types.unliteral, kinds)):
+        return None
+    if made is not _power:
+        kinds = tuple(map(types.unliteral, kinds))
+    try:
+        return made(*kinds)
+    except TypeError:  # of another number of arguments
+        return None

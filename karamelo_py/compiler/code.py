@@ -1,0 +1,268 @@
+"""Types of kernels as LLVM has them, in registers and in memory, and code that takes them apart."""
+
+import functools
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+
+I1, I8, I32, I64 = (ir.IntType(bits) for bits in (1, 8, 32, 64))
+NOTHING = I8.as_pointer()  # what None, classes and functions are
+_REALS = {32: ir.FloatType(), 64: ir.DoubleType()}
+
+
+@functools.cache
+def register_type(kind: types.Type) -> ir.Type:
+    """Give the LLVM type of a value in registers."""
+    own = getattr(kind, "register_type", None)  # of types of our own
+    if own is not None:
+        return own()
+    if isinstance(kind, types.Boolean):
+        return I1
+    if isinstance(kind, types.Integer):
+        return ir.IntType(kind.bitwidth)
+    if isinstance(kind, types.Float):
+        return _REALS[kind.bitwidth]
+    if isinstance(kind, types.Array):
+        sizes = ir.ArrayType(I64, kind.ndim)
+        return ir.LiteralStructType([memory_type(kind.dtype).as_pointer(), sizes, sizes])
+    if isinstance(kind, types.BaseTuple):
+        return ir.LiteralStructType(map(register_type, kind))
+    return NOTHING
+
+
+@functools.cache
+def memory_type(kind: types.Type) -> ir.Type:
+    """Give the LLVM type of a value in memory, where truth takes a byte."""
+    if isinstance(kind, types.Boolean):
+        return I8
+    if isinstance(kind, types.Record):
+        return ir.ArrayType(I8, kind.size)
+    if isinstance(kind, types.BaseTuple) and not hasattr(kind, "register_type"):
+        return ir.LiteralStructType(map(memory_type, kind))
+    return register_type(kind)
+
+
+@functools.cache
+def is_empty(kind: types.Type) -> bool:
+    """Tell whether there is nothing in a value of a type, as in None and in tuples of tags."""
+    if isinstance(kind, types.BaseTuple) and not hasattr(kind, "register_type"):
+        return all(map(is_empty, kind))
+    return register_type(kind) == NOTHING
+
+
+def nothing() -> ir.Constant:
+    """Give the value of None, of classes and of functions."""
+    return ir.Constant(NOTHING, None)
+
+
+def constant(builder: Any, kind: types.Type, value: Any) -> ir.Constant:
+    """Give a number, or an array, as a constant of this type."""
+    if isinstance(kind, types.Array):
+        return _constant_array(builder, kind, np.asarray(value))
+    if isinstance(kind, types.Float):
+        value = float(value)
+    return ir.Constant(register_type(kind), value if isinstance(value, float) else int(value))
+
+
+def _constant_array(builder: Any, kind: types.Array, value: np.ndarray) -> Any:
+    value = np.ascontiguousarray(value)
+    item = memory_type(kind.dtype)
+    content = ir.Constant(ir.ArrayType(item, value.size), value.ravel().tolist())
+    name = builder.module.get_unique_name("array")
+    place = ir.GlobalVariable(builder.module, content.type, name)
+    place.initializer, place.global_constant, place.linkage = content, True, "internal"
+    data = builder.bitcast(place, item.as_pointer())
+    return make_array(
+        builder, kind, data, [I64(n) for n in value.shape], [I64(n) for n in value.strides]
+    )
+
+
+def cast(builder: Any, value: Any, kind: types.Type, wanted: types.Type) -> Any:
+    """Convert a value of one type to another."""
+    if isinstance(wanted, types.Literal):
+        wanted = types.unliteral(wanted)
+    if kind == wanted:
+        return value
+    to = register_type(wanted)
+    if isinstance(wanted, types.BaseTuple) and isinstance(kind, types.BaseTuple):
+        items = [
+            cast(builder, builder.extract_value(value, k), *pair)
+            for k, pair in enumerate(zip(kind, wanted, strict=True))
+        ]
+        return make_tuple(builder, wanted, items)
+    if isinstance(kind, types.Boolean) and isinstance(wanted, types.Integer):
+        return builder.zext(value, to)
+    if isinstance(kind, types.Boolean) and isinstance(wanted, types.Float):
+        return builder.uitofp(value, to)
+    whole, real = isinstance(kind, types.Integer), isinstance(kind, types.Float)
+    if isinstance(wanted, types.Boolean) and whole:
+        return builder.icmp_signed("!=", value, value.type(0))
+    if isinstance(wanted, types.Boolean) and real:
+        return builder.fcmp_unordered("!=", value, value.type(0.0))
+    if whole and isinstance(wanted, types.Integer):
+        if to.width <= value.type.width:
+            return value if to == value.type else builder.trunc(value, to)
+        return builder.sext(value, to) if kind.signed else builder.zext(value, to)
+    if whole and isinstance(wanted, types.Float):
+        return builder.sitofp(value, to) if kind.signed else builder.uitofp(value, to)
+    if real and isinstance(wanted, types.Integer):
+        return builder.fptosi(value, to) if wanted.signed else builder.fptoui(value, to)
+    if real and isinstance(wanted, types.Float):
+        return (
+            builder.fpext(value, to)
+            if kind.bitwidth < wanted.bitwidth
+            else builder.fptrunc(value, to)
+        )
+    if register_type(kind) != to:
+        raise TypeError(f"{kind} is no {wanted}")
+    return value
+
+
+# --- memory ---------------------------------------------------------------------------------------
+
+
+def room(builder: Any, kind: ir.Type) -> Any:
+    """Give memory of the function that is written, once for all turns of a loop."""
+    with builder.goto_entry_block():
+        return builder.alloca(kind)
+
+
+def at(builder: Any, pointer: Any, *places: int) -> Any:
+    """Give the address of an item of a structure or array in memory."""
+    return builder.gep(pointer, [I32(place) for place in places], inbounds=True)
+
+
+def put(builder: Any, kind: types.Type, value: Any, pointer: Any, align: int | None = None) -> None:
+    """Store a value."""
+    builder.store(_as_in_memory(builder, kind, value), pointer, align=align)
+
+
+def get(builder: Any, kind: types.Type, pointer: Any, align: int | None = None) -> Any:
+    """Load a value."""
+    return _as_in_register(builder, kind, builder.load(pointer, align=align))
+
+
+def _as_in_memory(builder: Any, kind: types.Type, value: Any) -> Any:
+    if register_type(kind) == memory_type(kind):
+        return value
+    if not isinstance(kind, types.BaseTuple):
+        return builder.zext(value, I8)
+    made = ir.Constant(memory_type(kind), ir.Undefined)
+    for k, item in enumerate(kind):
+        part = _as_in_memory(builder, item, builder.extract_value(value, k))
+        made = builder.insert_value(made, part, k)
+    return made
+
+
+def _as_in_register(builder: Any, kind: types.Type, value: Any) -> Any:
+    if register_type(kind) == memory_type(kind):
+        return value
+    if not isinstance(kind, types.BaseTuple):
+        return builder.trunc(value, I1)
+    items = [
+        _as_in_register(builder, item, builder.extract_value(value, k))
+        for k, item in enumerate(kind)
+    ]
+    return make_tuple(builder, kind, items)
+
+
+# --- tuples and arrays ----------------------------------------------------------------------------
+
+
+def make_tuple(builder: Any, kind: types.Type, items: Sequence) -> Any:
+    """Put a tuple together."""
+    return make_struct(builder, register_type(kind), items)
+
+
+def make_struct(builder: Any, kind: ir.Type, items: Sequence) -> Any:
+    """Put a structure, or an array in registers, together."""
+    made = ir.Constant(kind, ir.Undefined)
+    for k, item in enumerate(items):
+        made = builder.insert_value(made, item, k)
+    return made
+
+
+def unpack(builder: Any, value: Any) -> list:
+    """Take a tuple apart."""
+    count = len(value.type.elements) if hasattr(value.type, "elements") else value.type.count
+    return [builder.extract_value(value, k) for k in range(count)]
+
+
+def make_array(
+    builder: Any, kind: types.Array, data: Any, shape: Sequence, strides: Sequence
+) -> Any:
+    """Put an array together."""
+    made = register_type(kind)
+    parts = [data, *(make_struct(builder, made.elements[1], part) for part in (shape, strides))]
+    return make_struct(builder, made, parts)
+
+
+class ArrayParts:
+    """Take an array apart, each part when it is asked for."""
+
+    def __init__(self, builder: Any, kind: types.Array, value: Any):
+        self.builder, self.kind, self.value = builder, kind, value
+
+    @functools.cached_property
+    def data(self) -> Any:
+        return self.builder.extract_value(self.value, 0)
+
+    @functools.cached_property
+    def shape(self) -> list:
+        return [self.builder.extract_value(self.value, (1, k)) for k in range(self.kind.ndim)]
+
+    @functools.cached_property
+    def strides(self) -> list:
+        return [self.builder.extract_value(self.value, (2, k)) for k in range(self.kind.ndim)]
+
+
+def item_pointer(
+    builder: Any, kind: types.Array, value: Any, indices: Sequence, last: Any = None
+) -> Any:
+    """Give the address of an item; `last`, if it is known, is the stride of the last index."""
+    parts = ArrayParts(builder, kind, value)
+    if kind.layout == "C":
+        place = indices[0]
+        for index, count in zip(indices[1:], parts.shape[1:], strict=True):
+            place = builder.add(builder.mul(place, count), index)
+        return builder.gep(parts.data, [place])
+    strides = parts.strides if last is None else [*parts.strides[:-1], last]
+    products = [builder.mul(s, i) for s, i in zip(strides, indices, strict=True)]
+    return byte_pointer(builder, parts.data, functools.reduce(builder.add, products))
+
+
+def byte_pointer(builder: Any, pointer: Any, offset: Any) -> Any:
+    """Give the address so many bytes behind another."""
+    place = builder.gep(builder.bitcast(pointer, I8.as_pointer()), [offset])
+    return builder.bitcast(place, pointer.type)
+
+
+# --- functions and loops --------------------------------------------------------------------------
+
+
+def external(builder: Any, name: str, result: ir.Type, arguments: Sequence[ir.Type]) -> ir.Function:
+    """Declare a function that is elsewhere, or one of LLVM's own."""
+    known = builder.module.globals.get(name)
+    kind = ir.FunctionType(result, arguments)
+    return known if known is not None else ir.Function(builder.module, kind, name)
+
+
+@contextmanager
+def counted(builder: Any, count: Any) -> Iterator[Any]:
+    """Write a loop: what is written within is done for each number below `count`."""
+    before = builder.block
+    head, body, end = (builder.append_basic_block(name) for name in ("head", "body", "end"))
+    builder.branch(head)
+    builder.position_at_end(head)
+    index = builder.phi(count.type)
+    index.add_incoming(count.type(0), before)
+    builder.cbranch(builder.icmp_signed("<", index, count), body, end)
+    builder.position_at_end(body)
+    yield index
+    index.add_incoming(builder.add(index, count.type(1), flags=("nsw",)), builder.block)
+    builder.branch(head)
+    builder.position_at_end(end)

@@ -1,0 +1,253 @@
+"""Items of arrays, parts of arrays, fields of records."""
+
+import math
+import operator
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+
+from karamelo_py.compiler import code
+from karamelo_py.compiler.values import Untraceable, Value
+
+
+def _places(place: Any) -> tuple:
+    return place if isinstance(place, tuple) else (place,)
+
+
+def is_part(kind: types.Array, place: Any) -> bool:
+    """Tell whether indices name a part of an array, and no item of it."""
+    places = _places(place)
+    return len(places) < kind.ndim or any(isinstance(one, slice) for one in places)
+
+
+def part_type(kind: types.Array, place: Any) -> types.Array:
+    """Give the type of a part of an array."""
+    places = _places(place)
+    if len(places) > kind.ndim:
+        raise Untraceable(f"an array of {kind.ndim} dimensions has no {len(places)} indices")
+    slices = [k for k, one in enumerate(places) if isinstance(one, slice)]
+    whole = not slices or (slices == [len(places) - 1] and places[-1].step is None)
+    layout = "C" if kind.layout == "C" and whole else "A"
+    return kind.copy(ndim=kind.ndim - len(places) + len(slices), layout=layout)
+
+
+def _index(lowering: Any, thing: Any, count: Any) -> Any:
+    """Give the code of an index; those that may be negative count from the end."""
+    kind = types.unliteral(lowering.kind_of(thing))
+    if not isinstance(kind, types.Integer | types.Boolean):
+        raise Untraceable(f"{kind} is no index")
+    builder = lowering.builder
+    value = lowering.lowered(thing, types.intp)
+    known = isinstance(thing, int) and thing >= 0
+    if known or isinstance(kind, types.Boolean) or not kind.signed:
+        return value
+    negative = builder.icmp_signed("<", value, code.I64(0))
+    return builder.select(negative, builder.add(count, value), value)
+
+
+def item_place(lowering: Any, array: Value, place: Any) -> Any:
+    """Give the address of an item."""
+    parts = code.ArrayParts(lowering.builder, array._kind, array._value)
+    pairs = zip(_places(place), parts.shape, strict=True)
+    indices = [_index(lowering, one, count) for one, count in pairs]
+    return code.item_pointer(lowering.builder, array._kind, array._value, indices)
+
+
+def _align(kind: types.Array) -> int | None:
+    return None if kind.aligned else 1
+
+
+def get(lowering: Any, array: Value, place: Any) -> Any:
+    """Read an item, or see a part."""
+    kind, builder = array._kind, lowering.builder
+    if is_part(kind, place):
+        made = part_type(kind, place)
+        return Value(made, builder and _part(lowering, array, place, made))
+    if builder is None:
+        for one in _places(place):
+            if not isinstance(
+                types.unliteral(lowering.kind_of(one)), types.Integer | types.Boolean
+            ):
+                raise Untraceable(f"{lowering.kind_of(one)} is no index")
+        return lowering.wrapped(kind.dtype, None)
+    at = item_place(lowering, array, place)
+    if isinstance(kind.dtype, types.Record):
+        return Value(kind.dtype, builder.bitcast(at, code.NOTHING))
+    return lowering.wrapped(kind.dtype, code.get(builder, kind.dtype, at, _align(kind)))
+
+
+def put(lowering: Any, array: Value, place: Any, value: Any) -> None:
+    """Write an item, or all items of a part."""
+    kind, builder = array._kind, lowering.builder
+    given = types.unliteral(lowering.kind_of(value))
+    if not isinstance(given, types.Number | types.Boolean | types.Array):
+        raise Untraceable(f"{given} cannot be put into an array")
+    if not kind.mutable:
+        raise Untraceable("an array that must not be changed")
+    if builder is None:
+        return
+    if not is_part(kind, place):
+        number = lowering.lowered(value, kind.dtype)
+        code.put(builder, kind.dtype, number, item_place(lowering, array, place), _align(kind))
+        return
+    made = part_type(kind, place)
+    _fill(lowering, Value(made, _part(lowering, array, place, made)), value)
+
+
+def _fill(lowering: Any, array: Value, value: Any, outer: tuple = ()) -> None:
+    """Give each item of an array a number, or that of another array."""
+    builder, kind = lowering.builder, array._kind
+    parts = code.ArrayParts(builder, kind, array._value)
+    if len(outer) < kind.ndim:
+        if not outer and not isinstance(lowering.kind_of(value), types.Array):
+            value = Value(kind.dtype, lowering.lowered(value, kind.dtype))
+        with code.counted(builder, parts.shape[len(outer)]) as index:
+            _fill(lowering, array, value, (*outer, index))
+        return
+    if isinstance(value._kind, types.Array):
+        own = value._kind
+        at = code.item_pointer(builder, own, value._value, outer[kind.ndim - own.ndim :])
+        value = Value(own.dtype, code.get(builder, own.dtype, at, _align(own)))
+    at = code.item_pointer(builder, kind, array._value, outer)
+    code.put(builder, kind.dtype, lowering.lowered(value, kind.dtype), at, _align(kind))
+
+
+def _bounds(lowering: Any, one: slice, count: Any) -> tuple[Any, Any, Any]:
+    """Give where a slice begins, how many items it has, and the step."""
+    builder = lowering.builder
+    zero = code.I64(0)
+    step = 1 if one.step is None else one.step
+    if not isinstance(step, int) or step < 1:
+        raise Untraceable("a slice with a step that is not known, or below 1")
+
+    def bound(thing: Any, otherwise: Any) -> Any:
+        if thing is None:
+            return otherwise
+        value = lowering.lowered(thing, types.intp)
+        negative = builder.icmp_signed("<", value, zero)
+        value = builder.select(negative, builder.add(value, count), value)
+        value = builder.select(builder.icmp_signed("<", value, zero), zero, value)
+        return builder.select(builder.icmp_signed(">", value, count), count, value)
+
+    first, last = bound(one.start, zero), bound(one.stop, count)
+    size = builder.sub(last, first)
+    if step > 1:
+        size = builder.sdiv(builder.add(size, code.I64(step - 1)), code.I64(step))
+    size = builder.select(builder.icmp_signed("<", size, zero), zero, size)
+    return first, size, code.I64(step)
+
+
+def _part(lowering: Any, array: Value, place: Any, made: types.Array) -> Any:
+    builder = lowering.builder
+    parts = code.ArrayParts(builder, array._kind, array._value)
+    shape, strides, offset = [], [], code.I64(0)
+    places = _places(place)
+    for k, (count, stride) in enumerate(zip(parts.shape, parts.strides, strict=True)):
+        one = places[k] if k < len(places) else slice(None)
+        if isinstance(one, slice):
+            first, size, step = _bounds(lowering, one, count)
+            shape.append(size)
+            strides.append(builder.mul(stride, step))
+        else:
+            first = _index(lowering, one, count)
+        offset = builder.add(offset, builder.mul(first, stride))
+    data = code.byte_pointer(builder, parts.data, offset)
+    return code.make_array(builder, made, data, shape, strides)
+
+
+# --- attributes -------------------------------------------------------------------------------
+
+
+def attribute(lowering: Any, thing: Value, name: str) -> Any:
+    """Give an attribute of an array, a record or a number."""
+    kind = thing._kind
+    if isinstance(kind, types.Array):
+        return _of_array(lowering, thing, name)
+    if isinstance(kind, types.Record):
+        return _of_record(lowering, thing, name)
+    if name == "view" and isinstance(kind, types.Integer | types.Float):
+        return lambda number: _seen_as(lowering, thing, number)
+    raise AttributeError(f"{kind} has no attribute '{name}'")
+
+
+def _of_array(lowering: Any, thing: Value, name: str) -> Any:
+    kind, builder = thing._kind, lowering.builder
+    parts = code.ArrayParts(builder, kind, thing._value)
+    if name in ("shape", "strides"):
+        found = getattr(parts, name) if builder else [None] * kind.ndim
+        return tuple(Value(types.intp, one) for one in found)
+    if name == "size":
+        sizes = _of_array(lowering, thing, "shape")
+        return math.prod(sizes[1:], start=sizes[0]) if sizes else 1
+    if name == "ndim":
+        return kind.ndim
+    if name == "itemsize":
+        return np.dtype(str(kind.dtype)).itemsize
+    raise AttributeError(f"an array has no attribute '{name}' in a kernel")
+
+
+def _of_record(lowering: Any, thing: Value, name: str) -> Any:
+    kind, builder = thing._kind, lowering.builder
+    if name not in kind.fields:
+        raise AttributeError(f"a record has no field '{name}'")
+    found = kind.typeof(name)
+    at = builder and builder.gep(thing._value, [code.I64(kind.offset(name))])
+    if isinstance(found, types.NestedArray):
+        made = types.Array(found.dtype, found.ndim, "C", aligned=False)
+        if builder is None:
+            return Value(made, None)
+        size = code.memory_type(found.dtype)
+        strides = [
+            math.prod(found.shape[k + 1 :]) * found.dtype.bitwidth // 8 for k in range(found.ndim)
+        ]
+        return Value(made, code.make_array(
+            builder, made, builder.bitcast(at, size.as_pointer()),
+            list(map(code.I64, found.shape)), list(map(code.I64, strides)),
+        ))  # fmt: skip
+    if builder is None:
+        return lowering.wrapped(found, None)
+    at = builder.bitcast(at, code.memory_type(found).as_pointer())
+    return lowering.wrapped(found, code.get(builder, found, at, 1))
+
+
+def set_attribute(lowering: Any, thing: Value, name: str, value: Any) -> None:
+    """Write a field of a record."""
+    kind, builder = thing._kind, lowering.builder
+    if not isinstance(kind, types.Record) or name not in kind.fields:
+        raise AttributeError(f"{kind} has no attribute '{name}' that can be set")
+    found = kind.typeof(name)
+    if builder is not None:
+        at = builder.gep(thing._value, [code.I64(kind.offset(name))])
+        at = builder.bitcast(at, code.memory_type(found).as_pointer())
+        code.put(builder, found, lowering.lowered(value, found), at, 1)
+
+
+def _seen_as(lowering: Any, thing: Value, number: Any) -> Value:
+    """See the bits of a number as another number."""
+    wanted = lowering.number_type(number)
+    if wanted.bitwidth != thing._kind.bitwidth:
+        raise Untraceable("numbers of other widths have other bits")
+    builder = lowering.builder
+    return Value(wanted, builder and builder.bitcast(thing._value, code.register_type(wanted)))
+
+
+def item_of_tuple(lowering: Any, things: tuple, place: Value) -> Any:
+    """Give the item of a tuple whose place only a run knows."""
+    kinds = [types.unliteral(lowering.kind_of(thing)) for thing in things]
+    kind, builder = lowering.unify(*kinds), lowering.builder
+    if kind is None:
+        raise Untraceable("items of several types at a place that only a run knows")
+    if builder is None:
+        return lowering.wrapped(kind, None)
+    values = [lowering.lowered(thing, kind) for thing in things]
+    index = _index(lowering, place, code.I64(len(values)))
+    room = code.room(builder, ir.ArrayType(code.memory_type(kind), len(values)))
+    for k, value in enumerate(values):
+        code.put(builder, kind, value, code.at(builder, room, 0, k))
+    found = builder.gep(room, [code.I64(0), index], inbounds=True)
+    return lowering.wrapped(kind, code.get(builder, kind, found))
+
+
+GET, PUT = operator.getitem, operator.setitem

@@ -1,0 +1,103 @@
+"""LLVM: the processor that code is made for, its optimisation, and code in memory.
+
+No fast mathematics: where products and sums contract would depend on what a loop is inlined into,
+so that results would differ between one thread and two, or a run in pieces and a whole.
+"""
+
+import ctypes
+import functools
+from collections.abc import Callable
+
+from llvmlite import binding as llvm
+
+# The loop over the nodes of a stencil must be unrolled, 27 of them too: weights are then in
+# registers and not in tuples on the stack. Quadratic splines in space are 1.7 times as fast for it.
+# In loops of hundreds of instructions a counter for each array takes registers from the numbers.
+OPTIONS = "--unroll-threshold=4000", "--disable-lsr"
+LEVEL = 3
+
+
+@functools.cache
+def features() -> str:
+    """List what the processor can do."""
+    try:
+        return llvm.get_host_cpu_features().flatten()
+    except RuntimeError:  # nothing is known of it
+        return ""
+
+
+def describe() -> tuple:
+    """Name all that decides what code looks like, but the code."""
+    return llvm.get_process_triple(), llvm.get_host_cpu_name(), features(), OPTIONS, LEVEL
+
+
+@functools.cache
+def _set_options() -> None:
+    for option in OPTIONS:
+        llvm.set_option("", option)
+
+
+@functools.cache
+def _target() -> llvm.TargetMachine:
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    _set_options()
+    triple = llvm.get_process_triple()
+    # Code is loaded where it stays: x86 needs no tables for that.
+    where = "static" if triple.startswith(("x86", "i386", "i686")) else "default"
+    return llvm.Target.from_triple(triple).create_target_machine(
+        opt=LEVEL, cpu=llvm.get_host_cpu_name(), features=features(), reloc=where,
+        codemodel="jitdefault", jit=True,
+    )  # fmt: skip
+
+
+@functools.cache
+def _engine() -> llvm.ExecutionEngine:
+    return llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target())
+
+
+def _optimised(text: str, target: llvm.TargetMachine) -> llvm.ModuleRef:
+    module = llvm.parse_assembly(text)
+    module.triple, module.data_layout = target.triple, str(target.target_data)
+    module.verify()
+    tuning = llvm.create_pipeline_tuning_options(speed_level=LEVEL)
+    tuning.loop_vectorization = tuning.slp_vectorization = True
+    builder = llvm.create_pass_builder(target, tuning)
+    builder.getModulePassManager().run(module, builder)
+    return module
+
+
+def compile_text(text: str) -> bytes:
+    """Make machine code of the text of a module."""
+    return _target().emit_object(_optimised(text, _target()))
+
+
+def assembly(text: str, triple: str, processor: str) -> str:
+    """Make assembly of the text of a module for another processor, such as a GPU."""
+    _set_options()
+    llvm.initialize_all_targets()
+    llvm.initialize_all_asmprinters()
+    target = llvm.Target.from_triple(triple).create_target_machine(cpu=processor, opt=LEVEL)
+    return target.emit_assembly(_optimised(text, target))
+
+
+def load(code: bytes, *names: str) -> list[int]:
+    """Bring machine code into memory; return the addresses of functions in it."""
+    engine = _engine()
+    engine.add_object_file(llvm.ObjectFileRef.from_data(code))
+    engine.finalize_object()
+    return [engine.get_function_address(name) for name in names]
+
+
+def publish(name: str, address: int) -> None:
+    """Let code that is loaded from now on call a function by its name."""
+    llvm.add_symbol(name, address)
+
+
+_callbacks: list = []  # code may call them as long as the process lives
+
+
+def publish_python(name: str, kind: type, function: Callable) -> None:
+    """Let code call a function of Python, in which nothing may be raised."""
+    _callbacks.append(kind(function))
+    publish(name, ctypes.cast(_callbacks[-1], ctypes.c_void_p).value)
