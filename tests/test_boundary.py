@@ -7,6 +7,7 @@ import pytest
 from scenes import SCHEMES, TRANSFERS, block
 from selection import parameters
 from states import final_state, same_bits
+from tensors import KINEMATICS
 
 from comparisons.results import read_dump, read_log
 from karamelo_py.points.boundary import turned
@@ -114,8 +115,10 @@ def test_the_gradient_of_a_reflected_point_is_a_mirror_image(d):
     """The field v = L x, seen in the mirror R: R v(R x)."""
     L, R = np.arange(1.0, d * d + 1).reshape(d, d), np.diag([-1.0, 1.0, -1.0][:d])
     mirror_image = [R @ L @ R @ x for x in np.eye(d)]
-    found = turned(tuple(np.diag(R)), tuple(L.ravel()))
-    assert np.reshape(found, (d, d)).T.tolist() == np.array(mirror_image).tolist()
+    tensor = KINEMATICS[d - 1].Tensor
+    found = turned(tuple(np.diag(R)), tensor._make([L[place] for place in tensor.places]))
+    image = np.array(mirror_image).T
+    assert list(found) == [image[place] for place in tensor.places]
     assert turned(tuple(np.diag(R)), ()) == ()
 
 

@@ -16,7 +16,7 @@ from karamelo_py.language.faults import fault
 from karamelo_py.points import laws
 from karamelo_py.points.basis import entry, locate, support
 from karamelo_py.points.basis.product import Along, along
-from karamelo_py.points.kinematics import tensor
+from karamelo_py.points.kinematics import tensor, vector
 from karamelo_py.points.transfers import updated_velocity
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.plugins import PartInUse, attributed, foreign_parts, is_foreign
@@ -41,7 +41,7 @@ def try_parts(hub: Hub, setup: Any) -> None:
         _try_basis(hub, setup)
     if is_foreign(type(transfer)):
         part = next(part for part in foreign_parts(hub) if part.kind is type(transfer))
-        v = (_one(setup),) * setup.kin.dimension
+        v = vector(setup.kin, (_one(setup),) * setup.kin.dimension)
         with _trial(hub, part):
             _expect(part, updated_velocity, updated_velocity(transfer, v, v, v), len(v))
 
