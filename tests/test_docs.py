@@ -76,7 +76,9 @@ def test_pages_of_the_house_name_what_exists(page):
     code = "".join(p.read_text("utf-8") for p in [*package.rglob("*.py"), *ROOT.glob("tests/*.py")])
     words = set(re.findall(r"\w+", code)) | set(registry.families())
     for name in re.findall(r"`@?([A-Za-z_][\w.]*)(?:\(\))?`", text):
-        assert name.endswith((".py", ".toml", ".lark", ".md")) or set(name.split(".")) <= words, name
+        assert name.endswith((".py", ".toml", ".lark", ".md")) or set(name.split(".")) <= words, (
+            name
+        )
 
 
 def arrows(depth):
