@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 from laws import TURN, start, stress, stretched, worked
 from tensors import every_kinematics, flat, symmetric_flat, symmetric_matrix, symmetric_tensors
 
+from karamelo_py.compiler.tuples import flat as flattened
+from karamelo_py.compiler.tuples import nested_as
 from karamelo_py.points.kinematics import (
     Axisymmetric,
     PlaneStrain,
@@ -404,12 +406,13 @@ def test_single_precision():
     for law in LAWS:
         eos, strength = (type(p)(*(np.float32(x) for x in p)) for p in law[:2])
         single = EosStrength(eos, strength)
-        state = initial_state(single, kin, np.float32(1))
+        begun = initial_state(single, kin, np.float32(1))
+        state = nested_as(begun, [np.float32(x) for x in flattened(begun)])  # as arrays hold it
         full = np.diag([1e-3, -2e-3, 1e-4]) + 1e-3 * np.eye(3, k=1)
-        dl = tuple(np.float32(x) for x in flat(kin, full))
+        dl = kin.Tensor._make([np.float32(x) for x in flat(kin, full)])
         for _ in range(10):
             state = advance(single, kin, state, dl, np.float32(1))
-        assert all(isinstance(x, np.float32) for x in state)
+        assert all(isinstance(x, np.float32) for x in flattened(state))
         double = stretched(law, kin, start(law, kin), full, 10)
         assert float(plastic_strain(single, kin, state)) == pytest.approx(
             plastic_strain(law, kin, double), rel=1e-2
