@@ -7,6 +7,7 @@ import shlex
 import subprocess
 import sys
 import tomllib
+from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 from types import SimpleNamespace
@@ -67,14 +68,20 @@ def test_the_house_has_all_rooms():
             assert f"`{room.name}`" in page
 
 
+@cache
+def words_of_code():
+    files = [*ROOT.glob("karamelo_py/**/*.py"), *ROOT.glob("tests/*.py")]
+    found = {word for file in files for word in re.findall(r"\w+", file.read_text("utf-8"))}
+    return found | set(registry.families())
+
+
 @pytest.mark.parametrize("page", ROOMS, ids=lambda page: page.stem)
 def test_pages_of_the_house_name_what_exists(page):
     text = re.sub(r"^```.*?^```", "", page.read_text("utf-8"), flags=re.S | re.M)
     package = ROOT / "karamelo_py"
     for named in re.findall(r"`([\w/]+\.(?:py|toml|lark)|[\w/]+/)`", text):
         assert list(package.rglob(named.rstrip("/"))) or (ROOT / named).exists(), named
-    code = "".join(p.read_text("utf-8") for p in [*package.rglob("*.py"), *ROOT.glob("tests/*.py")])
-    words = set(re.findall(r"\w+", code)) | set(registry.families())
+    words = words_of_code()
     for name in re.findall(r"`@?([A-Za-z_][\w.]*)(?:\(\))?`", text):
         assert name.endswith((".py", ".toml", ".lark", ".md")) or set(name.split(".")) <= words, (
             name
