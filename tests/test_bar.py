@@ -60,7 +60,7 @@ def test_flip_holds_frequency_and_energy(run_script):
     assert 0.99 < last / first < 1.002
 
 
-def test_pic_decays_as_computed(run_interpreted):
+def test_pic_decays_as_computed(run_script):
     """PIC multiplies a wave by a^2 in each step, by its two averages between points and nodes.
 
     A node averages points h/4 and 3h/4 away with weights 3/4 and 1/4, a point its nodes alike:
@@ -70,7 +70,7 @@ def test_pic_decays_as_computed(run_interpreted):
     """
     dt, k = 0.05, pi / (2 * LENGTH)
     script = bar(1, "PIC, linear", 10).replace("run_time", f"set_dt({dt})\nrun_time")
-    log = run_interpreted(script.replace("set_output(5)", "set_output(100)")).log
+    log = run_script(script.replace("set_output(5)", "set_output(100)")).log
     total = log.Ek + log.Es
     a = 0.75 * np.cos(k / 4) + 0.25 * np.cos(3 * k / 4)
     expected = np.exp(-(1 - a**2) / dt * log.Time)

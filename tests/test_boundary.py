@@ -53,11 +53,11 @@ def single(d: int, how: str, *lines: str, transfer: str = "FLIP") -> str:
 
 
 @pytest.mark.parametrize("d", [1, 2, 3])
-def test_error_is_the_default(run_interpreted, d):
-    said = run_interpreted(thrown(d, "error", "run(35)"), status=1).err
+def test_error_is_the_default(run_script, d):
+    said = run_script(thrown(d, "error", "run(35)"), status=1).err
     default = thrown(d, "error", "run(35)").replace("boundary(error)\n", "")
     assert (
-        run_interpreted(default, status=1).err.replace(":12:", ":13:").splitlines()[0]
+        run_script(default, status=1).err.replace(":12:", ":13:").splitlines()[0]
         == (said.splitlines()[0])
     )
     assert "leaves the domain" in said and "boundary(delete)" in said
@@ -251,13 +251,13 @@ SPLASH = """
 """
 
 
-def test_going_back_leaves_no_contact_behind(run_interpreted):
+def test_going_back_leaves_no_contact_behind(run_script):
     """The splash leaves some steps after the bullet has hit; the run goes back to before the hit.
 
     Nothing of the first try may be left on the nodes. A group without points shows 0.
     """
-    stays = run_interpreted(SPLASH.format(v=0), folder="stays").log
-    leaves = run_interpreted(SPLASH.format(v=50), folder="leaves").log
+    stays = run_script(SPLASH.format(v=0), folder="stays").log
+    leaves = run_script(SPLASH.format(v=50), folder="leaves").log
     assert stays.b_x[-1] < 0  # the bullet has hit
     assert (leaves.a_x[-1], leaves.b_x[-1]) == (stays.a_x[-1], stays.b_x[-1])
     assert leaves.c_x[0] == 50 and leaves.c_x[-1] == 0

@@ -105,9 +105,9 @@ STRESS = "fix(s, initial_stress, all, 5*cos(9*x0), 3, 0, 0, 0, 2*sin(50*x0*y0))"
 
 
 @pytest.mark.parametrize("stress", ["", STRESS], ids=["unstressed", "stressed"])
-def test_apic_conserves_angular_momentum(run_interpreted, stress):
+def test_apic_conserves_angular_momentum(run_script, stress):
     """To round-off (ten digits are logged), stressed or not (Jiang, Schroeder & Teran 2017)."""
-    log = run_interpreted(spinning("APIC", stress=stress)).log
+    log = run_script(spinning("APIC", stress=stress)).log
     # sum m r^2 of the points, by NumPy: 4 points a cell, offsets of a quarter of a cell
     places = 0.025 + 0.05 * np.arange(24)
     x, y = np.meshgrid(places - 0.6, places - 0.6)
@@ -206,15 +206,15 @@ def test_what_xpic_takes_of_the_angular_momentum_in_a_step(run_interpreted, orde
     assert 1 - momentum[1] / momentum[0] == pytest.approx(loss, rel=0.02)
 
 
-def test_flip_nearly_conserves_angular_momentum_and_pic_loses_it(run_interpreted):
+def test_flip_nearly_conserves_angular_momentum_and_pic_loses_it(run_script):
     """PIC averages velocities over a cell in each step; FLIP only loses by its lumped masses.
 
     Those shift the momentum of a node's points to the node, an arm of order h at the rim: the loss
     falls with h^2 (Love & Sulsky 2006), from 8 % with 2 cells in the radius to 2 % with 4.
     """
-    coarse = run_interpreted(spinning("FLIP"), folder="coarse").log.L_z
-    fine = run_interpreted(spinning("FLIP", h="0.05"), folder="fine").log.L_z
-    pic = run_interpreted(spinning("PIC", h="0.05"), folder="pic").log.L_z
+    coarse = run_script(spinning("FLIP"), folder="coarse").log.L_z
+    fine = run_script(spinning("FLIP", h="0.05"), folder="fine").log.L_z
+    pic = run_script(spinning("PIC", h="0.05"), folder="pic").log.L_z
     loss = [np.abs(momentum / momentum[0] - 1).max() for momentum in (coarse, fine)]
     assert loss[0] < 0.1
     assert loss[1] < loss[0] / 3
@@ -289,7 +289,7 @@ def test_averaged_volumes_do_the_work_that_is_stored(run_interpreted, method, sc
 
 
 @pytest.mark.parametrize("scheme", ["musl", "usf", "usavg"])
-def test_a_disk_that_turns_keeps_its_size(run_interpreted, scheme):
+def test_a_disk_that_turns_keeps_its_size(run_script, scheme):
     """As if rigid, by 3 rad: centrifugal forces stretch it by about rho (w R)^2/E, a thousandth.
 
     Gradients of this grid make the square of its size swing by 0.6 % with every scheme. With
@@ -308,7 +308,7 @@ def test_a_disk_that_turns_keeps_its_size(run_interpreted, scheme):
         dt_factor(0.8)
         run_time(3)
     """
-    result = run_interpreted(script.format(scheme))
+    result = run_script(script.format(scheme))
     steps = sorted(int(path.name.split(".")[1]) for path in result.folder.glob("end.*.LAMMPS"))
     first, last = (result.dump(f"end.{steps[k]}.LAMMPS") for k in (0, -1))
     spread = [np.mean(d.x**2 + d.y**2) for d in (first, last)]

@@ -181,7 +181,7 @@ def column(*lines: str) -> str:
     ])  # fmt: skip
 
 
-def test_weight_of_a_resting_block(run_interpreted):
+def test_weight_of_a_resting_block(run_script):
     """The contact force is the weight; what holds the base takes it, and the base does not move."""
     script = column(
         "fix(g, body_force, all, -10)", "fix(hold, velocity_nodes, base, 0)",
@@ -190,7 +190,7 @@ def test_weight_of_a_resting_block(run_interpreted):
         "log_modify(custom, step, ContactForce_top_x, ContactForce_base_x, hold_x, g_x, still_s)",
         "set_output(20)", "dt_factor(0.5)", "run(1200)",
     )  # fmt: skip
-    log = run_interpreted(script).log
+    log = run_script(script).log
     assert log.ContactForce_top_x[-1] == pytest.approx(3, rel=1e-3)
     assert log.ContactForce_base_x[-1] == pytest.approx(-3, rel=1e-3)
     assert log.hold_x[-1] == pytest.approx(5, rel=1e-3)
@@ -331,11 +331,11 @@ def test_no_friction_across_a_gap(run_interpreted):
 
 # Half a cell is closed in 31.25 steps; with splines two cells seem a quarter of a cell thicker.
 @pytest.mark.parametrize(("basis", "apart"), [("linear", 31), ("quadratic-spline", 15)])
-def test_friction_is_a_share_of_the_push(run_interpreted, basis, apart):
+def test_friction_is_a_share_of_the_push(run_script, basis, apart):
     """Coulomb while it slides: in the step in which the gap closes, too, where a part of the
     approach is still free. The rigid base decides the normal, at the edges of the block, too.
     """
-    log = run_interpreted(glide(H / 2, 0.4, 36, basis)).log
+    log = run_script(glide(H / 2, 0.4, 36, basis)).log
     assert (log.rub_y[: apart + 1] == 0).all() and (log.rub_x[: apart + 1] == 0).all()
     assert (log.rub_y[32:] > 0).all()
     assert log.v_x[-1] < 0.99

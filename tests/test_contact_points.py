@@ -116,7 +116,7 @@ def test_friction_of_two_points(run_interpreted, slip, share):
 
 
 @pytest.mark.parametrize("d", [1, 2, 3])
-def test_collision(run_interpreted, d):
+def test_collision(run_script, d):
     """Momentum is kept in every step, energy nearly; contact begins when the faces meet.
 
     Balls of half the edge of a point's domain touch when the domains do.
@@ -126,7 +126,7 @@ def test_collision(run_interpreted, d):
         "log_modify(custom, step, time, va_x, vb_x, k, e, c_x)", "dt_factor(0.4)",
         "set_output(1)", "run_time(0.6)" if d < 3 else "run_time(0.3)",
     )  # fmt: skip
-    log = run_interpreted(bodies(0.02, MINIMIZE, *lines, d=d, n=n)).log
+    log = run_script(bodies(0.02, MINIMIZE, *lines, d=d, n=n)).log
     assert np.abs(log.va_x + log.vb_x).max() < 1e-15
     first = log.Time[np.flatnonzero(log.c_x)[0]]
     assert 0.1 <= first <= 0.1 + 2 * np.diff(log.Time).max()
@@ -139,13 +139,13 @@ def test_collision(run_interpreted, d):
         assert log.c_x[-1] == 0
 
 
-def test_hertz_collision(run_interpreted):
+def test_hertz_collision(run_script):
     """Slow enough for the force of single points: the bodies bounce, and energy is kept."""
     lines = (
         "log_modify(custom, step, time, va_x, vb_x, k, e, c_x)", "dt_factor(0.4)",
         "set_output(5)", "run_time(8)",
     )  # fmt: skip
-    log = run_interpreted(bodies(0.02, "contact/hertz, a, b", *lines, n=2, v=0.01, E=100)).log
+    log = run_script(bodies(0.02, "contact/hertz, a, b", *lines, n=2, v=0.01, E=100)).log
     assert np.abs(log.va_x + log.vb_x).max() < 1e-16
     assert log.va_x[-1] == pytest.approx(-0.01, rel=0.05)
     assert log.k[-1] + log.e[-1] == pytest.approx(log.k[0], rel=0.05)

@@ -7,6 +7,7 @@ import shlex
 import subprocess
 import sys
 import tomllib
+from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 from types import SimpleNamespace
@@ -24,7 +25,8 @@ from karamelo_py.script.functions import FUNCTIONS
 from karamelo_py.script.parser import parse
 
 ROOT = Path(__file__).parent.parent
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+ROOMS = [ROOT / "docs" / "house.md", *sorted((ROOT / "docs" / "house").glob("*.md"))]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), *ROOMS[1:]]
 STYLES = [(f, n) for f in catalogue.families() for n in registry.names(f)]
 # Scenes on which the examples of docstrings are tried: domain, the region "disk", a wall.
 STAGES = {
@@ -57,14 +59,33 @@ def test_snippets_of_pages_parse_and_name_what_exists(page, snippet):
 
 
 def test_the_house_has_all_rooms():
-    page = (ROOT / "docs" / "house.md").read_text("utf-8")
+    page = ROOMS[0].read_text("utf-8")
     for room in (ROOT / "karamelo_py").iterdir():
         if room.is_dir() and len(list(room.glob("*.py"))) > 1:
             assert f"`{room.name}/`" in page
+            assert (ROOT / "docs" / "house" / f"{room.name}.md") in ROOMS
         elif room.suffix == ".py" and room.stem != "__init__":
             assert f"`{room.name}`" in page
-    for named in re.findall(r"`([\w/]+\.py)`", page):
-        assert list((ROOT / "karamelo_py").rglob(named)) or (ROOT / named).exists(), named
+
+
+@cache
+def words_of_code():
+    files = [*ROOT.glob("karamelo_py/**/*.py"), *ROOT.glob("tests/*.py")]
+    found = {word for file in files for word in re.findall(r"\w+", file.read_text("utf-8"))}
+    return found | set(registry.families())
+
+
+@pytest.mark.parametrize("page", ROOMS, ids=lambda page: page.stem)
+def test_pages_of_the_house_name_what_exists(page):
+    text = re.sub(r"^```.*?^```", "", page.read_text("utf-8"), flags=re.S | re.M)
+    package = ROOT / "karamelo_py"
+    for named in re.findall(r"`([\w/]+\.(?:py|toml|lark)|[\w/]+/)`", text):
+        assert list(package.rglob(named.rstrip("/"))) or (ROOT / named).exists(), named
+    words = words_of_code()
+    for name in re.findall(r"`@?([A-Za-z_][\w.]*)(?:\(\))?`", text):
+        assert name.endswith((".py", ".toml", ".lark", ".md")) or set(name.split(".")) <= words, (
+            name
+        )
 
 
 def arrows(depth):
@@ -83,8 +104,9 @@ def arrows(depth):
 
 
 def test_the_house_counts_its_arrows_and_lines():
-    page = (ROOT / "docs" / "house.md").read_text("utf-8")
-    now = dict(re.findall(r"^\| ([^|]*) \| \d+ \| (\d+) \|$", page, re.M))
+    page = ROOMS[0].read_text("utf-8")
+    numbers = (ROOT / "docs" / "house-numbers.md").read_text("utf-8")
+    now = dict(re.findall(r"^\| ([^|]*) \| \d+ \| (\d+) \|$", numbers, re.M))
     order = re.findall(r"^\| `(\w+)/` \|", page, re.M)
     folders, found = arrows(1)
     assert int(now["folders"]) == len(order) == len(folders)

@@ -273,10 +273,10 @@ run(50)
 
 
 @pytest.mark.parametrize("scheme", ["musl", "usl", "usf"])
-def test_a_block_pulled_beyond_yield(run_interpreted, scheme):
+def test_a_block_pulled_beyond_yield(run_script, scheme):
     """Uniform uniaxial strain of 0.005 in 50 steps, twice what yields: the same closed forms."""
     script = BLOCK + f"scheme({scheme})\nsolid(s, region, box, 1, steel, 0.1, 0)\n" + PULL
-    result = run_interpreted(script)
+    result = run_script(script)
     assert "will be 0" not in result.err
     last = result.dump("end.50.LAMMPS")
     steps = 49 if scheme == "usf" else 50  # strained up to where the last step began

@@ -43,13 +43,13 @@ WALL = f"""region(low, block, INF, INF, INF, 1.1)
         ("ulmpm", WALL),
     ],
 )
-def test_heat_is_the_work_of_friction(run_interpreted, method, ground):
+def test_heat_is_the_work_of_friction(run_script, method, ground):
     """A block slides: m cp (T - T0) is what its energy lacks (exact), and mu m g s (Coulomb).
 
     What differs from the first is of the order of the step: 3 and 5 % at four times this one. The
     block is dropped on the ground with its weight and bounces: the second holds on average.
     """
-    log = run_interpreted(BLOCK.format(method=method, ground=ground)).log
+    log = run_script(BLOCK.format(method=method, ground=ground)).log
     heat = 500 * (log.T - 300)
     assert heat[-1] == pytest.approx(log.E[0] - log.E[-1], rel=0.012)
     assert heat[-1] == pytest.approx(MU * G * (log.x_x[-1] - log.x_x[0]), rel=0.08)

@@ -117,13 +117,13 @@ def test_disks_that_are_dropped_and_measured(run_interpreted):
     assert mass[0] == pytest.approx(4 * 8 * 2.5, rel=1e-9)
 
 
-def test_a_bar_that_is_pulled(run_interpreted):
+def test_a_bar_that_is_pulled(run_script):
     """Total Lagrangian, thermo-mechanical word, names that only karamelo-py knows as functions.
 
     The force of the grip is that inside of the bar: sigma A in the steady part, within the waves.
     """
     log = run(
-        run_interpreted,
+        run_script,
         """\
         method(tlmpm, FLIP, linear, 0.99, mechanical)
         gamma = 2

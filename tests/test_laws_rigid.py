@@ -32,9 +32,9 @@ def scene(method="ulmpm", rho=1000):
 
 
 @pytest.mark.parametrize("method", ["ulmpm", "ulmpm/contacts"])
-def test_a_tool_pushes_a_block(run_interpreted, method):
+def test_a_tool_pushes_a_block(run_script, method):
     """The tool keeps its velocity to the last bit; the block goes with it, or bounces off."""
-    result = run_interpreted(scene(method).replace("run_time(3)", "run_time(2.5)"))
+    result = run_script(scene(method).replace("run_time(3)", "run_time(2.5)"))
     last = result.dump(sorted(p.name for p in result.folder.glob("end.*"))[-1])
     tool = last.type == 1
     assert last.vx[tool].tolist() == [0.5] * 16 and last.vy[tool].tolist() == [0] * 16
@@ -47,20 +47,20 @@ def test_a_tool_pushes_a_block(run_interpreted, method):
     assert result.log.vb_x.max() > 0.45 and last.x[~tool].min() > last.x[tool].max() - 0.05
 
 
-def test_its_velocity_may_be_a_formula(run_interpreted):
+def test_its_velocity_may_be_a_formula(run_script):
     text = scene().replace(
         "fix(v, initial_velocity_particles, tool, 0.5, 0, NULL)",
         "fix(v, velocity_particles, tool, 0.2*time, 0)\nset_dt(0.02)",
     )
-    result = run_interpreted(text)
+    result = run_script(text)
     last = result.dump("end.150.LAMMPS")
     tool = last.type == 1
     assert last.x[tool] - last.x0[tool] == pytest.approx(np.full(16, 0.1 * 9), rel=1e-2)
 
 
-def test_gravity_does_not_move_it(run_interpreted):
+def test_gravity_does_not_move_it(run_script):
     text = scene().replace("run_time(3)", "run_time(1)")
-    result = run_interpreted(text + "fix(g, body_force, all, 1, 0)\nrun(5)\n")
+    result = run_script(text + "fix(g, body_force, all, 1, 0)\nrun(5)\n")
     assert result.log.va_x[-1] == 0.5
 
 
@@ -116,17 +116,17 @@ run_time(0.3)
 
 
 @pytest.mark.parametrize("scheme", ["musl", "usf"])
-def test_a_block_between_plates(run_interpreted, scheme):
+def test_a_block_between_plates(run_script, scheme):
     """Uniaxial strain without Poisson's ratio: energy and force of a bar, whatever the density.
 
     When nodes had the mean velocity by mass, half of the energy was missing at equal densities.
     """
     text = PLATES.replace("SCHEME", scheme)
-    result = run_interpreted(text.replace("RHO", "1"), folder="light")
+    result = run_script(text.replace("RHO", "1"), folder="light")
     leads = r"energy +is not watched: nobody adds up the work of\s+fix velocity_particles 'va'"
     assert re.search(leads, result.out)
     light = result.log
-    heavy = run_interpreted(text.replace("RHO", "1024"), folder="heavy").log
+    heavy = run_script(text.replace("RHO", "1024"), folder="heavy").log
     assert light.Es.tolist() == heavy.Es.tolist()
     strain = 0.005 / 2  # each plate has come 0.01 (0.05 + 0.2) nearer
     assert light.Es[-1] == pytest.approx(1e6 * strain**2 / 2, rel=0.05)

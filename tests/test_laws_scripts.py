@@ -45,9 +45,9 @@ ALL = "material(m, eos-strength, bulk, hard, ductile, warm)"
 
 
 @pytest.mark.parametrize("method", ["ulmpm, FLIP, linear, 1", "tlmpm, FLIP, linear, 1"])
-def test_columns_and_computes(run_interpreted, method):
+def test_columns_and_computes(run_script, method):
     """Uniform strain: damage, temperature and dissipated energy are there."""
-    result = run_interpreted(pulled(ALL, method=method))
+    result = run_script(pulled(ALL, method=method))
     assert "will be 0" not in result.err
     last = result.dump("end.50.LAMMPS")
     assert np.ptp(last.T) == pytest.approx(0, abs=1e-9)
@@ -70,10 +70,10 @@ def test_ul_and_tl_are_the_same(run_interpreted):
         assert a[name] == pytest.approx(b[name], rel=1e-6)
 
 
-def test_order_of_damage_and_temperature_is_free(run_interpreted):
+def test_order_of_damage_and_temperature_is_free(run_script):
     """The first two lines differ in the order; numbers do not."""
     a, b = (
-        run_interpreted(pulled(f"material(m, eos-strength, bulk, hard, {x})"), folder=x[:4])
+        run_script(pulled(f"material(m, eos-strength, bulk, hard, {x})"), folder=x[:4])
         for x in ("ductile, warm", "warm, ductile")
     )
     assert a.dump("end.50.LAMMPS").s11.tolist() == b.dump("end.50.LAMMPS").s11.tolist()

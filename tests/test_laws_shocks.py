@@ -58,14 +58,14 @@ BAR = """
     ("method", "least", "most"),
     [("TPIC, quadratic-spline", 0, 0.02), ("FLIP, linear, 1", 0.025, 0.1)],
 )
-def test_speed_of_a_strong_shock(run_interpreted, method, least, most):
+def test_speed_of_a_strong_shock(run_script, method, least, most):
     """A copper bar hits a wall at 4 km/s: the front goes at c0 + (S - 1) v from the wall (exact).
 
     On 50 cells; docs/method-measurements.md has 200. The front is known to a point, a per cent of
     its way.
     """
     time = 1e-4
-    result = run_interpreted(BAR.format(method=method, time=time))
+    result = run_script(BAR.format(method=method, time=time))
     points = result.dump(
         max(p.name for p in result.folder.glob("p.*.LAMMPS") if ".0." not in p.name)
     )

@@ -95,7 +95,7 @@ def test_an_edge_without_points_is_told(run_interpreted):
     assert "no point of the group lies at this edge" in run_interpreted(block(2, lines)).err
 
 
-def test_a_column_comes_to_rest_by_local_damping(run_interpreted):
+def test_a_column_comes_to_rest_by_local_damping(run_script):
     """sigma = -rho g (L - x) as the weight asks for, while without damping it goes on swinging."""
     text = """
         method(ulmpm, FLIP, linear, 1)
@@ -116,9 +116,9 @@ def test_a_column_comes_to_rest_by_local_damping(run_interpreted):
         dump(end, all, particle, 1000, end.*.LAMMPS, x0, s11)
         """
     calm = text.replace("CALM", "fix(calm, local_damping, all, 0.8)") + "run(700)"
-    result = run_interpreted(calm, folder="calm")
+    result = run_script(calm, folder="calm")
     log, end = result.log, result.dump("end.700.LAMMPS")
-    swing = run_interpreted(text.replace("CALM", "") + "run(350)", folder="free").log.Ek
+    swing = run_script(text.replace("CALM", "") + "run(350)", folder="free").log.Ek
     # Ten periods of 4 L/c: a thousandth of the first swing is left at most.
     assert log.Ek[-50:].max() < 1e-6 * swing.max()
     assert log.base_x[-1] == pytest.approx(2 * 0.5 * 1, rel=1e-4)
@@ -134,7 +134,7 @@ def test_damping_shares_that_are_refused(run_interpreted, alpha):
     assert "from 0 to 1" in result.err or "between" in result.err
 
 
-def test_a_bar_under_traction_has_its_stress(run_interpreted):
+def test_a_bar_under_traction_has_its_stress(run_script):
     """E eps = t everywhere in a bar pulled at one end, held at the other, at rest."""
     text = block(
         2,
@@ -149,7 +149,7 @@ def test_a_bar_under_traction_has_its_stress(run_interpreted):
         "log_modify(custom, step, mean_11, mean_22, left_x, pull_x)",
         "run(300)",
     )  # fmt: skip
-    log = run_interpreted(text).log
+    log = run_script(text).log
     assert log.pull_x[-1] == pytest.approx(0.2 * 0.2, rel=1e-9)
     assert log.left_x[-1] == pytest.approx(-0.2 * 0.2, rel=1e-3)
     # The load acts a quarter of a cell inside of the end: the last 0.025 of 0.3 bear nothing.

@@ -236,7 +236,7 @@ def turning(scheme, step, steps) -> tuple[float, float, complex]:
 
 
 @pytest.mark.parametrize("d, axis, scheme", parameters([*TURNS, TURNS_3D[0]], TURNS_3D[1:]))
-def test_a_stressed_body_keeps_its_stress_when_it_turns(run_interpreted, d, axis, scheme):
+def test_a_stressed_body_keeps_its_stress_when_it_turns(run_script, d, axis, scheme):
     """Turned by 90 degrees about an axis, in its own frame, to 1e-6.
 
     All nodes move with w x (X - c). Each of the 250 steps turns the stress by 0.006 with an error
@@ -271,7 +271,7 @@ def test_a_stressed_body_keeps_its_stress_when_it_turns(run_interpreted, d, axis
         size=(0.1,) * d,
         ppc=2 if d == 2 else 1,
     )
-    result = run_interpreted(script)
+    result = run_script(script)
     last = result.dump(f"end.{steps}.LAMMPS")
     turn = np.eye(3) + np.sin(angle) * w + (1 - np.cos(angle)) * w @ w  # Rodrigues
     lam, g = 100 * 0.3 / (1.3 * 0.4), 100 / 2.6

@@ -277,6 +277,7 @@ def test_a_signal_before_the_run(tmp_path, ranks):
     assert not out and err == "error: ended by SIGTERM\n"
 
 
+@pytest.mark.full
 @needs_mpi
 @pytest.mark.parametrize("words", [pytest.param((), marks=FULL), ("--ranks", "2")])
 def test_a_signal_amid_the_first_picture(tmp_path, words):
@@ -345,6 +346,7 @@ if os.environ.get("OMPI_COMM_WORLD_RANK") == "1":
 """
 
 
+@pytest.mark.full
 @needs_mpi
 def test_a_process_is_killed_at_the_end(tmp_path):
     """When all is written and it only has to say so."""
@@ -385,6 +387,7 @@ if os.environ.get("OMPI_COMM_WORLD_RANK") == "1":
 """
 
 
+@pytest.mark.full
 @needs_mpi
 @pytest.mark.parametrize(
     "function",
@@ -421,6 +424,7 @@ if os.environ.get("OMPI_COMM_WORLD_RANK") == "0":
 FAILS = "def push(points):\n    if points.time > 0.01:\n        points.force[99999] = 0\n"
 
 
+@pytest.mark.full
 @needs_mpi
 @pytest.mark.parametrize(
     "line, says",
@@ -471,6 +475,7 @@ fails.point_by_point = True
 """
 
 
+@pytest.mark.full
 @needs_mpi
 def test_a_function_fails_on_one_process(tmp_path):
     """At the end of a step, whose row is not written then, as with a single process."""

@@ -31,9 +31,9 @@ def test_billet(run_interpreted):
     assert 10 / np.sqrt(0.9) < log.radius[-1] < 1.1 * 10 / np.sqrt(0.9)
 
 
-def test_cold_spray(run_interpreted):
+def test_cold_spray(run_script):
     """All energy is kinetic, stored or spent; the ball is flattened, warm, and stops."""
-    result = tiny(run_interpreted, "cold_spray_axisymmetric", refine=0.3, ppc=1, T=16e-9)
+    result = tiny(run_script, "cold_spray_axisymmetric", refine=0.3, ppc=1, T=16e-9)
     log = result.log
     total = log.kinetic + log.spent + log.stored
     # FLIP 0.99 takes a hundredth of what differs between points and grid in each step.
@@ -47,9 +47,9 @@ def test_cold_spray(run_interpreted):
     assert 0.7 * 0.9 < heat / log.spent[-1] < 0.9
 
 
-def test_machining(run_interpreted):
+def test_machining(run_script):
     """The tool pushes the piece back, by no more than Merchant's force of what has hardened."""
-    log = tiny(run_interpreted, "machining", refine=1 / 20, T=1e-6).log
+    log = tiny(run_script, "machining", refine=1 / 20, T=1e-6).log
     assert -6 < log.force.min() < -0.3
     work = np.trapezoid(-log.force * 1e9 * 0.15e-3 * 50, log.Time)
     assert (log.Ek + log.Es + log.lost)[-1] == pytest.approx(work, rel=0.15)
@@ -66,11 +66,11 @@ def test_plate_penetration(run_interpreted):
     assert 0.2 * PRESSURE < log.p.max() < 1.5 * PRESSURE
 
 
-def test_elastic_gate(run_interpreted):
+def test_elastic_gate(run_script):
     """Water begins to push its gate open, and not faster than its weight allows."""
     # The sum by hand: 598 Pa and 775 Pa on 79 mm, E I = 12.4 N m.
     assert beam(1e9) == pytest.approx(0.459, rel=0.01)
-    log = tiny(run_interpreted, "elastic_gate", refine=1 / 2, ppc=1, T=4e-4, E=12e6).log
+    log = tiny(run_script, "elastic_gate", refine=1 / 2, ppc=1, T=4e-4, E=12e6).log
     # The pressure at its end alone, without the water that has to move with it.
     fastest = 1000 * 9.81 * 0.14 / (1100 * 5e-3)
     assert 0.02 < log.ux[-1] / (1000 * fastest * 4e-4**2 / 2) < 1

@@ -89,14 +89,14 @@ def content(path: Path) -> dict:
     return json.loads(arrays(path)["content"].tobytes())
 
 
-def test_a_step_that_was_halved(run_interpreted):
+def test_a_step_that_was_halved(run_script):
     """Halvings, and the state that a run goes back to, are the same behind a file."""
     lines = ["fix(v, initial_velocity_particles, all, 0.05*sin(40*x0), 0.03*cos(30*y0))",
              "dt_factor(1.9)", "set_output(5)", "log_modify(custom, step, dt, limit)",
              "compute(E, energy_balance, all)", "dump(d, all, particle, 20, d.*.txt, x, vx)",
              "run(60, on_trouble=halve)"]  # fmt: skip
     script = with_files(block(2, *lines, size=(0.3, 0.3)), "restart(6, r.*.h5)\n")
-    whole = goes_on(run_interpreted, script, files=9)
+    whole = goes_on(run_script, script, files=9)
     halvings = {content(file)["run"][0] for file in whole.glob("r.*.h5")}
     assert max(halvings) > 0
 

@@ -32,6 +32,7 @@ def started(folder: Path, *options: str) -> subprocess.Popen:
     )  # fmt: skip
 
 
+@pytest.mark.full
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows ends processes otherwise")
 @pytest.mark.xdist_group("neo-hookean")
 @pytest.mark.parametrize("kills", [3, pytest.param(100, marks=pytest.mark.full)])

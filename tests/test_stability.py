@@ -341,7 +341,7 @@ def settled(result) -> bool:
 
 
 @pytest.mark.parametrize(("which", "least", "most"), [("musl", 3, 10), ("usavg", 0.8, 1.2)])
-def test_the_noise_of_a_drift_grows_at_any_step_but_with_usavg(run_interpreted, which, least, most):
+def test_the_noise_of_a_drift_grows_at_any_step_but_with_usavg(run_script, which, least, most):
     """By the largest eigenvalue of the linear steps of one cell: times 1.006 to 1.008 a step.
 
     What of the noise grows so shows after some 200 steps.
@@ -349,5 +349,5 @@ def test_the_noise_of_a_drift_grows_at_any_step_but_with_usavg(run_interpreted, 
     script = SHAKEN.format(step="").replace("run(120)", "run(400)").replace("20, 1)", "60, 1)")
     words = {"basis": "quadratic-spline", "which": which, "ppc": 3, "drift": 1}
     options = [w for name, value in words.items() for w in ("-var", name, str(value))]
-    energy = read_log(run_interpreted(script, *options).folder)["energy"]
+    energy = read_log(run_script(script, *options).folder)["energy"]
     assert least < energy[-1] / energy[0] < most

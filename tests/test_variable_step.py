@@ -160,12 +160,12 @@ def test_a_ring_converges_with_second_order(state_interpreted):
 
 
 @pytest.mark.parametrize("scheme", ["usf", "usavg"])
-def test_schemes_that_strain_first_are_of_second_order(run_interpreted, scheme):
+def test_schemes_that_strain_first_are_of_second_order(run_script, scheme):
     """Manufactured solution of a pulsating bar, whose step falls with the cells.
 
     In the first step there is nothing to strain by; else stress would lead by a step, with order 1.
     """
     words = ["-var", "update", scheme, "-var", "basis", "quadratic-spline", "-var", "refine"]
     scene = INPUTS / "in.axis_aligned_1d"
-    errors = [run_interpreted(scene, *words, n).log.error_z[-1] for n in ("0.5", "1")]
+    errors = [run_script(scene, *words, n).log.error_z[-1] for n in ("0.5", "1")]
     assert log(errors[0] / errors[1], 2) > 1.9

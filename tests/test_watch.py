@@ -90,7 +90,7 @@ def test_growth_is_one_thing_in_a_run_and_in_logs(gain, tells):
     assert (stability.growth(energy) > 1 + WITHIN) == tells
 
 
-def test_a_short_run_is_told(run_interpreted):
+def test_a_short_run_is_told(run_script):
     """Four cells across, a disk of boxes that turns by 9/s gains with usf, by a fifth in 144 steps.
 
     Two runs of half as many steps go on with the same watch.
@@ -109,12 +109,12 @@ def test_a_short_run_is_told(run_interpreted):
     log_modify(custom, step, E)
     set_output(12)
     """
-    grown = run_interpreted(spun.format("usf") + "run(144)\n")
+    grown = run_script(spun.format("usf") + "run(144)\n")
     assert max(grown.log.E) > 1.1 * grown.log.E[0]
     assert "energy comes from nowhere" in grown.err and "since the start" in grown.err
-    pieces = run_interpreted(spun.format("usf") + "run(72)\nrun(72)\n", folder="pieces")
+    pieces = run_script(spun.format("usf") + "run(72)\nrun(72)\n", folder="pieces")
     assert "energy comes from nowhere" in pieces.err
-    kept = run_interpreted(spun.format("usavg") + "run(144)\n", folder="kept")
+    kept = run_script(spun.format("usavg") + "run(144)\n", folder="kept")
     assert "energy comes from nowhere" not in kept.err
 
 
@@ -248,15 +248,15 @@ run_time(170{words})
 
 
 @pytest.mark.parametrize("v", [0.05, 0.1])
-def test_half_the_step_where_energy_grows(run_interpreted, v):
+def test_half_the_step_where_energy_grows(run_script, v):
     """A bar with one point a cell goes through the grid; nothing acts on it: its energy stays.
 
     Growth by a tenth is borne before it is told, as much in the hundred steps that a state is good
     for; with 0.9 of the stable step the bar is stopped or comes apart.
     """
-    ended = run_interpreted(DRIFTING.format(v=v, words=""), status=1)
+    ended = run_script(DRIFTING.format(v=v, words=""), status=1)
     assert "come from nowhere" in ended.err.replace("comes", "come")
-    halved = run_interpreted(DRIFTING.format(v=v, words=", on_trouble=halve"), folder="halved")
+    halved = run_script(DRIFTING.format(v=v, words=", on_trouble=halve"), folder="halved")
     assert "from nowhere" in halved.err and "with 1/2 of the step" in halved.err
     assert max(halved.log.E) < 1.2 * halved.log.E[0]
 
@@ -356,24 +356,24 @@ def test_a_drift_does_not_hide_what_vibrates(run_script):
     assert "noise of a drift" in said
 
 
-def test_a_drift_that_loads_give_does_not_hide_what_vibrates(run_interpreted):
+def test_a_drift_that_loads_give_does_not_hide_what_vibrates(run_script):
     """A bar is pushed to ten times the speed that it vibrates with, and is free from then on:
     growth is told before it doubles what the bar vibrates by, a two hundredth of all."""
     push = "fix(g, body_force, all, 0.1/5/sqrt(PI)*exp(0 - ((time - 10)/5)^2))"
     scene = DRIFTING.replace("{v}*(1 + 0.1*cos", "{v}*(0.1*cos").format(v=0.1, words="")
     scene = scene.replace("dt_factor(0.9)", push + "\ndt_factor(0.6)").replace("bar, 1", "bar, 2")
-    result = run_interpreted(scene.replace("40, 1)", "60, 1)").replace("170", "350"))
+    result = run_script(scene.replace("40, 1)", "60, 1)").replace("170", "350"))
     (step,) = re.findall(r"step (\d+), time [^:]*: energy comes from nowhere", result.err)
     drift = 0.5 * 8 * 0.1**2
     log = result.log
     assert log.E[log.Step <= int(step)][-1] - drift < 2 * log.E[0] < 0.015 * drift
 
 
-def test_points_that_drift_out_are_no_matter_of_the_step(run_interpreted):
+def test_points_that_drift_out_are_no_matter_of_the_step(run_script):
     """A free bar at constant speed: half the step brings it to the same edge."""
     lines = ["fix(v, initial_velocity_particles, all, 0.2)", "set_output(50)"]
     scene = DRIFTING.split("fix(v")[0].format(v=0, words="") + "\n".join(lines)
-    said = run_interpreted(scene + "\nrun_time(400, on_trouble=halve)", status=1).err
+    said = run_script(scene + "\nrun_time(400, on_trouble=halve)", status=1).err
     assert "leaves the domain" in said and "Back to step" not in said
 
 

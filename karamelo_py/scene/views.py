@@ -140,6 +140,7 @@ class PointsView(View):
     """The points of a group, at one stage of a step, in the order of their ids."""
 
     _fields = ("dt", "kick", "time", "ids", "moved")
+    ids: np.ndarray
 
     def __init__(self, simulation: Any, ids: np.ndarray, then: bool):
         super().__init__()

@@ -359,7 +359,7 @@ def _records_of(builder: Any, parts: list, lanes: Lanes, count: int) -> list:
 
 
 def _kept_in_memory(builder: Any, vectors: list) -> Callable:
-    """Store vectors in memory that LLVM does not see through; return where lane `j` of the k-th lies.
+    """Store vectors in memory that LLVM does not see through; return the address of a lane.
 
     A number from memory gets into all lanes as it is loaded; out of a register that takes as long
     as a shuffle.

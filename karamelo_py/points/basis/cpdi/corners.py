@@ -117,7 +117,7 @@ def pairs_of_spread(kin):
 def spread_of(kin, grid, weight, corner, centre):
     """The part of one corner in D, that is w [(x_c - x)(x_c - x)^T + h^2 r (1 - r)]."""
     away, r = corner.at - centre, corner.fractions
-    parts = []
+    parts: list = []
     for i, j in pairs_of_spread(kin):
         part = away[i] * away[j]
         if i == j:

@@ -61,7 +61,8 @@ def domain_of(basis, kin, place):
     x, edges = vector(kin, place[:d]), half_edges(kin, place)
     weight = real(0.5**d, place[0])
     k = weight / determinant({(e, i): edges[e][i] for e in range(d) for i in range(d)}, d)
-    corners, gradients = [], []
+    corners: list = []
+    gradients: list = []
     # Reciprocal vectors A, B (A . a = 1, A . b = 0 ...): N_c has the mean gradient (+-A +-B) / 4.
     # In space, nine products with k before the sums are fewer than twelve after them.
     A = reciprocals(kin, edges, k if d == 3 else 1)
