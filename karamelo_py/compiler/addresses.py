@@ -8,6 +8,7 @@ from numba import config, types
 
 from karamelo_py.compiler import code
 from karamelo_py.compiler.compile import define
+from karamelo_py.compiler.failing import noting
 from karamelo_py.compiler.intrinsics import intrinsic
 from karamelo_py.compiler.loops import address_in_memory
 from karamelo_py.compiler.lowering import function_type
@@ -36,12 +37,14 @@ def address_of(function: Callable, signature: types.Type) -> int:
 def address_of_python(function: Callable, signature: types.Type) -> int:
     """Give the address by which kernels call a function of Python, of whole numbers.
 
-    Nothing may be raised in it.
+    What is raised in it is raised again behind the kernel.
     """
     if config.DISABLE_JIT:
         _uncompiled.append(function)
         return len(_uncompiled) - 1
-    made = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * len(signature.args))(function)
+    made = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * len(signature.args))(
+        noting(function)
+    )
     _keep_alive.append(made)
     return ctypes.cast(made, ctypes.c_void_p).value
 

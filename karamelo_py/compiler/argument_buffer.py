@@ -1,8 +1,7 @@
 """Arguments of kernels put into memory by Python, and passed as one number.
 
-Numba takes every tuple that Python passes apart, array by array, in code that is compiled for each
-kernel anew and is longer than many kernels. Here Python writes the arguments into memory as kernels
-hold them (:mod:`karamelo_py.compiler.held`), and a kernel is called with its address.
+Python writes the arguments into memory as kernels hold them
+(:mod:`karamelo_py.compiler.held`), and a kernel is called with its address.
 """
 
 import ctypes
@@ -118,7 +117,8 @@ class ArgumentBuffer:
                     own += inner
             elif issubclass(kind, np.generic):
                 kinds.append(item.dtype)
-                own.append(item.item())
+                signed = item.view(f"i{item.itemsize}") if item.dtype.kind == "u" else item
+                own.append(signed.item())  # the same bits: words have signs
             else:  # of which there is nothing to be written: None, classes
                 kinds.append(item)
                 own.append(0)
@@ -208,6 +208,8 @@ def reader(kind: types.Type) -> tuple[int, Callable[[bytearray], Any]]:
         number = next(numbers)
         if isinstance(kind, types.NoneType):
             return None
+        if isinstance(kind, types.Integer) and not kind.signed:
+            return number % 2**kind.bitwidth
         return bool(number) if isinstance(kind, types.Boolean) else number
 
     def read(memory: bytearray) -> Any:

@@ -11,7 +11,7 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 
-from karamelo_py.compiler import code, machine
+from karamelo_py.compiler import code, failing, machine
 
 
 class Operation(NamedTuple):
@@ -51,6 +51,8 @@ def common(*kinds: types.Type) -> types.Type:
 
 
 def _wider(a: types.Type, b: types.Type) -> types.Type:
+    if types.uint64 in (a, b) and types.boolean in (a, b):
+        return types.uint64
     if a == b and not isinstance(a, types.Boolean) and a.bitwidth >= 32 + 32 * _is_whole(a):
         return a
     if _is_whole(a) and _is_whole(b):
@@ -424,7 +426,7 @@ def _gamma_of_python(x: float) -> float:
 
 
 _REAL = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)
-machine.publish_python("karamelo_gamma", _REAL, _gamma_of_python)
+machine.publish_python("karamelo_gamma", _REAL, failing.noting(_gamma_of_python))
 
 
 def _gamma(a: types.Type) -> Operation:

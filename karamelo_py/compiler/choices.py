@@ -69,7 +69,7 @@ def parts_noted() -> Iterator[set[tuple[Callable, tuple] | python.CodeType]]:
 
 
 def tag_class(numba_type: Any) -> Any:
-    """Find the class of a tag, by which point functions select, from its Numba type."""
+    """Find the class of a tag, by which point functions select, from its type."""
     return getattr(numba_type, "instance_class", None)
 
 

@@ -71,6 +71,7 @@ def constant(builder: Any, kind: types.Type, value: Any) -> ir.Constant:
 def _constant_array(builder: Any, kind: types.Array, value: np.ndarray) -> Any:
     value = np.ascontiguousarray(value)
     item = memory_type(kind.dtype)
+    value = value.view(np.uint8) if value.dtype == np.bool_ else value
     content = ir.Constant(ir.ArrayType(item, value.size), value.ravel().tolist())
     name = builder.module.get_unique_name("array")
     place = ir.GlobalVariable(builder.module, content.type, name)

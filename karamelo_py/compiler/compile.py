@@ -150,7 +150,7 @@ def real(value: float, like: Any) -> Any:
 
 
 def lanes_of(numba_type: Any) -> int:
-    """Count the lanes of a Numba type, or of a value (:mod:`karamelo_py.compiler.lanes`).
+    """Count the lanes of a type, or of a value (:mod:`karamelo_py.compiler.lanes`).
 
     It is 0 for numbers; of tuples, those of what is in them.
     """
@@ -291,7 +291,7 @@ def first_lane(number: int) -> int:
 def index(i: int) -> int:
     """Give `i` as an array index that is known not to be negative.
 
-    Saves Numba's test for indices counted from the end at every access (a tenth of a sweep).
+    Saves a test for indices counted from the end at every access (a tenth of a sweep).
     """
     return i
 

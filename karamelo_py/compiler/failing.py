@@ -1,6 +1,7 @@
 """Exceptions in kernels: noted where they are raised, and raised by Python behind the kernel."""
 
 import ctypes
+import functools
 import pickle
 from collections.abc import Callable
 from typing import Any
@@ -14,10 +15,30 @@ _noted: list[BaseException] = []
 _NOTE = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64)
 
 
+def note(error: BaseException) -> None:
+    """Have an exception raised behind the kernel that is at work."""
+    _noted.append(error)
+    _failed.value = 1
+
+
+def noting(function: Callable) -> Callable:
+    """Note what a function that kernels call raises, Ctrl-C too: Python drops it there."""
+
+    @functools.wraps(function)
+    def call(*arguments: Any) -> Any:
+        try:
+            return function(*arguments)
+        except BaseException as error:
+            note(error)
+            return 0
+
+    return call
+
+
+@noting
 def _note(text: int, size: int) -> None:
     kind, arguments = pickle.loads(ctypes.string_at(text, size))
-    _noted.append(kind(*arguments))
-    _failed.value = 1
+    note(kind(*arguments))
 
 
 machine.publish("karamelo_failed", ctypes.addressof(_failed))

@@ -1,10 +1,10 @@
 """Hash of all that a compiled kernel was made of: while it stays the same, so does the kernel.
 
-Numba does not notice when a function in another file changes. Here everything that a kernel's code
+Everything that a kernel's code
 can depend on is followed from the living functions: what it calls through its globals and closure
 (helpers, choosers by type, other kernels), the constants and classes they name, and, for point
 functions, only the implementations that were chosen for the types at hand. Those are noted while
-Numba compiles. An edited comment, or another basis, is in no hash of a kernel without it.
+a kernel is traced. An edited comment, or another basis, is in no hash of a kernel without it.
 """
 
 import functools
@@ -40,7 +40,7 @@ _PLAIN = (type(None), bool, int, float, complex, str, bytes, type(Ellipsis), ran
 
 
 def describe(numba_type: Any) -> str:
-    """A Numba type in words that mean the same in every process; tags with their fields."""
+    """Describe a type in words that mean the same in every process; tags with their fields."""
     if isinstance(numba_type, types.BaseNamedTuple):
         items = zip(numba_type.fields, numba_type, strict=True)
         inner = ",".join(f"{name}={describe(item)}" for name, item in items)
@@ -55,7 +55,7 @@ def describe(numba_type: Any) -> str:
 
 
 def classes_in(numba_type: Any) -> Iterable[type]:
-    """The classes of the tags in a Numba type."""
+    """Yield the classes of the tags in a type."""
     if isinstance(numba_type, types.BaseNamedTuple):
         yield numba_type.instance_class
     if isinstance(numba_type, types.BaseTuple):
@@ -79,7 +79,7 @@ def fingerprint(
     roots
         The function that is compiled, and what else its code depends on.
     arguments
-        Numba types of its arguments.
+        Types of its arguments.
     choices
         What its point functions were asked for.
     codes

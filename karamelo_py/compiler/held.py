@@ -1,11 +1,10 @@
 """Tuples of arrays held in memory, and passed as one pointer.
 
-A setup has some forty arrays, each of which Numba passes as seven to nine numbers, so that a call
-of one function by another is three hundred arguments, and half of what there is to compile are
-tuples that are taken apart and put together again. Where a kernel starts it therefore holds its
-setup: a tuple with arrays in it becomes a pointer to its items, and what such an item is itself is
-a pointer, too. The type of a held tuple is a tuple's (its items can be read by name and number,
-point functions are chosen by its class); tuples without arrays stay values.
+A setup has some forty arrays of seven to nine numbers each. Passed one by one, they would be three
+hundred arguments of each call, and half of what there is to compile. Where a kernel starts it
+therefore holds its setup: a tuple with arrays in it becomes a pointer to its items, and what such
+an item is itself is a pointer, too. The type of a held tuple is a tuple's (its items can be read by
+name and number, point functions are chosen by its class); tuples without arrays stay values.
 """
 
 import hashlib
@@ -30,7 +29,7 @@ def _words(numba_type: Any) -> str:
 
 
 class _Held(types.BaseTuple):
-    """Numba type of a pointer to the items of a tuple."""
+    """Type of a pointer to the items of a tuple."""
 
     def __init__(self, items: tuple, word: str):
         self.types = items

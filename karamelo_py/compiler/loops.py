@@ -10,6 +10,7 @@ import functools
 import gc
 import hashlib
 import re
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, NamedTuple
@@ -59,17 +60,19 @@ class Unit(NamedTuple):
 
 
 _loaded: dict[str, list[int]] = {}
+_alone = threading.RLock()  # one of the threads of Python compiles and loads at a time
 
 
 def load(unit: Unit) -> list[int]:
     """Give the addresses of a unit's function and of its entry, in memory from then on."""
-    if unit.name not in _loaded:
-        for needed in unit.needs:
-            load(needed)
-        found = machine.load(unit.code, unit.name, unit.name + ENTRY)
-        machine.publish(unit.name, found[0])
-        _loaded[unit.name] = found
-    return _loaded[unit.name]
+    with _alone:
+        if unit.name not in _loaded:
+            for needed in unit.needs:
+                load(needed)
+            found = machine.load(unit.code, unit.name, unit.name + ENTRY)
+            machine.publish(unit.name, found[0])
+            _loaded[unit.name] = found
+        return _loaded[unit.name]
 
 
 # --- compilation ----------------------------------------------------------------------------------
@@ -135,7 +138,7 @@ def _compiled(function: Callable, kinds: tuple, result: types.Type | None) -> tu
     with compilation(function.__name__), _no_collections(), parts_noted() as parts:
         module, result = written(function, kinds, result)
         text = str(module)
-        readable = re.sub(r"[^\w.]", "_", function.__qualname__)
+        readable = re.sub(r"[^\w.]", "_", function.__qualname__, flags=re.ASCII)
         name = f"{readable}.{hashlib.sha256(text.encode()).hexdigest()[:32]}"
         made = machine.compile_text(text.replace(NAME, name))
     unit = Unit(name, result, made, tuple(module.needs.values()), frozenset(), module.raises)
@@ -182,14 +185,15 @@ class Kernel:
 
     def unit(self, kinds: tuple, result: types.Type | None = None) -> Unit:
         """Give the machine code for arguments of these types."""
-        if kinds not in self.units:
-            with self.files.for_types(kinds, result) as place:
-                unit = place.found
-                if unit is None:
-                    unit, codes = _compiled(self.function, kinds, result)
-                    place.keep(unit, codes)
+        if kinds in self.units:
+            return self.units[kinds]
+        with _alone, self.files.for_types(kinds, result) as place:
+            unit = place.found
+            if unit is None:
+                unit, codes = _compiled(self.function, kinds, result)
+                place.keep(unit, codes)
             self.units[kinds] = unit
-        return self.units[kinds]
+        return unit
 
     def __call__(self, *arguments: Any) -> Any:
         written = ArgumentBuffer(arguments)
@@ -197,13 +201,12 @@ class Kernel:
         if kinds not in self._plans:
             plan = written.plan(arguments)
             unit = self.unit(plan.types)
-            self._plans[kinds] = plan, _CALL(load(unit)[1]), unit.raises, *reader(unit.result)
-        plan, entry, raises, size, read = self._plans[kinds]
+            self._plans[kinds] = plan, _CALL(load(unit)[1]), *reader(unit.result)
+        plan, entry, size, read = self._plans[kinds]
         _memory, address = written.in_memory(plan)
         result = bytearray(size)
         entry(address, ctypes.addressof(ctypes.c_char.from_buffer(result)))
-        if raises:
-            raise_noted()
+        raise_noted()
         return read(result)
 
     def compile(self, *arguments: Any) -> None:

@@ -28,7 +28,8 @@ def features() -> str:
 
 def describe() -> tuple:
     """Name all that decides what code looks like, but the code."""
-    return llvm.get_process_triple(), llvm.get_host_cpu_name(), features(), OPTIONS, LEVEL
+    version = llvm.llvm_version_info
+    return version, llvm.get_process_triple(), llvm.get_host_cpu_name(), features(), OPTIONS, LEVEL
 
 
 @functools.cache
@@ -86,7 +87,10 @@ def load(code: bytes, *names: str) -> list[int]:
     engine = _engine()
     engine.add_object_file(llvm.ObjectFileRef.from_data(code))
     engine.finalize_object()
-    return [engine.get_function_address(name) for name in names]
+    addresses = [engine.get_function_address(name) for name in names]
+    if not all(addresses):
+        raise RuntimeError(f"{names[0]} is not in the machine code that was made for it")
+    return addresses
 
 
 def publish(name: str, address: int) -> None:

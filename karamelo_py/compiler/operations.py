@@ -39,7 +39,7 @@ OPERATIONS = (
 
 @noinline
 def _whole(op, a):
-    """A number without its fraction; by sums, which every target of Numba knows."""
+    """A number without its fraction; by sums, which every processor has."""
     if not abs(a) < 2.0**52:
         return a  # whole, or no number
     far = math.copysign(2.0**52, a)

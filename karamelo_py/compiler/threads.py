@@ -1,8 +1,7 @@
 """Loops that threads share out: one for all kernels, which calls what is done by its address.
 
-Numba compiles a loop over threads in five functions, and takes the tuples that it works with apart
-and puts them together again in each. Here the arguments stay where they are; what is done with them
-is a function of where that is, and a number.
+The arguments of a loop stay where they are in memory. What is done with them is a function of that
+place and a number.
 
 Threads that sleep between two loops take as long to wake up as a small loop takes. A kernel of many
 loops is therefore run by a *team* (`by_team`): its first thread leads, and goes through the kernel;
@@ -13,6 +12,7 @@ for threads: one that another program keeps from running holds nobody up.
 
 import ctypes
 import functools
+import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
@@ -25,6 +25,7 @@ from numba import config, types
 from karamelo_py.compiler import code, machine
 from karamelo_py.compiler.atomics import I64, add, pause, read, replaced, write
 from karamelo_py.compiler.compile import by_type, define, shared
+from karamelo_py.compiler.failing import note, noting
 from karamelo_py.compiler.held import HeldTuple, address, at_address, held_type, hold
 from karamelo_py.compiler.intrinsics import builtin, intrinsic
 from karamelo_py.compiler.loops import noinline
@@ -61,19 +62,33 @@ def _pool(count: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(count)
 
 
+if hasattr(os, "register_at_fork"):
+    # A process that another one made by copying itself has none of its threads.
+    os.register_at_fork(after_in_child=_pool.cache_clear)
+
+
 def _share_out(count: int, part: int, task: int, arguments: int) -> None:
     """Do a task for each number below `count`, by `part`, a function of a range of these."""
     do = _PART(part)
     size = min(count, _threads)
     ends = [count * k // size for k in range(size + 1)] if size else [0, 0]
     pairs = pairwise(ends[1:])
-    others = [_pool(_threads - 1).submit(do, task, arguments, *pair) for pair in pairs]
-    do(task, arguments, *ends[:2])
-    for other in others:
-        other.result()
+    others: list = []
+    try:
+        for pair in pairs:
+            others.append(_pool(_threads - 1).submit(do, task, arguments, *pair))
+        do(task, arguments, *ends[:2])
+    except BaseException as error:  # such as Ctrl-C; the others still work on these arguments
+        note(error)
+    while others:
+        try:
+            others[-1].result()
+            others.pop()
+        except BaseException as error:
+            note(error)
 
 
-machine.publish_python("karamelo_share_out", _PART, _share_out)
+machine.publish_python("karamelo_share_out", _PART, noting(_share_out))
 
 
 def _address_of(function: Callable, *like: int) -> int:

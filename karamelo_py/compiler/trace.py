@@ -1,7 +1,6 @@
 """Functions are run once, on values of the function that is compiled, and written down.
 
-Numba makes code of a function in twenty passes, fifteen milliseconds for the smallest: half of a
-first compilation. Where a kernel calls a function marked for it, it is run by Python itself, on a
+Where a kernel calls a function marked for it, it is run by Python itself, on a
 :class:`~karamelo_py.compiler.values.Value` in the place of each number, and every operation that
 meets one is lowered at once, into the function that calls. Tuples are Python's own, so that what
 only takes them apart costs nothing. The bits are the same. A function that asks what only a run can

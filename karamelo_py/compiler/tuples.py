@@ -1,7 +1,6 @@
 """Records of arrays, nested tuples and their numbers, one after another; parts that may be absent.
 
-Comprehensions, which Numba does not know of tuples: kernels run them (`compiler/trace.py`). They
-are of lists, which Python makes in two thirds of the time where all is interpreted.
+Comprehensions are of lists, which Python makes in two thirds of the time where all is interpreted.
 """
 
 from karamelo_py.compiler.compile import Weighted, fma, shared

@@ -138,7 +138,7 @@ def _in_type_of(like: Any, kind: Any, thing: Any) -> Any:
 
 
 def emit(function: Callable, *arguments: Any) -> Any:
-    """Write a call: of code of Numba's, or of what was chosen by type."""
+    """Write a call: of an operation, or of what was chosen by type."""
     return now().call(function, arguments)
 
 
@@ -164,9 +164,6 @@ class Value:
             object.__setattr__(self, name, value)
         else:
             now().set_attribute(self, name, value)
-
-    def __call__(self, *arguments: Any) -> Any:
-        return now().call_bound(self, arguments)
 
     def __getitem__(self, place: Any) -> Any:
         return emit(operator.getitem, self, _place(place))
