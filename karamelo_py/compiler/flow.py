@@ -8,7 +8,15 @@ import numpy as np
 from numba import types
 
 from karamelo_py.compiler import failing
-from karamelo_py.compiler.values import HeldValue, Untraceable, Value, counting, emit, words
+from karamelo_py.compiler.values import (
+    HeldValue,
+    Untraceable,
+    Value,
+    counting,
+    emit,
+    is_literal,
+    words,
+)
 
 _PLAIN = (bool, int, float, str, np.generic, type(None))
 _DROPPED = object()
@@ -60,11 +68,6 @@ def is_value(thing: Any) -> bool:
 def is_real(thing: Any) -> bool:
     """Tell whether a thing is a real number that only a run knows."""
     return isinstance(thing, Value) and isinstance(thing._kind, types.Float)
-
-
-def is_literal(thing: Any) -> bool:
-    """Tell whether a thing is a number without a precision of its own."""
-    return type(thing) in (int, float)
 
 
 def _is_same(a: Any, b: Any) -> bool:

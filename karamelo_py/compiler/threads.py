@@ -83,9 +83,9 @@ def _share_out(count: int, part: int, task: int, arguments: int) -> None:
     while others:
         try:
             others[-1].result()
-            others.pop()
         except BaseException as error:
             note(error)
+        others = [other for other in others if not other.done()]
 
 
 machine.publish_python("karamelo_share_out", _PART, noting(_share_out))
