@@ -78,10 +78,18 @@ def _is_same(a: Any, b: Any) -> bool:
 
 
 class Grows(Untraceable):
-    """Tell that a number becomes one of another type from turn to turn of a loop."""
+    """Tell what numbers become from turn to turn of a loop, where that is of another type.
 
-    def __init__(self, place: int, kind: types.Type):
-        self.place, self.kind = place, kind
+    `grown` has, by the name and the places in tuples, a type or a number of the type.
+    """
+
+    def __init__(self, grown: dict[tuple, Any]):
+        self.grown = grown
+
+
+def is_number_type(thing: Any) -> bool:
+    """Tell whether a thing is a number of a class of tuples (`algebra`)."""
+    return hasattr(type(thing), "constant")
 
 
 def _counter(kinds: tuple) -> types.Integer:
@@ -175,6 +183,10 @@ class Flow:
             if any(item is _DROPPED for item in items):
                 return _DROPPED
             return type(first)(*items) if hasattr(first, "_fields") else tuple(items)
+        numbers = [t for t in things if is_number_type(t)]
+        if numbers and all(isinstance(t, Value) or is_literal(t) or is_number_type(t) for t in things):
+            wide = [t if is_number_type(t) else numbers[0].constant(t) for t in things]
+            return self._merged(wide, phis)
         if any(t is None or not isinstance(t, (Value, HeldValue, *_PLAIN)) for t in things):
             return _DROPPED
         kinds = [types.unliteral(self.lowering.kind_of(t)) for t in things]
@@ -202,31 +214,34 @@ class Flow:
     # --- loops
 
     def loop(
-        self, names: dict[str, Any], changed: frozenset[str], grown: dict[int, types.Type]
+        self, names: dict[str, Any], changed: frozenset[str], grown: dict[tuple, Any]
     ) -> tuple[LoopHeader, dict[str, Any]]:
         """Begin a loop; find what names stand for that change from turn to turn.
 
-        `grown` are the types that literals among these get, by their places.
+        `grown` is what numbers among these become, as `Grows` tells it.
         """
         phis: list[Phi] = []
-        self.grown = grown
+        self.grown, self.paths = grown, []
         inside = dict(names)
         for name in sorted(changed & names.keys()):
-            inside[name] = self._carried(names[name], phis)
+            inside[name] = self._carried(names[name], phis, (name,))
         block = self._block()
         self._enter(block, phis, [phi.on[0] for phi in phis])
         carried = {name: inside[name] for name in sorted(changed & names.keys())}
         self.start(Edge(block, {}, dict(self.lowering.read)))
         return LoopHeader(block, phis, carried), inside
 
-    def _carried(self, thing: Any, phis: list[Phi]) -> Any:
+    def _carried(self, thing: Any, phis: list[Phi], path: tuple) -> Any:
         if isinstance(thing, tuple):
-            items = [self._carried(item, phis) for item in thing]
+            items = [self._carried(item, phis, (*path, k)) for k, item in enumerate(thing)]
             return type(thing)(*items) if hasattr(thing, "_fields") else tuple(items)
         if thing is None or not isinstance(thing, (Value, HeldValue, *_PLAIN)):
             return thing
-        kind = types.unliteral(self.lowering.kind_of(thing))
-        kind = self.grown.get(len(phis), kind)
+        grown = self.grown.get(path)
+        if is_number_type(grown):
+            return self._carried(grown.constant(thing), phis, path)
+        kind = grown or types.unliteral(self.lowering.kind_of(thing))
+        self.paths.append(path)
         made = (HeldValue if isinstance(thing, HeldValue) else Value)(kind, None)
         phis.append(Phi(made, [thing]))
         return made
@@ -234,28 +249,35 @@ class Flow:
     def close(self, head: LoopHeader, names: dict[str, Any]) -> None:
         """Go back to where a loop begins."""
         values: list = []
+        self.growing: dict[tuple, Any] = {}
         self.began = [phi.on[0] for phi in head.phis]
         for name, before in head.names.items():
             if name not in names:
                 raise Untraceable(f"'{name}' is not known on all ways through a loop")
             self._close_phi(before, names[name], values)
+        if self.growing:
+            raise Grows(self.growing)
         self._enter(head.block, head.phis, values)
 
     def _close_phi(self, before: Any, after: Any, values: list) -> None:
         """Collect what the phis of `before` become, in their order."""
         if isinstance(before, Value | HeldValue):
+            path = self.paths[len(values)]
+            if is_number_type(after):
+                raise Grows({path: after})
             kind = types.unliteral(self.lowering.kind_of(after))
             if (
                 kind != before._kind
                 and is_literal(self.began[len(values)])
                 and isinstance(getattr(kind, "scalar", kind), types.Float)
             ):
-                raise Grows(len(values), kind)
+                self.growing[path] = kind
             both = self.lowering.unify(kind, before._kind)
             if both != before._kind:
                 if isinstance(both, types.Integer):
-                    raise Grows(len(values), both)
-                raise Untraceable(f"{words(before._kind)} becomes {words(kind)}{IN_A_LOOP}")
+                    self.growing[path] = both
+                elif path not in self.growing:
+                    raise Untraceable(f"{words(before._kind)} becomes {words(kind)}{IN_A_LOOP}")
             values.append(after)
         elif isinstance(before, tuple):
             if type(before) is not type(after) or len(before) != len(after):

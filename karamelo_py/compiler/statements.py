@@ -306,10 +306,10 @@ class AstCompiler(ExpressionCompiler):
             try:
                 self.rolled(node, counter, item, grown)
                 return
-            except Grows as literal:
+            except Grows as number:
                 if self.flow.builder:
                     raise
-                grown[literal.place] = literal.kind
+                grown |= number.grown
                 self.names, self.breaks, self.continues, self.returns = (
                     dict(state[0]),
                     state[1],

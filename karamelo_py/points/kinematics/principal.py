@@ -3,9 +3,10 @@
 from math import sqrt
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import point_function, round_off, shared, where
+from karamelo_py.compiler.compile import implements, point_function, round_off, shared, where
+from karamelo_py.compiler.slopes import Dual, size_of, slopes_of, value_of
 from karamelo_py.points.kinematics.tags import Axisymmetric, Line, PlaneStrain, Space
-from karamelo_py.points.kinematics.tensors import SymmetricTensor
+from karamelo_py.points.kinematics.tensors import SymmetricTensor, total
 
 
 class Angle(NamedTuple):
@@ -108,3 +109,113 @@ def _from_principal_space(s, values, directions):
         return a + b + c
 
     return s._make([component(i, j) for i, j in s.places])
+
+
+# --- slopes -----------------------------------------------------------------------------------
+# Jacobi's rotations end where a tensor is diagonal, its slopes need not be. With S' in the frame of
+# the principal directions n, f(S)' = sum_a f_a' n_a n_a
+# + sum_ab (f_a - f_b) / (s_a - s_b) (n_a . S' n_b) (n_a n_b + n_b n_a), a < b
+# (Ogden 1997, "Non-linear elastic deformations", section 6.1).
+
+
+class TurningFrame(NamedTuple):
+    """Directions, and what turns them."""
+
+    directions: Any
+    shears: tuple  # n_a . S' n_b of the pairs of directions, for each slope
+    apart: tuple  # s_a - s_b of the pairs
+
+
+@point_function()
+def in_frame(s: SymmetricTensor, directions):
+    """Find components of a tensor in a frame: (3,) of the diagonal, and those of the pairs."""
+
+
+@point_function()
+def out_of_frame(s: SymmetricTensor, diagonal, shears, directions):
+    """Make the tensor with components in a frame; of the class of `s`."""
+
+
+@in_frame.on(PlaneStrain.Symmetric)
+@in_frame.on(Axisymmetric.Symmetric)
+def _in_frame_plane(s, directions):
+    k, g = directions
+    apart, mean = 0.5 * (s.xx - s.yy), 0.5 * (s.xx + s.yy)
+    radius = apart * k + s.xy * g
+    return (mean + radius, mean - radius, s.zz), (s.xy * k - apart * g,)
+
+
+@out_of_frame.on(PlaneStrain.Symmetric)
+@out_of_frame.on(Axisymmetric.Symmetric)
+def _out_of_frame_plane(s, diagonal, shears, directions):
+    a, b, c = diagonal
+    k, g = directions
+    radius, mean = 0.5 * (a - b), 0.5 * (a + b)
+    apart = radius * k - shears[0] * g
+    return s._make([mean + apart, mean - apart, c, radius * g + shears[0] * k])
+
+
+PAIRS = (0, 1), (0, 2), (1, 2)
+
+
+def product(a, b):
+    """a_i b_i."""
+    return total([x * y for x, y in zip(a, b, strict=True)])
+
+
+@in_frame.on(Space.Symmetric)
+def _in_frame_space(s, directions):
+    a = s.at()
+    along = [tuple([product([a[i, j] for j in range(3)], n) for i in range(3)]) for n in directions]
+    shears = tuple([product(directions[a], along[b]) for a, b in PAIRS])
+    return tuple([product(n, t) for n, t in zip(directions, along, strict=True)]), shears
+
+
+@out_of_frame.on(Space.Symmetric)
+def _out_of_frame_space(s, diagonal, shears, directions):
+    def component(i, j):
+        own = [p * n[i] * n[j] for p, n in zip(diagonal, directions, strict=True)]
+        mixed = [
+            c * (directions[a][i] * directions[b][j] + directions[b][i] * directions[a][j])
+            for c, (a, b) in zip(shears, PAIRS, strict=True)
+        ]
+        return total([*own, *mixed])
+
+    return s._make([component(i, j) for i, j in s.places])
+
+
+def columns(numbers: tuple, n: int) -> list:
+    """Give the `n` slopes of numbers: for each a tuple of theirs."""
+    return list(zip(*[slopes_of(x, n) for x in numbers], strict=True))
+
+
+@implements(principal, Dual)
+def _principal_slopes(s):
+    values, directions = principal(value_of(s))
+    n = size_of(*s)
+    if isinstance(s.kin, Line):
+        return (s.xx, s.yy, s.zz), ()
+    turned = [in_frame(s._make(slopes), directions) for slopes in columns(s, n)]
+    along = zip(*[diagonal for diagonal, _ in turned], strict=True)
+    made = [Dual(value, tuple(slopes)) for value, slopes in zip(values, along, strict=True)]
+    apart = [values[a] - values[b] for a, b in PAIRS[: len(turned[0][1])]]
+    return tuple(made), TurningFrame(directions, tuple([t[1] for t in turned]), tuple(apart))
+
+
+@implements(from_principal, Dual)
+def _from_principal_slopes(s, values, directions):
+    if not isinstance(directions, TurningFrame):
+        return s._make(values)
+    plain, frame = value_of(values), directions.directions
+    pairs = zip(PAIRS[: len(directions.apart)], directions.apart, strict=True)
+    # Equal principal values stay equal: both lie on an edge, or at the apex.
+    ratios = [
+        where(apart == 0, 0, (plain[a] - plain[b]) / where(apart == 0, 1, apart))
+        for (a, b), apart in pairs
+    ]
+    tensors = [
+        out_of_frame(s, slopes, tuple([r * c for r, c in zip(ratios, shears, strict=True)]), frame)
+        for slopes, shears in zip(columns(values, len(directions.shears)), directions.shears, strict=True)
+    ]
+    made = from_principal(value_of(s), plain, frame)
+    return s._make([Dual(v, tuple(t)) for v, t in zip(made, zip(*tensors, strict=True), strict=True)])

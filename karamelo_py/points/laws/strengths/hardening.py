@@ -2,7 +2,16 @@
 
 from math import sqrt
 
-from karamelo_py.compiler.compile import any_lane, point_function, real, round_off, shared, where
+from karamelo_py.compiler.compile import (
+    any_lane,
+    implements,
+    point_function,
+    real,
+    round_off,
+    shared,
+    where,
+)
+from karamelo_py.compiler.slopes import Dual, value_of
 from karamelo_py.points.kinematics import von_mises
 from karamelo_py.points.laws.strengths.linear import elastic_trial
 
@@ -99,3 +108,14 @@ def plastic_increment(strength, q, memory, heat, dt):
         if not any_lane(active):
             break
     return x
+
+
+@implements(plastic_increment, Dual)
+def _plastic_increment_slopes(strength, q, memory, heat, dt):
+    # The excess e(x, q, ...) vanishes: x' = -e' / (de/dx), with e' at fixed x.
+    x = plastic_increment(strength, value_of(q), value_of(memory), value_of(heat), dt)
+    known = precompute(strength, memory, heat)
+    flow, hardening = flow_stress(strength, memory, known, x, heat, dt)
+    excess = q - 3 * strength.G * x - flow
+    rise = 1 / (3 * strength.G + value_of(hardening))
+    return excess.chain(x, where(x > 0, rise, 0))

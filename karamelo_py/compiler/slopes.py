@@ -1,0 +1,295 @@
+"""Numbers with slopes: a value and its derivatives by some others, in forward mode.
+
+A point function that runs on them gives its derivatives with its result, exact to round-off: of a
+law's stress the consistent tangent (Griewank & Walther 2008, "Evaluating Derivatives", chapter 3).
+The values have the bits that numbers without slopes have. A slope that is the literal 0 is known
+to be 0, and no code is written for it.
+"""
+
+import math
+from collections import namedtuple
+from typing import Any
+
+from karamelo_py.compiler.algebra import algebra
+from karamelo_py.compiler.compile import fma, implements, real, round_off, where
+from karamelo_py.compiler.powers import exponential, logarithm, logarithm_near_one, power
+from karamelo_py.compiler.values import is_literal
+
+
+@algebra
+class Dual(namedtuple("Dual", "value slopes")):
+    """A number and its derivatives.
+
+    Attributes
+    ----------
+    value
+        The number.
+    slopes
+        A tuple of its derivatives; literals 0 where they vanish.
+    """
+
+    __slots__ = ()
+    __array_ufunc__ = None  # NumPy's numbers leave operations to these
+
+    def constant(self, value: Any) -> "Dual":
+        """Make a number with as many slopes, which vanish."""
+        return Dual(value, (0,) * len(self.slopes))
+
+    def chain(self, value: Any, slope: Any) -> "Dual":
+        """Make a function of this number, from its value and its derivative here."""
+        return Dual(value, tuple([times(slope, s) for s in self.slopes]))
+
+    def __add__(self, other):
+        if is_tensor(other):
+            return NotImplemented
+        return combined(self.value + value_of(other), 1, self, 1, other)
+
+    __radd__ = __add__
+
+    def __sub__(self, other):
+        if is_tensor(other):
+            return NotImplemented
+        return combined(self.value - value_of(other), 1, self, -1, other)
+
+    def __rsub__(self, other):
+        return combined(other - self.value, 1, other, -1, self)
+
+    def __neg__(self):
+        return Dual(-self.value, tuple([times(-1, s) for s in self.slopes]))
+
+    def __mul__(self, other):
+        if is_tensor(other):
+            return NotImplemented
+        y = value_of(other)
+        return combined(self.value * y, y, self, self.value, other)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other):
+        if is_tensor(other):
+            return NotImplemented
+        y = value_of(other)
+        quotient, inverse = self.value / y, 1 / y
+        return combined(quotient, inverse, self, -quotient * inverse, other)
+
+    def __rtruediv__(self, other):
+        quotient = other / self.value
+        return self.chain(quotient, -quotient / self.value)
+
+    def __pow__(self, other):
+        return _power(self, other)
+
+    def __rpow__(self, other):
+        return _power(other, self)
+
+    def __abs__(self):
+        return _abs(self)
+
+    def __lt__(self, other):
+        return self.value < value_of(other)
+
+    def __le__(self, other):
+        return self.value <= value_of(other)
+
+    def __gt__(self, other):
+        return self.value > value_of(other)
+
+    def __ge__(self, other):
+        return self.value >= value_of(other)
+
+    def __eq__(self, other):
+        return self.value == value_of(other)
+
+    def __ne__(self, other):
+        return self.value != value_of(other)
+
+    __hash__ = None
+
+
+def is_tensor(thing: Any) -> bool:
+    """Tell whether a thing is a vector or tensor, which multiplies by itself."""
+    return isinstance(thing, tuple) and not isinstance(thing, Dual)
+
+
+def value_of(x: Any) -> Any:
+    """Give a number without its slopes; of tuples and tensors, all numbers in them."""
+    if isinstance(x, Dual):
+        return x.value
+    if isinstance(x, tuple):
+        items = [value_of(item) for item in x]
+        return x._make(items) if hasattr(x, "_fields") else tuple(items)
+    return x
+
+
+def slopes_of(x: Any, n: int) -> tuple:
+    """Give the `n` slopes of a number, zeros of one that is constant."""
+    return x.slopes if isinstance(x, Dual) else (0,) * n
+
+
+def seeded(numbers: tuple) -> Any:
+    """Make of numbers the variables by which all is derived; of a tensor one of its class."""
+    n = range(len(numbers))
+    made = [
+        Dual(x, tuple([1 if i == k else 0 for i in n])) for k, x in zip(n, numbers, strict=True)
+    ]
+    return numbers._make(made) if hasattr(numbers, "_make") else tuple(made)
+
+
+def is_zero(slope: Any) -> bool:
+    """Tell whether a slope is known to vanish."""
+    return is_literal(slope) and slope == 0
+
+
+def times(factor: Any, slope: Any) -> Any:
+    """Give factor slope; of literals 1 and -1 no product is written."""
+    if is_zero(slope):
+        return 0
+    if is_literal(factor) and abs(factor) == 1:
+        return slope if factor == 1 else -slope
+    if is_literal(slope) and slope == 1:
+        return factor
+    return factor * slope
+
+
+def combined(value: Any, a: Any, x: Any, b: Any, y: Any) -> Dual:
+    """Make the number with the slopes a x' + b y'."""
+    n = len(x.slopes) if isinstance(x, Dual) else len(y.slopes)
+    slopes = []
+    for s, t in zip(slopes_of(x, n), slopes_of(y, n), strict=True):
+        if is_zero(s) or is_zero(t):
+            slopes.append(times(a, s) if is_zero(t) else times(b, t))
+        else:
+            slopes.append(times(a, s) + times(b, t))
+    return Dual(value, tuple(slopes))
+
+
+def size_of(*things: Any) -> int:
+    """Count the slopes of the first number that has some."""
+    for x in things:
+        if isinstance(x, Dual):
+            return len(x.slopes)
+    return 0
+
+
+# --- functions of numbers ---------------------------------------------------------------------
+
+
+@implements(math.sqrt, Dual)
+def _sqrt(x):
+    root = math.sqrt(x.value)
+    some = root > 0
+    # At 0 the slope is infinite. That of norms, which square roots are taken for, is 0 there.
+    return x.chain(root, where(some, 0.5 / where(some, root, 1), 0))
+
+
+@implements(math.log, Dual)
+@implements(logarithm, Dual)
+def _logarithm(x):
+    return x.chain(logarithm(x.value), 1 / x.value)
+
+
+@implements(logarithm_near_one, Dual)
+def _logarithm_near_one(x):
+    return x.chain(logarithm_near_one(x.value), 1 / x.value)
+
+
+@implements(math.exp, Dual)
+@implements(exponential, Dual)
+def _exponential(x):
+    e = exponential(x.value)
+    return x.chain(e, e)
+
+
+@implements(power, Dual)
+@implements(pow, Dual)
+def _power(x, y):
+    base, exponent = value_of(x), value_of(y)
+    made = power(base, exponent)
+    some = base > 0
+    over = where(some, base, 1)
+    return combined(
+        made,
+        where(some, exponent * made / over, 0),
+        x,
+        where(some, made * logarithm(over), 0) if isinstance(y, Dual) else 0,
+        y,
+    )
+
+
+@implements(math.sin, Dual)
+def _sin(x):
+    return x.chain(math.sin(x.value), math.cos(x.value))
+
+
+@implements(math.cos, Dual)
+def _cos(x):
+    return x.chain(math.cos(x.value), -math.sin(x.value))
+
+
+@implements(math.tan, Dual)
+def _tan(x):
+    tangent = math.tan(x.value)
+    return x.chain(tangent, 1 + tangent * tangent)
+
+
+@implements(math.atan, Dual)
+def _atan(x):
+    return x.chain(math.atan(x.value), 1 / (1 + x.value * x.value))
+
+
+@implements(math.tanh, Dual)
+def _tanh(x):
+    tangent = math.tanh(x.value)
+    return x.chain(tangent, 1 - tangent * tangent)
+
+
+@implements(abs, Dual)
+def _abs(x):
+    return x.chain(abs(x.value), where(x.value < 0, -1, 1))
+
+
+@implements(real, Dual)
+def _real(value, like):
+    return real(value, like.value)
+
+
+@implements(round_off, Dual)
+def _round_off(like):
+    return round_off(like.value)
+
+
+@implements(fma, Dual)
+def _fma(a, b, c):
+    x, y = value_of(a), value_of(b)
+    n = size_of(a, b, c)
+    product = combined(0, y, a, x, b) if size_of(a, b) else Dual(0, (0,) * n)
+    return combined(fma(x, y, value_of(c)), 1, product, 1, c)
+
+
+@implements(where, Dual)
+def _where(condition, a, b):
+    if is_tensor(a):
+        items = [where(condition, x, y) for x, y in zip(a, b, strict=True)]
+        return a._make(items) if hasattr(a, "_fields") else tuple(items)
+    n = size_of(a, b)
+    if n == 0:
+        return where(condition, a, b)
+    pairs = zip(slopes_of(a, n), slopes_of(b, n), strict=True)
+    slopes = [0 if is_zero(s) and is_zero(t) else where(condition, s, t) for s, t in pairs]
+    return Dual(where(condition, value_of(a), value_of(b)), tuple(slopes))
+
+
+@implements(max, Dual)
+def _max(*numbers):
+    best = numbers[0]
+    for x in numbers[1:]:
+        best = where(value_of(x) > value_of(best), x, best)
+    return best
+
+
+@implements(min, Dual)
+def _min(*numbers):
+    best = numbers[0]
+    for x in numbers[1:]:
+        best = where(value_of(x) < value_of(best), x, best)
+    return best

@@ -1,0 +1,138 @@
+"""Numbers with slopes go through all laws as they are: their tangents are those of differences."""
+
+import math
+
+import numpy as np
+import pytest
+from numba import config
+
+from karamelo_py.compiler.algebra import on_numbers
+from karamelo_py.compiler.compile import shared
+from karamelo_py.compiler.loops import kernel
+from karamelo_py.compiler.slopes import Dual, seeded, slopes_of
+from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
+from karamelo_py.points.laws import advance, initial_state, kirchhoff_stress
+from karamelo_py.points.laws.elasticity import lame_parameters
+from karamelo_py.points.laws.eos.linear import LinearPressure
+from karamelo_py.points.laws.eos_strength import EosStrength
+from karamelo_py.points.laws.linear import LinearElastic
+from karamelo_py.points.laws.neo_hookean import NeoHookean
+from karamelo_py.points.laws.strengths.drucker_prager import DruckerPrager
+from karamelo_py.points.laws.strengths.johnson_cook import JohnsonCook
+from karamelo_py.points.laws.strengths.mohr_coulomb import MohrCoulomb
+from karamelo_py.points.laws.strengths.plastic import LinearHardening, Plastic
+
+E, NU = 1e6, 0.3
+MODULI = lame_parameters(E, NU)
+K, G = E / 3 / (1 - 2 * NU), E / 2 / (1 + NU)
+EOS = LinearPressure.given(1000.0, K)
+LAWS = {
+    "linear": (LinearElastic(1e-3, *MODULI), 0.05),
+    "neo-hookean": (NeoHookean(1e-3, *MODULI), 0.05),
+    "plastic": (EosStrength(EOS, Plastic(G, 2e4)), 0.03),
+    "hardening": (EosStrength(EOS, LinearHardening(G, 2e4, 1e5)), 0.03),
+    "johnson_cook": (
+        EosStrength(EOS, JohnsonCook.given(G, 2e4, 3e4, 0.3, 1.0, 0.02, 0.0, 0.0, 1.0)),
+        0.03,
+    ),
+    "drucker_prager": (EosStrength(EOS, DruckerPrager.given(G, 1e4, 30.0, 10.0)), 0.02),
+    "mohr_coulomb": (EosStrength(EOS, MohrCoulomb.given(G, 1e4, 30.0, 10.0)), 0.02),
+}
+KINEMATICS = {"line": Line(), "plane": PlaneStrain(), "axis": Axisymmetric(), "space": Space()}
+
+
+@shared
+def stress(law, kin, state, dl, dt):
+    """Kirchhoff stress after an increment."""
+    return kirchhoff_stress(law, kin, advance(law, kin, state, dl, dt))
+
+
+@shared
+def tangent(law, kin, state, dl, dt):
+    """Kirchhoff stress, and its derivatives by the increment."""
+    made = stress(law, kin, state, seeded(dl), dt)
+    values = tuple([x.value for x in made])
+    return values, tuple([tuple([0.0 + s for s in slopes_of(x, len(dl))]) for x in made])
+
+
+def differences(law, kin, state, dl, dt, e):
+    """Derivatives by central differences of fourth order."""
+    columns = []
+    for k in range(len(dl)):
+
+        def at(s, k=k):
+            moved = kin.Tensor._make([x + s * e * (i == k) for i, x in enumerate(dl)])
+            return np.array(stress(law, kin, state, moved, dt))
+
+        columns.append((8 * (at(1) - at(-1)) - (at(2) - at(-2))) / (12 * e))
+    return np.array(columns).T
+
+
+def error(found, law, kin, state, dl, size):
+    """The largest error over Young's modulus; of kinks, where differences are smallest."""
+    steps = (size * s for s in (1e-4, 1e-6, 1e-7))
+    errors = [
+        abs(np.array(found) - differences(law, kin, state, dl, 1e-2, e)).max() / E for e in steps
+    ]
+    return errors[0] if errors[0] < 1e-6 else min(errors)
+
+
+def cases(law, kin, size, count, seed=1):
+    """States that were loaded before, and increments: any, diagonal, with two alike."""
+    rng = np.random.default_rng(seed)
+    n = len(kin.tensor_names)
+    diagonal = np.array([i == j for i, j in kin.Tensor.places])
+    for trial in range(count):
+        scale = size * 10 ** rng.uniform(-2, 0.7)
+        state = initial_state(law, kin, 1.0)
+        kind = trial % 3
+        if kind == 0:
+            for _ in range(rng.integers(0, 4)):
+                dl = kin.Tensor._make([float(x) for x in rng.normal(0, scale, n)])
+                state = advance(law, kin, state, dl, 1e-2)
+        numbers = rng.normal(0, scale, n)
+        if kind > 0:
+            numbers *= diagonal
+        if kind == 2 and diagonal.sum() > 1:
+            alike = np.flatnonzero(diagonal)[:2]
+            numbers[alike] = numbers[alike[0]]
+        yield state, kin.Tensor._make([float(x) for x in numbers])
+
+
+@pytest.mark.parametrize("kin", KINEMATICS.values(), ids=KINEMATICS)
+@pytest.mark.parametrize("name", LAWS)
+def test_tangents_are_those_of_differences(name, kin):
+    law, size = LAWS[name]
+    errors = []
+    for state, dl in cases(law, kin, size, 30):
+        values, slopes = on_numbers(tangent)(law, kin, state, dl, 1e-2)
+        assert values == tuple(stress(law, kin, state, dl, 1e-2))
+        errors.append(error(slopes, law, kin, state, dl, size))
+    # Differences err by 1e-8; a case in thirty may have a kink of the surface within their reach.
+    assert sorted(errors)[-2] < 1e-6, errors
+
+
+def in_floats(thing):
+    """The same tuples, with floats in the place of whole numbers."""
+    if not isinstance(thing, tuple):
+        return float(thing)
+    items = tuple(map(in_floats, thing))
+    return thing._make(items) if hasattr(thing, "_make") else items
+
+
+@pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
+@pytest.mark.parametrize("kin", KINEMATICS.values(), ids=KINEMATICS)
+@pytest.mark.parametrize("name", LAWS)
+def test_kernels_know_them(name, kin):
+    law, size = LAWS[name]
+
+    @kernel
+    def compiled(law, kin, state, dl, dt):
+        return tangent(law, kin, state, dl, dt)
+
+    for state, dl in cases(law, kin, size, 9):
+        state = in_floats(state)
+        values, slopes = compiled(law, kin, state, dl, 1e-2)
+        expected, tangents = on_numbers(tangent)(law, kin, state, dl, 1e-2)
+        assert np.allclose(values, expected, rtol=1e-12, atol=1e-12 * E)
+        assert np.allclose(slopes, tangents, rtol=1e-9, atol=1e-9 * E)
