@@ -58,6 +58,7 @@ class LoopHeader(NamedTuple):
     block: Any
     phis: list[Phi]
     names: dict[str, Any]
+    paths: list[tuple]  # of what the phis stand for: a name, places in tuples
 
 
 def is_value(thing: Any) -> bool:
@@ -229,7 +230,7 @@ class Flow:
         self._enter(block, phis, [phi.on[0] for phi in phis])
         carried = {name: inside[name] for name in sorted(changed & names.keys())}
         self.start(Edge(block, {}, dict(self.lowering.read)))
-        return LoopHeader(block, phis, carried), inside
+        return LoopHeader(block, phis, carried, self.paths), inside
 
     def _carried(self, thing: Any, phis: list[Phi], path: tuple) -> Any:
         if isinstance(thing, tuple):
@@ -250,6 +251,7 @@ class Flow:
         """Go back to where a loop begins."""
         values: list = []
         self.growing: dict[tuple, Any] = {}
+        self.paths = head.paths
         self.began = [phi.on[0] for phi in head.phis]
         for name, before in head.names.items():
             if name not in names:

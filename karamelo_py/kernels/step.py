@@ -114,6 +114,14 @@ def _begin(scheme, visits, mode, s):
     return lambda scheme, visits, mode, s: _take_all(rows, s, mode, NoHooks(), True)
 
 
+def take_rows(rows: tuple, s: Setup, mode: Tag, hooks: Tag) -> bool:
+    """Take a part of a step from Python; returns whether all points went well."""
+    return _take_all(_alone(rows), s, mode, hooks, False)
+
+
+_alone: Any = functools.cache(table.one_by_one)
+
+
 # --- loop -------------------------------------------------------------------------------------
 
 DONE, STOPPED, ABOVE_LIMIT, SORT, SHRUNK, GAINED, HEATED = range(7)

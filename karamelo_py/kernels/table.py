@@ -163,6 +163,20 @@ def staged(rows: Iterable[Any]) -> list[Any]:
     return out
 
 
+def one_by_one(rows: Iterable[Any]) -> list[Any]:
+    """The rows of a part of a step, each with a visit of its own."""
+
+    def alone(row: Any) -> Any:
+        if isinstance(row, Gather):
+            return Sweep(Visit(_tasks([row]), (), OldWeights()), *row[1:], True, False)
+        if isinstance(row, Scatter):
+            visit = Visit((), row.quantities, row.weights)
+            return Sweep(visit, gathers=False, moves=False)
+        return row
+
+    return [alone(row) for row in rows]
+
+
 def says(row: Any, setup: Any) -> str | None:
     """Describe a row in words; None where it does nothing in this scene."""
     if isinstance(row, Sweep):

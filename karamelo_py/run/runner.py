@@ -62,7 +62,8 @@ def _note_in_rehearsal(runner: "Runner") -> None:
     """Note what the run asks for, and what acts in it."""
     hub = runner.hub
     span = runner.end_time - hub.update.time, inf if runner.steps is None else runner.steps
-    hub.later.append(large_steps.step_of(hub, runner.rollback.halve, span))
+    if not getattr(hub.update.scheme, "implicit", False):
+        hub.later.append(large_steps.step_of(hub, runner.rollback.halve, span))
     hub.in_runs += hub.lasting()
 
 
@@ -146,6 +147,8 @@ class Runner:
 
     def warn(self, simulation: Simulation) -> None:
         """Warn of what is known to go wrong in this run, and of one that is very long."""
+        if simulation.implicit:
+            return
         known_failures.warn(self.hub, simulation, self.duration, self.rollback.halve)
         warn_about_length(self.hub, simulation, self.end_time)
 

@@ -140,7 +140,7 @@ class Simulation(SceneArrays):
         courants = "courant", "courant_moving"
         before = [clock[name] for name in (*courants, *names)]
         now, moving = (step_of_waves(self.hub, still=s) for s in (clock.path <= STILL, False))
-        asked = self.hub.update.fixed_dt or 0.0, share_of_heat(self.hub), now[1], moving[1]
+        asked = self.hub.update.fixed_dt or float(self.implicit), share_of_heat(self.hub), now[1], moving[1]
         numbers = [now[0], moving[0], *(number / 2**halvings for number in asked)]
         for name, number in zip((*courants, *names), numbers, strict=True):
             clock[name] = number
@@ -214,13 +214,13 @@ class Simulation(SceneArrays):
     def _watch_limit(self) -> None:
         """Watch the limit, unless the step is above it from the start, as the user wants."""
         clock = self.control.clock[0]
-        clock.watch_limit = int(not self.above_limit())
+        clock.watch_limit = int(not self.above_limit() and not self.implicit)
         clock.over_limit = 0
 
     def _watch_energy(self, begun_before: int) -> None:
         """Begin to watch the balance of energy, or go on where nothing was set since."""
         clock = self.control.clock[0]
-        clock.watch_energy = int(not unknown_work(self.hub))
+        clock.watch_energy = int(not unknown_work(self.hub) and not self.implicit)
         set_anew = len(self._begun) > begun_before or bool(self._first_fixes)
         anew = not self.followed or set_anew
         self.followed = True
@@ -309,7 +309,7 @@ class Simulation(SceneArrays):
     def _advance(self, count: int) -> int:
         scheme = self.hub.update.scheme
         if self._first is not None:
-            status = run_steps(scheme, Staged(), self.mode, self.setup, self._first, 1)
+            status = self._run_steps(self._first, 1)
             if status in (DONE, SORT):
                 self._begun |= set(self._first_fixes)
                 self._first = None
@@ -317,9 +317,29 @@ class Simulation(SceneArrays):
                 return SORT  # there is more to do, unless that was all
             return status
         if self._python.by_stage:
-            return run_steps(scheme, Staged(), self.mode, self.setup, self._python, count)
+            return self._run_steps(self._python, count)
+        if self.implicit:
+            return self._run_steps(self.hooks, count)
         visits = Staged() if self.staged else Fused()
         return advance(scheme, visits, self.mode, self.setup, self.hooks, count)
+
+    def _run_steps(self, hooks: Any, count: int) -> int:
+        """Take steps row by row, with hooks between them; or load steps."""
+        if self.implicit:
+            return self.load_steps.advance(hooks, count)
+        scheme = self.hub.update.scheme
+        return run_steps(scheme, Staged(), self.mode, self.setup, hooks, count)
+
+    @property
+    def implicit(self) -> bool:
+        """Tell whether the scheme solves equations."""
+        return getattr(self.hub.update.scheme, "implicit", False)
+
+    @cached_property
+    def load_steps(self) -> Any:
+        from karamelo_py.run.implicit.load_steps import LoadSteps
+
+        return LoadSteps(self)
 
     def waits(self) -> np.ndarray:
         """Seconds that each process has waited for others in steps so far."""
@@ -330,7 +350,7 @@ class Simulation(SceneArrays):
 
         The first process does that, and the others find it on disk.
         """
-        if config.DISABLE_JIT or self._python.by_stage:
+        if config.DISABLE_JIT or self._python.by_stage or self.implicit:
             return
         visits = Staged() if self.staged else Fused()
         arguments = self.hub.update.scheme, visits, self.mode, self.setup, self.hooks, 1

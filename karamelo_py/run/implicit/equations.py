@@ -1,0 +1,227 @@
+"""The equations of an implicit step: unknown nodes, the sparse matrix, and ghost stabilisation."""
+
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from karamelo_py.compiler.tuples import flat, record
+from karamelo_py.kernels.arrays import MASS, Setup
+from karamelo_py.kernels.implicit import (
+    Response,
+    Seen,
+    add_forces,
+    add_stiffness,
+    keep_stress,
+    mark_pairs,
+    nothing_seen,
+    respond,
+    see,
+    strain,
+)
+from karamelo_py.points.laws import specific_volume
+
+
+class Equations:
+    """Forces at the nodes that a scene uses in a step, and their derivatives.
+
+    Parameters
+    ----------
+    s
+        The arrays of the scene, with the masses of the step at the nodes.
+
+    Attributes
+    ----------
+    nodes
+        (m,) numbers of the nodes that have mass.
+    places
+        (m, d) places of these in the grid, in cells.
+    """
+
+    def __init__(self, s: Setup):
+        self.s, self.d = s, s.kin.dimension
+        first, last = 1, 1 + int(s.spans[0, 0])
+        used = np.concatenate([np.arange(a, b) for a, b in s.spans[first:last]])
+        self.nodes = np.unique(used[s.nodes.sums[used, MASS] > 0])
+        self.places = self._places()
+        self.parts = [self._seen(block) for block in s.blocks]
+        self.reach = 1 + max((self._spread(seen) for seen, _ in self.parts), default=0)
+        self.row = 2 * self.reach + 1
+        weights = self.row ** np.arange(self.d)[::-1]
+        codes = self.places @ weights
+        for seen, _ in self.parts:
+            seen.offsets[:] = codes[seen.nodes]
+        self.middle = int(self.reach * weights.sum())
+        self.K = np.zeros((len(self.nodes), self.row**self.d, self.d**2))
+        self._pattern()
+
+    def _places(self) -> np.ndarray:
+        """Count the places of the nodes along each direction of their grid."""
+        grids = self.s.grids
+        g = np.searchsorted(grids.first, self.nodes, side="right") - 1
+        local, x, y = self.nodes - grids.first[g], grids.step_x[g], grids.step_y[g]
+        self.steps = np.stack([x, y, np.ones_like(x)], 1)[:, : self.d]
+        self.grid = g
+        return np.stack([local // x, local % x // y, local % y], 1)[:, : self.d]
+
+    def _seen(self, block: Any) -> tuple[Seen, Response]:
+        s = self.s
+        seen, response = nothing_seen(s, block)
+        now = int(s.control.clock[0].now)
+        see(s.frame, s.kin, s.basis, s.grids, block.points, block.laws, now, seen)
+        # Nodes without mass stay where they are: no point has weight there.
+        number = self.number_of(seen.nodes)
+        lost = number < 0
+        first = number[np.arange(len(number)), (~lost).argmax(1)]
+        seen.nodes[:] = np.where(lost, first[:, None], number)
+        seen.weights[lost] = 0
+        seen.gradients[lost] = 0
+        return seen, response
+
+    def _spread(self, seen: Seen) -> int:
+        if not len(seen.nodes):
+            return 0
+        return int(np.ptp(self.places[seen.nodes], axis=1).max())
+
+    def _pattern(self) -> None:
+        """Find which numbers of K there are, and the pairs of nodes that they belong to."""
+        used = np.zeros(self.K.shape[:2], np.uint8)
+        for seen, _ in self.parts:
+            mark_pairs(seen, self.middle, used)
+        rows, offsets = np.nonzero(used)
+        shift = np.stack(np.unravel_index(offsets, (self.row,) * self.d), 1) - self.reach
+        self.pairs = rows, offsets, self.number_of(self.nodes[rows] + (shift * self.steps[rows]).sum(1))
+
+    def number_of(self, nodes: np.ndarray) -> np.ndarray:
+        """Find the numbers of nodes among those with mass; -1 of others."""
+        at = np.minimum(np.searchsorted(self.nodes, nodes), len(self.nodes) - 1)
+        return np.where(self.nodes[at] == nodes, at, -1)
+
+    def unknowns(self, free: np.ndarray) -> None:
+        """Number the free components (m, d), and lay out the sparse matrix of their equations."""
+        d = self.d
+        rows, offsets, columns = self.pairs
+        number = np.full(free.shape, -1)
+        number[free] = np.arange(np.count_nonzero(free))
+        self.free, self.number = free, number
+        shape = (len(rows), d, d)
+        i = np.broadcast_to(number[rows][:, :, None], shape).ravel()
+        j = np.broadcast_to(number[columns][:, None, :], shape).ravel()
+        at = ((rows * self.K.shape[1] + offsets)[:, None] * d * d + np.arange(d * d)).ravel()
+        kept = (i >= 0) & (j >= 0)
+        order = np.lexsort((j[kept], i[kept]))
+        self.taken = at[kept][order]
+        count = np.count_nonzero(free)
+        starts = np.concatenate([[0], np.cumsum(np.bincount(i[kept], minlength=count))])
+        data = np.zeros(len(self.taken))
+        self.matrix = sp.csr_matrix((data, j[kept][order], starts), shape=(count, count))
+        # What prescribed components do to the free ones.
+        fixed = (i >= 0) & (j < 0)
+        self.moving = at[fixed], i[fixed], (columns.repeat(d * d) * d + np.tile(np.arange(d), len(rows) * d))[fixed]
+
+    def respond(self, u: np.ndarray, dt: float) -> np.ndarray:
+        """Find the nodal forces (m, d) of displacements (m, d); not finite where a point fails."""
+        s = self.s
+        f = np.zeros((len(self.nodes), self.d))
+        for block, (seen, response) in zip(s.blocks, self.parts, strict=True):
+            strain(s.kin, seen, u, response.increment)
+            respond(s.kin, block.points, block.laws, dt, response)
+            add_forces(s.kin, seen, response.stress, f)
+        return f
+
+    def present_forces(self) -> np.ndarray:
+        """Find the nodal forces (m, d) of the present stress."""
+        s = self.s
+        f = np.zeros((len(self.nodes), self.d))
+        for block, (seen, response) in zip(s.blocks, self.parts, strict=True):
+            keep_stress(s.kin, block.points, block.laws, response.stress)
+            add_forces(s.kin, seen, response.stress, f)
+        return f
+
+    def positions(self) -> np.ndarray:
+        """Find the positions (m, d) of the nodes."""
+        grids, g = self.s.grids, self.grid
+        origin = np.stack([grids.x0[g], grids.y0[g], grids.z0[g]], 1)[:, : self.d]
+        return origin + grids.spacing[g][:, None] * self.places
+
+    def for_all_components(self, matrix: sp.csr_matrix) -> sp.csr_matrix:
+        """Make of a matrix (m, m) that of all components (m d, m d), each by itself."""
+        return sp.kron(matrix, sp.eye(self.d), "csr")
+
+    def linearise(self) -> None:
+        """Assemble the derivatives of the last forces."""
+        self.K[:] = 0
+        for seen, response in self.parts:
+            add_stiffness(self.s.kin, seen, response.tangent, self.middle, self.K)
+        self.matrix.data[:] = self.K.reshape(-1)[self.taken]
+
+    def of_prescribed(self, change: np.ndarray) -> np.ndarray:
+        """Find the forces at the free components of changes (m, d) of the others."""
+        at, row, column = self.moving
+        parts = self.K.reshape(-1)[at] * change.reshape(-1)[column]
+        return np.bincount(row, parts, minlength=self.matrix.shape[0])
+
+    # --- ghost stabilisation ----------------------------------------------------------------------
+
+    def modulus(self) -> float:
+        """Estimate Young's modulus from the last tangents: 2.6 of the mean shear modulus."""
+        places = self.s.kin.Tensor.places
+        total = volume = 0.0
+        for block, (_, response) in zip(self.s.blocks, self.parts, strict=True):
+            C, points = response.tangent, block.points
+            total += np.sum(C[0] if self.d == 1 else 1.3 * (C[0] - C[places.index((1, 1))]))
+            laws = [record(block.laws, k) for k in range(len(flat(block.laws)[0]))]
+            volumes = np.array([float(specific_volume(law)) for law in laws])
+            volume += np.sum(points.mass * volumes[points.material])
+        return float(total / volume) if volume else 0.0
+
+    def ghost(self, order: int, spacing: float) -> sp.csr_matrix:
+        """Make the matrix (m, m) that penalises what jumps at the border of bodies.
+
+        Functions of `order` p have jumps in their p-th derivatives, which are differences of order
+        p + 1 of neighbours: across faces between cells of which one lies at the border (Coombs
+        2023, for linear functions), or for p = 2, whose knots lie within cells, across these.
+        """
+        d, places = self.d, self.places
+        shape = (int(self.grid.max()) + 1, *(places.max(0) + 2))
+        touched = np.zeros(shape, bool)
+        touched[self.grid, *places.T] = True
+        corners = [tuple(slice(c, c - 1 or None) for c in at) for at in np.ndindex(*(2,) * d)]
+        cells = np.logical_and.reduce([touched[:, *corner] for corner in corners])
+        padded = np.pad(cells, [(0, 0), *[(1, 1)] * d])
+        around = [np.roll(padded, k, 1 + i) for i in range(d) for k in (1, -1)]
+        border = cells & ~np.logical_and.reduce(around)[:, *(slice(1, -1),) * d]
+        weights = differences(order)
+        rows = []
+        for i in range(d):
+            beyond = np.roll(cells, 1, 1 + i), np.roll(border, 1, 1 + i)
+            across = border if order == 2 else cells & beyond[0] & (border | beyond[1])
+            g, *at = np.nonzero(across)
+            for side in np.ndindex(*(2,) * (d - 1)):
+                corner = np.stack(at, 1) + np.insert(np.array(side, int), i, 0)
+                rows.append(self._line(g, corner, i, np.arange(order + 2) - (order + 1) // 2))
+        lines = np.concatenate(rows)
+        lines = lines[(lines >= 0).all(1)]
+        n = len(lines)
+        values = np.tile(weights, n)
+        D = sp.csr_matrix((values, (np.repeat(np.arange(n), order + 2), lines.ravel())), (n, len(self.nodes)))
+        # The same size as for linear functions, whose square has the sum 6.
+        share = 2 / (weights @ weights) / 2 ** (d - 1)
+        return (share * spacing**d * (D.T @ D)).tocsr()
+
+    def _line(self, g: np.ndarray, corner: np.ndarray, axis: int, shifts: np.ndarray) -> np.ndarray:
+        """Find the numbers (rows, shifts) of neighbours of nodes along an axis; -1 where not used."""
+        grids = self.s.grids
+        steps = np.stack([grids.step_x, grids.step_y, np.ones_like(grids.step_x)], 1)[g, : self.d]
+        first = grids.first[g] + (corner * steps).sum(1)
+        along = corner[:, axis, None] + shifts
+        found = self.number_of(first[:, None] + shifts * steps[:, axis, None])
+        return np.where(along >= 0, found, -1)
+
+
+def differences(order: int) -> np.ndarray:
+    """Give the weights of a difference of `order` + 1: 1, -2, 1 for order 1."""
+    weights = np.array([1.0])
+    for _ in range(order + 1):
+        weights = np.convolve(weights, (1.0, -1.0))
+    return weights

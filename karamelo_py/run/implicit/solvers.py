@@ -1,0 +1,85 @@
+"""Solvers of the linear equations of an implicit step."""
+
+import warnings
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.linalg import MatrixRankWarning, splu
+
+MANY = 5000  # unknowns, from which on multigrid is faster than a direct solver
+
+
+class Singular(Exception):
+    """The equations have no solution: something is not held, or a limit load is reached."""
+
+
+def scaled(A: sp.csr_matrix) -> tuple[sp.csr_matrix, np.ndarray]:
+    """Scale rows and columns such that the diagonal is 1."""
+    diagonal = np.abs(A.diagonal())
+    if not np.all(diagonal > 0):
+        raise Singular
+    s = 1 / np.sqrt(diagonal)
+    return sp.diags(s) @ A @ sp.diags(s), s
+
+
+def direct(A: sp.csr_matrix, b: np.ndarray, rigid: np.ndarray) -> np.ndarray:
+    """Solve by SuperLU."""
+    B, s = scaled(A)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", MatrixRankWarning)
+        try:
+            factors = splu(B.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+        except (RuntimeError, MatrixRankWarning):
+            raise Singular from None
+    return s * factors.solve(s * b)
+
+
+def amg(A: sp.csr_matrix, b: np.ndarray, rigid: np.ndarray) -> np.ndarray:
+    """Solve by conjugate gradients (GMRES where A is not symmetric) with algebraic multigrid.
+
+    `rigid` are the rigid motions (n, k) of the unknowns: smoothed aggregation takes them for what
+    hardly meets a resistance (Vanek, Mandel & Brezina 1996).
+    """
+    import pyamg
+
+    B, s = scaled(A)
+    skew = abs(B - B.T).max()
+    symmetric = skew < 1e-9
+    solver = pyamg.smoothed_aggregation_solver(
+        B.tocsr(),
+        B=rigid / s[:, None],
+        symmetry="symmetric" if symmetric else "nonsymmetric",
+    )
+    left: list[float] = []
+    x = solver.solve(
+        s * b, tol=1e-10, accel="cg" if symmetric else "gmres", maxiter=300, residuals=left
+    )
+    if not np.all(np.isfinite(x)) or left[-1] > 1e-6 * max(left[0], 1e-300):
+        raise Singular
+    return s * x
+
+
+def solve(name: str, A: sp.csr_matrix, b: np.ndarray, rigid: np.ndarray) -> np.ndarray:
+    """Solve by the solver of a `name`: direct, amg or auto."""
+    chosen = direct if name == "direct" or (name == "auto" and A.shape[0] < MANY) else amg
+    x = chosen(A, b, rigid)
+    if not np.all(np.isfinite(x)):
+        raise Singular
+    return x
+
+
+def rigid_motions(positions: np.ndarray, axisymmetric: bool) -> np.ndarray:
+    """Rigid motions (m, d, k) of nodes at `positions` (m, d); around an axis, along it alone."""
+    m, d = positions.shape
+    x = positions - positions.mean(0)
+    motions = [np.broadcast_to(np.eye(d)[i], (m, d)) for i in range(d)]
+    if axisymmetric:
+        motions = motions[1:]
+    elif d == 2:
+        motions.append(np.stack([-x[:, 1], x[:, 0]], 1))
+    elif d == 3:
+        for i, j in ((0, 1), (0, 2), (1, 2)):
+            turn = np.zeros((m, d))
+            turn[:, i], turn[:, j] = -x[:, j], x[:, i]
+            motions.append(turn)
+    return np.stack(motions, 2)

@@ -1,0 +1,76 @@
+"""Quasi-static: load steps in equilibrium, each by Newton's method."""
+
+from typing import Annotated, Literal, NamedTuple
+
+from karamelo_py.kernels.arrays import (
+    FINAL_INTEGRATE,
+    INITIAL_INTEGRATE,
+    ON_SUMS,
+    ON_UPDATE,
+    POST_PARTICLES_TO_GRID,
+    POST_UPDATE_GRID_STATE,
+)
+from karamelo_py.kernels.g2p import Strain
+from karamelo_py.kernels.rows import AXIS, MOVE, SUMS, WORK_OF_LOADS
+from karamelo_py.kernels.table import AtNodes, AtPoints, Gather
+from karamelo_py.language.signature import NonNegative, Positive
+
+# What acts on the nodes in a step, by present stress; who holds them; and how points follow.
+BEGIN = (AtPoints(INITIAL_INTEGRATE, 0), SUMS, AtNodes(POST_PARTICLES_TO_GRID, ON_SUMS), AXIS)
+HOLD = (AtNodes(POST_UPDATE_GRID_STATE, ON_UPDATE), AXIS)
+CLOSE = (WORK_OF_LOADS, *MOVE, Gather(Strain()), AtPoints(FINAL_INTEGRATE, 1))
+
+
+class QuasiStatic(NamedTuple):
+    """Load steps without inertia: each ends in equilibrium, found by Newton's method.
+
+    Loads are formulas of `time`, which is no more than a parameter here: a step of the run is a
+    load step. The tangent is exact for every law and basis, so that Newton's method converges
+    quadratically. A step that does not converge is done in halves.
+
+    Parameters
+    ----------
+    tolerance
+        What is left of the largest nodal forces when a step ends, as a share of them.
+    iterations
+        How often a step is corrected before it is done in halves.
+    solver
+        Of the linear equations: ``direct``, ``amg`` (conjugate gradients with algebraic
+        multigrid), or ``auto``, which takes amg from 5000 unknowns on.
+    stabilisation
+        Share of Young's modulus by which jumps of the gradient at the border of a body are
+        penalised (ghost stabilisation; Coombs 2023). It bears nodes that see next to nothing of
+        the body. 0: none.
+
+    Example
+    -------
+    scheme(quasi-static)
+    scheme(quasi-static, tolerance=1e-8, iterations=30, solver=direct)
+
+    Notes
+    -----
+    Velocities are zero after a step, and so are kinetic energies.
+    """
+
+    implicit = True
+    begin = BEGIN
+    hold = HOLD
+    close = CLOSE
+    rows = (*BEGIN, *HOLD, *CLOSE)
+
+    tolerance: float
+    iterations: int
+    solver: str
+    stabilisation: float
+
+    @classmethod
+    def given(
+        cls,
+        *,
+        tolerance: Annotated[float, Positive] = 1e-10,
+        iterations: Annotated[int, Positive] = 20,
+        solver: Literal["auto", "direct", "amg"] = "auto",
+        stabilisation: Annotated[float, NonNegative] = 1 / 30,
+    ):
+        """The scheme from the words of a script."""
+        return cls(tolerance, iterations, solver, stabilisation)
