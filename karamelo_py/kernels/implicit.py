@@ -245,3 +245,22 @@ def furthest(kin, seen, u):
             total = total + seen.weights[p, k] * vector(kin, [u[node, i] for i in range(kin.dimension)])
         most = max(most, total.largest())
     return most
+
+
+@kernel
+def scatter(seen, mass, values, nodes):
+    """Add mass times values (d, n) of points to nodes (m, d)."""
+    for p in range(seen.nodes.shape[0]):
+        for k in range(seen.nodes.shape[1]):
+            share = mass[p] * seen.weights[p, k]
+            for i in range(nodes.shape[1]):
+                nodes[seen.nodes[p, k], i] += share * values[i, p]
+
+
+@kernel
+def gather(seen, nodes, values):
+    """Add values of nodes (m, d) to points (d, n)."""
+    for p in range(seen.nodes.shape[0]):
+        for k in range(seen.nodes.shape[1]):
+            for i in range(nodes.shape[1]):
+                values[i, p] += seen.weights[p, k] * nodes[seen.nodes[p, k], i]

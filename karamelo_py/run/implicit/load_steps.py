@@ -6,20 +6,13 @@ import numpy as np
 
 from karamelo_py.kernels.arrays import DT, MASS, TIME, TIMESTEP, Hooks, of_change, of_force
 from karamelo_py.kernels.clock import finish
-from karamelo_py.kernels.implicit import furthest
 from karamelo_py.kernels.step import DONE, SORT, take_rows
-from karamelo_py.points.kinematics import Axisymmetric
 from karamelo_py.run.implicit.equations import Equations
-from karamelo_py.run.implicit.solvers import Singular, rigid_motions, solve
+from karamelo_py.run.implicit.inertia import Motion, Rest
+from karamelo_py.run.implicit.newton import Failed, Newton
 from karamelo_py.script.errors import ScriptError
 
 HALVINGS = 10  # of a load step, at most
-FAR = 0.5  # cells that points may go in one part of a load step
-ROUNDED = 1e-14  # of the largest forces: no solution is better
-
-
-class Failed(Exception):
-    """A part of a load step has no solution that Newton's method finds, for a reason."""
 
 
 class Report(NamedTuple):
@@ -36,6 +29,7 @@ class LoadSteps:
     def __init__(self, simulation: Any):
         self.simulation = simulation
         self.scheme = simulation.hub.update.scheme
+        self.dynamic = hasattr(self.scheme, "beta")
         self.modulus = 0.0
         self.report = Report(0, 0.0, 0)
 
@@ -78,7 +72,7 @@ class LoadSteps:
         return DONE
 
     def _part(self, hooks: Any, dt: float) -> tuple[int, float]:
-        """Take a part of a load step: find its equilibrium, and let the points follow.
+        """Take a part of a step: find its equilibrium, and let the points follow.
 
         Loads are those of its end. Returns the number of corrections, and the residual that is
         left.
@@ -86,101 +80,69 @@ class LoadSteps:
         Raises
         ------
         Failed
-            If there is no equilibrium to be found; nothing has changed then.
+            If there is no equilibrium to be found; the points have not moved then.
         """
         simulation = self.simulation
         s, control = simulation.setup, simulation.setup.control
         time = float(control.values[TIME])
-        control.values[DT] = dt
-        control.clock[0].kick = control.clock[0].last_dt = dt
-        control.values[TIME] = time + dt
         totals = control.totals.copy()
+        control.values[DT] = control.clock[0].kick = control.clock[0].last_dt = dt
         try:
-            if not take_rows(self.scheme.begin, s, simulation.mode, hooks):
-                raise Failed("a point has left the domain")
-            equations = Equations(s)
-            found = self._newton(equations, hooks, dt)
+            before = self._forces(hooks).copy() if self.dynamic else None
+            control.values[TIME] = time + dt
+            after = self._forces(hooks)
+            found = self._equilibrium(hooks, dt, before, after)
+            self._publish(found, hooks, dt)
+            if not take_rows(self.scheme.close, s, simulation.mode, hooks):
+                raise Failed("a point has gone wrong")
         except Failed:
             control.totals[:] = totals
-            self._loads()[:] = 0
             raise
         finally:
             control.values[TIME] = time
-        control.values[TIME] = time + dt
-        self._publish(equations, found, hooks, dt)
-        went_well = take_rows(self.scheme.close, s, simulation.mode, hooks)
-        control.values[TIME] = time
-        if not went_well:
-            raise Failed("a point has gone wrong")
-        for block in s.blocks:
-            block.points.v[:] = 0
+        found.inertia.end(found.u, found.given, found.prescribed)
         finish(control)
         return found.iterations, found.residual
 
-    def _loads(self) -> np.ndarray:
-        """The loads at nodes that hooks note for the work that they do."""
-        hooks = self.simulation.hooks
-        return hooks.loads if isinstance(hooks, Hooks) else np.zeros(0)
-
-    def _newton(self, equations: Equations, hooks: Any, dt: float) -> "Equilibrium":
-        """Find the displacements at which the forces of a part of a step are in balance."""
-        scheme, d = self.scheme, equations.d
-        s, nodes = equations.s, equations.nodes
+    def _forces(self, hooks: Any) -> np.ndarray:
+        """Sum mass, momentum and forces at the nodes; return the forces (nodes, d) there."""
+        simulation = self.simulation
+        s = simulation.setup
+        simulation.clear_forces()
+        if isinstance(simulation.hooks, Hooks):
+            simulation.hooks.loads[:] = 0
+        if not take_rows(self.scheme.begin, s, simulation.mode, hooks):
+            raise Failed("a point has left the domain")
         force = of_force(s.kin)
-        external = s.nodes.sums[nodes, force : force + d] + equations.present_forces()
+        return s.nodes.sums[:, force : force + s.kin.dimension]
+
+    def _equilibrium(
+        self, hooks: Any, dt: float, before: np.ndarray | None, after: np.ndarray
+    ) -> "Equilibrium":
+        """Find the displacements at which forces are in balance.
+
+        `before` and `after` are the forces at all nodes, by the present stress and by loads of the
+        beginning and of the end; `before` is None where there is no inertia.
+        """
+        s = self.simulation.setup
+        equations = Equations(s)
+        nodes = equations.nodes
+        external = after[nodes] + equations.present_forces()
         given, prescribed = self._prescribed(equations, hooks)
-        jump = np.where(given, prescribed * dt, 0.0)
-        free = ~given
-        equations.unknowns(free)
-        u = np.zeros_like(external)
-        inner = equations.respond(u, dt)
-        spacing = float(s.grids.spacing[0])
+        equations.unknowns(~given)
+        if before is None:
+            inertia: Rest | Motion = Rest(equations)
+        else:
+            first = s.control.values[TIMESTEP] == 0
+            inertia = Motion(equations, self.scheme, dt, before[nodes], first)
+        newton = Newton(self.scheme, equations, inertia, external, dt)
         if not self.modulus:
             self.modulus = equations.modulus()
-        share = scheme.stabilisation * self.modulus
-        order = getattr(type(s.basis), "degree", 1)
-        ghost = share * equations.ghost(order, spacing) if share else None
-        floor = 1e-9 * self.modulus * spacing ** (d - 1)
-        motions = rigid_motions(equations.positions(), isinstance(s.kin, Axisymmetric))
-        rigid = motions[free]
-        residual, settled = np.inf, False
-        for iteration in range(scheme.iterations + 1):
-            balance = external - inner
-            if ghost is not None:
-                balance -= ghost @ u
-            size = max(np.linalg.norm(external), np.linalg.norm(inner), floor)
-            residual = float(np.linalg.norm(balance[free]) / size)
-            done = residual <= scheme.tolerance or settled
-            if done and not (iteration == 0 and np.any(jump)):
-                return Equilibrium(u, given, -balance, iteration, residual)
-            if iteration == scheme.iterations:
-                break
-            equations.linearise()
-            A, b = equations.matrix, balance[free] - equations.of_prescribed(jump)
-            if ghost is not None:
-                of_all = equations.for_all_components(ghost)
-                A = A + of_all[free.ravel()][:, free.ravel()]
-                b -= (ghost @ jump)[free]
-            change = jump.copy()
-            if len(b):
-                try:
-                    change[free] = solve(scheme.solver, A, b, rigid)
-                except Singular:
-                    raise Failed(SINGULAR) from None
-            u += change
-            jump[:] = 0
-            inner = equations.respond(u, dt)
-            if not np.all(np.isfinite(inner)):
-                raise Failed("a point turns inside out")
-            self._check_reach(equations, u, spacing)
-            settled = np.linalg.norm(change) <= scheme.tolerance * np.linalg.norm(u)
-        raise Failed(f"{scheme.iterations} corrections leave {residual:.1e} of the forces")
-
-    def _check_reach(self, equations: Equations, u: np.ndarray, spacing: float) -> None:
-        kin = equations.s.kin
-        far = max(furthest(kin, seen, u) for seen, _ in equations.parts) / spacing
-        if not far <= FAR:
-            raise Failed(f"points would go {far:.3g} cells at once")
+        newton.stabilise(self.scheme.stabilisation * self.modulus)
+        newton.floor = 1e-9 * self.modulus * newton.spacing ** (equations.d - 1)
+        u, iterations, residual = newton.solve(np.where(given, prescribed * dt, 0.0))
+        reaction = newton.reaction(u)
+        return Equilibrium(equations, inertia, u, given, prescribed, reaction, iterations, residual)
 
     def _prescribed(self, equations: Equations, hooks: Any) -> tuple[np.ndarray, np.ndarray]:
         """Find which components of the nodes are held, and the velocities that they get.
@@ -206,13 +168,13 @@ class LoadSteps:
             )
         return given, found[0]
 
-    def _publish(self, equations: Equations, found: "Equilibrium", hooks: Any, dt: float) -> None:
+    def _publish(self, found: "Equilibrium", hooks: Any, dt: float) -> None:
         """Let those that hold nodes publish the forces that they do it with; velocities at nodes.
 
         They are shown the velocity that a node would have without them.
         """
-        simulation, s = self.simulation, equations.s
-        d, nodes, update = equations.d, equations.nodes, s.nodes.update
+        simulation, s = self.simulation, found.equations.s
+        d, nodes, update = found.equations.d, found.equations.nodes, s.nodes.update
         mass = s.nodes.sums[nodes, MASS, None]
         v = found.u / dt
         without = np.where(found.given, -found.reaction * dt / mass, 0.0)
@@ -235,14 +197,14 @@ class LoadSteps:
         )
 
 
-SINGULAR = "the equations are singular"
-
-
 class Equilibrium(NamedTuple):
-    """Displacements (m, d) of the nodes, which are given, and the forces that hold them."""
+    """Displacements (m, d) of the nodes after a part of a step, and the forces that hold them."""
 
+    equations: Equations
+    inertia: Rest | Motion
     u: np.ndarray
-    given: np.ndarray
+    given: np.ndarray  # which components are held
+    prescribed: np.ndarray  # their velocities
     reaction: np.ndarray
     iterations: int
     residual: float

@@ -1,0 +1,134 @@
+"""Newton's method for the displacements of the nodes in an implicit step."""
+
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from karamelo_py.kernels.implicit import furthest
+from karamelo_py.points.kinematics import Axisymmetric
+from karamelo_py.run.implicit.equations import Equations
+from karamelo_py.run.implicit.solvers import Singular, rigid_motions, solve
+
+FAR = 0.5  # cells that points may go at once: weights are those of the beginning
+
+
+class Failed(Exception):
+    """Newton's method finds no equilibrium, for a reason."""
+
+
+class Newton:
+    """The balance of forces after displacements, and its solution.
+
+    Parameters
+    ----------
+    scheme
+        A tag with ``tolerance``, ``iterations`` and ``solver``.
+    equations
+        Forces and stiffness, with numbered unknowns.
+    inertia
+        What moving bodies add.
+    external
+        (m, d) forces that are not those of stress.
+    dt
+        The step.
+
+    Attributes
+    ----------
+    floor
+        A force that is next to nothing: residuals are relative to it at least.
+    """
+
+    def __init__(self, scheme: Any, equations: Equations, inertia: Any, external: np.ndarray, dt: float):
+        self.scheme, self.equations, self.inertia = scheme, equations, inertia
+        self.external, self.dt = external, dt
+        s = equations.s
+        self.free = equations.free
+        self.spacing = float(s.grids.spacing[0])
+        self.mass = s.nodes.sums[equations.nodes, 0].astype(float)
+        self.ghost: sp.csr_matrix | None = None
+        self.floor = 0.0
+        motions = rigid_motions(equations.positions(), isinstance(s.kin, Axisymmetric))
+        self.rigid = motions[self.free]
+        self.inner = equations.respond(np.zeros_like(external), dt)
+
+    def stabilise(self, stiffness: float) -> None:
+        """Penalise jumps at the border of bodies, by a `stiffness` per area."""
+        if stiffness:
+            degree = getattr(type(self.equations.s.basis), "degree", 1)
+            self.ghost = stiffness * self.equations.ghost(degree, self.spacing)
+
+    def solve(self, jump: np.ndarray) -> tuple[np.ndarray, int, float]:
+        """Find displacements (m, d); `jump` (m, d) are those of the components that are given.
+
+        Returns the number of corrections, too, and the residual that is left.
+
+        Raises
+        ------
+        Failed
+            If there are none within the iterations allowed.
+        """
+        scheme, free = self.scheme, self.free
+        u = np.zeros_like(jump)
+        settled = False
+        for iteration in range(scheme.iterations + 1):
+            balance = self.balance(u)
+            residual = float(np.linalg.norm(balance[free]) / self._size(u))
+            done = residual <= scheme.tolerance or settled
+            if done and not (iteration == 0 and np.any(jump)):
+                return u, iteration, residual
+            if iteration < scheme.iterations:
+                change = self._correction(balance, jump)
+                u += change
+                jump = np.zeros_like(jump)
+                self._respond(u)
+                # Where forces are small beside what they are rounded to, displacements tell.
+                settled = np.linalg.norm(change) <= scheme.tolerance * np.linalg.norm(u)
+        raise Failed(f"after {scheme.iterations} corrections {residual:.1e} of the forces are left")
+
+    def balance(self, u: np.ndarray) -> np.ndarray:
+        """Find what the forces leave (m, d)."""
+        forces = self.external - self.inner
+        if self.ghost is not None:
+            forces -= self.ghost @ u
+        return self.inertia.balance(u, forces)
+
+    def reaction(self, u: np.ndarray) -> np.ndarray:
+        """Find the forces (m, d) that hold given components."""
+        return -self.balance(u)
+
+    def _size(self, u: np.ndarray) -> float:
+        norms = np.linalg.norm(self.external), np.linalg.norm(self.inner), self.inertia.size(u)
+        return max(*norms, self.floor, 1e-300)
+
+    def _correction(self, balance: np.ndarray, jump: np.ndarray) -> np.ndarray:
+        """Solve the linear equations for the change of all displacements (m, d)."""
+        equations, inertia, free = self.equations, self.inertia, self.free
+        change = jump.copy()
+        equations.linearise()
+        A = inertia.share * equations.matrix
+        b = balance[free] - inertia.share * equations.of_prescribed(jump)
+        if self.ghost is not None:
+            of_all = inertia.share * equations.for_all_components(self.ghost)
+            A = A + of_all[free.ravel()][:, free.ravel()]
+            b -= inertia.share * (self.ghost @ jump)[free]
+        if inertia.diagonal:
+            mass = np.broadcast_to(self.mass[:, None], free.shape)[free]
+            A = A + sp.diags(inertia.diagonal * mass)
+        if len(b):
+            try:
+                change[free] = solve(self.scheme.solver, A, b, self.rigid)
+            except Singular:
+                raise Failed("the equations are singular") from None
+        return change
+
+    def _respond(self, u: np.ndarray) -> None:
+        """Find the forces of stress after displacements (m, d), if points can follow."""
+        equations = self.equations
+        self.inner = equations.respond(u, self.dt)
+        if not np.all(np.isfinite(self.inner)):
+            raise Failed("a point turns inside out")
+        kin = equations.s.kin
+        far = max(furthest(kin, seen, u) for seen, _ in equations.parts) / self.spacing
+        if not far <= FAR:
+            raise Failed(f"points would go {far:.3g} cells at once")
