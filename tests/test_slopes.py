@@ -1,7 +1,5 @@
 """Numbers with slopes go through all laws as they are: their tangents are those of differences."""
 
-import math
-
 import numpy as np
 import pytest
 from numba import config
@@ -9,7 +7,7 @@ from numba import config
 from karamelo_py.compiler.algebra import on_numbers
 from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.loops import kernel
-from karamelo_py.compiler.slopes import Dual, seeded, slopes_of
+from karamelo_py.compiler.slopes import seeded, slopes_of
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
 from karamelo_py.points.laws import advance, initial_state, kirchhoff_stress
 from karamelo_py.points.laws.elasticity import lame_parameters

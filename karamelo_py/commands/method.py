@@ -81,14 +81,14 @@ def method(
 
 
 def scheme(hub: Hub, style: StyleOf("scheme"), *arguments: Argument) -> None:
-    """Choose when in a step the stress is updated.
+    """Choose when in a step the stress is updated, or implicit steps.
 
     Parameters
     ----------
     style
         ``musl`` when there is no such command.
     arguments
-        What the style asks for; those that come with the program ask for nothing.
+        What the style asks for; explicit schemes ask for nothing.
 
     Example
     -------
@@ -102,6 +102,8 @@ def scheme(hub: Hub, style: StyleOf("scheme"), *arguments: Argument) -> None:
     chosen = signature.call(target, hub, arguments, f"scheme {style}")
     check_part(hub, f"scheme {style}", chosen)
     hub.update.scheme, hub.update.scheme_place = chosen, hub.place
+    for name in getattr(chosen, "published", ()):
+        hub.values.publish(name)
 
 
 def precision(hub: Hub, kind: Literal["double", "single"]) -> None:

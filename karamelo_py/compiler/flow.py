@@ -185,7 +185,8 @@ class Flow:
                 return _DROPPED
             return type(first)(*items) if hasattr(first, "_fields") else tuple(items)
         numbers = [t for t in things if is_number_type(t)]
-        if numbers and all(isinstance(t, Value) or is_literal(t) or is_number_type(t) for t in things):
+        plain = [t for t in things if not is_number_type(t)]
+        if numbers and all(isinstance(t, Value) or is_literal(t) for t in plain):
             wide = [t if is_number_type(t) else numbers[0].constant(t) for t in things]
             return self._merged(wide, phis)
         if any(t is None or not isinstance(t, (Value, HeldValue, *_PLAIN)) for t in things):

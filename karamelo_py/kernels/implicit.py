@@ -2,9 +2,10 @@
 
 Weights and gradients are those of the beginning of a step, and stay what they are while Newton's
 method goes on. With H = sum_I u_I (x) grad N_I of the trial displacements, the nominal stress
-P(H) = tau(H) (I + H)^-T gives the forces V0 P grad N, and dP/dH (:mod:`karamelo_py.compiler.slopes`)
-the whole stiffness V0 grad N dP/dH grad N: geometry, and all that a law does while it yields. (Wang
-et al. 2021, "A consistent implicit MPM", keep gradients in the same way.)
+P(H) = tau(H) (I + H)^-T gives the forces V0 P grad N. Its derivatives dP/dH
+(:mod:`karamelo_py.compiler.slopes`) give the whole stiffness V0 grad N dP/dH grad N: geometry, and
+all that a law does while it yields (Charlton, Coombs & Augarde 2017 keep gradients in the same
+way).
 """
 
 from typing import NamedTuple
@@ -18,7 +19,7 @@ from karamelo_py.compiler.fields import load, rows_of_points, store
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.slopes import seeded, slopes_of
-from karamelo_py.compiler.tuples import flat, record
+from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Block, Setup
 from karamelo_py.kernels.lanes import lanes_of_law, points_at_once, points_from
 from karamelo_py.kernels.sweep import places_of
@@ -120,7 +121,7 @@ def stress_and_tangent(law, kin, state, H, dt):
     return P._make([x.value for x in P]), tuple([slopes_of(x, len(H)) for x in P])
 
 
-if config.DISABLE_JIT:
+if config.DISABLE_JIT:  # type: ignore[attr-defined]
     stress_and_tangent = on_numbers(stress_and_tangent)
 
 
@@ -242,7 +243,9 @@ def furthest(kin, seen, u):
         total = vector(kin, [0.0 for _ in range(kin.dimension)])
         for k in range(seen.nodes.shape[1]):
             node = seen.nodes[p, k]
-            total = total + seen.weights[p, k] * vector(kin, [u[node, i] for i in range(kin.dimension)])
+            total = total + seen.weights[p, k] * vector(
+                kin, [u[node, i] for i in range(kin.dimension)]
+            )
         most = max(most, total.largest())
     return most
 

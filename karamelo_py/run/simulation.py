@@ -140,7 +140,8 @@ class Simulation(SceneArrays):
         courants = "courant", "courant_moving"
         before = [clock[name] for name in (*courants, *names)]
         now, moving = (step_of_waves(self.hub, still=s) for s in (clock.path <= STILL, False))
-        asked = self.hub.update.fixed_dt or float(self.implicit), share_of_heat(self.hub), now[1], moving[1]
+        fixed = self.hub.update.fixed_dt or float(self.implicit)  # load steps of 1
+        asked = fixed, share_of_heat(self.hub), now[1], moving[1]
         numbers = [now[0], moving[0], *(number / 2**halvings for number in asked)]
         for name, number in zip((*courants, *names), numbers, strict=True):
             clock[name] = number

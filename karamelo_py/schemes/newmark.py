@@ -4,7 +4,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 from karamelo_py.compiler.fields import Field, vector
 from karamelo_py.language.signature import NonNegative, Positive
-from karamelo_py.schemes.quasi_static import BEGIN, CLOSE, HOLD
+from karamelo_py.schemes.quasi_static import BEGIN, CLOSE, HOLD, PUBLISHED
 from karamelo_py.script.errors import ScriptError
 
 
@@ -50,6 +50,7 @@ class Newmark(NamedTuple):
     hold = HOLD
     close = CLOSE
     rows = (*BEGIN, *HOLD, *CLOSE)
+    published = PUBLISHED
     point_fields = (Acceleration,)
 
     beta: float

@@ -19,6 +19,8 @@ from karamelo_py.language.signature import NonNegative, Positive
 BEGIN = (AtPoints(INITIAL_INTEGRATE, 0), SUMS, AtNodes(POST_PARTICLES_TO_GRID, ON_SUMS), AXIS)
 HOLD = (AtNodes(POST_UPDATE_GRID_STATE, ON_UPDATE), AXIS)
 CLOSE = (WORK_OF_LOADS, *MOVE, Gather(Strain()), AtPoints(FINAL_INTEGRATE, 1))
+# Of the last step: corrections, the share of forces that was left, and parts it was done in.
+PUBLISHED = "iterations", "residual", "parts"
 
 
 class QuasiStatic(NamedTuple):
@@ -49,7 +51,12 @@ class QuasiStatic(NamedTuple):
 
     Notes
     -----
-    Velocities are zero after a step, and so are kinetic energies.
+    Velocities are zero after a step, and so are kinetic energies. A script can show `iterations`,
+    `residual` and `parts` of the last step: corrections, the share of the forces that was left,
+    and how many parts the step was done in.
+
+    Points should not go further than half a cell in a step; one that takes them further is done
+    in parts.
     """
 
     implicit = True
@@ -57,6 +64,7 @@ class QuasiStatic(NamedTuple):
     hold = HOLD
     close = CLOSE
     rows = (*BEGIN, *HOLD, *CLOSE)
+    published = PUBLISHED
 
     tolerance: float
     iterations: int

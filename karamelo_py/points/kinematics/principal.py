@@ -215,7 +215,11 @@ def _from_principal_slopes(s, values, directions):
     ]
     tensors = [
         out_of_frame(s, slopes, tuple([r * c for r, c in zip(ratios, shears, strict=True)]), frame)
-        for slopes, shears in zip(columns(values, len(directions.shears)), directions.shears, strict=True)
+        for slopes, shears in zip(
+            columns(values, len(directions.shears)), directions.shears, strict=True
+        )
     ]
     made = from_principal(value_of(s), plain, frame)
-    return s._make([Dual(v, tuple(t)) for v, t in zip(made, zip(*tensors, strict=True), strict=True)])
+    return s._make(
+        [Dual(v, tuple(t)) for v, t in zip(made, zip(*tensors, strict=True), strict=True)]
+    )

@@ -4,8 +4,10 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
 
-from karamelo_py.compiler.tuples import flat, record
+from karamelo_py.compiler.algebra import on_numbers
+from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import MASS, Setup
 from karamelo_py.kernels.implicit import (
     Response,
@@ -18,8 +20,9 @@ from karamelo_py.kernels.implicit import (
     respond,
     see,
     strain,
+    stress_and_tangent,
 )
-from karamelo_py.points.laws import specific_volume
+from karamelo_py.points.laws import initial_state, specific_volume
 
 
 class Equations:
@@ -90,12 +93,23 @@ class Equations:
             mark_pairs(seen, self.middle, used)
         rows, offsets = np.nonzero(used)
         shift = np.stack(np.unravel_index(offsets, (self.row,) * self.d), 1) - self.reach
-        self.pairs = rows, offsets, self.number_of(self.nodes[rows] + (shift * self.steps[rows]).sum(1))
+        self.pairs = (
+            rows,
+            offsets,
+            self.number_of(self.nodes[rows] + (shift * self.steps[rows]).sum(1)),
+        )
 
     def number_of(self, nodes: np.ndarray) -> np.ndarray:
         """Find the numbers of nodes among those with mass; -1 of others."""
         at = np.minimum(np.searchsorted(self.nodes, nodes), len(self.nodes) - 1)
         return np.where(self.nodes[at] == nodes, at, -1)
+
+    def bodies(self) -> np.ndarray:
+        """Number (m,) the bodies that nodes belong to: pieces that points connect."""
+        rows, _, columns = self.pairs
+        m = len(self.nodes)
+        graph = sp.csr_matrix((np.ones(len(rows), bool), (rows, columns)), (m, m))
+        return connected_components(graph, directed=False)[1]
 
     def unknowns(self, free: np.ndarray) -> None:
         """Number the free components (m, d), and lay out the sparse matrix of their equations."""
@@ -117,7 +131,11 @@ class Equations:
         self.matrix = sp.csr_matrix((data, j[kept][order], starts), shape=(count, count))
         # What prescribed components do to the free ones.
         fixed = (i >= 0) & (j < 0)
-        self.moving = at[fixed], i[fixed], (columns.repeat(d * d) * d + np.tile(np.arange(d), len(rows) * d))[fixed]
+        self.moving = (
+            at[fixed],
+            i[fixed],
+            (columns.repeat(d * d) * d + np.tile(np.arange(d), len(rows) * d))[fixed],
+        )
 
     def respond(self, u: np.ndarray, dt: float) -> np.ndarray:
         """Find the nodal forces (m, d) of displacements (m, d); not finite where a point fails."""
@@ -164,16 +182,21 @@ class Equations:
     # --- ghost stabilisation ----------------------------------------------------------------------
 
     def modulus(self) -> float:
-        """Estimate Young's modulus from the last tangents: 2.6 of the mean shear modulus."""
-        places = self.s.kin.Tensor.places
+        """Estimate Young's modulus of the bodies at rest: 2.6 of the mean shear modulus."""
+        kin = self.s.kin
+        places = kin.Tensor.places
         total = volume = 0.0
-        for block, (_, response) in zip(self.s.blocks, self.parts, strict=True):
-            C, points = response.tangent, block.points
-            total += np.sum(C[0] if self.d == 1 else 1.3 * (C[0] - C[places.index((1, 1))]))
-            laws = [record(block.laws, k) for k in range(len(flat(block.laws)[0]))]
-            volumes = np.array([float(specific_volume(law)) for law in laws])
-            volume += np.sum(points.mass * volumes[points.material])
-        return float(total / volume) if volume else 0.0
+        for block in self.s.blocks:
+            points = block.points
+            for k in np.unique(points.material):
+                law = record(block.laws, k)
+                rest = kin.Tensor._make([0.0] * len(places))
+                state = initial_state(law, kin, 1.0)
+                _, C = on_numbers(stress_and_tangent)(law, kin, state, rest, 1.0)
+                one = C[0][0] if self.d == 1 else 1.3 * (C[0][0] - C[0][places.index((1, 1))])
+                own = float(points.mass[points.material == k].sum() * specific_volume(law))
+                total, volume = total + own * float(one), volume + own
+        return total / volume if volume else 0.0
 
     def ghost(self, order: int, spacing: float) -> sp.csr_matrix:
         """Make the matrix (m, m) that penalises what jumps at the border of bodies.
@@ -204,7 +227,9 @@ class Equations:
         lines = lines[(lines >= 0).all(1)]
         n = len(lines)
         values = np.tile(weights, n)
-        D = sp.csr_matrix((values, (np.repeat(np.arange(n), order + 2), lines.ravel())), (n, len(self.nodes)))
+        D = sp.csr_matrix(
+            (values, (np.repeat(np.arange(n), order + 2), lines.ravel())), (n, len(self.nodes))
+        )
         # The same size as for linear functions, whose square has the sum 6.
         share = 2 / (weights @ weights) / 2 ** (d - 1)
         return (share * spacing**d * (D.T @ D)).tocsr()

@@ -1,4 +1,4 @@
-"""Inertia in the balance of an implicit step, and the velocities that follow; none of load steps."""
+"""Inertia in the balance of an implicit step, and the velocities that follow."""
 
 from typing import Any
 
@@ -51,7 +51,9 @@ class Motion:
         Whether this is a first step.
     """
 
-    def __init__(self, equations: Equations, scheme: Any, dt: float, before: np.ndarray, first: bool):
+    def __init__(
+        self, equations: Equations, scheme: Any, dt: float, before: np.ndarray, first: bool
+    ):
         self.equations, self.scheme, self.dt = equations, scheme, dt
         s = equations.s
         self.mass = s.nodes.sums[equations.nodes, MASS, None].astype(float)

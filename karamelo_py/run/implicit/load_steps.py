@@ -7,20 +7,15 @@ import numpy as np
 from karamelo_py.kernels.arrays import DT, MASS, TIME, TIMESTEP, Hooks, of_change, of_force
 from karamelo_py.kernels.clock import finish
 from karamelo_py.kernels.step import DONE, SORT, take_rows
+from karamelo_py.points.kinematics.tags import free_from
 from karamelo_py.run.implicit.equations import Equations
 from karamelo_py.run.implicit.inertia import Motion, Rest
 from karamelo_py.run.implicit.newton import Failed, Newton
+from karamelo_py.schemes.quasi_static import PUBLISHED
 from karamelo_py.script.errors import ScriptError
 
 HALVINGS = 10  # of a load step, at most
-
-
-class Report(NamedTuple):
-    """What a load step took."""
-
-    iterations: int
-    residual: float
-    parts: int
+SHOWN = 1e20  # a velocity that nobody prescribes
 
 
 class LoadSteps:
@@ -31,7 +26,6 @@ class LoadSteps:
         self.scheme = simulation.hub.update.scheme
         self.dynamic = hasattr(self.scheme, "beta")
         self.modulus = 0.0
-        self.report = Report(0, 0.0, 0)
 
     def advance(self, hooks: Any, count: int) -> int:
         """Take up to `count` load steps; return how they ended, as `run_steps` does."""
@@ -67,7 +61,8 @@ class LoadSteps:
                 part *= 2 if taken <= self.scheme.iterations // 2 else 1
                 if control.clock[0].drift > control.clock[0].drift_limit:
                     self.simulation.sort_if_due()
-        self.report = Report(iterations, residual, parts)
+        for name, value in zip(PUBLISHED, (iterations, residual, parts), strict=True):
+            self.simulation.hub.values.set(name, float(value))
         control.values[TIMESTEP] = step + 1
         return DONE
 
@@ -129,6 +124,8 @@ class LoadSteps:
         nodes = equations.nodes
         external = after[nodes] + equations.present_forces()
         given, prescribed = self._prescribed(equations, hooks)
+        if not self.dynamic:
+            self._check_held(equations, given)
         equations.unknowns(~given)
         if before is None:
             inertia: Rest | Motion = Rest(equations)
@@ -153,20 +150,20 @@ class LoadSteps:
         d, nodes, update = equations.d, equations.nodes, s.nodes.update
         totals = s.control.totals.copy()
         found = []
-        for shown in (0.0, 1.0):
+        for shown in (-SHOWN, SHOWN):
             update[nodes] = 0
             update[nodes, :d] = shown
             take_rows(self.scheme.hold, s, simulation.mode, hooks)
             found.append(np.array(update[nodes, :d]))
         s.control.totals[:] = totals
         given = found[0] == found[1]
-        if np.any(~given & ((found[0] != 0.0) | (found[1] != 1.0))):
-            raise ScriptError(
-                "a fix changes velocities of nodes without prescribing them, as friction at a wall "
-                "does: load steps know no such thing",
-                hint="fix velocity_nodes, or an explicit scheme: scheme(musl)",
+        if np.any(~given & ((found[0] != -SHOWN) | (found[1] != SHOWN))):
+            raise self._error(
+                "a fix changes velocities of nodes without prescribing them, which implicit steps "
+                "know nothing of",
+                "fix velocity_nodes, or scheme(musl)",
             )
-        return given, found[0]
+        return given, np.where(given, found[0], 0.0)
 
     def _publish(self, found: "Equilibrium", hooks: Any, dt: float) -> None:
         """Let those that hold nodes publish the forces that they do it with; velocities at nodes.
@@ -187,14 +184,49 @@ class LoadSteps:
 
     def _explained(self, reason: Failed, part: float) -> ScriptError:
         """Make of a failure what the user should know."""
-        hub, control = self.simulation.hub, self.simulation.setup.control
-        step, time = int(control.values[TIMESTEP]) + 1, float(control.values[TIME])
-        return ScriptError(
-            f"step {step}, time {time:.6g}: {reason}, and so it is with 1/{round(1 / part)} of the load step",
-            place=hub.place,
-            hint="smaller load steps; a solid that nothing holds, or a load beyond what the body "
-            "bears, has no equilibrium",
+        share = f" even in 1/{round(1 / part)} of the load step" if part < 1 else ""
+        return self._error(
+            f"{reason}{share}",
+            "smaller load steps; beyond the load that a body bears there is no equilibrium",
         )
+
+    def _error(self, message: str, hint: str) -> ScriptError:
+        hub, values = self.simulation.hub, self.simulation.setup.control.values
+        step, time = int(values[TIMESTEP]) + 1, float(values[TIME])
+        return ScriptError(f"step {step}, time {time:.6g}: {message}", place=hub.place, hint=hint)
+
+    def _check_held(self, equations: Equations, given: np.ndarray) -> None:
+        """Refuse bodies that can move as a whole: without inertia nothing says where they are.
+
+        Bodies are nodes that points connect.
+        """
+        s = equations.s
+        bodies = equations.bodies()
+        for body in range(bodies.max() + 1):
+            held = given[bodies == body].any(0)
+            first = free_from(s.kin)
+            loose = [
+                x for x, is_held in zip("xyz"[first:], held[first:], strict=False) if not is_held
+            ]
+            if loose:
+                ID = self._solid_at(equations, bodies == body)
+                how = (
+                    f"is not held along {loose[0]}" if held[first:].any() else "is held by nothing"
+                )
+                raise self._error(
+                    f"solid '{ID}' {how}, and there is no inertia",
+                    "fix velocity_nodes, or scheme(newmark) for bodies that move",
+                )
+
+    def _solid_at(self, equations: Equations, chosen: np.ndarray) -> str:
+        """Name the solid of a point that sees some of the chosen nodes (m,)."""
+        hub, firsts = self.simulation.hub, equations.s.control.firsts
+        for block, (seen, _) in zip(equations.s.blocks, equations.parts, strict=True):
+            points = np.flatnonzero(chosen[seen.nodes].any(1))
+            if len(points):
+                number = np.searchsorted(firsts, block.points.id[points[0]], side="right") - 1
+                return list(hub.solids)[number]
+        return ""
 
 
 class Equilibrium(NamedTuple):

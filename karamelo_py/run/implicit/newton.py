@@ -39,7 +39,9 @@ class Newton:
         A force that is next to nothing: residuals are relative to it at least.
     """
 
-    def __init__(self, scheme: Any, equations: Equations, inertia: Any, external: np.ndarray, dt: float):
+    def __init__(
+        self, scheme: Any, equations: Equations, inertia: Any, external: np.ndarray, dt: float
+    ):
         self.scheme, self.equations, self.inertia = scheme, equations, inertia
         self.external, self.dt = external, dt
         s = equations.s

@@ -47,6 +47,7 @@ from karamelo_py.points.laws.eos import taken_heat
 from karamelo_py.points.laws.plastic_rate import with_rate, without_rate
 from karamelo_py.points.laws.temperatures import initial_heat
 from karamelo_py.points.transfers import Moment, lost_shares
+from karamelo_py.run.implicit import check as implicit
 from karamelo_py.run.mpi.partition import SharedTiles
 from karamelo_py.run.tiles.buffers import no_nodes
 from karamelo_py.run.tiles.tiles import Tiles
@@ -101,6 +102,8 @@ def check_scene(hub: Hub) -> None:
         raise
     boundary.check(hub)
     check_rigid(hub)
+    if getattr(hub.update.scheme, "implicit", False):
+        implicit.check(hub)
 
 
 def check_rigid(hub: Hub) -> None:

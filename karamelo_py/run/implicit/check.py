@@ -1,0 +1,95 @@
+"""What implicit steps cannot do, said before the run."""
+
+import importlib.util
+from collections.abc import Iterator
+
+from karamelo_py.compiler.fields import declared
+from karamelo_py.kernels.averaging import PointByPoint
+from karamelo_py.language import registry
+from karamelo_py.points.laws import can, constrained_velocity
+from karamelo_py.points.transfers import Moment
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.modify import Fix
+from karamelo_py.script.errors import Place, ScriptError
+
+# Where fixes move points by what they are, not by forces.
+_MOVING = "post_grid_to_point", "post_advance_particles"
+_EXPLICIT = "an explicit scheme, scheme(musl)"
+
+
+def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
+    """What cannot be done in a scene, what to write instead, and where it stands."""
+    update = hub.update
+    method, transfer = update.method, update.transfer
+    name = registry.name_of("transfer", type(transfer))
+    if method.fields_per_solid:
+        yield "knows no contact between solids", f"method ulmpm, or {_EXPLICIT}", method.place
+    if Moment in declared([transfer], "point_fields") or name not in ("FLIP", "PIC"):
+        yield (
+            f"moves points by increments, which transfer {name} has no part in",
+            "FLIP in its place",
+            method.place,
+        )
+    if not isinstance(method.averaging(hub), PointByPoint):
+        yield "knows no averaged volumes", f"no anti_volumetric_locking, or {_EXPLICIT}", None
+    if update.thermal:
+        yield "knows no heat that flows", f"mechanical, or {_EXPLICIT}", method.place
+    if update.boundary != "none" and update.boundary == "reflect":
+        yield "knows no walls that points bounce from", "fix velocity_nodes", None
+    if hub.settings.precision != "double":
+        yield "needs double precision", "no precision(single)", None
+    if hub.settings.comm.size > 1:
+        yield "runs in one process", "no --ranks: threads serve it", None
+    for solid in hub.solids.values():
+        if can(solid.material.law, constrained_velocity):
+            yield f"knows no rigid solid such as '{solid.id}'", "fix velocity_nodes", solid.place
+    for fix in hub.fixes.values():
+        if any(hook in _MOVING for hook in fix.hooks()):
+            yield (
+                f"knows no fix {fix.style}, which moves points",
+                "fix velocity_nodes, or loads: force_particles, edge_traction",
+                fix.place,
+            )
+        elif "post_update_grid_state" in fix.hooks() and not _only_prescribes(fix):
+            yield (
+                f"knows no fix {fix.style} that changes velocities by what they are",
+                f"fix velocity_nodes without leq, geq and friction, or {_EXPLICIT}",
+                fix.place,
+            )
+        elif len(fix.solids) > 1 or fix.friction is not None:
+            yield f"knows no contact by fix {fix.style}", _EXPLICIT, fix.place
+
+
+def _only_prescribes(fix: Fix) -> bool:
+    bounds = any(getattr(formula, "bound", "") for formula in fix.formulas)
+    return (
+        (fix.prescribes_velocity or fix.first_step_only)
+        and not bounds
+        and fix.wall_friction is None
+    )
+
+
+def check(hub: Hub) -> None:
+    """Refuse what an implicit scheme cannot do.
+
+    Raises
+    ------
+    ScriptError
+        At the line of the script that asks for it.
+    """
+    update = hub.update
+    name = f"scheme {registry.name_of('scheme', type(update.scheme))}"
+    if importlib.util.find_spec("scipy") is None:
+        raise ScriptError(
+            f"{name} needs SciPy",
+            place=update.scheme_place,
+            hint="pip install 'karamelo-py[implicit]'",
+        )
+    for reason, instead, place in _reasons(hub):
+        raise ScriptError(f"{name} {reason}", place=place or update.scheme_place, expected=instead)
+    if hasattr(update.scheme, "beta") and not update.fixed_dt:
+        raise ScriptError(
+            f"{name} has no step of its own",
+            place=update.scheme_place,
+            hint="set_dt(...): vibrations that last twenty steps keep their period within 1 %",
+        )

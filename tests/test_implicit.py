@@ -1,0 +1,224 @@
+"""Implicit steps, against exact solutions; and what they refuse."""
+
+from math import log, pi, sqrt
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from comparisons.results import read_dump
+
+INPUTS = Path(__file__).parent.parent / "inputs"
+PATCH = """
+    d = 2
+    kind = "ulmpm"
+    basis = "linear"
+    domains = "mechanical"
+    method(kind, FLIP, basis, 1, domains)
+    scheme(quasi-static)
+    dimension(2, 0, 1.4, 0, 1, 0.1)
+    region(box, block, 0, 1, 0, 1)
+    material(m, linear, 1, 1000, 0.25)
+    solid(s, region, box, 2, m, 0.1, 0)
+    region(left, block, -INF, 1e-6, -INF, INF)
+    region(right, block, 1-1e-6, INF, -INF, INF)
+    region(everywhere, block, -INF, INF, -INF, INF)
+    group(left, nodes, region, left, all)
+    group(right, nodes, region, right, all)
+    group(everywhere, nodes, region, everywhere, all)
+    {lines}
+    set_output(1)
+    log_modify(custom, step, iterations, residual, parts, pull_x{columns})
+    run(4)
+"""
+HELD = """fix(flat, velocity_nodes, everywhere, NULL, 0)
+    fix(hold, velocity_nodes, left, 0, NULL)
+    fix(pull, velocity_nodes, right, 1e-4, NULL)"""
+
+
+def patch(lines: str = HELD, columns: str = "") -> str:
+    return PATCH.format(lines=lines, columns=columns)
+
+
+@pytest.mark.parametrize(
+    ("kind", "basis", "domains"),
+    [
+        ("ulmpm", "linear", "mechanical"),
+        ("tlmpm", "linear", "mechanical"),
+        ("ulmpm", "cpgimp", "stretch"),
+        ("ulcpdi", "linear", "Q4"),
+    ],
+)
+def test_patch(run_script, kind, basis, domains):
+    """Uniaxial strain: the force is (lam + 2 G) strain, exact for small strains (Hooke's law)."""
+    words = [w for k, v in zip(("kind", "basis", "domains"), (kind, basis, domains), strict=True)
+             for w in ("-var", k, v)]  # fmt: skip
+    log_of = run_script(patch(), *words).log
+    G = 1000 / 2 / 1.25
+    modulus = 2 * G + 2 * G * 0.25 / 0.5
+    assert np.allclose(log_of["pull_x"][1:] / modulus, 1e-4 * np.arange(1, 5), rtol=2e-3)
+    # Quadratic convergence: from 1 to below 1e-10 in a few corrections.
+    assert max(log_of["iterations"]) <= 3
+    assert max(log_of["residual"]) < 1e-10
+
+
+def test_a_column_under_its_weight(run_script):
+    """The exact stress is the weight above (Coombs & Augarde 2020): order 2 with GIMP."""
+    errors = []
+    for n in (8, 16):
+        result = run_script(INPUTS / "in.static_column", "-var", "N", str(n), folder=f"run{n}")
+        assert result.log["floor_y"][-1] == pytest.approx(80 * 10 * 50 * 50 / n, rel=1e-9)
+        points = read_dump(result.folder / "static_column.40.LAMMPS")[-1]
+        exact = -80 * 10 * (50 - points["y0"])
+        errors.append(np.mean(np.abs(points["s22"] - exact)) / (80 * 10 * 50))
+    assert errors[0] < 0.026 and errors[1] < 0.0094
+    assert log(errors[0] / errors[1]) / log(2) > 1.4
+
+
+def test_elastica(run_script):
+    """Tip of a beam that bends by 80 % of its length (Bisshopp & Drucker 1945)."""
+    # Cells of a quarter of the height: 1 % of the length, as AMPLE has it (tip 0.813 to 0.821).
+    result = run_script(INPUTS / "in.elastica")
+    assert result.log["down"][-1] == pytest.approx(0.8106, abs=0.012)
+    assert result.log["back"][-1] == pytest.approx(0.5550, abs=0.012)
+    assert result.log["pin_y"][-1] == pytest.approx(100e3, rel=1e-8)
+    assert result.log["iterations"][-1] <= 4
+
+
+def test_a_cylinder_flows_through(run_script):
+    """2/sqrt(3) Y ln(b/a) is the most that the wall bears (Hill 1950); nothing bears more."""
+    result = run_script(INPUTS / "in.thick_cylinder")
+    exact = 2 / sqrt(3) * log(2)
+    pressure = result.log["pressure"]
+    assert pressure[-1] == pytest.approx(exact, rel=5e-3) and max(pressure) < exact * 1.001
+    # Elastic at first, by Lame: u = U at r = a in plane strain.
+    E, nu, U = 1000, 0.3, 4 / 1000 / 30
+    lame = E * U * (2**2 - 1) / ((1 + nu) * ((1 - 2 * nu) + 2**2))
+    assert pressure[1] == pytest.approx(lame, rel=2e-3)
+
+
+BAR = """
+    N = 32
+    h = 1/N
+    T = 0.4
+    steps = 64
+    rule = "newmark"
+    radius = 1
+    method(tlmpm, FLIP, linear, 1)
+    scheme(newmark, radius=radius, rule=rule)
+    dimension(1, 0, 1 + 4*h, h)
+    region(bar, block, 0, 1)
+    material(m, linear, 1, 100, 0)
+    solid(s, region, bar, 2, m, h, 0)
+    region(wall, block, -INF, 1e-9)
+    group(wall, nodes, region, wall, all)
+    fix(hold, velocity_nodes, wall, 0)
+    fix(v, initial_velocity_particles, all, 1e-4*sin(PI*x/2))
+    compute(Ek, kinetic_energy, all)
+    compute(Es, strain_energy, all)
+    set_dt(T/steps)
+    set_output(1)
+    log_modify(custom, step, time, Ek, Es)
+    run_time(2*T)
+"""
+
+
+def period(log_of) -> float:
+    """Time between the first and the last minimum of the kinetic energy, by parabolas."""
+    E, t = log_of["Ek"], log_of["Time"]
+    found = []
+    for k in range(1, len(E) - 1):
+        if E[k] <= E[k - 1] and E[k] < E[k + 1]:
+            a, b, c = E[k - 1 : k + 2]
+            found.append(t[k] + (t[k + 1] - t[k]) * (a - c) / (2 * (a - 2 * b + c)))
+    return 2 * (found[-1] - found[0]) / (len(found) - 1)
+
+
+def test_a_bar_swings_at_its_period(run_script):
+    """4 L/c, and steps of twice the limit of waves; the trapezoidal rule keeps the energy."""
+    result = run_script(BAR)
+    total = result.log["Ek"] + result.log["Es"]
+    # The rule lengthens the period by (w dt)^2/12, 0.08 %.
+    assert period(result.log) == pytest.approx(0.4, rel=4e-3)
+    assert np.allclose(total, total[0], rtol=5e-3)
+
+
+@pytest.mark.parametrize(("words", "least", "most"), [
+    (("-var", "rule", "euler"), 0.3, 0.9),
+    (("-var", "radius", "0.5"), 0.97, 1.0),
+])  # fmt: skip
+def test_rules_that_damp(run_script, words, least, most):
+    """Euler's rule damps by 1/(1 + (w dt)^2) a step: exp(-2 w dt w t/2); 0.21 after two periods."""
+    log_of = run_script(BAR, *words).log
+    kept = (log_of["Ek"] + log_of["Es"])[-1] / log_of["Ek"][0]
+    if "euler" in words:
+        exact = (1 + (2 * pi / 64) ** 2) ** -128
+        assert kept == pytest.approx(exact, rel=0.05)
+    else:
+        assert least < kept < most
+
+
+WRONG = [
+    (
+        HELD.replace("left, 0, NULL", "left, leq 0, NULL"),
+        "changes velocities by what they are",
+        "hold",
+    ),
+    (
+        HELD + "\n    fix(calm, local_damping, all, 0.8)",
+        "changes velocities by what they are",
+        "calm",
+    ),
+    (HELD + "\n    fix(v, velocity_particles, all, 0, 0)", "knows no fix velocity_particles", "v"),
+    ("fix(pull, body_force, all, 1, 0)", "solid 's' is held by nothing", ""),
+    (
+        "fix(hold, velocity_nodes, left, 0, NULL)\n    fix(pull, body_force, all, 1, 0)",
+        "solid 's' is not held along y",
+        "",
+    ),
+]
+
+
+@pytest.mark.parametrize(("lines", "message", "marked"), WRONG)
+def test_refusals(run_script, lines, message, marked):
+    result = run_script(patch(lines), status=1)
+    assert message in result.err and "Traceback" not in result.err
+    assert marked in result.err
+
+
+METHODS = [
+    (
+        "method(kind, FLIP, basis, 1, domains)",
+        "method(ulmpm, APIC, quadratic-spline)",
+        "transfer APIC",
+    ),
+    ("scheme(quasi-static)", "scheme(quasi-static, tolerance=0)", "tolerance"),
+    ("scheme(quasi-static)", "scheme(quasi-static, solver=cg)", "solver"),
+    ("scheme(quasi-static)", "scheme(newmark)", "set_dt"),
+    ("scheme(quasi-static)", "scheme(newmark, 0.1, 0.5)", "gamma/2"),
+    ("scheme(quasi-static)", "scheme(quasi-static)\n    precision(single)", "double precision"),
+]
+
+
+@pytest.mark.parametrize(("line", "wrong", "message"), METHODS)
+def test_refused_choices(run_script, line, wrong, message):
+    result = run_script(patch().replace(line, wrong), status=1)
+    assert message in result.err and "Traceback" not in result.err
+
+
+def test_steps_that_are_too_large_are_done_in_parts(run_script):
+    """A stretch by half in one step: no point goes further than half a cell at once."""
+    fast = HELD.replace("1e-4", "0.08")
+    log_of = run_script(patch(fast)).log
+    assert max(log_of["parts"]) > 1
+    assert np.all(np.diff(log_of["pull_x"]) > 0)
+
+
+@pytest.mark.parametrize("scheme", ["quasi-static", "newmark"])
+def test_restarts_have_the_same_bytes(run_script, scheme):
+    """A run in two pieces writes the rows that a whole one writes."""
+    text = patch(HELD + f"\n    scheme({scheme})\n    set_dt(0.5)\n    restart(2, r.*.h5)")
+    whole = run_script(text)
+    rest = run_script(text, "-restart", str(whole.folder / "r.2.h5"), folder="again")
+    assert whole.log["pull_x"][-1] == rest.log["pull_x"][-1]
+    assert whole.log["residual"][-1] == rest.log["residual"][-1]
