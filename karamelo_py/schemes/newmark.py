@@ -89,6 +89,5 @@ class Newmark(NamedTuple):
         if radius < 1:
             alpha_m, alpha_f = (2 * radius - 1) / (radius + 1), radius / (radius + 1)
             gamma, beta = 0.5 - alpha_m + alpha_f, (1 - alpha_m + alpha_f) ** 2 / 4
-        return cls(
-            beta, gamma, alpha_m, alpha_f, rule, tolerance, iterations, solver, stabilisation
-        )
+        rules = beta, gamma, alpha_m, alpha_f, rule
+        return cls(*rules, tolerance, iterations, solver, stabilisation)
