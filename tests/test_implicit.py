@@ -123,6 +123,12 @@ BAR = """
 """
 
 
+def test_a_strip_footing(run_script):
+    """(2 + pi) c (Prandtl 1920), within the 3 % that cells of a tenth of the width give."""
+    result = run_script(INPUTS / "in.static_footing", "-var", "steps", "20")
+    assert result.log["load"][-1] == pytest.approx(2 + pi, rel=0.03)
+
+
 def period(log_of) -> float:
     """Time between the first and the last minimum of the kinetic energy, by parabolas."""
     E, t = log_of["Ek"], log_of["Time"]

@@ -35,6 +35,7 @@ class Choice(NamedTuple):
 
 point_functions: dict[str, list[Callable]] = {}
 choosers: dict[Callable, list[Callable]] = {}  # of what kernels choose by type
+of_numbers: dict[Callable, list[Callable]] = {}  # what functions are for types of numbers
 
 
 def name_of(thing: Any) -> str:

@@ -11,6 +11,7 @@ from karamelo_py.compiler.choices import (
     choosers,
     declare_point_function,
     note,
+    of_numbers,
     tag_class,
 )
 from karamelo_py.compiler.intrinsics import intrinsic
@@ -40,6 +41,7 @@ def implements(function: Callable, *numbers: type) -> Callable:
             if "implements" not in vars(one):
                 one.implements = {}
             one.implements[function] = made
+            of_numbers.setdefault(function, []).append(made)
         if function not in choosers or not numbers:
             traced(function, lambda *_: None if numbers else made, last=not numbers)
         return made

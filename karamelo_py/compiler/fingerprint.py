@@ -28,6 +28,7 @@ from karamelo_py.compiler.choices import (
     found_by_name,
     is_opaque,
     name_of,
+    of_numbers,
     point_functions,
 )
 from karamelo_py.compiler.intrinsics import Intrinsic
@@ -166,7 +167,7 @@ def _look(thing: Any) -> tuple[str, list]:
 def _function(function: Callable) -> tuple[str, list]:
     if hasattr(function, "find") and hasattr(function, "tags"):
         # Its implementations are in the choices.
-        return f"point function {name_of(function)} {function.tags}", []
+        return f"point function {name_of(function)} {function.tags}", of_numbers.get(function, [])
     if hasattr(function, "inner"):
         return f"method {name_of(function)}", [function.inner]
     if is_opaque(function):
@@ -185,7 +186,7 @@ def _function(function: Callable) -> tuple[str, list]:
             parts.append(cell.cell_contents)
         except ValueError:
             parts.append("empty")
-    return f"function {digest}", parts + _choosers(function)
+    return f"function {digest}", parts + _choosers(function) + of_numbers.get(function, [])
 
 
 def _from_module(value: Any, names: tuple[str, ...], above: tuple) -> list:

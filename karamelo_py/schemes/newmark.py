@@ -90,4 +90,4 @@ class Newmark(NamedTuple):
             alpha_m, alpha_f = (2 * radius - 1) / (radius + 1), radius / (radius + 1)
             gamma, beta = 0.5 - alpha_m + alpha_f, (1 - alpha_m + alpha_f) ** 2 / 4
         rules = beta, gamma, alpha_m, alpha_f, rule
-        return cls(*rules, tolerance, iterations, solver, stabilisation)
+        return cls(*rules, tolerance, iterations, solver, stabilisation)  # type: ignore[arg-type]

@@ -235,7 +235,7 @@ class Equations:
         return (share * spacing**d * (D.T @ D)).tocsr()
 
     def _line(self, g: np.ndarray, corner: np.ndarray, axis: int, shifts: np.ndarray) -> np.ndarray:
-        """Find the numbers (rows, shifts) of neighbours of nodes along an axis; -1 where not used."""
+        """Find the numbers (rows, shifts) of neighbours of nodes along an axis (-1: not used)."""
         grids = self.s.grids
         steps = np.stack([grids.step_x, grids.step_y, np.ones_like(grids.step_x)], 1)[g, : self.d]
         first = grids.first[g] + (corner * steps).sum(1)
