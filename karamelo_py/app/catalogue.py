@@ -27,13 +27,7 @@ def families() -> list[str]:
 
 
 def help_of(family: str, name: str) -> Help:
-    """Gather the help about a command or style.
-
-    Raises
-    ------
-    ScriptError
-        If there is none of this name, or its package is broken.
-    """
+    """Gather the help about a command or style."""
     target = registry.find(family, name)
     try:
         return describe(target, name if family == COMMAND else f"{family} {name}")
@@ -76,11 +70,6 @@ def print_styles(given: Sequence[str]) -> int:
     ----------
     given
         Nothing, or the family to list.
-
-    Raises
-    ------
-    ScriptError
-        For an unknown family, or more than one argument.
     """
     if len(given) > 1:
         raise ScriptError(f"too many arguments: {' '.join(given)}", expected=STYLES_USAGE)
@@ -105,11 +94,6 @@ def print_help(given: Sequence[str]) -> int:
     ----------
     given
         The name of a command, style, family or argument, or a family and a name.
-
-    Raises
-    ------
-    ScriptError
-        For an unknown name, or one that means several things.
     """
     if len(given) > 2:
         raise ScriptError(f"too many arguments: {' '.join(given)}", expected=HELP_USAGE)

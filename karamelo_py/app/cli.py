@@ -166,13 +166,7 @@ def begun() -> None:
 
 
 def _one_file(arguments: list[str]) -> list[str]:
-    """Take the last of the files behind -restart where a shell has put all that match a pattern.
-
-    Raises
-    ------
-    ScriptError
-        For ``-var NAME=VALUE``.
-    """
+    """Take the last of the files behind -restart where a shell has put all that match a pattern."""
     chosen: list[str] = []
     for word in arguments:
         before = chosen[-1] if chosen else ""
@@ -356,13 +350,7 @@ def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = 
 
 
 def _tell_of_no_run(hub: Hub, script: str) -> None:
-    """Tell of a script without a run: one that makes a scene may have forgotten it.
-
-    Raises
-    ------
-    ScriptError
-        For bodies that nothing was done with: whoever started that waits for what it computes.
-    """
+    """Tell of a script without a run: one that makes a scene may have forgotten it."""
     message = f"{script} runs nothing: there is no run command in it"
     if hub.checking:
         if hub.solids:

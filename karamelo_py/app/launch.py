@@ -48,13 +48,7 @@ A_CORE = 16  # processes at most: who asks for more means another number
 
 
 def launch(ranks: int, arguments: Sequence[str], module: str = "karamelo_py.app.start") -> int:
-    """Run a program on so many processes of this machine; returns the exit status.
-
-    Raises
-    ------
-    ScriptError
-        If there is no mpiexec, or no mpi4py, or not the cores for so many.
-    """
+    """Run a program on so many processes of this machine; returns the exit status."""
     cores = os.cpu_count() or 1
     if ranks > A_CORE * cores:
         raise ScriptError(

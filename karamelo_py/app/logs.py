@@ -15,11 +15,6 @@ def read_rows(path: Path) -> list[dict[str, float]]:
 
     A line that begins with # names the columns anew; one that a killed run has left half is passed
     over.
-
-    Raises
-    ------
-    ScriptError
-        If the file cannot be read, or is no log.
     """
     names: list[str] = []
     rows = []

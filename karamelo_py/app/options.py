@@ -87,11 +87,6 @@ def make_folder(folder: Path, option: str) -> None:
         Its path.
     option
         How one is named: ``-out {}``.
-
-    Raises
-    ------
-    ScriptError
-        If it cannot be made.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -105,13 +100,7 @@ def make_folder(folder: Path, option: str) -> None:
 
 
 def direct(hub: Hub, options: argparse.Namespace) -> None:
-    """Send the files of a scene where the options say.
-
-    Raises
-    ------
-    ScriptError
-        If the folder cannot be made, or that of the log is not there.
-    """
+    """Send the files of a scene where the options say."""
     if options.out is not None:
         if not hub.checking:
             make_folder(options.out, "-out {}")

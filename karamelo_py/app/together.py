@@ -181,13 +181,7 @@ def _signed(text: str, rank: int, size: int) -> str:
 
 
 def join(asked: int | None, ends: Callable[[BaseException], None]) -> MpiComm:
-    """Join the processes that mpiexec has started; `ends` as of `MpiComm`.
-
-    Raises
-    ------
-    ScriptError
-        If there are not as many as asked for, or mpi4py is missing or of another MPI.
-    """
+    """Join the processes that mpiexec has started; `ends` as of `MpiComm`."""
     size, _ = launched()
     if asked is not None and asked != size:
         raise ScriptError(

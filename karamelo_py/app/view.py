@@ -82,13 +82,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _matching(names: Iterable[Path]) -> set[Path]:
-    """Find the files of these names; a pattern stands for all files that match it.
-
-    Raises
-    ------
-    ScriptError
-        If none does.
-    """
+    """Find the files of these names; a pattern stands for all files that match it."""
     found: set[Path] = set()
     for name in names:
         if name.exists() or not glob.has_magic(str(name)):

@@ -45,13 +45,7 @@ def measured(part: Measurement) -> Measured:
 
 
 def measured_apart(part: Measurement) -> Measured | Outcome:
-    """Measure a workload in a process of its own; how that has ended where it went wrong.
-
-    Raises
-    ------
-    ScriptError
-        If somebody ended it.
-    """
+    """Measure a workload in a process of its own; how that has ended where it went wrong."""
     # A session of its own: Ctrl-C comes to this process alone.
     process = subprocess.Popen(
         COMMAND, bufsize=0, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True

@@ -89,13 +89,7 @@ def write(path: Path, found: Mapping[str, Any]) -> None:
 
 
 def read(path: Path) -> dict[str, Any]:
-    """A bench that was written before.
-
-    Raises
-    ------
-    ScriptError
-        If there is no such file, or it is none of a bench.
-    """
+    """A bench that was written before."""
     expected = "a file that karamelo-py bench -o has written"
     try:
         found = json.loads(path.read_text(encoding="utf-8"))

@@ -84,13 +84,7 @@ class Entry:
     ends_early: bool = False
 
     def lines(self, inputs: str, *, small: bool) -> list[str]:
-        """The commands with their values.
-
-        Raises
-        ------
-        ScriptError
-            For a word in braces that has no value.
-        """
+        """The commands with their values."""
         words = {"inputs": inputs, **self.whole, **(self.small if small else {})}
         try:
             return [command.format(**words) for command in self.commands]
@@ -102,13 +96,7 @@ class Entry:
 
 
 def read(path: Path) -> tuple[list[Entry], Path]:
-    """The entries of an atlas, and its folder of scripts.
-
-    Raises
-    ------
-    ScriptError
-        If it cannot be read, or an entry is not one.
-    """
+    """The entries of an atlas, and its folder of scripts."""
     try:
         found = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:

@@ -118,13 +118,7 @@ def run(options: Any) -> int:
 
 
 def read(path: Path, where: Sequence[str]) -> tuple[list, list[str], dict]:
-    """The rows of a table that fulfil the conditions, its variables, and how it was made.
-
-    Raises
-    ------
-    ScriptError
-        If it does not say which columns are variables, or no row is left.
-    """
+    """The rows of a table that fulfil the conditions, its variables, and how it was made."""
     rows = records.read(path)
     made = {"table": path.name, **records.beside(path)}
     if "folder" not in rows[0] and "variables" not in made:

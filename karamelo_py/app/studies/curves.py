@@ -109,11 +109,6 @@ class Family:
         The variable that differs along a line; by default the number with the most values.
     recorded
         What the sweep was asked to record: a column that is a formula is shown as such.
-
-    Raises
-    ------
-    ScriptError
-        For columns that the table does not have.
     """
 
     def __init__(

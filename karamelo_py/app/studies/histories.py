@@ -58,11 +58,6 @@ def histories(
         Columns.
     names
         What to call the runs, in the order of the table; by their values without.
-
-    Raises
-    ------
-    ScriptError
-        For a column that the logs do not have, and where there is no log at all.
     """
     found = []
     for k, row in enumerate(rows):

@@ -65,13 +65,7 @@ def look_at(
     row: Mapping[str, str], folder: Path, over: str, column: str, within: float,
     parts: Container[str] = (),
 ) -> Kept:  # fmt: skip
-    """Judge a column in a run; a value of one of the computes `parts` is no whole.
-
-    Raises
-    ------
-    ScriptError
-        For a column that its log does not have.
-    """
+    """Judge a column in a run; a value of one of the computes `parts` is no whole."""
     place = folder / row["folder"]
     try:
         lines = (place / "err.txt").read_text(encoding="utf-8", errors="replace").splitlines()

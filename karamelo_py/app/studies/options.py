@@ -86,13 +86,7 @@ def zipped(options: Any) -> list[list[str]]:
 
 
 def family(options: Any, *, timed: bool = False, repeat: int = 1) -> tuple[dict, Launch, int]:
-    """Values of the variables, how to run, and how many at once.
-
-    Raises
-    ------
-    ScriptError
-        For variables that the script does not read, or none.
-    """
+    """Values of the variables, how to run, and how many at once."""
     if not options.script.is_file():
         folder = options.script.parent
         close = nearest(options.script.name, scripts_in(folder))
@@ -120,13 +114,7 @@ def family(options: Any, *, timed: bool = False, repeat: int = 1) -> tuple[dict,
 
 
 def out_file(path: Path, *suffixes: str) -> Path:
-    """A file to write, with one of these endings.
-
-    Raises
-    ------
-    ScriptError
-        If its folder does not exist, or it ends otherwise.
-    """
+    """A file to write, with one of these endings."""
     if suffixes and path.suffix.lower() not in suffixes:
         raise ScriptError(f"-o {path}: unknown kind of file", expected=", ".join(suffixes))
     if not path.parent.is_dir():

@@ -72,13 +72,7 @@ Plotly.Plots.resize(document.getElementById("chart"));
 
 
 def require_plotly() -> None:
-    """See that Plotly is there, which takes long to import.
-
-    Raises
-    ------
-    ScriptError
-        If it is not installed.
-    """
+    """See that Plotly is there, which takes long to import."""
     if importlib.util.find_spec("plotly") is None:
         raise ScriptError(
             "a page needs the package plotly", hint='pip install "karamelo-py[studies]"'

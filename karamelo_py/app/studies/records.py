@@ -142,13 +142,7 @@ def recorded(
     variables: Container[str] = (),
     option: str = "-record",
 ) -> list[Recorded]:
-    """Read the numbers that -record, or another option, asks for.
-
-    Raises
-    ------
-    ScriptError
-        For a column that the script does not log, as far as that is known beforehand.
-    """
+    """Read the numbers that -record, or another option, asks for."""
     found = [Recorded(word.strip()) for word in _apart(text) if word.strip()]
     for item in found:
         for column in [*item.columns, *(n for n in item.names if n not in variables)]:
@@ -213,13 +207,7 @@ def _cell(value: Any) -> str:
 
 
 def read(path: Path) -> list[dict[str, str]]:
-    """The rows of a table.
-
-    Raises
-    ------
-    ScriptError
-        If there is no such file, or no table in it.
-    """
+    """The rows of a table."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             rows = list(csv.DictReader(file))

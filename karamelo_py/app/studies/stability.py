@@ -115,13 +115,7 @@ def run(options: Any) -> int:
 
 
 def energy_column(asked: str | None, headings: Sequence[str] | None, script: Path) -> str:
-    """The log column to watch.
-
-    Raises
-    ------
-    ScriptError
-        If the script does not log it, or logs no energy that is known by its name.
-    """
+    """The log column to watch."""
     if asked is not None:
         return records.recorded(asked, headings, script, option="-energy")[0].columns[0]
     for name in ENERGIES:

@@ -81,15 +81,7 @@ class Study:
         self.on_row: Callable[[], None] = lambda: None
 
     def run(self, cases: Sequence[Mapping[str, str]]) -> list[dict[str, Any]]:
-        """The rows of these cases, in order; runs what is not known yet.
-
-        Raises
-        ------
-        Refused
-            For a variant that is refused, in a strict study.
-        KeyboardInterrupt
-            When the user interrupts; the runs in progress are taken down, finished ones are kept.
-        """
+        """The rows of these cases, in order; runs what is not known yet."""
         self.names = list(cases[0])
         waiting = []
         for case in cases:

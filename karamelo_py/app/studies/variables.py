@@ -23,11 +23,6 @@ def choices(words: Iterable[str], in_step: Container[str] = ()) -> dict[str, lis
     """The values of each variable: ``N=10,20``, ``xi=0:1:5`` (5 of them), ``basis=linear``.
 
     Variables that go `in_step` with others may have a value twice.
-
-    Raises
-    ------
-    ScriptError
-        For a word that is not of this form, or a variable that is given twice.
     """
     found: dict[str, list[str]] = {}
     for word in words:
@@ -73,12 +68,6 @@ def cases(
         Names of variables that go in step: first with first, second with second.
     where
         Conditions in the language of scripts; a combination must fulfil all of them.
-
-    Raises
-    ------
-    ScriptError
-        For lists in step that differ in length, for a condition that is wrong, and where nothing is
-        left.
     """
     axes: list[list[dict[str, str]]] = []
     for name in values:
@@ -167,13 +156,7 @@ def holds(condition: str, case: Mapping[str, str], words: Iterable[str] = ()) ->
 
 
 def check_script(path: Path, names: Iterable[str]) -> None:
-    """See that a script reads each of these variables.
-
-    Raises
-    ------
-    ScriptError
-        For a script with a syntax error, and for a variable that it never reads.
-    """
+    """See that a script reads each of these variables."""
     read: set[str] = set()
     assigned: set[str] = set()
     if not _collect(path, read, assigned, set()):

@@ -48,13 +48,7 @@ def pairs(
     accuracy: str,
     cost: str,
 ) -> tuple[list[Pair], list[str]]:
-    """The pairs of a table, and the two values in their order.
-
-    Raises
-    ------
-    ScriptError
-        If the table lacks a column, or the variable has not two values.
-    """
+    """The pairs of a table, and the two values in their order."""
     for option, column in (("-accuracy", accuracy), ("-cost", cost)):
         require(rows, option, column)
     if name not in variables:
