@@ -4,18 +4,25 @@ from __future__ import annotations
 
 import argparse
 import gc
+import os
 import re
+import signal
 import sys
-import traceback
 from collections.abc import Callable, Sequence
-from contextlib import nullcontext
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from karamelo_py import __version__
-from karamelo_py.app.launch import launch
-from karamelo_py.app.leaving import INTERRUPTED, SIGNALLED, leaving_at_once, telling_of_the_end
+from karamelo_py.app.launch import (
+    ERROR,
+    has_terminal,
+    keep_to_oneself,
+    launch,
+    outcome_of,
+    share,
+    together,
+)
 from karamelo_py.app.options import (
     VARIABLE,
     add_output_options,
@@ -24,14 +31,12 @@ from karamelo_py.app.options import (
     positive,
     threads_option,
 )
-from karamelo_py.app.together import Outcome, has_terminal, keep_to_oneself, share, together
-from karamelo_py.run.mpi.comm import MpiComm, launched
-from karamelo_py.script.errors import FAILURES, ScriptError, nearest, render_message
+from karamelo_py.app.start import SIGNALLED, leaving_at_once
+from karamelo_py.run.mpi.comm import ENDING, MpiComm, handled_signals, launched
+from karamelo_py.script.errors import ScriptError, nearest, render_message
 
 if TYPE_CHECKING:  # which takes most of the time that the program needs to begin
     from karamelo_py.scene.hub import Hub
-
-ERROR = 1
 
 RUN = "The log goes to the terminal and to log.mpm; files are written to the current folder."
 CHECK = """\
@@ -62,42 +67,19 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit status."""
     arguments = list(sys.argv[1:] if argv is None else argv)
     keep_to_oneself()
-    # Where there are several, their launcher tells of it.
-    with nullcontext() if launched()[0] > 1 else telling_of_the_end():
+    # A word where a batch system ends the program, outside of runs; launchers say one of several.
+    unhandled = [number for number in ENDING if signal.getsignal(number) == signal.SIG_DFL]
+    with handled_signals(_end, () if launched()[0] > 1 else unhandled):
         status, text = outcome_of(lambda: _dispatch(arguments), debugging="--debug" in arguments)
     if text:
         _complain(text)
     return status
 
 
-def outcome_of(act: Callable[[], int], *, debugging: bool = False) -> Outcome:
-    """Run something and tell how it ends."""
-    try:
-        return Outcome(act())
-    except KeyboardInterrupt:
-        return Outcome(INTERRUPTED, render_message("error", "interrupted"))
-    except FAILURES as error:
-        # Rich makes a SystemExit of it.
-        if isinstance(error, BrokenPipeError) or isinstance(error.__context__, BrokenPipeError):
-            # Whoever read our output has gone; what was written stays.
-            sys.stderr.close()
-            return Outcome(ERROR)
-        if debugging:
-            traceback.print_exc()
-        return Outcome(ERROR, _rendered(error))
-
-
-def _rendered(error: BaseException) -> str:
-    """Write an exception for the user: no traceback, also where the fault is not the user's."""
-    if isinstance(error, ScriptError):
-        return error.render()
-    if isinstance(error, MemoryError):
-        message = "the scene does not fit into memory"
-        hint = "a coarser grid, fewer points per cell, or precision(single)"
-    else:
-        message = f"internal error: {type(error).__name__}: {error}"
-        hint = "run again with --debug to see where, and please report it"
-    return render_message("error", message, hint=hint)
+def _end(number: int, _: Any) -> NoReturn:
+    # All that is open is whole: files have their names when they are complete.
+    os.write(2, f"error: ended by {signal.Signals(number).name}\n".encode())
+    os._exit(SIGNALLED + number)
 
 
 def _complain(text: str) -> None:
@@ -105,8 +87,8 @@ def _complain(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-# Subcommands with a module of their own, which is imported when it is asked for: its function
-# add_parser(subparsers) adds a parser whose default `act` takes the options.
+# Subcommands with a module of their own, which is imported when it is asked for: DESCRIPTION,
+# add_options(parser) and run(options), which returns the exit status.
 ELSEWHERE = {
     "bench": ("karamelo_py.app.bench.command", "Measure the speed of this machine."),
     "view": ("karamelo_py.app.view", "Draw pictures or a movie of dumps."),
@@ -281,10 +263,12 @@ def _parser(command: str) -> tuple[CommandLine, Any]:
     explain = add("help", _help, "Explain a command or a style.", HELP)
     explain.add_argument("words", metavar="WORD", nargs="*")
     for name, (module, summary) in ELSEWHERE.items():
+        added = commands.add_parser(name, help=summary)
         if name == command:
-            import_module(module).add_parser(commands)
-        else:
-            commands.add_parser(name, help=summary)
+            found = import_module(module)
+            added.description = found.DESCRIPTION
+            added.set_defaults(act=found.run)
+            found.add_options(added)
     return parser, commands
 
 
@@ -298,11 +282,10 @@ def _run(options: argparse.Namespace) -> int:
     if launched()[0] > 1:
         with leaving_at_once():  # before they know of each other
             import_module("karamelo_py.scene.hub")
-        debugging = options.debug
         return together(
             options.ranks,
             lambda comm: _carry_out(options, script, comm),
-            lambda act: outcome_of(act, debugging=debugging),
+            debugging=options.debug,
         )
     if (options.ranks or 1) > 1:
         return launch(options.ranks, options.command_line)

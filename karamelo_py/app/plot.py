@@ -3,22 +3,20 @@
 import argparse
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 from karamelo_py.app.logs import read_rows
 from karamelo_py.output.files import picture_format
 from karamelo_py.output.plots import Plots, PlottedCurve
 from karamelo_py.script.errors import ScriptError, nearest_few
 
-SUMMARY = "Draw columns of a log."
-TEXT = """\
+DESCRIPTION = """\
+Draw columns of a log.
 The log is log.mpm or log.csv. Without columns, lists those that there are. The command of scripts
 is explained by karamelo-py help command plot."""
 
 
-def add_parser(subparsers: Any) -> argparse.ArgumentParser:
-    """Add the subcommand to the command line."""
-    parser = subparsers.add_parser("plot", help=SUMMARY, description=f"{SUMMARY}\n{TEXT}")
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add what the subcommand takes."""
     parser.add_argument("log", metavar="LOG", type=Path)
     parser.add_argument("columns", metavar="Y", nargs="*", help="columns to draw")
     parser.add_argument("-x", default="Time", help="column to draw over (default: Time)")
@@ -31,8 +29,6 @@ def add_parser(subparsers: Any) -> argparse.ArgumentParser:
         help="ending in .png, .pdf or .svg (default: log.png)",
     )  # fmt: skip
     parser.add_argument("--debug", action="store_true", help=argparse.SUPPRESS)
-    parser.set_defaults(act=run)
-    return parser
 
 
 def run(options: argparse.Namespace) -> int:

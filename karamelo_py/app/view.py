@@ -15,17 +15,16 @@ from karamelo_py.output.movies import Frames, movie_format
 from karamelo_py.output.snapshots import Snapshot, read
 from karamelo_py.script.errors import ScriptError
 
-SUMMARY = "Draw pictures or a movie of dumps of points."
-TEXT = """\
+DESCRIPTION = """\
+Draw pictures or a movie of dumps of points.
 Files are those of dump particle, particle/gz, hdf5 and vtk (its .pvd). The pictures are those of
 dump pyplot."""
 DPI = 100
 SAMPLE = 400  # points whose nearest neighbours are looked for
 
 
-def add_parser(subparsers: Any) -> argparse.ArgumentParser:
-    """Add the subcommand to the command line."""
-    parser = subparsers.add_parser("view", help=SUMMARY, description=f"{SUMMARY}\n{TEXT}")
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add what the subcommand takes."""
     parser.add_argument("files", metavar="FILE", nargs="+", type=Path)
     parser.add_argument("-c", "--column", help="what colours the points (default: their solid)")
     parser.add_argument(
@@ -43,8 +42,6 @@ def add_parser(subparsers: Any) -> argparse.ArgumentParser:
     parser.add_argument("--elevation", type=float, default=30.0, help="in 3D, degrees")
     parser.add_argument("--fps", type=float, default=25.0, help="frames a second of a movie")
     parser.add_argument("--debug", action="store_true", help=argparse.SUPPRESS)
-    parser.set_defaults(act=run)
-    return parser
 
 
 def run(options: argparse.Namespace) -> int:

@@ -3,6 +3,7 @@
 import re
 import subprocess
 import sys
+from argparse import ArgumentParser
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from math import inf
@@ -18,7 +19,6 @@ from karamelo_py.app.studies.options import (
     add_combinations,
     add_family,
     family,
-    new_parser,
     out_file,
     zipped,
 )  # fmt: skip
@@ -151,11 +151,8 @@ class Adviser:
         return min((c for c in found if c.forecast), key=lambda c: c.cost, default=None)
 
 
-def add_parser(subparsers: Any) -> None:
-    """The subcommand for the command line."""
-    parser = new_parser(
-        subparsers, "advise", "find the cheapest variant that is accurate enough", DESCRIPTION, run
-    )
+def add_options(parser: ArgumentParser) -> None:
+    """Add what the subcommand takes."""
     add_family(parser)
     add_combinations(parser)
     parser.add_argument(

@@ -10,14 +10,15 @@ import subprocess
 import sys
 import time
 import tomllib
+from argparse import ArgumentParser
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import karamelo_py
+from karamelo_py.app.logs import read_text
 from karamelo_py.app.studies import records
 from karamelo_py.app.studies.case import environment
-from karamelo_py.app.studies.options import new_parser
 from karamelo_py.output.console import duration
 from karamelo_py.output.files import write_whole
 from karamelo_py.script.errors import ScriptError, meant, plural
@@ -98,9 +99,7 @@ class Entry:
 def read(path: Path) -> tuple[list[Entry], Path]:
     """The entries of an atlas, and its folder of scripts."""
     try:
-        found = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ScriptError(f"cannot read {path}: {error.strerror or error}") from None
+        found = tomllib.loads(read_text(path))
     except tomllib.TOMLDecodeError as error:
         raise ScriptError(f"{path} is not TOML: {error}") from None
     entries = []
@@ -117,9 +116,8 @@ def read(path: Path) -> tuple[list[Entry], Path]:
     return entries, (path.parent / found.get("inputs", "inputs")).resolve()
 
 
-def add_parser(subparsers: Any) -> None:
-    """The subcommand for the command line."""
-    parser = new_parser(subparsers, "atlas", "make pictures of a page again", DESCRIPTION, run)
+def add_options(parser: ArgumentParser) -> None:
+    """Add what the subcommand takes."""
     parser.add_argument("atlas", type=Path, help="the list of entries, such as docs/atlas.toml")
     parser.add_argument("-only", default="", metavar="NAMES", help="entries or groups, with commas")
     parser.add_argument("-small", action="store_true", help="at the smaller values of the entries")

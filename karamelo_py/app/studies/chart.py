@@ -1,5 +1,6 @@
 """karamelo-py chart: what accuracy costs, how errors fall, where two variables lead."""
 
+from argparse import ArgumentParser
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -8,7 +9,7 @@ import numpy as np
 
 from karamelo_py.app.studies import histories, keeping, look, page, pictures, records, versus
 from karamelo_py.app.studies.curves import Family, missing, order
-from karamelo_py.app.studies.options import add_axes, along, new_parser, out_file, split
+from karamelo_py.app.studies.options import add_axes, along, out_file, split
 from karamelo_py.app.studies.study import plain_table, shown, terminal
 from karamelo_py.app.studies.variables import holds
 from karamelo_py.script.errors import ScriptError
@@ -27,9 +28,8 @@ Pareto front (runs that none beats in both). Prints the same as a table, with fi
 SUFFIXES = (".png", ".svg", ".pdf", ".html")
 
 
-def add_parser(subparsers: Any) -> None:
-    """The subcommand for the command line."""
-    parser = new_parser(subparsers, "chart", "draw a table of runs", DESCRIPTION, run)
+def add_options(parser: ArgumentParser) -> None:
+    """Add what the subcommand takes."""
     parser.add_argument(
         "tables", type=Path, nargs="+", metavar="table",
         help="what karamelo-py sweep has written; several with -versus",

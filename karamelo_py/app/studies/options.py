@@ -1,6 +1,5 @@
 """Options that the subcommands of studies share."""
 
-import argparse
 import csv
 from pathlib import Path
 from typing import Any
@@ -11,15 +10,6 @@ from karamelo_py.app.studies.study import default_jobs
 from karamelo_py.app.studies.variables import VALUES, check_script, choices, texts
 from karamelo_py.script.errors import ScriptError, nearest
 from karamelo_py.script.reading import scripts_in
-
-
-def new_parser(subparsers: Any, name: str, summary: str, description: str, run: Any) -> Any:
-    """A parser of a subcommand; its help keeps the lines of the description."""
-    parser = subparsers.add_parser(name, help=summary, description=description)
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.allow_abbrev = False
-    parser.set_defaults(act=run)
-    return parser
 
 
 def add_family(parser: Any) -> None:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 import karamelo_py
-from karamelo_py.app.logs import read_log
+from karamelo_py.app.logs import read_log, read_text
 from karamelo_py.app.studies.case import COLUMNS, CaseOutcome
 from karamelo_py.app.studies.variables import NamesOfCase
 from karamelo_py.output.files import write_whole
@@ -207,21 +207,14 @@ def _cell(value: Any) -> str:
 
 
 def read(path: Path) -> list[dict[str, str]]:
-    """The rows of a table."""
+    """Read the rows of a table."""
+    expected = "a table that karamelo-py sweep has written"
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            rows = list(csv.DictReader(file))
-    except OSError as error:
-        raise ScriptError(
-            f"cannot read {path}: {error.strerror or error}",
-            expected="a table that karamelo-py sweep has written",
-        ) from None
-    except (UnicodeDecodeError, csv.Error):
+        rows = list(csv.DictReader(io.StringIO(read_text(path, expected), newline="")))
+    except csv.Error:
         rows = []
     if not rows or any(None in each or None in each.values() for each in rows):
-        raise ScriptError(
-            f"{path} is not a table of runs", expected="a table that karamelo-py sweep has written"
-        )
+        raise ScriptError(f"{path} is not a table of runs", expected=expected)
     return rows
 
 

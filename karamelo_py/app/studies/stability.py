@@ -2,6 +2,7 @@
 
 import re
 import textwrap
+from argparse import ArgumentParser
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
@@ -20,7 +21,6 @@ from karamelo_py.app.studies.options import (
     add_family,
     along,
     family,
-    new_parser,
     out_file,
 )
 from karamelo_py.app.studies.study import Study
@@ -59,9 +59,8 @@ REASONS = {
 }
 
 
-def add_parser(subparsers: Any) -> None:
-    """The subcommand for the command line."""
-    parser = new_parser(subparsers, "stability", "map where a method is stable", DESCRIPTION, run)
+def add_options(parser: ArgumentParser) -> None:
+    """Add what the subcommand takes."""
     add_family(parser)
     parser.add_argument("-energy", metavar="COLUMN", help="log column that should not grow")
     parser.add_argument(

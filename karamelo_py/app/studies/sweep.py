@@ -1,6 +1,7 @@
 """karamelo-py sweep: every combination of values of variables, run and put into one table."""
 
 import sys
+from argparse import ArgumentParser
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,6 @@ from karamelo_py.app.studies.options import (
     add_combinations,
     add_family,
     family,
-    new_parser,
     out_file,
     zipped,
 )
@@ -29,9 +29,8 @@ An interrupted sweep goes on where it stopped when the same command is given aga
 threads and versions are written beside the table (sweep.json)."""
 
 
-def add_parser(subparsers: Any) -> None:
-    """The subcommand for the command line."""
-    parser = new_parser(subparsers, "sweep", "run a family of variants", DESCRIPTION, run)
+def add_options(parser: ArgumentParser) -> None:
+    """Add what the subcommand takes."""
     add_family(parser)
     add_combinations(parser)
     parser.add_argument(
