@@ -152,7 +152,7 @@ def test_the_atlas_of_the_pages_names_scripts_and_commands_that_exist():
     from karamelo_py.app.cli import ELSEWHERE
     from karamelo_py.app.studies.options import zipped
     from karamelo_py.app.studies.records import recorded
-    from karamelo_py.app.studies.variables import cases, check_script, choices, logged
+    from karamelo_py.app.studies.variables import ScriptFiles, cases, choices
 
     entries, inputs = atlas.read(ROOT / "docs" / "atlas.toml")
     assert len({entry.name for entry in entries}) == len(entries)
@@ -168,9 +168,9 @@ def test_the_atlas_of_the_pages_names_scripts_and_commands_that_exist():
                 assert script is None or script.is_file(), line
                 if line.startswith("sweep"):
                     values = choices(options.var, {n for g in zipped(options) for n in g})
-                    check_script(script, values)
+                    ScriptFiles(script).check(values)
                     assert cases(values, zipped(options), options.where)
-                    recorded(options.record, logged(script), script, values)
+                    recorded(options.record, ScriptFiles(script), values)
 
 
 def test_curves_of_a_sweep(folder, capsys):

@@ -2,19 +2,19 @@
 
 import re
 import subprocess
-import sys
 from argparse import ArgumentParser
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from karamelo_py.app.options import above_zero, positive
 from karamelo_py.app.studies import records
-from karamelo_py.app.studies.case import environment
+from karamelo_py.app.studies.case import PROGRAM, environment, options_of
 from karamelo_py.app.studies.curves import column, order, usable
-from karamelo_py.app.studies.forecast import Forecast, forecast
 from karamelo_py.app.studies.options import (
     add_combinations,
     add_family,
@@ -23,7 +23,7 @@ from karamelo_py.app.studies.options import (
     zipped,
 )  # fmt: skip
 from karamelo_py.app.studies.study import Study, plain_table, shown, terminal
-from karamelo_py.app.studies.variables import cases, logged
+from karamelo_py.app.studies.variables import cases
 from karamelo_py.script.errors import ScriptError, plural
 from karamelo_py.script.terms import number_of
 
@@ -37,6 +37,72 @@ target at the least cost, how sure that is, and what to write.
 One variable, the number with the most values, makes a scene finer; the others are choices. Runs go
 one at a time, since their times count, unless another cost is named. With -run the variant is run,
 and it is told whether it met the target."""
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """Forecast of a run that has not been made: its error, between which bounds, and its cost."""
+
+    error: float
+    low: float
+    high: float
+    cost: float
+
+
+def forecast(
+    x: float, xs: Sequence[float], rows: Sequence[Mapping[str, Any]], accuracy: str, cost: str
+) -> Forecast | None:
+    """Expect a run at `x` from the runs at `xs`, coarse ones first.
+
+    The error goes on with the order between the last two. Its bounds are those of the least and the
+    largest order so far, at least a third of the expected order away; an order that has fallen may
+    fall by as much again. The time is steps times
+    (a + b points), fitted to the runs; any other cost goes on as between the last two. None where
+    fewer than two runs have an error, or the last one got worse.
+    """
+    xs = np.asarray(xs, float)
+    error = column(rows, accuracy)
+    good = np.isfinite(error) & (error > 0)
+    if good.sum() < 2 or not good[-1]:
+        return None
+    xs, error = xs[good], error[good]
+    rows = [row for row, is_good in zip(rows, good, strict=True) if is_good]
+    local = np.diff(np.log(error)) / np.diff(np.log(xs))
+    # Signs such that finer means a larger way.
+    way = abs(np.log(x / xs[-1]))
+    fall = local * np.sign(np.diff(np.log(xs)))
+    if fall[-1] >= 0:
+        return None
+    expected = -fall[-1]
+    rates = [-f for f in fall if f < 0]
+    # An order that falls may go on falling.
+    drop = max(-fall[-2] - expected, 0.0) if len(fall) > 1 else 0.0
+    slow = max(min(*rates, 2 / 3 * expected, expected - drop), 0.0)
+    fast = max(*rates, 4 / 3 * expected)
+    at = [float(error[-1] * np.exp(-rate * way)) for rate in (expected, fast, slow)]
+    return Forecast(*at, _cost(x, xs, rows, cost))
+
+
+def _cost(x: float, xs: np.ndarray, rows: Sequence[Mapping[str, Any]], cost: str) -> float:
+    values = column(rows, cost)
+    if cost == "seconds" and all(usable(a) for a in values):
+        steps, points = (np.array(column(rows, name), float) for name in ("steps", "points"))
+        # Relative errors count alike; neither part of the time can be negative.
+        matrix = np.stack([steps, steps * points], axis=1) / values[:, None]
+        parts = np.linalg.lstsq(matrix, np.ones(len(values)), rcond=None)[0]
+        if (parts < 0).any():
+            best = int(np.argmax(parts))
+            parts = np.zeros(2)
+            parts[best] = 1 / np.mean(matrix[:, best])
+        more = [_power(x, xs, of) for of in (steps, points)]
+        return float(more[0] * (parts[0] + parts[1] * more[1]))
+    return _power(x, xs, values)
+
+
+def _power(x: float, xs: np.ndarray, values: np.ndarray) -> float:
+    """A power law through the last two values."""
+    exponent = order(xs[-2:], values[-2:]).exponent
+    return float(values[-1] * (x / xs[-1]) ** (exponent if np.isfinite(exponent) else 0.0))
 
 
 @dataclass
@@ -66,18 +132,8 @@ class Candidate:
 class Adviser:
     """Looks for the cheapest variant whose error is at most `target`.
 
-    Parameters
-    ----------
-    study
-        Runs the variants.
-    along
-        The variable that makes a scene finer, and its values, coarse ones first.
-    choices
-        The other variables.
-    accuracy, cost
-        Columns of the table.
-    target
-        The error that is allowed.
+    `along` is the variable that makes a scene finer, with its values, coarse ones first; `accuracy`
+    and `cost` are columns of the table.
     """
 
     def __init__(
@@ -173,8 +229,8 @@ def run(options: Any) -> int:
     """Do what the command line says; returns the exit status."""
     out = out_file(options.o, ".csv")
     timed = options.cost in ("seconds", "wall_s", "particle_steps_per_s")
-    values, launch, jobs = family(options, timed=timed)
-    items = records.recorded(options.accuracy, logged(options.script), options.script, values)
+    values, script, launch, jobs = family(options, timed=timed)
+    items = records.recorded(options.accuracy, script, values)
     if len(items) != 1:
         raise ScriptError(f"-accuracy {options.accuracy}", expected="one column")
     if options.cost not in records.COLUMNS:
@@ -193,16 +249,10 @@ def run(options: Any) -> int:
         raise ScriptError(f"-zip: {name} makes the scene finer", expected="choices in step")
     combined = cases(others, together, options.where) if others else [{}]
     choices = [ChoiceRuns(case) for case in combined]
-    study = Study(
-        launch, out.with_suffix(""), items, jobs, again=options.again, strict=True,
-        most=len(choices) * len(values[name]),
-    )  # fmt: skip
+    most = len(choices) * len(values[name])
+    study = Study(launch, out, items, jobs, again=options.again, strict=True, most=most)
     study.names = list(values)
-    records.describe(
-        out, script=str(options.script), variables=values, record=[items[0].text], timed=timed,
-        repeat=1, threads=launch.threads, jobs=jobs,
-    )  # fmt: skip
-    study.on_row = lambda: records.write(out, list(study.rows.values()))
+    study.describe(variables=values, record=[items[0].text], timed=timed, repeat=1)
     ordered = coarse_first(options.script, name, values[name], choices[0].values)
     adviser = Adviser(study, (name, ordered), choices, items[0].word, options.cost, options.target)
     adviser.pilot(options.pilot)
@@ -222,12 +272,11 @@ def coarse_first(
     ordered = sorted(values, key=float)
     work = []
     for value in (ordered[0], ordered[-1]):
-        command = [sys.executable, "-m", "karamelo_py.app.cli", "check", str(script), "--threads"]
-        command += ["1", "-var", name, value]
-        command += [w for n, v in others.items() for w in ("-var", n, v)]
+        command = [*PROGRAM, "check", str(script), "--threads", "1"]
         said = subprocess.run(
-            command, capture_output=True, text=True, encoding="utf-8", env=environment()
-        ).stdout
+            [*command, *options_of({name: value, **others})],
+            capture_output=True, text=True, encoding="utf-8", env=environment(),
+        ).stdout  # fmt: skip
         points = re.search(r"^points +(\d+)", said, re.M)
         dt = re.search(r"^first dt +([-+.\deE]+)", said, re.M)
         work.append(float(points[1]) / float(dt[1]) if points and dt else None)

@@ -7,7 +7,6 @@ import re
 import shlex
 import shutil
 import subprocess
-import sys
 import time
 import tomllib
 from argparse import ArgumentParser
@@ -18,7 +17,7 @@ from typing import Any
 import karamelo_py
 from karamelo_py.app.logs import read_text
 from karamelo_py.app.studies import records
-from karamelo_py.app.studies.case import environment
+from karamelo_py.app.studies.case import PROGRAM, environment
 from karamelo_py.output.console import duration
 from karamelo_py.output.files import write_whole
 from karamelo_py.script.errors import ScriptError, meant, plural
@@ -206,7 +205,7 @@ def make(entry: Entry, place: Path, inputs: Path, *, small: bool, again: bool) -
     told = []
     for line in lines:
         done = subprocess.run(
-            [sys.executable, "-m", "karamelo_py.app.cli", *shlex.split(line)],
+            [*PROGRAM, *shlex.split(line)],
             cwd=place, env={**environment(), **more}, stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE, text=True, encoding="utf-8", check=False,
         )  # fmt: skip

@@ -95,7 +95,7 @@ def run(options: Any) -> int:
             raise missing("-heat", name, variables)
     if options.heat and len(axes) != 2:
         raise ScriptError(f"-heat {options.heat}", expected="two variables: -heat N,ppc")
-    if not options.x and not axes and not any(line.shown(line.cost).any() for line in family.lines):
+    if not options.x and not axes and not any(line.shown.any() for line in family.lines):
         raise ScriptError(f"no run has a value of '{options.cost}' above 0")
     first = family.along if options.x else look.label(family.cost)
     words = along(options, *(axes or (first, family.error_label)))
@@ -105,14 +105,11 @@ def run(options: Any) -> int:
     if out.suffix.lower() == ".html":
         if axes:
             raise ScriptError("-heat is a picture", expected="-o heat.png, .svg or .pdf")
-        page.write(
-            family, rows, out, convergence=bool(options.x), title=title or "runs", made=made,
-            words=words,
-        )  # fmt: skip
+        page.write(family, rows, out, words, title or "runs", made)
     elif axes:
-        pictures.heat(family, rows, *axes, out, title, words=words)
+        pictures.heat(family, rows, *axes, out, words, title)
     else:
-        pictures.lines(family, out, convergence=bool(options.x), title=title, words=words)
+        pictures.lines(family, out, words, title)
     print(f"drawn: {out}")
     return 0
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf, isfinite
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,20 +15,11 @@ from karamelo_py.script.terms import number_of
 NONE = "mechanical"  # what a script says where a method has no such word
 
 
-@dataclass
-class Order:
-    """The exponent of a power law y = c x^exponent, fitted to logarithms by least squares.
+class Order(NamedTuple):
+    """The exponent of a power law y = c x^exponent, fitted to logarithms by least squares."""
 
-    Attributes
-    ----------
-    exponent
-        Of the fit; NaN with fewer than two points.
-    lowest, highest
-        Exponents between neighbouring points.
-    """
-
-    exponent: float
-    lowest: float
+    exponent: float  # NaN with fewer than two points
+    lowest: float  # exponents between neighbouring points
     highest: float
 
     def __str__(self) -> str:
@@ -40,7 +31,7 @@ class Order:
 
 
 def order(x: Sequence[float], y: Sequence[float]) -> Order:
-    """The order of y in x; points that have no logarithm are left out."""
+    """Fit the order of y in x; points that have no logarithm are left out."""
     pairs = sorted((a, b) for a, b in zip(x, y, strict=True) if usable(a) and usable(b))
     logs = np.log(np.array(pairs).reshape(-1, 2))
     if len(np.unique(logs[:, 0])) < 2:
@@ -58,23 +49,17 @@ def usable(a: float | None) -> bool:
 
 @dataclass
 class GroupedRuns:
-    """Runs that differ in one variable only.
+    """Runs that differ in one variable only, in its order."""
 
-    Attributes
-    ----------
-    choice
-        Values of the other variables that differ between lines.
-    rows
-        Rows of the table, in the order of that variable.
-    x, cost, error
-        Numbers of each, NaN where there is none.
-    """
-
-    choice: dict[str, str]
+    choice: dict[str, str]  # values of the other variables that differ between lines
     rows: list[Mapping[str, str]] = field(default_factory=list)
+    # Numbers of each, NaN where there is none.
     x: np.ndarray = field(default_factory=lambda: np.empty(0))
     cost: np.ndarray = field(default_factory=lambda: np.empty(0))
     error: np.ndarray = field(default_factory=lambda: np.empty(0))
+    across: np.ndarray = field(
+        default_factory=lambda: np.empty(0)
+    )  # x or cost: what errors are over
 
     @property
     def label(self) -> str:
@@ -83,9 +68,16 @@ class GroupedRuns:
         parts = [v if _tells(v) else f"{n} = {v}" for n, v in choice.items()]
         return ", ".join(parts) or "all"
 
-    def shown(self, along: np.ndarray) -> np.ndarray:
-        """Choose the members that have a place in a diagram of errors over `along`."""
-        return np.isfinite(self.error) & (self.error > 0) & np.isfinite(along) & (along > 0)
+    @property
+    def shown(self) -> np.ndarray:
+        """Choose the members that have a place in a diagram of errors."""
+        good = np.isfinite(self.error) & (self.error > 0)
+        return good & np.isfinite(self.across) & (self.across > 0)
+
+
+def told(choice: Mapping[str, str]) -> list[str]:
+    """Write values of variables: words alone, numbers with what they are the value of."""
+    return [v if number_of(v) is None else f"{name} = {v}" for name, v in choice.items()]
 
 
 def _tells(value: str) -> bool:
@@ -95,20 +87,9 @@ def _tells(value: str) -> bool:
 class Family:
     """A table of runs as lines.
 
-    Parameters
-    ----------
-    rows
-        Rows of the table.
-    variables
-        Names of its variables.
-    accuracy, cost
-        Columns to compare.
-    by
-        Variables whose values tell the lines apart; others that differ are added.
-    along
-        The variable that differs along a line; by default the number with the most values.
-    recorded
-        What the sweep was asked to record: a column that is a formula is shown as such.
+    `accuracy` and `cost` are the columns to compare. Variables `by` tell the lines apart; others
+    that differ are added. `along` differs along a line: by default the number with the most values.
+    What the sweep has `recorded` is shown as a formula where it is one.
     """
 
     def __init__(
@@ -128,6 +109,7 @@ class Family:
             for name in names:
                 if name not in variables:
                     raise missing(option, name, variables)
+        self.convergence = bool(along)  # errors over that variable, not over cost
         values = {name: list(dict.fromkeys(row[name] for row in rows)) for name in variables}
         differing = [name for name in variables if len(values[name]) > 1]
         numbers = [
@@ -151,6 +133,7 @@ class Family:
                 line.rows.sort(key=lambda row: number_of(row[self.along]))
             line.x = column(line.rows, self.along) if self.along else np.zeros(len(line.rows))
             line.cost, line.error = column(line.rows, self.cost), column(line.rows, self.accuracy)
+            line.across = line.x if self.convergence else line.cost
         return list(found.values())
 
     @property
@@ -160,7 +143,7 @@ class Family:
         return f"{self.accuracy} = {formula}" if formula else look.label(self.accuracy)
 
     def front(self) -> list[Mapping[str, str]]:
-        """The Pareto front: runs that none beats in both cost and error, cheapest first."""
+        """Find the Pareto front: runs that none beats in both cost and error, cheapest first."""
         members = [
             (c, e, k, row)
             for line in self.lines
@@ -176,7 +159,7 @@ class Family:
 
 
 def column(rows: Sequence[Mapping[str, Any]], name: str) -> np.ndarray:
-    """The numbers of a column, NaN where there is none."""
+    """Read the numbers of a column, NaN where there is none."""
     found = [value(row, name) for row in rows]
     return np.array([np.nan if a is None else a for a in found], float)
 
@@ -188,5 +171,5 @@ def require(rows: Sequence[Mapping[str, str]], option: str, name: str) -> None:
 
 
 def missing(option: str, name: str, known: Sequence[str], place: str = "the table") -> ScriptError:
-    """The error for a column or a variable that a table does not have."""
+    """Make the error for a column or a variable that a table does not have."""
     return unknown(f"{option}: {place} has no '{name}'", name, known)

@@ -15,7 +15,7 @@ def explore(
     classify: Callable[[Sequence[Cell]], Sequence[Hashable]],
     stride: int = 6,
 ) -> tuple[dict[Cell, Hashable], dict[Cell, Hashable]]:
-    """The class of every cell of a plane, most of them by inference.
+    """Find the class of every cell of a plane, most of them by inference.
 
     First lines and columns about `stride` cells apart are crossed. What lies in a row or a column
     between two cells of one class is taken to be like them, the nearest ones first; between unlike
@@ -23,19 +23,8 @@ def explore(
     three of its cells is asked for, so that no bow of it is cut off. So edges are found to the
     cell; an island that lies wholly between the cells that were asked for is missed.
 
-    Parameters
-    ----------
-    shape
-        Number of cells along each direction.
-    classify
-        Gives the classes of cells; it is asked for several at once, none of which tells another.
-    stride
-        Cells between the first ones.
-
-    Returns
-    -------
-    known, inferred
-        Classes of the cells that were asked for, and of the others.
+    `classify` gives the classes of cells; it is asked for several at once, none of which tells
+    another. Returns the classes of those cells, and of the others.
     """
     classes: list[Hashable] = []  # those of the numbers in the planes
     known = np.full(shape, UNKNOWN)
@@ -67,7 +56,7 @@ def _gaps(line: np.ndarray) -> Iterator[tuple[int, int]]:
 
 
 def _filled(known: np.ndarray, stride: int) -> np.ndarray:
-    """The plane with what lies between like cells; where row and column disagree, nothing."""
+    """Fill in what lies between like cells; where row and column disagree, nothing."""
     found, reach = known.copy(), 2
     while reach <= stride:
         rows, columns = _between(found, reach), _between(found.T, reach).T

@@ -17,22 +17,12 @@ DECADES = 1e4  # curves that reach over more are drawn on a logarithmic axis
 
 
 class History(NamedTuple):
-    """One column over another, of one run.
-
-    Attributes
-    ----------
-    x, y
-        The numbers.
-    label
-        What the run was chosen to be.
-    stopped
-        Whether the run was stopped before its end.
-    """
+    """One column over another, of one run."""
 
     x: np.ndarray
     y: np.ndarray
-    label: str
-    stopped: bool = False
+    label: str  # what the run was chosen to be
+    stopped: bool = False  # before its end
 
 
 def histories(
@@ -44,20 +34,10 @@ def histories(
     curve: str,
     names: Sequence[str] = (),
 ) -> list[History]:
-    """The curves of all runs whose logs there are.
+    """Read the curves of all runs whose logs there are: one column `over` another.
 
-    Parameters
-    ----------
-    rows, by
-        The table, and the variables that tell its runs apart.
-    folder
-        Where the table is.
-    log
-        The name of the log in the folder of a run.
-    over, curve
-        Columns.
-    names
-        What to call the runs, in the order of the table; by their values without.
+    Runs are called by their values of the variables `by`, or by `names` in the order of the table,
+    which is in `folder`.
     """
     found = []
     for k, row in enumerate(rows):

@@ -8,9 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.app.logs import read_log
-from karamelo_py.app.studies import stretches
 from karamelo_py.app.studies.curves import missing
-from karamelo_py.kernels.growth import WITHIN
+from karamelo_py.kernels.growth import WITHIN, growth
 
 SHARE = 0.2  # of the run: means over its first and its last part are compared
 WRONG = ("gains", "breaks")
@@ -25,25 +24,15 @@ _POINT = re.compile(r"point \d+ of solid '[^']*'")
 class Kept(NamedTuple):
     """Verdict on the column in a run.
 
-    Attributes
-    ----------
-    word
-        ``keeps``, ``damps``, ``gains``, ``breaks`` (the run was stopped on its way), ``refused``
-        (it made no step), or ``unknown`` (given up or killed). What is a part of the energy
-        ``falls`` or ``grows``: whether the whole is lost or gained it does not tell.
-    number
-        Mean of the last part of the run over that of the first; of a run that breaks, when.
-    said
-        Warnings of the run, and the error that ended it; what is known to be the cause where the
-        program named that.
-    warned
-        Whether it warned, or the error that ended it names a known cause.
+    Its word is ``keeps``, ``damps``, ``gains``, ``breaks`` (the run was stopped on its way),
+    ``refused`` (it made no step), or ``unknown`` (given up or killed). What is a part of the energy
+    ``falls`` or ``grows``: whether the whole is lost or gained it does not tell.
     """
 
     word: str
-    number: float
-    said: tuple[str, ...]
-    warned: bool
+    number: float  # mean of the last part over that of the first; of a run that breaks, when
+    said: tuple[str, ...]  # warnings, and the error that ended it: known causes where it named them
+    warned: bool  # or the error that ended it names a known cause
 
     @property
     def silent(self) -> bool:
@@ -51,10 +40,19 @@ class Kept(NamedTuple):
         return self.word in WRONG and not self.warned
 
 
+def grown(first: float, later: float) -> float:
+    """Growth from one mean to a later one, as a share of the first; NaN from nothing."""
+    return growth(first, later, first) if first else np.nan
+
+
 def judge(x: np.ndarray, y: np.ndarray, within: float = WITHIN) -> tuple[str, float]:
-    """The word for a column `y` over `x`, and its mean over the last part over that at first."""
-    first, last = stretches.ends(x, y, SHARE)
-    share = stretches.grown(first, last)
+    """Find the word for a column `y` over `x`, and its mean over the last part over that at first.
+
+    The parts are shares of the way along `x`.
+    """
+    span = SHARE * (x[-1] - x[0])
+    first, last = float(y[x <= x[0] + span].mean()), float(y[x >= x[-1] - span].mean())
+    share = grown(first, last)
     ratio = last / first if first else np.nan
     if not share <= within:  # nor for NaN
         return "gains", ratio
@@ -116,20 +114,17 @@ def table(rows: Sequence[Mapping[str, str]], kept: Sequence[Kept], by: Sequence[
     """
     keys = [tuple(row[name] for name in by) for row in rows]
 
-    def follows(name: str) -> bool:
-        return len({(key, row[name]) for key, row in zip(keys, rows, strict=True)}) == len(
-            set(keys)
-        )
+    def differs(name: str) -> bool:
+        pairs = {(key, row[name]) for key, row in zip(keys, rows, strict=True)}
+        return len(pairs) > len(set(keys))
 
-    across = [name for name in variables if name not in by and not follows(name)]
+    across = [name for name in variables if name not in by and differs(name)]
     columns = list(dict.fromkeys(tuple(row[name] for name in across) for row in rows))
     notes: list[str] = []
     cells: dict[tuple, str] = {}
     silent = []
     for key, row, one in zip(keys, rows, kept, strict=True):
-        for text in one.said:
-            if text not in notes:
-                notes.append(text)
+        notes += [text for text in one.said if text not in notes]
         marks = ", ".join(str(notes.index(text) + 1) for text in one.said)
         number = f" {one.number:.3g}" if np.isfinite(one.number) else ""
         if one.word == "breaks":

@@ -18,13 +18,8 @@ PALETTE = (
 )  # fmt: skip
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">")
 DASHES = (
-    "-",
-    (0, (5, 2)),
-    (0, (1, 1.5)),
-    (0, (5, 1.5, 1, 1.5)),
-    (0, (9, 3)),
-    (0, (3, 1, 1, 1, 1, 1)),
-)
+    "-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (9, 3)), (0, (3, 1, 1, 1, 1, 1)),
+)  # fmt: skip
 PLOTLY_DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")
 PLOTLY_MARKERS = (
     "circle", "square", "triangle-up", "diamond", "triangle-down", "cross", "x",
@@ -52,7 +47,7 @@ LABELS = {
 
 
 def place(word: str, others: Sequence[str] = ()) -> int:
-    """The number of a word's colour and marker: fixed for methods, else in the order of values."""
+    """Number the colour and marker of a word: fixed for methods, else in the order of values."""
     for family in FAMILIES:
         if word in family:
             return family.index(word) % len(PALETTE)
@@ -110,15 +105,10 @@ def log_ticks(low: float, high: float) -> list[float]:
     decades = log10(high / low)
     every = 1 if decades < 9 else ceil(decades / 8)
     exponents = range(floor(log10(low)) - 1, ceil(log10(high)) + 1)
-    finest = [k / 20 for k in range(20, 200)]
     for leads in (
-        (1,),
-        (1, 2, 5),
-        (1, 1.5, 2, 3, 4, 5, 6, 8),
-        [k / 2 for k in range(2, 20)],
-        [k / 5 for k in range(5, 50)],
-        finest,
-    ):
+        (1,), (1, 2, 5), (1, 1.5, 2, 3, 4, 5, 6, 8), [k / 2 for k in range(2, 20)],
+        [k / 5 for k in range(5, 50)], [k / 20 for k in range(20, 200)],
+    ):  # fmt: skip
         ticks = [lead * 10.0**k for k in exponents if k % every == 0 for lead in leads]
         ticks = [tick for tick in ticks if low * (1 - 1e-9) <= tick <= high * (1 + 1e-9)]
         if len(ticks) >= 3:
@@ -177,12 +167,9 @@ def apart(wanted: Sequence[float], gap: float, low: float, high: float) -> np.nd
 
 
 def direct_labels(axes: Any, ends: Sequence[tuple[float, float, str, str]]) -> None:
-    """Names of lines in a column beside the axes, each joined to the end of its line.
+    """Write names of lines in a column beside the axes, each joined to the end of its line.
 
-    Parameters
-    ----------
-    ends
-        x and y of the end of each line, its name and its colour.
+    Of each line x and y of its end, its name and its colour.
     """
     if not ends:
         return

@@ -1,19 +1,19 @@
 """Options that the subcommands of studies share."""
 
 import csv
+import os
 from pathlib import Path
 from typing import Any
 
 from karamelo_py.app.options import VARIABLE, above_zero, positive
 from karamelo_py.app.studies.case import Launch
-from karamelo_py.app.studies.study import default_jobs
-from karamelo_py.app.studies.variables import VALUES, check_script, choices, texts
+from karamelo_py.app.studies.variables import VALUES, ScriptFiles, choices
 from karamelo_py.script.errors import ScriptError, nearest
 from karamelo_py.script.reading import scripts_in
 
 
 def add_family(parser: Any) -> None:
-    """Options of a family of runs."""
+    """Add options of a family of runs."""
     parser.add_argument("script", type=Path, help="the script")
     parser.add_argument(
         *VARIABLE, action="append", default=[], metavar="NAME=VALUES",
@@ -35,7 +35,7 @@ def add_family(parser: Any) -> None:
 
 
 def add_axes(parser: Any) -> None:
-    """The option of words along the axes of a picture."""
+    """Add the option of words along the axes of a picture."""
     parser.add_argument(
         "-axes",
         metavar="X,Y",
@@ -53,12 +53,12 @@ def along(options: Any, x: str, y: str) -> tuple[str, str]:
 
 
 def split(text: str) -> list[str]:
-    """Words with commas between them; one in double quotes may have commas of its own."""
+    """Part words at commas; one in double quotes may have commas of its own."""
     return [word.strip() for word in next(csv.reader([text], skipinitialspace=True), [])]
 
 
 def add_combinations(parser: Any) -> None:
-    """Options of which values go together."""
+    """Add options of which values go together."""
     parser.add_argument(
         "-zip", action="append", default=[], metavar="A,B",
         help="variables that go in step: the first values together, then the second, ...",
@@ -70,41 +70,39 @@ def add_combinations(parser: Any) -> None:
 
 
 def zipped(options: Any) -> list[list[str]]:
-    """The variables that go in step."""
+    """Read which variables go in step."""
     groups = getattr(options, "zip", [])  # not every study of a family has it
     return [[name.strip() for name in group.split(",")] for group in groups]
 
 
-def family(options: Any, *, timed: bool = False, repeat: int = 1) -> tuple[dict, Launch, int]:
-    """Values of the variables, how to run, and how many at once."""
-    if not options.script.is_file():
-        folder = options.script.parent
-        close = nearest(options.script.name, scripts_in(folder))
+def family(
+    options: Any, *, timed: bool = False, repeat: int = 1
+) -> tuple[dict, ScriptFiles, Launch, int]:
+    """Read values of the variables, the script, how to run, and how many at once."""
+    path = options.script
+    if not path.is_file():
+        close = nearest(path.name, scripts_in(path.parent))
         raise ScriptError(
-            f"there is no file {options.script}",
+            f"there is no file {path}",
             expected="the name of a script",
-            hint=f"did you mean {folder / close}?" if close else None,
+            hint=f"did you mean {path.parent / close}?" if close else None,
         )
     in_step = {name for group in zipped(options) for name in group}
     values = choices(options.var, in_step)
     if not values:
         raise ScriptError("nothing varies", expected=f"-var {VALUES}")
-    check_script(options.script, values)
-    launch = Launch(
-        options.script,
-        threads=options.threads or 1,
-        repeat=repeat,
-        limit=options.limit,
-        texts=tuple(texts(options.script)),
-    )
+    script, threads = ScriptFiles(path), options.threads or 1
+    script.check(values)
+    launch = Launch(path, threads, repeat, options.limit, script.texts())
     if timed and (options.jobs or 1) > 1:
         raise ScriptError("-time runs one at a time", expected="-time without -jobs")
-    jobs = 1 if timed else options.jobs or max(1, default_jobs() // (options.threads or 1))
-    return values, launch, jobs
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
+    jobs = 1 if timed else options.jobs or max(1, cores // threads)
+    return values, script, launch, jobs
 
 
 def out_file(path: Path, *suffixes: str) -> Path:
-    """A file to write, with one of these endings."""
+    """See that a file can be written, with one of these endings."""
     if suffixes and path.suffix.lower() not in suffixes:
         raise ScriptError(f"-o {path}: unknown kind of file", expected=", ".join(suffixes))
     if not path.parent.is_dir():

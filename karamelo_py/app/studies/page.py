@@ -80,9 +80,8 @@ def require_plotly() -> None:
 
 
 def write(
-    family: Family, rows: list, path: Path, *, convergence: bool, title: str, made: Mapping,
-    words: tuple[str, str],
-) -> None:  # fmt: skip
+    family: Family, rows: list, path: Path, words: tuple[str, str], title: str, made: Mapping
+) -> None:
     """Write the page with Plotly; `words` stand along the axes."""
     from plotly import graph_objects
     from plotly import io as plotly_io
@@ -90,7 +89,7 @@ def write(
     number_of = {id(row): k for k, row in enumerate(rows)}
     figure = graph_objects.Figure()
     front = family.front()
-    if not convergence:
+    if not family.convergence:
         cost, error = column(front, family.cost), column(front, family.accuracy)
         figure.add_scatter(
             x=cost, y=error, mode="lines+markers", name="Pareto front", hoverinfo="skip",
@@ -99,35 +98,32 @@ def write(
         )  # fmt: skip
     styles = look.styles([line.choice for line in family.lines])
     for line, (colour, marker, dash) in zip(family.lines, styles, strict=True):
-        along = line.x if convergence else line.cost
-        shown = np.flatnonzero(line.shown(along))
+        shown = np.flatnonzero(line.shown)
         figure.add_scatter(
-            x=along[shown], y=line.error[shown], mode="lines+markers", name=line.label,
+            x=line.across[shown], y=line.error[shown], mode="lines+markers", name=line.label,
             customdata=[number_of[id(line.rows[k])] for k in shown],
             text=[_said(line.rows[k], family) for k in shown],
             hovertemplate="%{text}<br>%{y:.4g} at %{x:.4g}<extra></extra>",
             line={"color": colour, "dash": look.PLOTLY_DASHES[dash], "width": 2},
             marker={"symbol": look.PLOTLY_MARKERS[marker], "size": 10},
         )  # fmt: skip
-    axis = {
+    usual = {
         "type": "log", "showgrid": True, "gridcolor": "#e6e6e6", "exponentformat": "power",
         "linecolor": "#444", "ticks": "outside",
     }  # fmt: skip
     figure.update_layout(
         template="plotly_white", margin={"l": 70, "r": 20, "t": 20, "b": 60}, hovermode="closest",
-        xaxis={**axis, "title": words[0]},
-        yaxis={**axis, "title": words[1]},
+        xaxis={**usual, "title": words[0]},
+        yaxis={**usual, "title": words[1]},
         legend={"orientation": "h", "y": -0.15},
     )  # fmt: skip
-    for k, along in (("xaxis", 0), ("yaxis", 1)):
-        ends = _ends(family, convergence)[along]
-        ticks = look.log_ticks(*ends)
+    for axis, numbers in (("xaxis", "across"), ("yaxis", "error")):
+        drawn = np.concatenate([getattr(line, numbers)[line.shown] for line in family.lines])
+        ticks = look.log_ticks(drawn.min(), drawn.max()) if len(drawn) else []
         if 2 <= len(ticks) <= 14:
-            figure.layout[k].tickvals = ticks
-            figure.layout[k].ticktext = [f"{tick:g}" for tick in ticks]
-    folder = path.parent
-    table = folder / made["table"]
-    runs = [_run(row, family, table.parent, made, k) for k, row in enumerate(rows)]
+            figure.layout[axis].tickvals = ticks
+            figure.layout[axis].ticktext = [f"{tick:g}" for tick in ticks]
+    runs = [_run(row, family, path.parent, made, k) for k, row in enumerate(rows)]
     text = json.dumps(runs).replace("</", "<\\/")
     first = number_of[id(front[-1])] if front else 0
     chart = plotly_io.to_html(
@@ -135,24 +131,13 @@ def write(
         default_height="100%", config={"displaylogo": False, "responsive": True},
     )  # fmt: skip
     page = _PAGE.format(
-        title=html.escape(title), chart=chart, failures=_failures(family, rows),
+        title=html.escape(title), chart=chart, failures=_failures(family, number_of),
         footer=html.escape(_footer(made)), script=_SCRIPT % (text, first),
     )  # fmt: skip
     try:
         path.write_text(page, encoding="utf-8")
     except OSError as error:
         raise ScriptError(f"cannot write {path}: {error.strerror or error}") from None
-
-
-def _ends(family: Family, convergence: bool) -> list[tuple[float, float]]:
-    found = []
-    for axis in range(2):
-        numbers = []
-        for line in family.lines:
-            along = line.x if convergence else line.cost
-            numbers += list((along, line.error)[axis][line.shown(along)])
-        found.append((min(numbers), max(numbers)) if numbers else (1.0, 10.0))
-    return found
 
 
 def _said(row: Mapping[str, str], family: Family) -> str:
@@ -190,10 +175,9 @@ def _picture(folder: Path) -> str | None:
     return "data:image/png;base64," + base64.b64encode(out.getvalue()).decode()
 
 
-def _failures(family: Family, rows: list) -> str:
+def _failures(family: Family, number_of: Mapping[int, int]) -> str:
     if not family.without:
         return ""
-    number_of = {id(row): k for k, row in enumerate(rows)}
     items = "".join(
         f'<li><a href="#" data-run="{number_of[id(row)]}">{_said(row, family)}</a>: '
         f"{html.escape(row.get('reason') or row.get('status', ''))}</li>"

@@ -7,28 +7,25 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.app.studies import look
-from karamelo_py.app.studies.curves import Family, column, usable
+from karamelo_py.app.studies.curves import Family, column, told, usable
 from karamelo_py.output.files import savefig
 from karamelo_py.output.plot_style import blank_figure, tick_text, tidy
 from karamelo_py.script.errors import plural
 from karamelo_py.script.terms import number_of
 
 
-def lines(
-    family: Family, path: Path, *, convergence: bool, words: tuple[str, str], title: str = ""
-) -> None:
-    """Errors over costs with the Pareto front, or over the variable along lines.
+def lines(family: Family, path: Path, words: tuple[str, str], title: str = "") -> None:
+    """Draw errors over costs with the Pareto front, or over the variable along lines.
 
     `words` stand along the axes.
     """
     figure = blank_figure(8.4, 5.2)
     axes = figure.subplots()
+    convergence = family.convergence
     styles = look.styles([line.choice for line in family.lines])
-    across = [line.x if convergence else line.cost for line in family.lines]
-    drawn = [line.shown(x) for line, x in zip(family.lines, across, strict=True)]
-    xs = np.concatenate([x[k] for x, k in zip(across, drawn, strict=True)])
-    ys = np.concatenate([line.error[k] for line, k in zip(family.lines, drawn, strict=True)])
-    failed = [x[~k & (x > 0)] for x, k in zip(across, drawn, strict=True)] if convergence else []
+    xs = np.concatenate([line.across[line.shown] for line in family.lines])
+    ys = np.concatenate([line.error[line.shown] for line in family.lines])
+    failed = [line.across[~line.shown & (line.across > 0) & convergence] for line in family.lines]
     look.log_axis(
         axes.xaxis, *_ends(np.concatenate([xs, *failed])), list(xs) if convergence else None
     )
@@ -36,10 +33,9 @@ def lines(
     if not convergence:
         _front(axes, family)
     ends = []
-    for line, x, k, style in zip(family.lines, across, drawn, styles, strict=True):
-        colour, marker, dash = style
-        way = np.argsort(line.x[k], kind="stable")
-        px, py = x[k][way], line.error[k][way]
+    for line, (colour, marker, dash) in zip(family.lines, styles, strict=True):
+        way = np.argsort(line.x[line.shown], kind="stable")
+        px, py = line.across[line.shown][way], line.error[line.shown][way]
         if len(px):
             axes.plot(
                 px, py, color=colour, marker=look.MARKERS[marker], linestyle=look.DASHES[dash],
@@ -47,17 +43,17 @@ def lines(
             )  # fmt: skip
             last = int(np.argmax(px))
             ends.append((px[last], py[last], line.label, colour))
-    _gone(axes, [(x, style[0]) for style, gone in zip(styles, failed, strict=False) for x in gone])
+    _gone(axes, [(x, style[0]) for style, gone in zip(styles, failed, strict=True) for x in gone])
     look.direct_labels(axes, ends)
     axes.set(xlabel=words[0], ylabel=words[1])
     axes.set_title(title, loc="left", fontsize=10)
     tidy(axes)
-    _footnote(figure, family, convergence, not convergence and family.front())
+    _footnote(figure, family)
     savefig(figure, path)
 
 
 def _gone(axes: Any, marks: Sequence[tuple[float, str]]) -> None:
-    """A cross at the top for each run without a value; those at one place stand side by side."""
+    """Draw a cross at the top for each run without a value; those at one place stand side by side."""
     for at in {x for x, _ in marks}:
         colours = [colour for x, colour in marks if x == at]
         for k, colour in enumerate(colours):
@@ -80,23 +76,22 @@ def _front(axes: Any, family: Family) -> None:
     axes.plot(cost, error, "o", color="0.8", markersize=13, zorder=1)
 
 
-def _footnote(figure: Any, family: Family, convergence: bool, front: Any) -> None:
+def _footnote(figure: Any, family: Family) -> None:
     said = []
-    if front:
+    if not family.convergence and family.front():
         said.append("grey band: Pareto front, no run is both cheaper and more accurate")
-    if convergence and family.without:
-        said.append("× at the top: no value (failed)")
-    elif family.without:
-        said.append(f"not shown: {plural(len(family.without), 'run')} without a value")
+    if family.without:
+        missing = f"not shown: {plural(len(family.without), 'run')} without a value"
+        said.append("× at the top: no value (failed)" if family.convergence else missing)
     if said:
         figure.supxlabel("; ".join(said), fontsize=8, color="0.35", x=0.02, ha="left")
 
 
 def heat(
-    family: Family, rows: Sequence[Any], x: str, y: str, path: Path, title: str = "", *,
-    words: tuple[str, str],
+    family: Family, rows: Sequence[Any], x: str, y: str, path: Path, words: tuple[str, str],
+    title: str = "",
 ) -> None:  # fmt: skip
-    """A column of the table over two variables, as coloured cells with their numbers.
+    """Draw a column of the table over two variables, as coloured cells with their numbers.
 
     `words` stand along the axes.
     """
@@ -138,10 +133,7 @@ def heat(
         axes.set_xticks(np.arange(len(across)) + 0.5, across)
         axes.set_yticks(np.arange(len(up)) + 0.5, up)
         axes.set_facecolor("0.93")
-        said = [
-            v if number_of(v) is None else f"{n} = {v}" for n, v in zip(others, key, strict=True)
-        ]
-        axes.set_title(", ".join(said), fontsize=9)
+        axes.set_title(", ".join(told(dict(zip(others, key, strict=True)))), fontsize=9)
     for axes in all_axes[len(panels) :]:
         axes.set_visible(False)
     figure.supxlabel(words[0], fontsize=10)

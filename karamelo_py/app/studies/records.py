@@ -17,7 +17,7 @@ import numpy as np
 import karamelo_py
 from karamelo_py.app.logs import read_log, read_text
 from karamelo_py.app.studies.case import COLUMNS, CaseOutcome
-from karamelo_py.app.studies.variables import NamesOfCase
+from karamelo_py.app.studies.variables import NamesOfCase, ScriptFiles
 from karamelo_py.output.files import write_whole
 from karamelo_py.output.quantity import KEYWORDS
 from karamelo_py.script.errors import ScriptError, meant, nearest
@@ -136,21 +136,18 @@ class Recorded:
 
 
 def recorded(
-    text: str,
-    headings: Sequence[str] | None,
-    script: Path,
-    variables: Container[str] = (),
-    option: str = "-record",
+    text: str, script: ScriptFiles, variables: Container[str] = (), option: str = "-record"
 ) -> list[Recorded]:
     """Read the numbers that -record, or another option, asks for."""
     found = [Recorded(word.strip()) for word in _apart(text) if word.strip()]
+    headings = script.logged()
     for item in found:
         for column in [*item.columns, *(n for n in item.names if n not in variables)]:
             if headings is None or column in headings:
                 continue
             known = list(dict.fromkeys(headings))
             raise ScriptError(
-                f"{option} {item.text}: {script} does not log '{column}'",
+                f"{option} {item.text}: {script.path} does not log '{column}'",
                 expected="one of " + ", ".join(known),
                 hint=meant(column, known)
                 or f"log_modify(custom, step, dt, time, {column}) in the script",

@@ -6,7 +6,7 @@ from argparse import ArgumentParser
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from math import isclose, isfinite, nan, prod
+from math import ceil, inf, isclose, isfinite, nan, prod
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +14,9 @@ import numpy as np
 
 from karamelo_py.app.logs import read_log
 from karamelo_py.app.options import above_zero, positive
-from karamelo_py.app.studies import records, stretches
+from karamelo_py.app.studies import records
 from karamelo_py.app.studies.frontier import Cell, explore, unseen
+from karamelo_py.app.studies.keeping import grown
 from karamelo_py.app.studies.options import (
     add_axes,
     add_family,
@@ -24,7 +25,7 @@ from karamelo_py.app.studies.options import (
     out_file,
 )
 from karamelo_py.app.studies.study import Study
-from karamelo_py.app.studies.variables import logged
+from karamelo_py.app.studies.variables import ScriptFiles
 from karamelo_py.output.files import savefig
 from karamelo_py.output.plot_style import blank_figure
 from karamelo_py.script.errors import ScriptError, nearest, plural
@@ -75,7 +76,7 @@ def add_options(parser: ArgumentParser) -> None:
 def run(options: Any) -> int:
     """Do what the command line says; returns the exit status."""
     out = out_file(options.o, ".png", ".svg", ".pdf")
-    values, launch, jobs = family(options)
+    values, script, launch, jobs = family(options)
     axes = [name for name in values if len(values[name]) > 1]
     for name in axes:
         if any(number_of(value) is None for value in values[name]):
@@ -87,23 +88,20 @@ def run(options: Any) -> int:
         )
     for name in axes:
         values[name].sort(key=float)
-    energy = energy_column(options.energy, logged(options.script), options.script)
+    energy = energy_column(options.energy, script)
     words = along(options, axes[0], axes[1] if len(axes) > 1 else "")
     table = out.with_suffix(".csv")
     items = [records.Recorded(f"max:{energy}")]
-    cells = prod(len(values[name]) for name in axes)
+    most = prod(len(values[name]) for name in axes)
     study = Study(
-        launch, out.with_suffix(""), items, jobs, again=options.again, strict=True, most=cells
+        launch, table, items, jobs, again=options.again, strict=True, most=most, writes=False
     )
-    records.describe(
-        table, script=str(options.script), variables=values, energy=energy, bound=options.bound,
-        threads=launch.threads, jobs=jobs,
-    )  # fmt: skip
+    study.describe(variables=values, energy=energy, bound=options.bound)
     chart = Map(study, values, axes, energy, options.bound, out.parent)
     known, inferred = explore(chart.shape, chart.classify, options.stride)
     rows = chart.rows(known, inferred)
     records.write(table, rows)
-    chart.draw(known, inferred, out, options.script.name, words)
+    chart.draw({**inferred, **known}, out, options.script.name, words)
     chart.tell(known, inferred)
     width = unseen(chart.shape, options.stride)
     if inferred and width:
@@ -113,27 +111,37 @@ def run(options: Any) -> int:
     return 0
 
 
-def energy_column(asked: str | None, headings: Sequence[str] | None, script: Path) -> str:
-    """The log column to watch."""
+def energy_column(asked: str | None, script: ScriptFiles) -> str:
+    """Choose the log column to watch."""
     if asked is not None:
-        return records.recorded(asked, headings, script, option="-energy")[0].columns[0]
+        return records.recorded(asked, script, option="-energy")[0].columns[0]
+    headings = script.logged()
     for name in ENERGIES:
         if headings is None or name in headings:
             return name
     close = nearest("Ek+Es", headings or [])
     raise ScriptError(
-        f"{script} logs no energy under a usual name",
+        f"{script.path} logs no energy under a usual name",
         expected="-energy COLUMN, or log_modify(custom, step, dt, time, Ek + Es) in the script",
         hint=f"-energy {close}" if close else None,
     )
 
 
 def growth(energy: np.ndarray) -> float:
-    """The largest mean of an energy over the mean of its first tenth; infinite for NaN."""
-    first, later = stretches.most(energy, FIRST)
+    """Find the largest mean of an energy over that of its first tenth; infinite for NaN.
+
+    Means are over a tenth of the rows. From rest the median stands for the beginning.
+    """
+    if not len(energy):
+        return 0.0
+    if not np.isfinite(energy).all():
+        return inf
+    rows = max(1, ceil(FIRST * len(energy)))
+    means = np.convolve(np.abs(energy), np.full(rows, 1 / rows), "valid")
+    first = float(means[0]) or float(np.median(np.abs(energy)))
     if first == 0:
-        return np.inf if later > 0 else 0.0
-    return 1 + stretches.grown(first, later)
+        return inf if means.max() > 0 else 0.0
+    return 1 + grown(first, float(means.max()))
 
 
 def in_short(row: Mapping[str, Any]) -> str:
@@ -160,16 +168,8 @@ def limited_by(folder: Path) -> str:
 class Map:
     """The plane of a stability map.
 
-    Parameters
-    ----------
-    study
-        Runs the cases.
-    values, axes
-        Values of all variables, and the names of the one or two that vary.
-    energy, bound
-        The log column to watch, and how much it may grow.
-    folder
-        What folders in the table are relative to.
+    Of all variables in `values` the one or two `axes` vary. The log column `energy` may grow by the
+    factor `bound`. Folders in the table are relative to `folder`.
     """
 
     def __init__(
@@ -189,28 +189,27 @@ class Map:
     def classify(self, cells: Sequence[Cell]) -> list[str]:
         """Run cells; the class of each."""
         rows = self.study.run([self.case(cell) for cell in cells])
-        classes = []
         for cell, row in zip(cells, rows, strict=True):
-            log = read_log(self.folder / row["folder"])
-            if row["status"] == "done" and self.energy not in log:
+            place = self.folder / row["folder"]
+            log = read_log(place)
+            done = row["status"] == "done"
+            if done and self.energy not in log:
                 raise ScriptError(
                     f"the log has no column '{self.energy}'", expected=", ".join(log) or "a log"
                 )
             factor = growth(log.get(self.energy, np.empty(0)))
-            kind = "failed" if row["status"] != "done" else "stable"
-            if kind == "stable" and factor > self.bound:
-                kind = "growing"
-            reason = in_short(row) if kind == "failed" else ""
-            if kind == "growing":
-                reason = f"{self.energy} grows {factor:.3g} times"
-            name = limited_by(self.folder / row["folder"])
-            found = {**row, "class": kind, "why": reason, "growth": factor, "limit": name}
-            self.found[cell] = found
-            classes.append(kind)
-        return classes
+            kind, why = "stable", ""
+            if not done:
+                kind, why = "failed", in_short(row)
+            elif factor > self.bound:
+                kind, why = "growing", f"{self.energy} grows {factor:.3g} times"
+            found = {"class": kind, "why": why, "growth": factor, "limit": limited_by(place)}
+            self.found[cell] = {**row, **found}
+        return [self.found[cell]["class"] for cell in cells]
 
     def rows(self, known: Mapping[Cell, Any], inferred: Mapping[Cell, Any]) -> list[dict]:
-        """The table: every cell, whether it was run, and what it showed."""
+        """Make the table: every cell, whether it was run, and what it showed."""
+        numbers = ("growth", "dt", "stable_dt", "own_dt")
         rows = []
         for cell in sorted({**known, **inferred}):
             row = self.found.get(cell, {})
@@ -220,10 +219,7 @@ class Map:
                     "class": known.get(cell) or inferred.get(cell),
                     "run": "yes" if cell in known else "no",
                     "reason": row.get("why", ""),
-                    "growth": row.get("growth"),
-                    "dt": row.get("dt"),
-                    "stable_dt": row.get("stable_dt"),
-                    "own_dt": row.get("own_dt"),
+                    **{name: row.get(name) for name in numbers},
                     "limit": row.get("limit", ""),
                     "message": row.get("reason", ""),
                     "folder": row.get("folder", ""),
@@ -232,7 +228,7 @@ class Map:
         return rows
 
     def where(self, step: str, j: int) -> float | None:
-        """The first variable where the first step is the one of this column, in row j."""
+        """Find the first variable where the first step is that of this column, in row j."""
         x = [float(v) for v in self.values[self.axes[0]]]
         points = []
         for (i, other), row in sorted(self.found.items()):
@@ -245,7 +241,7 @@ class Map:
         return None
 
     def margins(self, classes: Mapping[Cell, Any]) -> list[float]:
-        """The largest stable step over the program's stable step, in each row that has an edge."""
+        """Divide the largest stable step by the program's, in each row that has an edge."""
         found = []
         for j in range(self.shape[1]):
             column = [classes[i, j] for i in range(self.shape[0])]
@@ -273,19 +269,13 @@ class Map:
             print(f"the largest stable first step is {ends} times the program's stable step")
 
     def draw(
-        self,
-        known: Mapping[Cell, Any],
-        inferred: Mapping[Cell, Any],
-        path: Path,
-        title: str,
-        words: tuple[str, str],
+        self, classes: Mapping[Cell, Any], path: Path, title: str, words: tuple[str, str]
     ) -> None:
         """Draw the map, with `words` along its axes."""
         from matplotlib.colors import ListedColormap
         from matplotlib.lines import Line2D
         from matplotlib.patches import Patch
 
-        classes = {**inferred, **known}
         x = [float(v) for v in self.values[self.axes[0]]]
         two = len(self.axes) > 1
         y = [float(v) for v in self.values[self.axes[1]]] if two else [0.0]

@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ import numpy as np
 
 from karamelo_py.app.logs import read_log
 from karamelo_py.app.studies.case import CaseOutcome, Launch, Refused, folder_name
-from karamelo_py.app.studies.records import Recorded, row
+from karamelo_py.app.studies.records import Recorded, describe, row, write
 from karamelo_py.output.console import duration
 from karamelo_py.script.terms import number_of
 
@@ -22,71 +23,47 @@ _FACTS = ("seconds", "points", "steps")
 _STATUS = 24  # characters at least, for what became of a run
 
 
+@dataclass
 class Study:
-    """A family of runs of one script.
+    """A family of runs of one script."""
 
-    Parameters
-    ----------
-    launch
-        How a case is run.
-    folder
-        Where the folders of the runs are.
-    items
-        What is recorded of their logs.
-    jobs
-        How many run at once.
-    again
-        Whether to run also what has been run before.
-    title
-        Heads the table on the terminal.
-    strict
-        Whether a variant that is refused ends the study.
-    most
-        How many cases there can be, of a study that asks for them by and by; 0: `run` gets all.
+    launch: Launch
+    out: Path  # the table or picture: runs have their folders in one of that name
+    items: Sequence[Recorded]  # what is recorded of the logs
+    jobs: int  # runs at once
+    again: bool = False  # run also what has been run before
+    title: str = ""  # heads the table on the terminal
+    strict: bool = False  # a variant that is refused ends the study
+    most: int = 0  # cases of a study that asks for them by and by; 0: `run` gets all
+    writes: bool = True  # the table, after each run
+    names: list[str] = field(default_factory=list)  # the variables
+    # Of finished runs, by the values of the case.
+    rows: dict[tuple[str, ...], dict[str, Any]] = field(default_factory=dict)
+    ran: int = 0  # not taken from an earlier study
+    begun: float = field(default_factory=time.perf_counter)
 
-    Attributes
-    ----------
-    rows
-        The rows of finished runs, by the values of the case.
-    names
-        The variables.
-    ran
-        How many were run, not taken from an earlier study.
-    """
+    def __post_init__(self) -> None:
+        self.folder = self.out.with_suffix("")
 
-    def __init__(
-        self,
-        launch: Launch,
-        folder: Path,
-        items: Sequence[Recorded],
-        jobs: int,
-        *,
-        again: bool = False,
-        title: str = "",
-        strict: bool = False,
-        most: int = 0,
-    ):
-        self.launch = launch
-        self.folder = folder
-        self.items = items
-        self.jobs = max(1, jobs)
-        self.again = again
-        self.title = title
-        self.strict = strict
-        self.most = most
-        self.rows: dict[tuple[str, ...], dict[str, Any]] = {}
-        self.names: list[str] = []
-        self.ran = 0
-        self.begun = time.perf_counter()
-        self.on_row: Callable[[], None] = lambda: None
+    def describe(self, **said: Any) -> None:
+        """Write beside the table what it is made with."""
+        script, threads = str(self.launch.script), self.launch.threads
+        describe(self.out, script=script, **said, threads=threads, jobs=self.jobs)
+
+    def write(self) -> None:
+        """Write the table of what is known."""
+        if self.writes and self.rows:
+            write(self.out, list(self.rows.values()))
 
     def run(self, cases: Sequence[Mapping[str, str]]) -> list[dict[str, Any]]:
-        """The rows of these cases, in order; runs what is not known yet."""
+        """Give the rows of these cases, in order; runs what is not known yet.
+
+        When the user interrupts, runs in progress are taken down, and finished ones are kept.
+        """
         self.names = list(cases[0])
         waiting = []
         for case in cases:
-            key = tuple(case.values())
-            if key in self.rows:
+            if tuple(case.values()) in self.rows:
                 continue
             place = self.folder / folder_name(case)
             known = None if self.again else self.launch.kept(case, place)
@@ -94,24 +71,28 @@ class Study:
                 self._put(case, known)
             else:
                 waiting.append((case, place))
-        if len(self.rows):
-            self.on_row()
+        self.write()
         if waiting:
-            with _Display(self, cases, len(waiting)) as display:
+            with _Display(self, len(waiting)) as display:
                 self._run(waiting, display)
         return [self.rows[tuple(case.values())] for case in cases]
 
-    def _run(self, waiting: list[tuple[Mapping[str, str], Path]], display: _Display) -> None:
+    def _run(self, queue: list[tuple[Mapping[str, str], Path]], display: _Display) -> None:
         pool = ThreadPoolExecutor(self.jobs)
         running: dict[Future, Mapping[str, str]] = {}
         started: set[tuple] = set()
         compiled = {kind_of(dict(zip(self.names, key, strict=True))) for key in self.rows}
+
+        def ready() -> Any:
+            """Choose a case to run; the first of a kind goes ahead: only it has to compile."""
+            kinds = (((case, place), kind_of(case)) for case, place in queue)
+            return next((i for i, kind in kinds if kind in compiled or kind not in started), None)
+
         try:
-            queue = list(waiting)
             while queue or running:
-                while len(running) < self.jobs and (ready := self._ready(queue, started, compiled)):
-                    case, place = ready
-                    queue.remove(ready)
+                while len(running) < self.jobs and (item := ready()):
+                    queue.remove(item)
+                    case, place = item
                     started.add(kind_of(case))
                     running[pool.submit(self.launch.run, case, place)] = case
                     display.begin(case)
@@ -122,21 +103,13 @@ class Study:
                     compiled.add(kind_of(case))
                     self._put(case, future.result())
                     display.finish(case, self.rows[tuple(case.values())])
-                    self.on_row()
+                    self.write()
                 display.tick([case for case, _ in queue], list(running.values()))
         except BaseException:
             self.launch.stop.set()
             raise
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
-
-    @staticmethod
-    def _ready(queue: list, started: set, compiled: set) -> Any:
-        """The next case to run; the first of a kind goes ahead, so that only it has to compile."""
-        for item in queue:
-            if kind_of(item[0]) in compiled or kind_of(item[0]) not in started:
-                return item
-        return None
 
     def _put(self, case: Mapping[str, str], outcome: CaseOutcome) -> None:
         if self.strict and outcome.status == "refused":
@@ -151,10 +124,8 @@ class Study:
 class _Display:
     """The table of a study on the terminal while it runs; plain lines where nobody looks."""
 
-    def __init__(self, study: Study, cases: Sequence[Mapping[str, str]], count: int):
-        self.study = study
-        self.names = study.names
-        self.count = count
+    def __init__(self, study: Study, count: int):
+        self.study, self.count = study, count
         self.finished = 0
         self.started: dict[tuple[str, ...], float] = {}
         self.live: Any = None
@@ -195,12 +166,9 @@ class _Display:
 
         rows = list(self.study.rows.values())
         room = max(4, self.live.console.height - 8 - len(running))
-        waiting = [
-            (case, f"running, {duration(time.perf_counter() - self.started[tuple(case.values())])}")
-            for case in running
-        ]
+        waiting = [(case, f"running, {duration(self.since(case))}") for case in running]
         table = results_table(
-            rows[-room:], self.names, self.study.items, self.study.title,
+            rows[-room:], self.study.names, self.study.items, self.study.title,
             self.live.console.width, waiting,
         )  # fmt: skip
         # Nobody knows how many more a study by and by asks for.
@@ -221,18 +189,19 @@ class _Display:
         most = self.study.most
         return (self.study.ran, most) if most else (self.finished, self.count)
 
+    def since(self, case: Mapping) -> float:
+        """Tell for how many seconds a case has been running."""
+        return time.perf_counter() - self.started[tuple(case.values())]
+
     def left(self, queue: Sequence[Mapping], running: Sequence[Mapping]) -> float | None:
-        """Seconds that remain, from the times of finished runs and how they grow with variables."""
+        """Guess the seconds that remain, by the times of finished runs and their variables."""
         done = [found for found in self.study.rows.values() if found.get("wall_s")]
         if not self.finished or not done:
             return None
-        predict = guessed_time(
-            [{n: f[n] for n in self.names} for f in done], [f["wall_s"] for f in done]
-        )
-        now = time.perf_counter()
+        cases = [{name: found[name] for name in self.study.names} for found in done]
+        predict = guessed_time(cases, [found["wall_s"] for found in done])
         rest = sum(predict(case) for case in queue)
-        for case in running:
-            rest += max(predict(case) - (now - self.started[tuple(case.values())]), 0.0)
+        rest += sum(max(predict(case) - self.since(case), 0.0) for case in running)
         return rest / min(self.study.jobs, max(len(queue) + len(running), 1))
 
 
@@ -244,10 +213,9 @@ def kind_of(case: Mapping[str, str]) -> tuple[str, ...]:
 def guessed_time(
     cases: Sequence[Mapping[str, str]], times: Sequence[float]
 ) -> Callable[[Mapping[str, str]], float]:
-    """A guess of the time of a case: a product of powers of its numbers and factors of its words.
+    """Fit the time of a case: a product of powers of its numbers and factors of its words.
 
-    Fitted by least squares of logarithms, with a pull towards "changes nothing" where little is
-    known.
+    By least squares of logarithms, with a pull towards "changes nothing" where little is known.
     """
     # A variable may have numbers and words, of which 0 is one.
     terms = list(dict.fromkeys(_term(n, v) for case in cases for n, v in case.items()))
@@ -274,7 +242,7 @@ def _term(name: str, value: str) -> tuple[str, Any]:
 
 
 def shown(value: Any) -> str:
-    """A number or a word as a table shows it; NaN is none."""
+    """Write a number or a word as a table shows it; NaN is none."""
     if value is None or value == "" or value != value:
         return "–"
     if isinstance(value, float):
@@ -283,7 +251,7 @@ def shown(value: Any) -> str:
 
 
 def plain_table(words: Sequence[str], numbers: Sequence[str], title: str | None = None) -> Any:
-    """A table for a terminal, empty, with columns of words and of numbers."""
+    """Make an empty table for a terminal, with columns of words and of numbers."""
     from rich.table import Table
 
     table = Table(box=None, pad_edge=False, title=title, title_justify="left")
@@ -302,7 +270,7 @@ def results_table(
     width: int,
     running: Sequence[tuple[Mapping[str, str], str]] = (),
 ) -> Any:
-    """A table of runs for a terminal of `width` characters, and below them those that run.
+    """Make a table of runs for a terminal of `width` characters, and below them those that run.
 
     No value is cut off: where there is little room some facts are left out, and the last column
     takes more lines.
@@ -333,11 +301,6 @@ def results_table(
     for case, state in running:
         table.add_row(*case.values(), *[""] * len(columns), state, style="dim")
     return table
-
-
-def default_jobs() -> int:
-    """As many as there are cores."""
-    return max(1, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1)
 
 
 def terminal() -> Any:

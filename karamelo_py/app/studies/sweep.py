@@ -15,7 +15,7 @@ from karamelo_py.app.studies.options import (
     zipped,
 )
 from karamelo_py.app.studies.study import Study, results_table, terminal
-from karamelo_py.app.studies.variables import cases, computes, logged
+from karamelo_py.app.studies.variables import cases
 from karamelo_py.script.errors import ScriptError, plural
 
 DESCRIPTION = """\
@@ -50,25 +50,20 @@ def run(options: Any) -> int:
     """Do what the command line says; returns the exit status."""
     out = out_file(options.o, ".csv")
     repeat = options.repeat if options.time else 1
-    values, launch, jobs = family(options, timed=options.time, repeat=repeat)
+    values, script, launch, jobs = family(options, timed=options.time, repeat=repeat)
     combinations = cases(values, zipped(options), options.where)
-    items = records.recorded(options.record, logged(options.script), options.script, values)
+    items = records.recorded(options.record, script, values)
     folder = out.with_suffix("")
     if folder.exists() and not folder.is_dir():
         raise ScriptError(f"{folder} is a file", expected="a free name for the folder of the runs")
-    study = Study(launch, folder, items, jobs, again=options.again, title=str(options.script))
-    records.describe(
-        out,
-        script=str(options.script),
+    study = Study(launch, out, items, jobs, again=options.again, title=str(options.script))
+    study.describe(
         variables=values,
         record=[item.text for item in items],
-        computes=computes(options.script),
+        computes=script.computes(),
         timed=options.time,
         repeat=repeat,
-        threads=launch.threads,
-        jobs=jobs,
     )
-    study.on_row = lambda: records.write(out, list(study.rows.values()))
     try:
         rows = study.run(combinations)
     except KeyboardInterrupt:

@@ -8,28 +8,22 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.app.studies import look
-from karamelo_py.app.studies.curves import missing, require, usable
+from karamelo_py.app.studies.curves import missing, require, told, usable
 from karamelo_py.app.studies.records import value
 from karamelo_py.app.studies.study import plain_table, shown, terminal
 from karamelo_py.output.files import savefig
 from karamelo_py.output.plot_style import blank_figure, tidy
 from karamelo_py.script.errors import ScriptError, plural
-from karamelo_py.script.terms import number_of
 
 
 @dataclass
 class Pair:
-    """The runs of a scene that differ in one variable only.
+    """The runs of a scene that differ in one variable only: numbers of its first and second value.
 
-    Attributes
-    ----------
-    label
-        The scene, and what else was chosen.
-    error, cost, bytes
-        Of the first and the second value, NaN where there is none.
+    They are NaN where there is none.
     """
 
-    label: str
+    label: str  # the scene, and what else was chosen
     error: tuple[float, float]
     cost: tuple[float, float]
     bytes: tuple[float, float]
@@ -48,7 +42,7 @@ def pairs(
     accuracy: str,
     cost: str,
 ) -> tuple[list[Pair], list[str]]:
-    """The pairs of a table, and the two values in their order."""
+    """Find the pairs of a table, and the two values in their order."""
     for option, column in (("-accuracy", accuracy), ("-cost", cost)):
         require(rows, option, column)
     if name not in variables:
@@ -70,7 +64,7 @@ def pairs(
         if len(two) < 2:
             continue
         said = dict(zip(others, case, strict=True))
-        parts = [said[n] if number_of(said[n]) is None else f"{n} = {said[n]}" for n in differing]
+        parts = told({name: said[name] for name in differing})
         numbers = [
             tuple(_number(two[word], column) for word in values)
             for column in (accuracy, cost, "bytes_per_particle")
