@@ -117,6 +117,8 @@ def _dispatch(arguments: list[str]) -> int:
         arguments = ["run", *arguments]
     if first == "help" and len(arguments) == 2 and arguments[1] in COMMANDS[1:]:
         arguments = [arguments[1], "-h"]
+    elif arguments == ["help"]:
+        arguments = ["help", "-h"]
     if arguments[0] in ("run", "check"):
         arguments = _one_file(arguments)
     parser, commands = _parser(arguments[0])
@@ -157,19 +159,12 @@ def _one_file(arguments: list[str]) -> list[str]:
                 f"-var takes a name and a value, with a blank between them, not {word}",
                 hint=f"-var {given[1]} {given[2]}",
             )
-        if chosen[-2:-1] and chosen[-2] in RESTART and _unnumbered(word) == _unnumbered(before):
-            chosen[-1] = max(word, before, key=_numbers)
+        unnumbered = [re.sub(r"\d+", "#", name) for name in (word, before)]
+        if chosen[-2:-1] and chosen[-2] in RESTART and unnumbered[0] == unnumbered[1]:
+            chosen[-1] = max(word, before, key=lambda name: [*map(int, re.findall(r"\d+", name))])
         else:
             chosen.append(word)
     return chosen
-
-
-def _unnumbered(name: str) -> str:
-    return re.sub(r"\d+", "#", name)
-
-
-def _numbers(name: str) -> list[int]:
-    return [int(digits) for digits in re.findall(r"\d+", name)]
 
 
 def _surplus(words: list[str], command: str, parser: CommandLine) -> ScriptError:
@@ -183,7 +178,7 @@ def _surplus(words: list[str], command: str, parser: CommandLine) -> ScriptError
     close = nearest(option, parser.options()) if option else None
     if (same := MPI_OPTIONS.get((option or "").rstrip("0123456789"))) in parser.options():
         close = f"{same} N"
-    usage = USAGE if command == "run" else parser.format_usage().removeprefix("usage: ").rstrip()
+    usage = USAGE if command == "run" else parser.plain_usage()
     return ScriptError(
         f"there is no option {option}" if option else f"one word too many: {words[0]}",
         expected=usage,
@@ -202,8 +197,12 @@ class CommandLine(argparse.ArgumentParser):
         """List all words that begin an option."""
         return [word for action in self._actions for word in action.option_strings]
 
+    def plain_usage(self) -> str:
+        """Write the usage without that word."""
+        return self.format_usage().removeprefix("usage: ").rstrip()
+
     def error(self, message: str) -> NoReturn:
-        expected = self.format_usage().removeprefix("usage: ").rstrip()
+        expected = self.plain_usage()
         if of := re.match(r"argument (-\S+): ", message):
             spelled = of[1].split("/")
             action = next(a for a in self._actions if spelled[0] in a.option_strings)
@@ -277,9 +276,7 @@ def _run(options: argparse.Namespace) -> int:
     if script is None:
         command = "karamelo-py check" if options.checking else "karamelo-py"
         raise ScriptError("no script is named", expected=f"{command} SCRIPT")
-    if options.checking:
-        return _carry_out(options, script)
-    if launched()[0] > 1:
+    if launched()[0] > 1 and not options.checking:
         with leaving_at_once():  # before they know of each other
             import_module("karamelo_py.scene.hub")
         return together(
@@ -287,7 +284,7 @@ def _run(options: argparse.Namespace) -> int:
             lambda comm: _carry_out(options, script, comm),
             debugging=options.debug,
         )
-    if (options.ranks or 1) > 1:
+    if (options.ranks or 1) > 1 and not options.checking:
         return launch(options.ranks, options.command_line)
     return _carry_out(options, script)
 
@@ -357,8 +354,6 @@ def _styles(options: argparse.Namespace) -> int:
 def _help(options: argparse.Namespace) -> int:
     from karamelo_py.app.catalogue import print_help
 
-    if not options.words:
-        return _dispatch(["help", "-h"])
     return print_help(options.words)
 
 

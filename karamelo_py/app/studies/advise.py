@@ -3,7 +3,7 @@
 import re
 import subprocess
 from argparse import ArgumentParser
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
@@ -13,7 +13,7 @@ import numpy as np
 
 from karamelo_py.app.options import above_zero, positive
 from karamelo_py.app.studies import records
-from karamelo_py.app.studies.case import PROGRAM, environment, options_of
+from karamelo_py.app.studies.case import PROGRAM, environment, options_of, worded
 from karamelo_py.app.studies.curves import column, order, usable
 from karamelo_py.app.studies.options import (
     add_combinations,
@@ -115,12 +115,12 @@ class ChoiceRuns:
     @property
     def label(self) -> str:
         """The choice in words."""
-        return ", ".join(f"{n} = {v}" for n, v in self.values.items()) or "the script"
+        return worded(self.values) or "the script"
 
 
 @dataclass
 class Candidate:
-    """A variant that may meet the target."""
+    """A variant that may meet the target; without a forecast it was run."""
 
     choice: ChoiceRuns
     step: int
@@ -159,52 +159,57 @@ class Adviser:
                     self.go_on(choice)
 
     def _met(self, choice: ChoiceRuns) -> int | None:
-        """The first of its runs that meets the target."""
+        """Find the first of its runs that meets the target."""
         errors = column(choice.rows, self.accuracy)
         return next((k for k, e in enumerate(errors) if e <= self.target), None)
 
-    def candidates(self, choice: ChoiceRuns, hope: bool = False) -> Iterator[Candidate]:
-        """The cheapest variant of a choice that meets the target, known or expected.
+    def candidate(self, choice: ChoiceRuns, hope: bool = False) -> Candidate | None:
+        """Find the cheapest variant of a choice that meets the target, known or expected.
 
         With `hope` by the lower bound of the error.
         """
         k = self._met(choice)
         if k is not None:
-            row = choice.rows[k]
-            cost = column([row], self.cost)[0]
-            yield Candidate(choice, k, cost, column([row], self.accuracy)[0])
-            return
+            cost, error = (column(choice.rows, name)[k] for name in (self.cost, self.accuracy))
+            return Candidate(choice, k, cost, error)
         known = self.xs[: len(choice.rows)]
         for step in range(len(choice.rows), len(self.xs)):
             found = forecast(self.xs[step], known, choice.rows, self.accuracy, self.cost)
             if found is None:
-                return
+                return None
             if (found.low if hope else found.error) <= self.target:
-                yield Candidate(choice, step, found.cost, found.error, found)
-                return
+                return Candidate(choice, step, found.cost, found.error, found)
+        return None
+
+    def candidates(self, hope: bool = False) -> list[Candidate]:
+        """Find those of all choices, the cheapest first."""
+        found = filter(None, (self.candidate(choice, hope) for choice in self.choices))
+        return sorted(found, key=lambda c: c.cost)
 
     def best(self) -> Candidate | None:
-        """The cheapest candidate, after running what lies in between as far as it pays.
+        """Find the cheapest candidate, after running what lies in between as far as it pays.
 
         A choice that could become the cheapest is followed until its candidate is the next finer
         variant, so that its order is known where it matters.
         """
         while True:
-            found = [c for choice in self.choices for c in self.candidates(choice)]
-            best = min(found, key=lambda c: c.cost, default=None)
+            best = next(iter(self.candidates()), None)
             limit = best.cost if best else inf
             doubtful = [
-                c for choice in self.choices for c in self.candidates(choice, hope=True)
+                c for c in self.candidates(hope=True)
                 if c.forecast and c.step > len(c.choice.rows) and c.cost <= limit
             ]  # fmt: skip
             if not doubtful:
                 return best
-            self.go_on(min(doubtful, key=lambda c: c.cost).choice)
+            self.go_on(doubtful[0].choice)
 
     def hopeful(self) -> Candidate | None:
-        """The cheapest variant that may meet the target though none is expected to."""
-        found = [c for choice in self.choices for c in self.candidates(choice, hope=True)]
-        return min((c for c in found if c.forecast), key=lambda c: c.cost, default=None)
+        """Find the cheapest variant that may meet the target though none is expected to."""
+        return next((c for c in self.candidates(hope=True) if c.forecast), None)
+
+    def label(self, choice: ChoiceRuns, step: int) -> str:
+        """Write a variant in words."""
+        return f"{choice.label}, {self.name} = {self.values[step]}"
 
 
 def add_options(parser: ArgumentParser) -> None:
@@ -212,11 +217,9 @@ def add_options(parser: ArgumentParser) -> None:
     add_family(parser)
     add_combinations(parser)
     parser.add_argument(
-        "-accuracy",
-        required=True,
-        metavar="COLUMN",
+        "-accuracy", required=True, metavar="COLUMN",
         help="log column: err, max:err, or a formula: off=abs(max:u/3.28 - 1)",
-    )
+    )  # fmt: skip
     parser.add_argument("-target", required=True, type=above_zero, help="the error that is allowed")
     parser.add_argument("-cost", default="seconds", help="what counts as cost (seconds)")
     parser.add_argument("-along", metavar="NAME", help="the variable that makes the scene finer")
@@ -238,11 +241,11 @@ def run(options: Any) -> int:
     numeric = [name for name in values if all(number_of(v) is not None for v in values[name])]
     name = options.along or max(numeric, key=lambda n: len(values[n]), default=None)
     if name not in numeric or len(values[name]) < 3:
-        raise ScriptError(
-            "no variable makes the scene finer" if name not in numeric
-            else f"-var {name} has {plural(len(values[name]), 'value')}",
-            expected="a number with at least 3 values, such as -var N=10,20,40,80",
-        )  # fmt: skip
+        wrong = "no variable makes the scene finer"
+        if name in numeric:
+            wrong = f"-var {name} has {plural(len(values[name]), 'value')}"
+        expected = "a number with at least 3 values, such as -var N=10,20,40,80"
+        raise ScriptError(wrong, expected=expected)
     others = {n: v for n, v in values.items() if n != name}
     together = zipped(options)
     if any(name in group for group in together):
@@ -268,7 +271,7 @@ def run(options: Any) -> int:
 def coarse_first(
     script: Path, name: str, values: list[str], others: Mapping[str, str]
 ) -> list[str]:
-    """Values in the order of the work they make, by what `karamelo-py check` says of the ends."""
+    """Put values in the order of the work they make: `karamelo-py check` tells that of the ends."""
     ordered = sorted(values, key=float)
     work = []
     for value in (ordered[0], ordered[-1]):
@@ -291,19 +294,17 @@ def tell(adviser: Adviser) -> None:
     table = plain_table(["choice"], headings)
     for choice in adviser.choices:
         errors = column(choice.rows, adviser.accuracy)
-        last = choice.rows[-1]
-        found = next(adviser.candidates(choice), None)
-        if not usable(errors[-1]):
-            shown_order = f"{last['status']}: {last['reason']}"[:60]
-        else:
-            shown_order = str(order(adviser.xs[: len(errors)], errors))
-        where = "–" if found is None else adviser.values[found.step]
-        cost = "–" if found is None else shown(float(found.cost))
-        if found is not None and found.forecast:
-            cost = f"about {cost}"
-        error = shown(float(errors[-1])) if usable(errors[-1]) else "–"
-        fine = adviser.values[len(choice.rows) - 1]
-        table.add_row(choice.label, str(len(choice.rows)), fine, error, shown_order, where, cost)
+        last, count = choice.rows[-1], len(choice.rows)
+        found = adviser.candidate(choice)
+        where = cost = error = "–"
+        if found is not None:
+            where = adviser.values[found.step]
+            cost = "about " * bool(found.forecast) + shown(float(found.cost))
+        fit = f"{last['status']}: {last['reason']}"[:60]
+        if usable(errors[-1]):
+            error, fit = shown(float(errors[-1])), str(order(adviser.xs[:count], errors))
+        fine = adviser.values[count - 1]
+        table.add_row(choice.label, str(count), fine, error, fit, where, cost)
     terminal().print(table)
 
 
@@ -324,33 +325,30 @@ def sureness(adviser: Adviser, best: Candidate) -> str:
     if best.forecast is None:
         return f"sure: it was run ({said})"
     low, high = best.forecast.low, best.forecast.high
-    word = "almost sure" if high <= adviser.target else "likely"
-    fraction = adviser.target / best.error
-    if high > adviser.target and fraction < 1.1:
-        word = "uncertain"
+    word = "almost sure"
+    if high > adviser.target:
+        word = "uncertain" if adviser.target / best.error < 1.1 else "likely"
     return f"{word}: expected {said}; by its orders the error lies between {low:.3g} and {high:.3g}"
 
 
 def _nothing(adviser: Adviser) -> int:
-    """No variant meets the target: say what comes nearest."""
+    """Say that no variant meets the target, and what comes nearest."""
     print(f"\nno variant is expected to reach {adviser.accuracy} <= {adviser.target:g}")
     found = [
-        (column([row], adviser.accuracy)[0], choice, row)
-        for choice in adviser.choices for row in choice.rows
+        (error, adviser.label(choice, k))
+        for choice in adviser.choices
+        for k, error in enumerate(column(choice.rows, adviser.accuracy)) if usable(error)
     ]  # fmt: skip
-    found = [item for item in found if usable(item[0])]
     if found:
-        error, choice, row = min(found, key=lambda item: item[0])
-        print(
-            f"nearest: {choice.label}, {adviser.name} = {row[adviser.name]} with {error:.3g}; "
-            f"finer values of {adviser.name} or other choices may do"
-        )
+        error, label = min(found, key=lambda item: item[0])
+        others = f"finer values of {adviser.name} or other choices may do"
+        print(f"nearest: {label} with {error:.3g}; {others}")
     hope = adviser.hopeful()
     if hope is not None:
         print(
-            f"{hope.choice.label}, {adviser.name} = {adviser.values[hope.step]} may do, at about "
-            f"{adviser.cost} {hope.cost:.3g}: expected {hope.error:.3g}, at best "
-            f"{hope.forecast.low:.3g}; with -run it is tried"
+            f"{adviser.label(hope.choice, hope.step)} may do, at about {adviser.cost} "
+            f"{hope.cost:.3g}: expected {hope.error:.3g}, at best {hope.forecast.low:.3g}; "
+            "with -run it is tried"
         )
     return 1
 
@@ -367,7 +365,7 @@ def carry_out(adviser: Adviser, best: Candidate | None, script: Path) -> int:
         row = best.choice.rows[-1]
         error = column([row], adviser.accuracy)[0]
         word = "met" if error <= adviser.target else "missed" if advised else "not yet met"
-        said = f"{best.choice.label}, {adviser.name} = {row[adviser.name]}"
+        said = adviser.label(best.choice, len(best.choice.rows) - 1)
         print(f"\nrun: {said}: {adviser.accuracy} {error:.4g}, the target is {word}")
         if row["reason"]:
             print(f"{row['status']}: {row['reason']}")
@@ -377,10 +375,9 @@ def carry_out(adviser: Adviser, best: Candidate | None, script: Path) -> int:
         best = best or adviser.hopeful()
     if best is None:
         return _nothing(adviser)
-    row = best.choice.rows[best.step]
     print(
-        f"\nthe target is met: {best.choice.label}, {adviser.name} = {row[adviser.name]} with "
-        f"{adviser.accuracy} {best.error:.4g} at {adviser.cost} {best.cost:.4g}; "
-        f"its files are in {row['folder']}"
+        f"\nthe target is met: {adviser.label(best.choice, best.step)} with {adviser.accuracy} "
+        f"{best.error:.4g} at {adviser.cost} {best.cost:.4g}; its files are in "
+        f"{best.choice.rows[best.step]['folder']}"
     )
     return 0

@@ -46,25 +46,38 @@ class CaseOutcome:
     @property
     def complaint(self) -> str:
         """All that the program said of what went wrong."""
-        return (self.folder / "err.txt").read_text(encoding="utf-8", errors="replace")
+        return said_in(self.folder / "err.txt")
 
 
-# What is measured of every run beside the log, with its meaning.
+# What is measured of every run beside the log, with titles of axes.
 COLUMNS = {
-    "seconds": "seconds in the stepping loop, without compilation and output",
-    "cpu_seconds": "seconds of processors in the stepping loop, of all threads",
-    "seconds_spread": "largest less smallest of the repetitions",
-    "particle_steps_per_s": "steps times points over seconds",
+    "seconds": "time of the stepping loop (s)",  # without compilation and output
+    "cpu_seconds": "processor time of the stepping loop (s)",  # of all threads
+    "seconds_spread": "seconds_spread",  # largest less smallest of the repetitions
+    "particle_steps_per_s": "particle-steps per second",
     "particle_steps": "steps times points",
-    "steps": "steps of all runs of the script",
-    "points": "points at the beginning",
-    "dt": "the first step",
-    "stable_dt": "the largest stable step at the beginning",
-    "own_dt": "the first step of the program's own choice, where the script chose another",
-    "bytes_per_particle": "bytes of all fields of a point, the mean over points",
-    "peak_memory_mib": "largest resident memory of the process, MiB",
-    "wall_s": "seconds of the whole process",
+    "steps": "steps",  # of all runs of the script
+    "points": "points",  # at the beginning
+    "dt": "first step (time of the script)",
+    "stable_dt": "stable_dt",  # the largest stable step at the beginning
+    "own_dt": "own_dt",  # the first of the program's own choice, where the script chose another
+    "bytes_per_particle": "bytes per particle",  # of all fields, the mean over points
+    "peak_memory_mib": "peak memory (MiB)",
+    "wall_s": "time of the process (s)",
 }
+
+
+def worded(case: Mapping[str, Any]) -> str:
+    """Write the values of a case in words."""
+    return ", ".join(f"{name} = {value}" for name, value in case.items())
+
+
+def said_in(file: Path) -> str:
+    """Read what a run has said; nothing where that is gone."""
+    try:
+        return file.read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return ""
 
 
 class Refused(ScriptError):
@@ -77,8 +90,7 @@ class Refused(ScriptError):
         super().__init__(outcome.reason)
         lines = outcome.complaint.rstrip().splitlines()
         first = next((k for k, line in enumerate(lines) if _ERROR.search(line)), 0)
-        said = ", ".join(f"{name} = {value}" for name, value in case.items())
-        self._whole = "\n".join([*lines[first:], f"this is the script with {said}"])
+        self._whole = "\n".join([*lines[first:], f"this is the script with {worded(case)}"])
 
     def render(self) -> str:
         return self._whole
@@ -159,8 +171,7 @@ class Launch:
                 env=environment(), start_new_session=os.name == "posix",
             )  # fmt: skip
             memory, overdue = self._wait(process, begun)
-        said = (folder / "out.txt").read_text(encoding="utf-8", errors="replace")
-        facts = read_facts(said)
+        facts = read_facts(said_in(folder / "out.txt"))
         facts["wall_s"] = time.perf_counter() - begun
         if memory:
             facts["peak_memory_mib"] = memory

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.app.studies import histories, keeping, look, page, pictures, records, versus
-from karamelo_py.app.studies.curves import Family, missing, order
-from karamelo_py.app.studies.options import add_axes, along, out_file, split
+from karamelo_py.app.studies.curves import Family, order, require
+from karamelo_py.app.studies.options import add_axes, along, names, out_file, split
 from karamelo_py.app.studies.study import plain_table, shown, terminal
 from karamelo_py.app.studies.variables import holds
 from karamelo_py.script.errors import ScriptError
@@ -37,9 +37,7 @@ def add_options(parser: ArgumentParser) -> None:
     wanted = parser.add_mutually_exclusive_group(required=True)
     wanted.add_argument("-accuracy", metavar="COLUMN", help="the error")
     wanted.add_argument(
-        "-curve",
-        metavar="COLUMN",
-        help="a log column, a curve for each run, over -x (Time)",
+        "-curve", metavar="COLUMN", help="a log column, a curve for each run, over -x (Time)"
     )
     wanted.add_argument(
         "-keeps", metavar="COLUMN",
@@ -76,7 +74,7 @@ def run(options: Any) -> int:
         raise ScriptError(f"{len(options.tables)} tables", expected="one, or several with -versus")
     options.table = options.tables[0]
     rows, variables, made = read(options.table, options.where)
-    by = [name.strip() for name in options.by.split(",") if name.strip()]
+    by = names(options.by)
     if options.keeps:
         return keeps(options, rows, by or variables, variables, made)
     if options.curve:
@@ -88,11 +86,9 @@ def run(options: Any) -> int:
     out = out_file(options.o, *SUFFIXES) if options.o else None
     if out is not None and out.suffix.lower() == ".html":
         page.require_plotly()
-    title = options.title if options.title is not None else Path(made.get("script", "")).name
-    axes = [name.strip() for name in (options.heat or "").split(",") if name.strip()]
-    for name in axes:
-        if name not in variables:
-            raise missing("-heat", name, variables)
+    title = made["title"] if options.title is None else options.title
+    axes = names(options.heat or "")
+    require("-heat", axes, variables)
     if options.heat and len(axes) != 2:
         raise ScriptError(f"-heat {options.heat}", expected="two variables: -heat N,ppc")
     if not options.x and not axes and not any(line.shown.any() for line in family.lines):
@@ -115,9 +111,10 @@ def run(options: Any) -> int:
 
 
 def read(path: Path, where: Sequence[str]) -> tuple[list, list[str], dict]:
-    """The rows of a table that fulfil the conditions, its variables, and how it was made."""
+    """Read rows of a table that fulfil the conditions, its variables, and how it was made."""
     rows = records.read(path)
     made = {"table": path.name, **records.beside(path)}
+    made["title"] = Path(made.get("script", "")).name
     if "folder" not in rows[0] and "variables" not in made:
         raise ScriptError(
             f"{path} does not say which columns are variables",
@@ -164,18 +161,18 @@ def curves(options: Any, rows: list, by: list[str], made: dict) -> int:
     out = out_file(options.o or Path("curves.png"), *SUFFIXES[:-1])
     differing = [name for name in by if len({row[name] for row in rows}) > 1]
     over = options.x or "Time"
-    names = [name for name in split(options.names) if name]
+    called = [name for name in split(options.names) if name]
 
     def read(column: str) -> list[histories.History]:
         return histories.histories(
-            rows, differing, options.table.parent, options.log, over, column, names
+            rows, differing, options.table.parent, options.log, over, column, called
         )
 
     exact = None
     if options.exact:
         whole = max(read(options.exact), key=lambda each: len(each.x))
         exact = whole._replace(label=options.exact)
-    title = options.title if options.title is not None else Path(made.get("script", "")).name
+    title = made["title"] if options.title is None else options.title
     found = read(options.curve)
     x, y = along(options, over, options.curve)
     histories.draw(found, out, x=x, y=y, title=title, exact=exact)
@@ -188,9 +185,7 @@ def curves(options: Any, rows: list, by: list[str], made: dict) -> int:
 def keeps(options: Any, rows: list, by: list[str], variables: list[str], made: dict) -> int:
     """Show whether a log column stays what it was, and which runs fail without a known cause."""
     out = out_file(options.o, ".md") if options.o else None
-    for name in by:
-        if name not in variables:
-            raise missing("-by", name, variables)
+    require("-by", by, variables)
     over, folder = options.x or "Time", options.table.parent
     what = over, options.keeps, keeping.WITHIN, made.get("computes", ())
     kept = [keeping.look_at(row, folder, *what) for row in rows]

@@ -1,6 +1,6 @@
 """A table of runs as lines of ever finer runs, their orders, and the Pareto front."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf, isfinite
 from typing import Any, NamedTuple
@@ -103,12 +103,10 @@ class Family:
         recorded: Sequence[str] = (),
     ):
         self.formulas = dict(word.split("=", 1) for word in recorded if "=" in word)
-        for option, name in (("-accuracy", accuracy), ("-cost", cost)):
-            require(rows, option, name)
-        for option, names in (("-by", by), ("-x", [along] if along else [])):
-            for name in names:
-                if name not in variables:
-                    raise missing(option, name, variables)
+        require("-accuracy", [accuracy], rows[0])
+        require("-cost", [cost], rows[0])
+        require("-by", by, variables)
+        require("-x", [along] if along else [], variables)
         self.convergence = bool(along)  # errors over that variable, not over cost
         values = {name: list(dict.fromkeys(row[name] for row in rows)) for name in variables}
         differing = [name for name in variables if len(values[name]) > 1]
@@ -164,10 +162,11 @@ def column(rows: Sequence[Mapping[str, Any]], name: str) -> np.ndarray:
     return np.array([np.nan if a is None else a for a in found], float)
 
 
-def require(rows: Sequence[Mapping[str, str]], option: str, name: str) -> None:
-    """See that a table has a column."""
-    if name not in rows[0]:
-        raise missing(option, name, list(rows[0]))
+def require(option: str, names: Iterable[str], known: Iterable[str]) -> None:
+    """See that a table has columns, or variables."""
+    for name in names:
+        if name not in known:
+            raise missing(option, name, list(known))
 
 
 def missing(option: str, name: str, known: Sequence[str], place: str = "the table") -> ScriptError:

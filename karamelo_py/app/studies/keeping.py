@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.app.logs import read_log
+from karamelo_py.app.studies.case import said_in, worded
 from karamelo_py.app.studies.curves import missing
 from karamelo_py.kernels.growth import WITHIN, growth
 
@@ -65,10 +66,7 @@ def look_at(
 ) -> Kept:  # fmt: skip
     """Judge a column in a run; a value of one of the computes `parts` is no whole."""
     place = folder / row["folder"]
-    try:
-        lines = (place / "err.txt").read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError:
-        lines = []
+    lines = said_in(place / "err.txt").splitlines()
     said = [match[1] for line in lines if (match := _SAID.search(line))]
     causes = [_general(text) for text in said]
     warned = any(_WARNED.search(line) for line in lines)
@@ -133,8 +131,8 @@ def table(rows: Sequence[Mapping[str, str]], kept: Sequence[Kept], by: Sequence[
         place = tuple(row[name] for name in across)
         cells[key, place] = one.word + number + marks + (" (silent)" if one.silent else "")
         if one.silent:
-            silent.append(", ".join(f"{name} = {row[name]}" for name in (*by, *across)))
-    headings = [", ".join(f"{n} = {v}" for n, v in zip(across, c, strict=True)) for c in columns]
+            silent.append(worded({name: row[name] for name in (*by, *across)}))
+    headings = [worded(dict(zip(across, values, strict=True))) for values in columns]
     return Verdicts(
         [*by, *(heading or "all" for heading in headings)],
         [[*key, *(cells.get((key, c), "") for c in columns)] for key in dict.fromkeys(keys)],

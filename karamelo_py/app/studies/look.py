@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from karamelo_py.app.studies.case import COLUMNS
 from karamelo_py.output.plot_style import tick_text
 from karamelo_py.script.terms import number_of
 
@@ -32,18 +33,6 @@ FAMILIES = (
     ("ulmpm", "tlmpm", "ulcpdi", "tlcpdi", "ulmpm/contacts"),
     ("musl", "usl", "usf", "usavg"),
 )
-LABELS = {
-    "seconds": "time of the stepping loop (s)",
-    "cpu_seconds": "processor time of the stepping loop (s)",
-    "particle_steps": "steps times points",
-    "wall_s": "time of the process (s)",
-    "peak_memory_mib": "peak memory (MiB)",
-    "bytes_per_particle": "bytes per particle",
-    "particle_steps_per_s": "particle-steps per second",
-    "points": "points",
-    "steps": "steps",
-    "dt": "first step (time of the script)",
-}
 
 
 def place(word: str, others: Sequence[str] = ()) -> int:
@@ -92,8 +81,8 @@ def _in_order(value: str, values: Sequence[str]) -> str:
 
 
 def label(name: str) -> str:
-    """The title of an axis."""
-    return LABELS.get(name, name)
+    """Give the title of an axis."""
+    return COLUMNS.get(name, name)
 
 
 def log_ticks(low: float, high: float) -> list[float]:

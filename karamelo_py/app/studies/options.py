@@ -57,6 +57,11 @@ def split(text: str) -> list[str]:
     return [word.strip() for word in next(csv.reader([text], skipinitialspace=True), [])]
 
 
+def names(text: str) -> list[str]:
+    """Part names at commas."""
+    return [name.strip() for name in text.split(",") if name.strip()]
+
+
 def add_combinations(parser: Any) -> None:
     """Add options of which values go together."""
     parser.add_argument(

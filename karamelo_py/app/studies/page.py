@@ -7,68 +7,18 @@ import io
 import json
 from collections.abc import Mapping
 from pathlib import Path
+from string import Template
 from typing import Any
 
 import numpy as np
 
 from karamelo_py.app.studies import look
+from karamelo_py.app.studies.case import options_of, worded
 from karamelo_py.app.studies.curves import Family, column
 from karamelo_py.script.errors import ScriptError
 
 _WIDEST = 480  # pixels of a picture in the page
 _MOST = 60  # pictures in a page
-_PAGE = """<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><title>{title}</title><style>
-body {{ font: 14px/1.4 system-ui, sans-serif; margin: 1.5em; color: #222; background: #fff }}
-main {{ display: flex; gap: 1.5em }}
-@media (max-width: 900px) {{ main {{ flex-direction: column }} }}
-.chart {{ flex: 1 1 600px; min-width: 0; height: 640px }}
-aside {{ flex: 0 0 380px; order: 2; box-sizing: border-box }}
-aside {{ border-left: 3px solid #ddd; padding-left: 1.2em }}
-aside code {{ display: block; white-space: pre-wrap; background: #f4f4f4; padding: .6em }}
-aside img {{ max-width: 100%; margin-top: 1em }}
-aside .bad {{ color: #b00020 }}
-table {{ border-collapse: collapse; margin: .6em 0 }} td {{ padding: .1em .9em .1em 0 }}
-td:last-child {{ font-variant-numeric: tabular-nums }}
-h1 {{ font-size: 1.2em }} footer {{ color: #666; margin-top: 1em; font-size: 12px }}
-</style></head><body><h1>{title}</h1><main>
-<aside id="run"><p>Choose a point to see its run.</p></aside>
-<div class="chart">{chart}</div></main>
-{failures}<footer>{footer}</footer><script>{script}</script></body></html>
-"""
-_SCRIPT = """
-window.addEventListener("load", () => {
-const runs = %s, aside = document.getElementById("run");
-function text(tag, words, parent, kind) {
-  const made = document.createElement(tag);
-  made.textContent = words; if (kind) made.className = kind;
-  parent.appendChild(made); return made;
-}
-function show(k) {
-  const run = runs[k]; aside.replaceChildren();
-  text("h2", run.title, aside);
-  if (run.reason) text("p", run.status + ": " + run.reason, aside, "bad");
-  text("code", run.command, aside);
-  const table = document.createElement("table"); aside.appendChild(table);
-  for (const [name, number] of run.numbers) {
-    const row = document.createElement("tr"); table.appendChild(row);
-    text("td", name, row); text("td", number, row);
-  }
-  if (run.picture) {
-    const image = document.createElement("img"); image.src = run.picture; image.alt = "the run";
-    aside.appendChild(image);
-  }
-}
-document.getElementById("chart").on("plotly_click", event => {
-  const k = event.points[0].customdata;
-  if (k !== undefined && k !== null) show(k);
-});
-document.querySelectorAll("[data-run]").forEach(link =>
-  link.addEventListener("click", event => { event.preventDefault(); show(link.dataset.run); }));
-show(%d);
-Plotly.Plots.resize(document.getElementById("chart"));
-});
-"""
 
 
 def require_plotly() -> None:
@@ -119,7 +69,7 @@ def write(
     )  # fmt: skip
     for axis, numbers in (("xaxis", "across"), ("yaxis", "error")):
         drawn = np.concatenate([getattr(line, numbers)[line.shown] for line in family.lines])
-        ticks = look.log_ticks(drawn.min(), drawn.max()) if len(drawn) else []
+        ticks = look.log_ticks(*(drawn.min(), drawn.max()) if len(drawn) else (1.0, 10.0))
         if 2 <= len(ticks) <= 14:
             figure.layout[axis].tickvals = ticks
             figure.layout[axis].ticktext = [f"{tick:g}" for tick in ticks]
@@ -130,9 +80,10 @@ def write(
         figure, include_plotlyjs=True, full_html=False, div_id="chart",
         default_height="100%", config={"displaylogo": False, "responsive": True},
     )  # fmt: skip
-    page = _PAGE.format(
+    template = Template(Path(__file__).with_suffix(".html").read_text(encoding="utf-8"))
+    page = template.substitute(
         title=html.escape(title), chart=chart, failures=_failures(family, number_of),
-        footer=html.escape(_footer(made)), script=_SCRIPT % (text, first),
+        footer=html.escape(_footer(made)), runs=text, first=first,
     )  # fmt: skip
     try:
         path.write_text(page, encoding="utf-8")
@@ -140,16 +91,20 @@ def write(
         raise ScriptError(f"cannot write {path}: {error.strerror or error}") from None
 
 
+def _values(row: Mapping[str, str], family: Family) -> dict[str, str]:
+    return {name: row[name] for name in family.variables}
+
+
 def _said(row: Mapping[str, str], family: Family) -> str:
-    return ", ".join(f"{name} = {html.escape(row[name])}" for name in family.variables)
+    return html.escape(worded(_values(row, family)))
 
 
 def _run(row: Mapping[str, str], family: Family, folder: Path, made: Mapping, k: int) -> dict:
-    words = " ".join(f"-var {name} {row[name]}" for name in family.variables)
-    skipped = {*family.variables, "status", "reason", "folder"}
+    values = _values(row, family)
+    skipped = {*values, "status", "reason", "folder"}
     return {
-        "title": ", ".join(f"{name} = {row[name]}" for name in family.variables),
-        "command": f"karamelo-py {made.get('script', 'SCRIPT')} {words}",
+        "title": worded(values),
+        "command": f"karamelo-py {made.get('script', 'SCRIPT')} {' '.join(options_of(values))}",
         "status": row.get("status", ""),
         "reason": row.get("reason", ""),
         "numbers": [[n, v] for n, v in row.items() if n not in skipped and v],
@@ -178,11 +133,11 @@ def _picture(folder: Path) -> str | None:
 def _failures(family: Family, number_of: Mapping[int, int]) -> str:
     if not family.without:
         return ""
-    items = "".join(
-        f'<li><a href="#" data-run="{number_of[id(row)]}">{_said(row, family)}</a>: '
-        f"{html.escape(row.get('reason') or row.get('status', ''))}</li>"
-        for row in family.without
-    )
+    items = ""
+    for row in family.without:
+        why = html.escape(row.get("reason") or row.get("status", ""))
+        link = f'<a href="#" data-run="{number_of[id(row)]}">{_said(row, family)}</a>'
+        items += f"<li>{link}: {why}</li>"
     return f"<h2>Without a value</h2><ul>{items}</ul>"
 
 

@@ -53,7 +53,7 @@ def lines(family: Family, path: Path, words: tuple[str, str], title: str = "") -
 
 
 def _gone(axes: Any, marks: Sequence[tuple[float, str]]) -> None:
-    """Draw a cross at the top for each run without a value; those at one place stand side by side."""
+    """Draw a cross at the top for each run without a value, side by side at one place."""
     for at in {x for x, _ in marks}:
         colours = [colour for x, colour in marks if x == at]
         for k, colour in enumerate(colours):

@@ -15,6 +15,7 @@ import numpy as np
 from karamelo_py.app.logs import read_log
 from karamelo_py.app.options import above_zero, positive
 from karamelo_py.app.studies import records
+from karamelo_py.app.studies.case import said_in
 from karamelo_py.app.studies.frontier import Cell, explore, unseen
 from karamelo_py.app.studies.keeping import grown
 from karamelo_py.app.studies.options import (
@@ -157,11 +158,7 @@ def in_short(row: Mapping[str, Any]) -> str:
 
 def limited_by(folder: Path) -> str:
     """Read by name what limits the first step of a run; nothing where the script says the step."""
-    try:
-        said = (folder / "out.txt").read_text(encoding="utf-8", errors="replace")
-    except OSError:
-        return ""
-    match = re.search(r"^  limited by +(\w+);", said, re.M)
+    match = re.search(r"^  limited by +(\w+);", said_in(folder / "out.txt"), re.M)
     return match[1] if match and match[1] not in ("set_dt", "end") else ""
 
 

@@ -150,7 +150,7 @@ class _Display:
         if self.live is None:
             said = " ".join(f"{name}={value}" for name, value in case.items())
             numbers = [f"{i.word} {shown(found[i.word])}" for i in self.study.items]
-            end = found["status"] + (f": {found['reason']}" if found["reason"] else "")
+            end = ended(found)
             line = ", ".join([said, *numbers, f"{shown(found['seconds'])} s", end])
             done, of = self.progress
             number = f"run {done} of at most {of}:" if self.study.most else f"{done}/{of} "
@@ -250,6 +250,11 @@ def shown(value: Any) -> str:
     return str(value)
 
 
+def ended(found: Mapping[str, Any]) -> str:
+    """Write what became of a run."""
+    return found["status"] + (f": {found['reason']}" if found["reason"] else "")
+
+
 def plain_table(words: Sequence[str], numbers: Sequence[str], title: str | None = None) -> Any:
     """Make an empty table for a terminal, with columns of words and of numbers."""
     from rich.table import Table
@@ -294,7 +299,7 @@ def results_table(
         table.add_column(name, justify="right", min_width=widths[name])
     table.add_column("status", overflow="fold", min_width=6)
     for k, each in enumerate(rows):
-        end = each["status"] + (f": {each['reason']}" if each["reason"] else "")
+        end = ended(each)
         style = {"done": "green", "failed": "red", "refused": "red"}.get(each["status"], "yellow")
         cells = [Text(values[name][k]) for name in (*names, *columns)]
         table.add_row(*cells, Text(end if len(end) < 60 else end[:59] + "…", style=style))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.app.studies import look
-from karamelo_py.app.studies.curves import missing, require, told, usable
+from karamelo_py.app.studies.curves import require, told, usable
 from karamelo_py.app.studies.records import value
 from karamelo_py.app.studies.study import plain_table, shown, terminal
 from karamelo_py.output.files import savefig
@@ -43,10 +43,9 @@ def pairs(
     cost: str,
 ) -> tuple[list[Pair], list[str]]:
     """Find the pairs of a table, and the two values in their order."""
-    for option, column in (("-accuracy", accuracy), ("-cost", cost)):
-        require(rows, option, column)
-    if name not in variables:
-        raise missing("-versus", name, variables)
+    require("-accuracy", [accuracy], rows[0])
+    require("-cost", [cost], rows[0])
+    require("-versus", [name], variables)
     values = list(dict.fromkeys(row[name] for row in rows))
     if len(values) != 2:
         raise ScriptError(
