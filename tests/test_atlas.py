@@ -8,7 +8,7 @@ import pytest
 
 import karamelo_py
 from karamelo_py.app.cli import main
-from karamelo_py.app.studies import atlas, histories
+from karamelo_py.app.studies import atlas, pictures
 
 ROOT = Path(__file__).parent.parent
 SCRIPT = """
@@ -150,9 +150,8 @@ def test_the_atlas_of_the_pages_names_scripts_and_commands_that_exist():
     import shlex
 
     from karamelo_py.app.cli import ELSEWHERE
-    from karamelo_py.app.studies.options import zipped
     from karamelo_py.app.studies.records import recorded
-    from karamelo_py.app.studies.variables import ScriptFiles, cases, choices
+    from karamelo_py.app.studies.variables import ScriptFiles, cases, choices, zipped
 
     entries, inputs = atlas.read(ROOT / "docs" / "atlas.toml")
     assert len({entry.name for entry in entries}) == len(entries)
@@ -194,8 +193,8 @@ def test_curves_of_a_sweep(folder, capsys):
 
 def test_rows_that_a_run_gave_up_are_no_part_of_its_curve():
     time = np.array([0.0, 1.0, 2.0, 3.0, 1.0, 1.5])
-    assert list(time[histories.forward(time, stopped=True)]) == [0, 1, 2, 3]
-    assert list(time[histories.forward(time, stopped=False)]) == [0, 1, 1.5]
+    assert list(time[pictures.forward(time, stopped=True)]) == [0, 1, 2, 3]
+    assert list(time[pictures.forward(time, stopped=False)]) == [0, 1, 1.5]
 
 
 @pytest.mark.full

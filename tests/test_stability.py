@@ -9,7 +9,7 @@ import pytest
 from selection import covering, parameters
 
 from karamelo_py.app.cli import main
-from karamelo_py.app.logs import read_log
+from karamelo_py.app.plot import read_log
 from karamelo_py.app.studies import stability, variables
 from karamelo_py.app.studies.frontier import explore, unseen
 from karamelo_py.script.errors import ScriptError

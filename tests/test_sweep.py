@@ -13,7 +13,7 @@ import pandas
 import pytest
 
 from karamelo_py.app.cli import main
-from karamelo_py.app.logs import read_log
+from karamelo_py.app.plot import read_log
 from karamelo_py.app.studies import case, records, study, variables
 from karamelo_py.script.errors import ScriptError
 

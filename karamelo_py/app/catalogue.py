@@ -64,18 +64,11 @@ def describe_parameter(parameter: Parameter) -> str:
 
 
 def print_styles(given: Sequence[str]) -> int:
-    """List commands and styles, a line each, with where they come from; returns the exit status.
-
-    Parameters
-    ----------
-    given
-        Nothing, or the family to list.
-    """
+    """List commands and styles, or a family, with where they come from; returns the exit status."""
     if len(given) > 1:
         raise ScriptError(f"too many arguments: {' '.join(given)}", expected=STYLES_USAGE)
-    chosen = [_family(given[0])] if given else families()
     page = _Page()
-    for index, family in enumerate(chosen):
+    for index, family in enumerate([_family(given[0])] if given else families()):
         if index:
             page.line()
         page.line(_plural(family), "bold")
@@ -88,12 +81,9 @@ def print_styles(given: Sequence[str]) -> int:
 
 
 def print_help(given: Sequence[str]) -> int:
-    """Explain a command or a style; returns the exit status.
+    """Explain a command, style, family or argument by its name, or a family and a name.
 
-    Parameters
-    ----------
-    given
-        The name of a command, style, family or argument, or a family and a name.
+    Returns the exit status.
     """
     if len(given) > 2:
         raise ScriptError(f"too many arguments: {' '.join(given)}", expected=HELP_USAGE)
@@ -129,9 +119,8 @@ def _singular(word: str) -> str:
 
 
 def _plural(family: str) -> str:
-    if family in ("basis", "eos"):
-        return {"basis": "bases", "eos": "eos"}[family]
-    return family + ("es" if family.endswith(("x", "s")) else "s")
+    usual = family + ("es" if family.endswith(("x", "s")) else "s")
+    return {"basis": "bases", "eos": "eos"}.get(family, usual)
 
 
 def _unknown(what: str, name: str, known: Iterable[str]) -> ScriptError:

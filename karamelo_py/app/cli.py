@@ -23,15 +23,14 @@ from karamelo_py.app.launch import (
     share,
     together,
 )
+from karamelo_py.app.leaving import SIGNALLED, leaving_at_once
 from karamelo_py.app.options import (
     VARIABLE,
-    add_output_options,
     add_variables,
-    direct,
+    make_folder,
     positive,
     threads_option,
 )
-from karamelo_py.app.start import SIGNALLED, leaving_at_once
 from karamelo_py.run.mpi.comm import ENDING, MpiComm, handled_signals, launched
 from karamelo_py.script.errors import ScriptError, nearest, render_message
 
@@ -250,7 +249,14 @@ def _parser(command: str) -> tuple[CommandLine, Any]:
             "--trust-geometries", action="store_true",
             help="let .geo files run programs and write files",
         )  # fmt: skip
-        add_output_options(script)
+        script.add_argument(
+            "-log", "--log", type=Path, metavar="FILE",
+            help="where the log goes (default: log.mpm); with the ending .csv it has commas",
+        )  # fmt: skip
+        script.add_argument(
+            "-out", "--out", type=Path, metavar="FOLDER",
+            help="where all files go; it is made if need be (default: the current folder)",
+        )  # fmt: skip
         if name == "run":
             script.add_argument(
                 *RESTART, type=Path, metavar="FILE",
@@ -305,7 +311,7 @@ def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = 
     hub.settings.debug = options.debug
     hub.settings.trusts = options.trust_geometries
     hub.checking = options.checking
-    direct(hub, options)
+    _direct(hub, options)
     presets = dict(options.var)
     if getattr(options, "restart", None) is not None:
         from karamelo_py.run.checkpoint.restart_file import Restart
@@ -327,6 +333,22 @@ def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = 
     if not hub.rehearsed:
         _tell_of_no_run(hub, script)
     return 0
+
+
+def _direct(hub: Hub, options: argparse.Namespace) -> None:
+    """Send the files of a scene where the options say."""
+    if options.out is not None:
+        if not hub.checking:
+            make_folder(options.out, "-out {}")
+        hub.folder = options.out.absolute()
+    if options.log is not None:
+        hub.output.log.file = options.log
+        hub.output.log.is_asked_for = True
+        if not hub.output.log.path.parent.is_dir() or hub.output.log.path.is_dir():
+            raise ScriptError(
+                f"the log cannot be written to {options.log}",
+                expected="the name of a file in a folder that exists",
+            )
 
 
 def _tell_of_no_run(hub: Hub, script: str) -> None:

@@ -25,7 +25,7 @@ from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple, TextIO
 
-from karamelo_py.app.start import INTERRUPTED, SIGNALLED
+from karamelo_py.app.leaving import INTERRUPTED, SIGNALLED
 from karamelo_py.run.mpi.comm import (
     ENDING,
     FAILED,

@@ -18,10 +18,10 @@ import karamelo_py
 from karamelo_py.app.bench import apart, measure
 from karamelo_py.app.bench.workloads import WORKLOADS
 from karamelo_py.app.launch import Outcome
-from karamelo_py.app.logs import read_text
 from karamelo_py.app.options import above_zero, add_variables, threads_option
-from karamelo_py.app.studies.options import out_file
+from karamelo_py.app.plot import read_text
 from karamelo_py.app.studies.records import surroundings
+from karamelo_py.app.studies.variables import out_file
 from karamelo_py.output.files import write_whole
 from karamelo_py.script.errors import ScriptError, unknown
 

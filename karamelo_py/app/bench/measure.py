@@ -61,12 +61,10 @@ class Measured(NamedTuple):
 
     @property
     def best(self) -> float:
-        """Particle-steps per second of the fastest repetition."""
         return max(self.speeds)
 
     @property
     def median(self) -> float:
-        """Their median."""
         return statistics.median(self.speeds)
 
     @property

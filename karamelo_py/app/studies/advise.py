@@ -15,15 +15,15 @@ from karamelo_py.app.options import above_zero, positive
 from karamelo_py.app.studies import records
 from karamelo_py.app.studies.case import PROGRAM, environment, options_of, worded
 from karamelo_py.app.studies.curves import column, order, usable
-from karamelo_py.app.studies.options import (
+from karamelo_py.app.studies.study import Study, plain_table, shown, terminal
+from karamelo_py.app.studies.variables import (
     add_combinations,
     add_family,
+    cases,
     family,
     out_file,
     zipped,
 )  # fmt: skip
-from karamelo_py.app.studies.study import Study, plain_table, shown, terminal
-from karamelo_py.app.studies.variables import cases
 from karamelo_py.script.errors import ScriptError, plural
 from karamelo_py.script.terms import number_of
 

@@ -15,10 +15,10 @@ from pathlib import Path
 from typing import Any
 
 import karamelo_py
-from karamelo_py.app.logs import read_text
+from karamelo_py.app.plot import read_text
 from karamelo_py.app.studies import records
 from karamelo_py.app.studies.case import PROGRAM, environment
-from karamelo_py.app.studies.options import names
+from karamelo_py.app.studies.variables import names
 from karamelo_py.output.console import duration
 from karamelo_py.output.files import write_whole
 from karamelo_py.script.errors import ScriptError, meant, plural

@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.app.studies import histories, keeping, look, page, pictures, records, versus
+from karamelo_py.app.studies import keeping, look, page, pictures, records
 from karamelo_py.app.studies.curves import Family, order, require
-from karamelo_py.app.studies.options import add_axes, along, names, out_file, split
 from karamelo_py.app.studies.study import plain_table, shown, terminal
-from karamelo_py.app.studies.variables import holds
+from karamelo_py.app.studies.variables import add_axes, along, holds, names, out_file, split
 from karamelo_py.script.errors import ScriptError
 
 DESCRIPTION = """\
@@ -137,7 +136,7 @@ def side_by_side(options: Any) -> int:
     found, known = [], []
     for path in options.tables:
         rows, variables, made = read(path, options.where)
-        some, values = versus.pairs(
+        some, values = pictures.pairs(
             rows, made, variables, options.versus, options.accuracy, options.cost
         )
         if known and values != known:
@@ -145,13 +144,13 @@ def side_by_side(options: Any) -> int:
                               expected=", ".join(known) + ", as in the first table")  # fmt: skip
         known = values
         found += some
-    versus.tell(found, known, options.accuracy, options.cost)
+    pictures.tell_pairs(found, known, options.accuracy, options.cost)
     if out is not None:
         cost = look.label(options.cost).removesuffix(" (s)")
         words = along(
             options, look.label(options.accuracy), f"{cost},\n{known[1]} over {known[0]} (1)"
         )
-        versus.draw(found, known, out, words, options.accuracy, options.title or "")
+        pictures.draw_pairs(found, known, out, words, options.accuracy, options.title or "")
         print(f"drawn: {out}")
     return 0
 
@@ -163,8 +162,8 @@ def curves(options: Any, rows: list, by: list[str], made: dict) -> int:
     over = options.x or "Time"
     called = [name for name in split(options.names) if name]
 
-    def read(column: str) -> list[histories.History]:
-        return histories.histories(
+    def read(column: str) -> list[pictures.History]:
+        return pictures.histories(
             rows, differing, options.table.parent, options.log, over, column, called
         )
 
@@ -175,7 +174,7 @@ def curves(options: Any, rows: list, by: list[str], made: dict) -> int:
     title = made["title"] if options.title is None else options.title
     found = read(options.curve)
     x, y = along(options, over, options.curve)
-    histories.draw(found, out, x=x, y=y, title=title, exact=exact)
+    pictures.draw_histories(found, out, x=x, y=y, title=title, exact=exact)
     for each in found:
         print(f"{each.label}: {options.curve} {shown(float(each.y[-1]))} at the end")
     print(f"drawn: {out}")
@@ -189,12 +188,11 @@ def keeps(options: Any, rows: list, by: list[str], variables: list[str], made: d
     over, folder = options.x or "Time", options.table.parent
     what = over, options.keeps, keeping.WITHIN, made.get("computes", ())
     kept = [keeping.look_at(row, folder, *what) for row in rows]
-    found = keeping.table(rows, kept, by, variables)
-    text = keeping.markdown(found)
+    text, silent = keeping.table(rows, kept, by, variables)
     print(text)
     for word in dict.fromkeys(one.word for one in kept):
         print(f"{word}: {sum(one.word == word for one in kept)} of {len(kept)}")
-    for line in found.silent:
+    for line in silent:
         print(f"nothing says why: {line}")
     if out:
         out.write_text(text, encoding="utf-8")

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.app.logs import read_log
+from karamelo_py.app.plot import read_log
 from karamelo_py.app.studies.case import said_in, worded
 from karamelo_py.app.studies.curves import missing
 from karamelo_py.kernels.growth import WITHIN, growth
@@ -95,20 +95,14 @@ def _general(text: str) -> str:
     return _POINT.sub("a point", _OWN.sub("", text))
 
 
-class Verdicts(NamedTuple):
-    """Cells of runs: rows and columns are the values of variables."""
+def table(
+    rows: Sequence[Mapping[str, str]], kept: Sequence[Kept], by: Sequence[str],
+    variables: Sequence[str],
+) -> tuple[str, list[str]]:  # fmt: skip
+    """Write runs as Markdown: a row for each value of the variables `by`, columns for the others.
 
-    headings: list[str]
-    rows: list[list[str]]
-    notes: list[str]
-    silent: list[str]
-
-
-def table(rows: Sequence[Mapping[str, str]], kept: Sequence[Kept], by: Sequence[str],
-          variables: Sequence[str]) -> Verdicts:  # fmt: skip
-    """Arrange runs: a row for each value of the variables `by`, a column for each of the others.
-
-    Variables that go in step with those of the rows are left out.
+    What runs said stands below, by the numbers in brackets. Variables that go in step with those of
+    the rows are left out. Also names the runs that go wrong silently.
     """
     keys = [tuple(row[name] for name in by) for row in rows]
 
@@ -133,17 +127,11 @@ def table(rows: Sequence[Mapping[str, str]], kept: Sequence[Kept], by: Sequence[
         if one.silent:
             silent.append(worded({name: row[name] for name in (*by, *across)}))
     headings = [worded(dict(zip(across, values, strict=True))) for values in columns]
-    return Verdicts(
+    lines = [
         [*by, *(heading or "all" for heading in headings)],
-        [[*key, *(cells.get((key, c), "") for c in columns)] for key in dict.fromkeys(keys)],
-        notes,
-        silent,
-    )
-
-
-def markdown(found: Verdicts) -> str:
-    """The table as Markdown, and below what runs said, by the numbers in brackets."""
-    lines = [found.headings, ["---"] * len(found.headings), *found.rows]
+        ["---"] * (len(by) + len(headings)),
+        *([*key, *(cells.get((key, c), "") for c in columns)] for key in dict.fromkeys(keys)),
+    ]
     text = "\n".join("| " + " | ".join(line) + " |" for line in lines)
-    notes = "\n".join(f"{k}. {note}" for k, note in enumerate(found.notes, 1))
-    return f"{text}\n\n{notes}".rstrip() + "\n"
+    said = "\n".join(f"{k}. {note}" for k, note in enumerate(notes, 1))
+    return f"{text}\n\n{said}".rstrip() + "\n", silent

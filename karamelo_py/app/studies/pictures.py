@@ -1,17 +1,23 @@
 """Charts of studies as pictures (PNG, SVG, PDF), drawn with Matplotlib."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from karamelo_py.app.plot import read_log
 from karamelo_py.app.studies import look
-from karamelo_py.app.studies.curves import Family, column, told, usable
+from karamelo_py.app.studies.curves import Family, GroupedRuns, column, require, told, usable
+from karamelo_py.app.studies.records import value
+from karamelo_py.app.studies.study import plain_table, shown, terminal
 from karamelo_py.output.files import savefig
 from karamelo_py.output.plot_style import blank_figure, tick_text, tidy
-from karamelo_py.script.errors import plural
+from karamelo_py.script.errors import ScriptError, plural, unknown
 from karamelo_py.script.terms import number_of
+
+DECADES = 1e4  # curves that reach over more are drawn on a logarithmic axis
 
 
 def lines(family: Family, path: Path, words: tuple[str, str], title: str = "") -> None:
@@ -149,3 +155,224 @@ def heat(
 def _sorted(rows: Sequence[Any], name: str) -> list[str]:
     found = list(dict.fromkeys(row[name] for row in rows))
     return sorted(found, key=number_of) if all(number_of(v) is not None for v in found) else found
+
+
+# ---- columns of logs, a curve for each run -------------------------------------------------------
+
+
+class History(NamedTuple):
+    """One column over another, of one run."""
+
+    x: np.ndarray
+    y: np.ndarray
+    label: str  # what the run was chosen to be
+    stopped: bool = False  # before its end
+
+
+def histories(
+    rows: Sequence[Mapping[str, str]],
+    by: Sequence[str],
+    folder: Path,
+    log: str,
+    over: str,
+    curve: str,
+    names: Sequence[str] = (),
+) -> list[History]:
+    """Read the curves of all runs whose logs there are: one column `over` another.
+
+    Runs are called by their values of the variables `by`, or by `names` in the order of the table,
+    which is in `folder`.
+    """
+    found = []
+    for k, row in enumerate(rows):
+        columns = read_log(folder / row["folder"], log)
+        if not columns:
+            continue
+        for name in (over, curve):
+            if name not in columns:
+                raise unknown(f"{log} has no column '{name}'", name, columns)
+        label = names[k] if k < len(names) else GroupedRuns({name: row[name] for name in by}).label
+        stopped = row.get("status", "done") != "done"
+        kept = forward(columns["Time"], stopped) if "Time" in columns else slice(None)
+        found.append(History(columns[over][kept], columns[curve][kept], label, stopped))
+    if not found:
+        raise ScriptError(f"no run has left a {log}", expected="the folders of the sweep")
+    return found
+
+
+def forward(time: np.ndarray, stopped: bool) -> np.ndarray:
+    """Choose the rows (n,) of a log that belong to one way forward.
+
+    A run that was stopped ends with its last good state, which came before; one that went back and
+    on with smaller steps has rows of what it gave up.
+    """
+    if stopped:
+        return np.arange(len(time)) <= np.argmax(time)
+    after = np.append(np.minimum.accumulate(time[::-1])[::-1][1:], np.inf)
+    return time < after
+
+
+def draw_histories(
+    found: Sequence[History],
+    path: Path,
+    *,
+    x: str,
+    y: str,
+    title: str = "",
+    exact: History | None = None,
+) -> None:
+    """Draw curves with their names beside them; a cross where a run was stopped."""
+    figure = blank_figure(7.2, 4.0)
+    axes = figure.subplots()
+    ys = np.concatenate([each.y for each in found])
+    positive = ys[np.isfinite(ys) & (ys > 0)]
+    logarithmic = not (ys < 0).any() and len(positive) and positive.max() > DECADES * positive.min()
+    if logarithmic:
+        # What is zero but for round-off stays below the axis.
+        top = float(positive.max())
+        low = max(float(positive.min()), 1e-16 * top)
+        look.log_axis(axes.yaxis, low, top)
+    ends = []
+    if exact is not None:
+        axes.plot(exact.x, exact.y, color="0.6", linewidth=4, zorder=1)
+        ends.append((exact.x[-1], exact.y[-1], exact.label, "0.4"))
+    for k, each in enumerate(found):
+        colour = look.PALETTE[(k + 2) % len(look.PALETTE) if len(found) > 1 else 1]
+        axes.plot(
+            each.x, each.y, color=colour, linestyle=look.DASHES[k % len(look.DASHES)],
+            linewidth=1.6, zorder=3,
+        )  # fmt: skip
+        name = each.label
+        if each.stopped:
+            axes.plot(each.x[-1], each.y[-1], "X", color=colour, markersize=9, zorder=4)
+            name += " (stopped)"
+        last = each.y[-1] if not logarithmic else max(each.y[-1], low)
+        ends.append((each.x[-1], last, name, colour))
+    axes.set_xlabel(x)
+    axes.set_ylabel(y)
+    axes.set_title(title, loc="left", fontsize=10)
+    tidy(axes)
+    figure.canvas.draw()  # limits are known from here on
+    look.direct_labels(axes, ends)
+    savefig(figure, path)
+
+
+# ---- two values of a variable side by side, scene by scene ---------------------------------------
+
+
+@dataclass
+class Pair:
+    """The runs of a scene that differ in one variable only: numbers of its first and second value.
+
+    They are NaN where there is none.
+    """
+
+    label: str  # the scene, and what else was chosen
+    error: tuple[float, float]
+    cost: tuple[float, float]
+    bytes: tuple[float, float]
+
+    @property
+    def cost_ratio(self) -> float:
+        """The cost of the second over that of the first."""
+        return self.cost[1] / self.cost[0]
+
+
+def pairs(
+    rows: Sequence[Mapping[str, str]],
+    made: Mapping[str, Any],
+    variables: Sequence[str],
+    name: str,
+    accuracy: str,
+    cost: str,
+) -> tuple[list[Pair], list[str]]:
+    """Find the pairs of a table, and the two values in their order."""
+    require("-accuracy", [accuracy], rows[0])
+    require("-cost", [cost], rows[0])
+    require("-versus", [name], variables)
+    values = list(dict.fromkeys(row[name] for row in rows))
+    if len(values) != 2:
+        raise ScriptError(
+            f"-versus {name}: {made['table']} has {plural(len(values), 'value')} of it",
+            expected="two",
+        )
+    others = [n for n in variables if n != name]
+    cases: dict[tuple[str, ...], dict[str, Mapping[str, str]]] = {}
+    for row in rows:
+        cases.setdefault(tuple(row[n] for n in others), {})[row[name]] = row
+    differing = [n for k, n in enumerate(others) if len({case[k] for case in cases}) > 1]
+    scene = Path(made.get("script") or made["table"]).name
+    found = []
+    for case, two in cases.items():
+        if len(two) < 2:
+            continue
+        said = dict(zip(others, case, strict=True))
+        parts = told({name: said[name] for name in differing})
+        numbers = [
+            tuple(_number(two[word], column) for word in values)
+            for column in (accuracy, cost, "bytes_per_particle")
+        ]
+        found.append(Pair(", ".join([scene, *parts]), *numbers))
+    return found, values
+
+
+def _number(row: Mapping[str, str], column: str) -> float:
+    found = value(row, column)
+    return found if usable(found) else np.nan
+
+
+def tell_pairs(found: Sequence[Pair], values: Sequence[str], accuracy: str, cost: str) -> None:
+    """Print the pairs as a table."""
+    ratio = f"{values[1]}/{values[0]}"
+    headings = [f"{what}, {word}" for what in (accuracy, cost) for word in values]
+    table = plain_table([""], [*headings, f"{cost}, {ratio}", f"bytes, {ratio}"])
+    for pair in found:
+        numbers = [*pair.error, *pair.cost, pair.cost_ratio, pair.bytes[1] / pair.bytes[0]]
+        table.add_row(pair.label, *(shown(float(f"{a:.3g}")) for a in numbers))
+    terminal().print(table)
+
+
+def draw_pairs(
+    found: Sequence[Pair],
+    values: Sequence[str],
+    path: Path,
+    words: Sequence[str],
+    accuracy: str,
+    title: str,
+) -> None:
+    """Draw errors of both values on the left, and the ratio of their costs on the right.
+
+    `words` stand along these axes.
+    """
+    figure = blank_figure(9.0, 1.1 + 0.3 * len(found))
+    left, right = figure.subplots(1, 2, sharey=True, width_ratios=(3, 2))
+    errors = np.array([pair.error for pair in found])
+    good = errors[np.isfinite(errors)]
+    if not len(good):
+        raise ScriptError(f"no run has a value of '{accuracy}' above 0")
+    look.log_axis(left.xaxis, float(good.min()), float(good.max()))
+    up = np.arange(len(found))[::-1]
+    for k, (word, filled) in enumerate(zip(values, (True, False), strict=True)):
+        colour = look.PALETTE[1 + k]
+        left.plot(
+            errors[:, k], up, look.MARKERS[k], color=colour, label=word, markersize=9 - 2 * k,
+            markerfacecolor=colour if filled else "white", markeredgewidth=1.6, zorder=3 + k,
+        )  # fmt: skip
+    ratios = np.array([pair.cost_ratio for pair in found])
+    right.barh(up, np.nan_to_num(ratios), height=0.55, color="0.7", zorder=2)
+    for at, a in zip(up, ratios, strict=True):
+        if np.isfinite(a):
+            right.text(0.04, at, f"{a:.2f}", va="center", fontsize=8, zorder=4)
+    right.axvline(1.0, color="0.3", linewidth=1, linestyle=look.DASHES[1], zorder=3)
+    right.set_xlim(0, 1.15 * max(1.0, float(np.nanmax(ratios, initial=1.0))))
+    left.set_yticks(up, [pair.label for pair in found])
+    left.set_ylim(-0.7, len(found) - 0.3)
+    left.set_xlabel(words[0])
+    right.set_xlabel(words[1])
+    left.set_title(title, loc="left", fontsize=10)
+    # Above the axes: within them it would hide points.
+    left.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False, fontsize=9)
+    for axes in (left, right):
+        tidy(axes)
+        axes.tick_params(axis="y", length=0)
+    savefig(figure, path)

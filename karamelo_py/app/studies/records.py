@@ -8,14 +8,14 @@ import platform
 import re
 from collections.abc import Container, Iterable, Mapping, Sequence
 from datetime import datetime
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import karamelo_py
-from karamelo_py.app.logs import read_log, read_text
+from karamelo_py.app.plot import read_log, read_text
 from karamelo_py.app.studies.case import COLUMNS, CaseOutcome
 from karamelo_py.app.studies.variables import NamesOfCase, ScriptFiles
 from karamelo_py.output.files import write_whole
@@ -191,16 +191,8 @@ def write(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
     writer.writeheader()
     for each in rows:
-        writer.writerow({name: _cell(value) for name, value in each.items()})
+        writer.writerow({n: f"{v:.10g}" if isinstance(v, float) else v for n, v in each.items()})
     write_whole(path, file.getvalue())
-
-
-def _cell(value: Any) -> str:
-    if value is None:
-        return ""
-    if isinstance(value, float):
-        return f"{value:.10g}"
-    return str(value)
 
 
 def read(path: Path) -> list[dict[str, str]]:
@@ -232,11 +224,7 @@ def describe(path: Path, **said: Any) -> None:
 def surroundings() -> dict[str, Any]:
     """Date, machine and versions, for what is measured here and now."""
     versions = {"python": platform.python_version(), "karamelo-py": karamelo_py.__version__}
-    for name in ("numpy", "numba", "llvmlite"):
-        try:
-            versions[name] = version(name)
-        except PackageNotFoundError:
-            versions[name] = "not installed"
+    versions |= {name: version(name) for name in ("numpy", "numba", "llvmlite")}
     return {
         "date": datetime.now().astimezone().isoformat(timespec="seconds"),
         "processor": processor(),

@@ -12,21 +12,21 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.app.logs import read_log
 from karamelo_py.app.options import above_zero, positive
+from karamelo_py.app.plot import read_log
 from karamelo_py.app.studies import records
 from karamelo_py.app.studies.case import said_in
 from karamelo_py.app.studies.frontier import Cell, explore, unseen
 from karamelo_py.app.studies.keeping import grown
-from karamelo_py.app.studies.options import (
+from karamelo_py.app.studies.study import Study
+from karamelo_py.app.studies.variables import (
+    ScriptFiles,
     add_axes,
     add_family,
     along,
     family,
     out_file,
 )
-from karamelo_py.app.studies.study import Study
-from karamelo_py.app.studies.variables import ScriptFiles
 from karamelo_py.output.files import savefig
 from karamelo_py.output.plot_style import blank_figure
 from karamelo_py.script.errors import ScriptError, nearest, plural

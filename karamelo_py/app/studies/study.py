@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.app.logs import read_log
+from karamelo_py.app.plot import read_log
 from karamelo_py.app.studies.case import CaseOutcome, Launch, Refused, folder_name
 from karamelo_py.app.studies.records import Recorded, describe, row, write
 from karamelo_py.output.console import duration

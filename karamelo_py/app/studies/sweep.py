@@ -7,15 +7,15 @@ from typing import Any
 
 from karamelo_py.app.options import positive
 from karamelo_py.app.studies import records
-from karamelo_py.app.studies.options import (
+from karamelo_py.app.studies.study import Study, results_table, terminal
+from karamelo_py.app.studies.variables import (
     add_combinations,
     add_family,
+    cases,
     family,
     out_file,
     zipped,
 )
-from karamelo_py.app.studies.study import Study, results_table, terminal
-from karamelo_py.app.studies.variables import cases
 from karamelo_py.script.errors import ScriptError, plural
 
 DESCRIPTION = """\

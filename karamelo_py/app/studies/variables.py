@@ -1,5 +1,7 @@
-"""Variables of a study: their values, which go together, and whether a script reads them."""
+"""Variables of a study, their values and whether its script reads them; options of studies."""
 
+import csv
+import os
 import re
 from collections.abc import Container, Iterable, Mapping, Sequence
 from itertools import product
@@ -7,11 +9,14 @@ from math import prod
 from pathlib import Path
 from typing import Any
 
+from karamelo_py.app.options import VARIABLE, above_zero, positive
+from karamelo_py.app.studies.case import Launch
 from karamelo_py.output.quantity import KEYWORDS
-from karamelo_py.script.errors import ScriptError, meant, plural
+from karamelo_py.script.errors import ScriptError, meant, nearest, plural
 from karamelo_py.script.evaluation import evaluate
 from karamelo_py.script.functions import CONSTANTS
 from karamelo_py.script.parser import parse, parse_text
+from karamelo_py.script.reading import scripts_in
 from karamelo_py.script.syntax import Assignment, CommandCall
 from karamelo_py.script.terms import number_of
 
@@ -201,3 +206,111 @@ class ScriptFiles:
         """List the IDs of its computes, as far as known."""
         calls = [call for path in sorted(self.statements) for call in self.calls("compute", path)]
         return [call.arguments[0].code.strip() for call in calls if call.arguments]
+
+
+# ---- options ------------------------------------------------------------------------------------
+
+
+def add_family(parser: Any) -> None:
+    """Add options of a family of runs."""
+    parser.add_argument("script", type=Path, help="the script")
+    parser.add_argument(
+        *VARIABLE, action="append", default=[], metavar="NAME=VALUES",
+        help=f"values of a variable of the script: {VALUES}; again for each variable",
+    )  # fmt: skip
+    parser.add_argument(
+        "-jobs", type=positive, help="runs at once (default: as many as there are cores)"
+    )
+    parser.add_argument(
+        "--threads", type=positive, default=None, help="threads of each run (default: 1)"
+    )
+    parser.add_argument(
+        "-limit", type=above_zero, metavar="SECONDS", help="give up a run that takes longer"
+    )
+    parser.add_argument(
+        "-again", action="store_true", help="run also what is known from an earlier study"
+    )
+    parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
+
+
+def add_axes(parser: Any) -> None:
+    """Add the option of words along the axes of a picture."""
+    parser.add_argument(
+        "-axes",
+        metavar="X,Y",
+        help="what to write along them, such as 'time (s),F (N)'; an empty one stays as it is, "
+        "one with commas stands in double quotes",
+    )
+
+
+def along(options: Any, x: str, y: str) -> tuple[str, str]:
+    """Choose the words along the axes: as the options say, else `x` and `y`."""
+    words = split(options.axes or ",")
+    if len(words) != 2:
+        raise ScriptError(f"-axes {options.axes}", expected="two, such as -axes 'time (s),F (N)'")
+    return words[0] or x, words[1] or y
+
+
+def split(text: str) -> list[str]:
+    """Part words at commas; one in double quotes may have commas of its own."""
+    return [word.strip() for word in next(csv.reader([text], skipinitialspace=True), [])]
+
+
+def names(text: str) -> list[str]:
+    """Part names at commas."""
+    return [name.strip() for name in text.split(",") if name.strip()]
+
+
+def add_combinations(parser: Any) -> None:
+    """Add options of which values go together."""
+    parser.add_argument(
+        "-zip", action="append", default=[], metavar="A,B",
+        help="variables that go in step: the first values together, then the second, ...",
+    )  # fmt: skip
+    parser.add_argument(
+        "-where", action="append", default=[], metavar="CONDITION",
+        help="keep the combinations that fulfil it: 'N < 40 || basis == linear'",
+    )  # fmt: skip
+
+
+def zipped(options: Any) -> list[list[str]]:
+    """Read which variables go in step."""
+    groups = getattr(options, "zip", [])  # not every study of a family has it
+    return [[name.strip() for name in group.split(",")] for group in groups]
+
+
+def family(
+    options: Any, *, timed: bool = False, repeat: int = 1
+) -> tuple[dict, ScriptFiles, Launch, int]:
+    """Read values of the variables, the script, how to run, and how many at once."""
+    path = options.script
+    if not path.is_file():
+        close = nearest(path.name, scripts_in(path.parent))
+        raise ScriptError(
+            f"there is no file {path}",
+            expected="the name of a script",
+            hint=f"did you mean {path.parent / close}?" if close else None,
+        )
+    in_step = {name for group in zipped(options) for name in group}
+    values = choices(options.var, in_step)
+    if not values:
+        raise ScriptError("nothing varies", expected=f"-var {VALUES}")
+    script, threads = ScriptFiles(path), options.threads or 1
+    script.check(values)
+    launch = Launch(path, threads, repeat, options.limit, script.texts())
+    if timed and (options.jobs or 1) > 1:
+        raise ScriptError("-time runs one at a time", expected="-time without -jobs")
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
+    jobs = 1 if timed else options.jobs or max(1, cores // threads)
+    return values, script, launch, jobs
+
+
+def out_file(path: Path, *suffixes: str) -> Path:
+    """See that a file can be written, with one of these endings."""
+    if suffixes and path.suffix.lower() not in suffixes:
+        raise ScriptError(f"-o {path}: unknown kind of file", expected=", ".join(suffixes))
+    if not path.parent.is_dir():
+        raise ScriptError(f"the folder {path.parent} does not exist", hint=f"mkdir {path.parent}")
+    if path.is_dir():
+        raise ScriptError(f"{path} is a folder", expected="the name of a file")
+    return path
