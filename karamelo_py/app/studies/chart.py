@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.app.studies import keeping, look, page, pictures, records
-from karamelo_py.app.studies.curves import Family, order, require
+from karamelo_py.app.studies.curves import Family, Table, order, require
 from karamelo_py.app.studies.study import plain_table, shown, terminal
 from karamelo_py.app.studies.variables import add_axes, along, holds, names, out_file, split
 from karamelo_py.script.errors import ScriptError
@@ -71,49 +71,45 @@ def run(options: Any) -> int:
         return side_by_side(options)
     if len(options.tables) > 1:
         raise ScriptError(f"{len(options.tables)} tables", expected="one, or several with -versus")
-    options.table = options.tables[0]
-    rows, variables, made = read(options.table, options.where)
+    table = read(options.tables[0], options.where)
     by = names(options.by)
     if options.keeps:
-        return keeps(options, rows, by or variables, variables, made)
+        return keeps(options, table, by or table.variables)
     if options.curve:
-        return curves(options, rows, by or variables, made)
-    said = made.get("record", ())
-    family = Family(rows, variables, options.accuracy, options.cost, by, options.x, said)
-    if len(family.without) == len(rows):
+        return curves(options, table, by or table.variables)
+    family = Family(table, options.accuracy, options.cost, by, options.x)
+    if len(family.without) == len(table.rows):
         raise ScriptError(f"no run has a value of '{options.accuracy}' above 0")
     out = out_file(options.o, *SUFFIXES) if options.o else None
     if out is not None and out.suffix.lower() == ".html":
         page.require_plotly()
-    title = made["title"] if options.title is None else options.title
+    title = table.script if options.title is None else options.title
     axes = names(options.heat or "")
-    require("-heat", axes, variables)
+    require("-heat", axes, table.variables)
     if options.heat and len(axes) != 2:
         raise ScriptError(f"-heat {options.heat}", expected="two variables: -heat N,ppc")
     if not options.x and not axes and not any(line.shown.any() for line in family.lines):
         raise ScriptError(f"no run has a value of '{options.cost}' above 0")
     first = family.along if options.x else look.label(family.cost)
     words = along(options, *(axes or (first, family.error_label)))
-    tell(family, made, costs=costs)
+    tell(family, costs=costs)
     if out is None:
         return 0
     if out.suffix.lower() == ".html":
         if axes:
             raise ScriptError("-heat is a picture", expected="-o heat.png, .svg or .pdf")
-        page.write(family, rows, out, words, title or "runs", made)
+        page.write(family, out, words, title or "runs")
     elif axes:
-        pictures.heat(family, rows, *axes, out, words, title)
+        pictures.heat(family, *axes, out, words, title)
     else:
         pictures.lines(family, out, words, title)
     print(f"drawn: {out}")
     return 0
 
 
-def read(path: Path, where: Sequence[str]) -> tuple[list, list[str], dict]:
-    """Read rows of a table that fulfil the conditions, its variables, and how it was made."""
-    rows = records.read(path)
-    made = {"table": path.name, **records.beside(path)}
-    made["title"] = Path(made.get("script", "")).name
+def read(path: Path, where: Sequence[str]) -> Table:
+    """Read a table, of its rows those that fulfil the conditions."""
+    rows, made = records.read(path), records.beside(path)
     if "folder" not in rows[0] and "variables" not in made:
         raise ScriptError(
             f"{path} does not say which columns are variables",
@@ -125,7 +121,7 @@ def read(path: Path, where: Sequence[str]) -> tuple[list, list[str], dict]:
         rows = [r for r in rows if holds(condition, {n: r[n] for n in variables}, words)]
     if not rows:
         raise ScriptError("no row fulfils -where " + " and ".join(where))
-    return rows, variables, made
+    return Table(rows, variables, path, made)
 
 
 def side_by_side(options: Any) -> int:
@@ -135,10 +131,8 @@ def side_by_side(options: Any) -> int:
     out = out_file(options.o, *SUFFIXES[:-1]) if options.o else None
     found, known = [], []
     for path in options.tables:
-        rows, variables, made = read(path, options.where)
-        some, values = pictures.pairs(
-            rows, made, variables, options.versus, options.accuracy, options.cost
-        )
+        table = read(path, options.where)
+        some, values = pictures.pairs(table, options.versus, options.accuracy, options.cost)
         if known and values != known:
             raise ScriptError(f"{path}: {options.versus} is {', '.join(values)}",
                               expected=", ".join(known) + ", as in the first table")  # fmt: skip
@@ -155,40 +149,37 @@ def side_by_side(options: Any) -> int:
     return 0
 
 
-def curves(options: Any, rows: list, by: list[str], made: dict) -> int:
+def curves(options: Any, table: Table, by: list[str]) -> int:
     """Draw a column of the logs, a curve for each run."""
     out = out_file(options.o or Path("curves.png"), *SUFFIXES[:-1])
-    differing = [name for name in by if len({row[name] for row in rows}) > 1]
+    differing = [name for name in by if len({row[name] for row in table.rows}) > 1]
     over = options.x or "Time"
     called = [name for name in split(options.names) if name]
 
     def read(column: str) -> list[pictures.History]:
-        return pictures.histories(
-            rows, differing, options.table.parent, options.log, over, column, called
-        )
+        return pictures.histories(table, differing, options.log, over, column, called)
 
     exact = None
     if options.exact:
         whole = max(read(options.exact), key=lambda each: len(each.x))
         exact = whole._replace(label=options.exact)
-    title = made["title"] if options.title is None else options.title
+    title = table.script if options.title is None else options.title
     found = read(options.curve)
-    x, y = along(options, over, options.curve)
-    pictures.draw_histories(found, out, x=x, y=y, title=title, exact=exact)
+    words = along(options, over, options.curve)
+    pictures.draw_histories(found, out, words, title, exact)
     for each in found:
         print(f"{each.label}: {options.curve} {shown(float(each.y[-1]))} at the end")
     print(f"drawn: {out}")
     return 0
 
 
-def keeps(options: Any, rows: list, by: list[str], variables: list[str], made: dict) -> int:
+def keeps(options: Any, table: Table, by: list[str]) -> int:
     """Show whether a log column stays what it was, and which runs fail without a known cause."""
     out = out_file(options.o, ".md") if options.o else None
-    require("-by", by, variables)
-    over, folder = options.x or "Time", options.table.parent
-    what = over, options.keeps, keeping.WITHIN, made.get("computes", ())
-    kept = [keeping.look_at(row, folder, *what) for row in rows]
-    text, silent = keeping.table(rows, kept, by, variables)
+    require("-by", by, table.variables)
+    what = options.x or "Time", options.keeps, keeping.WITHIN, table.made.get("computes", ())
+    kept = [keeping.look_at(row, table.path.parent, *what) for row in table.rows]
+    text, silent = keeping.verdicts(table, kept, by)
     print(text)
     for word in dict.fromkeys(one.word for one in kept):
         print(f"{word}: {sum(one.word == word for one in kept)} of {len(kept)}")
@@ -200,7 +191,7 @@ def keeps(options: Any, rows: list, by: list[str], variables: list[str], made: d
     return 0
 
 
-def tell(family: Family, made: dict, *, costs: bool = True) -> None:
+def tell(family: Family, *, costs: bool) -> None:
     """Print the runs, by cost with the Pareto front marked, and the order of each line."""
     front = {id(row) for row in family.front()} if costs else set()
     named = family.along, family.cost if costs else None, family.accuracy
@@ -233,7 +224,7 @@ def tell(family: Family, made: dict, *, costs: bool = True) -> None:
         fits = (order(getattr(line, x), getattr(line, y)) for x, y in pairs.values())
         orders.add_row(line.label, *map(str, fits))
     console.print(orders)
-    if costs and family.cost == "seconds" and made.get("timed") is False:
+    if costs and family.cost == "seconds" and family.table.made.get("timed") is False:
         print(
             "note: these runs went side by side, their times disturb each other; "
             "sweep -time measures"

@@ -1,8 +1,9 @@
 """A table of runs as lines of ever finer runs, their orders, and the Pareto front."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import inf, isfinite
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -47,32 +48,49 @@ def usable(a: float | None) -> bool:
     return a is not None and 0 < a < inf
 
 
+class Table(NamedTuple):
+    """A table of runs, the variables among its columns, and how it was made."""
+
+    rows: list[Mapping[str, str]]
+    variables: list[str]
+    path: Path = Path()
+    made: Mapping[str, Any] = {}
+
+    @property
+    def script(self) -> str:
+        """The name of the script."""
+        return Path(self.made.get("script", "")).name
+
+
 @dataclass
 class GroupedRuns:
     """Runs that differ in one variable only, in its order."""
 
     choice: dict[str, str]  # values of the other variables that differ between lines
-    rows: list[Mapping[str, str]] = field(default_factory=list)
+    rows: list[Mapping[str, str]]
     # Numbers of each, NaN where there is none.
-    x: np.ndarray = field(default_factory=lambda: np.empty(0))
-    cost: np.ndarray = field(default_factory=lambda: np.empty(0))
-    error: np.ndarray = field(default_factory=lambda: np.empty(0))
-    across: np.ndarray = field(
-        default_factory=lambda: np.empty(0)
-    )  # x or cost: what errors are over
+    x: np.ndarray
+    cost: np.ndarray
+    error: np.ndarray
+    across: np.ndarray  # one of the first two: what errors are drawn over
 
     @property
     def label(self) -> str:
-        """The choice in words; what says nothing alone says what it is the value of."""
-        choice = {n: v for n, v in self.choice.items() if v != NONE} or self.choice
-        parts = [v if _tells(v) else f"{n} = {v}" for n, v in choice.items()]
-        return ", ".join(parts) or "all"
+        """Write the choice in words."""
+        return label(self.choice)
 
     @property
     def shown(self) -> np.ndarray:
         """Choose the members that have a place in a diagram of errors."""
         good = np.isfinite(self.error) & (self.error > 0)
         return good & np.isfinite(self.across) & (self.across > 0)
+
+
+def label(choice: Mapping[str, str]) -> str:
+    """Write a choice in words; what says nothing alone says what it is the value of."""
+    choice = {n: v for n, v in choice.items() if v != NONE} or choice
+    parts = [v if _tells(v) else f"{n} = {v}" for n, v in choice.items()]
+    return ", ".join(parts) or "all"
 
 
 def told(choice: Mapping[str, str]) -> list[str]:
@@ -89,20 +107,15 @@ class Family:
 
     `accuracy` and `cost` are the columns to compare. Variables `by` tell the lines apart; others
     that differ are added. `along` differs along a line: by default the number with the most values.
-    What the sweep has `recorded` is shown as a formula where it is one.
+    What the sweep has recorded is shown as a formula where it is one.
     """
 
     def __init__(
-        self,
-        rows: Sequence[Mapping[str, str]],
-        variables: Sequence[str],
-        accuracy: str,
-        cost: str,
-        by: Sequence[str] = (),
+        self, table: Table, accuracy: str, cost: str, by: Sequence[str] = (),
         along: str | None = None,
-        recorded: Sequence[str] = (),
-    ):
-        self.formulas = dict(word.split("=", 1) for word in recorded if "=" in word)
+    ):  # fmt: skip
+        self.table, self.accuracy, self.cost = table, accuracy, cost
+        rows, variables = table.rows, table.variables
         require("-accuracy", [accuracy], rows[0])
         require("-cost", [cost], rows[0])
         require("-by", by, variables)
@@ -116,28 +129,28 @@ class Family:
         ]  # fmt: skip
         self.along = along or max(numbers, key=lambda name: len(values[name]), default=None)
         self.by = [*by, *(n for n in differing if n not in by and n != self.along)]
-        self.accuracy, self.cost, self.variables = accuracy, cost, list(variables)
-        self.lines = self._lines(rows)
+        groups: dict[tuple[str, ...], list[Mapping[str, str]]] = {}
+        for row in rows:
+            groups.setdefault(tuple(row[name] for name in self.by), []).append(row)
+        self.lines = [
+            self._line(dict(zip(self.by, key, strict=True)), members)
+            for key, members in groups.items()
+        ]
         self.without = [row for row in rows if not usable(value(row, accuracy))]
 
-    def _lines(self, rows: Sequence[Mapping[str, str]]) -> list[GroupedRuns]:
-        found: dict[tuple[str, ...], GroupedRuns] = {}
-        for row in rows:
-            key = tuple(row[name] for name in self.by)
-            line = found.setdefault(key, GroupedRuns(dict(zip(self.by, key, strict=True))))
-            line.rows.append(row)
-        for line in found.values():
-            if self.along:
-                line.rows.sort(key=lambda row: number_of(row[self.along]))
-            line.x = column(line.rows, self.along) if self.along else np.zeros(len(line.rows))
-            line.cost, line.error = column(line.rows, self.cost), column(line.rows, self.accuracy)
-            line.across = line.x if self.convergence else line.cost
-        return list(found.values())
+    def _line(self, choice: dict[str, str], rows: list[Mapping[str, str]]) -> GroupedRuns:
+        x = np.zeros(len(rows))
+        if self.along:
+            rows.sort(key=lambda row: number_of(row[self.along]))
+            x = column(rows, self.along)
+        cost, error = column(rows, self.cost), column(rows, self.accuracy)
+        return GroupedRuns(choice, rows, x, cost, error, x if self.convergence else cost)
 
     @property
     def error_label(self) -> str:
         """Name the error for an axis."""
-        formula = self.formulas.get(self.accuracy)
+        words = (word.partition("=") for word in self.table.made.get("record", ()))
+        formula = {name: formula for name, _, formula in words}.get(self.accuracy)
         return f"{self.accuracy} = {formula}" if formula else look.label(self.accuracy)
 
     def front(self) -> list[Mapping[str, str]]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from karamelo_py.app.plot import read_log
 from karamelo_py.app.studies.case import said_in, worded
-from karamelo_py.app.studies.curves import missing
+from karamelo_py.app.studies.curves import Table, missing
 from karamelo_py.kernels.growth import WITHIN, growth
 
 SHARE = 0.2  # of the run: means over its first and its last part are compared
@@ -95,22 +95,20 @@ def _general(text: str) -> str:
     return _POINT.sub("a point", _OWN.sub("", text))
 
 
-def table(
-    rows: Sequence[Mapping[str, str]], kept: Sequence[Kept], by: Sequence[str],
-    variables: Sequence[str],
-) -> tuple[str, list[str]]:  # fmt: skip
+def verdicts(table: Table, kept: Sequence[Kept], by: Sequence[str]) -> tuple[str, list[str]]:
     """Write runs as Markdown: a row for each value of the variables `by`, columns for the others.
 
     What runs said stands below, by the numbers in brackets. Variables that go in step with those of
     the rows are left out. Also names the runs that go wrong silently.
     """
+    rows = table.rows
     keys = [tuple(row[name] for name in by) for row in rows]
 
     def differs(name: str) -> bool:
         pairs = {(key, row[name]) for key, row in zip(keys, rows, strict=True)}
         return len(pairs) > len(set(keys))
 
-    across = [name for name in variables if name not in by and differs(name)]
+    across = [name for name in table.variables if name not in by and differs(name)]
     columns = list(dict.fromkeys(tuple(row[name] for name in across) for row in rows))
     notes: list[str] = []
     cells: dict[tuple, str] = {}

@@ -29,13 +29,12 @@ def require_plotly() -> None:
         )
 
 
-def write(
-    family: Family, rows: list, path: Path, words: tuple[str, str], title: str, made: Mapping
-) -> None:
+def write(family: Family, path: Path, words: tuple[str, str], title: str) -> None:
     """Write the page with Plotly; `words` stand along the axes."""
     from plotly import graph_objects
     from plotly import io as plotly_io
 
+    rows = family.table.rows
     number_of = {id(row): k for k, row in enumerate(rows)}
     figure = graph_objects.Figure()
     front = family.front()
@@ -73,7 +72,7 @@ def write(
         if 2 <= len(ticks) <= 14:
             figure.layout[axis].tickvals = ticks
             figure.layout[axis].ticktext = [f"{tick:g}" for tick in ticks]
-    runs = [_run(row, family, path.parent, made, k) for k, row in enumerate(rows)]
+    runs = [_run(row, family, family.table.path.parent, k) for k, row in enumerate(rows)]
     text = json.dumps(runs).replace("</", "<\\/")
     first = number_of[id(front[-1])] if front else 0
     chart = plotly_io.to_html(
@@ -83,7 +82,7 @@ def write(
     template = Template(Path(__file__).with_suffix(".html").read_text(encoding="utf-8"))
     page = template.substitute(
         title=html.escape(title), chart=chart, failures=_failures(family, number_of),
-        footer=html.escape(_footer(made)), runs=text, first=first,
+        footer=html.escape(_footer(family.table.made)), runs=text, first=first,
     )  # fmt: skip
     try:
         path.write_text(page, encoding="utf-8")
@@ -92,19 +91,20 @@ def write(
 
 
 def _values(row: Mapping[str, str], family: Family) -> dict[str, str]:
-    return {name: row[name] for name in family.variables}
+    return {name: row[name] for name in family.table.variables}
 
 
 def _said(row: Mapping[str, str], family: Family) -> str:
     return html.escape(worded(_values(row, family)))
 
 
-def _run(row: Mapping[str, str], family: Family, folder: Path, made: Mapping, k: int) -> dict:
+def _run(row: Mapping[str, str], family: Family, folder: Path, k: int) -> dict[str, Any]:
+    script = family.table.made.get("script", "SCRIPT")
     values = _values(row, family)
     skipped = {*values, "status", "reason", "folder"}
     return {
         "title": worded(values),
-        "command": f"karamelo-py {made.get('script', 'SCRIPT')} {' '.join(options_of(values))}",
+        "command": f"karamelo-py {script} {' '.join(options_of(values))}",
         "status": row.get("status", ""),
         "reason": row.get("reason", ""),
         "numbers": [[n, v] for n, v in row.items() if n not in skipped and v],

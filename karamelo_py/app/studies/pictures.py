@@ -9,7 +9,7 @@ import numpy as np
 
 from karamelo_py.app.plot import read_log
 from karamelo_py.app.studies import look
-from karamelo_py.app.studies.curves import Family, GroupedRuns, column, require, told, usable
+from karamelo_py.app.studies.curves import Family, Table, column, label, require, told, usable
 from karamelo_py.app.studies.records import value
 from karamelo_py.app.studies.study import plain_table, shown, terminal
 from karamelo_py.output.files import savefig
@@ -94,9 +94,8 @@ def _footnote(figure: Any, family: Family) -> None:
 
 
 def heat(
-    family: Family, rows: Sequence[Any], x: str, y: str, path: Path, words: tuple[str, str],
-    title: str = "",
-) -> None:  # fmt: skip
+    family: Family, x: str, y: str, path: Path, words: tuple[str, str], title: str = ""
+) -> None:
     """Draw a column of the table over two variables, as coloured cells with their numbers.
 
     `words` stand along the axes.
@@ -104,6 +103,7 @@ def heat(
     from matplotlib import colormaps
     from matplotlib.colors import LogNorm
 
+    rows = family.table.rows
     others = [n for n in [*family.by, family.along] if n and n not in (x, y)]
     panels: dict[tuple, list] = {}
     for row in rows:
@@ -170,31 +170,24 @@ class History(NamedTuple):
 
 
 def histories(
-    rows: Sequence[Mapping[str, str]],
-    by: Sequence[str],
-    folder: Path,
-    log: str,
-    over: str,
-    curve: str,
-    names: Sequence[str] = (),
+    table: Table, by: Sequence[str], log: str, over: str, curve: str, names: Sequence[str] = ()
 ) -> list[History]:
     """Read the curves of all runs whose logs there are: one column `over` another.
 
-    Runs are called by their values of the variables `by`, or by `names` in the order of the table,
-    which is in `folder`.
+    Runs are called by their values of the variables `by`, or by `names` in the order of the table.
     """
     found = []
-    for k, row in enumerate(rows):
-        columns = read_log(folder / row["folder"], log)
+    for k, row in enumerate(table.rows):
+        columns = read_log(table.path.parent / row["folder"], log)
         if not columns:
             continue
         for name in (over, curve):
             if name not in columns:
                 raise unknown(f"{log} has no column '{name}'", name, columns)
-        label = names[k] if k < len(names) else GroupedRuns({name: row[name] for name in by}).label
+        called = names[k] if k < len(names) else label({name: row[name] for name in by})
         stopped = row.get("status", "done") != "done"
         kept = forward(columns["Time"], stopped) if "Time" in columns else slice(None)
-        found.append(History(columns[over][kept], columns[curve][kept], label, stopped))
+        found.append(History(columns[over][kept], columns[curve][kept], called, stopped))
     if not found:
         raise ScriptError(f"no run has left a {log}", expected="the folders of the sweep")
     return found
@@ -213,13 +206,7 @@ def forward(time: np.ndarray, stopped: bool) -> np.ndarray:
 
 
 def draw_histories(
-    found: Sequence[History],
-    path: Path,
-    *,
-    x: str,
-    y: str,
-    title: str = "",
-    exact: History | None = None,
+    found: Sequence[History], path: Path, words: Sequence[str], title: str, exact: History | None
 ) -> None:
     """Draw curves with their names beside them; a cross where a run was stopped."""
     figure = blank_figure(7.2, 4.0)
@@ -248,8 +235,7 @@ def draw_histories(
             name += " (stopped)"
         last = each.y[-1] if not logarithmic else max(each.y[-1], low)
         ends.append((each.x[-1], last, name, colour))
-    axes.set_xlabel(x)
-    axes.set_ylabel(y)
+    axes.set(xlabel=words[0], ylabel=words[1])
     axes.set_title(title, loc="left", fontsize=10)
     tidy(axes)
     figure.canvas.draw()  # limits are known from here on
@@ -278,22 +264,16 @@ class Pair:
         return self.cost[1] / self.cost[0]
 
 
-def pairs(
-    rows: Sequence[Mapping[str, str]],
-    made: Mapping[str, Any],
-    variables: Sequence[str],
-    name: str,
-    accuracy: str,
-    cost: str,
-) -> tuple[list[Pair], list[str]]:
+def pairs(table: Table, name: str, accuracy: str, cost: str) -> tuple[list[Pair], list[str]]:
     """Find the pairs of a table, and the two values in their order."""
+    rows, variables = table.rows, table.variables
     require("-accuracy", [accuracy], rows[0])
     require("-cost", [cost], rows[0])
     require("-versus", [name], variables)
     values = list(dict.fromkeys(row[name] for row in rows))
     if len(values) != 2:
         raise ScriptError(
-            f"-versus {name}: {made['table']} has {plural(len(values), 'value')} of it",
+            f"-versus {name}: {table.path.name} has {plural(len(values), 'value')} of it",
             expected="two",
         )
     others = [n for n in variables if n != name]
@@ -301,7 +281,7 @@ def pairs(
     for row in rows:
         cases.setdefault(tuple(row[n] for n in others), {})[row[name]] = row
     differing = [n for k, n in enumerate(others) if len({case[k] for case in cases}) > 1]
-    scene = Path(made.get("script") or made["table"]).name
+    scene = table.script or table.path.name
     found = []
     for case, two in cases.items():
         if len(two) < 2:
@@ -333,13 +313,9 @@ def tell_pairs(found: Sequence[Pair], values: Sequence[str], accuracy: str, cost
 
 
 def draw_pairs(
-    found: Sequence[Pair],
-    values: Sequence[str],
-    path: Path,
-    words: Sequence[str],
-    accuracy: str,
+    found: Sequence[Pair], values: Sequence[str], path: Path, words: Sequence[str], accuracy: str,
     title: str,
-) -> None:
+) -> None:  # fmt: skip
     """Draw errors of both values on the left, and the ratio of their costs on the right.
 
     `words` stand along these axes.
