@@ -11,7 +11,7 @@ from selection import covering, parameters
 from karamelo_py.app.cli import main
 from karamelo_py.app.plot import read_log
 from karamelo_py.app.studies import stability, variables
-from karamelo_py.app.studies.frontier import explore, unseen
+from karamelo_py.app.studies.stability import explore, unseen
 from karamelo_py.script.errors import ScriptError
 
 # An elastic bar on a Lagrangian grid of equal cells, a point in the middle of each. A wave of

@@ -263,9 +263,11 @@ def _parser(command: str) -> tuple[CommandLine, Any]:
                 help="go on from a file that restart(...) has written",
             )  # fmt: skip
         script.add_argument("--quiet", action="store_true", help="write warnings and errors only")
-    styles = add("styles", _styles, "List commands and styles, and where they come from.")
+    summary = "List commands and styles, and where they come from."
+    styles = add("styles", lambda given: _catalogue().print_styles(given.family), summary)
     styles.add_argument("family", metavar="FAMILY", nargs="*", help="fix, compute, region, ...")
-    explain = add("help", _help, "Explain a command or a style.", HELP)
+    summary = "Explain a command or a style."
+    explain = add("help", lambda given: _catalogue().print_help(given.words), summary, HELP)
     explain.add_argument("words", metavar="WORD", nargs="*")
     for name, (module, summary) in ELSEWHERE.items():
         added = commands.add_parser(name, help=summary)
@@ -275,6 +277,10 @@ def _parser(command: str) -> tuple[CommandLine, Any]:
             added.set_defaults(act=found.run)
             found.add_options(added)
     return parser, commands
+
+
+def _catalogue() -> Any:
+    return import_module("karamelo_py.app.catalogue")
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -365,18 +371,6 @@ def _tell_of_no_run(hub: Hub, script: str) -> None:
     elif hub.domain is not None or not hub.interpreter.variables:
         hub.place = None
         hub.warn(message, hint=RUN_COMMANDS)
-
-
-def _styles(options: argparse.Namespace) -> int:
-    from karamelo_py.app.catalogue import print_styles
-
-    return print_styles(options.family)
-
-
-def _help(options: argparse.Namespace) -> int:
-    from karamelo_py.app.catalogue import print_help
-
-    return print_help(options.words)
 
 
 if __name__ == "__main__":

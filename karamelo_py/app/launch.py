@@ -269,7 +269,9 @@ class Launcher:
             return SIGNALLED + self.signals[0]
         status = self.process.returncode
         status = SIGNALLED - status if status < 0 else status or 1
-        self._say(self._loss(status) if self.lost else self._no_start())
+        unstarted = f"{self.command[0]} has not started {self.ranks} processes"
+        text = f"{render_message('error', unstarted)}\n{self._words()}".rstrip()
+        self._say(self._loss(status) if self.lost else text)
         return status
 
     def _loss(self, status: int) -> str:
@@ -281,10 +283,6 @@ class Launcher:
         hint = "the system does that to who takes too much memory" if sent not in ENDING else None
         who += ", and the run with it: files are complete up to there"
         return render_message("error", who, hint=hint)
-
-    def _no_start(self) -> str:
-        text = f"{self.command[0]} has not started {self.ranks} processes"
-        return "\n".join([render_message("error", text), self._words()]).rstrip()
 
     def _words(self) -> str:
         """Read what mpiexec said, and libraries of C through it."""

@@ -151,7 +151,8 @@ def run(options: Any) -> int:
         elif bad:
             state += f", {len(bad)} of {plural(count, 'run')} ended early"
             if not entry.ends_early:
-                failed[entry.name] = f" ({_few(bad)})"
+                more = f" and {len(bad) - 3} more" if len(bad) > 3 else ""
+                failed[entry.name] = f" ({', '.join(bad[:3])}{more})"
         print(f"{said} {state} ({duration(time.perf_counter() - begun)})", flush=True)
     if options.page and not options.small:
         write_page(options.page, entries, folder, inputs)
@@ -166,10 +167,6 @@ def ended(place: Path) -> tuple[list[str], int]:
     tables = [records.read(path) for path in sorted(place.glob("*.csv"))]
     runs = [row for table in tables for row in table if "status" in row and "folder" in row]
     return [Path(row["folder"]).name for row in runs if row["status"] != "done"], len(runs)
-
-
-def _few(names: list[str]) -> str:
-    return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
 
 
 def make(entry: Entry, place: Path, inputs: Path, *, small: bool, again: bool) -> str:

@@ -79,10 +79,14 @@ def write(family: Family, path: Path, words: tuple[str, str], title: str) -> Non
         figure, include_plotlyjs=True, full_html=False, div_id="chart",
         default_height="100%", config={"displaylogo": False, "responsive": True},
     )  # fmt: skip
+    made = family.table.made
+    versions = ", ".join(f"{n} {v}" for n, v in made.get("versions", {}).items())
+    threads = f"{made['threads']} threads" if "threads" in made else None
+    about = filter(None, [made.get("processor"), threads, versions, made.get("date")])
     template = Template(Path(__file__).with_suffix(".html").read_text(encoding="utf-8"))
     page = template.substitute(
         title=html.escape(title), chart=chart, failures=_failures(family, number_of),
-        footer=html.escape(_footer(family.table.made)), runs=text, first=first,
+        footer=html.escape("; ".join(about)), runs=text, first=first,
     )  # fmt: skip
     try:
         path.write_text(page, encoding="utf-8")
@@ -113,7 +117,7 @@ def _run(row: Mapping[str, str], family: Family, folder: Path, k: int) -> dict[s
 
 
 def _picture(folder: Path) -> str | None:
-    """The newest picture of a run, small enough for a page, as a data URL."""
+    """Read the newest picture of a run, small enough for a page, as a data URL."""
     pictures = sorted(folder.glob("*.png"), key=lambda p: p.stat().st_mtime)
     if not pictures:
         return None
@@ -139,9 +143,3 @@ def _failures(family: Family, number_of: Mapping[int, int]) -> str:
         link = f'<a href="#" data-run="{number_of[id(row)]}">{_said(row, family)}</a>'
         items += f"<li>{link}: {why}</li>"
     return f"<h2>Without a value</h2><ul>{items}</ul>"
-
-
-def _footer(made: Mapping[str, Any]) -> str:
-    versions = ", ".join(f"{n} {v}" for n, v in made.get("versions", {}).items())
-    parts = [made.get("processor"), f"{made['threads']} threads" if "threads" in made else None]
-    return "; ".join(filter(None, [*parts, versions, made.get("date")]))

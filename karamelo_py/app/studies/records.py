@@ -55,7 +55,7 @@ class Reduction:
             )
 
     def of(self, log: Mapping[str, np.ndarray]) -> float | None:
-        """The number, if the log has it."""
+        """Take the number, if the log has it."""
         values = log.get(self.column)
         if values is None or not len(values):
             return None
@@ -70,7 +70,7 @@ class Reduction:
         return float(log["Time"][k - 1] + share * (log["Time"][k] - log["Time"][k - 1]))
 
     def missing(self, log: Mapping[str, np.ndarray]) -> str:
-        """Why there is no such number."""
+        """Tell why there is no such number."""
         if self.column not in log:
             return f"the log has no column '{self.column}'"
         return f"{self.column} does not reach {self.level:g}"
@@ -86,8 +86,7 @@ class Recorded:
     def __init__(self, word: str):
         name, equals, formula = (part.strip() for part in word.partition("="))
         self.text, self.raw = word, None
-        self.parts: dict[str, Reduction] = {}
-        self.names: list[str] = []
+        self.parts: dict[str, Reduction] = {}  # by their names in the formula
         if not equals:
             self.word = word
             reduction, colon, rest = word.partition(":")
@@ -104,22 +103,21 @@ class Recorded:
 
         formula = _PART.sub(named, formula)
         self.raw, self.node = parse_text(formula, f"-record {name}")
-        names = {*_NAME.findall(formula)}
-        self.names = sorted(names - {*self.parts, *CONSTANTS})
+        for name in sorted({*_NAME.findall(formula)} - {*self.parts, *CONSTANTS}):
+            self.parts[name] = Reduction("last", name, None, word)
 
-    @property
-    def columns(self) -> list[str]:
-        """The log columns that it names, each with what is taken of it."""
-        return [part.column for part in self.parts.values()]
+    def columns(self, variables: Container[str] = ()) -> list[str]:
+        """List the log columns that it names, but for `variables` of the study."""
+        return [part.column for name, part in self.parts.items() if name not in variables]
 
     def of(self, log: Mapping[str, np.ndarray], case: Mapping[str, Any]) -> float | None:
-        """The number, if the log has what it takes."""
-        found = {name: part.of(log) for name, part in self.parts.items()}
+        """Take the number, if the log has what it takes."""
+        found = {
+            name: number_of(case[name]) if name in case else part.of(log)
+            for name, part in self.parts.items()
+        }
         if self.raw is None:
             return found[""]
-        for name in self.names:
-            last = Reduction("last", name, None, self.text)
-            found[name] = number_of(case[name]) if name in case else last.of(log)
         if None in found.values():
             return None
         try:
@@ -129,10 +127,10 @@ class Recorded:
         return value if isinstance(value, float) else None
 
     def missing(self, log: Mapping[str, np.ndarray]) -> str:
-        """Why there is no number."""
-        plain = [Reduction("last", name, None, self.text) for name in self.names]
-        parts = [p for p in [*self.parts.values(), *plain] if p.of(log) is None]
-        return parts[0].missing(log) if parts else f"'{self.text}' has no value"
+        """Tell why there is no number."""
+        lacking = (part for part in self.parts.values() if part.of(log) is None)
+        part = next(lacking, None)
+        return part.missing(log) if part else f"'{self.text}' has no value"
 
 
 def recorded(
@@ -142,7 +140,7 @@ def recorded(
     found = [Recorded(word.strip()) for word in _apart(text) if word.strip()]
     headings = script.logged()
     for item in found:
-        for column in [*item.columns, *(n for n in item.names if n not in variables)]:
+        for column in item.columns(variables):
             if headings is None or column in headings:
                 continue
             known = list(dict.fromkeys(headings))
@@ -156,7 +154,7 @@ def recorded(
 
 
 def _apart(text: str) -> list[str]:
-    """The words between commas that stand in no parentheses."""
+    """Part words at commas that stand in no parentheses."""
     words, depth = [""], 0
     for sign in text:
         depth += (sign == "(") - (sign == ")")
@@ -170,19 +168,18 @@ def _apart(text: str) -> list[str]:
 def row(
     case: Mapping[str, str], outcome: CaseOutcome, items: Iterable[Recorded], folder: Path
 ) -> dict[str, Any]:
-    """The row of a run; what is not known of it is left empty.
+    """Make the row of a run; what is not known of it is left empty.
 
     A run that did not end well has no recorded values: those of its last moments say nothing.
     """
     log = read_log(outcome.folder) if outcome.status == "done" else {}
-    found: dict[str, Any] = dict(case)
-    for item in items:
-        found[item.word] = item.of(log, case)
-    for name in COLUMNS:
-        found[name] = outcome.facts.get(name)
-    found["status"], found["reason"] = outcome.status, outcome.reason
-    found["folder"] = os.path.relpath(outcome.folder, folder).replace(os.sep, "/")
-    return found
+    place = os.path.relpath(outcome.folder, folder).replace(os.sep, "/")
+    return {
+        **case,
+        **{item.word: item.of(log, case) for item in items},
+        **{name: outcome.facts.get(name) for name in COLUMNS},
+        "status": outcome.status, "reason": outcome.reason, "folder": place,
+    }  # fmt: skip
 
 
 def write(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
@@ -208,7 +205,7 @@ def read(path: Path) -> list[dict[str, str]]:
 
 
 def value(each: Mapping[str, Any], name: str) -> float | None:
-    """The number in a column, None where it is empty or no number."""
+    """Read the number in a column, None where it is empty or no number."""
     cell = each.get(name)
     if cell is None or isinstance(cell, float):
         return cell
@@ -243,7 +240,7 @@ def beside(path: Path) -> dict[str, Any]:
 
 
 def processor() -> str:
-    """The name of the processor."""
+    """Find the name of the processor."""
     try:
         for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
             if line.lower().startswith("model name"):

@@ -150,10 +150,9 @@ class _Display:
         if self.live is None:
             said = " ".join(f"{name}={value}" for name, value in case.items())
             numbers = [f"{i.word} {shown(found[i.word])}" for i in self.study.items]
-            end = ended(found)
-            line = ", ".join([said, *numbers, f"{shown(found['seconds'])} s", end])
             done, of = self.progress
             number = f"run {done} of at most {of}:" if self.study.most else f"{done}/{of} "
+            line = ", ".join([said, *numbers, f"{shown(found['seconds'])} s", ended(found)])
             print(f"{number} {line}", flush=True)
 
     def tick(self, queue: Sequence[Mapping], running: Sequence[Mapping]) -> None:
@@ -173,14 +172,12 @@ class _Display:
         )  # fmt: skip
         # Nobody knows how many more a study by and by asks for.
         left = None if self.study.most else self.left(queue, running)
-        line = Table.grid(padding=(0, 1))
         done, of = self.progress
         said = f"{done} of {'at most ' if self.study.most else ''}{of} runs"
         said += f", {duration(time.perf_counter() - self.study.begun)}"
-        line.add_row(
-            ProgressBar(total=of, completed=done, width=30),
-            Text(said + (f", about {duration(left)} left" if left is not None else "")),
-        )
+        said += f", about {duration(left)} left" if left is not None else ""
+        line = Table.grid(padding=(0, 1))
+        line.add_row(ProgressBar(total=of, completed=done, width=30), Text(said))
         self.live.update(Group(table, line))
 
     @property
@@ -217,28 +214,31 @@ def guessed_time(
 
     By least squares of logarithms, with a pull towards "changes nothing" where little is known.
     """
-    # A variable may have numbers and words, of which 0 is one.
-    terms = list(dict.fromkeys(_term(n, v) for case in cases for n, v in case.items()))
 
-    def features(case: Mapping[str, str]) -> list[float]:
-        have = {_term(n, v): v for n, v in case.items()}
-        return [
-            0.0 if t not in have else np.log(number_of(have[t])) if t[1] is None else 1.0
-            for t in terms
-        ]
+    def features(case: Mapping[str, str]) -> dict[Any, float]:
+        """Note logarithms of numbers by their names, and 1 for each word; 0 is a word, too."""
+        found: dict[Any, float] = {}
+        for name, word in case.items():
+            number = number_of(word)
+            if number is not None and number > 0:
+                found[name] = np.log(number)
+            else:
+                found[name, word] = 1.0
+        return found
 
-    matrix = np.array([features(case) for case in cases], float).reshape(len(cases), -1)
+    terms = list(dict.fromkeys(term for case in cases for term in features(case)))
+
+    def row(case: Mapping[str, str]) -> list[float]:
+        have = features(case)
+        return [have.get(term, 0.0) for term in terms]
+
+    matrix = np.array([row(case) for case in cases], float).reshape(len(cases), -1)
     logs = np.log(times)
     centre, mean = matrix.mean(axis=0), logs.mean()
     shifted = matrix - centre
     normal = shifted.T @ shifted + 0.05 * np.eye(matrix.shape[1])
     slopes = np.linalg.solve(normal, shifted.T @ (logs - mean))
-    return lambda case: float(np.exp(mean + (np.array(features(case)) - centre) @ slopes))
-
-
-def _term(name: str, value: str) -> tuple[str, Any]:
-    as_number = number_of(value)
-    return (name, None) if as_number is not None and as_number > 0 else (name, value)
+    return lambda case: float(np.exp(mean + (np.array(row(case)) - centre) @ slopes))
 
 
 def shown(value: Any) -> str:
