@@ -3,6 +3,7 @@
 import argparse
 import glob
 from collections.abc import Iterable
+from itertools import chain
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -57,7 +58,7 @@ def run(options: argparse.Namespace) -> int:
     drawn = 0
     with unwarned():
         picture = None
-        for snapshot in (snapshot for file in files for snapshot in read(file)):
+        for snapshot in chain.from_iterable(map(read, files)):
             picture = picture or _picture(snapshot, files, options)
             time = "" if np.isnan(snapshot.time) else f", time {snapshot.time:.6g}"
             # As they stand in the file, whatever their ids.
@@ -82,13 +83,12 @@ def _matching(names: Iterable[Path]) -> set[Path]:
     """Find the files of these names; a pattern stands for all files that match it."""
     found: set[Path] = set()
     for name in names:
-        if name.exists() or not glob.has_magic(str(name)):
-            found.add(name)
-            continue
-        there = glob.glob(str(name))
+        there = [name]
+        if not name.exists() and glob.has_magic(str(name)):
+            there = [Path(file) for file in glob.glob(str(name))]
         if not there:
             raise ScriptError(f"no file matches {name}", expected="dumps of an earlier run")
-        found |= {Path(file) for file in there}
+        found.update(there)
     return found
 
 
@@ -133,7 +133,7 @@ def _all(files: Iterable[Path], column: str) -> tuple[np.ndarray, np.ndarray, An
     from karamelo_py.output.pictures import grown
 
     corners, ends = [], []
-    for snapshot in (snapshot for file in files for snapshot in read(file)):
+    for snapshot in chain.from_iterable(map(read, files)):
         corners.append((snapshot.lo, snapshot.hi))
         values = snapshot.columns.get(column, np.empty(0))
         values = values[np.isfinite(values)]

@@ -204,15 +204,17 @@ def comparison(now: Mapping[str, Any], then: Mapping[str, Any]) -> list[str]:
 
 def _differences(now: Mapping[str, Any], then: Mapping[str, Any]) -> list[str]:
     """List other differences between two benches, a line each: machine, threads, versions."""
-    about = ("processor", "cores", "system", "commit", "threads")
-    pairs = [(key, now.get(key), then.get(key)) for key in about]
-    ours, theirs = now.get("versions") or {}, then.get("versions") or {}
-    pairs += [
-        (f"version of {name}", ours.get(name), theirs.get(name))
-        for name in dict.fromkeys((*ours, *theirs))
-    ]
+
+    def about(found: Mapping[str, Any]) -> dict[str, Any]:
+        keys = ("processor", "cores", "system", "commit", "threads")
+        versions = found.get("versions") or {}
+        return {key: found.get(key) for key in keys} | {
+            f"version of {name}": version for name, version in versions.items()
+        }
+
+    ours, theirs = about(now), about(then)
     return [
-        f"another {word}: {b or 'unknown'} then, {a or 'unknown'} now"
-        for word, a, b in pairs
-        if a != b
+        f"another {word}: {theirs.get(word) or 'unknown'} then, {ours.get(word) or 'unknown'} now"
+        for word in ours | theirs
+        if ours.get(word) != theirs.get(word)
     ]

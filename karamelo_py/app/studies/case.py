@@ -1,6 +1,5 @@
 """One run of a study: a process of its own in a folder of its own, and what is read from it."""
 
-import contextlib
 import hashlib
 import json
 import os
@@ -21,6 +20,7 @@ from karamelo_py.output.files import write_whole
 from karamelo_py.script.errors import ScriptError
 
 KEPT = "case.json"
+WAIT4 = hasattr(os, "wait4")
 PROGRAM = [sys.executable, "-m", "karamelo_py.app.cli"]
 # Facts are indented by 2, the parts of the time by 4.
 _FACT = re.compile(r"^( {2}| {4})(\S.*?) {2,}(\S.*)$")
@@ -189,23 +189,20 @@ class Launch:
         return outcome
 
     def _wait(self, process: subprocess.Popen, begun: float) -> tuple[float | None, bool]:
-        """Wait for the end; the peak memory in MiB, where known, and whether it was late."""
+        """Wait for the end; tells the peak memory in MiB, where known, and whether it was late."""
         pause, memory = 0.005, None
         while process.returncode is None:
             if self.stop.is_set() or (self.limit and time.perf_counter() - begun > self.limit):
-                if hasattr(os, "wait4"):
+                if WAIT4:
                     os.kill(process.pid, signal.SIGKILL)  # Popen.kill might reap it before wait4.
                 else:
                     process.kill()
-            if hasattr(os, "wait4"):
-                number, status, usage = os.wait4(process.pid, os.WNOHANG)
-                if number:
-                    process.returncode = os.waitstatus_to_exitcode(status)
-                    # Linux counts kibibytes, macOS bytes.
-                    memory = usage.ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10)
-            else:
-                with contextlib.suppress(subprocess.TimeoutExpired):
-                    process.wait(0)
+            if not WAIT4:
+                process.poll()
+            elif (ended := os.wait4(process.pid, os.WNOHANG))[0]:
+                process.returncode = os.waitstatus_to_exitcode(ended[1])
+                # Linux counts kibibytes, macOS bytes.
+                memory = ended[2].ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10)
             if process.returncode is None:
                 time.sleep(pause)
                 pause = min(1.5 * pause, 0.1)

@@ -138,20 +138,13 @@ def apart(wanted: Sequence[float], gap: float, low: float, high: float) -> np.nd
     Between `low` and `high` as long as there is room.
     """
     rank = np.argsort(wanted, kind="stable")
-    places = np.asarray(wanted, float)[rank]
-    gap = min(gap, (high - low) / max(len(places) - 1, 1))
-    for k in range(1, len(places)):
-        places[k] = max(places[k], places[k - 1] + gap)
-    limit = high
-    for k in range(len(places) - 1, -1, -1):
-        places[k] = min(places[k], limit)
-        limit = places[k] - gap
-    limit = low
-    for k in range(len(places)):
-        places[k] = max(places[k], limit)
-        limit = places[k] + gap
+    count = max(len(rank) - 1, 1)
+    steps = min(gap, (high - low) / count) * np.arange(len(rank))
+    # Less what lies between them at least, places only have to rise.
+    places = np.maximum.accumulate(np.asarray(wanted, float)[rank] - steps)
+    places = np.maximum(np.minimum(places, high - steps[-1]), low)
     found = np.empty(len(places))
-    found[rank] = places
+    found[rank] = places + steps
     return found
 
 

@@ -44,15 +44,14 @@ class Reduction:
         self.reduction, self.column = reduction, KEYWORDS.get(column, column)
         self.level = None if level is None else number_of(level)
         known = [*REDUCTIONS, "when"]
-        if reduction not in known or not column or (reduction == "when") == (self.level is None):
-            close = nearest(reduction, known) if reduction not in known else None
-            raise ScriptError(
-                f"-record {word}: unknown word '{reduction}'"
-                if reduction not in known
-                else f"-record {word}: '{reduction}:{column}' is not complete",
-                expected=_WORDS,
-                hint=f"did you mean '{close}:{self.column}'?" if close else None,
-            )
+        if reduction not in known:
+            close = nearest(reduction, known)
+            hint = f"did you mean '{close}:{self.column}'?" if close else None
+            unknown = f"-record {word}: unknown word '{reduction}'"
+            raise ScriptError(unknown, expected=_WORDS, hint=hint)
+        if not column or (reduction == "when") == (self.level is None):
+            incomplete = f"-record {word}: '{reduction}:{column}' is not complete"
+            raise ScriptError(incomplete, expected=_WORDS)
 
     def of(self, log: Mapping[str, np.ndarray]) -> float | None:
         """Take the number, if the log has it."""

@@ -53,16 +53,13 @@ def run(options: Any) -> int:
     values, script, launch, jobs = family(options, timed=options.time, repeat=repeat)
     combinations = cases(values, zipped(options), options.where)
     items = records.recorded(options.record, script, values)
-    folder = out.with_suffix("")
-    if folder.exists() and not folder.is_dir():
-        raise ScriptError(f"{folder} is a file", expected="a free name for the folder of the runs")
     study = Study(launch, out, items, jobs, again=options.again, title=str(options.script))
+    if study.folder.exists() and not study.folder.is_dir():
+        expected = "a free name for the folder of the runs"
+        raise ScriptError(f"{study.folder} is a file", expected=expected)
+    record, computes = [item.text for item in items], script.computes()
     study.describe(
-        variables=values,
-        record=[item.text for item in items],
-        computes=script.computes(),
-        timed=options.time,
-        repeat=repeat,
+        variables=values, record=record, computes=computes, timed=options.time, repeat=repeat
     )
     try:
         rows = study.run(combinations)
@@ -88,17 +85,11 @@ def tell(rows: list, values: dict, items: list, study: Study, out: Path) -> None
     console = terminal()
     console.print(results_table(rows, list(values), items, study.title, console.width))
     done = sum(row["status"] == "done" for row in rows)
-    old = len(rows) - study.ran
-    print(
-        f"{done} of {plural(len(rows), 'run')} {'is' if done == 1 else 'are'} done"
-        + (
-            f", {len(rows) - done} {'is' if len(rows) - done == 1 else 'are'} not (see reason)"
-            if done < len(rows)
-            else ""
-        )
-        + (f"; {old} were known" if old > 0 else "")
-        + f"; the table is {out}"
-    )
+    left, old = len(rows) - done, len(rows) - study.ran
+    said = f"{done} of {plural(len(rows), 'run')} {'is' if done == 1 else 'are'} done"
+    said += f", {left} {'is' if left == 1 else 'are'} not (see reason)" if left else ""
+    said += f"; {old} were known" if old > 0 else ""
+    print(f"{said}; the table is {out}")
     refused = [row["reason"] for row in rows if row["status"] == "refused"]
     if refused and done:
         print(
