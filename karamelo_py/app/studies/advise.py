@@ -56,9 +56,9 @@ def forecast(
 
     The error goes on with the order between the last two. Its bounds are those of the least and the
     largest order so far, at least a third of the expected order away; an order that has fallen may
-    fall by as much again. The time is steps times
-    (a + b points), fitted to the runs; any other cost goes on as between the last two. None where
-    fewer than two runs have an error, or the last one got worse.
+    fall by as much again. The time is steps times (a + b points), fitted to the runs; any other
+    cost goes on as between the last two. None where fewer than two runs have an error, or the last
+    one got worse.
     """
     xs = np.asarray(xs, float)
     error = column(rows, accuracy)
@@ -173,10 +173,10 @@ class Adviser:
             cost, error = (column(choice.rows, name)[k] for name in (self.cost, self.accuracy))
             return Candidate(choice, k, cost, error)
         known = self.xs[: len(choice.rows)]
-        for step in range(len(choice.rows), len(self.xs)):
+        for step in range(len(known), len(self.xs)):
             found = forecast(self.xs[step], known, choice.rows, self.accuracy, self.cost)
             if found is None:
-                return None
+                break
             if (found.low if hope else found.error) <= self.target:
                 return Candidate(choice, step, found.cost, found.error, found)
         return None

@@ -134,8 +134,8 @@ def side_by_side(options: Any) -> int:
         table = read(path, options.where)
         some, values = pictures.pairs(table, options.versus, options.accuracy, options.cost)
         if known and values != known:
-            raise ScriptError(f"{path}: {options.versus} is {', '.join(values)}",
-                              expected=", ".join(known) + ", as in the first table")  # fmt: skip
+            expected = ", ".join(known) + ", as in the first table"
+            raise ScriptError(f"{path}: {options.versus} is {', '.join(values)}", expected=expected)
         known = values
         found += some
     pictures.tell_pairs(found, known, options.accuracy, options.cost)
@@ -194,31 +194,26 @@ def keeps(options: Any, table: Table, by: list[str]) -> int:
 def tell(family: Family, *, costs: bool) -> None:
     """Print the runs, by cost with the Pareto front marked, and the order of each line."""
     front = {id(row) for row in family.front()} if costs else set()
-    named = family.along, family.cost if costs else None, family.accuracy
-    table = plain_table(family.by, list(filter(None, named)))
+    named = {"x": family.along, "cost": family.cost if costs else None, "error": family.accuracy}
+    columns = {column: name for column, name in named.items() if name}
+    table = plain_table(family.by, list(columns.values()))
     table.add_column("Pareto" if costs else "", no_wrap=True)
-    members = [
-        (cost, x, error, line, row)
-        for line in family.lines
-        for cost, x, error, row in zip(line.cost, line.x, line.error, line.rows, strict=True)
-    ]
+    members = [(line, k) for line in family.lines for k in range(len(line.rows))]
     if costs:
-        members.sort(key=lambda m: (np.isnan(m[0]), m[0]))
-    for cost, x, error, line, row in members:
-        numbers = [shown(float(x))] if family.along else []
-        measured = (cost, error) if costs else (error,)
-        numbers += [shown(float(a)) for a in measured]
+        members.sort(key=lambda m: (np.isnan(m[0].cost[m[1]]), m[0].cost[m[1]]))
+    for line, k in members:
+        row = line.rows[k]
         end = "front" if id(row) in front else ""
-        if np.isnan(error):
+        if np.isnan(line.error[k]):
             end = (row.get("status", "") + ": " + row.get("reason", ""))[:70]
+        numbers = (shown(float(getattr(line, column)[k])) for column in columns)
         table.add_row(*line.choice.values(), *numbers, end)
     console = terminal()
     console.print(table)
-    pairs = {f"{family.accuracy} by {family.cost}": ("cost", "error")} if costs else {}
-    if family.along:
-        pairs[f"{family.accuracy} by {family.along}"] = ("x", "error")
-    if family.along and costs:
-        pairs[f"{family.cost} by {family.along}"] = ("x", "cost")
+    pairs = {
+        f"{columns[y]} by {columns[x]}": (x, y)
+        for x, y in (("cost", "error"), ("x", "error"), ("x", "cost")) if {x, y} <= {*columns}
+    }  # fmt: skip
     orders = plain_table([""], list(pairs), "\norders, of all and between neighbours")
     for line in family.lines:
         fits = (order(getattr(line, x), getattr(line, y)) for x, y in pairs.values())

@@ -211,12 +211,6 @@ def value(each: Mapping[str, Any], name: str) -> float | None:
     return number_of(str(cell))
 
 
-def describe(path: Path, **said: Any) -> None:
-    """Write beside a table what it was made with: processor, threads, versions, date."""
-    text = json.dumps({**said, **surroundings()}, indent=1) + "\n"
-    path.with_suffix(".json").write_text(text, encoding="utf-8")
-
-
 def surroundings() -> dict[str, Any]:
     """Date, machine and versions, for what is measured here and now."""
     versions = {"python": platform.python_version(), "karamelo-py": karamelo_py.__version__}
@@ -231,7 +225,7 @@ def surroundings() -> dict[str, Any]:
 
 
 def beside(path: Path) -> dict[str, Any]:
-    """Read what `describe` wrote beside a table, or nothing."""
+    """Read what a study wrote beside its table, or nothing."""
     try:
         return json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
     except (OSError, ValueError):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import sys
 import time
@@ -15,7 +16,7 @@ import numpy as np
 
 from karamelo_py.app.plot import read_log
 from karamelo_py.app.studies.case import CaseOutcome, Launch, Refused, folder_name
-from karamelo_py.app.studies.records import Recorded, describe, row, write
+from karamelo_py.app.studies.records import Recorded, row, surroundings, write
 from karamelo_py.output.console import duration
 from karamelo_py.script.terms import number_of
 
@@ -47,8 +48,9 @@ class Study:
 
     def describe(self, **said: Any) -> None:
         """Write beside the table what it is made with."""
-        script, threads = str(self.launch.script), self.launch.threads
-        describe(self.out, script=script, **said, threads=threads, jobs=self.jobs)
+        how = {"threads": self.launch.threads, "jobs": self.jobs, **surroundings()}
+        text = json.dumps({"script": str(self.launch.script), **said, **how}, indent=1) + "\n"
+        self.out.with_suffix(".json").write_text(text, encoding="utf-8")
 
     def write(self) -> None:
         """Write the table of what is known."""
