@@ -48,15 +48,13 @@ def describe_parameter(parameter: Parameter) -> str:
         parts.append("any number of them")
     if parameter.keyword:
         parts.append(f"written {parameter.name}=...")
-    if parameter.optional and parameter.default is None:
-        parts.append("may be left out")
-    elif parameter.optional:
+    if parameter.optional:
         default = parameter.default
         if isinstance(default, bool):
             default = str(default).lower()
         elif isinstance(default, float):
             default = f"{default:g}"
-        parts.append(f"{default} when left out")
+        parts.append("may be left out" if default is None else f"{default} when left out")
     return ", ".join(parts)
 
 

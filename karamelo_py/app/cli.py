@@ -24,13 +24,7 @@ from karamelo_py.app.launch import (
     together,
 )
 from karamelo_py.app.leaving import SIGNALLED, leaving_at_once
-from karamelo_py.app.options import (
-    VARIABLE,
-    add_variables,
-    make_folder,
-    positive,
-    threads_option,
-)
+from karamelo_py.app.options import VARIABLE, add_variables, make_folder, positive, threads_option
 from karamelo_py.run.mpi.comm import ENDING, MpiComm, handled_signals, launched
 from karamelo_py.script.errors import ScriptError, nearest, render_message
 

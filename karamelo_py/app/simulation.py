@@ -265,9 +265,7 @@ class Simulation:
             raise AttributeError(f"there is no command '{name}'{hint}")
 
         def call(*arguments: Any, **named: Any) -> None:
-            words = [self._word(argument) for argument in arguments]
-            words += [f"{key}={self._word(value)}" for key, value in named.items()]
-            self._do(f"{name}({', '.join(words)})", f"Simulation.{name}")
+            self._do(f"{name}({self._words(*arguments, **named)})", f"Simulation.{name}")
 
         call.__name__ = name
         call.__doc__ = registry.find("command", name).__doc__
@@ -275,6 +273,10 @@ class Simulation:
 
     def __dir__(self) -> list[str]:
         return [*super().__dir__(), *registry.names("command")]
+
+    def _words(self, *arguments: Any, **named: Any) -> str:
+        words = [self._word(argument) for argument in arguments]
+        return ", ".join([*words, *(f"{key}={self._word(v)}" for key, v in named.items())])
 
     def _word(self, value: Any) -> str:
         """Write a value as a script would."""
@@ -369,9 +371,8 @@ class Simulation:
 
         with _as_simulation_error():
             given = [] if field is None else [field]
-            words = ["1", "shown.png", *(self._word(v) for v in (width, height, *given))]
-            words += [f"{key}={self._word(value)}" for key, value in look.items()]
-            (call,) = parse(f"show({', '.join(words)})", "Simulation.show")
+            words = self._words(1, "shown.png", width, height, *given, **look)
+            (call,) = parse(f"show({words})", "Simulation.show")
             arguments = [signature.Argument(raw, self._interpreter) for raw in call.arguments]
             dump = signature.call(PyPlot, self.hub, arguments, "dump pyplot")
             file = io.BytesIO()

@@ -12,18 +12,10 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.app.options import above_zero, positive
-from karamelo_py.app.studies import records
+from karamelo_py.app.studies import records, variables
 from karamelo_py.app.studies.case import PROGRAM, environment, options_of, worded
 from karamelo_py.app.studies.curves import column, order, usable
 from karamelo_py.app.studies.study import Study, plain_table, shown, terminal
-from karamelo_py.app.studies.variables import (
-    add_combinations,
-    add_family,
-    cases,
-    family,
-    out_file,
-    zipped,
-)  # fmt: skip
 from karamelo_py.script.errors import ScriptError, plural
 from karamelo_py.script.terms import number_of
 
@@ -214,8 +206,8 @@ class Adviser:
 
 def add_options(parser: ArgumentParser) -> None:
     """Add what the subcommand takes."""
-    add_family(parser)
-    add_combinations(parser)
+    variables.add_family(parser)
+    variables.add_combinations(parser)
     parser.add_argument(
         "-accuracy", required=True, metavar="COLUMN",
         help="log column: err, max:err, or a formula: off=abs(max:u/3.28 - 1)",
@@ -230,9 +222,9 @@ def add_options(parser: ArgumentParser) -> None:
 
 def run(options: Any) -> int:
     """Do what the command line says; returns the exit status."""
-    out = out_file(options.o, ".csv")
+    out = variables.out_file(options.o, ".csv")
     timed = options.cost in ("seconds", "wall_s", "particle_steps_per_s")
-    values, script, launch, jobs = family(options, timed=timed)
+    values, script, launch, jobs = variables.family(options, timed=timed)
     items = records.recorded(options.accuracy, script, values)
     if len(items) != 1:
         raise ScriptError(f"-accuracy {options.accuracy}", expected="one column")
@@ -247,10 +239,10 @@ def run(options: Any) -> int:
         expected = "a number with at least 3 values, such as -var N=10,20,40,80"
         raise ScriptError(wrong, expected=expected)
     others = {n: v for n, v in values.items() if n != name}
-    together = zipped(options)
+    together = variables.zipped(options)
     if any(name in group for group in together):
         raise ScriptError(f"-zip: {name} makes the scene finer", expected="choices in step")
-    combined = cases(others, together, options.where) if others else [{}]
+    combined = variables.cases(others, together, options.where) if others else [{}]
     choices = [ChoiceRuns(case) for case in combined]
     most = len(choices) * len(values[name])
     study = Study(launch, out, items, jobs, again=options.again, strict=True, most=most)

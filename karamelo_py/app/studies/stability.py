@@ -14,18 +14,10 @@ import numpy as np
 
 from karamelo_py.app.options import above_zero, positive
 from karamelo_py.app.plot import read_log
-from karamelo_py.app.studies import records
+from karamelo_py.app.studies import records, variables
 from karamelo_py.app.studies.case import said_in
 from karamelo_py.app.studies.keeping import grown
 from karamelo_py.app.studies.study import Study
-from karamelo_py.app.studies.variables import (
-    ScriptFiles,
-    add_axes,
-    add_family,
-    along,
-    family,
-    out_file,
-)
 from karamelo_py.output.files import savefig
 from karamelo_py.output.plot_style import blank_figure
 from karamelo_py.script.errors import ScriptError, nearest, plural
@@ -64,21 +56,21 @@ REASONS = {
 
 def add_options(parser: ArgumentParser) -> None:
     """Add what the subcommand takes."""
-    add_family(parser)
+    variables.add_family(parser)
     parser.add_argument("-energy", metavar="COLUMN", help="log column that should not grow")
     parser.add_argument(
         "-bound", type=above_zero, default=2.0,
         help="growing: energy above this times that of the first tenth of the log, in the mean (2)",
     )  # fmt: skip
     parser.add_argument("-stride", type=positive, default=6, help="cells between first runs (6)")
-    add_axes(parser)
+    variables.add_axes(parser)
     parser.add_argument("-o", type=Path, default=Path("map.png"), help="the picture (map.png)")
 
 
 def run(options: Any) -> int:
     """Do what the command line says; returns the exit status."""
-    out = out_file(options.o, ".png", ".svg", ".pdf")
-    values, script, launch, jobs = family(options)
+    out = variables.out_file(options.o, ".png", ".svg", ".pdf")
+    values, script, launch, jobs = variables.family(options)
     axes = [name for name in values if len(values[name]) > 1]
     for name in axes:
         if any(number_of(value) is None for value in values[name]):
@@ -91,7 +83,7 @@ def run(options: Any) -> int:
     for name in axes:
         values[name].sort(key=float)
     energy = energy_column(options.energy, script)
-    words = along(options, axes[0], axes[1] if len(axes) > 1 else "")
+    words = variables.along(options, axes[0], axes[1] if len(axes) > 1 else "")
     table = out.with_suffix(".csv")
     items = [records.Recorded(f"max:{energy}")]
     most = prod(len(values[name]) for name in axes)
@@ -113,7 +105,7 @@ def run(options: Any) -> int:
     return 0
 
 
-def energy_column(asked: str | None, script: ScriptFiles) -> str:
+def energy_column(asked: str | None, script: variables.ScriptFiles) -> str:
     """Choose the log column to watch."""
     if asked is not None:
         return records.recorded(asked, script, option="-energy")[0].columns()[0]
@@ -179,7 +171,7 @@ class Map:
         self.y = more[0] if more else [0.0]
         self.shape = len(self.x), len(self.y)
         self.found: dict[Cell, dict[str, Any]] = {}  # cells that were run
-        self.classes: dict[Cell, str] = {}  # those of all cells
+        self.classes: dict[Cell, Any] = {}  # those of all cells
 
     @property
     def failures(self) -> list[tuple[str, int]]:

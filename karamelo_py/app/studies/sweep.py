@@ -6,16 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from karamelo_py.app.options import positive
-from karamelo_py.app.studies import records
+from karamelo_py.app.studies import records, variables
 from karamelo_py.app.studies.study import Study, results_table, terminal
-from karamelo_py.app.studies.variables import (
-    add_combinations,
-    add_family,
-    cases,
-    family,
-    out_file,
-    zipped,
-)
 from karamelo_py.script.errors import ScriptError, plural
 
 DESCRIPTION = """\
@@ -31,8 +23,8 @@ threads and versions are written beside the table (sweep.json)."""
 
 def add_options(parser: ArgumentParser) -> None:
     """Add what the subcommand takes."""
-    add_family(parser)
-    add_combinations(parser)
+    variables.add_family(parser)
+    variables.add_combinations(parser)
     parser.add_argument(
         "-record", default="", metavar="COLUMNS",
         help="log columns: err (the last value), max:err, min:err, mean:err, first:err, the time "
@@ -48,10 +40,10 @@ def add_options(parser: ArgumentParser) -> None:
 
 def run(options: Any) -> int:
     """Do what the command line says; returns the exit status."""
-    out = out_file(options.o, ".csv")
+    out = variables.out_file(options.o, ".csv")
     repeat = options.repeat if options.time else 1
-    values, script, launch, jobs = family(options, timed=options.time, repeat=repeat)
-    combinations = cases(values, zipped(options), options.where)
+    values, script, launch, jobs = variables.family(options, timed=options.time, repeat=repeat)
+    combinations = variables.cases(values, variables.zipped(options), options.where)
     items = records.recorded(options.record, script, values)
     study = Study(launch, out, items, jobs, again=options.again, title=str(options.script))
     if study.folder.exists() and not study.folder.is_dir():
