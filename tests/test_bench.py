@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from karamelo_py.app.bench import apart, command, measure
-from karamelo_py.app.bench.measure import Measured
-from karamelo_py.app.bench.workloads import WORKLOADS
+from karamelo_py.app.bench.measure import WORKLOADS, Measured
 from karamelo_py.app.cli import main
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.scene.hub import Hub

@@ -79,10 +79,7 @@ def print_styles(given: Sequence[str]) -> int:
 
 
 def print_help(given: Sequence[str]) -> int:
-    """Explain a command, style, family or argument by its name, or a family and a name.
-
-    Returns the exit status.
-    """
+    """Explain what a name means, or a family and a name; returns the exit status."""
     if len(given) > 2:
         raise ScriptError(f"too many arguments: {' '.join(given)}", expected=HELP_USAGE)
     if len(given) == 2:

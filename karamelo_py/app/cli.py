@@ -86,7 +86,7 @@ ELSEWHERE = {
     "bench": ("karamelo_py.app.bench.command", "Measure the speed of this machine."),
     "view": ("karamelo_py.app.view", "Draw pictures or a movie of dumps."),
     "plot": ("karamelo_py.app.plot", "Draw columns of a log."),
-    "sweep": ("karamelo_py.app.studies.sweep", "Run a family of variants into one table."),
+    "sweep": ("karamelo_py.app.studies.study", "Run a family of variants into one table."),
     "chart": ("karamelo_py.app.studies.chart", "Draw a table of runs: what accuracy costs."),
     "advise": ("karamelo_py.app.studies.advise", "Find the cheapest variant that is good enough."),
     "stability": ("karamelo_py.app.studies.stability", "Map where a method is stable."),

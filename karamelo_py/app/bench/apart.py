@@ -22,8 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.app.bench import measure
-from karamelo_py.app.bench.measure import Measured
-from karamelo_py.app.bench.workloads import WORKLOADS
+from karamelo_py.app.bench.measure import WORKLOADS, Measured
 from karamelo_py.app.launch import Outcome, keep_to_oneself, launch, outcome_of, together
 from karamelo_py.run.mpi.comm import MpiComm
 from karamelo_py.script.errors import ScriptError

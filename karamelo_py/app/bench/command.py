@@ -16,7 +16,7 @@ from typing import Any
 
 import karamelo_py
 from karamelo_py.app.bench import apart, measure
-from karamelo_py.app.bench.workloads import WORKLOADS
+from karamelo_py.app.bench.measure import WORKLOADS
 from karamelo_py.app.launch import Outcome
 from karamelo_py.app.options import above_zero, add_variables, threads_option
 from karamelo_py.app.plot import read_text

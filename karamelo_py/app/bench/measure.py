@@ -2,15 +2,16 @@
 
 import statistics
 import time
-from collections.abc import Callable, Iterator, Mapping
+import tomllib
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from math import inf
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numba import config
 
-from karamelo_py.app.bench.workloads import MOST_STEPS, Workload
 from karamelo_py.app.launch import share
 from karamelo_py.compiler.compile import index, shared
 from karamelo_py.compiler.loops import kernel
@@ -27,10 +28,43 @@ from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
+MOST_STEPS = 2500  # in the scenes nothing leaves the domain before
 ARRAYS = 3 * 256 * 2**20  # bytes, far more than caches hold
 REPETITIONS = 5
 ALONE = 0.5  # the share of a step from which on something is said to limit it
 APART = 1.5  # times a step in one compiled loop, up to which its sweeps one by one are believed
+
+
+class Workload(NamedTuple):
+    """A scene to be timed."""
+
+    title: str
+    script: str
+    # Steps before the measuring begins.
+    lead: int = 3
+    # Published million particle-steps a second of Karamelo (C++) on one core of a small AMD EPYC.
+    karamelo: float | None = None
+
+
+def _read_workloads() -> dict[str, Workload]:
+    path = Path(__file__).with_name("workloads.toml")
+    found = tomllib.loads(path.read_text(encoding="utf-8"))
+    texts = found["scenes"]
+
+    def workload(
+        title: str, scenes: Sequence[str], variables: Mapping[str, str | int],
+        method: str = "ulmpm, FLIP, linear, 1", scheme: str = "musl", precision: str = "double",
+        **rest,
+    ) -> Workload:  # fmt: skip
+        lines = [f"precision({precision})", f"method({method})", f"scheme({scheme})"]
+        for name, value in variables.items():
+            lines.append(f'{name} = "{value}"' if isinstance(value, str) else f"{name} = {value}")
+        return Workload(title, "\n".join([*lines, *(texts[name] for name in scenes)]), **rest)
+
+    return {name: workload(**each) for name, each in found["workloads"].items()}
+
+
+WORKLOADS = _read_workloads()
 
 
 class Timed(NamedTuple):

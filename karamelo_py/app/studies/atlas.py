@@ -210,10 +210,7 @@ def key_of(lines: list[str]) -> str:
 
 
 def write_page(page: Path, entries: list[Entry], folder: Path, inputs: Path) -> None:
-    """Write a page of the entries that are done, with their pictures, commands and tables.
-
-    What it says of others stays.
-    """
+    """Write a page of the entries that are done; what it says of others stays."""
     before = page.read_text(encoding="utf-8") if page.exists() else ""
     kept = {
         part.partition("\n")[0]: part.rstrip() for part in re.split("^##+ ", before, flags=re.M)

@@ -149,10 +149,7 @@ def apart(wanted: Sequence[float], gap: float, low: float, high: float) -> np.nd
 
 
 def direct_labels(axes: Any, ends: Sequence[tuple[float, float, str, str]]) -> None:
-    """Write names of lines in a column beside the axes, each joined to the end of its line.
-
-    Of each line x and y of its end, its name and its colour.
-    """
+    """Write names of lines beside the axes, by x and y of their ends, names and colours."""
     if not ends:
         return
     to_axes = axes.transData + axes.transAxes.inverted()

@@ -1,4 +1,4 @@
-"""Charts of studies as pictures (PNG, SVG, PDF), drawn with Matplotlib."""
+"""Charts of studies as pictures (PNG, SVG, PDF), by Matplotlib; `words` stand along their axes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -21,10 +21,7 @@ DECADES = 1e4  # curves that reach over more are drawn on a logarithmic axis
 
 
 def lines(family: Family, path: Path, words: tuple[str, str], title: str = "") -> None:
-    """Draw errors over costs with the Pareto front, or over the variable along lines.
-
-    `words` stand along the axes.
-    """
+    """Draw errors over costs with the Pareto front, or over the variable along lines."""
     figure = blank_figure(8.4, 5.2)
     axes = figure.subplots()
     convergence = family.convergence
@@ -96,10 +93,7 @@ def _footnote(figure: Any, family: Family) -> None:
 def heat(
     family: Family, x: str, y: str, path: Path, words: tuple[str, str], title: str = ""
 ) -> None:
-    """Draw a column of the table over two variables, as coloured cells with their numbers.
-
-    `words` stand along the axes.
-    """
+    """Draw a column of the table over two variables, as coloured cells with their numbers."""
     from matplotlib import colormaps
     from matplotlib.colors import LogNorm
 
@@ -248,10 +242,7 @@ def draw_histories(
 
 @dataclass
 class Pair:
-    """The runs of a scene that differ in one variable only: numbers of its first and second value.
-
-    They are NaN where there is none.
-    """
+    """The runs of a scene for two values of one variable, with numbers of both, or NaN."""
 
     label: str  # the scene, and what else was chosen
     error: tuple[float, float]
@@ -316,10 +307,7 @@ def draw_pairs(
     found: Sequence[Pair], values: Sequence[str], path: Path, words: Sequence[str], accuracy: str,
     title: str,
 ) -> None:  # fmt: skip
-    """Draw errors of both values on the left, and the ratio of their costs on the right.
-
-    `words` stand along these axes.
-    """
+    """Draw errors of both values on the left, and the ratio of their costs on the right."""
     figure = blank_figure(9.0, 1.1 + 0.3 * len(found))
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=(3, 2))
     errors = np.array([pair.error for pair in found])

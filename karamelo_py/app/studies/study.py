@@ -1,4 +1,4 @@
-"""Runs the cases of a study: some at once, those that are known not again, all of them shown."""
+"""Cases of a study, some run at once, known ones not again; karamelo-py sweep, all in a table."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import json
 import os
 import sys
 import time
+from argparse import ArgumentParser
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
@@ -14,12 +15,24 @@ from typing import Any
 
 import numpy as np
 
+from karamelo_py.app.options import positive
 from karamelo_py.app.plot import read_log
+from karamelo_py.app.studies import variables
 from karamelo_py.app.studies.case import CaseOutcome, Launch, Refused, folder_name
-from karamelo_py.app.studies.records import Recorded, row, surroundings, write
+from karamelo_py.app.studies.records import Recorded, recorded, row, surroundings, write
 from karamelo_py.output.console import duration
+from karamelo_py.script.errors import ScriptError, plural
 from karamelo_py.script.terms import number_of
 
+DESCRIPTION = """\
+Runs a script with every combination of values of its variables, and writes one table (CSV).
+
+  karamelo-py sweep in.file -var N=10,20,40 -var basis=linear,quadratic-spline -record err,max:Etot
+
+Each run has a folder of its own, named after its values, in a folder named after the table. A run
+that fails is recorded with its reason and stops nothing; where none is done, the exit status is 1.
+An interrupted sweep goes on where it stopped when the same command is given again. Processor,
+threads and versions are written beside the table (sweep.json)."""
 _FACTS = ("seconds", "points", "steps")
 _STATUS = 24  # characters at least, for what became of a run
 
@@ -230,17 +243,17 @@ def guessed_time(
 
     terms = list(dict.fromkeys(term for case in cases for term in features(case)))
 
-    def row(case: Mapping[str, str]) -> list[float]:
+    def line(case: Mapping[str, str]) -> list[float]:
         have = features(case)
         return [have.get(term, 0.0) for term in terms]
 
-    matrix = np.array([row(case) for case in cases], float).reshape(len(cases), -1)
+    matrix = np.array([line(case) for case in cases], float).reshape(len(cases), -1)
     logs = np.log(times)
     centre, mean = matrix.mean(axis=0), logs.mean()
     shifted = matrix - centre
     normal = shifted.T @ shifted + 0.05 * np.eye(matrix.shape[1])
     slopes = np.linalg.solve(normal, shifted.T @ (logs - mean))
-    return lambda case: float(np.exp(mean + (np.array(row(case)) - centre) @ slopes))
+    return lambda case: float(np.exp(mean + (np.array(line(case)) - centre) @ slopes))
 
 
 def shown(value: Any) -> str:
@@ -315,3 +328,75 @@ def terminal() -> Any:
     from rich.console import Console
 
     return Console() if sys.stdout.isatty() else Console(width=200)
+
+
+# ---- karamelo-py sweep --------------------------------------------------------------------------
+
+
+def add_options(parser: ArgumentParser) -> None:
+    """Add what the subcommand takes."""
+    variables.add_family(parser)
+    variables.add_combinations(parser)
+    parser.add_argument(
+        "-record", default="", metavar="COLUMNS",
+        help="log columns: err (the last value), max:err, min:err, mean:err, first:err, the time "
+        "when:err:0.1; formulas of them: off=abs(max:u/3.28 - 1); with commas",
+    )  # fmt: skip
+    parser.add_argument(
+        "-time", action="store_true",
+        help="measure time: one run at a time, each repeated; seconds are the median",
+    )  # fmt: skip
+    parser.add_argument("-repeat", type=positive, default=3, help="repetitions of -time (3)")
+    parser.add_argument("-o", type=Path, default=Path("sweep.csv"), help="the table (sweep.csv)")
+
+
+def run(options: Any) -> int:
+    """Do what the command line says; returns the exit status."""
+    out = variables.out_file(options.o, ".csv")
+    repeat = options.repeat if options.time else 1
+    values, script, launch, jobs = variables.family(options, timed=options.time, repeat=repeat)
+    combinations = variables.cases(values, variables.zipped(options), options.where)
+    items = recorded(options.record, script, values)
+    study = Study(launch, out, items, jobs, again=options.again, title=str(options.script))
+    if study.folder.exists() and not study.folder.is_dir():
+        expected = "a free name for the folder of the runs"
+        raise ScriptError(f"{study.folder} is a file", expected=expected)
+    record, computes = [item.text for item in items], script.computes()
+    study.describe(
+        variables=values, record=record, computes=computes, timed=options.time, repeat=repeat
+    )
+    try:
+        rows = study.run(combinations)
+    except KeyboardInterrupt:
+        print(
+            f"{len(study.rows)} of {len(combinations)} runs are in {out}; "
+            "the same command goes on with the others",
+            file=sys.stderr,
+        )
+        raise
+    write(out, rows)
+    tell(rows, values, items, study, out)
+    if not any(row["status"] == "done" for row in rows):
+        raise ScriptError(
+            f"no run is done: {rows[0]['reason']}",
+            hint=f"{out.parent / rows[0]['folder'] / 'err.txt'} has all that it said",
+        )
+    return 0
+
+
+def tell(rows: list, values: dict, items: list, study: Study, out: Path) -> None:
+    """Show the whole table and what became of the runs."""
+    console = terminal()
+    console.print(results_table(rows, list(values), items, study.title, console.width))
+    done = sum(row["status"] == "done" for row in rows)
+    left, old = len(rows) - done, len(rows) - study.ran
+    said = f"{done} of {plural(len(rows), 'run')} {'is' if done == 1 else 'are'} done"
+    said += f", {left} {'is' if left == 1 else 'are'} not (see reason)" if left else ""
+    said += f"; {old} were known" if old > 0 else ""
+    print(f"{said}; the table is {out}")
+    refused = [row["reason"] for row in rows if row["status"] == "refused"]
+    if refused and done:
+        print(
+            f"{len(refused)} of them {'was' if len(refused) == 1 else 'were'} refused before any "
+            "step, by a mistake of the script: " + "; ".join([*dict.fromkeys(refused)][:3])
+        )
