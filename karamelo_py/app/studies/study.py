@@ -110,7 +110,7 @@ class Study:
                     case, place = item
                     started.add(kind_of(case))
                     running[pool.submit(self.launch.run, case, place)] = case
-                    display.begin(case)
+                    display.started[tuple(case.values())] = time.perf_counter()
                 done, _ = wait(running, timeout=0.25, return_when=FIRST_COMPLETED)
                 for future in done:
                     case = running.pop(future)
@@ -156,9 +156,6 @@ class _Display:
     def __exit__(self, *_: Any) -> None:
         if self.live is not None:
             self.live.stop()
-
-    def begin(self, case: Mapping[str, str]) -> None:
-        self.started[tuple(case.values())] = time.perf_counter()
 
     def finish(self, case: Mapping[str, str], found: Mapping[str, Any]) -> None:
         self.finished += 1
