@@ -13,7 +13,7 @@ import pandas
 import pytest
 
 from karamelo_py.app.cli import main
-from karamelo_py.app.logs import read_log
+from karamelo_py.app.plot import read_log
 from karamelo_py.app.studies import case, records, study, variables
 from karamelo_py.script.errors import ScriptError
 
@@ -210,11 +210,11 @@ def test_combinations():
 def test_variables_of_included_scripts_count(tmp_path):
     (tmp_path / "in.main").write_text("include(part)\nN = 3\n", encoding="utf-8")
     (tmp_path / "part").write_text('print("speed")\nh = 1/N\nk = 2*h', encoding="utf-8")
-    variables.check_script(tmp_path / "in.main", ["N", "h"])
+    variables.ScriptFiles(tmp_path / "in.main").check(["N", "h"])
     with pytest.raises(ScriptError, match=r"-var k: .* never reads it"):
-        variables.check_script(tmp_path / "in.main", ["k"])
+        variables.ScriptFiles(tmp_path / "in.main").check(["k"])
     with pytest.raises(ScriptError, match="has no such variable"):
-        variables.check_script(tmp_path / "in.main", ["speed"])
+        variables.ScriptFiles(tmp_path / "in.main").check(["speed"])
 
 
 def test_the_time_that_remains_grows_as_the_runs_do():

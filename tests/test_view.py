@@ -7,7 +7,7 @@ from PIL import Image
 
 from karamelo_py.app import view
 from karamelo_py.app.cli import main
-from karamelo_py.app.logs import read_rows
+from karamelo_py.app.plot import read_rows
 from karamelo_py.output.rhythm import ByTime
 from karamelo_py.output.snapshots import read
 from karamelo_py.styles.dumps.hdf5 import Hdf5
