@@ -11,7 +11,7 @@ from karamelo_py.kernels.export import export
 from karamelo_py.kernels.laws import elastic_law
 from karamelo_py.language.scene import Scene
 from karamelo_py.output.node_columns import ABSENT_AT_NODES, BROUGHT, NODE_NAMES, NodeFields
-from karamelo_py.output.point_table import AXES, COMPONENTS, PointTable, Rows
+from karamelo_py.output.point_table import AXES, COMPONENTS, PointTable, Rows, declared_columns
 from karamelo_py.points.boundary import Bounces
 from karamelo_py.points.laws import can, dissipated_energy, energy_density
 from karamelo_py.points.laws.eos import initial_energy, taken_heat
@@ -120,12 +120,12 @@ class Fields(PointTable):
 
     def particle_names(self) -> list[str]:
         """Names that `particle` knows."""
-        own = [*sorted(self.columns_of_laws()), *self.declared_columns()]
+        own = [*sorted(self.columns_of_laws()), *declared_columns(self.hub, "point_fields")]
         return list(dict.fromkeys([*PARTICLE_NAMES, *own]))
 
     def node_names(self) -> list[str]:
         """Names that `node` knows."""
-        return list(NODE_NAMES)
+        return list(dict.fromkeys([*NODE_NAMES, *declared_columns(self.hub, "node_fields")]))
 
     def rate_is_asked_for(self) -> bool:
         """Tell whether a dump or a compute has the column ``epdot``, which points keep for it."""
@@ -134,14 +134,14 @@ class Fields(PointTable):
 
     def absent_at_points(self) -> list[str]:
         """Names that `particle` knows, but that are 0 because no material has them."""
-        present = self.columns_of_laws() | set(self.declared_columns())
+        present = self.columns_of_laws() | {*declared_columns(self.hub, "point_fields")}
         if any(has_rate(material.law) for material in self.hub.materials.values()):
             present.add("epdot")
         return [name for name in ABSENT_AT_POINTS if name not in present]
 
     def absent_at_nodes(self) -> list[str]:
         """Names that `node` knows, but that are 0 in this scene."""
-        present = {"T"} if self.hub.update.thermal else set()
+        present = {*declared_columns(self.hub, "node_fields"), *["T"] * self.hub.update.thermal}
         return [name for name in ABSENT_AT_NODES if name not in present]
 
     def node_pieces(self, names: Sequence[str], *, to_first: bool = False) -> Iterator[NodeFields]:

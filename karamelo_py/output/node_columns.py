@@ -13,7 +13,7 @@ from karamelo_py.kernels.export import EXPORTED, JACOBIAN, export_state, export_
 from karamelo_py.kernels.hooks import CompiledHook
 from karamelo_py.kernels.p2g import Force
 from karamelo_py.language.scene import Scene
-from karamelo_py.output.point_table import volumes_before
+from karamelo_py.output.point_table import declared_columns, volumes_before
 from karamelo_py.points.laws import can, constrained_velocity
 
 AXES = "xyz"
@@ -68,6 +68,12 @@ class NodeFields:
             return np.where(mass > 0, arrays["heat/velocity"][:, 0], 0.0)
         if name in COLUMNS:
             return COLUMNS[name](self)
+        if name in (shown := declared_columns(self.hub, "node_fields")):
+            kind, k = shown[name]
+            array = arrays.get(f"nodes/{fields.name_of(kind)}")
+            if array is not None and k < kind.shape(self.rows.kin):
+                return array[:, k].astype(float)
+            return np.zeros(len(self.ids))
         if name in ABSENT_AT_NODES or (axis := AXES.index(name[1])) >= self.hub.domain.dimension:
             return np.zeros(len(self.ids))
         field = {

@@ -8,7 +8,6 @@ import numpy as np
 
 from karamelo_py.compiler import fields
 from karamelo_py.kernels.arrays import MASS, Block, Points, Setup, known_to_laws, some_of
-from karamelo_py.kernels.averaging import FBar
 from karamelo_py.kernels.export import (
     ENERGY,
     EXPORTED,
@@ -200,21 +199,6 @@ class PointTable:
         laws = [material.law for material in self.hub.materials.values()]
         return {name for law in laws for name in columns_of(law)}
 
-    def declared_columns(self) -> dict[str, tuple[type, int]]:
-        """Map columns to the declared field of the points that shows each, and the component."""
-        update = self.hub.update
-        basis = getattr(update.method, "basis", None)
-        owners = [*self.hub.fixes.values(), update.method, update.transfer, basis, update.scheme]
-        owners += [getattr(update.method, "frame", None)]
-        owners += [Conducting] if update.thermal else []
-        owners += [ReflectingGrid] if update.boundary == "reflect" else []
-        owners += [FBar] if update.anti_locking else []
-        found: dict[str, tuple[type, int]] = {}
-        for kind in fields.declared(owners, "point_fields"):
-            for k, column in enumerate(fields.columns_of(kind)):
-                found.setdefault(column, (kind, k))
-        return found
-
     def particle(self, name: str) -> np.ndarray:
         """Return a column (n,) of the points that there are.
 
@@ -248,7 +232,7 @@ class PointTable:
         if name[:1] in "se" and name[1:] in COMPONENTS:
             first = 0 if name[0] == "s" else STRAIN
             return self._exported[:, first + COMPONENTS.index(name[1:])].copy()
-        if name in (shown := self.declared_columns()):
+        if name in (shown := declared_columns(self.hub, "point_fields")):
             kind, k = shown[name]
             if (array := self._rows.declared(kind)) is not None:
                 return _column(array, k)
@@ -260,6 +244,28 @@ class PointTable:
         return self._cached(
             "exported", lambda rows: rows.computed(lambda laws: export_state, EXPORTED)
         )
+
+
+def owners_of_fields(hub: Scene, contact: Any = None) -> list:
+    """List the parts of a scene that may declare fields of points and nodes."""
+    update, method = hub.update, hub.update.method
+    heat = Conducting if update.thermal else None
+    grids = ReflectingGrid if update.boundary == "reflect" else None
+    of_method = [None] * 4
+    if method is not None:
+        of_method = [method.frame, method.averaging(hub), method.basis, method]
+    frame, averaging, *others = of_method
+    owners = [frame, update.transfer, averaging, contact, heat, grids]
+    return [*owners, *hub.fixes.values(), update.scheme, *others]
+
+
+def declared_columns(hub: Scene, attribute: str) -> dict[str, tuple[type, int]]:
+    """Map columns to the field, declared in `attribute`, that shows each, and the component."""
+    found: dict[str, tuple[type, int]] = {}
+    for kind in fields.declared(owners_of_fields(hub), attribute):
+        for k, column in enumerate(fields.columns_of(kind)):
+            found.setdefault(column, (kind, k))
+    return found
 
 
 def _place(s: Setup, points: Points) -> np.ndarray:

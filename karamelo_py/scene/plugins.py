@@ -18,6 +18,8 @@ from karamelo_py.kernels.hooks import ACTS_ON, STAGES, CompiledHook
 from karamelo_py.language import faults, registry
 from karamelo_py.language.scene import Scene
 from karamelo_py.output.fields import ABSENT_AT_POINTS, PARTICLE_NAMES
+from karamelo_py.output.node_columns import ABSENT_AT_NODES, NODE_NAMES
+from karamelo_py.output.point_table import declared_columns
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import KINEMATICS
 from karamelo_py.points.transfers import updated_velocity
@@ -34,6 +36,11 @@ ROWS = (
     table.AtPoints, table.AtNodes, table.Gather, table.Scatter, table.NodeTask, table.SceneTask,
     table.Check,
 )  # fmt: skip
+# Columns of points and nodes in every scene, and those of them that only some scenes fill.
+COLUMNS = {
+    "point_fields": (PARTICLE_NAMES, ABSENT_AT_POINTS),
+    "node_fields": (NODE_NAMES, ABSENT_AT_NODES),
+}
 HOOKS_BEGIN = ("initial_", "post_", "final_", "supply_")
 ALIKE = 0.85  # so much of a name has to be that of a hook
 
@@ -161,12 +168,10 @@ def check_fields(hub: Scene, name: str, owner: Any, place: Any) -> None:
                 what = _wrong_field(kind) or _wrong_size(kind, hub.domain)
             if what:
                 raise faults.fault(name, f"{field}{what}", place)
-    for kind in getattr(owner, "point_fields", ()):
-        for column in columns_of(kind):
-            if shows := _shows(hub, column, kind):
-                raise faults.fault(
-                    name, f"{kind.__name__}: the column '{column}' is {shows}", place
-                )
+            for column in columns_of(kind):
+                if shows := _shows(hub, column, kind, attribute):
+                    what = f"{kind.__name__}: the column '{column}' is {shows}"
+                    raise faults.fault(name, what, place)
 
 
 def check_columns(hub: Scene, name: str, law: Any) -> None:
@@ -201,13 +206,14 @@ def _wrong_size(kind: type, domain: Any) -> str:
     return ""
 
 
-def _shows(hub: Scene, column: str, kind: type | None) -> str:
+def _shows(hub: Scene, column: str, kind: type | None, where: str = "point_fields") -> str:
     """Say what a column shows already, if that is not this field (None: a law)."""
-    if column in PARTICLE_NAMES and column not in ABSENT_AT_POINTS:
+    names, absent = COLUMNS[where]
+    if column in names and column not in absent:
         return "one of every scene"
-    if kind is not None and column in hub.fields.columns_of_laws():
+    if kind is not None and where == "point_fields" and column in hub.fields.columns_of_laws():
         return "one of a material"
-    other = hub.fields.declared_columns().get(column, (kind, 0))[0]
+    other = declared_columns(hub, where).get(column, (kind, 0))[0]
     return "" if other is kind else f"one of the field {other.__name__}"
 
 

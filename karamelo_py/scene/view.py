@@ -65,6 +65,7 @@ class View:
 
     def __init__(self) -> None:
         self._handed_out: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+        self._declared: dict[type, tuple[np.ndarray, np.ndarray]] = {}
 
     def _take_times(self, control: Any) -> None:
         self.dt = float(control.values[DT])
@@ -77,6 +78,17 @@ class View:
             write = getattr(type(self), name).write
             if write is not None and not np.array_equal(now, before, equal_nan=True):
                 write(self, now)
+        for kind, (now, before) in self._declared.items():
+            if not np.array_equal(now, before, equal_nan=True):
+                self._put(kind, now)
+
+    def _get(self, kind: type) -> np.ndarray:
+        """(n, components) of a declared field."""
+        raise NotImplementedError
+
+    def _put(self, kind: type, value: np.ndarray) -> None:
+        """Write a declared field."""
+        raise NotImplementedError
 
     def __setattr__(self, name: str, value: Any) -> None:
         known = name in self._fields or name.startswith("_")
@@ -87,11 +99,17 @@ class View:
     def __getattr__(self, name: str) -> Any:
         raise self._unknown(name)
 
-    def __getitem__(self, name: Any) -> Any:
-        raise self._no_column(name)
+    def __getitem__(self, kind: type) -> np.ndarray:
+        """(n, components) of a field that a part declares."""
+        if not isinstance(kind, type):
+            raise self._no_column(kind)
+        if kind not in self._declared:
+            array = np.array(self._get(kind))
+            self._declared[kind] = array, array.copy()
+        return self._declared[kind][0]
 
-    def __setitem__(self, name: Any, value: Any) -> None:
-        raise self._no_column(name)
+    def __setitem__(self, kind: type, value: Any) -> None:
+        self[kind][...] = value
 
     def _no_column(self, name: Any) -> KeyError:
         """The error for a column in brackets, which says the attribute."""

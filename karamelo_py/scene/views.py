@@ -23,6 +23,19 @@ from karamelo_py.points.transfers import Moment
 from karamelo_py.scene.view import Shown, View
 
 
+def _declared(kind: type, of: str) -> Callable:
+    """Return what finds the array of a declared field in those of points or nodes."""
+
+    def find(arrays: Any) -> np.ndarray:
+        array = field(arrays.fields, kind)
+        if array is None:
+            where = f"{of}_fields of the fix"
+            raise ValueError(f"{of}s have no {name_of(kind)}: name it in the {where}")
+        return array
+
+    return find
+
+
 class NodesView(View):
     """The nodes of a group that carry mass, at one stage of a step::
 
@@ -63,6 +76,12 @@ class NodesView(View):
     def _part(self, array: np.ndarray, first: int) -> tuple:
         """Return where in an array of the nodes a vector of those of the view lies."""
         return self.index, slice(first, first + self._d)
+
+    def _get(self, kind: type) -> np.ndarray:
+        return _declared(kind, "node")(self._nodes)[self.index, : kind.shape(self._kin)]
+
+    def _put(self, kind: type, value: np.ndarray) -> None:
+        _declared(kind, "node")(self._nodes)[self.index, : kind.shape(self._kin)] = value
 
     @Shown
     def position(self) -> np.ndarray:
@@ -150,7 +169,6 @@ class PointsView(View):
         self.ids = ids
         self.moved = False
         self._found: Rows | None = None
-        self._declared: dict[type, tuple[np.ndarray, np.ndarray]] = {}
 
     def total(self, terms: Any) -> np.ndarray:
         """The sum of terms (n,) or (n, k) over all points of the group, rounded once.
@@ -177,36 +195,11 @@ class PointsView(View):
             self._found = Rows(s, parts, self.ids, np.ones(len(self.ids), np.bool_))
         return self._found
 
-    def __getitem__(self, kind: type) -> np.ndarray:
-        """(n, components) of a field that a fix declares in its ``point_fields``."""
-        if isinstance(kind, str):
-            raise self._no_column(kind)
-        if kind not in self._declared:
-            array = np.array(self._rows.take(self._of(kind)))
-            self._declared[kind] = array, array.copy()
-        return self._declared[kind][0]
+    def _get(self, kind: type) -> np.ndarray:
+        return self._rows.take(_declared(kind, "point"))
 
-    def __setitem__(self, kind: type, value: np.ndarray) -> None:
-        self[kind][...] = value
-
-    def write_back(self) -> None:
-        """Write what a hook has changed; called when it returns."""
-        super().write_back()
-        for kind, (array, before) in self._declared.items():
-            if not np.array_equal(array, before, equal_nan=True):
-                self._rows.put(self._of(kind), array)
-
-    @staticmethod
-    def _of(kind: type) -> Callable:
-        def of(points: Any) -> np.ndarray:
-            array = field(points.fields, kind)
-            if array is None:
-                raise ValueError(
-                    f"points have no {name_of(kind)}: name it in the point_fields of the fix"
-                )
-            return array
-
-        return of
+    def _put(self, kind: type, value: np.ndarray) -> None:
+        self._rows.put(_declared(kind, "point"), value)
 
     def _places(self, points: Any) -> np.ndarray:
         now = self._simulation.now
@@ -284,11 +277,11 @@ class PointsView(View):
 
         Only for fixes with ``point_fields = (Force,)``. It is zero before the first of them.
         """
-        return self._rows.take(self._of(Force))
+        return self._get(Force)
 
     @force.writer
     def _write_force(self, value: np.ndarray) -> None:
-        self._rows.put(self._of(Force), value)
+        self._put(Force, value)
 
     @Shown
     def temperature(self) -> np.ndarray:

@@ -7,7 +7,7 @@ import numpy as np
 from karamelo_py.kernels.arrays import MASS, Setup
 from karamelo_py.output.fields import PIECE
 from karamelo_py.output.node_columns import NodeRows, brought, loaded
-from karamelo_py.run.checkpoint.arrays import of_nodes
+from karamelo_py.run.checkpoint.arrays import kept_at_nodes, of_nodes
 from karamelo_py.run.tiles.boxes import numbers
 
 
@@ -23,6 +23,9 @@ class ByNumber:
         """
         self.show_on_nodes()
         self.bring(names)
+        kept = kept_at_nodes(self.setup)
+        if self.subdomain is not None:
+            self.subdomain.share_kept()
         gather = self.comm.gather if to_first else self.comm.allgather
         for first, end in self.node_ranges():
             if self.comm.size == 1:
@@ -33,6 +36,7 @@ class ByNumber:
                 if parts is None:
                     continue
                 arrays, sums = self._joined(first, end, parts)
+                arrays |= {f"nodes/{name}": array[first:end] for name, array in kept}
             sums = {name: of.sum(axis=1) for name, of in sums.items()}
             yield NodeRows(first, end, self.kin, arrays, sums, self._loaded)
         self.bring(())

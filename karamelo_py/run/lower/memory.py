@@ -88,7 +88,7 @@ def least_bytes(hub: Hub, real: type, copied: bool) -> float:
     It is the least: boxes of tiles, groups and what the program itself takes come on top.
     """
     kin = hub.update.method.kinematics(hub)
-    kinds = point_kinds(hub, real)
+    kinds = point_kinds(hub)
     points, cells = 0, [0.0]
     for solid in hub.solids.values():
         if not solid.count:
