@@ -42,9 +42,9 @@ def karamelo_points(region, domain, ppc, dimension):
         3: [(a, b, c) for c in along for a in along for b in along],
     }[dimension]
     points = []
-    for i in range(domain.cells[0]):
-        for j in range(domain.cells[1]):
-            for k in range(domain.cells[2]):
+    for i in range(domain.lattice.cells[0]):
+        for j in range(domain.lattice.cells[1]):
+            for k in range(domain.lattice.cells[2]):
                 for offset in pattern:
                     x = [
                         domain.lo[axis] + (cell + 0.5 + offset[axis]) * domain.h

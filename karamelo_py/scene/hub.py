@@ -32,8 +32,7 @@ class Catalogue(dict):
         """File `item` under `ID`; a second use of an ID is an error unless `replace`."""
         if not replace:
             self.refuse(ID)
-        item.id = ID
-        item.place = self.hub.place
+        item.id, item.place = ID, self.hub.place
         self[ID] = item
         return item
 
@@ -55,7 +54,8 @@ class Catalogue(dict):
         below = line_below(self.hub.interpreter, self.kind, ID)
         hint = meant(ID, [*always, *self])
         if self.kind == "group" and other in ("region", "solid"):
-            hint = _group_of(other, ID)
+            who = f"{ID}, all" if other == "region" else f"regionID, solid, {ID}"
+            hint = f"group({ID}, particles, region, {who}) makes a group of a {other}"
         if below is not None:
             hint = f"{self.kind} '{ID}' stands further down: move line {below} up"
         raise ScriptError(
@@ -84,12 +84,6 @@ class Parts(dict):
 PARTS = ("eos", "strength", "damage", "temperature")
 
 
-def _group_of(kind: str, ID: str) -> str:
-    """Word the hint that makes a group of a region or a solid."""
-    who = f"{ID}, all" if kind == "region" else f"regionID, solid, {ID}"
-    return f"group({ID}, particles, region, {who}) makes a group of a {kind}"
-
-
 class Settings:
     """Settings of the command line or the script: threads, precision, processes."""
 
@@ -104,67 +98,29 @@ class Settings:
 
 
 class Hub:
-    """The scene, how it goes forward, and what it writes.
-
-    Attributes
-    ----------
-    domain
-        The domain, or None before ``dimension``.
-    regions, load_paths, elements, solids, groups, fixes, computes, dumps
-        Catalogues of what the script has named.
-    materials
-        The same: materials.
-    parts
-        The catalogues of the parts that some materials are made of, by their kind.
-    values
-        Numbers that fixes and computes publish, and time, timestep, dt.
-    place
-        Place of the statement in progress.
-    functions
-        Functions in Python that a program has given, by name.
-    pausing
-        Whether a script stops in front of its runs: a program lets time go on.
-    running
-        The run in progress, or None.
-    runs
-        The published values at the end of each run so far.
-    begun
-        Whether a run has begun, in fact or in the rehearsal of what follows it.
-    later
-        What the runs ask for that a rehearsal came to (`run.large_steps.Step`).
-    restart
-        What the script goes on from, until it is where that was written.
-    open_ended
-        Whether a program may go on behind the script.
-    in_runs
-        What acts, is written or drawn in some run, as far as a rehearsal came to them.
-    rehearsing
-        True while the rest of a script is tried before the first step: nothing runs or is written.
-    answered
-        Whether the script has printed or written something by itself, or said where it ends.
-    checking
-        True under ``karamelo-py check``: the first run only reports.
-    """
+    """The scene, how it goes forward, and what it writes."""
 
     def __init__(self, console: Console | None = None):
         self.console = console or Console()
         self.settings = Settings()
         self.folder = Path.cwd()
-        self.place: Place | None = None
+        self.place: Place | None = None  # of the statement in progress
+        # While the rest of a script is tried before the first step nothing runs or is written.
         self.rehearsing = False
         self.rehearsed = False
-        self.begun = False
-        self.answered = False
-        self.checking = False
-        self.pausing = False
-        self.open_ended = False
+        self.begun = False  # a run, in fact or in the rehearsal of what follows it
+        self.answered = False  # the script has printed or written something, or said where it ends
+        self.checking = False  # under ``karamelo-py check``: the first run only reports
+        self.pausing = False  # a script stops in front of its runs: a program lets time go on
+        self.open_ended = False  # a program may go on behind the script
+        # What acts, is written or drawn in some run, as far as a rehearsal came to them.
         self.in_runs: list[Any] = []
         self.interpreter: Any = None
-        self.restart: Any = None
+        self.restart: Any = None  # what the script goes on from, until it is there
         self.domain: Any = None
         self.announced_dimension: int | None = None
         self.regions = Catalogue("region", self)
-        self.parts = Parts(self)
+        self.parts = Parts(self)  # that some materials are made of
         self.materials = Catalogue("material", self)
         self.load_paths = Catalogue("load path", self)
         self.elements = Catalogue("element", self)
@@ -173,14 +129,14 @@ class Hub:
         self.fixes = Catalogue("fix", self)
         self.computes = Catalogue("compute", self)
         self.dumps = Catalogue("dump", self)
-        self.values = Values()
+        self.values = Values()  # that fixes and computes publish, and time, timestep, dt
         self.update = Update(self.values)
         self.output = Output(self)
         self.fields = Fields(self)
-        self.functions: dict[str, Any] = {}
-        self.running: Any = None
-        self.runs: list[dict[str, float]] = []
-        self.later: list[Any] = []
+        self.functions: dict[str, Any] = {}  # in Python, that a program has given
+        self.running: Any = None  # the run in progress
+        self.runs: list[dict[str, float]] = []  # published values at the end of each so far
+        self.later: list[Any] = []  # `run.advice.large_steps`, of runs that a rehearsal came to
         self._simulation: Any = None
         self._lattices: tuple[tuple, list[Lattice]] | None = None
 
@@ -213,11 +169,7 @@ class Hub:
         domain, method = self.domain, self.update.method
         key = (domain, domain.h, method, *self.solids.values())
         if self._lattices is None or self._lattices[0] != key:
-            if method is None:
-                lattices = [Lattice(domain.dimension, domain.lo, domain.hi, domain.h)]
-            else:
-                lattices = method.lattices(self)
-            self._lattices = key, lattices
+            self._lattices = key, method.lattices(self) if method else [domain.lattice]
         return self._lattices[1]
 
     def forget_simulation(self) -> None:

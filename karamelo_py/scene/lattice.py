@@ -23,30 +23,10 @@ class Lattice:
     When a side of the box is not a multiple of `h`, it reaches over the upper corner by less than
     one cell.
 
-    Parameters
-    ----------
-    dimension
-        1, 2 or 3.
-    lo, hi
-        Corners of the box; only the first `dimension` numbers count.
-    h
-        Cell size.
-    nodes_per_cell
-        1, or 2 with nodes in the middle of cells too.
-    least_nodes
-        Nodes per direction that there are at least; those beyond the box stay without mass.
-    first
-        Number of the first node.
-
-    Attributes
-    ----------
-    cells, shape : tuple of 3 int
-        Cells and nodes per direction, 1 in unused directions.
-
-    Raises
-    ------
-    ScriptError
-        When there would be more nodes than can be counted.
+    Cells have the size `h`, and `nodes_per_cell` 1, or 2 with nodes in their middle, too. Nodes are
+    numbered from `first` on; there are at least `least_nodes` per direction, of which those beyond
+    the box stay without mass. `cells` and `shape` (3,) count cells and nodes, 1 in unused
+    directions. More nodes than can be counted are an error.
     """
 
     def __init__(
@@ -61,8 +41,7 @@ class Lattice:
     ):
         self.dimension = dimension
         self.lo, self.hi = np.zeros((2, 3))
-        self.lo[:dimension] = lo[:dimension]
-        self.hi[:dimension] = hi[:dimension]
+        self.lo[:dimension], self.hi[:dimension] = lo[:dimension], hi[:dimension]
         self.h = float(h)
         self.nodes_per_cell = nodes_per_cell
         self.first = first
@@ -126,20 +105,14 @@ class Lattice:
         size = (self.hi - self.lo) / self.h
         reach = float(np.abs([self.lo, self.hi]).max()) / self.h
         _, ny, nz = self.shape
+        slack = max(RELATIVE_TOLERANCE, 8 * np.finfo(real).eps * reach)
+        lengths = *self.lo, self.h, 1 / self.h, self.spacing
         return Grid(
-            *(real(x) for x in self.lo),
-            h=real(self.h),
-            inv_h=real(1 / self.h),
-            spacing=real(self.spacing),
-            nx=int(self.cells[0]),
-            ny=int(self.cells[1]),
-            nz=int(self.cells[2]),
-            lx=real(size[0]),
-            ly=real(size[1]),
-            lz=real(size[2]),
-            slack=real(max(RELATIVE_TOLERANCE, 8 * np.finfo(real).eps * reach)),
-            step_x=int(ny * nz),
-            step_y=int(nz),
+            *map(real, lengths),
+            *self.cells,
+            *map(real, (*size, slack)),
+            step_x=ny * nz,
+            step_y=nz,
             first=self.first,
         )
 

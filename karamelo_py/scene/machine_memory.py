@@ -41,14 +41,8 @@ def machine_memory(processes: int = 1, root: Path = Path("/")) -> MachineMemory 
     """Count what can be had at most: free, or held by caches and swap; None where no one tells.
 
     The machine's, or less where the processes of a container or of a batch job have a limit
-    (cgroup, of either version), or each of its own (ulimit -v).
-
-    Parameters
-    ----------
-    processes
-        How many share the scene on this machine: so many limits of a process are there.
-    root
-        For tests.
+    (cgroup, of either version), or each of the `processes` that share the scene here its own
+    (ulimit -v). `root` is for tests.
     """
     import psutil
 
@@ -114,8 +108,7 @@ def on_machine(hub: Scene) -> int:
 
 def share_of_machine(hub: Scene) -> float:
     """Tell which part of a scene is on this machine, where several share it."""
-    comm = hub.settings.comm
-    return comm.on_machine / comm.size
+    return on_machine(hub) / hub.settings.comm.size
 
 
 def most_points(hub: Scene, already: int, dimension: int) -> float:

@@ -37,35 +37,11 @@ class Solid:
         Initial temperature; None for that of the material.
     glued_to
         The solid with which this one shares a velocity field, in methods that have several.
-
-    Attributes
-    ----------
-    index : int
-        0 for the first solid made, and so on.
-    first_id : int
-        Number (from 0) of its first point; point ids are these numbers plus 1.
-    places : ndarray (n, d), or Filled
-        Reference positions; of a slice of points they are made where they are not kept.
-    volume0 : ndarray (n,)
-        Initial volumes: per unit thickness in 2D, per unit area in 1D, per radian where the domain
-        is axisymmetric. Read only, as is all that follows.
-    mass : ndarray (n,)
-        Masses, per the same unit.
-    half_size : ndarray (n, d)
-        Half edge lengths of the initial domain of each point along the axes.
-    corners : ndarray (n, c, d) or None
-        Corners of the initial domains in the order of the nodes of an element, for solids from a
-        mesh; None where the domains are boxes.
-    shape : str
-        ``box``, or as meshio says: ``line``, ``triangle``, ``quad``, ``tetra``, ``hexahedron``.
-    lo, hi : ndarray (d,)
-        Box of the solid.
     """
 
     id: str = ""
     place: Place | None = None
-    # The argument that says where the points are, for messages.
-    source = "region"
+    source = "region"  # the argument that says where the points are, for messages
 
     def __init__(
         self,
@@ -90,10 +66,11 @@ class Solid:
             )
         self._compare_temperatures(hub)
         self.index = len(hub.solids)
+        # From 0; ids of points are such numbers plus 1.
         self.first_id = sum(other.count for other in hub.solids.values())
 
     def _compare_temperatures(self, hub: Scene) -> None:
-        """Tell of a temperature that the material does not have, or that nobody gives."""
+        """Tell of a temperature that the material cannot have, or that nobody gives."""
         # Scripts of Karamelo give T0 in mechanical runs, too.
         if hub.update.thermal and self.T0 and not can(self.material.law, initial_heat):
             hub.warn(
@@ -101,8 +78,19 @@ class Solid:
                 hint="material(ID, linear, rho, E, nu, cp, kappa), or temperature(...) with "
                 "eos-strength",
             )
-        if can(self.material.law, initial_heat) and self.T0 is not None:
-            self._judge_temperature(hub, self.T0)
+        T0 = self.T0 if can(self.material.law, initial_heat) else None
+        Tm = min((getattr(part, "Tm", math.inf) for part in self.material.law), default=math.inf)
+        if T0 is not None and T0 < 0:
+            hub.warn(
+                f"T0 = {T0:g} is below absolute zero, unless it is counted from another point",
+                hint="temperatures in kelvin throughout: T0, Tr, Tm",
+            )
+        elif T0 is not None and Tm <= T0:
+            hub.warn(
+                f"T0 = {T0:g} is not below the melting temperature {Tm:g}: "
+                "the solid has no strength from the start",
+                hint="all temperatures counted from the same point",
+            )
         kinds = law_kind(self.material.law)
         if self.T0 is None and any("initial_temperature" in kind._fields for kind in kinds):
             hub.warn(
@@ -110,29 +98,8 @@ class Solid:
                 hint="give T0 behind the cell size",
             )
 
-    def _judge_temperature(self, hub: Scene, T0: float) -> None:
-        """Tell of a temperature at which the material does not exist."""
-        Tm = min((getattr(part, "Tm", math.inf) for part in self.material.law), default=math.inf)
-        if T0 < 0:
-            hub.warn(
-                f"T0 = {T0:g} is below absolute zero, unless it is counted from another point",
-                hint="temperatures in kelvin throughout: T0, Tr, Tm",
-            )
-        elif Tm <= T0:
-            hub.warn(
-                f"T0 = {T0:g} is not below the melting temperature {Tm:g}: "
-                "the solid has no strength from the start",
-                hint="all temperatures counted from the same point",
-            )
-
     def put(self, hub: Scene, placement: Placement, *, may_be_empty: bool = False) -> None:
-        """Give the solid its points, in place of those that it has.
-
-        Raises
-        ------
-        ScriptError
-            For none, for too many, or for points left of the axis of symmetry.
-        """
+        """Give the solid its points; none, too many, or some left of the axis are an error."""
         count, d = len(placement.x0), self.domain.dimension
         if not count and not may_be_empty:
             raise ScriptError(
@@ -148,7 +115,8 @@ class Solid:
             radius = placement.x0[:][:, 0]
             self._check_radii(radius)
             volume = volume * radius
-        # Equal volumes are stored once, however many points there are.
+        # As in `Placement`, but volumes are per radian where the domain is axisymmetric. Equal ones
+        # are stored once, however many points there are. All is to be read only.
         self.places = placement.x0
         self.volume0 = np.broadcast_to(volume, (count,))
         self.mass = np.broadcast_to(volume / float(specific_volume(self.material.law)), (count,))
@@ -156,9 +124,10 @@ class Solid:
         self.shape, self.corners = placement.shape, placement.corners
         self.lo, self.hi = placement.lo, placement.hi
         if placement.outside:
+            uncounted = math.isinf(placement.outside)
+            points = "points" if uncounted else plural(placement.outside, "point")
             hub.warn(
-                f"{_counted(placement.outside)} of {self.described()} outside the domain "
-                "left out of the solid",
+                f"{points} of {self.described()} outside the domain left out of the solid",
                 hint=f"make the domain larger or the {self.described().split()[0]} smaller",
             )
 
@@ -282,13 +251,7 @@ def _within(x: np.ndarray, lo: np.ndarray, hi: np.ndarray) -> np.ndarray:
 
 
 def _keys(x: np.ndarray, h: float) -> np.ndarray:
-    """A number (n,) for each position, equal for positions that differ by rounding only."""
+    """Number positions (n,), those alike that differ by rounding only."""
     places = np.rint(x * (1e4 / h)).astype(np.int64)
     # Primes keep places apart; the product may overflow, which only mixes the bits.
     return places @ np.array([1, 1_000_003, 998_244_353_001], np.int64)[: x.shape[1]]
-
-
-def _counted(outside: float) -> str:
-    if math.isinf(outside):
-        return "points"
-    return plural(outside, "point")

@@ -9,58 +9,26 @@ from karamelo_py.script.values import Values
 
 
 class Update:
-    """Choices of method, scheme, set_dt and dt_factor, and the clock.
-
-    Attributes
-    ----------
-    method
-        The method style, or None as long as there is none.
-    transfer
-        The transfer's NamedTuple (PIC, FLIP, APIC ...).
-    thermal
-        Whether heat flows between points.
-    anti_locking
-        Whether changes of volume are averaged against volumetric locking.
-    scheme
-        The scheme's tag.
-    scheme_place
-        Where the script says so.
-    fixed_dt
-        The constant step of set_dt, or None: the step follows the fastest point.
-    dt_factor
-        Share of the stable step that the script asks for, or None: the program chooses.
-    dt_place
-        Where the script asks for its step.
-    boundary
-        What happens to points that reach the edge of the domain: error, delete or reflect.
-    boundary_place
-        Where the script says so.
-    warned_of_bounces
-        Whether the user knows that points were reflected.
-    warned_of
-        Names of the failures that the user was warned of.
-    moving
-        The fixes of the last run, and since when none has come to them.
-    """
+    """Choices of method, scheme, set_dt and dt_factor, and the clock."""
 
     remembers = ("warned_of_bounces", "warned_of")
 
     def __init__(self, values: Values):
         self.values = values
         self.method: Any = None
-        self.transfer: Any = None
+        self.transfer: Any = None  # a NamedTuple: PIC, FLIP, APIC ...
         self.scheme: Any = MUSL()
-        self.scheme_place: Place | None = None
-        self.thermal = False
-        self.anti_locking = False
-        self.fixed_dt: float | None = None
-        self.dt_factor: float | None = None
+        self.scheme_place: Place | None = None  # in the script, as of the others below
+        self.thermal = False  # heat flows between points
+        self.anti_locking = False  # changes of volume are averaged against volumetric locking
+        self.fixed_dt: float | None = None  # of set_dt; None: the step follows the fastest point
+        self.dt_factor: float | None = None  # share of the stable step; None: the program chooses
         self.dt_place: Place | None = None
-        self.boundary = "error"
+        self.boundary = "error"  # or delete or reflect, for points that reach the edge
         self.boundary_place: Place | None = None
-        self.warned_of_bounces = False
-        self.warned_of: list[str] = []
-        self.moving: tuple[list[Any], float] = ([], 0.0)
+        self.warned_of_bounces = False  # the user knows that points were reflected
+        self.warned_of: list[str] = []  # names of failures that the user knows of
+        self.moving: tuple[list[Any], float] = ([], 0.0)  # fixes of the last run, and since when
 
     def first_time(self, name: str) -> bool:
         """Note that the user is warned of something; False where that was so before."""

@@ -4,6 +4,9 @@ A view hands out arrays with a row for each node or point of the group. What a h
 by assignment or in place, is written back when it returns; what cannot be changed is read-only.
 """
 
+from __future__ import annotations
+
+import re
 from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
@@ -20,31 +23,148 @@ from karamelo_py.kernels.p2g import Force
 from karamelo_py.output.point_table import Part, PointTable, Rows
 from karamelo_py.points.laws import can, with_stress
 from karamelo_py.points.transfers import Moment
-from karamelo_py.scene.view import Shown, View
+from karamelo_py.script.errors import NoItem, nearest
 
 
-def _declared(kind: type, of: str) -> Callable:
+class Shown:
+    """A field of a view: how it is read and, unless it is read-only, written."""
+
+    def __init__(self, read: Callable):
+        self.read = read
+        self.write: Callable | None = None
+        self.__doc__ = read.__doc__
+
+    def writer(self, write: Callable) -> Callable:
+        """Decorate the function that writes the field."""
+        self.write = write
+        return write
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    def __get__(self, view: View | None, owner: type) -> Any:
+        if view is None:
+            return self
+        if self.name not in view._handed_out:
+            array = np.array(self.read(view))
+            array.flags.writeable = self.write is not None
+            view._handed_out[self.name] = array, array.copy() if self.write else array
+        return view._handed_out[self.name][0]
+
+    def __set__(self, view: View, value: Any) -> None:
+        if self.write is None:
+            raise AttributeError(f"{self.name} is read-only")
+        now = self.__get__(view, type(view))
+        value = np.asarray(value)
+        if value.ndim and value.shape != now.shape:
+            raise ValueError(f"{self.name} has the shape {now.shape}, not {value.shape}")
+        now[...] = value
+
+
+# Columns of dumps, by the letters around the direction, and the arrays that hold them.
+_COLUMN = re.compile("([vfb]?)([xyz])(0?)")
+_VECTORS = {
+    ("", ""): "position",
+    ("", "0"): "reference_position",
+    ("v", ""): "velocity",
+    ("f", ""): "force",
+    ("b", ""): "force",
+}
+
+
+class View:
+    """A view whose fields are the only attributes, and take only what fits."""
+
+    _fields: tuple[str, ...] = ()
+
+    def __init__(self) -> None:
+        self._handed_out: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+        self._declared: dict[type, tuple[np.ndarray, np.ndarray]] = {}
+
+    def _take_times(self, control: Any) -> None:
+        self.dt = float(control.values[arrays.DT])
+        self.kick = float(control.clock[0].kick)
+        self.time = float(control.values[arrays.TIME])
+
+    def write_back(self) -> None:
+        """Write what a hook has changed; called when it returns."""
+        for name, (now, before) in self._handed_out.items():
+            write = getattr(type(self), name).write
+            if write is not None and not np.array_equal(now, before, equal_nan=True):
+                write(self, now)
+        for kind, (now, before) in self._declared.items():
+            if not np.array_equal(now, before, equal_nan=True):
+                self._put(kind, now)
+
+    def _get(self, kind: type) -> np.ndarray:
+        """(n, components) of a declared field."""
+        raise NotImplementedError
+
+    def _put(self, kind: type, value: np.ndarray) -> None:
+        """Write a declared field."""
+        raise NotImplementedError
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        known = name in self._fields or name.startswith("_")
+        if not known and not isinstance(getattr(type(self), name, None), Shown):
+            raise self._unknown(name)
+        object.__setattr__(self, name, value)
+
+    def __getattr__(self, name: str) -> Any:
+        raise self._unknown(name)
+
+    def __getitem__(self, kind: type) -> np.ndarray:
+        """(n, components) of a field that a part declares."""
+        if not isinstance(kind, type):
+            raise self._no_column(kind)
+        if kind not in self._declared:
+            array = np.array(self._get(kind))
+            self._declared[kind] = array, array.copy()
+        return self._declared[kind][0]
+
+    def __setitem__(self, kind: type, value: Any) -> None:
+        self[kind][...] = value
+
+    def _no_column(self, name: Any) -> KeyError:
+        """The error for a column in brackets, which says the attribute."""
+        kind = type(self).__name__
+        split = _COLUMN.fullmatch(str(name))
+        attribute = _VECTORS.get((split[1], split[3])) if split else name
+        if isinstance(getattr(type(self), str(attribute), None), Shown):
+            place = f"[:, {'xyz'.index(split[2])}]" if split else ""
+            return NoItem(f"{kind} has no ['{name}']: write .{attribute}{place}")
+        names = ", ".join(n for n in dir(type(self)) if isinstance(getattr(type(self), n), Shown))
+        return NoItem(f"{kind} has no ['{name}']; its attributes are {names}")
+
+    def _unknown(self, name: str) -> AttributeError:
+        names = [*self._fields, *(n for n in dir(type(self)) if not n.startswith("_"))]
+        close = nearest(name, names)
+        return AttributeError(
+            f"{type(self).__name__} has no {name}; "
+            + (f"did you mean {close}?" if close else f"it has {', '.join(sorted(names))}")
+        )
+
+
+NO_HEAT = "no heat flows: the method has to be thermo-mechanical"
+
+
+def _declared(kind: type, of: str, missing: str = "") -> Callable:
     """Return what finds the array of a declared field in those of points or nodes."""
 
-    def find(arrays: Any) -> np.ndarray:
-        array = field(arrays.fields, kind)
+    def find(found: Any) -> np.ndarray:
+        array = field(found.fields, kind)
         if array is None:
-            where = f"{of}_fields of the fix"
-            raise ValueError(f"{of}s have no {name_of(kind)}: name it in the {where}")
+            what = f"{of}s have no {name_of(kind)}: name it in the {of}_fields of the fix"
+            raise ValueError(missing or what)
         return array
 
     return find
 
 
 class NodesView(View):
-    """The nodes of a group that carry mass, at one stage of a step::
+    """The nodes of a group that carry mass, at one stage of a step, numbers `index` (n,)::
 
-        nodes.force += nodes.mass[:, None] * self.gravity
-
-    Attributes
-    ----------
-    index : (n,) int
-        Node numbers.
+    nodes.force += nodes.mass[:, None] * self.gravity
     """
 
     _fields = ("dt", "kick", "time", "index")
@@ -73,9 +193,12 @@ class NodesView(View):
         own = slice(None) if self._foreign is None else self._foreign[self.index] == 0
         return self._simulation.summed(terms[own])
 
-    def _part(self, array: np.ndarray, first: int) -> tuple:
-        """Return where in an array of the nodes a vector of those of the view lies."""
-        return self.index, slice(first, first + self._d)
+    def _vector(self, name: str, first: int = 0) -> np.ndarray:
+        """Return (n, d) components from `first` on of an array of the nodes."""
+        return getattr(self._nodes, name)[self.index, first : first + self._d]
+
+    def _put_vector(self, value: np.ndarray, name: str, first: int = 0) -> None:
+        getattr(self._nodes, name)[self.index, first : first + self._d] = value
 
     def _get(self, kind: type) -> np.ndarray:
         return _declared(kind, "node")(self._nodes)[self.index, : kind.shape(self._kin)]
@@ -102,57 +225,47 @@ class NodesView(View):
     @Shown
     def force(self) -> np.ndarray:
         """(n, d) internal plus external force; set it in ``post_particles_to_grid``."""
-        return self._nodes.sums[self._at_force()]
+        return self._vector("sums", arrays.of_force(self._kin))
 
     @force.writer
     def _write_force(self, value: np.ndarray) -> None:
-        self._nodes.sums[self._at_force()] = value
-
-    def _at_force(self) -> tuple:
-        return self._part(self._nodes.sums, arrays.of_force(self._kin))
+        self._put_vector(value, "sums", arrays.of_force(self._kin))
 
     @Shown
     def velocity(self) -> np.ndarray:
         """(n, d) velocity: v before the momentum update, or the one that deforms the points."""
-        nodes = self._nodes
         if self._on_velocity:
-            return nodes.velocity[self._part(nodes.velocity, 0)]
+            return self._vector("velocity")
         if self._stage == arrays.POST_PARTICLES_TO_GRID:
-            momentum = nodes.sums[self._part(nodes.sums, arrays.of_momentum(self._kin))]
-            return momentum / nodes.sums[self.index, arrays.MASS][:, None]
-        change = nodes.update[self._part(nodes.update, arrays.of_change(self._kin))]
-        return nodes.update[self._part(nodes.update, 0)] - change
+            momentum = self._vector("sums", arrays.of_momentum(self._kin))
+            return momentum / self._nodes.sums[self.index, arrays.MASS][:, None]
+        return self._vector("update") - self._vector("update", arrays.of_change(self._kin))
 
     @velocity.writer
     def _write_velocity(self, value: np.ndarray) -> None:
-        nodes = self._nodes
         if self._on_velocity:
-            nodes.velocity[self._part(nodes.velocity, 0)] = value
+            self._put_vector(value, "velocity")
         elif self._stage in (arrays.POST_UPDATE_GRID_STATE, arrays.POST_UPDATE_GRID_HEAT):
-            star = nodes.update[self._part(nodes.update, 0)]
-            nodes.update[self._part(nodes.update, arrays.of_change(self._kin))] = star - value
+            change = self._vector("update") - value
+            self._put_vector(change, "update", arrays.of_change(self._kin))
         else:
-            mass = nodes.sums[self.index, arrays.MASS][:, None]
-            nodes.sums[self._part(nodes.sums, arrays.of_momentum(self._kin))] = mass * value
+            mass = self._nodes.sums[self.index, arrays.MASS][:, None]
+            self._put_vector(mass * value, "sums", arrays.of_momentum(self._kin))
 
     @Shown
     def velocity_update(self) -> np.ndarray:
         """(n, d) v*, the velocity after the momentum update (``post_update_grid_state``)."""
-        if self._on_velocity:
-            return self._nodes.velocity[self._part(self._nodes.velocity, 0)]
-        return self._nodes.update[self._part(self._nodes.update, 0)]
+        return self._vector("velocity" if self._on_velocity else "update")
 
     @velocity_update.writer
     def _write_velocity_update(self, value: np.ndarray) -> None:
-        nodes = self._nodes
         if self._on_velocity:
-            nodes.velocity[self._part(nodes.velocity, 0)] = value
+            self._put_vector(value, "velocity")
             return
-        star = self._part(nodes.update, 0)
-        change = self._part(nodes.update, arrays.of_change(self._kin))
-        old = nodes.update[star] - nodes.update[change]
-        nodes.update[star] = value
-        nodes.update[change] = nodes.update[star] - old
+        change = arrays.of_change(self._kin)
+        old = self._vector("update") - self._vector("update", change)
+        self._put_vector(value, "update")
+        self._put_vector(self._vector("update") - old, "update", change)
 
 
 class PointsView(View):
@@ -237,14 +350,9 @@ class PointsView(View):
     def set_velocity_gradient(self, component: int, gradient: Callable) -> None:
         """Let points whose transfer keeps it (APIC, TPIC ...) know how their velocity changes.
 
-        Parameters
-        ----------
-        component
-            The component of velocity whose gradient this is.
-        gradient
-            ``gradient(moves, step)`` -> (n, d), its derivatives by the coordinates that the grid
-            has (positions, or reference positions where `moves` is False); `step` is a length that
-            is small beside a cell. It is not called where no point keeps such a thing.
+        ``gradient(moves, step)`` -> (n, d) are the derivatives of the `component` by the
+        coordinates that the grid has (positions, or reference positions where `moves` is False);
+        `step` is a length that is small beside a cell. It is called where a point keeps them.
         """
         simulation, slopes = self._simulation, None
         s, d = simulation.setup, simulation.kin.dimension
@@ -286,26 +394,16 @@ class PointsView(View):
     @Shown
     def temperature(self) -> np.ndarray:
         """(n,) temperatures, where heat flows; read only."""
-        return self._rows.take(self._heat(Temperature))[:, 0]
+        return self._rows.take(_declared(Temperature, "point", NO_HEAT))[:, 0]
 
     @Shown
     def heat_supply(self) -> np.ndarray:
         """(n,) heat per time that fixes bring; add to it in ``supply_heat``."""
-        return self._rows.take(self._heat(Supply))[:, 0]
+        return self._rows.take(_declared(Supply, "point", NO_HEAT))[:, 0]
 
     @heat_supply.writer
     def _write_heat_supply(self, value: np.ndarray) -> None:
-        self._rows.put(self._heat(Supply), value[:, None])
-
-    @staticmethod
-    def _heat(kind: type) -> Callable:
-        def of(points: Any) -> np.ndarray:
-            array = field(points.fields, kind)
-            if array is None:
-                raise ValueError("no heat flows: the method has to be thermo-mechanical")
-            return array
-
-        return of
+        self._rows.put(_declared(Supply, "point", NO_HEAT), value[:, None])
 
     def set_stress(self, given: dict[str, np.ndarray]) -> None:
         """Set components of the Cauchy stress: ``{"11": (n,) values, ...}`` of rate-form laws."""
