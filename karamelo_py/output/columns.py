@@ -20,15 +20,7 @@ _QUANTITIES = {
 
 
 def check_columns(columns: Sequence[str], known: Sequence[str], *, first: int) -> None:
-    """Refuse names that are not `known`.
-
-    `first` is the place of the first column among the arguments of the style.
-
-    Raises
-    ------
-    ScriptError
-        Naming the columns that may be meant.
-    """
+    """Refuse names that are not `known`; `first` is the place of the first among the arguments."""
     for index, name in enumerate(columns):
         if name not in known:
             raise unknown_column(f"unknown column '{name}'", name, known, argument=first + index)

@@ -101,13 +101,8 @@ class Fields(PointTable):
     def added_up(self, part: Any, name: str = "terms", *arguments: Any) -> np.ndarray:
         """Sums (k,) over the points of a part's group, rounded once: of processes and of one alike.
 
-        Parameters
-        ----------
-        part
-            A compute or fix, as it stands in the scene.
-        name
-            Of its method that is called with fields of some of the points after others, and the
-            `arguments`, and returns terms (k, n).
+        The method `name` of the part, a compute or fix as it stands in the scene, is called with
+        fields of some of the points after others, and `arguments`, and returns terms (k, n).
         """
         return self._simulation.added_up(part, name, *arguments)
 

@@ -34,13 +34,7 @@ def folder_of_discarded() -> Path | None:
 
 @contextmanager
 def whole(path: Path) -> Iterator[BinaryIO]:
-    """Open `path` for writing; the file appears under its name only when all of it is written.
-
-    Raises
-    ------
-    ScriptError
-        If the file cannot be written, with the system's reason.
-    """
+    """Open `path` for writing; the file appears under its name only when all of it is written."""
     if folder_of_discarded() is not None:
         yield BytesIO()
         return
@@ -66,11 +60,6 @@ def continued(path: Path, start: int, tail: bytes) -> Iterator[BinaryIO]:
     """Open `path` to go on at byte `start` (0: a new file).
 
     If that breaks off, the file ends there again, with `tail`.
-
-    Raises
-    ------
-    ScriptError
-        If the file cannot be written, with the system's reason.
     """
     with reported(path), path.open("r+b" if start else "wb") as file:
         try:
@@ -86,13 +75,7 @@ def continued(path: Path, start: int, tail: bytes) -> Iterator[BinaryIO]:
 
 
 def picture_format(path: Path) -> str:
-    """Read the format that the name of a picture asks for.
-
-    Raises
-    ------
-    ScriptError
-        If it is none of png, pdf, svg.
-    """
+    """Read the format that the name of a picture asks for: png, pdf or svg."""
     ending = path.suffix.lower().lstrip(".")
     if ending not in FORMATS:
         raise ScriptError(
@@ -124,9 +107,9 @@ def unwarned() -> Iterator[None]:
 
 
 @contextmanager
-def reported(path: Path) -> Iterator[None]:
+def reported(path: Path, what: str = "") -> Iterator[None]:
     """Turn what the system says against writing `path` into a ScriptError."""
     try:
         yield
     except OSError as error:
-        raise ScriptError(f"cannot write {path}: {error.strerror or error}") from error
+        raise ScriptError(f"cannot write {what}{path}: {error.strerror or error}") from error

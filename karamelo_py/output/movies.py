@@ -12,13 +12,7 @@ from karamelo_py.script.errors import ScriptError
 
 
 def movie_format(path: Path) -> str:
-    """Read the format that the name of a movie asks for.
-
-    Raises
-    ------
-    ScriptError
-        If it is neither gif nor mp4, has a ``*``, or wants a program that is not there.
-    """
+    """Read the format that the name of a movie asks for: gif, or mp4 where it can be made."""
     ending = path.suffix.lower().lstrip(".")
     if ending not in ("gif", "mp4") or "*" in path.name:
         raise ScriptError(
@@ -37,13 +31,7 @@ def movie_format(path: Path) -> str:
 
 
 class Frames:
-    """Pictures that become a movie. They are kept as PNG, which are small.
-
-    Parameters
-    ----------
-    fps
-        Frames in a second.
-    """
+    """Pictures that become a movie of `fps` in a second. They are kept as PNG, which are small."""
 
     remembers = ("_frames",)
 

@@ -13,10 +13,9 @@ from karamelo_py.kernels.export import EXPORTED, JACOBIAN, export_state, export_
 from karamelo_py.kernels.hooks import CompiledHook
 from karamelo_py.kernels.p2g import Force
 from karamelo_py.language.scene import Scene
-from karamelo_py.output.point_table import declared_columns, volumes_before
+from karamelo_py.output.point_table import AXES, declared_columns, volumes_before
 from karamelo_py.points.laws import can, constrained_velocity
 
-AXES = "xyz"
 NODE_NAMES = (
     ["id", "type"]
     + list(AXES)
@@ -29,24 +28,14 @@ ABSENT_AT_NODES = ("T",)
 
 
 class NodeRows(NamedTuple):
-    """The nodes with numbers from `first` to before `end`: their rows in the arrays of nodes.
-
-    Attributes
-    ----------
-    arrays
-        By name, as in a file to go on from.
-    brought
-        Sums over the points that were asked for (`BROUGHT`).
-    loaded
-        Number of nodes with mass that each fix acts on, by ID.
-    """
+    """The nodes with numbers from `first` to before `end`: their rows in the arrays of nodes."""
 
     first: int
     end: int
     kin: Any
-    arrays: dict[str, np.ndarray]
-    brought: dict[str, np.ndarray]
-    loaded: dict[str, int]
+    arrays: dict[str, np.ndarray]  # by name, as in a file to go on from
+    brought: dict[str, np.ndarray]  # sums over the points that were asked for (`BROUGHT`)
+    loaded: dict[str, int]  # number of nodes with mass that each fix acts on, by ID
 
 
 class NodeFields:

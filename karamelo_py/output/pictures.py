@@ -38,40 +38,18 @@ LIT = 8  # points, from which on they have a surface
 
 
 class Options(NamedTuple):
-    """Options of a picture.
+    """Options of a picture."""
 
-    Attributes
-    ----------
-    column
-        The column that colours the points, or is drawn over x in 1D.
-    label
-        Text beside the colours (or, in 1D, at the ordinate).
-    solids
-        Names of the solids that colour the points, if a column does not.
-    limits
-        Ends of the colours; None for ends that grow with what has been seen.
-    symmetric
-        True for limits that grow about 0.
-    cmap
-        A colour map of Matplotlib.
-    azimuth, elevation
-        Angles of view in 3D, in degrees.
-    axes
-        False for none.
-    lengths
-        Text behind the names of the axes: the unit.
-    """
-
-    column: str
-    label: str
-    solids: tuple[str, ...] = ()
-    limits: tuple[float | None, float | None] = (None, None)
-    symmetric: bool = False
+    column: str  # that colours the points, or is drawn over x in 1D
+    label: str  # text beside the colours (or, in 1D, at the ordinate)
+    solids: tuple[str, ...] = ()  # names of those that colour the points, if a column does not
+    limits: tuple[float | None, float | None] = (None, None)  # None: grow with what has been seen
+    symmetric: bool = False  # limits grow about 0
     cmap: str = "viridis"
-    azimuth: float = -60.0
+    azimuth: float = -60.0  # angles of view in 3D, in degrees
     elevation: float = 30.0
     axes: bool = True
-    lengths: str = ""
+    lengths: str = ""  # text behind the names of the axes: the unit
 
 
 class DrawnPoints(Artist):

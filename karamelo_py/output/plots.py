@@ -1,6 +1,5 @@
 """Plots of logged quantities against each other, drawn with Matplotlib when a run ends."""
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -41,45 +40,32 @@ class PlottedCurve(Rhythmic):
         self.points.append((float(self.x.read()), float(self.y.read())))
 
 
-class Plots:
-    """The curves of a scene and the file they are drawn to.
+class Plots(dict[str, PlottedCurve]):
+    """The curves of a scene by their IDs, and the file they are drawn to.
 
     Curves over the same quantity share one pair of axes; each further quantity gets axes of its
     own below. Without a file the curves are collected only.
     """
 
     def __init__(self, hub: Scene):
+        super().__init__()
         self.hub = hub
         self.file: Path | None = None
         self.place: Place | None = None  # of save_plot
-        self._curves: dict[str, PlottedCurve] = {}
-
-    def __iter__(self) -> Iterator[PlottedCurve]:
-        return iter(self._curves.values())
-
-    def __contains__(self, item: object) -> bool:
-        return any(curve is item for curve in self)
-
-    def __len__(self) -> int:
-        return len(self._curves)
 
     def add(self, ID: str, curve: PlottedCurve) -> None:
         """File a curve under `ID`, which must be new."""
         curve.id = ID
-        self._curves[ID] = curve
-
-    def ids(self) -> list[str]:
-        """List IDs of the curves."""
-        return list(self._curves)
+        self[ID] = curve
 
     def finish(self) -> None:
         """Draw every curve that has points to the file; without file or points do nothing."""
-        if self.file is None or not any(curve.points for curve in self):
-            return
         by_x: dict[str, list[PlottedCurve]] = {}
-        for curve in self:
+        for curve in self.values():
             if curve.points:
                 by_x.setdefault(curve.x.name, []).append(curve)
+        if self.file is None or not by_x:
+            return
         figure = blank_figure(6.4, 3.8 * len(by_x))
         all_axes = figure.subplots(len(by_x), 1, squeeze=False)[:, 0]
         for axes, (x_name, curves) in zip(all_axes, by_x.items(), strict=True):
@@ -90,14 +76,8 @@ class Plots:
                 # Colours go on from one side to the other.
                 lines += self._draw(axes, side, chosen, first=len(lines)) if chosen else []
             # Above the curves, where it hides none.
-            axes.legend(
-                handles=lines,
-                loc="lower left",
-                bbox_to_anchor=(0, 1),
-                ncols=4,
-                frameon=False,
-                fontsize="small",
-            )
+            above = {"loc": "lower left", "bbox_to_anchor": (0, 1), "ncols": 4}
+            axes.legend(handles=lines, **above, frameon=False, fontsize="small")
         savefig(figure, self.hub.folder / self.file)
 
     def _draw(self, axes: Any, side: str, curves: list[PlottedCurve], first: int) -> list:

@@ -25,6 +25,14 @@ from karamelo_py.points.transfers import Moment
 
 AXES = "xyz"
 COMPONENTS = ("11", "22", "33", "12", "13", "23")
+# Columns, the vectors that they belong to, and directions.
+VECTORS = {
+    f"{before}{axis}{after}": (vector, k)
+    for before, after, vector in (
+        ("", "", "position"), ("", "0", "reference_position"), ("v", "", "velocity")
+    )
+    for k, axis in enumerate(AXES)
+}  # fmt: skip
 
 
 class Part(NamedTuple):
@@ -113,13 +121,6 @@ class PointTable:
 
     Deleted points (boundary delete) have zeros in the arrays of all points and of a piece;
     `particle` leaves them out.
-
-    Attributes
-    ----------
-    ids : ndarray (n,)
-        Their numbers, from 0.
-    present : ndarray (n,)
-        False for points that were deleted.
     """
 
     def __init__(self, hub: Scene, rows: Rows):
@@ -128,7 +129,7 @@ class PointTable:
         self._cache: dict[str, Any] = {}
 
     def _cached(self, name: str, make: Callable[[Rows], Any]) -> Any:
-        rows = self._rows
+        rows = self._rows  # where the scene has gone on this forgets what was made
         if name not in self._cache:
             self._cache[name] = make(rows)
         return self._cache[name]
@@ -212,12 +213,9 @@ class PointTable:
             return self.ids + 1
         if name == "type":
             return self.solid + 1
-        if name in AXES:
-            return _column(self.position, AXES.index(name))
-        if name[:1] in AXES and name[1:] == "0":
-            return _column(self.reference_position, AXES.index(name[0]))
-        if name in ("vx", "vy", "vz"):
-            return _column(self.velocity, AXES.index(name[1]))
+        if name in VECTORS:
+            attribute, axis = VECTORS[name]
+            return _column(getattr(self, attribute), axis)
         if name == "mass":
             return self.mass.astype(float)
         if name == "volume":
@@ -282,28 +280,23 @@ def _velocity_moment(s: Setup, points: Points) -> np.ndarray:
 
 def places_before(hub: Scene, ids: np.ndarray) -> np.ndarray:
     """Return (n, d) positions of points before the first step, without those of others."""
-    found = np.empty((len(ids), hub.domain.dimension))
-    for solid, rows, own in _of_solids(hub, ids):
-        found[rows] = solid.x0_of(own)
-    return found
+    return _before(hub, ids, lambda solid, own: solid.x0_of(own), hub.domain.dimension)
 
 
 def volumes_before(hub: Scene, ids: np.ndarray) -> np.ndarray:
     """Return (n,) volumes of points before the first step."""
-    found = np.empty(len(ids))
-    for solid, rows, own in _of_solids(hub, ids):
-        found[rows] = solid.volume0[own]
-    return found
+    return _before(hub, ids, lambda solid, own: solid.volume0[own])
 
 
-def _of_solids(hub: Scene, ids: np.ndarray) -> Iterator[tuple[Any, np.ndarray, np.ndarray]]:
-    """Yield solids with some of these points: rows of these, and their numbers there."""
-    order = np.argsort(ids)
+def _before(hub: Scene, ids: np.ndarray, of: Callable, *columns: int) -> np.ndarray:
+    """Gather what ``of(solid, numbers)`` returns of its points with these numbers."""
+    found, order = np.empty((len(ids), *columns)), np.argsort(ids)
     for solid in hub.solids.values():
         ends = solid.first_id, solid.first_id + solid.count
         rows = order[slice(*np.searchsorted(ids, ends, sorter=order))]
         if len(rows):
-            yield solid, rows, ids[rows] - solid.first_id
+            found[rows] = of(solid, ids[rows] - solid.first_id)
+    return found
 
 
 def _column_of_laws(name: str, laws: Any) -> Callable | None:

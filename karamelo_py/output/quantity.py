@@ -20,23 +20,8 @@ class Quantity:
     """A named number of the running scene.
 
     It is one of the words ``step``, ``dt``, ``time``; a variable of the script; a value published
-    by a fix or a compute (``Ek``, ``v_x``); or a formula written on the spot (``Ek + Es``).
-
-    Parameters
-    ----------
-    hub
-        The hub of the scene.
-    name
-        What the script says.
-    formula
-        The formula to evaluate when `name` is a formula written on the spot.
-    words
-        Whether it may be the word ``limit``, whose content is a word.
-
-    Raises
-    ------
-    ScriptError
-        If nothing of that name exists, or it is not a single number.
+    by a fix or a compute (``Ek``, ``v_x``); or a `formula` written on the spot (``Ek + Es``). With
+    `words` it may be ``limit``, too, whose content is a word.
     """
 
     script_kind = "a quantity"
@@ -56,8 +41,6 @@ class Quantity:
                 hint=meant(name, self.names(hub)),
             )
         source = self._source()
-        if isinstance(source, str):
-            raise ScriptError(f"'{name}' is text, not a number")
         per_point = PER_POINT & getattr(source, "names", frozenset())
         if per_point:
             raise ScriptError(
@@ -79,9 +62,8 @@ class Quantity:
             if error.message == f"unknown name '{text}'":
                 error.expected = "one of " + ", ".join(dict.fromkeys(cls.names(hub)))
                 if not (error.hint or "").startswith("did you mean"):
-                    error.hint = (
-                        table()["energies"].get(text) or meant(text, KEYWORDS) or error.hint
-                    )
+                    energy = table()["energies"].get(text)
+                    error.hint = energy or meant(text, KEYWORDS) or error.hint
                 if text in hub.fields.particle_names():
                     error.hint = (
                         f"{text} differs from point to point: dump(...) writes it, and "
@@ -115,8 +97,6 @@ class Quantity:
 
     def _number(self) -> float | int:
         source = self._source()
-        if isinstance(source, str):
-            raise ScriptError(f"'{self.name}' is text, not a number")
         if hasattr(source, "evaluate"):
             return float(source.evaluate(self.hub.values))
         return source
@@ -126,14 +106,18 @@ class Quantity:
 
         Looked up each time, as the script may set a variable anew between two runs.
         """
-        if self.formula is not None:
-            return self.formula
-        if self.name in KEYWORDS:
-            return getattr(self.hub.update, self.name)
         variables = _variables(self.hub)
-        if self.name in variables:
-            return variables[self.name]
-        return float(self.hub.values.get(self.name))
+        if self.formula is not None:
+            source = self.formula
+        elif self.name in KEYWORDS:
+            return getattr(self.hub.update, self.name)
+        elif self.name in variables:
+            source = variables[self.name]
+        else:
+            return float(self.hub.values.get(self.name))
+        if isinstance(source, str):
+            raise ScriptError(f"'{self.name}' is text, not a number")
+        return source
 
 
 class Logged(Quantity):

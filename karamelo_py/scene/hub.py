@@ -210,7 +210,7 @@ class Hub:
 
     def lasting(self) -> list[Any]:
         """List the parts that act in runs: fixes, dumps and curves."""
-        return [*self.fixes.values(), *self.dumps.values(), *self.output.plots]
+        return [*self.fixes.values(), *self.dumps.values(), *self.output.plots.values()]
 
     def _tell_of_late(self, rehearsed: Hub) -> None:
         """Warn of what the script has only behind its last run."""
@@ -243,8 +243,7 @@ class Hub:
         other.output = Output(other)
         other.output.files = dict(self.output.files)
         other.output.log.file = self.output.log.file
-        for curve in self.output.plots:
-            other.output.plots.add(curve.id, curve)
+        other.output.plots.update(self.output.plots)
         other.output.plots.file = self.output.plots.file
         other.fields = Fields(other)
         return other

@@ -6,7 +6,6 @@ by assignment or in place, is written back when it returns; what cannot be chang
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
@@ -20,7 +19,7 @@ from karamelo_py.kernels.heat import Supply, Temperature
 from karamelo_py.kernels.hook_loop import corners_that_move
 from karamelo_py.kernels.laws import elastic_law
 from karamelo_py.kernels.p2g import Force
-from karamelo_py.output.point_table import Part, PointTable, Rows
+from karamelo_py.output.point_table import VECTORS, Part, PointTable, Rows
 from karamelo_py.points.laws import can, with_stress
 from karamelo_py.points.transfers import Moment
 from karamelo_py.script.errors import NoItem, nearest
@@ -61,15 +60,8 @@ class Shown:
         now[...] = value
 
 
-# Columns of dumps, by the letters around the direction, and the arrays that hold them.
-_COLUMN = re.compile("([vfb]?)([xyz])(0?)")
-_VECTORS = {
-    ("", ""): "position",
-    ("", "0"): "reference_position",
-    ("v", ""): "velocity",
-    ("f", ""): "force",
-    ("b", ""): "force",
-}
+# Columns of dumps, and the arrays that hold them.
+_VECTORS = VECTORS | {f"{of}{axis}": ("force", k) for of in "fb" for k, axis in enumerate("xyz")}
 
 
 class View:
@@ -128,10 +120,9 @@ class View:
     def _no_column(self, name: Any) -> KeyError:
         """The error for a column in brackets, which says the attribute."""
         kind = type(self).__name__
-        split = _COLUMN.fullmatch(str(name))
-        attribute = _VECTORS.get((split[1], split[3])) if split else name
-        if isinstance(getattr(type(self), str(attribute), None), Shown):
-            place = f"[:, {'xyz'.index(split[2])}]" if split else ""
+        attribute, *k = _VECTORS.get(str(name), (str(name),))
+        if isinstance(getattr(type(self), attribute, None), Shown):
+            place = f"[:, {k[0]}]" if k else ""
             return NoItem(f"{kind} has no ['{name}']: write .{attribute}{place}")
         names = ", ".join(n for n in dir(type(self)) if isinstance(getattr(type(self), n), Shown))
         return NoItem(f"{kind} has no ['{name}']; its attributes are {names}")
