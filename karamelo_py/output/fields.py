@@ -10,29 +10,15 @@ from karamelo_py.kernels.arrays import MASS, known_to_laws
 from karamelo_py.kernels.export import export
 from karamelo_py.kernels.laws import elastic_law
 from karamelo_py.language.scene import Scene
-from karamelo_py.output.node_columns import ABSENT_AT_NODES, BROUGHT, NODE_NAMES, NodeFields
-from karamelo_py.output.point_table import AXES, COMPONENTS, PointTable, Rows, declared_columns
+from karamelo_py.output import node_columns, point_table
+from karamelo_py.output.node_columns import BROUGHT, NodeFields
+from karamelo_py.output.point_table import PointTable, Rows, absent, declared_columns
 from karamelo_py.points.boundary import Bounces
 from karamelo_py.points.laws import can, dissipated_energy, energy_density
 from karamelo_py.points.laws.eos import initial_energy, taken_heat
 from karamelo_py.points.laws.plastic_rate import has_rate
 
 PIECE = 1 << 17  # points that are looked at together
-PARTICLE_NAMES = (
-    ["id", "type"]
-    + list(AXES)
-    + [axis + "0" for axis in AXES]
-    + ["v" + axis for axis in AXES]
-    + ["s" + c for c in COMPONENTS]
-    + ["e" + c for c in COMPONENTS]
-    + ["seq", "volume", "mass", "damage", "damage_init", "bx", "by", "bz", "ep", "epdot"]
-    + ["T", "ienergy", "gamma"]
-)
-
-# Columns of Karamelo that are zero here: nothing keeps them apart, or only some materials do.
-ABSENT_AT_POINTS = (
-    "damage", "damage_init", "bx", "by", "bz", "ep", "epdot", "T", "gamma",
-)  # fmt: skip
 
 
 class Fields(PointTable):
@@ -59,16 +45,6 @@ class Fields(PointTable):
             self._key = key
             self._cache.clear()
         return simulation.rows()
-
-    @property
-    def count(self) -> int:
-        """Number of points."""
-        return self._simulation.count
-
-    @property
-    def present(self) -> np.ndarray:
-        """(N,) False for points that were deleted."""
-        return self._simulation.present
 
     def pieces(self, *, to_first: bool = False) -> Iterator[PointTable]:
         """The points, so many at a time, in the order of their ids.
@@ -116,11 +92,12 @@ class Fields(PointTable):
     def particle_names(self) -> list[str]:
         """Names that `particle` knows."""
         own = [*sorted(self.columns_of_laws()), *declared_columns(self.hub, "point_fields")]
-        return list(dict.fromkeys([*PARTICLE_NAMES, *own]))
+        return list(dict.fromkeys([*point_table.COLUMNS, *own]))
 
     def node_names(self) -> list[str]:
         """Names that `node` knows."""
-        return list(dict.fromkeys([*NODE_NAMES, *declared_columns(self.hub, "node_fields")]))
+        own = declared_columns(self.hub, "node_fields")
+        return list(dict.fromkeys([*node_columns.COLUMNS, *own]))
 
     def rate_is_asked_for(self) -> bool:
         """Tell whether a dump or a compute has the column ``epdot``, which points keep for it."""
@@ -132,12 +109,12 @@ class Fields(PointTable):
         present = self.columns_of_laws() | {*declared_columns(self.hub, "point_fields")}
         if any(has_rate(material.law) for material in self.hub.materials.values()):
             present.add("epdot")
-        return [name for name in ABSENT_AT_POINTS if name not in present]
+        return absent(point_table.COLUMNS, present)
 
     def absent_at_nodes(self) -> list[str]:
         """Names that `node` knows, but that are 0 in this scene."""
         present = {*declared_columns(self.hub, "node_fields"), *["T"] * self.hub.update.thermal}
-        return [name for name in ABSENT_AT_NODES if name not in present]
+        return absent(node_columns.COLUMNS, present)
 
     def node_pieces(self, names: Sequence[str], *, to_first: bool = False) -> Iterator[NodeFields]:
         """Fields of all nodes, of which `names` are asked for, so many nodes at a time.

@@ -16,16 +16,6 @@ from karamelo_py.language.scene import Scene
 from karamelo_py.output.point_table import AXES, declared_columns, volumes_before
 from karamelo_py.points.laws import can, constrained_velocity
 
-NODE_NAMES = (
-    ["id", "type"]
-    + list(AXES)
-    + ["v" + axis for axis in AXES]
-    + ["v" + axis + "_update" for axis in AXES]
-    + ["f" + axis for axis in AXES]
-    + ["mass", "vol", "mask", "rigid", "T", "bx", "by", "bz", "ntypex", "ntypey", "ntypez"]
-)
-ABSENT_AT_NODES = ("T",)
-
 
 class NodeRows(NamedTuple):
     """The nodes with numbers from `first` to before `end`: their rows in the arrays of nodes."""
@@ -47,30 +37,17 @@ class NodeFields:
 
     def node(self, name: str) -> np.ndarray:
         """Return a field of the nodes, (n,)."""
-        arrays = self.rows.arrays
-        if name == "mass":
-            return arrays["nodes/sums"][:, MASS].astype(float)
-        if name in AXES:
-            return self.positions()[:, AXES.index(name)]
         if name == "T" and self.hub.update.thermal:
-            mass = arrays["heat/sums"][:, MASS]
-            return np.where(mass > 0, arrays["heat/velocity"][:, 0], 0.0)
-        if name in COLUMNS:
-            return COLUMNS[name](self)
+            mass = self.rows.arrays["heat/sums"][:, MASS]
+            return np.where(mass > 0, self.rows.arrays["heat/velocity"][:, 0], 0.0)
+        if (show := COLUMNS.get(name)) is not None:
+            return show(self)
         if name in (shown := declared_columns(self.hub, "node_fields")):
             kind, k = shown[name]
-            array = arrays.get(f"nodes/{fields.name_of(kind)}")
+            array = self.rows.arrays.get(f"nodes/{fields.name_of(kind)}")
             if array is not None and k < kind.shape(self.rows.kin):
                 return array[:, k].astype(float)
-            return np.zeros(len(self.ids))
-        if name in ABSENT_AT_NODES or (axis := AXES.index(name[1])) >= self.hub.domain.dimension:
-            return np.zeros(len(self.ids))
-        field = {
-            "v": arrays["nodes/velocity"][:, axis],
-            "u": arrays["nodes/update"][:, axis],
-            "f": arrays["nodes/sums"][:, of_force(self.rows.kin) + axis],
-        }["u" if name.endswith("_update") else name[0]]
-        return np.where(self.node("mass") > 0, field, 0.0)
+        return np.zeros(len(self.ids))
 
     def positions(self) -> np.ndarray:
         """Return where they are, (n, 3)."""
@@ -151,14 +128,37 @@ def load(axis: int, nodes: NodeFields) -> np.ndarray:
     return out
 
 
-COLUMNS: dict[str, Callable[[NodeFields], np.ndarray]] = {
+def of_vector(name: str, first: Callable, axis: int, nodes: NodeFields) -> np.ndarray:
+    """Return a component of a vector, which begins at ``first(kin)`` in an array of nodes."""
+    if axis >= nodes.hub.domain.dimension:
+        return np.zeros(len(nodes.ids))
+    component = nodes.rows.arrays[name][:, first(nodes.rows.kin) + axis]
+    return np.where(nodes.node("mass") > 0, component, 0.0)
+
+
+def vector(name: str, array: str, first: Callable = lambda kin: 0) -> dict[str, Callable]:
+    """Return the columns of a vector, with the direction in the place of ``*``."""
+    return {
+        name.replace("*", axis): partial(of_vector, f"nodes/{array}", first, k)
+        for k, axis in enumerate(AXES)
+    }
+
+
+# Columns of every scene; those with None only some scenes have, in others they are 0.
+COLUMNS: dict[str, Callable[[NodeFields], np.ndarray] | None] = {
     "id": lambda nodes: nodes.ids,
     "type": kind_of_grid,
+    **{axis: lambda nodes, k=k: nodes.positions()[:, k] for k, axis in enumerate(AXES)},
+    **vector("v*", "velocity"),
+    **vector("v*_update", "update"),
+    **vector("f*", "sums", of_force),
+    "mass": lambda nodes: nodes.rows.arrays["nodes/sums"][:, MASS].astype(float),
     "vol": lambda nodes: nodes.rows.brought["vol"],
-    "rigid": lambda nodes: (nodes.rows.brought["rigid"] > 0) * 1.0,
     "mask": mask,
-    **{f"ntype{axis}": partial(kind_of_node, k) for k, axis in enumerate(AXES)},
+    "rigid": lambda nodes: (nodes.rows.brought["rigid"] > 0) * 1.0,
+    "T": None,
     **{f"b{axis}": partial(load, k) for k, axis in enumerate(AXES)},
+    **{f"ntype{axis}": partial(kind_of_node, k) for k, axis in enumerate(AXES)},
 }
 
 # --- what points bring to nodes where it is asked for ---------------------------------------------

@@ -209,27 +209,11 @@ class PointTable:
         return values if present.all() else values[present]
 
     def _particle(self, name: str) -> np.ndarray:
-        if name == "id":
-            return self.ids + 1
-        if name == "type":
-            return self.solid + 1
-        if name in VECTORS:
-            attribute, axis = VECTORS[name]
-            return _column(getattr(self, attribute), axis)
-        if name == "mass":
-            return self.mass.astype(float)
-        if name == "volume":
-            return self.reference_volume * self._exported[:, JACOBIAN]
-        if name == "ienergy":
-            return self._exported[:, ENERGY].copy()
+        if (show := COLUMNS.get(name)) is not None:
+            return show(self)
         if name in self.columns_of_laws() or name == "epdot":
             shown = partial(_column_of_laws, name)
             return self._cached(name, lambda rows: rows.computed(shown)).copy()
-        if name == "seq":
-            return _von_mises(self._exported[:, :STRAIN])
-        if name[:1] in "se" and name[1:] in COMPONENTS:
-            first = 0 if name[0] == "s" else STRAIN
-            return self._exported[:, first + COMPONENTS.index(name[1:])].copy()
         if name in (shown := declared_columns(self.hub, "point_fields")):
             kind, k = shown[name]
             if (array := self._rows.declared(kind)) is not None:
@@ -264,6 +248,11 @@ def declared_columns(hub: Scene, attribute: str) -> dict[str, tuple[type, int]]:
         for k, column in enumerate(fields.columns_of(kind)):
             found.setdefault(column, (kind, k))
     return found
+
+
+def absent(columns: dict[str, Callable | None], present: set[str] = frozenset()) -> list[str]:
+    """List the columns that only some scenes have, without those that are `present`."""
+    return [name for name, show in columns.items() if show is None and name not in present]
 
 
 def _place(s: Setup, points: Points) -> np.ndarray:
@@ -315,3 +304,28 @@ def _von_mises(s: np.ndarray) -> np.ndarray:
     xx, yy, zz, xy, xz, yz = s.T
     normal = (xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2
     return np.sqrt(0.5 * normal + 3 * (xy**2 + xz**2 + yz**2))
+
+
+def _of_vector(attribute: str, axis: int, table: PointTable) -> np.ndarray:
+    return _column(getattr(table, attribute), axis)
+
+
+def _exported(k: int, table: PointTable) -> np.ndarray:
+    return table._exported[:, k].copy()
+
+
+# Columns of every scene. Those with None only some materials or fields have; in other scenes they
+# are 0, as in Karamelo.
+COLUMNS: dict[str, Callable[[PointTable], np.ndarray] | None] = {
+    "id": lambda table: table.ids + 1,
+    "type": lambda table: table.solid + 1,
+    **{name: partial(_of_vector, *where) for name, where in VECTORS.items()},
+    **{f"s{name}": partial(_exported, k) for k, name in enumerate(COMPONENTS)},
+    **{f"e{name}": partial(_exported, STRAIN + k) for k, name in enumerate(COMPONENTS)},
+    "seq": lambda table: _von_mises(table._exported[:, :STRAIN]),
+    "volume": lambda table: table.reference_volume * table._exported[:, JACOBIAN],
+    "mass": lambda table: table.mass.astype(float),
+    **dict.fromkeys(("damage", "damage_init", "bx", "by", "bz", "ep", "epdot", "T")),
+    "ienergy": partial(_exported, ENERGY),
+    "gamma": None,
+}

@@ -20,18 +20,19 @@ class Quantity:
     """A named number of the running scene.
 
     It is one of the words ``step``, ``dt``, ``time``; a variable of the script; a value published
-    by a fix or a compute (``Ek``, ``v_x``); or a `formula` written on the spot (``Ek + Es``). With
-    `words` it may be ``limit``, too, whose content is a word.
+    by a fix or a compute (``Ek``, ``v_x``); or a `formula` written on the spot (``Ek + Es``).
     """
 
     script_kind = "a quantity"
 
-    def __init__(self, hub: Scene, name: str, formula: Any = None, words: bool = False):
+    words = False  # it may be ``limit``, whose content is a word
+
+    def __init__(self, hub: Scene, name: str, formula: Any = None):
         self.hub = hub
         self.name = name
         self.formula = formula
         self._told = False  # whether the user knows of a NaN
-        self.is_word = words and name == LIMIT and name not in self.names(hub)
+        self.is_word = self.words and name == LIMIT and name not in self.names(hub)
         if self.is_word:
             return
         if formula is None and name not in self.names(hub):
@@ -49,12 +50,12 @@ class Quantity:
             )
 
     @classmethod
-    def from_script(cls, hub: Scene, argument: Argument, words: bool = False) -> Quantity:
+    def from_script(cls, hub: Scene, argument: Argument) -> Quantity:
         """Read the quantity that a script's argument means; errors mark the argument."""
         text = argument.text.strip().strip('"')
         try:
-            if text in cls.names(hub) or (words and text == LIMIT):
-                return cls(hub, text, words=words)
+            if text in cls.names(hub) or (cls.words and text == LIMIT):
+                return cls(hub, text)
             return cls(hub, text, argument.value(hub))
         except ScriptError as error:
             if error.place is None:
@@ -121,12 +122,9 @@ class Quantity:
 
 
 class Logged(Quantity):
-    """For signatures: a quantity, or the word ``limit``."""
+    """A quantity, or the word ``limit``."""
 
-    @classmethod
-    def from_script(cls, hub: Scene, argument: Argument) -> Quantity:
-        """See `Quantity.from_script`."""
-        return Quantity.from_script(hub, argument, words=True)
+    words = True
 
 
 def _variables(hub: Scene) -> dict[str, Any]:

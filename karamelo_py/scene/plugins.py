@@ -17,8 +17,7 @@ from karamelo_py.kernels import table
 from karamelo_py.kernels.hooks import ACTS_ON, STAGES, CompiledHook
 from karamelo_py.language import faults, registry
 from karamelo_py.language.scene import Scene
-from karamelo_py.output.fields import ABSENT_AT_POINTS, PARTICLE_NAMES
-from karamelo_py.output.node_columns import ABSENT_AT_NODES, NODE_NAMES
+from karamelo_py.output import node_columns, point_table
 from karamelo_py.output.point_table import declared_columns
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import KINEMATICS
@@ -36,11 +35,7 @@ ROWS = (
     table.AtPoints, table.AtNodes, table.Gather, table.Scatter, table.NodeTask, table.SceneTask,
     table.Check,
 )  # fmt: skip
-# Columns of points and nodes in every scene, and those of them that only some scenes fill.
-COLUMNS = {
-    "point_fields": (PARTICLE_NAMES, ABSENT_AT_POINTS),
-    "node_fields": (NODE_NAMES, ABSENT_AT_NODES),
-}
+COLUMNS = {"point_fields": point_table.COLUMNS, "node_fields": node_columns.COLUMNS}
 HOOKS_BEGIN = ("initial_", "post_", "final_", "supply_")
 ALIKE = 0.85  # so much of a name has to be that of a hook
 
@@ -208,8 +203,7 @@ def _wrong_size(kind: type, domain: Any) -> str:
 
 def _shows(hub: Scene, column: str, kind: type | None, where: str = "point_fields") -> str:
     """Say what a column shows already, if that is not this field (None: a law)."""
-    names, absent = COLUMNS[where]
-    if column in names and column not in absent:
+    if COLUMNS[where].get(column) is not None:
         return "one of every scene"
     if kind is not None and where == "point_fields" and column in hub.fields.columns_of_laws():
         return "one of a material"
