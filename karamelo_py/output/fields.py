@@ -1,6 +1,7 @@
 """Fields of points and nodes for output, in the order of their ids."""
 
-from collections.abc import Callable, Iterator, Sequence
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,15 +18,13 @@ from karamelo_py.points.boundary import Bounces
 from karamelo_py.points.laws import can, dissipated_energy, energy_density
 from karamelo_py.points.laws.eos import initial_energy, taken_heat
 from karamelo_py.points.laws.plastic_rate import has_rate
+from karamelo_py.script.errors import ScriptError, unknown
 
 PIECE = 1 << 17  # points that are looked at together
 
 
 class Fields(PointTable):
-    """The points and nodes of the running scene: columns of all points, sums over them, names.
-
-    N counts all points there have ever been. `members` leaves deleted ones out.
-    """
+    """The points and nodes of the running scene: columns of all points, sums over them, names."""
 
     def __init__(self, hub: Scene):
         self.hub = hub
@@ -47,10 +46,7 @@ class Fields(PointTable):
         return simulation.rows()
 
     def pieces(self, *, to_first: bool = False) -> Iterator[PointTable]:
-        """The points, so many at a time, in the order of their ids.
-
-        With `to_first`, of several processes the first alone gets them.
-        """
+        """The points, so many at a time, by id; with `to_first` the first process gets them all."""
         return self._simulation.pieces(to_first=to_first)
 
     @property
@@ -59,7 +55,7 @@ class Fields(PointTable):
         return sum(lattice.node_count for lattice in self.hub.lattices)
 
     def members(self, group: Any) -> np.ndarray:
-        """Ids (0-based) of a particle group."""
+        """Ids (0-based) of a particle group, without deleted points."""
         return self._simulation.members(group)
 
     def kinetic_energy(self, group: Any) -> float:
@@ -85,7 +81,7 @@ class Fields(PointTable):
     def each(self, part: Any, name: str, *arguments: Any) -> list:
         """List what a method of a part says of fields of some points of its group after others.
 
-        Which points are together, and in what order they come, depends on processes and steps.
+        Which points are together, and their order, depends on processes and steps.
         """
         return self._simulation.each(part, name, *arguments)
 
@@ -117,10 +113,7 @@ class Fields(PointTable):
         return absent(node_columns.COLUMNS, present)
 
     def node_pieces(self, names: Sequence[str], *, to_first: bool = False) -> Iterator[NodeFields]:
-        """Fields of all nodes, of which `names` are asked for, so many nodes at a time.
-
-        With `to_first`, of several processes the first alone gets them.
-        """
+        """Fields of all nodes, of which `names` are asked for, so many at a time, see `pieces`."""
         brought = [name for name in names if name in BROUGHT]
         for rows in self._simulation.node_pieces(brought, to_first=to_first):
             yield NodeFields(self.hub, rows)
@@ -187,3 +180,41 @@ SUMMED = {
     "born with": _born_with,
     "bounces": _bounces,
 }
+
+# ---- columns that are asked for by name, and may be none ----------------------------------------
+
+# Columns, and other words for what they are together.
+_QUANTITIES = {
+    "s11 s22 s33 s12 s13 s23 seq": ("stress", "sigma", "sig", "p", "pressure"),
+    "seq": ("mises", "vonmises", "von_mises", "svm"),
+    "e11 e22 e33 e12 e13 e23": ("strain", "eps", "epsilon"),
+    "x y z": ("pos", "position", "positions", "coord", "coordinates"),
+    "vx vy vz": ("vel", "velocity", "v"),
+    "fx fy fz": ("force", "forces", "f"),
+    "x y z x0 y0 z0": ("u", "disp", "displacement"),
+    "T": ("temp", "temperature"),
+}
+
+
+def check_columns(columns: Sequence[str], known: Sequence[str], *, first: int) -> None:
+    """Refuse names that are not `known`; `first` is the place of the first among the arguments."""
+    for index, name in enumerate(columns):
+        if name not in known:
+            raise unknown_column(f"unknown column '{name}'", name, known, argument=first + index)
+
+
+def unknown_column(message: str, name: str, known: Iterable[str], **where: Any) -> ScriptError:
+    """Make the error for a column that is none of the `known`; `where` it stands."""
+    known = list(known)
+    error = unknown(message, name, known, **where)
+    quantity = next((q for q, words in _QUANTITIES.items() if name.lower() in words), "")
+    if there := [column for column in quantity.split() if column in known]:
+        error.hint = f"did you mean {', '.join(there)}?"
+    component = re.fullmatch(r"(s|sigma|stress|e|eps|strain)_?([xyz123])([xyz123])", name.lower())
+    if component is not None:
+        i, j = sorted("xyz".find(axis) + 1 or int(axis) for axis in component.groups()[1:])
+        tensor = "e" if component[1] in ("e", "eps", "strain") else "s"
+        error.hint = f"did you mean '{tensor}{i}{j}'?"
+    if name[:2] in ("v_", "c_"):  # as in LAMMPS
+        error.hint = f"log_modify(custom, step, time, {name[2:]}) writes one number"
+    return error

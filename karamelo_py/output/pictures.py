@@ -5,6 +5,7 @@ Axes, labels and the bar of colours are a background that is drawn once and then
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import product
 from typing import Any, BinaryIO, NamedTuple
 
@@ -103,21 +104,11 @@ class Picture:
             self.axes.set_axis_off()
         self._add_legend()
 
-    def _prepare(self) -> Any:
-        """Set up axes; return the artist that shows the points."""
-        raise NotImplementedError
-
-    def _rows(self, ids: np.ndarray, x: np.ndarray, values: np.ndarray, side: float) -> np.ndarray:
-        """List what shows of points at x (n, 3), in the order in which they are drawn."""
-        raise NotImplementedError
-
-    def place(self, rows: np.ndarray) -> None:
-        """Hand what shows of some points to the artist."""
-        raise NotImplementedError
-
-    def _apply_limits(self, lo: float, hi: float) -> None:
-        """Take new limits of the field."""
-        raise NotImplementedError
+    _prepare: Callable[[], Any]  # sets up axes and returns the artist that shows the points
+    # Lists what shows of points at x (n, 3), in the order in which they are drawn.
+    _rows: Callable[[np.ndarray, np.ndarray, np.ndarray, float], np.ndarray]
+    place: Callable[[np.ndarray], None]  # hands what shows of some points to the artist
+    _apply_limits: Callable[[float, float], None]  # takes new limits of the field
 
     def _apply_beyond(self, below: bool, above: bool) -> None:
         """Mark the ends of the colours beyond which there are values."""

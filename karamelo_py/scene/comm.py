@@ -25,6 +25,11 @@ class SerialComm:
         """Tell whether this is the first process, which writes."""
         return self.rank == 0
 
+    @property
+    def share_here(self) -> float:
+        """Part of the scene that is on this machine."""
+        return self.on_machine / self.size
+
     @contextmanager
     def joint(self) -> Iterator[None]:
         """Note an error in what all do together: the others would wait for ever."""

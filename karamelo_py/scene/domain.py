@@ -6,10 +6,8 @@ import numpy as np
 
 from karamelo_py.language.own_words import words_of
 from karamelo_py.language.scene import Scene
-from karamelo_py.scene.lattice import CHUNK, RELATIVE_TOLERANCE, Lattice
+from karamelo_py.scene.lattice import RELATIVE_TOLERANCE, Lattice
 from karamelo_py.script.errors import Place, ScriptError
-
-__all__ = ["CHUNK", "Domain", "require_domain", "require_grid"]
 
 
 class Domain:

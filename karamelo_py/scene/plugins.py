@@ -208,7 +208,7 @@ def _shows(hub: Scene, column: str, kind: type | None, where: str = "point_field
     if kind is not None and where == "point_fields" and column in hub.fields.columns_of_laws():
         return "one of a material"
     other = declared_columns(hub, where).get(column, (kind, 0))[0]
-    return "" if other is kind else f"one of the field {other.__name__}"
+    return "" if other in (None, kind) else f"one of the field {other.__name__}"
 
 
 def _shown(kind: Any) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -12,7 +12,8 @@ from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
 from karamelo_py.points.laws import can, law_kind, specific_volume
 from karamelo_py.points.laws.temperatures import initial_heat
-from karamelo_py.scene.domain import CHUNK, Domain, require_domain
+from karamelo_py.scene.domain import Domain, require_domain
+from karamelo_py.scene.lattice import CHUNK
 from karamelo_py.scene.material import Material
 from karamelo_py.scene.placement import MAX_POINTS, Placement
 from karamelo_py.scene.region import look_up
@@ -131,17 +132,9 @@ class Solid:
                 hint=f"make the domain larger or the {self.described().split()[0]} smaller",
             )
 
-    def described(self) -> str:
-        """Describe the source of the points in words, such as ``region 'disk'``."""
-        raise NotImplementedError
-
-    def why_empty(self) -> str:
-        """Why there are no points, though none lies outside the domain."""
-        raise NotImplementedError
-
-    def wanted(self) -> str:
-        """Describe a source that would give points."""
-        raise NotImplementedError
+    described: Callable[[], str]  # the source of the points in words, such as ``region 'disk'``
+    why_empty: Callable[[], str]  # why there are no points, though none lies outside the domain
+    wanted: Callable[[], str]  # a source that would give points
 
     @property
     def count(self) -> int:
@@ -195,8 +188,7 @@ def named(hub: Scene, number: int) -> str:
 
 def own_grids(hub: Scene) -> bool:
     """Return True if the method lays a grid of its own for each solid."""
-    method = hub.update.method
-    return method is not None and method.own_grids
+    return getattr(hub.update.method, "own_grids", False)
 
 
 def _cell_size(hub: Scene, domain: Domain, h: float) -> float:
@@ -231,8 +223,8 @@ def coinciding(a: Solid, b: Solid) -> bool:
     """Return True if points of `a` coincide with points of `b`; of many, a sample is tested."""
     if not a.count or not b.count:
         return False
-    (low, high), (other_low, other_high) = _box(a), _box(b)
-    lo, hi = np.maximum(low, other_low), np.minimum(high, other_high)
+    lows, highs = zip(_box(a), _box(b), strict=True)
+    lo, hi = np.maximum(*lows), np.minimum(*highs)
     if (lo > hi).any():
         return False
     of_a = np.concatenate([_within(x, lo, hi) for _, x in a.pieces()])

@@ -88,13 +88,8 @@ class View:
             if not np.array_equal(now, before, equal_nan=True):
                 self._put(kind, now)
 
-    def _get(self, kind: type) -> np.ndarray:
-        """(n, components) of a declared field."""
-        raise NotImplementedError
-
-    def _put(self, kind: type, value: np.ndarray) -> None:
-        """Write a declared field."""
-        raise NotImplementedError
+    _get: Callable[[type], np.ndarray]  # (n, components) of a declared field
+    _put: Callable[[type, np.ndarray], None]
 
     def __setattr__(self, name: str, value: Any) -> None:
         known = name in self._fields or name.startswith("_")

@@ -10,7 +10,7 @@ from karamelo_py.app.logs import read_log
 from karamelo_py.app.studies import look
 from karamelo_py.app.studies.curves import GroupedRuns
 from karamelo_py.output.files import savefig
-from karamelo_py.output.plot_style import blank_figure, tidy
+from karamelo_py.output.plots import blank_figure, tidy
 from karamelo_py.script.errors import ScriptError, unknown
 
 DECADES = 1e4  # curves that reach over more are drawn on a logarithmic axis

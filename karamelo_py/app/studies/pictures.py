@@ -9,7 +9,7 @@ import numpy as np
 from karamelo_py.app.studies import look
 from karamelo_py.app.studies.curves import Family, column, usable
 from karamelo_py.output.files import savefig
-from karamelo_py.output.plot_style import blank_figure, tick_text, tidy
+from karamelo_py.output.plots import blank_figure, tick_text, tidy
 from karamelo_py.script.errors import plural
 from karamelo_py.script.terms import number_of
 
