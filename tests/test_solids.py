@@ -100,7 +100,7 @@ def test_points_do_not_depend_on_chunks(monkeypatch):
         return hub.solid("s", hub.region("r", Sphere, 0.5, 0.5, 0.5, 0.4)).x0
 
     whole_at_once = points()
-    monkeypatch.setattr("karamelo_py.scene.domain.CHUNK", 100)
+    monkeypatch.setattr("karamelo_py.scene.lattice.CHUNK", 100)
     np.testing.assert_array_equal(points(), whole_at_once)
 
 

@@ -66,12 +66,6 @@ class NodeFields:
         ]
 
 
-def kind_of_grid(nodes: NodeFields) -> np.ndarray:
-    """Return the number of the grid, from 1."""
-    begins = [lattice.first for lattice in nodes.hub.lattices]
-    return np.searchsorted(begins, nodes.ids, side="right")
-
-
 def mask(nodes: NodeFields) -> np.ndarray:
     """Karamelo's bits: 1 for all nodes, 2 for those of the first group, 4 of the second, ..."""
     bits = np.ones(len(nodes.ids))
@@ -147,7 +141,9 @@ def vector(name: str, array: str, first: Callable = lambda kin: 0) -> dict[str, 
 # Columns of every scene; those with None only some scenes have, in others they are 0.
 COLUMNS: dict[str, Callable[[NodeFields], np.ndarray] | None] = {
     "id": lambda nodes: nodes.ids,
-    "type": kind_of_grid,
+    "type": lambda nodes: np.searchsorted(
+        [grid.first for grid in nodes.hub.lattices], nodes.ids, side="right"
+    ),
     **{axis: lambda nodes, k=k: nodes.positions()[:, k] for k, axis in enumerate(AXES)},
     **vector("v*", "velocity"),
     **vector("v*_update", "update"),
@@ -174,11 +170,6 @@ def _volume(simulation: Any, block: Any) -> np.ndarray:
     return volumes_before(simulation.hub, points.id) * rows[:, JACOBIAN]
 
 
-def _rigid(simulation: Any, block: Any) -> np.ndarray | None:
-    """1 where a rigid solid takes part, else 0."""
-    return np.ones(len(block.points.id)) if can(block.laws, constrained_velocity) else None
-
-
 def _force(axis: int, simulation: Any, block: Any) -> np.ndarray | None:
     force = fields.field(block.points.fields, Force)
     return None if force is None or axis >= len(force) else force[axis]
@@ -187,7 +178,9 @@ def _force(axis: int, simulation: Any, block: Any) -> np.ndarray | None:
 # What `of(simulation, block)` says of each point of a block, if anything.
 BROUGHT: dict[str, Callable[[Any, Any], np.ndarray | None]] = {
     "vol": _volume,
-    "rigid": _rigid,
+    "rigid": lambda simulation, block: (  # 1 where a rigid solid takes part
+        np.ones(len(block.points.id)) if can(block.laws, constrained_velocity) else None
+    ),
     **{f"b{axis}": partial(_force, k) for k, axis in enumerate(AXES)},
 }
 

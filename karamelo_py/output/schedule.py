@@ -23,9 +23,6 @@ class Output:
     Each of them is due at the first and the last state of every run and at the multiples of its
     `every`, counted in absolute steps or time, so that a further run goes on in the same rhythm.
     No state is written twice to the same file. In a rehearsal nothing is written.
-
-    A run calls ``begin``, then again and again ``next_step`` and ``write``, then ``end``;
-    ``abort`` stands in for ``end`` when the run breaks off.
     """
 
     def __init__(self, hub: Scene):
@@ -132,8 +129,7 @@ class Output:
     def abort(self) -> None:
         """Draw the plots, complete dumps and close the log of a run that breaks off.
 
-        No further state is written: a caller that holds a sound one calls ``write(last=True)``
-        before. What prevents them is told as a warning, as another error is on its way.
+        No further state is written. What prevents them is told as a warning.
         """
         if self.hub.rehearsing:
             return

@@ -153,13 +153,6 @@ def _numbers_of(solid: Solid) -> Iterator[np.ndarray]:
         yield np.arange(first, min(first + CHUNK, end))
 
 
-def united(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """The numbers in one or the other of two ascending arrays, each once, ascending."""
-    if not len(a) or not len(b):
-        return a if len(a) else b  # millions would be sorted for nothing
-    return np.union1d(a, b)
-
-
 class NodeGroup(Group):
     """A set of nodes, by their positions. Methods decide whether solids share them.
 
@@ -187,10 +180,10 @@ class NodeGroup(Group):
         """Members of a group that is not that of all; looked for anew where grids are others."""
         lattices = self.hub.lattices
         if self._found is None or self._found[0] is not lattices:
-            members = np.empty(0, dtype=np.int64)
-            for part in self._parts:
-                members = united(members, self._find(*part))
-            self._found = lattices, members
+            found = [numbers for part in self._parts if len(numbers := self._find(*part))]
+            # Each is ascending: millions would be sorted for nothing.
+            members = [np.unique(np.concatenate(found))] if len(found) > 1 else found
+            self._found = lattices, (members or [np.empty(0, np.int64)])[0]
         return self._found[1]
 
     def add(self, region: Region, solids: Sequence[Solid] | None) -> int:

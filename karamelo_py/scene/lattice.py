@@ -83,22 +83,17 @@ class Lattice:
 
         `lo` and `hi` (3,) may be infinite. Nodes come in the order of their numbers.
         """
-        first, last = [], []
-        for axis in range(self.dimension):
-            top = self.shape[axis] - 1
-            below = (lo[axis] - self.lo[axis]) / self.spacing - 1e-6
-            above = (hi[axis] - self.lo[axis]) / self.spacing + 1e-6
-            first.append(math.ceil(min(max(below, 0), top + 1)))
-            last.append(math.floor(min(max(above, -1), top)))
+        used = slice(self.dimension)
+        corner, shape = self.lo[used], self.shape[used]
+        below = (lo[used] - corner) / self.spacing - 1e-6
+        above = (hi[used] - corner) / self.spacing + 1e-6
+        first = np.ceil(np.clip(below, 0, shape)).astype(int).tolist()
+        last = np.floor(np.clip(above, -1, np.array(shape) - 1)).astype(int).tolist()
         if any(a > b for a, b in zip(first, last, strict=True)):
             return
-        _, *trailing = self.shape[: self.dimension]
         for index in boxes(first, last, 1):
-            number = index[:, 0].copy()
-            for axis, count in enumerate(trailing, start=1):
-                number *= count
-                number += index[:, axis]
-            yield number + self.first, self.lo[: self.dimension] + index * self.spacing
+            number = np.ravel_multi_index(tuple(index.T), shape)
+            yield number + self.first, corner + index * self.spacing
 
     def numbers(self, real: type) -> Grid:
         """The lattice as kernels read it, in the precision `real`."""
@@ -157,9 +152,4 @@ def chunks(first: Sequence[int], last: Sequence[int], weight: int) -> list[tuple
 def positions(first: Sequence[int], last: Sequence[int], start: int, end: int) -> np.ndarray:
     """Those with the numbers from `start` to before `end`."""
     counts = [b - a + 1 for a, b in zip(first, last, strict=True)]
-    number = np.arange(start, end, dtype=np.int64)
-    index = np.empty((len(number), len(counts)), dtype=np.int64)
-    for axis in range(len(counts) - 1, -1, -1):
-        number, index[:, axis] = np.divmod(number, counts[axis])
-        index[:, axis] += first[axis]
-    return index
+    return np.stack(np.unravel_index(np.arange(start, end), counts), axis=1) + first

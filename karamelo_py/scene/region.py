@@ -20,16 +20,8 @@ HALVINGS = 12  # of the way on which a surface is looked for
 class Region:
     """Base of the region styles: override `contains`.
 
-    Parameters
-    ----------
-    hub
-        The scene. Its domain must exist.
-    lo, hi
-        Corners of a box around the shape, one number per dimension; infinite where it is open.
-    exterior
-        Whether the region is what lies outside the shape.
-    parts
-        The regions it is made of, if any.
+    `lo` and `hi` are corners of a box around the shape, one number per dimension, infinite where it
+    is open. An `exterior` region is what lies outside; `parts` are regions that it is made of.
     """
 
     # Direction (0, 1, 2) and centre of the axis that a region in space is round about at the same

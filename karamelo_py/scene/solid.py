@@ -25,19 +25,9 @@ _SAMPLE = 5000
 class Solid:
     """Base of the styles of solid: a body of points. A style calls `put` with its points.
 
-    Parameters
-    ----------
-    hub
-        The scene. Its domain must exist.
-    material
-        What the points are made of.
-    h
-        Cell size. With a grid shared by all solids it must be that of the domain; a method with
-        the attribute ``own_grids`` lays a grid of its own for each solid.
-    T0
-        Initial temperature; None for that of the material.
-    glued_to
-        The solid with which this one shares a velocity field, in methods that have several.
+    Where all solids share a grid the cell size `h` is that of the domain; a method with the
+    attribute ``own_grids`` lays a grid for each. Without an initial temperature `T0` the material
+    says it. With the solid that it is `glued_to` it shares a velocity field in methods of several.
     """
 
     id: str = ""
@@ -114,7 +104,13 @@ class Solid:
         volume = np.asarray(placement.volume, float)
         if self.domain.axisymmetric:
             radius = placement.x0[:][:, 0]
-            self._check_radii(radius)
+            if count and radius.min() <= 0:  # a point on the axis itself would have no mass
+                raise ScriptError(
+                    f"points at x = {radius.min():g}: in an axisymmetric domain x is the radius, "
+                    "and points lie at x > 0",
+                    argument=self.source,
+                    expected=f"a {self.described().split()[0]} at x >= 0",
+                )
             volume = volume * radius
         # As in `Placement`, but volumes are per radian where the domain is axisymmetric. Equal ones
         # are stored once, however many points there are. All is to be read only.
@@ -164,16 +160,6 @@ class Solid:
     def from_script(cls, hub: Scene, argument: Argument) -> Solid:
         """The solid that `argument` names."""
         return look_up(hub.solids, argument)
-
-    def _check_radii(self, radius: np.ndarray) -> None:
-        # A point on the axis itself would have no mass.
-        if len(radius) and radius.min() <= 0:
-            raise ScriptError(
-                f"points at x = {radius.min():g}: in an axisymmetric domain x is the radius, "
-                "and points lie at x > 0",
-                argument=self.source,
-                expected=f"a {self.described().split()[0]} at x >= 0",
-            )
 
 
 def solid_with(hub: Scene, number: int) -> Solid:

@@ -40,10 +40,7 @@ class Bins:
         return np.clip(((x - self.lo) / self.size).astype(np.int64), 0, self.cells - 1)
 
     def _number(self, index: np.ndarray) -> np.ndarray:
-        number = index[:, 0].copy()
-        for axis in range(1, index.shape[1]):
-            number = number * self.cells[axis] + index[:, axis]
-        return number
+        return np.ravel_multi_index(tuple(index.T), tuple(self.cells))
 
     def _file(self, first, spans, filed) -> tuple[np.ndarray, np.ndarray]:
         """Boxes in the order of cells, and where those of each cell begin."""
