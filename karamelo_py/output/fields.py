@@ -32,10 +32,6 @@ class Fields(PointTable):
         self._cache: dict[str, Any] = {}
 
     @property
-    def _simulation(self) -> Any:
-        return self.hub.simulation
-
-    @property
     def _rows(self) -> Rows:
         """All points; the cache of what was made of them is forgotten when they have gone on."""
         simulation = self.hub.simulation
@@ -47,7 +43,7 @@ class Fields(PointTable):
 
     def pieces(self, *, to_first: bool = False) -> Iterator[PointTable]:
         """The points, so many at a time, by id; with `to_first` the first process gets them all."""
-        return self._simulation.pieces(to_first=to_first)
+        return self.hub.simulation.pieces(to_first=to_first)
 
     @property
     def node_count(self) -> int:
@@ -56,19 +52,19 @@ class Fields(PointTable):
 
     def members(self, group: Any) -> np.ndarray:
         """Ids (0-based) of a particle group, without deleted points."""
-        return self._simulation.members(group)
+        return self.hub.simulation.members(group)
 
     def kinetic_energy(self, group: Any) -> float:
         """sum m v^2 / 2 of a particle group."""
-        return self._simulation.total("kinetic", group)
+        return self.hub.simulation.total("kinetic", group)
 
     def strain_energy(self, group: Any) -> float:
         """Stored energy of a particle group."""
-        return self._simulation.total("stored", group)
+        return self.hub.simulation.total("stored", group)
 
     def dissipated_energy(self, group: Any) -> float:
         """Dissipated energy of a particle group."""
-        return self._simulation.total("dissipated", group)
+        return self.hub.simulation.total("dissipated", group)
 
     def added_up(self, part: Any, name: str = "terms", *arguments: Any) -> np.ndarray:
         """Sums (k,) over the points of a part's group, rounded once: of processes and of one alike.
@@ -76,14 +72,14 @@ class Fields(PointTable):
         The method `name` of the part, a compute or fix as it stands in the scene, is called with
         fields of some of the points after others, and `arguments`, and returns terms (k, n).
         """
-        return self._simulation.added_up(part, name, *arguments)
+        return self.hub.simulation.added_up(part, name, *arguments)
 
     def each(self, part: Any, name: str, *arguments: Any) -> list:
         """List what a method of a part says of fields of some points of its group after others.
 
         Which points are together, and their order, depends on processes and steps.
         """
-        return self._simulation.each(part, name, *arguments)
+        return self.hub.simulation.each(part, name, *arguments)
 
     def particle_names(self) -> list[str]:
         """Names that `particle` knows."""
@@ -115,19 +111,19 @@ class Fields(PointTable):
     def node_pieces(self, names: Sequence[str], *, to_first: bool = False) -> Iterator[NodeFields]:
         """Fields of all nodes, of which `names` are asked for, so many at a time, see `pieces`."""
         brought = [name for name in names if name in BROUGHT]
-        for rows in self._simulation.node_pieces(brought, to_first=to_first):
+        for rows in self.hub.simulation.node_pieces(brought, to_first=to_first):
             yield NodeFields(self.hub, rows)
 
     def mass_at_nodes(self, group: Any) -> np.ndarray:
         """(4,) the mass of the nodes of a group, and this times x, y and z; rounded once."""
-        self._simulation.show_on_nodes()
-        return self._simulation.mass_at_nodes(group.id)
+        self.hub.simulation.show_on_nodes()
+        return self.hub.simulation.mass_at_nodes(group.id)
 
     @property
     def occupied_nodes(self) -> tuple[int, int]:
         """The number of nodes with mass, and the last of them."""
-        self._simulation.show_on_nodes()
-        return self._simulation.occupied_nodes()
+        self.hub.simulation.show_on_nodes()
+        return self.hub.simulation.occupied_nodes()
 
     def node(self, name: str) -> np.ndarray:
         """A field of all nodes, (n,); nodes without mass are at rest."""

@@ -1,6 +1,6 @@
 """Fields of nodes for output, in the order of their numbers."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from math import frexp
 from typing import Any, NamedTuple
@@ -51,19 +51,22 @@ class NodeFields:
 
     def positions(self) -> np.ndarray:
         """Return where they are, (n, 3)."""
-        found = np.empty((len(self.ids), 3))
-        for lattice, own in self.lattices():
-            found[own] = lattice.positions(self.ids[own])
-        return found
+        return places_of(self.hub, self.ids)
 
-    def lattices(self) -> list[tuple[Any, slice]]:
-        """List the grids that they belong to, and which of them do."""
-        ends = ((one, one.first + one.node_count) for one in self.hub.lattices)
-        return [
-            (one, slice(*np.searchsorted(self.ids, (one.first, end)).tolist()))
-            for one, end in ends
-            if one.first < self.rows.end and end > self.rows.first
-        ]
+
+def by_lattice(hub: Scene, nodes: np.ndarray) -> Iterator[tuple[Any, slice]]:
+    """Yield the grids of a scene, and which of some nodes, of ascending numbers, are of each."""
+    for lattice in hub.lattices:
+        ends = lattice.first, lattice.first + lattice.node_count
+        yield lattice, slice(*np.searchsorted(nodes, ends))
+
+
+def places_of(hub: Scene, nodes: np.ndarray) -> np.ndarray:
+    """(n, 3) positions of nodes, of ascending numbers."""
+    found = np.empty((len(nodes), 3))
+    for lattice, own in by_lattice(hub, nodes):
+        found[own] = lattice.positions(nodes[own])
+    return found
 
 
 def mask(nodes: NodeFields) -> np.ndarray:
@@ -90,7 +93,9 @@ def kind_of_node(axis: int, nodes: NodeFields) -> np.ndarray:
     basis = nodes.hub.update.method.basis
     splines = type(basis).__name__ in ("QuadraticSpline", "CubicSpline")
     found = np.zeros(len(nodes.ids))
-    for lattice, own in nodes.lattices() if axis < nodes.hub.domain.dimension else ():
+    if axis >= nodes.hub.domain.dimension:
+        return found
+    for lattice, own in by_lattice(nodes.hub, nodes.ids):
         i, last = lattice.places(nodes.ids[own])[:, axis], lattice.shape[axis] - 1
         if splines:
             found[own] = np.minimum(2, i) - np.minimum(2, last - i)

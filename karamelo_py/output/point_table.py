@@ -73,6 +73,9 @@ class Rows(NamedTuple):
         """Gather (n, ...) a field, which `of` takes from `Points`; zero for deleted points."""
         own = [(part.places, part.taken(of(part.block.points))) for part in self.parts]
         found = np.zeros((*own[0][1].shape[:-1], len(self.ids)), own[0][1].dtype)
+        return self._filled(found, own)
+
+    def _filled(self, found: np.ndarray, own: list[tuple]) -> np.ndarray:
         for places, array in self.of_all(own):
             found[..., places] = array
         return found.T
@@ -92,9 +95,7 @@ class Rows(NamedTuple):
             return None
         found = fields.at_points(kind, self.s.kin, len(self.ids), float).array
         own = [(part.places, part.taken(array)) for part, array in arrays if array is not None]
-        for places, array in self.of_all(own):
-            found[:, places] = array
-        return found.T
+        return self._filled(found, own)
 
     def computed(self, of: Callable[[Block], Callable | None], *columns: int) -> np.ndarray:
         """Compute (n, *columns) numbers of each point by a kernel.
@@ -109,11 +110,8 @@ class Rows(NamedTuple):
             if len(points.id) and (fill := of(part.block.laws)):
                 rows = np.zeros((len(points.id), *columns))
                 fill(s.kin, s.nodes.sums[0, MASS], points, part.block.laws, rows)
-                own.append((part.places, rows))
-        found = np.zeros((len(self.ids), *columns))
-        for places, rows in self.of_all(own):
-            found[places] = rows
-        return found
+                own.append((part.places, rows.T))
+        return self._filled(np.zeros((*columns, len(self.ids))), own)
 
 
 class PointTable:

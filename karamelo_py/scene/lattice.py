@@ -24,7 +24,7 @@ class Lattice:
     one cell.
 
     Cells have the size `h`, and `nodes_per_cell` 1, or 2 with nodes in their middle, too. Nodes are
-    numbered from `first` on; there are at least `least_nodes` per direction, of which those beyond
+    numbered from `first` on. There are at least `least_nodes` per direction, of which those beyond
     the box stay without mass. `cells` and `shape` (3,) count cells and nodes, 1 in unused
     directions. More nodes than can be counted are an error.
     """
@@ -37,18 +37,17 @@ class Lattice:
         h: float,
         nodes_per_cell: int = 1,
         least_nodes: int = 2,
-        first: int = 0,
     ):
         self.dimension = dimension
         self.lo, self.hi = np.zeros((2, 3))
         self.lo[:dimension], self.hi[:dimension] = lo[:dimension], hi[:dimension]
         self.h = float(h)
         self.nodes_per_cell = nodes_per_cell
-        self.first = first
+        self.first = 0  # number of the first node, see `numbered`
         lengths = (self.hi - self.lo)[:dimension]
         cells = [max(1, math.ceil(length / h - RELATIVE_TOLERANCE)) for length in lengths]
         nodes = [max(n * nodes_per_cell + 1, least_nodes) for n in cells]
-        if first + math.prod(nodes) > MAX_NODES:
+        if math.prod(nodes) > MAX_NODES:
             raise ScriptError(
                 f"cell size {h:g} gives a grid of {math.prod(nodes):.3g} nodes",
                 argument="h",

@@ -148,9 +148,9 @@ def _declared(kind: type, of: str, missing: str = "") -> Callable:
 
 
 class NodesView(View):
-    """The nodes of a group that carry mass, at one stage of a step, numbers `index` (n,)::
+    """The nodes `index` (n,) of a group that carry mass, at one stage of a step.
 
-    nodes.force += nodes.mass[:, None] * self.gravity
+    A hook writes ``nodes.force += nodes.mass[:, None] * self.gravity``.
     """
 
     _fields = ("dt", "kick", "time", "index")

@@ -6,7 +6,7 @@ import numpy as np
 
 from karamelo_py.kernels.arrays import MASS, Setup
 from karamelo_py.output.fields import PIECE
-from karamelo_py.output.node_columns import NodeRows, brought, loaded
+from karamelo_py.output.node_columns import NodeRows, brought, loaded, places_of
 from karamelo_py.run.checkpoint.arrays import kept_at_nodes, of_nodes
 from karamelo_py.run.tiles.boxes import numbers
 
@@ -91,16 +91,7 @@ class ByNumber:
         )
         mass = self.setup.nodes.sums[nodes, MASS].astype(float)
         ones = np.ones(len(nodes))
-        return self.summed(mass[:, None] * np.column_stack([ones, self.places_of(nodes)]))
-
-    def places_of(self, nodes: np.ndarray) -> np.ndarray:
-        """(n, 3) positions of nodes, of ascending numbers."""
-        x = np.empty((len(nodes), 3))
-        for lattice in self.hub.lattices:
-            ends = lattice.first, lattice.first + lattice.node_count
-            rows = slice(*np.searchsorted(nodes, ends))
-            x[rows] = lattice.positions(nodes[rows])
-        return x
+        return self.summed(mass[:, None] * np.column_stack([ones, places_of(self.hub, nodes)]))
 
     def occupied_nodes(self) -> tuple[int, int]:
         """Count the nodes that have mass, and find the last of them."""
