@@ -1,25 +1,8 @@
 """Fixes and computes: what acts on a run and what measures it (LAMMPS's and Karamelo's Modify).
 
-A fix overrides the hooks it needs, by the names of Karamelo:
-
-=============================  =================================================================
-``initial_integrate``          before anything else in the step; gets :class:`PointsView`
-``post_particles_to_grid``     mass, momentum and force are on the nodes; :class:`NodesView`
-``post_update_grid_state``     v* is known; :class:`NodesView`
-``post_grid_to_point``         the points have their new velocity and place; :class:`PointsView`
-``post_advance_particles``     the same moment, after all ``post_grid_to_point``
-``post_velocities_to_grid``    the velocity that will deform the points; :class:`NodesView`
-``post_heat_to_grid``          the temperature of the nodes is known; :class:`NodesView` of heat
-``supply_heat``                points may get heat; :class:`PointsView` with ``heat_supply``
-``post_update_grid_heat``      the temperature after the step is known; :class:`NodesView` of heat
-``final_integrate``            the end of the step; :class:`PointsView`
-=============================  =================================================================
-
-The last three are those of thermo-mechanical methods. In a view of heat, ``velocity`` is the
-temperature, (n, 1), ``mass`` the heat capacity and ``force`` the heat flow.
-
-A hook is either a method, called with a view of the group (Python comes back at that stage of each
-step), or the result of :func:`node_hook` or :func:`point_hook`, which is compiled into the loop.
+A fix overrides the hooks it needs, by the names of Karamelo: the page on plug-ins lists them. Each
+is either a method, called with a view of the group (Python comes back at that stage of each step),
+or the result of :func:`node_hook` or :func:`point_hook`, which is compiled into the loop.
 """
 
 from collections.abc import Callable

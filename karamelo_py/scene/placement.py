@@ -124,13 +124,6 @@ class Filled:
         return x[low - begin * m : high - begin * m] if bits is None else x[found - begin * m]
 
 
-class CellPattern(NamedTuple):
-    """The points of one cell of size 1."""
-
-    places: np.ndarray  # (m, d) from the centre of the cell
-    sizes: np.ndarray  # (m, d) or (d,) edge lengths of their domains, whose product is the volume
-
-
 def lattice_of(region: Region, domain: Domain, h: float, *, own: bool) -> Lattice:
     """The cells in which `region` is filled.
 
@@ -161,13 +154,15 @@ def offsets(ppc: int, rule: str | None = None) -> tuple[np.ndarray, np.ndarray]:
     return (np.arange(ppc) + 0.5) / ppc - 0.5, lengths
 
 
-def cell_pattern(ppc: int, dimension: int, rule: str | None = None) -> CellPattern:
-    """The `ppc`^dimension points of a cell, see `offsets`.
+def cell_pattern(
+    ppc: int, dimension: int, rule: str | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """The `ppc`^dimension points of a cell of size 1, see `offsets`: places and sizes, (m, d).
 
-    In Karamelo's order: x before y; in 3D the lowest z first.
+    In Karamelo's order: x before y; in 3D the lowest z first. Sizes that are the same are (d,).
     """
     places, lengths = (_in_order(along, dimension) for along in offsets(ppc, rule))
-    return CellPattern(places, lengths if rule == "gauss" else lengths[0])
+    return places, lengths if rule == "gauss" else lengths[0]
 
 
 def _in_order(along: np.ndarray, dimension: int) -> np.ndarray:
@@ -225,9 +220,8 @@ def fill(
     if not counted:
         first, last = inner_first, inner_last
 
-    pattern = cell_pattern(ppc, dimension, rule)
-    even = pattern.sizes.ndim == 1
-    places = pattern.places * h
+    places, sizes = (of_unit * h for of_unit in cell_pattern(ppc, dimension, rule))
+    even = sizes.ndim == 1
     x0 = Filled([int(i) for i in first], [int(i) for i in last], corner, h, places)
     numbers: list[np.ndarray] = []  # which point of the pattern each one is
     left: list[tuple[np.ndarray, Pieces]] = []
@@ -262,7 +256,7 @@ def fill(
         return _cut_off(placed, region, h / ppc, left)
     if even:
         return placed
-    sizes = pattern.sizes[np.concatenate(numbers)] * h if numbers else np.empty((0, dimension))
+    sizes = sizes[np.concatenate(numbers)] if numbers else np.empty((0, dimension))
     return placed._replace(volume=sizes.prod(axis=1), half_size=sizes / 2)
 
 

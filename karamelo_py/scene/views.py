@@ -70,8 +70,8 @@ class View:
     _fields: tuple[str, ...] = ()
 
     def __init__(self) -> None:
-        self._handed_out: dict[str, tuple[np.ndarray, np.ndarray]] = {}
-        self._declared: dict[type, tuple[np.ndarray, np.ndarray]] = {}
+        # By names of attributes, and classes of declared fields: arrays, and what was in them.
+        self._handed_out: dict[str | type, tuple[np.ndarray, np.ndarray]] = {}
 
     def _take_times(self, control: Any) -> None:
         self.dt = float(control.values[arrays.DT])
@@ -80,13 +80,13 @@ class View:
 
     def write_back(self) -> None:
         """Write what a hook has changed; called when it returns."""
-        for name, (now, before) in self._handed_out.items():
-            write = getattr(type(self), name).write
-            if write is not None and not np.array_equal(now, before, equal_nan=True):
-                write(self, now)
-        for kind, (now, before) in self._declared.items():
-            if not np.array_equal(now, before, equal_nan=True):
-                self._put(kind, now)
+        for key, (now, before) in self._handed_out.items():
+            if now is before or np.array_equal(now, before, equal_nan=True):
+                continue
+            if isinstance(key, str):
+                getattr(type(self), key).write(self, now)
+            else:
+                self._put(key, now)
 
     _get: Callable[[type], np.ndarray]  # (n, components) of a declared field
     _put: Callable[[type, np.ndarray], None]
@@ -104,10 +104,10 @@ class View:
         """(n, components) of a field that a part declares."""
         if not isinstance(kind, type):
             raise self._no_column(kind)
-        if kind not in self._declared:
+        if kind not in self._handed_out:
             array = np.array(self._get(kind))
-            self._declared[kind] = array, array.copy()
-        return self._declared[kind][0]
+            self._handed_out[kind] = array, array.copy()
+        return self._handed_out[kind][0]
 
     def __setitem__(self, kind: type, value: Any) -> None:
         self[kind][...] = value
