@@ -77,17 +77,13 @@ class Log(Rhythmic):
 
     def write(self) -> None:
         """Write one line: the quantities now."""
-        cells: list[str] = []
         numbers = [column.read() for column in self.columns]
         if self.rows is not None:
             self.rows.append(([column.heading for column in self.columns], numbers))
-        for number in numbers:
-            if isinstance(number, int | str):
-                cells.append(str(number))
-            else:
-                # A blank keeps the place of the minus sign; the first column starts at the margin
-                # for pandas' sake.
-                cells.append(f"{number: .10g}" if cells else f"{number:.10g}")
+        # A blank keeps the place of the minus sign; the first column starts at the margin for
+        # pandas' sake.
+        cells = [str(x) if isinstance(x, int | str) else f"{x: .10g}" for x in numbers]
+        cells[0] = cells[0].lstrip()
         self._put(cells)
         self.hub.console.log_line(_row(cells, self._widths))
 

@@ -161,13 +161,8 @@ def chosen_cells(mesh: meshio.Mesh, group: str | int | None) -> list[tuple[str, 
 def _members(mesh: meshio.Mesh, group: str | int) -> list[np.ndarray]:
     tags = mesh.cell_data.get("gmsh:physical", [])
     if group in mesh.cell_sets:
-        masks = []
-        for block, members in zip(mesh.cells, mesh.cell_sets[group], strict=True):
-            mask = np.zeros(len(block.data), bool)
-            if members is not None:
-                mask[np.asarray(members, int)] = True
-            masks.append(mask)
-        return masks
+        sets = zip(mesh.cells, mesh.cell_sets[group], strict=True)
+        return [np.isin(np.arange(len(b.data)), () if of is None else of) for b, of in sets]
     number, dimension = group, None
     if isinstance(group, str):
         number, dimension = mesh.field_data.get(group, (None, None))
