@@ -219,6 +219,10 @@ class Lost(Group):
     node_fields = (Unshaped,)
 
 
+class Nodal(Group):
+    node_fields = (Taken,)
+
+
 class First(Group):
     published = ()
     point_fields = (Other,)

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from karamelo_py.app.cli import main
 from karamelo_py.app.studies import look, pictures
 from karamelo_py.app.studies.curves import Family, Table, order
-from karamelo_py.output.plot_style import blank_figure, tick_text, tidy
+from karamelo_py.output.plots import blank_figure, tick_text, tidy
 
 ORDERS = {"linear": 1, "quadratic-spline": 2, "cubic-spline": 4}
 

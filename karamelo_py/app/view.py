@@ -10,9 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.output.columns import unknown_column
-from karamelo_py.output.files import picture_format, unwarned, whole
-from karamelo_py.output.movies import Frames, movie_format
+from karamelo_py.output.fields import unknown_column
+from karamelo_py.output.files import Frames, movie_format, picture_format, unwarned, whole
 from karamelo_py.output.snapshots import Snapshot, read
 from karamelo_py.script.errors import ScriptError
 

@@ -161,9 +161,14 @@ def some_points(array: np.ndarray, points: np.ndarray) -> np.ndarray:
 def at_points(kind: type, kin: Any, count: int, real: type) -> NamedTuple:
     """The field of `count` points, (components, count), as it starts."""
     array = rows_of_points((kind.shape(kin), count), real)
-    start = getattr(kind, "start", 0.0)
-    array[:] = np.array(start(kin) if callable(start) else [start], real)[:, None]
+    array[:] = _start(kind, kin, real)[:, None]
     return kind(array)
+
+
+def _start(kind: type, kin: Any, real: type) -> np.ndarray:
+    """The number, or those of all components, that a field starts from."""
+    start = getattr(kind, "start", 0.0)
+    return np.array(start(kin) if callable(start) else [start], real)
 
 
 def records(count: int, width: int, real: type) -> np.ndarray:
@@ -175,10 +180,13 @@ def records(count: int, width: int, real: type) -> np.ndarray:
 
 
 def at_nodes(kind: type, kin: Any, count: int, real: type) -> NamedTuple:
-    """The field of `count` nodes, (count, components), zero."""
+    """The field of `count` nodes, (count, components), as it starts."""
     width = kind.shape(kin)
     # Three numbers, wherever they begin, are loaded and stored as four, the width of a register.
-    return kind(records(count, width if width < 3 else -(-(width + 1) // 4) * 4, real))
+    array = records(count, width if width < 3 else -(-(width + 1) // 4) * 4, real)
+    if (start := _start(kind, kin, real)).any():
+        array[:, :width] = start
+    return kind(array)
 
 
 @shared

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.app.studies.case import COLUMNS
-from karamelo_py.output.plot_style import tick_text
+from karamelo_py.output.plots import tick_text
 from karamelo_py.script.terms import number_of
 
 # After Okabe & Ito, for eyes that see colours differently; each has a marker of its own, so that a

@@ -13,7 +13,7 @@ from karamelo_py.app.studies.curves import Family, Table, column, label, require
 from karamelo_py.app.studies.records import value
 from karamelo_py.app.studies.study import plain_table, shown, terminal
 from karamelo_py.output.files import savefig
-from karamelo_py.output.plot_style import blank_figure, tick_text, tidy
+from karamelo_py.output.plots import blank_figure, tick_text, tidy
 from karamelo_py.script.errors import ScriptError, plural, unknown
 from karamelo_py.script.terms import number_of
 

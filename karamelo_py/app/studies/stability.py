@@ -19,7 +19,7 @@ from karamelo_py.app.studies.case import said_in
 from karamelo_py.app.studies.keeping import grown
 from karamelo_py.app.studies.study import Study
 from karamelo_py.output.files import savefig
-from karamelo_py.output.plot_style import blank_figure
+from karamelo_py.output.plots import blank_figure
 from karamelo_py.script.errors import ScriptError, nearest, plural
 from karamelo_py.script.terms import number_of
 

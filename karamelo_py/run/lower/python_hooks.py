@@ -82,7 +82,8 @@ def _on_nodes(hooks: PythonHooks, s: Setup, stage: int, target: int) -> None:
 
 def _on_heat_nodes(hooks: PythonHooks, s: Setup, stage: int, target: int) -> None:
     # A temperature is to a capacity what a velocity is to a mass: the same view shows it.
-    _on_nodes(hooks, s._replace(nodes=s.heat.nodes), stage, target)
+    nodes = s.heat.nodes._replace(fields=s.nodes.fields)
+    _on_nodes(hooks, s._replace(nodes=nodes), stage, target)
 
 
 def _on_points(hooks: PythonHooks, s: Setup, stage: int, then: int) -> None:

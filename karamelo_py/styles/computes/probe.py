@@ -5,7 +5,7 @@ from typing import Annotated
 import numpy as np
 
 from karamelo_py.language.signature import Positive
-from karamelo_py.output.columns import check_columns
+from karamelo_py.output.fields import check_columns
 from karamelo_py.output.point_table import PointTable
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub

@@ -2,8 +2,11 @@
 
 import struct
 from collections.abc import Iterator
+from itertools import chain
 
 import numpy as np
+
+from karamelo_py.styles.dumps.lammps import bounds
 
 MAGIC = b"DUMPCUSTOM"
 ENDIAN, REVISION = 1, 2
@@ -22,18 +25,12 @@ class BinaryRows:
     """
 
     def _snapshot(self) -> Iterator[bytes]:
-        hub = self.hub
-        domain, update = hub.domain, hub.update
+        update = self.hub.update
         count, names = self.extent()[0], ["id", "type", *self.columns]
-        bounds = []
-        for axis in range(3):
-            # A box of no thickness is degenerate to viewers, as in the text format.
-            used = axis < domain.dimension
-            bounds += (domain.lo[axis], domain.hi[axis]) if used else (-domain.h / 2, domain.h / 2)
         line = " ".join(names).encode("ascii")
         yield struct.pack("<q", -len(MAGIC)) + MAGIC + struct.pack("<ii", ENDIAN, REVISION)
         yield struct.pack("<qqi", update.step, count, 0)  # 0: the box is not skewed
-        yield struct.pack("<6i6d", *[SHRUNK, AT_LEAST] * 3, *bounds)
+        yield struct.pack("<6i6d", *[SHRUNK, AT_LEAST] * 3, *chain(*bounds(self.hub.domain)))
         yield struct.pack("<iibd", len(names), 0, 1, update.time)  # no units, but a time
         yield struct.pack("<i", len(line)) + line
         yield struct.pack("<ii", 1, count * len(names))  # all in one piece

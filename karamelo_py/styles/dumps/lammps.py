@@ -10,6 +10,7 @@ from typing import BinaryIO, Protocol
 
 from karamelo_py.kernels.text import rows
 from karamelo_py.output.files import continued, whole
+from karamelo_py.scene.domain import Domain
 from karamelo_py.scene.hub import Hub
 from karamelo_py.styles.dumps.table import TableDump
 
@@ -137,17 +138,20 @@ class Gzipped:
         return gzip.open(path)
 
 
+def bounds(domain: Domain) -> list[tuple[float, float]]:
+    """List the ends of the box along each axis.
+
+    OVITO takes a box of no thickness for degenerate; one cell about zero is right for a slice of
+    unit width.
+    """
+    ends = zip(domain.lo.tolist(), domain.hi.tolist(), strict=True)
+    return [*ends][: domain.dimension] + [(-0.5 * domain.h, 0.5 * domain.h)] * (
+        3 - domain.dimension
+    )
+
+
 def header(hub: Hub, count: int, names: Sequence[str]) -> bytes:
     """Write the lines above the rows of a snapshot."""
-    domain = hub.domain
-    bounds = []
-    for axis in range(3):
-        lo, hi = float(domain.lo[axis]), float(domain.hi[axis])
-        if axis >= domain.dimension:
-            # OVITO takes a box of no thickness for degenerate; one cell about zero is right for a
-            # slice of unit width.
-            lo, hi = -0.5 * domain.h, 0.5 * domain.h
-        bounds.append(f"{lo:.10g} {hi:.10g}")
     units = hub.output.units
     lines = [
         *(["ITEM: UNITS", str(units)] if units else []),
@@ -158,7 +162,7 @@ def header(hub: Hub, count: int, names: Sequence[str]) -> bytes:
         "ITEM: NUMBER OF ATOMS",
         str(count),
         "ITEM: BOX BOUNDS sm sm sm",
-        *bounds,
+        *(f"{lo:.10g} {hi:.10g}" for lo, hi in bounds(hub.domain)),
         "ITEM: ATOMS " + " ".join(names),
     ]
     return ("\n".join(lines) + "\n").encode("ascii")

@@ -2,7 +2,7 @@
 
 from functools import cached_property
 
-from karamelo_py.output.movies import Frames, movie_format
+from karamelo_py.output.files import Frames, movie_format
 from karamelo_py.styles.dumps.pyplot import PyPlot
 
 FRAMES_PER_SECOND = 25

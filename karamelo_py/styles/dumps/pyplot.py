@@ -8,7 +8,7 @@ import numpy as np
 
 from karamelo_py.language.kinds import In
 from karamelo_py.language.signature import OutputFile, Positive
-from karamelo_py.output.columns import check_columns
+from karamelo_py.output.fields import check_columns
 from karamelo_py.output.files import picture_format, savefig, unwarned, whole
 from karamelo_py.output.point_table import PointTable
 from karamelo_py.output.rhythm import Every

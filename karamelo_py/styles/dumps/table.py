@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.language.signature import OutputFile
-from karamelo_py.output.columns import check_columns
+from karamelo_py.output.fields import check_columns
 from karamelo_py.output.rhythm import Every
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError

@@ -8,9 +8,8 @@ import numpy as np
 from karamelo_py.scene.domain import RELATIVE_TOLERANCE, require_domain
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.meshes.elements import elements_of
+from karamelo_py.scene.meshes.inside import Simplices, Skin, outer_faces, split
 from karamelo_py.scene.meshes.reading import MeshFile, read
-from karamelo_py.scene.meshes.simplices import Simplices, split
-from karamelo_py.scene.meshes.skin import Skin, outer_faces
 from karamelo_py.scene.region import EXTERIOR, Region
 
 

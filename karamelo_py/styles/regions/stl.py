@@ -7,9 +7,8 @@ import numpy as np
 
 from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.meshes.inside import Skin, Surface
 from karamelo_py.scene.meshes.reading import MeshFile, read
-from karamelo_py.scene.meshes.skin import Skin
-from karamelo_py.scene.meshes.surface import Surface
 from karamelo_py.scene.region import EXTERIOR, Region
 from karamelo_py.script.errors import ScriptError
 
