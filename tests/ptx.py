@@ -13,7 +13,7 @@ from numba import typeof
 
 from karamelo_py.compiler import loops, machine
 from karamelo_py.compiler.argument_buffer import ArgumentBuffer
-from karamelo_py.compiler.compile import define, index, shared
+from karamelo_py.compiler.compile import index, shared
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Nodes, Setup
@@ -140,13 +140,14 @@ def compiled(function: Any, *arguments: Any) -> Compiled:
 
 
 def calling(function: Callable, count: int) -> Callable:
-    """A kernel that writes down what a function of so many numbers gives, another tuple of them."""
-    names = ", ".join(f"a{k}" for k in range(count))
-    return define(
-        f"out, {names}",
-        f"for k, value in enumerate(function({names})): out[k] = value",
-        function=shared(function),
-    )
+    """A kernel that writes down what a function of numbers gives, another tuple of them."""
+    shared(function)
+
+    def write(out, *numbers):
+        for k, value in enumerate(function(*numbers)):
+            out[k] = value
+
+    return write
 
 
 def nodes_of(visit: Visit, setup: Setup) -> Nodes:

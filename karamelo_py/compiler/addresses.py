@@ -6,12 +6,10 @@ from typing import Any
 
 from numba import config, types
 
-from karamelo_py.compiler import code
-from karamelo_py.compiler.compile import define
 from karamelo_py.compiler.failing import noting
-from karamelo_py.compiler.intrinsics import intrinsic
 from karamelo_py.compiler.loops import address_in_memory
 from karamelo_py.compiler.lowering import function_type
+from karamelo_py.compiler.values import intrinsic
 
 _uncompiled: list[Callable] = []
 _addresses: dict[Callable, int] = {}
@@ -26,8 +24,7 @@ def address_of(function: Callable, signature: types.Type) -> int:
     """
     if function not in _addresses:
         if config.DISABLE_JIT:
-            _uncompiled.append(function)
-            _addresses[function] = len(_uncompiled) - 1
+            _addresses[function] = address_of_python(function, signature)
         else:
             kinds, result = signature.args, signature.return_type
             _addresses[function] = address_in_memory(function, kinds, result)
@@ -56,17 +53,12 @@ def caller_of(signature: Any) -> Callable:
     if config.DISABLE_JIT:
         return lambda address, *arguments: _uncompiled[address](*arguments)
 
-    def codegen(builder, _, arguments):
-        kind = function_type(parameters, result)
-        pointer = builder.inttoptr(arguments[0], kind.as_pointer())
-        made = builder.call(pointer, arguments[1:])
-        return code.nothing() if result == types.none else made
+    @intrinsic
+    def call(address, *arguments):
+        def codegen(builder, place, *values):
+            kind = function_type(parameters, result)
+            return builder.call(builder.inttoptr(place, kind.as_pointer()), values)
 
-    names = ", ".join(f"a{k}" for k in range(len(parameters)))
-    call = define(
-        f"address, {names}",
-        "return typed, codegen",
-        typed=result(types.int64, *parameters),
-        codegen=codegen,
-    )
-    return intrinsic(call)
+        return result(types.int64, *parameters), codegen
+
+    return call

@@ -1,6 +1,7 @@
 """Operations on numbers: the type of the result, and the code."""
 
 import ctypes
+import functools
 import math
 import operator
 import sys
@@ -12,6 +13,7 @@ from llvmlite import ir
 from numba import types
 
 from karamelo_py.compiler import code, failing, machine
+from karamelo_py.compiler.code import Lanes, scalar_of
 
 
 class Operation(NamedTuple):
@@ -32,7 +34,7 @@ class Operation(NamedTuple):
     code: Callable
 
 
-_NUMBER = (types.Number, types.Boolean)
+_NUMBER = (types.Number, types.Boolean, Lanes)
 _TYPES = {
     **{getattr(np, name): getattr(types, name) for name in (
         "float32", "float64", "int8", "int16", "int32", "int64",
@@ -44,13 +46,12 @@ _TYPES = {
 
 def common(*kinds: types.Type) -> types.Type:
     """Give the type of a sum of numbers of these types."""
-    wide = kinds[0]
-    for kind in kinds[1:]:
-        wide = _wider(wide, kind)
-    return wide
+    return functools.reduce(_wider, kinds)
 
 
 def _wider(a: types.Type, b: types.Type) -> types.Type:
+    if isinstance(a, Lanes) or isinstance(b, Lanes):
+        return _wider_lanes(a, b)
     if types.uint64 in (a, b) and types.boolean in (a, b):
         return types.uint64
     if a == b and not isinstance(a, types.Boolean) and a.bitwidth >= 32 + 32 * _is_whole(a):
@@ -65,37 +66,51 @@ def _wider(a: types.Type, b: types.Type) -> types.Type:
     return types.float32 if singles else types.float64
 
 
+def _wider_lanes(a: types.Type, b: types.Type) -> Lanes:
+    """Choose the lanes of what two give, at least one of them lanes; literals are of their type."""
+    if isinstance(a, Lanes) and isinstance(b, Lanes):
+        if a == b:
+            return a
+        if isinstance(a.scalar, types.Integer) and isinstance(b.scalar, types.Integer):
+            return a if a.scalar.bitwidth >= b.scalar.bitwidth else b
+        raise TypeError("lanes of several types")
+    lanes, other = (a, b) if isinstance(a, Lanes) else (b, a)
+    # Numbers of cells beside a real number would be cut off: `real(i, x)` makes lanes of reals.
+    if isinstance(other, types.Float) and _is_whole(lanes):
+        raise TypeError("whole lanes and a real number")
+    return lanes
+
+
 def _is_whole(kind: types.Type) -> bool:
-    return isinstance(kind, types.Integer | types.Boolean)
+    return isinstance(scalar_of(kind), types.Integer | types.Boolean)
+
+
+def _is_unsigned(kind: types.Type) -> bool:
+    return isinstance(kind, types.Integer) and not kind.signed
 
 
 # --- operators --------------------------------------------------------------------------------
 
 
-def _binary(of_reals: str | None, of_whole: str | None, flags: tuple = ()) -> Callable:
-    def operation(a: types.Type, b: types.Type) -> Operation | None:
+def _binary(of_reals: str, of_whole: str) -> Callable:
+    def operation(a: types.Type, b: types.Type) -> Operation:
         kind = common(a, b)
-        name = of_reals if isinstance(kind, types.Float) else of_whole
-        if name is None:
-            return None
-        more = {"flags": flags} if flags and name == of_whole and kind.signed else {}
-        return Operation(kind, (kind, kind), lambda builder, v: getattr(builder, name)(*v, **more))
+        name = of_whole if _is_whole(kind) else of_reals
+        return Operation(kind, (kind, kind), lambda builder, v: getattr(builder, name)(*v))
 
     return operation
 
 
-def _true_division(a: types.Type, b: types.Type) -> Operation:
-    kind = common(a, b)
-    kind = kind if isinstance(kind, types.Float) else types.float64
-    return Operation(kind, (kind, kind), lambda builder, v: builder.fdiv(*v))
+def _true_division(a: types.Type, b: types.Type) -> Operation | None:
+    kind = _real_of(common(a, b))
+    return kind and Operation(kind, (kind, kind), lambda builder, v: builder.fdiv(*v))
 
 
 def _bitwise(name: str) -> Callable:
     def operation(a: types.Type, b: types.Type) -> Operation | None:
         if not (_is_whole(a) and _is_whole(b)):
             return None
-        both = isinstance(a, types.Boolean) and isinstance(b, types.Boolean)
-        kind = types.boolean if both else common(a, b)
+        kind = types.boolean if a == b == types.boolean else common(a, b)
         kind = types.int64 if isinstance(kind, types.Float) else kind
         return Operation(kind, (kind, kind), lambda builder, v: getattr(builder, name)(*v))
 
@@ -116,19 +131,26 @@ def _shift(left: bool) -> Callable:
 def _comparison(sign: str) -> Callable:
     def operation(a: types.Type, b: types.Type) -> Operation:
         kind = common(a, b)
-        if isinstance(kind, types.Float) and _is_whole(a) and _is_whole(b):
+        if not _is_whole(kind) and _is_whole(a) and _is_whole(b):
             return Operation(types.boolean, (a, b), _mixed(sign, a.signed))
-
-        def compared(builder: Any, values: list) -> Any:
-            if isinstance(kind, types.Float):
-                compare = builder.fcmp_unordered if sign == "!=" else builder.fcmp_ordered
-            else:
-                compare = builder.icmp_signed if kind.signed else builder.icmp_unsigned
-            return compare(sign, *values)
-
-        return Operation(types.boolean, (kind, kind), compared)
+        return Operation(_truth_of(kind), (kind, kind), _compared(sign, kind))
 
     return operation
+
+
+def _truth_of(kind: types.Type) -> types.Type:
+    return Lanes(types.boolean, kind.width) if isinstance(kind, Lanes) else types.boolean
+
+
+def _compared(sign: str, kind: types.Type) -> Callable:
+    def compared(builder: Any, values: list) -> Any:
+        if not _is_whole(kind):
+            compare = builder.fcmp_unordered if sign == "!=" else builder.fcmp_ordered
+        else:
+            compare = builder.icmp_unsigned if _is_unsigned(kind) else builder.icmp_signed
+        return compare(sign, *values)
+
+    return compared
 
 
 def _mixed(sign: str, first_signed: bool) -> Callable:
@@ -217,7 +239,7 @@ def _power(a: types.Type, b: types.Type) -> Operation | None:
     kind = common(types.unliteral(a), types.unliteral(b))
     if _is_whole(kind):
         return None
-    return Operation(kind, (kind, kind), _of_library("llvm.pow"))
+    return Operation(kind, (kind, kind), of_library("llvm.pow"))
 
 
 def _product(kind: types.Type, exponent: int) -> Callable:
@@ -253,13 +275,17 @@ def _truth(a: types.Type) -> Operation:
 
 
 def _untruth(a: types.Type) -> Operation:
-    return Operation(types.boolean, (types.boolean,), lambda builder, values: builder.not_(*values))
+    kind = _truth_of(a)
+    return Operation(kind, (kind,), lambda builder, values: builder.not_(*values))
 
 
-def _size(a: types.Type) -> Operation:
+def _size(a: types.Type) -> Operation | None:
+    if isinstance(a, Lanes) and _is_whole(a):
+        return None
+
     def size(builder: Any, values: list) -> Any:
         (value,) = values
-        if isinstance(kind, types.Float):
+        if not _is_whole(kind):
             return _call(builder, "llvm.fabs", value.type, [value])
         below = builder.icmp_signed("<", value, value.type(0))
         return builder.select(below, builder.neg(value), value) if kind.signed else value
@@ -275,16 +301,12 @@ def _extreme(sign: str) -> Callable:
         if len(kinds) < 2:
             return None
         kind = common(*kinds)
+        better = _compared(sign, kind)
 
         def extreme(builder: Any, values: list) -> Any:
             best = values[0]
             for value in values[1:]:
-                if isinstance(kind, types.Float):
-                    better = builder.fcmp_ordered(sign, value, best)
-                else:
-                    compare = builder.icmp_signed if kind.signed else builder.icmp_unsigned
-                    better = compare(sign, value, best)
-                best = builder.select(better, value, best)
+                best = builder.select(better(builder, [value, best]), value, best)
             return best
 
         return Operation(kind, (kind,) * len(kinds), extreme)
@@ -301,13 +323,18 @@ def _to(kind: types.Type) -> Callable:
 
 
 def _to_whole(a: types.Type) -> Operation:
-    kind = a if isinstance(a, types.Integer) else types.int64
-    return Operation(kind, (kind,), _as_it_is)
+    return _to(a if isinstance(a, types.Integer) else types.int64)(a)
 
 
 def _to_real(a: types.Type) -> Operation:
-    kind = a if isinstance(a, types.Float) else types.float64
-    return Operation(kind, (kind,), _as_it_is)
+    return _to(_real_of(a))(a)
+
+
+def _real_of(kind: types.Type) -> types.Type | None:
+    """Give the type of real numbers that those of a type become; whole ones in lanes do not."""
+    if isinstance(kind, Lanes):
+        return None if _is_whole(kind) else kind
+    return kind if isinstance(kind, types.Float) else types.float64
 
 
 # --- functions of math ------------------------------------------------------------------------
@@ -317,7 +344,7 @@ def _call(builder: Any, name: str, result: ir.Type, values: list) -> Any:
     """Call a function of LLVM's (whose name tells the type), or of the library of C."""
     kinds = [value.type for value in values]
     if name.startswith("llvm."):
-        name += f".{kinds[0].intrinsic_name}"
+        name += f".{code.overloaded(kinds[0])}"
     elif isinstance(kinds[0], ir.FloatType):
         name += "f"
     function = code.external(builder, name, result, kinds)
@@ -328,7 +355,7 @@ def _call(builder: Any, name: str, result: ir.Type, values: list) -> Any:
     return builder.call(function, values)
 
 
-def _of_library(name: str) -> Callable:
+def of_library(name: str) -> Callable:
     return lambda builder, values: _call(builder, name, values[0].type, values)
 
 
@@ -336,15 +363,15 @@ def _of_reals(name: str, count: int = 1) -> Callable:
     def operation(*kinds: types.Type) -> Operation | None:
         if len(kinds) != count:
             return None
-        kind = _to_real(common(*kinds)).result
-        return Operation(kind, (kind,) * count, _of_library(name))
+        kind = _real_of(common(*kinds))
+        return kind and Operation(kind, (kind,) * count, of_library(name))
 
     return operation
 
 
 def _rounding(name: str) -> Callable:
     def operation(a: types.Type) -> Operation:
-        kind = _to_real(a).result
+        kind = _real_of(a)
 
         def rounded(builder: Any, values: list) -> Any:
             return builder.fptosi(_call(builder, name, values[0].type, values), code.I64)
@@ -356,7 +383,7 @@ def _rounding(name: str) -> Callable:
 
 def _question(asked: Callable) -> Callable:
     def operation(a: types.Type) -> Operation:
-        kind = _to_real(a).result
+        kind = _real_of(a)
         return Operation(types.boolean, (kind,), lambda builder, values: asked(builder, *values))
 
     return operation
@@ -373,7 +400,7 @@ def _is_finite(builder: Any, x: Any) -> Any:
 
 
 def _frexp(a: types.Type) -> Operation:
-    kind = _to_real(a).result
+    kind = _real_of(a)
     result = types.Tuple((kind, types.int32))
 
     def parts(builder: Any, values: list) -> Any:
@@ -385,13 +412,13 @@ def _frexp(a: types.Type) -> Operation:
 
 
 def _ldexp(a: types.Type, b: types.Type) -> Operation:
-    kind = _to_real(a).result
-    return Operation(kind, (kind, types.int32), _of_library("ldexp"))
+    kind = _real_of(a)
+    return Operation(kind, (kind, types.int32), of_library("ldexp"))
 
 
 def _scaled(factor: float) -> Callable:
     def operation(a: types.Type) -> Operation:
-        kind = _to_real(a).result
+        kind = _real_of(a)
         return Operation(kind, (kind,), lambda builder, v: builder.fmul(v[0], v[0].type(factor)))
 
     return operation
@@ -431,7 +458,7 @@ machine.publish_python("karamelo_gamma", _REAL, failing.noting(_gamma_of_python)
 
 def _gamma(a: types.Type) -> Operation:
     """Python's function, whose bits do not depend on the library of C."""
-    kind = _to_real(a).result
+    kind = _real_of(a)
 
     def gamma(builder: Any, values: list) -> Any:
         value = code.cast(builder, values[0], kind, types.float64)
@@ -520,19 +547,21 @@ OPERATIONS |= {
 }
 OPERATIONS |= {np.minimum: _numpy_extreme("<"), np.maximum: _numpy_extreme(">")}
 
-ON_LANES: dict[Any, Callable] = {}  # the same of numbers in lanes (`karamelo_py.compiler.lanes`)
+IN_LANES = {
+    operator.add, operator.sub, operator.mul, operator.truediv, operator.and_, operator.or_,
+    operator.neg, operator.not_, operator.lt, operator.le, operator.gt, operator.ge, operator.eq,
+    operator.ne, abs, max, min, math.sqrt,
+}  # fmt: skip
 
 
 def operation(function: Callable, kinds: tuple[types.Type, ...]) -> Operation | None:
     """Give what a function of numbers is for these types; None where it is nothing."""
-    if any(hasattr(kind, "width") for kind in kinds):
-        return ON_LANES[function](*kinds) if function in ON_LANES else None
-    made = OPERATIONS.get(function)
-    if made is None or not all(isinstance(k, _NUMBER) for k in map(types.unliteral, kinds)):
+    made, plain = OPERATIONS.get(function), tuple(map(types.unliteral, kinds))
+    if made is None or not all(isinstance(kind, _NUMBER) for kind in plain):
         return None
-    if made is not _power:
-        kinds = tuple(map(types.unliteral, kinds))
+    if function not in IN_LANES and any(isinstance(kind, Lanes) for kind in plain):
+        return None
     try:
-        return made(*kinds)
-    except TypeError:  # of another number of arguments
+        return made(*(kinds if made is _power else plain))
+    except TypeError:  # of another number of arguments, or of lanes that do not agree
         return None

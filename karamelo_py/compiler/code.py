@@ -14,6 +14,17 @@ NOTHING = I8.as_pointer()  # what None, classes and functions are
 _REALS = {32: ir.FloatType(), 64: ir.DoubleType()}
 
 
+class Lanes(types.Type):
+    """`width` numbers of a scalar type, side by side in a vector register."""
+
+    def __init__(self, scalar: types.Type, width: int):
+        self.scalar, self.width = scalar, width
+        super().__init__(name=f"Lanes({scalar}, {width})")
+
+    def register_type(self) -> ir.VectorType:
+        return ir.VectorType(register_type(self.scalar), self.width)
+
+
 @functools.cache
 def register_type(kind: types.Type) -> ir.Type:
     """Give the LLVM type of a value in registers."""
@@ -88,13 +99,17 @@ def cast(builder: Any, value: Any, kind: types.Type, wanted: types.Type) -> Any:
         wanted = types.unliteral(wanted)
     if kind == wanted:
         return value
-    to = register_type(wanted)
     if isinstance(wanted, types.BaseTuple) and isinstance(kind, types.BaseTuple):
         items = [
             cast(builder, builder.extract_value(value, k), *pair)
             for k, pair in enumerate(zip(kind, wanted, strict=True))
         ]
         return make_tuple(builder, wanted, items)
+    if isinstance(wanted, Lanes) and not isinstance(kind, Lanes):
+        return splat(builder, cast(builder, value, kind, wanted.scalar), wanted)
+    to, of = register_type(wanted), kind
+    if isinstance(kind, Lanes) and isinstance(wanted, Lanes):
+        kind, wanted = kind.scalar, wanted.scalar
     if isinstance(kind, types.Boolean) and isinstance(wanted, types.Integer):
         return builder.zext(value, to)
     if isinstance(kind, types.Boolean) and isinstance(wanted, types.Float):
@@ -105,22 +120,62 @@ def cast(builder: Any, value: Any, kind: types.Type, wanted: types.Type) -> Any:
     if isinstance(wanted, types.Boolean) and real:
         return builder.fcmp_unordered("!=", value, value.type(0.0))
     if whole and isinstance(wanted, types.Integer):
-        if to.width <= value.type.width:
+        if wanted.bitwidth <= kind.bitwidth:
             return value if to == value.type else builder.trunc(value, to)
         return builder.sext(value, to) if kind.signed else builder.zext(value, to)
     if whole and isinstance(wanted, types.Float):
+        if isinstance(of, Lanes) and kind.bitwidth > 32:  # what every processor can
+            value = builder.trunc(value, ir.VectorType(I32, of.width))
         return builder.sitofp(value, to) if kind.signed else builder.uitofp(value, to)
     if real and isinstance(wanted, types.Integer):
         return builder.fptosi(value, to) if wanted.signed else builder.fptoui(value, to)
     if real and isinstance(wanted, types.Float):
-        return (
-            builder.fpext(value, to)
-            if kind.bitwidth < wanted.bitwidth
-            else builder.fptrunc(value, to)
-        )
-    if register_type(kind) != to:
-        raise TypeError(f"{kind} is no {wanted}")
+        convert = builder.fpext if kind.bitwidth < wanted.bitwidth else builder.fptrunc
+        return convert(value, to)
+    if register_type(of) != to:
+        raise TypeError(f"{of} is no {wanted}")
     return value
+
+
+# --- lanes ----------------------------------------------------------------------------------------
+
+
+def scalar_of(kind: types.Type) -> types.Type:
+    """Give the type of the numbers in lanes; of other types, themselves."""
+    return kind.scalar if isinstance(kind, Lanes) else kind
+
+
+def splat(builder: Any, value: Any, lanes: Lanes) -> Any:
+    """Put the same number into all lanes."""
+    vector = register_type(lanes)
+    none = ir.Constant(vector, ir.Undefined)
+    one = builder.insert_element(none, value, I32(0))
+    return shuffle(builder, one, none, [0] * lanes.width)
+
+
+def lane(builder: Any, value: Any, k: int) -> Any:
+    """Give the number of lane `k`."""
+    return builder.extract_element(value, I32(k))
+
+
+def pack(builder: Any, values: list, lanes: Lanes) -> Any:
+    """Put a number into each lane."""
+    made = ir.Constant(register_type(lanes), ir.Undefined)
+    for k, value in enumerate(values):
+        made = builder.insert_element(made, value, I32(k))
+    return made
+
+
+def shuffle(builder: Any, a: Any, b: Any, order: list[int]) -> Any:
+    """Choose lanes of two vectors."""
+    return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(I32, len(order)), order))
+
+
+def overloaded(kind: ir.Type) -> str:
+    """Name a type as LLVM's functions do: f64, v4f64."""
+    if isinstance(kind, ir.VectorType):
+        return f"v{kind.count}{kind.element.intrinsic_name}"
+    return kind.intrinsic_name
 
 
 # --- memory ---------------------------------------------------------------------------------------

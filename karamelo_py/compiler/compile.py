@@ -6,16 +6,10 @@ from typing import Any, NamedTuple
 import numba
 from numba import config
 
-from karamelo_py.compiler.choices import (
-    SPELLED,
-    choosers,
-    declare_point_function,
-    note,
-    tag_class,
-)
-from karamelo_py.compiler.intrinsics import intrinsic
+from karamelo_py.compiler import arithmetic
+from karamelo_py.compiler.choices import choosers, declare_point_function, note, tag_class
 from karamelo_py.compiler.trace import INSTEAD, Undefined, forget, run_for_kernel, traced
-from karamelo_py.compiler.values import OF_REALS, at_work, now
+from karamelo_py.compiler.values import OF_REALS, at_work, intrinsic, now
 
 
 def by_type(function: Callable) -> Callable:
@@ -192,15 +186,15 @@ def fma(a: float, b: float, c: float) -> float:
 
 @intrinsic
 def _fused(a, b, c):
-    def codegen(builder, signature, arguments):
-        return builder.fma(*arguments)
-
-    return a(a, b, c), codegen
+    kind = arithmetic.common(a, b, c)
+    call = arithmetic.of_library("llvm.fma")
+    return kind(kind, kind, kind), lambda builder, *values: call(builder, values)
 
 
 @by_type(fma)
 def _fma(a, b, c):
-    return _fused if a == b == c and isinstance(a, numba.types.Float) else None
+    real = a == b == c and isinstance(a, numba.types.Float)
+    return _fused if real or lanes_of((a, b, c)) else None
 
 
 @shared
@@ -326,13 +320,3 @@ def over_blocks(per_block: Callable) -> Callable:
             per_block(block, setup, *arguments)
 
     return loop
-
-
-def define(parameters: str, *lines: str, **names: Any) -> Callable:
-    """The function with these `parameters` and body `lines`, which may use `names`."""
-    body = "\n    ".join(lines or ("pass",))
-    text = f"def spelled({parameters}):\n    {body}"
-    exec(compile(text, SPELLED, "exec"), names)
-    made = names["spelled"]
-    made.text = text  # for who walks through it
-    return made

@@ -30,7 +30,7 @@ from karamelo_py.compiler.choices import (
     name_of,
     point_functions,
 )
-from karamelo_py.compiler.intrinsics import Intrinsic
+from karamelo_py.compiler.values import Intrinsic
 
 _HERE = f"{__package__}."  # the text of all these modules is in every key
 _PLAIN = (type(None), bool, int, float, complex, str, bytes, type(Ellipsis), range, slice)

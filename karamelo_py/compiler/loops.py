@@ -24,9 +24,9 @@ from karamelo_py.compiler.choices import Choice, Unknown, choosers, contents, no
 from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.failing import raise_noted
 from karamelo_py.compiler.held import HeldTuple, hold, item_of
-from karamelo_py.compiler.intrinsics import builtin
 from karamelo_py.compiler.lowering import function_type
 from karamelo_py.compiler.trace import alone, formula, write_into
+from karamelo_py.compiler.values import builtin
 
 _CALL = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64)  # free of the interpreter lock
 NAME, ENTRY = "$kernel", ".entry"  # what functions of a module are called until it has a name

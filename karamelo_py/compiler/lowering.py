@@ -9,8 +9,16 @@ from numba import typeof, types
 
 from karamelo_py.compiler import arithmetic, code, failing, indexing
 from karamelo_py.compiler.held import _Held, item_of
-from karamelo_py.compiler.intrinsics import BUILTINS, Intrinsic
-from karamelo_py.compiler.values import Emitted, HeldValue, Untraceable, Value, words, writing
+from karamelo_py.compiler.values import (
+    BUILTINS,
+    Emitted,
+    HeldValue,
+    Intrinsic,
+    Untraceable,
+    Value,
+    words,
+    writing,
+)
 
 MOST_OPERATIONS = 10_000  # of one formula; beyond, a loop is better left to the compiler
 
@@ -43,8 +51,6 @@ class Lowering:
         Whether the function goes on where one that it calls raises an exception.
     """
 
-    spread: Callable  # what makes lanes of a number
-    converted: Callable  # what makes lanes of real numbers of lanes of whole ones
     dispatch: Callable  # what calls functions that are chosen by type
 
     def __init__(self, seen: Callable, builder: ir.IRBuilder | None = None):
@@ -116,11 +122,10 @@ class Lowering:
             items = [self.lowered(a, k) for a, k in zip(thing, wanted, strict=True)]
             return code.make_tuple(self.builder, wanted, items)
         if isinstance(thing, int | float | np.generic):
-            if hasattr(wanted, "width"):
-                made = code.constant(self.builder, wanted.scalar, thing)
-                return self.spread(self.builder, made, wanted)
-            if isinstance(types.unliteral(wanted), types.Number | types.Boolean):
-                return code.constant(self.builder, types.unliteral(wanted), thing)
+            scalar = types.unliteral(code.scalar_of(wanted))
+            if isinstance(scalar, types.Number | types.Boolean):
+                made = code.constant(self.builder, scalar, thing)
+                return code.cast(self.builder, made, scalar, wanted)
         return code.nothing()
 
     def constant(self, array: np.ndarray) -> Value:
@@ -198,9 +203,9 @@ class Lowering:
 
     def in_type_of(self, thing: Any, like: Any) -> Any:
         """Give a whole number as a real one of the type of `like`."""
-        if hasattr(thing._kind, "width"):
-            return self.call(self.converted, (thing, like))
-        kind = getattr(like._kind, "scalar", like._kind)
+        kind = code.scalar_of(like._kind)
+        if isinstance(thing._kind, code.Lanes):
+            kind = code.Lanes(kind, thing._kind.width)
         value = self.builder and code.cast(self.builder, thing._value, thing._kind, kind)
         return Value(kind, value)
 
@@ -296,11 +301,9 @@ def _of_intrinsic(function: Intrinsic, kinds: tuple) -> arithmetic.Operation | N
     if found is None:
         return None
     signature, codegen = found
-
-    def write(builder: Any, values: list) -> Any:
-        return codegen(builder, signature, values)
-
-    return arithmetic.Operation(signature.return_type, signature.args, write)
+    return arithmetic.Operation(
+        signature.return_type, signature.args, lambda builder, values: codegen(builder, *values)
+    )
 
 
 def name_of(function: Callable) -> str:

@@ -5,12 +5,12 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-from llvmlite import ir
 from numba import types
 
 from karamelo_py.compiler import code
-from karamelo_py.compiler.compile import by_type
-from karamelo_py.compiler.intrinsics import intrinsic
+from karamelo_py.compiler.code import I64
+from karamelo_py.compiler.compile import implements, index
+from karamelo_py.compiler.values import intrinsic
 
 
 def addresses_of_rows(arrays: Iterable[np.ndarray]) -> np.ndarray:
@@ -38,6 +38,24 @@ def addresses_of_rows(arrays: Iterable[np.ndarray]) -> np.ndarray:
     return np.array(found, np.int64).reshape(-1, 2)
 
 
+def _row(address: int, like: Any, count: int) -> np.ndarray:
+    """The `count` items from an address on, whole numbers of the type of `like`."""
+    memory = (ctypes.c_char * int(count * like.itemsize)).from_address(int(address))
+    return np.frombuffer(memory, like.dtype)
+
+
+@implements(_row)
+@intrinsic
+def _row_in_kernels(address, like, count):
+    row = types.Array(like, 1, "C")
+
+    def codegen(builder, place, _, size):
+        data = builder.inttoptr(place, code.memory_type(like).as_pointer())
+        return code.make_array(builder, row, data, [size], [I64(like.bitwidth // 8)])
+
+    return row(types.int64, like, types.int64), codegen
+
+
 def pick_items(
     address: int, like: Any, order: np.ndarray, room: np.ndarray, c: int, begin: int, end: int
 ) -> None:
@@ -48,48 +66,20 @@ def pick_items(
     room[c, begin:end] = _row(address, like, order.size)[order[begin:end]]
 
 
+@implements(pick_items)
+def _pick(address, like, order, room, c, begin, end):
+    row = _row(address, like, order.size)
+    for p in range(begin, end):
+        room[c, p] = row[index(order[p])]
+
+
 def put_items(address: int, like: Any, room: np.ndarray, c: int, begin: int, end: int) -> None:
     """Item p of such a row becomes ``room[c, p]``, from `begin` to `end`."""
     _row(address, like, end)[begin:end] = room[c, begin:end]
 
 
-def _row(address: int, like: Any, count: int) -> np.ndarray:
-    memory = (ctypes.c_char * int(count * like.itemsize)).from_address(int(address))
-    return np.frombuffer(memory, like.dtype)
-
-
-def _pointer(builder: Any, address: Any, k: Any, kind: types.Integer) -> Any:
-    row = builder.inttoptr(address, ir.IntType(kind.bitwidth).as_pointer())
-    return builder.gep(row, [k])
-
-
-@intrinsic
-def _item_at(address, k, like):
-    def codegen(builder, signature, values):
-        return builder.load(_pointer(builder, *values[:2], like))
-
-    return like(types.int64, types.int64, like), codegen
-
-
-@intrinsic
-def _put_item_at(address, k, value, like):
-    def codegen(builder, signature, values):
-        item = code.cast(builder, values[2], types.int64, like)
-        builder.store(item, _pointer(builder, *values[:2], like))
-        return code.nothing()
-
-    return types.none(types.int64, types.int64, types.int64, like), codegen
-
-
-def _pick(address, like, order, room, c, begin, end):
-    for p in range(begin, end):
-        room[c, p] = _item_at(address, order[p], like)
-
-
+@implements(put_items)
 def _put(address, like, room, c, begin, end):
+    row = _row(address, like, end)
     for p in range(begin, end):
-        _put_item_at(address, p, room[c, p], like)
-
-
-by_type(pick_items)(lambda *_: _pick)
-by_type(put_items)(lambda *_: _put)
+        row[index(p)] = room[c, p]

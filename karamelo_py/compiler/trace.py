@@ -29,17 +29,18 @@ from numba import types
 from karamelo_py.compiler.arithmetic import OPERATIONS
 from karamelo_py.compiler.choices import choosers, note, parts_noted, tag_class
 from karamelo_py.compiler.flow import Flow
-from karamelo_py.compiler.intrinsics import BUILTINS, Intrinsic
 from karamelo_py.compiler.lowering import Lowering, name_of, numbers_of
 from karamelo_py.compiler.methods import refuse_methods
 from karamelo_py.compiler.statements import AstFunction, place_in_text
 from karamelo_py.compiler.values import (
+    BUILTINS,
     OF_REALS,
     OF_WHOLE,
     DataDependentBranch,
     Emitted,
     Globals,
     HeldValue,
+    Intrinsic,
     Untraceable,
     Value,
     alike,

@@ -5,11 +5,12 @@ meets one becomes code of the function that is compiled.
 """
 
 import builtins
+import functools
 import math
 import operator
 import sys
 import types as python
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -142,6 +143,40 @@ def emit(function: Callable, *arguments: Any) -> Any:
     return now().call(function, arguments)
 
 
+# --- functions whose code is written by hand ------------------------------------------------------
+
+BUILTINS: dict[Callable, Callable] = {}
+
+
+def builtin(function: Callable) -> Callable[[Callable], Callable]:
+    """Decorate what `function` is in kernels: ``made(lowering, *arguments)``, of what is traced."""
+
+    def register(made: Callable) -> Callable:
+        BUILTINS[function] = made
+        return made
+
+    return register
+
+
+class Intrinsic:
+    """Define a function of values: by its signature for types, and by what writes the code.
+
+    ``definition(*types)`` returns ``result(*arguments)`` and ``codegen(builder, *values)``, or None
+    where it is not defined. Types of whole numbers that are known are given where it is not
+    defined for others.
+    """
+
+    def __init__(self, definition: Callable):
+        self.definition = definition
+        functools.update_wrapper(self, definition)
+
+    def __call__(self, *arguments: Any) -> Any:
+        raise NotImplementedError(f"only kernels can call {self.__qualname__}")
+
+
+intrinsic = Intrinsic
+
+
 # --- values -------------------------------------------------------------------------------------
 
 
@@ -228,6 +263,18 @@ def _operators() -> None:
 
 
 _operators()
+
+
+def rebuilt(like: tuple, items: Iterable) -> tuple:
+    """Make a tuple of the class of another."""
+    return type(like)(*items) if hasattr(like, "_fields") else tuple(items)
+
+
+def mapped(change: Callable, thing: Any) -> Any:
+    """Change each thing in nested tuples."""
+    if isinstance(thing, tuple):
+        return rebuilt(thing, [mapped(change, item) for item in thing])
+    return change(thing)
 
 
 class HeldValue:

@@ -152,7 +152,7 @@ def _with_items_of(values, others):
     return type(values)(*(new.get(name, item) for name, item in items))
 
 
-_act_on_parts = shared_out(_act_apart, "what, task, hooks, control, dt, h, share")
+_act_on_parts = shared_out(_act_apart)
 
 
 @point_function()
