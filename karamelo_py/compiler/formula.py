@@ -14,27 +14,15 @@ import numpy as np
 from numba import config, types
 
 from karamelo_py.compiler.addresses import caller_of
-from karamelo_py.compiler.compile import implements
+from karamelo_py.compiler.compile import implements, shared
 from karamelo_py.compiler.loops import kernel, noinline
 from karamelo_py.compiler.operations import (
-    ABS,
-    ADD,
-    COS,
-    DIV,
-    EXP,
     FIRST_BINARY,
     IN_NUMPY,
-    LOG,
-    MAX,
-    MIN,
-    MUL,
-    NEG,
-    POW,
+    OPERATIONS,
     SELECT,
-    SIN,
-    SQRT,
-    SUB,
     function_of,
+    in_kernels,
     operation_of,
 )
 
@@ -68,29 +56,19 @@ class Program(NamedTuple):
     constants: np.ndarray
 
 
-# Rows of numbers: in Python by NumPy, in kernels by loops.
+# --- rows of numbers ----------------------------------------------------------------------------
 
 
+@noinline
 def _copy(n, a, b):
     """Copy the first `n` numbers of `b` to `a`."""
     a[:n] = b[:n]
 
 
-@implements(_copy)
-def _copy_in_kernels(n, a, b):
-    for i in range(n):
-        a[i] = b[i]
-
-
+@noinline
 def _fill(n, a, value):
     """Give the first `n` numbers of `a` a value."""
     a[:n] = value
-
-
-@implements(_fill)
-def _fill_in_kernels(n, a, value):
-    for i in range(n):
-        a[i] = value
 
 
 def _select(n, a, b, c):
@@ -104,9 +82,26 @@ def _select_in_kernels(n, a, b, c):
         a[i] = b[i] if a[i] != 0.0 else c[i]
 
 
+# What has a loop of its own in kernels; others share one, which chooses for each number.
+_UNARY_LOOPS = in_kernels("neg", "sqrt", "sin", "cos", "exp", "log", "abs")
+_BINARY_LOOPS = in_kernels("+", "-", "*", "/", "min", "max")
+_POWER = OPERATIONS["^"]
+
+
 def _unary(op, n, a):
     """Replace the first `n` numbers of `a` by a function of them."""
     a[:n] = IN_NUMPY[op](a[:n])
+
+
+@noinline
+def _unary_in_kernels(op, n, a):
+    for number, do in _UNARY_LOOPS:
+        if op == number:
+            for i in range(n):
+                a[i] = do(a[i])
+            return
+    for i in range(n):
+        a[i] = function_of(op, a[i])
 
 
 def _binary(op, n, a, b):
@@ -115,71 +110,35 @@ def _binary(op, n, a, b):
 
 
 @noinline
-def _unary_in_kernels(op, n, a):
-    if op == NEG:
-        for i in range(n):
-            a[i] = -a[i]
-    elif op == SQRT:
-        for i in range(n):
-            a[i] = math.sqrt(a[i])
-    elif op == SIN:
-        for i in range(n):
-            a[i] = math.sin(a[i])
-    elif op == COS:
-        for i in range(n):
-            a[i] = math.cos(a[i])
-    elif op == EXP:
-        for i in range(n):
-            a[i] = math.exp(a[i])
-    elif op == LOG:
-        for i in range(n):
-            a[i] = math.log(a[i])
-    elif op == ABS:
-        for i in range(n):
-            a[i] = abs(a[i])
-    else:
-        for i in range(n):
-            a[i] = function_of(op, a[i])
-
-
-@noinline
 def _binary_in_kernels(op, n, a, b):
-    if op == ADD:
-        for i in range(n):
-            a[i] += b[i]
-    elif op == SUB:
-        for i in range(n):
-            a[i] -= b[i]
-    elif op == MUL:
-        for i in range(n):
-            a[i] *= b[i]
-    elif op == DIV:
-        for i in range(n):
-            a[i] /= b[i]
-    elif op == POW:
-        # Small whole powers are the common case, and pow costs ten multiplications.
-        power = b[0]
-        same = True
-        for i in range(n):
-            same = same and b[i] == power
-        if same and power == 2.0:
+    for number, do in _BINARY_LOOPS:
+        if op == number:
             for i in range(n):
-                a[i] *= a[i]
-        elif same and power == 3.0:
-            for i in range(n):
-                a[i] *= a[i] * a[i]
-        else:
-            for i in range(n):
-                a[i] = math.pow(a[i], b[i])
-    elif op == MIN:
+                a[i] = do(a[i], b[i])
+            return
+    if op == _POWER:
+        _powers(n, a, b)
+        return
+    for i in range(n):
+        a[i] = operation_of(op, a[i], b[i])
+
+
+@shared
+def _powers(n, a, b):
+    """Powers; small whole ones are the common case, and pow costs ten multiplications."""
+    power = b[0]
+    same = True
+    for i in range(n):
+        same = same and b[i] == power
+    if same and power == 2.0:
         for i in range(n):
-            a[i] = b[i] if b[i] < a[i] else a[i]
-    elif op == MAX:
+            a[i] *= a[i]
+    elif same and power == 3.0:
         for i in range(n):
-            a[i] = b[i] if b[i] > a[i] else a[i]
+            a[i] *= a[i] * a[i]
     else:
         for i in range(n):
-            a[i] = operation_of(op, a[i], b[i])
+            a[i] = math.pow(a[i], b[i])
 
 
 implements(_unary)(lambda op, n, a: _unary_in_kernels(op, n, a))
