@@ -174,7 +174,7 @@ class Kernel:
 
     def __init__(self, function: Callable):
         self.function = function
-        self.files = cache.KernelFiles(function)
+        self.files = cache.KernelFiles(function, load)
         self.units: dict[tuple, Unit] = {}
         self._plans: dict[tuple, tuple] = {}
 
@@ -185,15 +185,12 @@ class Kernel:
 
     def unit(self, kinds: tuple, result: types.Type | None = None) -> Unit:
         """Give the machine code for arguments of these types."""
-        if kinds in self.units:
+        with _alone:
+            if kinds not in self.units:
+                self.units[kinds] = self.files.kernel(
+                    kinds, result, lambda: _compiled(self.function, kinds, result)
+                )
             return self.units[kinds]
-        with _alone, self.files.for_types(kinds, result) as place:
-            unit = place.found
-            if unit is None:
-                unit, codes = _compiled(self.function, kinds, result)
-                place.keep(unit, codes)
-            self.units[kinds] = unit
-        return unit
 
     def __call__(self, *arguments: Any) -> Any:
         written = ArgumentBuffer(arguments)
