@@ -6,6 +6,7 @@ import math
 import operator
 import sys
 from collections.abc import Callable
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -85,47 +86,56 @@ def _is_whole(kind: types.Type) -> bool:
     return isinstance(scalar_of(kind), types.Integer | types.Boolean)
 
 
-def _is_unsigned(kind: types.Type) -> bool:
-    return isinstance(kind, types.Integer) and not kind.signed
-
-
 # --- operators --------------------------------------------------------------------------------
 
 
-def _binary(of_reals: str, of_whole: str) -> Callable:
-    def operation(a: types.Type, b: types.Type) -> Operation:
-        kind = common(a, b)
-        name = of_whole if _is_whole(kind) else of_reals
-        return Operation(kind, (kind, kind), lambda builder, v: getattr(builder, name)(*v))
+def _unary(kind_of: Callable, write: Callable, result: types.Type | None = None) -> Callable:
+    """Make an operation on one number, cast to a type: ``write(builder, kind, value)``."""
+
+    def operation(a: types.Type) -> Operation | None:
+        kind = kind_of(a)
+        return kind and Operation(
+            result or kind, (kind,), lambda builder, values: write(builder, kind, *values)
+        )
 
     return operation
 
 
-def _true_division(a: types.Type, b: types.Type) -> Operation | None:
-    kind = _real_of(common(a, b))
-    return kind and Operation(kind, (kind, kind), lambda builder, v: builder.fdiv(*v))
+def _binary(kind_of: Callable, write: Callable) -> Callable:
+    """Make an operation on two numbers likewise."""
 
-
-def _bitwise(name: str) -> Callable:
     def operation(a: types.Type, b: types.Type) -> Operation | None:
+        kind = kind_of(a, b)
+        return kind and Operation(
+            kind, (kind, kind), lambda builder, values: write(builder, kind, *values)
+        )
+
+    return operation
+
+
+def _sum(of_reals: str, of_whole: str) -> Callable:
+    def write(builder: Any, kind: types.Type, *values: Any) -> Any:
+        return getattr(builder, of_whole if _is_whole(kind) else of_reals)(*values)
+
+    return _binary(common, write)
+
+
+def _bits(name: str) -> Callable:
+    def kind_of(a: types.Type, b: types.Type) -> types.Type | None:
         if not (_is_whole(a) and _is_whole(b)):
             return None
         kind = types.boolean if a == b == types.boolean else common(a, b)
-        kind = types.int64 if isinstance(kind, types.Float) else kind
-        return Operation(kind, (kind, kind), lambda builder, v: getattr(builder, name)(*v))
+        return types.int64 if isinstance(kind, types.Float) else kind
 
-    return operation
+    return _binary(kind_of, lambda builder, kind, *values: getattr(builder, name)(*values))
 
 
-def _shift(left: bool) -> Callable:
-    def operation(a: types.Type, b: types.Type) -> Operation | None:
-        if not (_is_whole(a) and _is_whole(b)):
-            return None
-        kind = common(a, a)
-        name = "shl" if left else "ashr" if kind.signed else "lshr"
-        return Operation(kind, (kind, kind), lambda builder, v: getattr(builder, name)(*v))
+def _shift(write: Callable) -> Callable:
+    return _binary(lambda a, b: common(a, a) if _is_whole(a) and _is_whole(b) else None, write)
 
-    return operation
+
+def _shifted_right(builder: Any, kind: types.Integer, *values: Any) -> Any:
+    return (builder.ashr if kind.signed else builder.lshr)(*values)
 
 
 def _comparison(sign: str) -> Callable:
@@ -147,7 +157,8 @@ def _compared(sign: str, kind: types.Type) -> Callable:
         if not _is_whole(kind):
             compare = builder.fcmp_unordered if sign == "!=" else builder.fcmp_ordered
         else:
-            compare = builder.icmp_unsigned if _is_unsigned(kind) else builder.icmp_signed
+            unsigned = isinstance(kind, types.Integer) and not kind.signed
+            compare = builder.icmp_unsigned if unsigned else builder.icmp_signed
         return compare(sign, *values)
 
     return compared
@@ -170,14 +181,11 @@ def _mixed(sign: str, first_signed: bool) -> Callable:
 def _whole_division(remainder: bool) -> Callable:
     """Python's division without a fraction; 0 where it is by 0."""
 
-    def operation(a: types.Type, b: types.Type) -> Operation:
-        kind = common(a, b)
-        of = _real_parts if isinstance(kind, types.Float) else _whole_parts
-        return Operation(
-            kind, (kind, kind), lambda builder, values: of(builder, kind, *values)[remainder]
-        )
+    def write(builder: Any, kind: types.Type, *values: Any) -> Any:
+        of = _whole_parts if _is_whole(kind) else _real_parts
+        return of(builder, kind, *values)[remainder]
 
-    return operation
+    return _binary(common, write)
 
 
 def _whole_parts(builder: Any, kind: types.Integer, x: Any, y: Any) -> tuple[Any, Any]:
@@ -257,41 +265,35 @@ def _product(kind: types.Type, exponent: int) -> Callable:
     return power
 
 
-def _negation(a: types.Type) -> Operation:
-    kind = common(a, a)
-    name = "neg" if _is_whole(kind) else "fneg"
-    return Operation(kind, (kind,), lambda builder, values: getattr(builder, name)(*values))
+def _alone(a: types.Type) -> types.Type:
+    return common(a, a)
 
 
-def _inversion(a: types.Type) -> Operation | None:
+def _negative(builder: Any, kind: types.Type, value: Any) -> Any:
+    return builder.neg(value) if _is_whole(kind) else builder.fneg(value)
+
+
+def _inverted(a: types.Type) -> types.Type | None:
     if not _is_whole(a):
         return None
-    kind = a if isinstance(a, types.Boolean) else common(a, a)
-    return Operation(kind, (kind,), lambda builder, values: builder.not_(*values))
+    return a if isinstance(a, types.Boolean) else common(a, a)
 
 
-def _truth(a: types.Type) -> Operation:
-    return Operation(types.boolean, (types.boolean,), lambda builder, values: values[0])
+def _not(builder: Any, kind: types.Type, value: Any) -> Any:
+    return builder.not_(value)
 
 
-def _untruth(a: types.Type) -> Operation:
-    kind = _truth_of(a)
-    return Operation(kind, (kind,), lambda builder, values: builder.not_(*values))
-
-
-def _size(a: types.Type) -> Operation | None:
+def _sized(a: types.Type) -> types.Type | None:
     if isinstance(a, Lanes) and _is_whole(a):
         return None
+    return common(a, a) if isinstance(a, types.Boolean) else a
 
-    def size(builder: Any, values: list) -> Any:
-        (value,) = values
-        if not _is_whole(kind):
-            return _call(builder, "llvm.fabs", value.type, [value])
-        below = builder.icmp_signed("<", value, value.type(0))
-        return builder.select(below, builder.neg(value), value) if kind.signed else value
 
-    kind = common(a, a) if isinstance(a, types.Boolean) else a
-    return Operation(kind, (kind,), size)
+def _size(builder: Any, kind: types.Type, value: Any) -> Any:
+    if not _is_whole(kind):
+        return _call(builder, "llvm.fabs", value.type, [value])
+    below = builder.icmp_signed("<", value, value.type(0))
+    return builder.select(below, builder.neg(value), value) if kind.signed else value
 
 
 def _extreme(sign: str) -> Callable:
@@ -314,20 +316,16 @@ def _extreme(sign: str) -> Callable:
     return operation
 
 
-def _as_it_is(builder: Any, values: list) -> Any:
-    return values[0]
+def _as_it_is(builder: Any, kind: types.Type, value: Any) -> Any:
+    return value
 
 
 def _to(kind: types.Type) -> Callable:
-    return lambda a: Operation(kind, (kind,), _as_it_is)
+    return _unary(lambda a: kind, _as_it_is)
 
 
-def _to_whole(a: types.Type) -> Operation:
-    return _to(a if isinstance(a, types.Integer) else types.int64)(a)
-
-
-def _to_real(a: types.Type) -> Operation:
-    return _to(_real_of(a))(a)
+def _whole_of(kind: types.Type) -> types.Type:
+    return kind if isinstance(kind, types.Integer) else types.int64
 
 
 def _real_of(kind: types.Type) -> types.Type | None:
@@ -370,31 +368,21 @@ def _of_reals(name: str, count: int = 1) -> Callable:
 
 
 def _rounding(name: str) -> Callable:
-    def operation(a: types.Type) -> Operation:
-        kind = _real_of(a)
+    def rounded(builder: Any, kind: types.Type, value: Any) -> Any:
+        return builder.fptosi(_call(builder, name, value.type, [value]), code.I64)
 
-        def rounded(builder: Any, values: list) -> Any:
-            return builder.fptosi(_call(builder, name, values[0].type, values), code.I64)
-
-        return Operation(types.int64, (kind,), rounded)
-
-    return operation
+    return _unary(_real_of, rounded, types.int64)
 
 
-def _question(asked: Callable) -> Callable:
-    def operation(a: types.Type) -> Operation:
-        kind = _real_of(a)
-        return Operation(types.boolean, (kind,), lambda builder, values: asked(builder, *values))
-
-    return operation
+def _is_no_number(builder: Any, kind: types.Type, x: Any) -> Any:
+    return builder.fcmp_unordered("uno", x, x)
 
 
-def _is_infinite(builder: Any, x: Any) -> Any:
-    size = _call(builder, "llvm.fabs", x.type, [x])
-    return builder.fcmp_ordered("==", size, x.type(math.inf))
+def _is_infinite(builder: Any, kind: types.Type, x: Any) -> Any:
+    return builder.fcmp_ordered("==", _size(builder, kind, x), x.type(math.inf))
 
 
-def _is_finite(builder: Any, x: Any) -> Any:
+def _is_finite(builder: Any, kind: types.Type, x: Any) -> Any:
     rest = builder.fsub(x, x)
     return builder.fcmp_ordered("ord", rest, rest)
 
@@ -417,11 +405,7 @@ def _ldexp(a: types.Type, b: types.Type) -> Operation:
 
 
 def _scaled(factor: float) -> Callable:
-    def operation(a: types.Type) -> Operation:
-        kind = _real_of(a)
-        return Operation(kind, (kind,), lambda builder, v: builder.fmul(v[0], v[0].type(factor)))
-
-    return operation
+    return _unary(_real_of, lambda builder, kind, x: builder.fmul(x, x.type(factor)))
 
 
 def _numpy_extreme(sign: str) -> Callable:
@@ -452,20 +436,15 @@ def _gamma_of_python(x: float) -> float:
         return math.copysign(math.inf, x) if x == 0 else math.nan
 
 
-_REAL = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)
-machine.publish_python("karamelo_gamma", _REAL, failing.noting(_gamma_of_python))
+_OF_DOUBLE = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)
+machine.publish_python("karamelo_gamma", _OF_DOUBLE, failing.noting(_gamma_of_python))
 
 
-def _gamma(a: types.Type) -> Operation:
+def _gamma(builder: Any, kind: types.Type, x: Any) -> Any:
     """Python's function, whose bits do not depend on the library of C."""
-    kind = _real_of(a)
-
-    def gamma(builder: Any, values: list) -> Any:
-        value = code.cast(builder, values[0], kind, types.float64)
-        found = _call(builder, "karamelo_gamma", value.type, [value])
-        return code.cast(builder, found, types.float64, kind)
-
-    return Operation(kind, (kind,), gamma)
+    double = code.cast(builder, x, kind, types.float64)
+    found = _call(builder, "karamelo_gamma", double.type, [double])
+    return code.cast(builder, found, types.float64, kind)
 
 
 _HYPOT = "_hypot" if sys.platform == "win32" else "hypot"
@@ -475,48 +454,57 @@ _IN_C = (
     "atanh", "sinh", "cosh", "tanh", "lgamma", "cbrt",
 )  # fmt: skip
 
+for _name, (_real, _ending) in product(
+    _IN_C, ((ctypes.c_double, ""), (ctypes.c_float, "f"))
+):  # what this library of C lacks
+    if not machine.is_known(_name + _ending):
+        _kind = ctypes.CFUNCTYPE(_real, _real)
+        machine.publish_python(_name + _ending, _kind, failing.noting(getattr(math, _name)))
+
 OPERATIONS: dict[Any, Callable] = {
-    operator.add: _binary("fadd", "add"),
-    operator.sub: _binary("fsub", "sub"),
-    operator.mul: _binary("fmul", "mul"),
-    operator.truediv: _true_division,
+    operator.add: _sum("fadd", "add"),
+    operator.sub: _sum("fsub", "sub"),
+    operator.mul: _sum("fmul", "mul"),
+    operator.truediv: _binary(
+        lambda a, b: _real_of(common(a, b)), lambda builder, kind, *values: builder.fdiv(*values)
+    ),
     operator.floordiv: _whole_division(False),
     operator.mod: _whole_division(True),
     operator.pow: _power,
-    operator.and_: _bitwise("and_"),
-    operator.or_: _bitwise("or_"),
-    operator.xor: _bitwise("xor"),
-    operator.lshift: _shift(True),
-    operator.rshift: _shift(False),
-    operator.neg: _negation,
-    operator.pos: lambda a: _to(common(a, a))(a),
-    operator.invert: _inversion,
-    operator.not_: _untruth,
+    operator.and_: _bits("and_"),
+    operator.or_: _bits("or_"),
+    operator.xor: _bits("xor"),
+    operator.lshift: _shift(lambda builder, kind, *values: builder.shl(*values)),
+    operator.rshift: _shift(_shifted_right),
+    operator.neg: _unary(_alone, _negative),
+    operator.pos: _unary(_alone, _as_it_is),
+    operator.invert: _unary(_inverted, _not),
+    operator.not_: _unary(_truth_of, _not),
     operator.lt: _comparison("<"),
     operator.le: _comparison("<="),
     operator.gt: _comparison(">"),
     operator.ge: _comparison(">="),
     operator.eq: _comparison("=="),
     operator.ne: _comparison("!="),
-    abs: _size,
-    bool: _truth,
-    float: _to_real,
-    int: _to_whole,
+    abs: _unary(_sized, _size),
+    bool: _to(types.boolean),
+    float: _unary(_real_of, _as_it_is),
+    int: _unary(_whole_of, _as_it_is),
     max: _extreme(">"),
     min: _extreme("<"),
     round: lambda *kinds: _rounding("llvm.rint")(*kinds) if len(kinds) == 1 else None,
     math.floor: _rounding("llvm.floor"),
     math.ceil: _rounding("llvm.ceil"),
     math.trunc: _rounding("llvm.trunc"),
-    math.isnan: _question(lambda builder, x: builder.fcmp_unordered("uno", x, x)),
-    math.isinf: _question(_is_infinite),
-    math.isfinite: _question(_is_finite),
-    math.pow: _power,
+    math.isnan: _unary(_real_of, _is_no_number, types.boolean),
+    math.isinf: _unary(_real_of, _is_infinite, types.boolean),
+    math.isfinite: _unary(_real_of, _is_finite, types.boolean),
+    math.pow: lambda a, b: _power(_real_of(types.unliteral(a)), b),
     math.copysign: _of_reals("llvm.copysign", 2),
     math.atan2: _of_reals("atan2", 2),
     math.hypot: _of_reals(_HYPOT, 2),
     math.fmod: _of_reals("fmod", 2),
-    math.gamma: _gamma,
+    math.gamma: _unary(_real_of, _gamma),
     math.frexp: _frexp,
     math.ldexp: _ldexp,
     math.degrees: _scaled(180 / math.pi),
@@ -531,7 +519,7 @@ OPERATIONS: dict[Any, Callable] = {
 # NumPy's names of the same, and of what is rounded to a real number.
 _IN_NUMPY = {
     "absolute": abs, "add": operator.add, "subtract": operator.sub, "multiply": operator.mul,
-    "true_divide": operator.truediv, "negative": operator.neg, "power": math.pow,
+    "true_divide": operator.truediv, "negative": operator.neg, "power": operator.pow,
     "arcsin": math.asin, "arccos": math.acos, "arctan": math.atan, "arctan2": math.atan2,
     "arcsinh": math.asinh, "arccosh": math.acosh, "arctanh": math.atanh,
 }  # fmt: skip
@@ -554,6 +542,9 @@ IN_LANES = {
 }  # fmt: skip
 
 
+_POWERS = {operator.pow, math.pow, np.power}  # by products, where the exponent is known
+
+
 def operation(function: Callable, kinds: tuple[types.Type, ...]) -> Operation | None:
     """Give what a function of numbers is for these types; None where it is nothing."""
     made, plain = OPERATIONS.get(function), tuple(map(types.unliteral, kinds))
@@ -562,6 +553,6 @@ def operation(function: Callable, kinds: tuple[types.Type, ...]) -> Operation | 
     if function not in IN_LANES and any(isinstance(kind, Lanes) for kind in plain):
         return None
     try:
-        return made(*(kinds if made is _power else plain))
+        return made(*(kinds if function in _POWERS else plain))
     except TypeError:  # of another number of arguments, or of lanes that do not agree
         return None

@@ -232,8 +232,8 @@ def _operated(operation: Callable, a: Any, b: Any) -> Any:
     if isinstance(a if isinstance(b, Value) else b, tuple):
         return NotImplemented
     if operation is operator.pow and type(b) is int and 1 < b <= 4 and _real_kind(a):
-        half = a * a if b != 3 else a
-        return half * half if b == 4 else (half * a if b == 3 else half)
+        square = a * a
+        return square if b == 2 else square * (a if b == 3 else square)
     return emit(operation, *alike((a, b)))
 
 
