@@ -130,10 +130,10 @@ class ExpressionCompiler:
         """Compile one comparison."""
         if isinstance(op, ast.Is | ast.IsNot):
             return (a is b) == isinstance(op, ast.Is)
-        if isinstance(op, ast.In | ast.NotIn):
-            return (
-                self.among(a, b) if isinstance(op, ast.In) else self.flow.negate(self.among(a, b))
-            )
+        if isinstance(op, ast.In):
+            return self.among(a, b)
+        if isinstance(op, ast.NotIn):
+            return self.flow.negate(self.among(a, b))
         return BINARY[type(op)](a, b)
 
     def among(self, a: Any, things: Any) -> Any:
@@ -165,14 +165,10 @@ class ExpressionCompiler:
 
             return put
 
-        outer = self.names.get("?", _NOTHING)
         self.branch(condition, of(then), of(otherwise))
         if "?" not in self.names:
             raise Untraceable("an expression gives things of two kinds")
-        value = self.names.pop("?")
-        if outer is not _NOTHING:
-            self.names["?"] = outer
-        return value
+        return self.names.pop("?")
 
     def IfExp(self, node: ast.IfExp) -> Any:
         condition = self.do(node.test)
@@ -230,4 +226,3 @@ _WORDS = {
     "Global": "`global`", "Nonlocal": "`nonlocal`", "Match": "`match`", "ClassDef": "`class`",
     "Raise": "`raise` of this kind", "FunctionDef": "function within of this kind",
 }  # fmt: skip
-_NOTHING = object()

@@ -17,6 +17,8 @@ from typing import Any
 import numpy as np
 from numba import types
 
+from karamelo_py.compiler.code import Lanes, scalar_of
+
 
 class Untraceable(BaseException):
     """Say why a function cannot become code of a kernel; no function may catch that."""
@@ -30,7 +32,7 @@ def words(kind: types.Type) -> str:
     """Name a type as a user would."""
     if isinstance(kind, types.BaseTuple):
         return getattr(getattr(kind, "instance_class", None), "__name__", "a tuple")
-    if hasattr(kind, "width"):
+    if isinstance(kind, Lanes):
         return f"numbers in lanes ({kind})"
     for one, name in _WORDS:
         if isinstance(kind, one):
@@ -108,8 +110,7 @@ def at_work() -> bool:
 
 def _real_kind(thing: Any) -> Any:
     """Find the number type of a real number or of lanes of these; None of all else."""
-    kind = thing._kind if isinstance(thing, Value) else None
-    kind = getattr(kind, "scalar", kind)
+    kind = scalar_of(thing._kind) if isinstance(thing, Value) else None
     return kind if isinstance(kind, types.Float) else None
 
 
@@ -132,7 +133,7 @@ def _in_type_of(like: Any, kind: Any, thing: Any) -> Any:
             return thing if kind.bitwidth == 64 else np.float32(thing)
     if not isinstance(thing, Value):
         return thing
-    own = getattr(thing._kind, "scalar", thing._kind)
+    own = scalar_of(thing._kind)
     if isinstance(own, types.Integer) and not isinstance(own, types.Boolean):
         return now().in_type_of(thing, like)
     return thing
