@@ -12,7 +12,7 @@ from cuda.bindings import nvjitlink
 from numba import typeof
 
 from karamelo_py.compiler import loops, machine
-from karamelo_py.compiler.argument_buffer import ArgumentBuffer
+from karamelo_py.compiler.argument_buffer import plan_for
 from karamelo_py.compiler.compile import index, shared
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.tuples import record
@@ -110,7 +110,7 @@ def visits_of(setup: Setup, scheme: Any, in_stages: bool = False) -> list[Visit]
 
 def compiled(function: Any, *arguments: Any) -> Compiled:
     """A kernel for arguments of these types."""
-    kinds = ArgumentBuffer(arguments).plan(arguments).types
+    kinds = plan_for(arguments).types
     module, _ = loops.written(shared(function), kinds)
     main = module.globals[loops.NAME]
     main.linkage = "internal"

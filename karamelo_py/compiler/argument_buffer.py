@@ -72,21 +72,13 @@ class Plan(NamedTuple):
 
 
 class ArgumentBuffer:
-    """Collect what is written for some arguments: held tuples one after another, inner first.
-
-    Attributes
-    ----------
-    kinds
-        What decides on the types of the arguments.
-    words
-        The numbers in the tuples; 0 for a tuple in a tuple.
-    """
+    """Collect what is written for some arguments: held tuples one after another, inner first."""
 
     __slots__ = ("kinds", "words")
 
     def __init__(self, arguments: tuple):
-        self.kinds: list = []
-        self.words: list = []
+        self.kinds: list = []  # what decides on the types of the arguments
+        self.words: list = []  # the numbers in the tuples; 0 for a tuple in a tuple
         own, _ = self._of(arguments)
         self.words += own
 
@@ -123,10 +115,6 @@ class ArgumentBuffer:
                 kinds.append(item)
                 own.append(0)
         return own, arrays
-
-    def plan(self, arguments: tuple) -> Plan:
-        """Lay out memory for arguments of these types."""
-        return _plan(arguments)
 
     def in_memory(self, plan: Plan) -> tuple[bytearray, int]:
         """Write the arguments into memory; where the items of the outermost tuple are."""
@@ -168,7 +156,8 @@ def _lay(kind: ir.Type, at: int, places: list[tuple[int, str]]) -> tuple[int, in
     return at + size, size
 
 
-def _plan(arguments: tuple) -> Plan:
+def plan_for(arguments: tuple) -> Plan:
+    """Lay out memory for arguments of these types."""
     places: list[tuple[int, str]] = []
     tuples: list[tuple[int, int]] = []
     end = 0

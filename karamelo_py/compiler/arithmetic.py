@@ -18,21 +18,11 @@ from karamelo_py.compiler.code import Lanes, scalar_of
 
 
 class Operation(NamedTuple):
-    """Describe what a function of numbers of some types is.
-
-    Attributes
-    ----------
-    result
-        The type of what it gives.
-    arguments
-        The types that its arguments are cast to.
-    code
-        ``code(builder, values)`` writes it.
-    """
+    """Describe what a function of numbers of some types is."""
 
     result: types.Type
-    arguments: tuple[types.Type, ...]
-    code: Callable
+    arguments: tuple[types.Type, ...]  # what its arguments are cast to
+    code: Callable  # ``code(builder, values)`` writes it
 
 
 _NUMBER = (types.Number, types.Boolean, Lanes)

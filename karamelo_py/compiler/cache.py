@@ -80,15 +80,7 @@ def telling(tell: Callable[[str], None]) -> Iterator[None]:
 
 
 class KernelFiles:
-    """Keep the kernels of one function in files.
-
-    Parameters
-    ----------
-    function
-        What is compiled.
-    load
-        Brings a kernel into memory; a file in which there is none that can be is as none.
-    """
+    """Keep the kernels of one function in files; what `load` cannot bring into memory is none."""
 
     def __init__(self, function: Callable, load: Callable[[Any], Any]):
         self._function, self._load = function, load

@@ -46,11 +46,6 @@ def shared(function: Callable) -> Callable:
     return implements(function)(function)
 
 
-def in_each_lane(function: Callable, arguments: tuple) -> Any:
-    """Do a function of numbers for each lane among its arguments."""
-    raise TypeError("only compiled kernels know lanes")
-
-
 def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Callable], Any]:
     """Declare a pure function of one point, selected by the classes of its first `tags` arguments.
 
@@ -93,16 +88,14 @@ def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Calla
             return run_for_kernel(dispatch, arguments) if at_work() else plain(*arguments)
 
         dispatch = plain if config.DISABLE_JIT else watched
-        dispatch.__name__ = stub.__name__
-        dispatch.__qualname__ = stub.__qualname__
-        dispatch.__module__ = stub.__module__
-        dispatch.__doc__ = stub.__doc__
+        for name in ("__name__", "__qualname__", "__module__", "__doc__"):
+            setattr(dispatch, name, getattr(stub, name))
 
         def choose(*arguments: Any) -> Callable | None:
             classes = tuple(tag_class(a) for a in arguments[:tags])
             found = find(classes)
             apart = any(stub.__name__ in getattr(tag, "scalarised", ()) for tag in classes)
-            return _scalarised(dispatch) if apart and lanes_of(arguments) else found
+            return _in_each_lane(dispatch) if apart and lanes_of(arguments) else found
 
         by_type(dispatch)(choose)
 
@@ -130,9 +123,13 @@ def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Calla
     return declare
 
 
-def _scalarised(function: Callable) -> Callable:
-    """Make a function of arguments, some in lanes, that does `function` for each lane."""
-    return lambda *arguments: in_each_lane(function, arguments)
+def lane_by_lane(function: Callable, unrolled: bool, arguments: tuple) -> Any:
+    """Do a function of numbers for each lane among its arguments."""
+    raise TypeError("only compiled kernels know lanes")
+
+
+def _in_each_lane(function: Callable) -> Callable:
+    return lambda *arguments: lane_by_lane(function, False, arguments)
 
 
 def real(value: float, like: Any) -> Any:
@@ -158,17 +155,13 @@ INSTEAD[lanes_of] = lambda thing: lanes_of(now().kind_of(thing))
 
 @by_type(real)
 def _real(value, like):
-    if like is numba.types.float32:
-        return lambda value, like: numba.float32(value)
-    return lambda value, like: numba.float64(value)
+    number = numba.float32 if like is numba.types.float32 else numba.float64
+    return lambda value, like: number(value)
 
 
 def round_off(like: Any) -> Any:
     """Give the relative error of one operation, in the number type of `like`."""
-    return type(like)(_ROUND_OFF.get(type(like).__name__, 2.0**-52))
-
-
-_ROUND_OFF = {"float32": 2.0**-23}
+    return type(like)(2.0**-23 if type(like).__name__ == "float32" else 2.0**-52)
 
 
 @by_type(round_off)

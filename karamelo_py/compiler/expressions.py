@@ -22,22 +22,12 @@ BINARY = {
 
 
 class ExpressionCompiler:
-    """Compile expressions, by what the names in them stand for.
+    """Compile expressions, by what the names in them stand for."""
 
-    Attributes
-    ----------
-    function, free
-        The function that they are of, with the globals that it is to see, and its closure.
-    flow
-        Writes the code of ways.
-    names
-        What the function's own names stand for.
-    """
-
-    function: Callable
-    free: dict[str, Any]
-    flow: Flow
-    names: dict[str, Any]
+    function: Callable  # that they are of, with the globals that it is to see
+    free: dict[str, Any]  # its closure
+    flow: Flow  # writes the code of ways
+    names: dict[str, Any]  # what the function's own names stand for
 
     def branch(self, condition: Any, then: Callable, otherwise: Callable) -> None:
         """Go both ways, and on from where they meet."""

@@ -70,23 +70,10 @@ def fingerprint(
     choices: frozenset[Choice],
     codes: frozenset[python.CodeType] = frozenset(),
 ) -> str:
-    """Hash of all that code made of `roots` depends on, for these types and choices.
+    """Hash of all that code made of `roots` depends on, for these types of arguments and choices.
 
-    Parameters
-    ----------
-    roots
-        The function that is compiled, and what else its code depends on.
-    arguments
-        Types of its arguments.
-    choices
-        What its point functions were asked for.
-    codes
-        What must be among all that is followed.
-
-    Raises
-    ------
-    Unknown
-        Where something cannot be followed, or is no longer there; where one of `codes` is missed.
+    Raises `Unknown` where something cannot be followed, or is no longer there, and where one of
+    `codes` is not among what is followed.
     """
     ahead = [*roots]
     for argument in arguments:

@@ -42,18 +42,10 @@ KEEP, KEPT = 150, 151
 
 
 class Program(NamedTuple):
-    """A formula, ready to be evaluated.
+    """A formula, ready to be evaluated."""
 
-    Attributes
-    ----------
-    code : ndarray (n, 2) int64
-        Operation and operand of each instruction.
-    constants : ndarray (m,) float64
-        The numbers that CONSTANT instructions push.
-    """
-
-    code: np.ndarray
-    constants: np.ndarray
+    code: np.ndarray  # (n, 2) int64: operation and operand of each instruction
+    constants: np.ndarray  # (m,) float64, which CONSTANT instructions push
 
 
 # --- rows of numbers ----------------------------------------------------------------------------
@@ -146,24 +138,12 @@ implements(_binary)(lambda op, n, a, b: _binary_in_kernels(op, n, a, b))
 
 
 def _evaluate(program, globals_, points, count, out, stack):
-    """Evaluate `program` at `count` points.
+    """Evaluate `program` at `count` points, the rows x, y, z, x0, y0, z0 of `points` (6, BLOCK).
 
-    Parameters
-    ----------
-    program : Program
-    globals_ : ndarray (n,) float64
-        Published values, see :class:`karamelo_py.script.values.Values`.
-    points : ndarray (6, BLOCK) float64
-        Rows x, y, z, x0, y0, z0.
-    count : int
-        Number of points, at most BLOCK.
-    out : ndarray (BLOCK,) float64
-        Gets the `count` results.
-    stack : ndarray (ROWS, BLOCK) float64
-        Scratch.
+    `globals_` are published values (:class:`karamelo_py.script.values.Values`), `out` (BLOCK,) gets
+    the results, `stack` (ROWS, BLOCK) is scratch.
     """
-    code = program.code
-    constants = program.constants
+    code, constants = program
     top = -1
     uniform = False
     for k in range(code.shape[0]):
@@ -236,18 +216,9 @@ def evaluate_in_table(code, constants, globals_, scratch, begin, end, first, las
 
 @kernel
 def evaluate_all(program, globals_, x, x0, out, scratch):
-    """Evaluate `program` at any number of positions.
+    """Evaluate `program` at any number of positions (n, 3), now and in the beginning.
 
-    Parameters
-    ----------
-    program : Program
-    globals_ : ndarray (n,) float64
-        Published values.
-    x, x0 : ndarray (n, 3) float64
-        Positions now and in the beginning.
-    out : ndarray (n,) float64
-        Gets the results.
-    scratch : ndarray (6 + ROWS, BLOCK) float64
+    `out` (n,) gets the results; `scratch` is (6 + ROWS, BLOCK).
     """
     points = scratch[:6]
     stack = scratch[6:]

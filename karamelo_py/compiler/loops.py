@@ -19,7 +19,7 @@ from llvmlite import ir
 from numba import config, types
 
 from karamelo_py.compiler import cache, code, compile_lock, machine
-from karamelo_py.compiler.argument_buffer import ArgumentBuffer, reader
+from karamelo_py.compiler.argument_buffer import ArgumentBuffer, plan_for, reader
 from karamelo_py.compiler.choices import Choice, Unknown, choosers, contents, note, parts_noted
 from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.failing import raise_noted
@@ -33,30 +33,14 @@ NAME, ENTRY = "$kernel", ".entry"  # what functions of a module are called until
 
 
 class Unit(NamedTuple):
-    """Hold the machine code of a function for arguments of some types.
+    """Hold the machine code of a function for arguments of some types."""
 
-    Attributes
-    ----------
-    name
-        Of the function; that of its entry for Python has an ending more.
-    result
-        The type of what it gives.
-    code
-        An object file.
-    needs
-        The units that it calls.
-    choices
-        What its point functions were asked for, and those of its needs.
-    raises
-        Whether something in it raises exceptions.
-    """
-
-    name: str
+    name: str  # that of its entry for Python has an ending more
     result: types.Type
-    code: bytes
-    needs: tuple
-    choices: frozenset[Choice]
-    raises: bool
+    code: bytes  # an object file
+    needs: tuple  # the units that it calls
+    choices: frozenset[Choice]  # what point functions were asked for, also those of its needs
+    raises: bool  # whether something in it raises exceptions
 
 
 _loaded: dict[str, list[int]] = {}
@@ -164,13 +148,7 @@ def _write_entry(module: ir.Module, main: ir.Function, kinds: tuple, result: typ
 
 
 class Kernel:
-    """Compile a function for the types of its arguments, and keep it on disk.
-
-    Parameters
-    ----------
-    function
-        What is traced.
-    """
+    """Compile a function for the types of its arguments, and keep it on disk."""
 
     def __init__(self, function: Callable):
         self.function = function
@@ -196,7 +174,7 @@ class Kernel:
         written = ArgumentBuffer(arguments)
         kinds = tuple(written.kinds)
         if kinds not in self._plans:
-            plan = written.plan(arguments)
+            plan = plan_for(arguments)
             unit = self.unit(plan.types)
             self._plans[kinds] = plan, _CALL(load(unit)[1]), *reader(unit.result)
         plan, entry, size, read = self._plans[kinds]
@@ -208,7 +186,7 @@ class Kernel:
 
     def compile(self, *arguments: Any) -> None:
         """Have it compiled for arguments of these types."""
-        load(self.unit(ArgumentBuffer(arguments).plan(arguments).types))
+        load(self.unit(plan_for(arguments).types))
 
 
 def kernel(function: Callable) -> Callable:

@@ -34,31 +34,17 @@ class FunctionType(types.Type):
 class Lowering:
     """Write code with a builder, or none while only types are asked for.
 
-    Parameters
-    ----------
-    seen
-        What takes the place of a function in functions that are run.
-    builder
-        LLVM's.
-
-    Attributes
-    ----------
-    classes
-        Of the tuples that were met.
-    read
-        What was read of held tuples on the way to here.
-    regardless
-        Whether the function goes on where one that it calls raises an exception.
+    ``seen(function)`` takes the place of a function in functions that are run.
     """
 
     dispatch: Callable  # what calls functions that are chosen by type
 
     def __init__(self, seen: Callable, builder: ir.IRBuilder | None = None):
         self.seen, self.builder = seen, builder
-        self.classes: set[type] = set()
+        self.classes: set[type] = set()  # of the tuples that were met
         self.operations = 0
-        self.regardless = False
-        self.read: dict[tuple, Any] = {}
+        self.regardless = False  # whether it goes on where what it calls raises an exception
+        self.read: dict[tuple, Any] = {}  # what was read of held tuples on the way to here
 
     # --- what point functions see, and its types
 

@@ -91,12 +91,7 @@ def source_of(function: Callable) -> ast.FunctionDef:
 class AstFunction:
     """Compile a function from its text, statement by statement, where it is called.
 
-    Parameters
-    ----------
-    function
-        With the globals that it is to see.
-    flow
-        Makes what writes the code of edges, when a call begins.
+    The function has the globals that it is to see; `flow` makes what writes the code of a call.
     """
 
     def __init__(self, function: Callable, flow: Callable[[], Flow]):
@@ -117,20 +112,12 @@ class AstFunction:
 
 
 class AstCompiler(ExpressionCompiler):
-    """Compile one call of a function.
-
-    Attributes
-    ----------
-    names
-        What the function's own names stand for.
-    goes
-        Whether anything is done after the statement before.
-    """
+    """Compile one call of a function."""
 
     def __init__(self, walked: AstFunction, flow: Flow, names: dict[str, Any]):
         self.walked, self.flow, self.names = walked, flow, names
         self.function, self.free = walked.function, walked.free
-        self.goes = True
+        self.goes = True  # whether anything is done after the statement before
         self.returns: list[Edge] = []
         self.breaks: list[Edge] = []
         self.continues: list[Edge] = []

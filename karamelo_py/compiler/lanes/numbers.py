@@ -18,8 +18,8 @@ from karamelo_py.compiler.compile import (
     first_false_lane,
     first_lane,
     implements,
-    in_each_lane,
     index,
+    lane_by_lane,
     lanes_of,
     largest,
     real,
@@ -203,15 +203,8 @@ def _place(builder: Any, stored: Value, k: Any) -> Any:
     return builder.gep(builder.bitcast(stored._value, scalar.as_pointer()), [k])
 
 
-def _lane_by_lane(function: Callable, unrolled: bool, arguments: tuple) -> Any:
-    """Call a function of numbers for one lane after another."""
-    raise NotImplementedError
-
-
-@builtin(_lane_by_lane)
-def _called_lane_by_lane(
-    lowering: Any, function: Callable, unrolled: bool, arguments: tuple
-) -> Any:
+@builtin(lane_by_lane)
+def _lane_by_lane(lowering: Any, function: Callable, unrolled: bool, arguments: tuple) -> Any:
     builder = lowering.builder
     width = lanes_of(tuple(map(lowering.kind_of, arguments)))
     stored = _lanes_changed(arguments, lambda value: _in_memory(builder, value))
@@ -247,14 +240,9 @@ def _called_lane_by_lane(
     return _lanes_changed(found, lambda value: _from_memory(builder, value))
 
 
-@implements(in_each_lane)
-def _in_each_lane(function, arguments):
-    return _lane_by_lane(function, False, arguments)
-
-
 def _each_lane(function: Callable) -> None:
     """Let a function of numbers know lanes: it is called for one after another."""
-    implements(function, Lanes)(lambda *arguments: _lane_by_lane(function, True, arguments))
+    implements(function, Lanes)(lambda *arguments: lane_by_lane(function, True, arguments))
 
 
 for _function in (
