@@ -1,7 +1,7 @@
 """Types of kernels as LLVM has them, in registers and in memory, and code that takes them apart."""
 
 import functools
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -62,7 +62,7 @@ def is_empty(kind: types.Type) -> bool:
     """Tell whether there is nothing in a value of a type, as in None and in tuples of tags."""
     if isinstance(kind, types.BaseTuple) and not hasattr(kind, "register_type"):
         return all(map(is_empty, kind))
-    return register_type(kind) == NOTHING
+    return register_type(kind) == NOTHING and not isinstance(kind, types.Record)
 
 
 def nothing() -> ir.Constant:
@@ -84,13 +84,18 @@ def _constant_array(builder: Any, kind: types.Array, value: np.ndarray) -> Any:
     item = memory_type(kind.dtype)
     value = value.view(np.uint8) if value.dtype == np.bool_ else value
     content = ir.Constant(ir.ArrayType(item, value.size), value.ravel().tolist())
-    name = builder.module.get_unique_name("array")
-    place = ir.GlobalVariable(builder.module, content.type, name)
-    place.initializer, place.global_constant, place.linkage = content, True, "internal"
-    data = builder.bitcast(place, item.as_pointer())
+    data = builder.bitcast(in_module(builder, content, "array"), item.as_pointer())
     return make_array(
         builder, kind, data, [I64(n) for n in value.shape], [I64(n) for n in value.strides]
     )
+
+
+def in_module(builder: Any, content: ir.Constant, name: str) -> ir.GlobalVariable:
+    """Put a constant into memory; where it is."""
+    name = builder.module.get_unique_name(name)
+    place = ir.GlobalVariable(builder.module, content.type, name)
+    place.initializer, place.global_constant, place.linkage = content, True, "internal"
+    return place
 
 
 def cast(builder: Any, value: Any, kind: types.Type, wanted: types.Type) -> Any:
@@ -100,11 +105,8 @@ def cast(builder: Any, value: Any, kind: types.Type, wanted: types.Type) -> Any:
     if kind == wanted:
         return value
     if isinstance(wanted, types.BaseTuple) and isinstance(kind, types.BaseTuple):
-        items = [
-            cast(builder, builder.extract_value(value, k), *pair)
-            for k, pair in enumerate(zip(kind, wanted, strict=True))
-        ]
-        return make_tuple(builder, wanted, items)
+        parts = zip(unpack(builder, value), kind, wanted, strict=True)
+        return make_tuple(builder, wanted, [cast(builder, *part) for part in parts])
     if isinstance(wanted, Lanes) and not isinstance(kind, Lanes):
         return splat(builder, cast(builder, value, kind, wanted.scalar), wanted)
     to, of = register_type(wanted), kind
@@ -203,27 +205,22 @@ def get(builder: Any, kind: types.Type, pointer: Any, align: int | None = None) 
 
 
 def _as_in_memory(builder: Any, kind: types.Type, value: Any) -> Any:
-    if register_type(kind) == memory_type(kind):
-        return value
-    if not isinstance(kind, types.BaseTuple):
-        return builder.zext(value, I8)
-    made = ir.Constant(memory_type(kind), ir.Undefined)
-    for k, item in enumerate(kind):
-        part = _as_in_memory(builder, item, builder.extract_value(value, k))
-        made = builder.insert_value(made, part, k)
-    return made
+    return _converted(builder, kind, value, memory_type, lambda truth: builder.zext(truth, I8))
 
 
 def _as_in_register(builder: Any, kind: types.Type, value: Any) -> Any:
+    return _converted(builder, kind, value, register_type, lambda byte: builder.trunc(byte, I1))
+
+
+def _converted(builder: Any, kind: types.Type, value: Any, to: Callable, truth: Callable) -> Any:
+    """Convert each truth value among nested tuples."""
     if register_type(kind) == memory_type(kind):
         return value
     if not isinstance(kind, types.BaseTuple):
-        return builder.trunc(value, I1)
-    items = [
-        _as_in_register(builder, item, builder.extract_value(value, k))
-        for k, item in enumerate(kind)
-    ]
-    return make_tuple(builder, kind, items)
+        return truth(value)
+    items = zip(kind, unpack(builder, value), strict=True)
+    parts = [_converted(builder, item, part, to, truth) for item, part in items]
+    return make_struct(builder, to(kind), parts)
 
 
 # --- tuples and arrays ----------------------------------------------------------------------------

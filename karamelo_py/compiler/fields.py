@@ -125,8 +125,12 @@ def rows_of_points(
         room = np.empty(length_of_rows(shape, dtype), dtype)
     *rows, count = shape
     stride = _distance_of_rows(count, dtype)
-    first = -room.ctypes.data % LINE // room.itemsize
+    first = _first_of_line(room)
     return room[first : first + prod(rows) * stride].reshape(*rows, stride)[..., :count]
+
+
+def _first_of_line(room: np.ndarray) -> int:
+    return -room.ctypes.data % LINE // room.itemsize
 
 
 def length_of_rows(shape: tuple[int, ...], dtype: type) -> int:
@@ -168,9 +172,8 @@ def at_points(kind: type, kin: Any, count: int, real: type) -> NamedTuple:
 
 def records(count: int, width: int, real: type) -> np.ndarray:
     """(count, width) zeros of nodes; untouched pages cost no memory, no record is in two lines."""
-    size = np.dtype(real).itemsize
-    room = np.zeros(count * width + LINE // size, real)
-    first = -room.ctypes.data % LINE // size
+    room = np.zeros(count * width + LINE // np.dtype(real).itemsize, real)
+    first = _first_of_line(room)
     return room[first : first + count * width].reshape(count, width)
 
 

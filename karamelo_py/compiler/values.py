@@ -202,26 +202,16 @@ class Value:
             now().set_attribute(self, name, value)
 
     def __getitem__(self, place: Any) -> Any:
-        return emit(operator.getitem, self, _place(place))
+        return emit(operator.getitem, self, place)
 
     def __setitem__(self, place: Any, value: Any) -> None:
-        emit(operator.setitem, self, _place(place), value)
+        emit(operator.setitem, self, place, value)
 
     __bool__ = _only_at_run_time("a condition in an expression within an expression")
     __int__ = __index__ = __float__ = _only_at_run_time("a number that has to be written")
     __iter__ = __len__ = __contains__ = _only_at_run_time("what is gone through or counted")
     __hash__ = _only_at_run_time("a key")
     __str__ = __repr__ = __format__ = _only_at_run_time("a number in a text")
-
-
-def _place(place: Any) -> Any:
-    """Write what stands in the brackets of an array."""
-    if isinstance(place, tuple):
-        return tuple(map(_place, place))
-    if isinstance(place, slice):
-        bounds = place.start, place.stop, place.step
-        return emit(slice, *(bounds if bounds[2] is not None else bounds[:2]))
-    return place
 
 
 _BINARY = ("add", "sub", "mul", "truediv", "floordiv", "mod", "pow")
