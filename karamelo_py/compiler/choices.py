@@ -8,6 +8,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
+from numba import config
+
+INTERPRETED = bool(config.DISABLE_JIT)  # nothing is compiled
+
 # Known by name: their versions are part of every key.
 _OPAQUE = {"numba", "llvmlite", "numpy", *sys.stdlib_module_names}
 # What writes code is in every key as a whole, and so are methods of tensors, which belong to

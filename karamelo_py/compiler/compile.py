@@ -1,31 +1,32 @@
 """Decorators that compile kernels, and point functions that are chosen by type."""
 
+import functools
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numba
-from numba import config
 
 from karamelo_py.compiler import arithmetic
-from karamelo_py.compiler.choices import choosers, declare_point_function, note, tag_class
+from karamelo_py.compiler.choices import (
+    INTERPRETED,
+    choosers,
+    declare_point_function,
+    note,
+    tag_class,
+)
 from karamelo_py.compiler.trace import INSTEAD, Undefined, forget, run_for_kernel, traced
 from karamelo_py.compiler.values import OF_REALS, at_work, intrinsic, now
 
 
 def by_type(function: Callable) -> Callable:
     """Decorate the chooser of what `function` is in a kernel, from the types of its arguments."""
-
-    def register(chooser: Callable) -> Callable:
-        traced(function, chooser)
-        return chooser
-
-    return register
+    return functools.partial(traced, function)
 
 
 def implements(function: Callable, *numbers: type) -> Callable:
     """Decorate what `function` is in a kernel: for these types of numbers, or for all others.
 
-    A type of numbers is a NamedTuple with operators (:func:`~.algebra.number_type`), or lanes. It
+    A type of numbers is a NamedTuple with operators (:func:`~.algebra.algebra`), or lanes. It
     is looked for in tuples, too. What is decorated is traced, or code written by hand.
     """
 
@@ -61,33 +62,21 @@ def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Calla
     def declare(stub: Callable) -> Callable:
         table: dict[tuple[type, ...], Callable] = {}
         fallback = stub if otherwise else None
-        memo: dict[Any, Callable] = {}  # what was found before, for speed where interpreted
 
         def find(classes: tuple) -> Callable | None:
             return table.get(classes, fallback)
 
-        def select(classes: tuple) -> Callable:
-            chosen = find(classes)
+        def plain(*arguments: Any) -> Any:
+            classes = tuple([a.__class__ for a in arguments[:tags]])
+            chosen = table.get(classes, fallback)
             if chosen is None:
                 raise Undefined(stub.__name__, classes)
-            memo[classes if tags > 1 else classes[0]] = chosen
-            return chosen
-
-        if tags == 1:
-
-            def plain(*arguments: Any) -> Any:
-                kind = arguments[0].__class__
-                return (memo.get(kind) or select((kind,)))(*arguments)
-        else:
-
-            def plain(*arguments: Any) -> Any:
-                classes = tuple([a.__class__ for a in arguments[:tags]])
-                return (memo.get(classes) or select(classes))(*arguments)
+            return chosen(*arguments)
 
         def watched(*arguments: Any) -> Any:
             return run_for_kernel(dispatch, arguments) if at_work() else plain(*arguments)
 
-        dispatch = plain if config.DISABLE_JIT else watched
+        dispatch = plain if INTERPRETED else watched
         for name in ("__name__", "__qualname__", "__module__", "__doc__"):
             setattr(dispatch, name, getattr(stub, name))
 
@@ -102,22 +91,17 @@ def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Calla
         def on(*classes: type) -> Callable[[Callable], Callable]:
             def register(implementation: Callable) -> Callable:
                 table[classes] = implementation
-                memo.clear()
                 forget()
                 return implementation
 
             return register
 
-        dispatch.tags = tags
-        dispatch.find = find
-        declare_point_function(dispatch)
-        dispatch.on = on
-
         def defined(*classes: type) -> bool:
             note([(dispatch, classes)])
             return classes in table
 
-        dispatch.defined = defined
+        dispatch.tags, dispatch.find, dispatch.on, dispatch.defined = tags, find, on, defined
+        declare_point_function(dispatch)
         return dispatch
 
     return declare

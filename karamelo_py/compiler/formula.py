@@ -11,11 +11,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import config, types
+from numba import types
 
-from karamelo_py.compiler.addresses import caller_of
 from karamelo_py.compiler.compile import implements, shared
-from karamelo_py.compiler.loops import kernel, noinline
+from karamelo_py.compiler.loops import caller_of, kernel, noinline
 from karamelo_py.compiler.operations import (
     FIRST_BINARY,
     IN_NUMPY,
@@ -82,7 +81,8 @@ _POWER = OPERATIONS["^"]
 
 def _unary(op, n, a):
     """Replace the first `n` numbers of `a` by a function of them."""
-    a[:n] = IN_NUMPY[op](a[:n])
+    with np.errstate(all="ignore"):
+        a[:n] = IN_NUMPY[op](a[:n])
 
 
 @noinline
@@ -98,7 +98,8 @@ def _unary_in_kernels(op, n, a):
 
 def _binary(op, n, a, b):
     """Replace the first `n` numbers of `a` by what `op` makes of them and those of `b`."""
-    a[:n] = IN_NUMPY[op](a[:n], b[:n])
+    with np.errstate(all="ignore"):
+        a[:n] = IN_NUMPY[op](a[:n], b[:n])
 
 
 @noinline
@@ -137,7 +138,8 @@ implements(_unary)(lambda op, n, a: _unary_in_kernels(op, n, a))
 implements(_binary)(lambda op, n, a, b: _binary_in_kernels(op, n, a, b))
 
 
-def _evaluate(program, globals_, points, count, out, stack):
+@kernel
+def evaluate(program, globals_, points, count, out, stack):
     """Evaluate `program` at `count` points, the rows x, y, z, x0, y0, z0 of `points` (6, BLOCK).
 
     `globals_` are published values (:class:`karamelo_py.script.values.Values`), `out` (BLOCK,) gets
@@ -183,14 +185,6 @@ def _evaluate(program, globals_, points, count, out, stack):
         _fill(count, out, stack[0, 0])
     else:
         _copy(count, out, stack[0])
-
-
-def _evaluate_in_python(*arguments):
-    with np.errstate(all="ignore"):
-        _evaluate(*arguments)
-
-
-evaluate = _evaluate_in_python if config.DISABLE_JIT else kernel(_evaluate)
 
 
 # How kernels of hooks call the evaluator: by address, so that none of them has to contain it, and

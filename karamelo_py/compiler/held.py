@@ -72,7 +72,7 @@ class HeldNamedTuple(_Held, types.BaseNamedTuple):
 
     @property
     def key(self):
-        return self.instance_class, self.types
+        return getattr(self, "instance_class", None), self.types
 
 
 def _has_arrays(numba_type: Any) -> bool:

@@ -16,17 +16,25 @@ from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 from llvmlite import ir
-from numba import config, types
+from numba import types
 
 from karamelo_py.compiler import cache, code, compile_lock, machine
 from karamelo_py.compiler.argument_buffer import ArgumentBuffer, plan_for, reader
-from karamelo_py.compiler.choices import Choice, Unknown, choosers, contents, note, parts_noted
+from karamelo_py.compiler.choices import (
+    INTERPRETED,
+    Choice,
+    Unknown,
+    choosers,
+    contents,
+    note,
+    parts_noted,
+)
 from karamelo_py.compiler.compile import shared
-from karamelo_py.compiler.failing import raise_noted
+from karamelo_py.compiler.failing import noting, raise_noted
 from karamelo_py.compiler.held import HeldTuple, hold, item_of
 from karamelo_py.compiler.lowering import function_type
 from karamelo_py.compiler.trace import alone, formula, write_into
-from karamelo_py.compiler.values import builtin
+from karamelo_py.compiler.values import builtin, intrinsic
 
 _CALL = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64)  # free of the interpreter lock
 NAME, ENTRY = "$kernel", ".entry"  # what functions of a module are called until it has a name
@@ -195,7 +203,7 @@ def kernel(function: Callable) -> Callable:
     No fast mathematics: where products and sums contract would depend on what a loop is inlined
     into. `fma` says where.
     """
-    if config.DISABLE_JIT:
+    if INTERPRETED:
         return function
     made = Kernel(shared(function))
 
@@ -227,14 +235,64 @@ def kernel(function: Callable) -> Callable:
 
 def noinline(function: Callable) -> Callable:
     """Mark a function that kernels call, too large to be written into each place that calls it."""
-    if not config.DISABLE_JIT:
+    if not INTERPRETED:
         alone(function)
         shared(function)
     return function
 
 
-def address_in_memory(function: Callable, kinds: tuple, result: types.Type) -> int:
-    """Compile a function of these types; give its address."""
-    if function not in choosers:
-        shared(function)
-    return load(Kernel(function).unit(kinds, result))[0]
+# --- functions that kernels call by their address, and do not contain -----------------------------
+
+_uncompiled: list[Callable] = []
+_addresses: dict[Callable, int] = {}
+_keep_alive: list = []
+
+
+def address_of(function: Callable, signature: types.Type) -> int:
+    """Compile `function` (cached on disk) and return the address that kernels call it by.
+
+    Whoever calls by address does not contain the function: it need not be compiled anew for
+    another one, and the function is compiled once for all its callers.
+    """
+    if function not in _addresses:
+        if INTERPRETED:
+            _addresses[function] = address_of_python(function, signature)
+        else:
+            if function not in choosers:
+                shared(function)
+            unit = Kernel(function).unit(signature.args, signature.return_type)
+            _addresses[function] = load(unit)[0]
+    return _addresses[function]
+
+
+def address_of_python(function: Callable, signature: types.Type) -> int:
+    """Give the address by which kernels call a function of Python, of whole numbers.
+
+    What is raised in it is raised again behind the kernel.
+    """
+    if INTERPRETED:
+        _uncompiled.append(function)
+        return len(_uncompiled) - 1
+    made = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * len(signature.args))(
+        noting(function)
+    )
+    _keep_alive.append(made)
+    return ctypes.cast(made, ctypes.c_void_p).value
+
+
+def caller_of(signature: Any) -> Callable:
+    """Make ``call(address, ...)``, which calls a function of this signature by its address."""
+    result, parameters = signature.return_type, signature.args
+
+    if INTERPRETED:
+        return lambda address, *arguments: _uncompiled[address](*arguments)
+
+    @intrinsic
+    def call(address, *arguments):
+        def codegen(builder, place, *values):
+            kind = function_type(parameters, result)
+            return builder.call(builder.inttoptr(place, kind.as_pointer()), values)
+
+        return result(types.int64, *parameters), codegen
+
+    return call

@@ -30,7 +30,6 @@ from karamelo_py.compiler.lowering import Lowering, name_of, numbers_of
 from karamelo_py.compiler.statements import AstFunction, place_in_text
 from karamelo_py.compiler.values import (
     BUILTINS,
-    OF_REALS,
     DataDependentBranch,
     Emitted,
     Globals,
@@ -38,12 +37,9 @@ from karamelo_py.compiler.values import (
     Intrinsic,
     Untraceable,
     Value,
-    alike,
     at_work,
     branching,
     counting,
-    emit,
-    implemented,
     is_literal,
     now,
     rebuilt,
@@ -104,22 +100,6 @@ class Module:
 
     def __getattr__(self, name: str) -> Any:
         return self._seen(getattr(self._module, name))
-
-
-class _Dispatched(Emitted):
-    """Call what the classes of tags, or the types of numbers, choose."""
-
-    def __call__(self, *arguments: Any) -> Any:
-        if self.counts(arguments):
-            return self.seen(*arguments)
-        made = implemented(self.seen, arguments)
-        if made is not None:
-            return _seen(made)(*arguments)
-        return emit(self.seen, *(alike(arguments) if self.seen in OF_REALS else arguments))
-
-    def defined(self, *classes: type) -> bool:
-        """Tell whether a point function has an implementation for these classes."""
-        return self.seen.defined(*classes)
 
 
 def _class_of(thing: Any) -> type:
@@ -188,11 +168,10 @@ def _copy(thing: Any) -> Any:
         return INSTEAD[thing]
     if thing in _SAFE:
         return thing
-    if thing in choosers and thing not in BUILTINS:
-        return _Dispatched(thing)
     if isinstance(thing, type) and issubclass(thing, tuple):
         return thing
-    if isinstance(thing, Intrinsic | type) or thing in BUILTINS or thing in OPERATIONS:
+    known = thing in choosers or thing in BUILTINS or thing in OPERATIONS
+    if known or isinstance(thing, Intrinsic | type):
         return Emitted(thing)
     if isinstance(thing, python.FunctionType):
         return _copied(thing)
@@ -371,13 +350,14 @@ def alone(dispatch: Callable) -> None:
     _own.add(dispatch)
 
 
-def traced(dispatch: Callable, chooser: Callable, last: bool = False) -> None:
+def traced(dispatch: Callable, chooser: Callable, last: bool = False) -> Callable:
     """Let kernels run what `chooser` makes of `dispatch` for types; None if it has nothing.
 
     It is asked before those that are known already, or as the `last`.
     """
     known = choosers.setdefault(dispatch, [])
     known.insert(len(known) if last else 0, chooser)
+    return chooser
 
 
 def _call(function: Callable, arguments: tuple) -> Any:

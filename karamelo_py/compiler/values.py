@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numba import types
 
+from karamelo_py.compiler.choices import choosers
 from karamelo_py.compiler.code import Lanes, scalar_of
 
 
@@ -325,20 +326,20 @@ class Emitted:
         self.seen = function
 
     def __call__(self, *arguments: Any) -> Any:
-        if self.counts(arguments):
-            return self.seen(*arguments)
+        if self.seen in OF_WHOLE and all(isinstance(a, int) for a in arguments):
+            return self.seen(*arguments)  # of numbers that are known, as lengths of loops are
         made = implemented(self.seen, arguments)
         if made is not None:
             return now().seen(made)(*arguments)
         if self.seen in OF_REALS:
-            if all(type(a) in (int, float) for a in arguments):
+            if self.seen not in choosers and all(map(is_literal, arguments)):
                 return self.seen(*arguments)  # known already
             arguments = alike(arguments)
         return emit(self.seen, *arguments)
 
-    def counts(self, arguments: tuple) -> bool:
-        """Tell whether all arguments are whole numbers that are known, as lengths of loops are."""
-        return self.seen in OF_WHOLE and all(isinstance(a, int) for a in arguments)
+    def defined(self, *classes: type) -> bool:
+        """Tell whether a point function has an implementation for these classes."""
+        return self.seen.defined(*classes)
 
 
 OF_WHOLE = {min, max, abs, int, bool}

@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.compiler.compile import shared
+from karamelo_py.compiler.fields import pick_items, put_items
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import kernel, noinline
-from karamelo_py.compiler.rows import pick_items, put_items
 from karamelo_py.compiler.threads import by_team, shared_out
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Number, Tag, Tiling
