@@ -112,31 +112,33 @@ def cast(builder: Any, value: Any, kind: types.Type, wanted: types.Type) -> Any:
     to, of = register_type(wanted), kind
     if isinstance(kind, Lanes) and isinstance(wanted, Lanes):
         kind, wanted = kind.scalar, wanted.scalar
-    if isinstance(kind, types.Boolean) and isinstance(wanted, types.Integer):
-        return builder.zext(value, to)
-    if isinstance(kind, types.Boolean) and isinstance(wanted, types.Float):
-        return builder.uitofp(value, to)
-    whole, real = isinstance(kind, types.Integer), isinstance(kind, types.Float)
-    if isinstance(wanted, types.Boolean) and whole:
+    if isinstance(wanted, types.Boolean) and isinstance(kind, types.Integer):
         return builder.icmp_signed("!=", value, value.type(0))
-    if isinstance(wanted, types.Boolean) and real:
+    if isinstance(wanted, types.Boolean) and isinstance(kind, types.Float):
         return builder.fcmp_unordered("!=", value, value.type(0.0))
-    if whole and isinstance(wanted, types.Integer):
-        if wanted.bitwidth <= kind.bitwidth:
-            return value if to == value.type else builder.trunc(value, to)
-        return builder.sext(value, to) if kind.signed else builder.zext(value, to)
-    if whole and isinstance(wanted, types.Float):
-        if isinstance(of, Lanes) and kind.bitwidth > 32:  # what every processor can
-            value = builder.trunc(value, ir.VectorType(I32, of.width))
-        return builder.sitofp(value, to) if kind.signed else builder.uitofp(value, to)
-    if real and isinstance(wanted, types.Integer):
-        return builder.fptosi(value, to) if wanted.signed else builder.fptoui(value, to)
-    if real and isinstance(wanted, types.Float):
-        convert = builder.fpext if kind.bitwidth < wanted.bitwidth else builder.fptrunc
-        return convert(value, to)
+    conversion = _conversion(kind, wanted)
+    if conversion is not None:
+        if conversion == "sitofp" and isinstance(of, Lanes) and kind.bitwidth > 32:
+            value = builder.trunc(value, ir.VectorType(I32, of.width))  # what every processor can
+        return getattr(builder, conversion)(value, to)
     if register_type(of) != to:
         raise TypeError(f"{of} is no {wanted}")
     return value
+
+
+def _conversion(kind: types.Type, wanted: types.Type) -> str | None:
+    """Name LLVM's instruction that converts a number; None where there is nothing to do."""
+    whole, real = types.Integer | types.Boolean, types.Float
+    signed, width = getattr(kind, "signed", False), getattr(kind, "bitwidth", 1)
+    if isinstance(kind, whole) and isinstance(wanted, types.Integer) and width != wanted.bitwidth:
+        return "trunc" if width > wanted.bitwidth else "sext" if signed else "zext"
+    if isinstance(kind, whole) and isinstance(wanted, real):
+        return "sitofp" if signed else "uitofp"
+    if isinstance(kind, real) and isinstance(wanted, types.Integer):
+        return "fptosi" if wanted.signed else "fptoui"
+    if isinstance(kind, real) and isinstance(wanted, real):
+        return "fpext" if width < wanted.bitwidth else "fptrunc"
+    return None
 
 
 # --- lanes ----------------------------------------------------------------------------------------

@@ -32,7 +32,7 @@ from karamelo_py.compiler.failing import note, noting
 from karamelo_py.compiler.held import HeldTuple, held_as, held_type
 from karamelo_py.compiler.loops import noinline
 from karamelo_py.compiler.trace import formula
-from karamelo_py.compiler.values import HeldValue, Value, builtin, intrinsic, now
+from karamelo_py.compiler.values import HeldValue, Value, in_kernels, intrinsic, now
 
 
 class Serial(NamedTuple):
@@ -198,13 +198,9 @@ def _address(lowering: Any, name: str, run: Callable, count: int) -> Value:
     return Value(types.intp, lowering.builder.ptrtoint(made, I64))
 
 
-def _task(function: Callable, items: tuple) -> tuple[int, int]:
+@in_kernels
+def _task(lowering: Any, function: Any, items: tuple) -> tuple[Value, Value]:
     """Put items into memory; the address of what does a function of them and a number; theirs."""
-    raise NotImplementedError
-
-
-@builtin(_task)
-def _task_in_kernels(lowering: Any, function: Any, items: tuple) -> tuple[Value, Value]:
     held = HeldTuple(tuple(held_type(types.unliteral(lowering.kind_of(item))) for item in items))
     found = formula(function.seen, (*held, types.intp))
     there = held_as(lowering, items, held)
@@ -224,42 +220,14 @@ def _call(task, arguments, number):
     return types.none(types.intp, types.intp, types.intp), codegen
 
 
-@intrinsic
-def _call_python(count, part, task, arguments):
-    """Call `_share_out`."""
-
-    def codegen(builder, *numbers):
-        function = code.external(builder, "karamelo_share_out", ir.VoidType(), [I64] * 4)
-        builder.call(function, numbers)
-
-    return types.none(*[types.intp] * 4), codegen
-
-
-def _regardless(function: Callable, *arguments: Any) -> Any:
+@in_kernels
+def _regardless(lowering: Any, function: Callable, *arguments: Any) -> Any:
     """Call a function; an exception in it is left to who called this one."""
-    raise NotImplementedError
-
-
-@builtin(_regardless)
-def _call_regardless(lowering: Any, function: Callable, *arguments: Any) -> Any:
     lowering.regardless = True
     try:
         return function(*arguments)
     finally:
         lowering.regardless = False
-
-
-def _address_of_part() -> int:
-    """Give the address of `_do_part`."""
-    raise NotImplementedError
-
-
-@builtin(_address_of_part)
-def _address_of_part_in_kernels(lowering: Any) -> Value:
-    found = formula(_do_part, (types.intp,) * 4)
-    if lowering.builder is None:
-        return Value(types.intp, None)
-    return _address(lowering, found.name, found.run, 4)
 
 
 @shared
@@ -268,10 +236,15 @@ def _do_part(task, arguments, begin, end):
         _call(task, arguments, number)
 
 
-@noinline
-def _in_parallel(count, task, arguments):
-    """Do a task for each number below `count`, by threads that begin for it."""
-    _call_python(count, _address_of_part(), task, arguments)
+@in_kernels
+def _in_parallel(lowering: Any, count: Any, task: Value, arguments: Value) -> None:
+    """Do a task for each number below `count`, by threads that begin for it (`_share_out`)."""
+    found = formula(_do_part, (types.intp,) * 4)
+    if lowering.builder:
+        part = _address(lowering, found.name, found.run, 4)
+        numbers = [lowering.lowered(n, types.intp) for n in (count, part, task, arguments)]
+        function = code.external(lowering.builder, "karamelo_share_out", ir.VoidType(), [I64] * 4)
+        lowering.builder.call(function, numbers)
 
 
 # --- teams ------------------------------------------------------------------------------------
@@ -381,12 +354,6 @@ def _distribute(team, count, task, arguments):
         _call(task, arguments, 0)
 
 
-@noinline
-def _begin_and_end(team, body, arguments):
-    """Let threads do `body`: one of them leads."""
-    _in_parallel(read(team + _SIZE), body, arguments)
-
-
 def shared_out(function: Callable) -> Callable:
     """Make ``f(mode, count, ...)``: ``function(..., k)`` for each k below `count`."""
 
@@ -430,7 +397,7 @@ def by_team(function: Callable) -> Callable:
         if team == 0:
             return inner(mode, *arguments)
         write(team + _STATE, _WAITS)
-        _begin_and_end(team, *_task(member, (mode, *arguments)))
+        _in_parallel(read(team + _SIZE), *_task(member, (mode, *arguments)))
         return read(team + _RESULT)
 
     @by_type(alone)

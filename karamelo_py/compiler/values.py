@@ -160,6 +160,11 @@ def builtin(function: Callable) -> Callable[[Callable], Callable]:
     return register
 
 
+def in_kernels(made: Callable) -> Callable:
+    """Decorate a function that only kernels know, and that is written so: it is its own code."""
+    return builtin(made)(made)
+
+
 class Intrinsic:
     """Define a function of values: by its signature for types, and by what writes the code.
 
