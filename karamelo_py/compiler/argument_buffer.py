@@ -5,6 +5,7 @@ Python writes the arguments into memory as kernels hold them
 """
 
 import ctypes
+import functools
 import struct
 import weakref
 from collections.abc import Callable, Iterator
@@ -42,19 +43,16 @@ def _array(array: np.ndarray) -> _Array:
         )  # fmt: skip
         words = (array.ctypes.data, *array.shape, *array.strides)
         kept = _kinds.setdefault(kind, len(_kinds))
-        known = _Array(weakref.ref(array, _gone(number)), array.shape, kept, words)
+        alive = weakref.ref(array, functools.partial(_drop, number))
+        known = _Array(alive, array.shape, kept, words)
         _arrays[number] = known
     return known
 
 
-def _gone(number: int) -> Callable[[weakref.ref], None]:
-    """Make what is done when an array is gone that had this number, unless another has it."""
-
-    def drop(alive: weakref.ref) -> None:
-        if number in _arrays and _arrays[number].alive is alive:
-            del _arrays[number]
-
-    return drop
+def _drop(number: int, alive: weakref.ref) -> None:
+    """Forget an array that is gone, unless another one has its number."""
+    if number in _arrays and _arrays[number].alive is alive:
+        del _arrays[number]
 
 
 def forget(array: np.ndarray) -> None:
