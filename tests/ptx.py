@@ -12,8 +12,8 @@ from cuda.bindings import nvjitlink
 from numba import typeof
 
 from karamelo_py.compiler import loops, machine
-from karamelo_py.compiler.argument_buffer import ArgumentBuffer
-from karamelo_py.compiler.compile import define, index, shared
+from karamelo_py.compiler.argument_buffer import plan_for
+from karamelo_py.compiler.compile import index, shared
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Nodes, Setup
@@ -110,7 +110,7 @@ def visits_of(setup: Setup, scheme: Any, in_stages: bool = False) -> list[Visit]
 
 def compiled(function: Any, *arguments: Any) -> Compiled:
     """A kernel for arguments of these types."""
-    kinds = ArgumentBuffer(arguments).plan(arguments).types
+    kinds = plan_for(arguments).types
     module, _ = loops.written(shared(function), kinds)
     main = module.globals[loops.NAME]
     main.linkage = "internal"
@@ -140,13 +140,14 @@ def compiled(function: Any, *arguments: Any) -> Compiled:
 
 
 def calling(function: Callable, count: int) -> Callable:
-    """A kernel that writes down what a function of so many numbers gives, another tuple of them."""
-    names = ", ".join(f"a{k}" for k in range(count))
-    return define(
-        f"out, {names}",
-        f"for k, value in enumerate(function({names})): out[k] = value",
-        function=shared(function),
-    )
+    """A kernel that writes down what a function of numbers gives, another tuple of them."""
+    shared(function)
+
+    def write(out, *numbers):
+        for k, value in enumerate(function(*numbers)):
+            out[k] = value
+
+    return write
 
 
 def nodes_of(visit: Visit, setup: Setup) -> Nodes:

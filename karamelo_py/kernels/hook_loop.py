@@ -9,12 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.addresses import caller_of
 from karamelo_py.compiler.compile import over_blocks, point_function, shared
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.formula import BLOCK, call_evaluate
 from karamelo_py.compiler.held import hold
-from karamelo_py.compiler.loops import kernel, noinline
+from karamelo_py.compiler.loops import caller_of, kernel, noinline
 from karamelo_py.compiler.threads import Serial, Threaded, shared_out
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels import arrays, totals
@@ -152,7 +151,7 @@ def _with_items_of(values, others):
     return type(values)(*(new.get(name, item) for name, item in items))
 
 
-_act_on_parts = shared_out(_act_apart, "what, task, hooks, control, dt, h, share")
+_act_on_parts = shared_out(_act_apart)
 
 
 @point_function()

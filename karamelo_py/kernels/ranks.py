@@ -9,8 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from karamelo_py.compiler.addresses import caller_of
-from karamelo_py.compiler.loops import kernel
+from karamelo_py.compiler.loops import caller_of, kernel
 from karamelo_py.kernels import totals
 from karamelo_py.kernels.sums import given
 from karamelo_py.kernels.sweep import context_of, sweep_blocks, sweep_points, visit_shares

@@ -73,7 +73,7 @@ def _check_share(frame, kin, grids, points, tiling, now, k):
         tiling.report[t, 2] = wrong
 
 
-_check_shares = shared_out(_check_share, "frame, kin, grids, points, tiling, now")
+_check_shares = shared_out(_check_share)
 
 
 @kernel

@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.compiler.compile import shared
+from karamelo_py.compiler.fields import pick_items, put_items
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import kernel, noinline
-from karamelo_py.compiler.rows import pick_items, put_items
 from karamelo_py.compiler.threads import by_team, shared_out
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Number, Tag, Tiling
@@ -213,12 +213,12 @@ def _put_rows(rows, first, last, room, parts, k):
             put_items(rows[r, 0], np.int64(0), room, r - first, begin, end)
 
 
-_find_all_tiles = shared_out(_find_tiles, "kin, grids, tiles, x, of, ends, tile")
-_order_parts = shared_out(_order_part, "found")
-_order_in_all_tiles = shared_out(_order_in_tiles, "kin, grids, sight, tiles, x, of, ids, found")
-_find_all_rows = shared_out(_find_rows, "kin, grids, sight, x, tiling, parts")
-_pick_all_rows = shared_out(_pick_rows, "rows, first, last, order, room, parts")
-_put_all_rows = shared_out(_put_rows, "rows, first, last, room, parts")
+_find_all_tiles = shared_out(_find_tiles)
+_order_parts = shared_out(_order_part)
+_order_in_all_tiles = shared_out(_order_in_tiles)
+_find_all_rows = shared_out(_find_rows)
+_pick_all_rows = shared_out(_pick_rows)
+_put_all_rows = shared_out(_put_rows)
 
 
 @noinline
@@ -245,7 +245,7 @@ def _sort(mode, kin, grids, sight, tiles, x, of, ids, found, rows):
     return 0
 
 
-_sort_by_team = by_team(_sort, "kin, grids, sight, tiles, x, of, ids, found, rows")
+_sort_by_team = by_team(_sort)
 
 
 @kernel

@@ -160,7 +160,7 @@ def _led(mode, scheme, visits, s, hooks, count):
 
 
 shared(run_steps)
-_by_team = by_team(_led, "scheme, visits, s, hooks, count")
+_by_team = by_team(_led)
 
 
 @kernel

@@ -312,7 +312,7 @@ def by_threads(share: Callable) -> Callable:
     The threads of `mode` divide these numbers among them.
     """
     names = ["mode", "count", *inspect.signature(share).parameters][:-1]
-    loop = shared_out(share, ", ".join(names[2:]))
+    loop = shared_out(share)
 
     def all_shares(*arguments):
         loop(*arguments)

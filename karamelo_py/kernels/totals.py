@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.atomics import add_among
 from karamelo_py.compiler.compile import point_function, shared
 from karamelo_py.compiler.loops import kernel, noinline
+from karamelo_py.compiler.threads import add_among
 
 LIMBS = 68
 LOST = LIMBS - 1  # counts terms that are no numbers

@@ -119,7 +119,7 @@ def _look_at_share(kin, points, laws, tiling, firsts, k):
         _note(tiling.report, t, total)
 
 
-_look_at_shares = shared_out(_look_at_share, "kin, points, laws, tiling, firsts")
+_look_at_shares = shared_out(_look_at_share)
 
 
 @kernel

@@ -358,7 +358,7 @@ def _triad_part(a, b, c, factor, parts, k):
         a[index(i)] = b[index(i)] + factor * c[index(i)]
 
 
-_triad_parts = shared_out(shared(_triad_part), "a, b, c, factor, parts")
+_triad_parts = shared_out(shared(_triad_part))
 
 
 @kernel

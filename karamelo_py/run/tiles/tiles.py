@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from karamelo_py.compiler.fields import addresses_of_rows
 from karamelo_py.compiler.lanes import lanes_for
-from karamelo_py.compiler.rows import addresses_of_rows
 from karamelo_py.compiler.threads import Serial, Threaded
 from karamelo_py.kernels.arrays import (
     ADD,
