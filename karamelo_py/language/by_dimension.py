@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from karamelo_py.language.arguments import with_gap
-from karamelo_py.language.own_words import words_of
 from karamelo_py.language.scene import Scene
+from karamelo_py.language.unknown import words_of
 from karamelo_py.script.errors import ScriptError, meant, plural
 
 # Karamelo's own stand-in for infinity; scripts that write it mean INF.

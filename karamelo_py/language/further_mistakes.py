@@ -12,9 +12,8 @@ from typing import Any
 
 from karamelo_py.language import registry
 from karamelo_py.language.unknown import unknown_call
-from karamelo_py.script.errors import Quit, ScriptError, nearest, plural
+from karamelo_py.script.errors import Quit, ScriptError, instead, nearest, plural
 from karamelo_py.script.functions import FUNCTIONS
-from karamelo_py.script.other_programs import instead
 from karamelo_py.script.syntax import Assignment, CommandCall, Statement
 
 MOST = 9

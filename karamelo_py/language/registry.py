@@ -15,8 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from karamelo_py import __version__
-from karamelo_py.script.errors import FAILURES, ScriptError, meant
-from karamelo_py.script.other_programs import instead
+from karamelo_py.script.errors import FAILURES, ScriptError, instead, meant
 
 PREFIX = "karamelo_py."
 BUILT_IN = Path(__file__).parents[1] / "styles.toml"

@@ -37,9 +37,8 @@ from karamelo_py.language.kinds import (
     is_raw,
     kind_of,
 )
-from karamelo_py.language.own_words import longer
-from karamelo_py.script.errors import Place, ScriptError, meant, nearest
-from karamelo_py.script.other_programs import table
+from karamelo_py.language.unknown import longer
+from karamelo_py.script.errors import Place, ScriptError, meant, nearest, table
 
 __all__ = [
     "Argument", "AtLeast", "Constraint", "In", "InputFile", "NonNegative", "OutputFile", "Positive",

@@ -14,14 +14,15 @@ import numpy as np
 from karamelo_py.compiler import formula
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.functions import compute_quietly
-from karamelo_py.script.programs import in_order, program
 from karamelo_py.script.terms import (
     Term,
     alike,
     applied,
     constant,
+    in_order,
     is_short,
     number_text,
+    program,
     text_of,
 )
 from karamelo_py.script.values import Values
@@ -103,13 +104,7 @@ class Expression:
         return alike(self._term, other._term)
 
     def evaluate(self, values: Values) -> float:
-        """Compute the number it has now.
-
-        Raises
-        ------
-        ScriptError
-            If it needs a position.
-        """
+        """Compute the number it has now; a formula of positions has none."""
         needed = self.names.intersection(POINT_SEEDS)
         if needed:
             raise ScriptError(
@@ -135,18 +130,9 @@ class Expression:
     def evaluate_points(
         self, values: Values, x: np.ndarray, x0: np.ndarray | None = None
     ) -> np.ndarray:
-        """Compute the numbers it has at positions `x`, whose reference positions are `x0`.
+        """Compute the (n,) numbers it has at positions `x`, whose reference positions are `x0`.
 
-        Parameters
-        ----------
-        values
-            Published values.
-        x, x0 : ndarray (n, 1 to 3)
-            Missing directions count as 0; `x0` defaults to `x`.
-
-        Returns
-        -------
-        ndarray (n,) float64
+        Positions are (n, 1 to 3); missing directions count as 0, and `x0` defaults to `x`.
         """
         if not self.names.intersection(POINT_SEEDS):
             return np.full(len(x), self.evaluate(values))

@@ -10,7 +10,7 @@ from typing import Any
 
 from karamelo_py.compiler import cache
 from karamelo_py.script import syntax
-from karamelo_py.script.mistakes import Mistake
+from karamelo_py.script.syntax import Mistake
 
 # Trees are walked by recursion; this keeps well below Python's limit.
 MAX_DEPTH = 150

@@ -10,7 +10,7 @@ from karamelo_py.app.studies.case import Launch
 from karamelo_py.app.studies.study import default_jobs
 from karamelo_py.app.studies.variables import VALUES, check_script, choices, texts
 from karamelo_py.script.errors import ScriptError, nearest
-from karamelo_py.script.reading import scripts_in
+from karamelo_py.script.parser import scripts_in
 
 
 def new_parser(subparsers: Any, name: str, summary: str, description: str, run: Any) -> Any:
