@@ -115,7 +115,7 @@ class Argument:
             return script.evaluate(parse_expression(self._raw), self._raw)
         except ScriptError as error:
             if unknown := re.fullmatch(r"unknown name '(\w+)'", error.message):
-                numbers = [n for n, value in own.variables.items() if isinstance(value, float)]
+                numbers = self.numbers()
                 others = ", ".join(numbers) or "none so far"
                 known = f"{', '.join(seeds)}, or a number that the script has set ({others})"
                 hint = meant(unknown[1], [*seeds, *numbers]) or f"set it first: {unknown[1]} = ..."
@@ -129,6 +129,11 @@ class Argument:
     def _from(self, start: int, end: int | None = None) -> Argument:
         end = self._raw.end if end is None else end
         return Argument(Raw(self._raw.source, start, end), self._interpreter)
+
+    def numbers(self) -> list[str]:
+        """List the variables that are numbers."""
+        variables = self._interpreter.variables.items()
+        return [name for name, value in variables if isinstance(value, float)]
 
     def knows(self, name: str) -> bool:
         """Tell if a name means something where the argument stands."""

@@ -17,13 +17,7 @@ _WORD = r"[^\W\d]\w*"
 
 
 class Presets(dict[str, str]):
-    """Text by name, as it was given; the script's own assignment of such a name is passed over.
-
-    Raises
-    ------
-    ScriptError
-        For a name that no variable can have.
-    """
+    """Text by name, as it was given; the script's own assignment of such a name is passed over."""
 
     def __init__(self, script: Any, given: Mapping[str, str]):
         super().__init__(given)
@@ -62,13 +56,7 @@ class Presets(dict[str, str]):
                 variables[name] = present
 
     def stand_for(self, statement: Assignment) -> None:
-        """Take the place of what a script assigns.
-
-        Raises
-        ------
-        ScriptError
-            For what is no expression, in the place of a number.
-        """
+        """Take the place of what a script assigns; no text takes that of a number."""
         name, variables = statement.name, self._script.variables
         # What was a word at first may have become an expression of variables.
         if isinstance(variables.get(name), str):
@@ -111,9 +99,8 @@ class Presets(dict[str, str]):
         """Refuse a variable of the command line that nothing reads or assigns."""
         words = set(re.findall(_WORD, " ".join(self.values())))
         assigned: dict[str, None] = {}
-        if not self or not self._collect(statements, self._script.folder, words, assigned, []):
-            return
-        for name in self:
+        told = self and self._collect(statements, self._script.folder, words, assigned, [])
+        for name in self if told else ():
             if name not in words:
                 raise ScriptError(
                     f"-var {name}: the script has no variable '{name}'",

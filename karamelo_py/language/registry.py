@@ -45,9 +45,8 @@ def _families() -> dict[str, dict[str, list[EntryPoint]]]:
 
 
 def _origin(entry: EntryPoint) -> str:
-    dist = entry.dist
-    if dist is not None:
-        return f"{dist.name} {dist.version}"
+    if entry.dist is not None:
+        return f"{entry.dist.name} {entry.dist.version}"
     built_in = entry.value.startswith(PREFIX)
     return f"karamelo-py {__version__}" if built_in else "an unknown package"
 
@@ -93,9 +92,8 @@ def find(family: str, name: str) -> Any:
     if key not in _loaded:
         entries = _entries(family, name)
         if len(entries) > 1:
-            packages = " and ".join(_origin(entry) for entry in entries)
             raise ScriptError(
-                f"{family} '{name}' is offered by two packages: {packages}",
+                f"{family} '{name}' is offered by two packages: {origin(family, name)}",
                 expected="one package for each style",
                 hint="uninstall one of them (pip uninstall ...)",
             )
@@ -114,13 +112,7 @@ def find(family: str, name: str) -> Any:
 
 
 def called(family: str, ID: str, name: str) -> Any:
-    """Find the same for a statement that has an ID in front of it.
-
-    Raises
-    ------
-    ScriptError
-        See `find`; also where the style stands in the place of the ID.
-    """
+    """Find the same for a statement that has an ID in front of it, and not the style."""
     if not knows(family, name) and knows(family, ID):
         raise ScriptError(
             f"'{ID}' is a style, and the ID comes first",

@@ -38,21 +38,15 @@ CHUNK = 1 << 18  # points at which a formula is evaluated together
 class Expression:
     """A number, or a formula of positions, time and published values; used alike in signatures.
 
-    Parameters
-    ----------
-    value
-        A number, or another expression.
-
-    Attributes
-    ----------
-    names : frozenset of str
-        The seeds it needs: some of x y z x0 y0 z0, time timestep dt, published names.
+    Its `names` are the seeds it needs: some of x y z x0 y0 z0, time timestep dt, published names.
     """
 
     __slots__ = ("_term",)
 
     def __init__(self, value: float | Term | Expression):
-        self._term = value if isinstance(value, Term) else _term(value)
+        if not isinstance(value, Term):
+            value = value._term if isinstance(value, Expression) else constant(value)
+        self._term = value
 
     @classmethod
     def seed(cls, name: str) -> Expression:
@@ -161,10 +155,6 @@ def shown(value: Value) -> str:
     return number_text(value)
 
 
-def _term(value: float | Expression) -> Term:
-    return value._term if isinstance(value, Expression) else constant(value)
-
-
 def _evaluate(root: Term, values: Values) -> float:
     found: dict[int, float] = {}
     for term in in_order(root):
@@ -187,5 +177,5 @@ def _published(name: str, values: Values) -> str:
 def _three_columns(x: np.ndarray) -> np.ndarray:
     x = np.asarray(x, dtype=np.float64)
     if x.shape[1] < 3:
-        x = np.concatenate([x, np.zeros((len(x), 3 - x.shape[1]))], axis=1)
+        x = np.pad(x, ((0, 0), (0, 3 - x.shape[1])))
     return np.ascontiguousarray(x)
