@@ -160,3 +160,27 @@ def state_interpreted(tmp_path, _interpreter) -> Callable[..., dict[str, np.ndar
             return dict(arrays)
 
     return run
+
+
+@pytest.fixture(scope="session")
+def _forking(tmp_path_factory) -> Iterator[Path]:
+    folder = tmp_path_factory.mktemp("forking")
+    words = [str(TESTS / "forking.py"), str(folder / "door")]
+    python = folder / "python"
+    python.write_text(f'#!/bin/sh\nexec {sys.executable} -ISs {" ".join(words)} $0 "$@"\n')
+    python.chmod(0o755)
+    process = subprocess.Popen(
+        [sys.executable, *words], stdout=subprocess.PIPE,
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+    )  # fmt: skip
+    process.stdout.readline()
+    yield python
+    process.kill()
+    process.wait(timeout=30)
+
+
+@pytest.fixture
+def starts_are_cheap(_forking, monkeypatch) -> None:
+    """Studies start runs, interpreted, as forks of a process that has the program at hand."""
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
+    monkeypatch.setattr(sys, "executable", str(_forking))

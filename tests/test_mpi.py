@@ -502,7 +502,11 @@ PART_OF_ALL = """
 @pytest.mark.parametrize(
     "line, says",
     [
-        ("second and points.total(points.mass)", "to its end on one process, and to a total on"),
+        pytest.param(
+            "second and points.total(points.mass)",
+            "to its end on one process, and to a total on",
+            marks=pytest.mark.full,  # test_ranks.py has it of a function
+        ),
         ("self.publish('x', points.position[:, 0].sum())", "fix drag: air_x is "),
         ("self.publish('x', points.total(points.mass))", ""),
     ],
