@@ -185,7 +185,7 @@ def _bind(
     by_name = {p.name: p for p in expected if p.keyword}
     slots = [p for p in expected if not p.keyword]
     variadic = next((p for p in slots if p.variadic), None)
-    given = []
+    given: list[Argument] = []
     # Raw arguments are passed on to a style, which knows the names.
     passed_on = variadic is not None and is_raw(variadic.kind)
     for argument in arguments:

@@ -37,21 +37,18 @@ def unknown_call(script: Any, name: str, place: Any, statement: bool) -> ScriptE
     what = "command" if statement else "function"
     other = in_own_words(script, name) or instead("command", name) if statement else None
     if script.knows(name) and not other:
-        return ScriptError(
+        message, expected = (
             f"'{name}' is not a {what} but a variable",
-            place=place,
-            expected="an operator between the name and the parenthesis",
-            hint=f"{name}*(...)",
+            "an operator between the name and the parenthesis",
         )
-    if name in BLOCKS:
-        other = NO_BLOCKS
-    known = commands if statement else [*FUNCTIONS, *commands]
+        return ScriptError(message, place=place, expected=expected, hint=f"{name}*(...)")
     shown = commands if statement else sorted(FUNCTIONS)
+    known = commands if statement else [*FUNCTIONS, *commands]
     return ScriptError(
         f"unknown {what} '{name}'",
         place=place,
-        expected="one of " + ", ".join(shown),
-        hint=other or meant(name, known),
+        expected=f"one of {', '.join(shown)}",
+        hint=NO_BLOCKS if name in BLOCKS else other or meant(name, known),
     )
 
 
@@ -67,17 +64,16 @@ def no_value(name: str, place: Any) -> ScriptError:
 
 def unknown_name(script: Any, name: str, place: Any) -> ScriptError:
     """Make the error for a name in an expression."""
-    what, kind = "", "command" if registry.knows("command", name) else "function"
+    kind = "command" if registry.knows("command", name) else "function"
     if name in WORDS:
-        what = f"{name} is not a number"
         expected = (
             "a number or a formula; NULL, INF and EDGE are words that stand alone, "
             "where a command knows them"
         )
-    elif kind == "command" or name in FUNCTIONS:
-        what = f"'{name}' is a {kind} and needs parentheses"
+        return ScriptError(f"{name} is not a number", place=place, expected=expected)
+    if kind == "command" or name in FUNCTIONS:
         expected = f"{name}(...)" if kind == "command" else usage(name)
-    if what:
+        what = f"'{name}' is a {kind} and needs parentheses"
         return ScriptError(what, place=place, expected=expected)
     if other := _not_published(script, name, place) or defined_later(script, name, place):
         return other
@@ -112,7 +108,7 @@ def _meant_by(script: Any, name: str, known: list[str]) -> str:
     if name.upper() in WORDS:
         return f"write {name.upper()}"
     by_style = {
-        item.style: f"{ID}_{item.published[0]}" if item.published[0] else ID
+        item.style: "_".join(filter(None, (ID, item.published[0])))
         for _, ID, item in _publishing(script)
         if item.published
     }

@@ -30,25 +30,16 @@ def check_characters(text: str) -> None:
         if len(word) > 1 or word in '"#()':
             continue
         if word == "&":
-            raise Mistake(
-                "no & stands at the end of a line",
-                *match.span(),
-                expected="a statement in one line, or a call over several",
-                hint="leave it out; a call may run over several lines inside its parentheses",
-            )
-        if ord(word) < 32 or word == "\x7f":
-            raise Mistake(
-                f"a control character (code {ord(word)}) stands here",
-                *match.span(),
-                expected="a text file",
-                hint="delete it; is this really a script?",
-            )
-        raise Mistake(
-            f"typographic quote {word}",
-            *match.span(),
-            expected='the plain quote "',
-            hint="such quotes come from word processors and web pages; type them anew",
-        )
+            message = "no & stands at the end of a line"
+            expected = "a statement in one line, or a call over several"
+            hint = "leave it out; a call may run over several lines inside its parentheses"
+        elif ord(word) < 32 or word == "\x7f":
+            message = f"a control character (code {ord(word)}) stands here"
+            expected, hint = "a text file", "delete it; is this really a script?"
+        else:
+            message, expected = f"typographic quote {word}", 'the plain quote "'
+            hint = "such quotes come from word processors and web pages; type them anew"
+        raise Mistake(message, *match.span(), expected, hint)
 
 
 def in_script(text: str) -> Mistake:
@@ -60,10 +51,10 @@ def in_script(text: str) -> Mistake:
             return open_quote(text, start)
         if word == "(":
             opened.append(start)
+        elif word == ")" and not opened:
+            message, *advice = CLOSES_NOTHING
+            return Mistake(message, start, start + 1, *advice)
         elif word == ")":
-            if not opened:
-                message, *advice = CLOSES_NOTHING
-                return Mistake(message, start, start + 1, *advice)
             opened.pop()
     if opened:
         return open_parenthesis(text, opened[0])
@@ -73,13 +64,9 @@ def in_script(text: str) -> Mistake:
 def open_quote(text: str, start: int) -> Mistake:
     """Make the mistake of a quote that begins at `start` and has no end."""
     end = text.find("\n", start)
-    return Mistake(
-        "this quote is not closed",
-        start,
-        len(text) if end < 0 else end,
-        expected='a second " in the same line',
-        hint="comments begin with #" if _SLASHES.search(text, 0, start) else 'add the missing "',
-    )
+    hint = "comments begin with #" if _SLASHES.search(text, 0, start) else 'add the missing "'
+    end = len(text) if end < 0 else end
+    return Mistake("this quote is not closed", start, end, 'a second " in the same line', hint)
 
 
 def open_parenthesis(text: str, start: int) -> Mistake:
@@ -87,13 +74,8 @@ def open_parenthesis(text: str, start: int) -> Mistake:
     before = re.search(r"[^\W\d]\w*[ \t]*$", text[:start])
     begin = before.start() if before else start
     what = f"the call of {before[0].rstrip()}" if before else "this parenthesis"
-    return Mistake(
-        f"{what} is not closed: a ) is missing",
-        begin,
-        start + 1,
-        expected="as many ) as (",
-        hint="add the missing )",
-    )
+    message = f"{what} is not closed: a ) is missing"
+    return Mistake(message, begin, start + 1, "as many ) as (", "add the missing )")
 
 
 # ---- expressions ---------------------------------------------------------------------------------
@@ -102,10 +84,7 @@ _REMEDIES = {
     ";": "one statement per line, without ;",
     "&": "write && or and",
     "|": "write || or or",
-    "[": "use parentheses ( )",
-    "]": "use parentheses ( )",
-    "{": "use parentheses ( )",
-    "}": "use parentheses ( )",
+    **dict.fromkeys("[]{}", "use parentheses ( )"),
     "'": 'text stands in double quotes: "..."',
     "$": "a variable is written by its name alone, without $",
     "@": "a name consists of letters, digits and _",
@@ -114,10 +93,8 @@ _REMEDIES = {
     "?": "write if(condition, a, b)",
     "~": "negate a condition with !",
     "−": "this is a typographic minus; type -",
-    "–": "this is a dash; type -",
-    "—": "this is a dash; type -",
-    "×": "multiply with *",
-    "·": "multiply with *",
+    **dict.fromkeys("–—", "this is a dash; type -"),
+    **dict.fromkeys("×·", "multiply with *"),
     "÷": "divide with /",
     "²": "write ^2",
     "³": "write ^3",
@@ -254,13 +231,9 @@ def _equals(at: _Stop) -> Mistake:
         message = f"'{before}=' is not known here"
         return Mistake(message, before.start_pos, at.end, expected, hint)
     if first.type == "NAME" and len(tokens) > 1 and tokens[1] == "(" and before == ")":
-        return Mistake(
-            "only a name can stand left of '='",
-            first.start_pos,
-            before.end_pos,
-            expected,
-            f"a formula needs no arguments: {first} = {rest}",
-        )
+        hint = f"a formula needs no arguments: {first} = {rest}"
+        place = first.start_pos, before.end_pos
+        return Mistake("only a name can stand left of '='", *place, expected, hint)
     hint = "compare with ==" if at.opened else None
     if all(token.type in ("NAME", "NUMBER", *_OPERATORS) for token in tokens):
         hint = "a name begins with a letter and has letters, digits and _ only"
@@ -303,20 +276,12 @@ def _side_by_side(at: _Stop) -> Mistake:
         if re.fullmatch(r"[eEdD]\d*", here):
             good = re.fullmatch(r"[dD](\d+)", here)
             end += len(here) == 1 and code[end : end + 1] in ("+", "-")
-            return Mistake(
-                f"'{code[start:end]}' is not a number",
-                start,
-                end,
-                expected="an exponent as in 1e-5",
-                hint=f"{before}e{good[1]}" if good else None,
-            )
-        return Mistake(
-            f"an operator is missing between '{before}' and '{here}'",
-            start,
-            end,
-            expected="an operator, such as *",
-            hint=f"{before}*{here}; a name cannot start with a digit",
-        )
+            hint = f"{before}e{good[1]}" if good else None
+            message = f"'{code[start:end]}' is not a number"
+            return Mistake(message, start, end, "an exponent as in 1e-5", hint)
+        message = f"an operator is missing between '{before}' and '{here}'"
+        hint = f"{before}*{here}; a name cannot start with a digit"
+        return Mistake(message, start, end, "an operator, such as *", hint)
     if len(at.before) == 1 and before.type == "NAME":
         words = [word.strip(",") for word in code[at.start :].strip().rstrip(",").split()]
         hint = _block_or_call(before, words)

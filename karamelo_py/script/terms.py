@@ -193,10 +193,8 @@ def text_of(term: Term) -> str:
     level = _PRECEDENCE.get(operation)
     if level is None:
         return f"{operation}({', '.join(text_of(operand) for operand in operands)})"
-    if operation == "neg":
-        return "-" + _bracketed(operands[0], 7)
-    if operation == "not":
-        return "!" + _bracketed(operands[0], 3)
+    if operation in ("neg", "not"):
+        return ("-" if operation == "neg" else "!") + _bracketed(operands[0], level)
     if operation == "^":
         return _bracketed(operands[0], 9) + "^" + _bracketed(operands[1], 7)
     left, right = operands
