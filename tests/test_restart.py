@@ -56,7 +56,7 @@ def test_every_way(run_interpreted, tmp_path, way):
 def test_every_part(run_interpreted, tmp_path, name):
     """Contact, heat, damage, edges, tools, computes that look back."""
     (tmp_path / "curve.csv").write_text(CURVE, encoding="utf-8")
-    goes_on(run_interpreted, with_files(SCENES[name]), files=2)
+    goes_on(run_interpreted, with_files(SCENES[name]))
 
 
 CHANGING = {

@@ -79,12 +79,10 @@ class InputFile:
         if cls.endings is not None:
             files = [p for p in files if p.suffix.lower() in cls.endings]
         what = "is a folder, not a file" if here.is_dir() else "does not exist"
-        raise ScriptError(
-            f"the file {name} {what}",
-            place=argument.place,
-            expected="a file in the current folder or beside the script",
-            hint=meant(here.name, [p.name for p in files]),
-        )
+        expected = "a file in the current folder or beside the script"
+        hint = meant(here.name, [p.name for p in files])
+        message = f"the file {name} {what}"
+        raise ScriptError(message, place=argument.place, expected=expected, hint=hint)
 
 
 class TableFile(InputFile):
@@ -113,12 +111,10 @@ class OutputFile:
                 hint="the environment variable PYTHONUTF8=1, or another name",
             ) from None
         if not path.parent.is_dir():
-            parent = Path(name).parent
+            folder, expected = Path(name).parent, "a file in a folder that exists"
+            message = f"the folder {folder} does not exist"
             raise ScriptError(
-                f"the folder {parent} does not exist",
-                place=argument.place,
-                expected="a file in a folder that exists",
-                hint=f"mkdir {parent}",
+                message, place=argument.place, expected=expected, hint=f"mkdir {folder}"
             )
         if path.is_dir() or name.endswith(("/", "\\")):
             raise ScriptError(
@@ -262,16 +258,16 @@ def _of_words(words: tuple[str, ...]) -> Callable[[Any, Argument], str]:
 
 
 def _no_word_of(words: tuple[str, ...], word: str, argument: Argument) -> Unfit:
-    value = argument._interpreter.variables.get(word)
-    got = f"'{word}'"
+    value, got = argument._interpreter.variables.get(word), f"'{word}'"
+    literal = bool(NUMBER.fullmatch(word))
     if isinstance(value, float):
         got += f", which is {number_text(value)}"
-    elif NUMBER.fullmatch(word):
+    elif literal:
         value = float(word)
     hint = meant(word, words)
     if words == TRUTH and value in (0, 1):
         truth = TRUTH[not value]
-        hint = f"write {truth}" if NUMBER.fullmatch(word) else f'write {word} = "{truth}"'
+        hint = f"write {truth}" if literal else f'write {word} = "{truth}"'
     return Unfit(got, hint=hint)
 
 

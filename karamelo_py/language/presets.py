@@ -29,12 +29,11 @@ class Presets(dict[str, str]):
         # Which of them a variable is made of, by its name.
         itself = {name: {name: None} for name in given}
         self._made_of: dict[str, dict[str, None]] = dict(given._made_of) if again else itself
+        expected = "letters, digits and _, as in -var h 0.05"
         for name in given:
             if not name.isidentifier():
-                raise ScriptError(
-                    f"-var: '{name}' is not the name of a variable",
-                    expected="letters, digits and _, as in -var h 0.05",
-                )
+                message = f"-var: '{name}' is not the name of a variable"
+                raise ScriptError(message, expected=expected)
             try:
                 check_name(name)
             except ScriptError as error:
@@ -90,10 +89,8 @@ class Presets(dict[str, str]):
         for name, own in self._texts.items():
             if re.search(rf"\b{name}\b", spelled(statement)):
                 self.blamed.add(name)
-                error.hint = (
-                    f"-var {name} {self[name]} is a text, and the script has a number there, as in "
-                    f"-var {name} {own}"
-                )
+                text = f"-var {name} {self[name]} is a text"
+                error.hint = f"{text}, and the script has a number there, as in -var {name} {own}"
 
     def refuse_unused(self, statements: list[Statement]) -> None:
         """Refuse a variable of the command line that nothing reads or assigns."""

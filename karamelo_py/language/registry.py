@@ -103,10 +103,10 @@ def find(family: str, name: str) -> Any:
         except ScriptError:
             raise
         except FAILURES as error:
+            package, what = _origin(entry), f"{type(error).__name__}: {error}"
             raise ScriptError(
-                f"{family} '{name}' of {_origin(entry)} cannot be loaded: "
-                f"{type(error).__name__}: {error}",
-                hint=f"reinstall or repair {_origin(entry).split()[0]}; it names {entry.value}",
+                f"{family} '{name}' of {package} cannot be loaded: {what}",
+                hint=f"reinstall or repair {package.split()[0]}; it names {entry.value}",
             ) from error
     return _loaded[key]
 

@@ -17,16 +17,10 @@ def spelled(statement: Statement) -> str:
 
 @dataclass
 class Record:
-    """The statements that a script has done so far.
+    """The statements that a script has done so far, in the order in which they were begun.
 
-    Commands that only say how a run goes on or what it writes (``may_differ``) are not in it.
-
-    Attributes
-    ----------
-    statements
-        The statements, in the order in which they were begun.
-    values
-        By the number of a statement: what its calls of value(...) gave.
+    Commands that only say how a run goes on or what it writes (``may_differ``) are not in it. By
+    the number of a statement it has the `values` that its calls of value(...) gave.
     """
 
     statements: list[str] = field(default_factory=list)
@@ -40,14 +34,8 @@ class Record:
 class Replay:
     """Compares a script that is gone through once more with the record of the first time.
 
-    Parameters
-    ----------
-    record
-        What was done up to the state that is gone on from.
-    within
-        Whether its last statement was in progress then, a run.
-    file
-        Where the record comes from, for messages.
+    The record is of what was done up to the state that is gone on from, its last statement perhaps
+    `within`, in progress then: a run. Messages name the `file` that it comes from.
     """
 
     def __init__(self, record: Record, within: bool, file: str):
