@@ -24,12 +24,7 @@ _KEYWORD = re.compile(r"([^\W\d]\w*)\s*=(?!=)")
 class Argument:
     """One argument of a call as the script has it, not evaluated.
 
-    Attributes
-    ----------
-    text : str
-        What is written, without blanks around it.
-    place : Place
-        Where it stands.
+    Its `text` is what is written, without blanks around it, and `place` where that stands.
     """
 
     def __init__(self, raw: Raw, interpreter: Any):

@@ -49,11 +49,9 @@ class Forms:
     def read(self, hub: Scene, arguments: Sequence[Any], dimension: int) -> dict[str, float | str]:
         """Read the values of `arguments` by name, for `dimension`."""
         if dimension not in self.names:
-            known = sorted(self.names)
-            raise ScriptError(
-                f"there is no form for {dimension}D",
-                expected=f"a domain with {' or '.join(str(d) for d in known)} dimensions",
-            )
+            known = " or ".join(map(str, sorted(self.names)))
+            expected = f"a domain with {known} dimensions"
+            raise ScriptError(f"there is no form for {dimension}D", expected=expected)
         names = self.names[dimension]
         if len(arguments) != len(names):
             self._refuse_count(arguments, dimension)

@@ -58,18 +58,11 @@ class Interpreter:
         """Run a script from a file."""
         path = Path(path)
         self.files.append(path)
-        self._run(self._parsed(read_script(path), str(path)), path)
+        self._run(read_script(path), str(path), path)
 
     def run_text(self, text: str, name: str = "<text>") -> None:
         """Run a script that is in memory."""
-        self._run(self._parsed(text, name), None)
-
-    def _parsed(self, text: str, name: str) -> list[syntax.Statement]:
-        try:
-            return parse(text, name)
-        except ScriptError as error:
-            error.others = errors_of_text(self, error)
-            raise
+        self._run(text, name)
 
     @property
     def waits(self) -> bool:
@@ -133,16 +126,19 @@ class Interpreter:
     @property
     def folder(self) -> Path:
         """Folder of the script in progress."""
-        for frame in reversed(self.frames):
-            if frame.path is not None:
-                return frame.path.parent
-        return self._working_folder
+        paths = (frame.path.parent for frame in reversed(self.frames) if frame.path)
+        return next(paths, self._working_folder)
 
     @property
     def _working_folder(self) -> Path:
         return getattr(self.hub, "folder", None) or Path.cwd()
 
-    def _run(self, statements: list[syntax.Statement], path: Path | None) -> None:
+    def _run(self, text: str, name: str, path: Path | None = None) -> None:
+        try:
+            statements = parse(text, name)
+        except ScriptError as error:
+            error.others = errors_of_text(self, error)
+            raise
         self.frames.append(_Frame(statements, path))
         try:
             self.presets.refuse_unused(statements)
@@ -218,9 +214,8 @@ class Interpreter:
             error.complete = True
             raise
         except RecursionError:
-            raise ScriptError(
-                "this is nested too deeply", place=statement.place, hint="use more names"
-            ) from None
+            message, hint = "this is nested too deeply", "use more names"
+            raise ScriptError(message, place=statement.place, hint=hint) from None
 
     def _execute_recorded(self, statement: syntax.Statement) -> None:
         name = statement.name if isinstance(statement, syntax.CommandCall) else ""
@@ -270,18 +265,15 @@ class Interpreter:
         check_name(name)
         if name in self.presets:
             return self.presets.stand_for(statement)
-        if name not in self.variables and (name in FUNCTIONS or registry.knows("command", name)):
-            kind = "function" if name in FUNCTIONS else "command"
-            self._warn(
-                f"'{name}' is a {kind}, too; from here on it means the variable that is assigned "
-                f"here, and the {kind} cannot be called"
-            )
-        if name in self.hub.values and name not in self.variables:
-            self._warn(
-                f"'{name}' is a value of a fix or a compute; "
-                "from here on it means the variable that is assigned here",
-                hint="choose another name",
-            )
+        if name not in self.variables and hasattr(self.hub, "warn"):
+            means = "from here on it means the variable that is assigned here"
+            if name in FUNCTIONS or registry.knows("command", name):
+                kind = "function" if name in FUNCTIONS else "command"
+                message = f"'{name}' is a {kind}, too; {means}, and the {kind} cannot be called"
+                self.hub.warn(message, hint=None)
+            if name in self.hub.values:
+                message = f"'{name}' is a value of a fix or a compute; {means}"
+                self.hub.warn(message, hint="choose another name")
         try:
             self.variables[name] = self.evaluate(statement.node, statement.right)
         except ScriptError as error:
@@ -290,10 +282,6 @@ class Interpreter:
                 error.hint = f'a text stands in quotes: "{word}"'
             raise
         self.presets.follow(statement)
-
-    def _warn(self, message: str, hint: str | None = None) -> None:
-        if hasattr(self.hub, "warn"):
-            self.hub.warn(message, hint=hint)
 
     # -- calls ------------------------------------------------------------------------------------
 

@@ -12,16 +12,16 @@ from karamelo_py.script.terms import REWRITTEN, applied
 
 
 class NameScope(Protocol):
-    """The scope that gives names and calls of commands their meaning: the interpreter."""
+    """The scope that gives names and calls of commands their meaning: the interpreter.
 
-    def name(self, name: str, node: syntax.Name, raw: syntax.Raw) -> Value:
-        """Find the value of a name."""
+    It `hides` the function of a name that the script uses for something else.
+    """
 
-    def command(self, node: syntax.FunctionCall, raw: syntax.Raw) -> Value:
-        """Find the value of a call that is not a function."""
+    def name(self, name: str, node: syntax.Name, raw: syntax.Raw) -> Value: ...
 
-    def hides(self, name: str) -> bool:
-        """Tell if the script uses the name of a function for something else."""
+    def command(self, node: syntax.FunctionCall, raw: syntax.Raw) -> Value: ...
+
+    def hides(self, name: str) -> bool: ...
 
 
 def evaluate(node: syntax.Node, raw: syntax.Raw, scope: NameScope) -> Value:
@@ -77,11 +77,8 @@ def _texts(node: syntax.BinaryOperation, left: Value, right: Value, raw: syntax.
 def _numeric(node: syntax.Node, raw: syntax.Raw, scope: NameScope, user: str) -> float | Expression:
     value = evaluate(node, raw, scope)
     if isinstance(value, str):
-        raise ScriptError(
-            f"'{value}' is text, and {user} needs a number",
-            place=mark(raw, node),
-            expected="a number",
-        )
+        message = f"'{value}' is text, and {user} needs a number"
+        raise ScriptError(message, place=mark(raw, node), expected="a number")
     return value
 
 
@@ -91,11 +88,8 @@ def _function(node: syntax.FunctionCall, raw: syntax.Raw, scope: NameScope) -> V
     if not signature.least <= count <= signature.most:
         wanted = "at least " * (signature.most > signature.least)
         wanted += plural(signature.least, "operand")
-        raise ScriptError(
-            f"{node.name} takes {wanted}, not {count}",
-            place=mark(raw, node),
-            expected=usage(node.name),
-        )
+        message = f"{node.name} takes {wanted}, not {count}"
+        raise ScriptError(message, place=mark(raw, node), expected=usage(node.name))
     if node.name == "if":
         condition = _numeric(node.operands[0], raw, scope, "if")
         if isinstance(condition, float):
@@ -153,17 +147,11 @@ def _impossible(
         guilty = operands[0] if operation in ("^", "pow") else operands[-1]
         literal = isinstance(guilty, syntax.NumberLiteral)
         what = "" if literal else f": {raw.code[guilty.start : guilty.end]} is 0"
-        return ScriptError(
-            f"division by zero{what}",
-            place=mark(raw, guilty),
-            expected="a number other than 0",
-        )
+        message, expected = f"division by zero{what}", "a number other than 0"
+        return ScriptError(message, place=mark(raw, guilty), expected=expected)
     if isinstance(error, OverflowError):
-        return ScriptError(
-            f"the result of {_spelled(operation, shown)} is too large",
-            place=mark(raw, node),
-            expected="at most 1.8e308",
-        )
+        message = f"the result of {_spelled(operation, shown)} is too large"
+        return ScriptError(message, place=mark(raw, node), expected="at most 1.8e308")
     return ScriptError(
         f"{_spelled(operation, shown)} is not a real number",
         place=mark(raw, operands[0] if len(operands) == 1 else node),

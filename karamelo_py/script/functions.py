@@ -81,13 +81,7 @@ OPERATORS: dict[str, Callable[..., float]] = {
 
 
 def compute(name: str, *numbers: float) -> float:
-    """Compute a function or operator of plain numbers; NaN in, NaN out.
-
-    Raises
-    ------
-    ValueError, ZeroDivisionError, OverflowError
-        As the functions of :mod:`math` do.
-    """
+    """Compute a function or operator of plain numbers; NaN in, NaN out, errors as in `math`."""
     if any(math.isnan(number) for number in numbers):
         return math.nan
     result = (OPERATORS.get(name) or FUNCTIONS[name].compute)(*numbers)
@@ -112,11 +106,8 @@ def compute_quietly(name: str, *numbers: float) -> float:
             return OPERATORS[name](*numbers)
         return math.copysign(math.inf, numbers[0]) if odd else math.inf
     except ValueError:
-        at_zero = {"log", "log2", "log10"}
-        if name in at_zero and numbers[0] == 0:
+        zero = numbers[0] == 0
+        if name in ("log", "log2", "log10") and zero:
             return -math.inf
-        if name == "^" or name == "pow":
-            return math.inf if numbers[0] == 0 else math.nan
-        if name in ("gamma", "tgamma", "lgamma"):
-            return math.inf if numbers[0] == 0 or name == "lgamma" else math.nan
-        return math.nan
+        infinite = name == "lgamma" or (zero and name in ("^", "pow", "gamma", "tgamma"))
+        return math.inf if infinite else math.nan

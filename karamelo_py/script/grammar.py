@@ -53,9 +53,8 @@ def literal(word: str, start: int) -> float:
     """Read a number, which stands at `start`."""
     value = float(word)
     if math.isinf(value):
-        raise Mistake(
-            f"the number {word} is too large", start, start + len(word), expected="below 1.8e308"
-        )
+        message = f"the number {word} is too large"
+        raise Mistake(message, start, start + len(word), "below 1.8e308")
     return value
 
 

@@ -59,13 +59,8 @@ def read_script(path: Path) -> str:
 def parse(text: str, file: str = "<text>") -> list[syntax.Statement]:
     """Read the statements of a script.
 
-    Arguments of calls stay as they are written; everything else is checked.
-
-    Raises
-    ------
-    ScriptError
-        At the first syntax error, with its place; those of other statements are its `others`, and
-        statements without any its `statements`.
+    Arguments of calls stay as they are written; everything else is checked. Syntax errors of other
+    statements are `others` of the first, and statements without any its `statements`.
     """
     # A byte order mark and the line ends of other systems mean nothing.
     text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")

@@ -226,17 +226,8 @@ def program(
 ) -> formula.Program:
     """Write the stack program of a term.
 
-    Parameters
-    ----------
-    place
-        The instruction that pushes a name: GLOBAL or POINT, and where it is.
-    depth
-        Of a stack without rows behind it; the program keeps nothing then.
-
-    Raises
-    ------
-    ScriptError
-        If more has to be kept at a time than there are rows.
+    `place` gives the instruction that pushes a name: GLOBAL or POINT, and where it is. A stack of
+    the given `depth` has no rows behind it; the program keeps nothing then.
     """
     return _Writer(root, place, depth).program()
 
