@@ -45,9 +45,8 @@ commands = ["sweep {inputs}/in.law -var M=1"]
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
+def folder(tmp_path, monkeypatch, starts_are_cheap):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
     (tmp_path / "in.law").write_text(SCRIPT, encoding="utf-8")
     (tmp_path / "a.toml").write_text(ATLAS, encoding="utf-8")
     return tmp_path

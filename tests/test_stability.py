@@ -37,9 +37,8 @@ run(200)
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
+def folder(tmp_path, monkeypatch, starts_are_cheap):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
     (tmp_path / "in.bar").write_text(SCRIPT, encoding="utf-8")
     return tmp_path
 

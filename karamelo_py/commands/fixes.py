@@ -8,9 +8,8 @@ from karamelo_py.language.signature import Argument
 from karamelo_py.language.unknown import MEANINGS
 from karamelo_py.scene.hub import Catalogue, Hub
 from karamelo_py.scene.plugins import check_fix
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.errors import ScriptError, instead
 from karamelo_py.script.expressions import SEEDS
-from karamelo_py.script.other_programs import instead
 
 
 def fix(hub: Hub, ID: str, style: StyleOf("fix"), *arguments: Argument) -> None:

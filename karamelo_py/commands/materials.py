@@ -4,8 +4,8 @@ from collections.abc import Callable, Sequence
 
 from karamelo_py.language import registry, signature
 from karamelo_py.language.kinds import StyleOf
-from karamelo_py.language.own_words import longer
 from karamelo_py.language.signature import Argument
+from karamelo_py.language.unknown import longer
 from karamelo_py.scene.hub import Catalogue, Hub
 from karamelo_py.scene.material import Material, MaterialPart
 from karamelo_py.scene.plugins import check_columns

@@ -6,8 +6,8 @@ from typing import Literal
 
 from karamelo_py.language import registry, signature
 from karamelo_py.language.kinds import StyleOf
-from karamelo_py.language.own_words import SHAPES, filled, in_own_words
 from karamelo_py.language.signature import Argument
+from karamelo_py.language.unknown import SHAPES, filled, in_own_words
 from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.group import ALL, KINDS, NOTHING_THERE
 from karamelo_py.scene.hub import Hub

@@ -7,9 +7,8 @@ from typing import Any
 
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
-from karamelo_py.script.errors import ScriptError, meant
+from karamelo_py.script.errors import ScriptError, meant, table
 from karamelo_py.script.expressions import POINT_SEEDS
-from karamelo_py.script.other_programs import table
 
 KEYWORDS = {"step": "Step", "dt": "dt", "time": "Time"}
 LIMIT = "limit"  # the log shows the name of what limits the step

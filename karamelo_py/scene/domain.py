@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from karamelo_py.language.own_words import words_of
 from karamelo_py.language.scene import Scene
+from karamelo_py.language.unknown import words_of
 from karamelo_py.scene.lattice import RELATIVE_TOLERANCE, Lattice
 from karamelo_py.script.errors import Place, ScriptError
 

@@ -4,8 +4,8 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from karamelo_py.language.own_words import words_of
 from karamelo_py.language.signature import Argument, NonNegative
+from karamelo_py.language.unknown import words_of
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
