@@ -17,16 +17,12 @@ from karamelo_py.points.basis.ugimp import UGIMP
 from karamelo_py.scene.placement import cell_pattern
 from karamelo_py.scene.region import Region
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.styles.methods.base import Method, OwnGrids
-from karamelo_py.styles.methods.ulcpdi import ULCPDI
-from karamelo_py.styles.regions.block import BlockRegion
-from karamelo_py.styles.regions.cylinder import Cylinder
-from karamelo_py.styles.regions.difference import Difference
-from karamelo_py.styles.regions.intersection import Intersection
-from karamelo_py.styles.regions.mesh import MeshRegion
-from karamelo_py.styles.regions.sphere import Sphere
-from karamelo_py.styles.regions.stl import STL
-from karamelo_py.styles.regions.union import Union
+from karamelo_py.styles.methods.base import Method
+from karamelo_py.styles.methods.cpdi import ULCPDI
+from karamelo_py.styles.methods.tlmpm import OwnGrids
+from karamelo_py.styles.regions.combined import Difference, Intersection, Union
+from karamelo_py.styles.regions.meshes import STL, MeshRegion
+from karamelo_py.styles.regions.shapes import BlockRegion, Cylinder, Sphere
 
 
 def whole(hub, ID="whole"):

@@ -63,7 +63,6 @@ class Probe(Compute):
         return any(c is not None for c in self.place_xyz)
 
     def refresh(self) -> None:
-        """Measure and publish."""
         if self.point is None and not self.at_place:
             volume, *total = self.hub.fields.added_up(self)
             values = np.array(total) / volume if volume > 0 else np.full(len(total), np.nan)

@@ -39,7 +39,6 @@ class Reaction(Compute):
         super().__init__(hub, group)
 
     def refresh(self) -> None:
-        """Sum and publish."""
         values = self.hub.values
         total = np.zeros(3)
         for fix in self.hub.fixes.values():

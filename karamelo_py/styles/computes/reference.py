@@ -1,5 +1,8 @@
 """compute reference: how far a value or a field is from a curve in a file."""
 
+import re
+from math import isnan
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -12,7 +15,39 @@ from karamelo_py.scene.group import ALL, ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Compute
 from karamelo_py.script.errors import ScriptError, nearest, unknown
-from karamelo_py.styles.computes.columns import Compared, Norm, column, refuse_absent, table
+from karamelo_py.script.terms import number_of
+from karamelo_py.styles.computes.error import Compared, Norm, column, refuse_absent
+
+
+def read_table(path: Path) -> dict[str, np.ndarray]:
+    """The columns of a file of numbers, by the names in its first row (or "1", "2", ...).
+
+    Numbers are separated by commas, semicolons or blanks; a line that begins with # is a comment.
+    """
+    rows = []
+    for number, line in enumerate(path.read_text(encoding="utf-8-sig").splitlines(), 1):
+        if line.strip() and not line.lstrip().startswith("#"):
+            cells = re.split(r"\s*[,;\t]\s*" if re.search("[,;\t]", line) else r"\s+", line.strip())
+            rows.append((number, [cell.strip('" ') for cell in cells]))
+    if not rows:
+        raise ScriptError(f"{path} has no rows", expected="columns of numbers", argument="file")
+    names = rows[0][1]
+    if any(number_of(cell) is not None for cell in names):
+        names = [str(k + 1) for k in range(len(names))]
+    else:
+        rows = rows[1:]
+    table = []
+    for number, cells in rows:
+        values = [number_of(cell) for cell in cells]
+        if len(values) != len(names) or None in values or any(map(isnan, values)):
+            raise ScriptError(
+                f"line {number} of {path}: {' '.join(cells)}",
+                expected=f"{len(names)} numbers: {', '.join(names)}",
+                argument="file",
+            )
+        table.append(values)
+    columns = np.array(table, float).reshape(-1, len(names)).T
+    return dict(zip(names, columns, strict=True))
 
 
 class GroupOrValue:
@@ -85,7 +120,7 @@ class Reference(Compared, Compute):
         self.points = isinstance(subject, ParticleGroup)
         super().__init__(hub, subject if self.points else None)
         self.subject = subject
-        columns = table(file)
+        columns = read_table(file)
         name = column.text.strip('"')
         if name not in columns:
             raise unknown(f"{file} has no column '{name}'", name, columns, place=column.place)
@@ -111,10 +146,9 @@ class Reference(Compared, Compute):
         refuse_absent(hub, (self.column,))
 
     def refresh(self) -> None:
-        """Measure and publish."""
         if self.points:
             moment, (total, count) = self.measured()
-            now = self.norm.now(moment)
+            now = self.norm.scaled(*moment)
             self.publish("", now)
             self.publish("now", now)
             self.publish("curve", total / count if count else 0.0)

@@ -1,4 +1,4 @@
-"""dump hdf5: the material points in one binary file, as arrays over time and id."""
+"""dump hdf5 and grid/hdf5: one binary file, as arrays over time and id."""
 
 import os
 import re
@@ -12,7 +12,7 @@ import numpy as np
 from karamelo_py.output.fields import PIECE
 from karamelo_py.output.files import whole
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.styles.dumps.table import OfPoints, TableDump, TableRows
+from karamelo_py.styles.dumps.base import OfNodes, OfPoints, TableDump, TableRows
 
 # The least compression: with the bytes of like order together, more takes twice the time for a few
 # per cent.
@@ -237,4 +237,24 @@ class Hdf5(OfPoints, Hdf5Dump):
     See Also
     --------
     dump particle, dump grid/hdf5
+    """
+
+
+class GridHdf5(OfNodes, Hdf5Dump):
+    """Write the nodes of the background grids to one compressed binary file.
+
+    Everything else is as in dump hdf5.
+
+    Parameters
+    ----------
+    occupied
+        true: nodes without mass are NaN.
+
+    Example
+    -------
+    dump(d2, all, grid/hdf5, 100, nodes.h5, vx, vy, mass, occupied=true)
+
+    See Also
+    --------
+    dump grid, dump hdf5
     """

@@ -1,7 +1,8 @@
-"""dump pyplot: pictures of the points, drawn with Matplotlib."""
+"""dump pyplot and movie: pictures of the points, drawn with Matplotlib."""
 
 import re
 from collections.abc import Iterator
+from functools import cached_property
 from typing import Annotated, Any, BinaryIO
 
 import numpy as np
@@ -10,6 +11,7 @@ from karamelo_py.language.kinds import In
 from karamelo_py.language.signature import OutputFile, Positive
 from karamelo_py.output.columns import check_columns
 from karamelo_py.output.files import picture_format, savefig, unwarned, whole
+from karamelo_py.output.movies import Frames, movie_format
 from karamelo_py.output.point_table import PointTable
 from karamelo_py.output.rhythm import Every
 from karamelo_py.output.snapshots import Snapshot
@@ -244,3 +246,50 @@ def _inches(argument: str, value: float) -> float:
             f"from {LEAST_PIXELS} to {MOST_PIXELS} pixels",
         )
     return inches
+
+
+FRAMES_PER_SECOND = 25
+
+
+class Movie(PyPlot):
+    """Draw a movie of the points, as dump pyplot draws pictures: 25 frames in a second.
+
+    The file is written at the end of each run, also of one that breaks off or is interrupted.
+
+    Parameters
+    ----------
+    every
+        Steps between two frames, or ``time(T)``. The first and the last state of a run are
+        always drawn.
+    file
+        File name ending in .gif or, where the program ffmpeg is installed, .mp4.
+    vmin, vmax
+        Ends of the colours. Without them the colours change when numbers outgrow them.
+
+    Example
+    -------
+    dump(d3, all, movie, 100, disks.gif, 500, 500, seq, vmin=0, vmax=2e5)
+
+    See Also
+    --------
+    dump pyplot
+    """
+
+    remembers = ("frames",)
+
+    @cached_property
+    def frames(self) -> Frames:
+        """The pictures so far."""
+        return Frames(FRAMES_PER_SECOND)
+
+    def check_format(self) -> str:
+        """Read the format that the file name asks for."""
+        return movie_format(self.file)
+
+    def write(self) -> None:
+        """Draw the present state as the next frame."""
+        self.frames.add(self.draw)
+
+    def finish(self) -> None:
+        """Write the movie of all frames so far."""
+        self.frames.save(self.path())

@@ -7,7 +7,6 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix, PointsView
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
-from karamelo_py.styles.fixes.formulas import evaluated
 
 NAMES = ("11", "22", "33", "23", "13", "12")
 
@@ -58,10 +57,9 @@ class InitialStress(Fix):
                 )
 
     def initial_integrate(self, points: PointsView) -> None:
-        """Set the stresses."""
         x, x0 = points.position, points.reference_position
         given = {
-            name: evaluated(formula, self.hub, x, x0)
+            name: formula.evaluate_points(self.hub.values, x, x0)
             for name, formula in zip(NAMES, self.formulas, strict=True)
             if formula is not None
         }

@@ -1,4 +1,4 @@
-"""Base of methods with convected domains: their variants, and what they refuse."""
+"""Methods with convected domains: ulcpdi and tlcpdi."""
 
 from typing import Any, ClassVar
 
@@ -9,11 +9,14 @@ from karamelo_py.points.basis.cpdi.hexahedron import H8
 from karamelo_py.points.basis.cpdi.parallel import R4, R8
 from karamelo_py.points.basis.cpdi.quadrilateral import Q4
 from karamelo_py.points.basis.cpdi.simplex import T3, Tet4
+from karamelo_py.points.frames import Total
 from karamelo_py.points.transfers.asflip import ASFLIP
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.methods.base import Method
+from karamelo_py.styles.methods.tlmpm import OwnGrids
+from karamelo_py.styles.methods.ulmpm import ULMPM
 
 VARIANTS = {"R4": R4, "Q4": Q4, "T3": T3, "R8": R8, "H8": H8, "Tet4": Tet4}
 
@@ -92,3 +95,47 @@ class Convected(Method):
             place=solid.place,
             hint=hint,
         )
+
+
+class ULCPDI(Convected, ULMPM):
+    """CPDI: every point has a domain that deforms with it, and sees the nodes around its corners.
+
+    All solids share one grid. A body does not break between points, however far it stretches, and
+    no force jumps when a point crosses a cell face (Sadeghirad et al. 2011, 2013).
+
+    ``R4`` and ``R8``
+        parallelograms and parallelepipeds that follow the deformation of their point: robust;
+    ``Q4`` and ``H8``
+        quadrilaterals and hexahedra whose corners move with the grid: no gaps nor overlaps;
+    ``T3`` and ``Tet4``
+        the triangles and tetrahedra of a mesh, whose corners move with the grid.
+
+    Parameters
+    ----------
+    variant
+        The shape of the domains.
+
+    Example
+    -------
+    method(ulcpdi, FLIP, linear, 1, R4)
+    method(ulcpdi, FLIP, linear, 1, mechanical, Q4)
+    """
+
+
+class TLCPDI(Convected, OwnGrids):
+    """Total Lagrangian CPDI: the initial domain of every point on a grid of its solid's own.
+
+    Domains keep their initial shape, so that none tangles; weights never change. Solids do not see
+    each other on the grid. The variants are those of ulcpdi.
+
+    Parameters
+    ----------
+    variant
+        The shape of the domains.
+
+    Example
+    -------
+    method(tlcpdi, FLIP, linear, 1, Q4)
+    """
+
+    frame = Total()

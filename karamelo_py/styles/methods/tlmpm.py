@@ -1,7 +1,41 @@
 """method tlmpm: total Lagrangian, a grid for each solid."""
 
+from typing import NamedTuple
+
 from karamelo_py.points.frames import Total
-from karamelo_py.styles.methods.base import OwnGrids
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.lattice import Lattice, numbered
+from karamelo_py.scene.solid import Solid
+from karamelo_py.styles.methods.base import Method
+
+
+class OwnGrids(Method):
+    """A grid of its own for every solid."""
+
+    own_grids = True
+    remembers = ("warned",)
+    warned = False
+
+    def begin(self, hub: Hub, contact: NamedTuple) -> None:
+        """Tell once of solids that pass through all others."""
+        touching = {solid.id for fix in hub.fixes.values() for solid in fix.solids}
+        alone = [ID for ID in hub.solids if ID not in touching]
+        if len(hub.solids) > 1 and alone and not self.warned:
+            self.warned = True
+            hub.warn(
+                f"solids with grids of their own pass through each other: {', '.join(alone)}",
+                hint="fix(ID, contact/minimize_penetration, solid1, solid2, mu) for those that may "
+                "meet, or method ulmpm",
+            )
+
+    def lattices(self, hub: Hub) -> list[Lattice]:
+        """A grid over the box of each solid."""
+        d = hub.domain.dimension
+        return numbered([self._lattice(d, s.lo, s.hi, s.h) for s in hub.solids.values()])
+
+    def lattice_of(self, hub: Hub, solid: Solid) -> int:
+        """The grid of a solid has its number."""
+        return solid.index
 
 
 class TLMPM(OwnGrids):

@@ -10,7 +10,7 @@ from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import Lattice
 from karamelo_py.scene.solid import Solid
-from karamelo_py.styles.methods.base import DIRECTIONS, Method, force_on, torque_on
+from karamelo_py.styles.methods.base import Method, publish_loads, slots_of_loads
 
 
 class ULMPM(Method):
@@ -33,8 +33,7 @@ class ULMPM(Method):
     def welcome(self, hub: Hub, solid: Solid) -> None:
         """Publish the force on a rigid solid."""
         if can(solid.material.law, constrained_velocity):
-            hub.values.publish_vector(force_on(solid), DIRECTIONS)
-            hub.values.publish_vector(torque_on(solid), DIRECTIONS)
+            publish_loads(hub, solid)
 
     def contact_between(self, hub: Hub, lattices: Sequence[Lattice]) -> NamedTuple:
         """Rigid solids lead what they meet."""
@@ -42,17 +41,8 @@ class ULMPM(Method):
         rigid = [can(solid.material.law, constrained_velocity) for solid in solids]
         if not any(rigid):
             return super().contact_between(hub, lattices)
-
-        def slots(stem) -> list[int]:
-            return [
-                hub.values.slot(stem(solid) + "_x") if leads else -1
-                for solid, leads in zip(solids, rigid, strict=True)
-            ]
-
-        counts = [solid.count for solid in solids]
-        force, torque = slots(force_on), slots(torque_on)
-        return RigidBodies(
-            force=np.repeat(np.array(force, np.int64), counts),
-            torque=np.repeat(np.array(torque, np.int64), counts),
-            slots=np.array([slot for slot in force + torque if slot >= 0], np.int64),
-        )
+        slots = np.full((2, len(solids)), -1)
+        for k in np.flatnonzero(rigid):
+            slots[:, k] = slots_of_loads(hub, solids[k])
+        force, torque = np.repeat(slots, [solid.count for solid in solids], axis=1)
+        return RigidBodies(force=force, torque=torque, slots=slots[slots >= 0])

@@ -20,7 +20,7 @@ from karamelo_py.scene.lattice import Lattice, numbered
 from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.styles.methods.base import DIRECTIONS, Method, force_on, torque_on
+from karamelo_py.styles.methods.base import Method, publish_loads, slots_of_loads
 
 
 def fields(hub: Hub) -> list[int]:
@@ -127,8 +127,7 @@ class ULMPMContacts(Method):
 
     def welcome(self, hub: Hub, solid: Solid) -> None:
         """Publish the contact force."""
-        hub.values.publish_vector(force_on(solid), DIRECTIONS)
-        hub.values.publish_vector(torque_on(solid), DIRECTIONS)
+        publish_loads(hub, solid)
 
     def held_with(self, hub: Hub, nodes: np.ndarray) -> np.ndarray:
         """`nodes`, and what else the points of a body see whose cells have all corners among them.
@@ -155,21 +154,20 @@ class ULMPMContacts(Method):
         nodes = sum(lattice.node_count for lattice in lattices)
         h = hub.domain.h
         first: dict[int, Solid] = {}
-        copies: list[list[int]] = []
+        copies: list[tuple[int, int]] = []
         solids = hub.solids.values()
         for solid, field in zip(solids, fields(hub), strict=True):
             if first.setdefault(field, solid) is not solid:
-                for stem in (force_on, torque_on):
-                    of_both = (stem(first[field]), stem(solid))
-                    copies.append([hub.values.slot(name + "_x") for name in of_both])
+                both = (slots_of_loads(hub, one) for one in (first[field], solid))
+                copies += zip(*both, strict=True)
+        laws = [first[k].material.law for k in range(count)]
+        slots = np.array([slots_of_loads(hub, first[k]) for k in range(count)])
         return SeparateFields(
             stride=lattices[0].node_count,
             friction=np.zeros((count, count)),
-            warmth=heat_shares(
-                [first[k].material.law for k in range(count)], conducting=hub.update.thermal
-            ),
+            warmth=heat_shares(laws, conducting=hub.update.thermal),
             pair=np.full((count, count), -1, np.int64),
-            slot=np.array([hub.values.slot(f"{force_on(first[k])}_x") for k in range(count)]),
+            slot=slots[:, 0].copy(),
             copies=np.array(copies, np.int64).reshape(-1, 2),
             # Pages that nothing is written to cost no memory.
             touched=np.zeros((nodes, count), np.int32),
@@ -178,10 +176,8 @@ class ULMPMContacts(Method):
             meeting=np.zeros(count, np.int64),
             partners=np.zeros(count, np.int64),
             change=np.zeros((count, d)),
-            rigid=np.array(
-                [can(first[k].material.law, constrained_velocity) for k in range(count)]
-            ),
-            torque=np.array([hub.values.slot(f"{torque_on(first[k])}_x") for k in range(count)]),
+            rigid=np.array([can(law, constrained_velocity) for law in laws]),
+            torque=slots[:, 1].copy(),
             surface=np.array(
                 [surface_table(self.basis, first[k].half_size.mean() / h) for k in range(count)]
             ),
