@@ -15,8 +15,7 @@ from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.methods.base import Method
 from karamelo_py.styles.methods.tlmpm import TLMPM
 from karamelo_py.styles.methods.ulmpm_contacts import ULMPMContacts
-from karamelo_py.styles.regions.combined import Difference
-from karamelo_py.styles.regions.shapes import BlockRegion, Cylinder
+from karamelo_py.styles.regions import BlockRegion, Cylinder, Difference
 
 
 def scene():

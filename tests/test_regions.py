@@ -13,9 +13,15 @@ from karamelo_py.commands import domain as commands
 from karamelo_py.scene.domain import Domain
 from karamelo_py.scene.lattice import Lattice
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.styles.regions.combined import Difference, Intersection, Union
-from karamelo_py.styles.regions.meshes import STL, MeshRegion
-from karamelo_py.styles.regions.shapes import BlockRegion, Cylinder, Sphere
+from karamelo_py.styles.meshes import STL, MeshRegion
+from karamelo_py.styles.regions import (
+    BlockRegion,
+    Cylinder,
+    Difference,
+    Intersection,
+    Sphere,
+    Union,
+)
 
 
 def empty_hub():

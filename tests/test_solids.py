@@ -17,12 +17,18 @@ from karamelo_py.points.basis.ugimp import UGIMP
 from karamelo_py.scene.placement import cell_pattern
 from karamelo_py.scene.region import Region
 from karamelo_py.script.errors import ScriptError
+from karamelo_py.styles.meshes import STL, MeshRegion
 from karamelo_py.styles.methods.base import Method
 from karamelo_py.styles.methods.cpdi import ULCPDI
 from karamelo_py.styles.methods.tlmpm import OwnGrids
-from karamelo_py.styles.regions.combined import Difference, Intersection, Union
-from karamelo_py.styles.regions.meshes import STL, MeshRegion
-from karamelo_py.styles.regions.shapes import BlockRegion, Cylinder, Sphere
+from karamelo_py.styles.regions import (
+    BlockRegion,
+    Cylinder,
+    Difference,
+    Intersection,
+    Sphere,
+    Union,
+)
 
 
 def whole(hub, ID="whole"):

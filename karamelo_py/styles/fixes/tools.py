@@ -21,34 +21,20 @@ from karamelo_py.styles.fixes.formulas import judge_friction, per_direction, vec
 class Bodies:
     """The points of a group as small cubes (in the plane squares), at one moment.
 
-    What a tool does not ask for is not looked for.
-
-    Attributes
-    ----------
-    x, x0, v : (n, d)
-        Positions now and before the first step, velocities.
-    mass, side, face, stiffness : (n,)
-        Masses, edges of the cubes, areas of one face (per radian around an axis), and shear moduli
-        less what damage has taken of them.
-    total
-        The sum of terms (n,) over all points of the group, those of all processes.
-    dt, kick
-        The step, and how long forces act in it.
+    What a tool does not ask for is not looked for: positions `x` and velocities `v` (n, d), `mass`,
+    `side` of the cubes, area of one `face` (per radian around an axis), and `stiffness`, the shear
+    modulus less what damage has taken of it, (n,). Forces act for `kick` in a step of `dt`; `total`
+    sums over all points of the group, those of all processes.
     """
 
     def __init__(self, hub: Hub, points: PointsView):
         self._hub, self._points = hub, points
-        self.dt, self.kick = points.dt, points.kick
+        self.dt, self.kick, self.total = points.dt, points.kick, points.total
         self._d = hub.domain.dimension
-        self.total = points.total
 
     @cached_property
     def x(self) -> np.ndarray:
         return self._points.position.astype(float)
-
-    @property
-    def x0(self) -> np.ndarray:
-        return self._points.reference_position
 
     @cached_property
     def v(self) -> np.ndarray:
@@ -64,20 +50,17 @@ class Bodies:
 
     @cached_property
     def side(self) -> np.ndarray:
-        return (self._column("volume") / self._radius) ** (1 / self._d)
+        return (self._points.column("volume") / self._radius) ** (1 / self._d)
 
     @property
     def face(self) -> np.ndarray:
         return self.side ** (self._d - 1) * self._radius
 
-    @cached_property
+    @property
     def stiffness(self) -> np.ndarray:
-        solid = self._column("type").astype(int) - 1
+        solid = self._points.column("type").astype(int) - 1
         moduli = np.array([_shear_modulus(one) for one in self._hub.solids.values()])
-        return moduli[solid] * (1 - self._column("damage"))
-
-    def _column(self, name: str) -> np.ndarray:
-        return self._points.column(name)
+        return moduli[solid] * (1 - self._points.column("damage"))
 
 
 class PointForceFix(PointForces):
@@ -145,7 +128,7 @@ def _shear_modulus(solid: Solid) -> float:
     return float(getattr(law, "G", None) or getattr(getattr(law, "strength", None), "G", None) or 0)
 
 
-class NeumannBcMech(PointForceFix):
+class NeumannBcMech(PointForces):
     """Load the surface of a body with a force per area.
 
     Parameters
@@ -178,8 +161,10 @@ class NeumannBcMech(PointForceFix):
         super().__init__(hub, group)
         self.traction = per_direction(hub, "t", traction)
 
-    def push(self, bodies: Bodies) -> np.ndarray:
-        return bodies.face[:, None] * vector(self.traction, self.hub, bodies.x, lambda: bodies.x0)
+    def forces(self, points: PointsView) -> np.ndarray:
+        bodies = Bodies(self.hub, points)
+        traction = vector(self.traction, self.hub, bodies.x, lambda: points.reference_position)
+        return bodies.face[:, None] * traction
 
 
 class ImpenetrableSurface(PointForceFix):

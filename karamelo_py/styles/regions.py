@@ -1,4 +1,4 @@
-"""Region styles block, cylinder and sphere."""
+"""Region styles block, cylinder and sphere; union, intersection and difference of regions."""
 
 import math
 from collections.abc import Sequence
@@ -14,19 +14,11 @@ from karamelo_py.scene.hub import Hub
 _NAMES = ("xlo", "xhi", "ylo", "yhi", "zlo", "zhi")
 
 
-class Shape(region.Region):
-    """Base of what lies between planes across some axes, and near a centre or an axis.
+class PlanesAndRounds(region.Region):
+    """Base of what lies between planes across some axes, and near a centre or an axis."""
 
-    Attributes
-    ----------
-    slabs
-        Axis, lower and upper end, for each pair of planes.
-    across, centre, radius
-        The axes along which it is round, and where.
-    """
-
-    slabs: Sequence[tuple[int, float, float]] = ()
-    across: Sequence[int] = ()
+    slabs: Sequence[tuple[int, float, float]] = ()  # axis, lower and upper end of each
+    across: Sequence[int] = ()  # the axes along which it is round, with a centre and a radius
 
     def contains(self, x: np.ndarray) -> np.ndarray:
         inside = np.ones(len(x), dtype=bool)
@@ -51,7 +43,7 @@ class Shape(region.Region):
         return depth
 
 
-class BlockRegion(Shape):
+class BlockRegion(PlanesAndRounds):
     """A box with faces along the axes; its faces belong to it.
 
     Parameters
@@ -92,7 +84,7 @@ class BlockRegion(Shape):
         super().__init__(hub, ends[::2], ends[1::2], exterior=exterior)
 
 
-class Cylinder(Shape):
+class Cylinder(PlanesAndRounds):
     """A disk in 2D, a cylinder along one of the axes in 3D; its surface belongs to it.
 
     Parameters
@@ -145,7 +137,7 @@ class Cylinder(Shape):
         super().__init__(hub, lo, hi, exterior=exterior)
 
 
-class Sphere(Shape):
+class Sphere(PlanesAndRounds):
     """A sphere in 3D, a disk in 2D, an interval in 1D; its surface belongs to it.
 
     Parameters
@@ -177,3 +169,93 @@ class Sphere(Shape):
         self.across, self.centre = range(len(centre)), np.array(centre)
         lo, hi = self.centre - self.radius, self.centre + self.radius
         super().__init__(hub, lo, hi, exterior=exterior)
+
+
+class Union(region.Region):
+    """All that lies in at least one of two or more regions.
+
+    Parameters
+    ----------
+    first, second, more
+        IDs of regions. Those made with ``exterior`` count as what is outside their shape.
+
+    Example
+    -------
+    region(a, block, 0, 1, 0, 0.2)
+    region(b, block, 0, 0.2, 0, 1)
+    region(angle, union, a, b)
+
+    See Also
+    --------
+    intersection, difference
+    """
+
+    # How the insides and the corners of the boxes of the parts are put together.
+    joined, low, high = np.logical_or, np.minimum, np.maximum
+
+    def __init__(self, hub: Hub, first: region.Region, second: region.Region, *more: region.Region):
+        parts = (first, second, *more)
+        used = slice(0, require_domain(hub).dimension)
+        super().__init__(
+            hub,
+            self.low.reduce([part.box_lo[used] for part in parts]),
+            self.high.reduce([part.box_hi[used] for part in parts]),
+            parts=parts,
+        )
+
+    def contains(self, x: np.ndarray) -> np.ndarray:
+        return self.joined.reduce([part.inside(x) for part in self.parts])
+
+    def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
+        return self.high.reduce([part.depth(x, reach) for part in self.parts])
+
+
+class Intersection(Union):
+    """All that lies in each of two or more regions.
+
+    Example
+    -------
+    region(disk, cylinder, 0, 0, 0.2)
+    region(above, block, INF, INF, 0, INF)
+    region(half, intersection, disk, above)
+
+    See Also
+    --------
+    union, difference
+    """
+
+    joined, low, high = np.logical_and, np.maximum, np.minimum
+
+
+class Difference(region.Region):
+    """All that lies in the first region and not in the second.
+
+    Parameters
+    ----------
+    first
+        ID of the region to cut from.
+    second
+        ID of the region that is cut off, its surface included.
+
+    Example
+    -------
+    region(plate, block, -1, 1, -1, 1)
+    region(hole, cylinder, 0, 0, 0.2)
+    region(sheet, difference, plate, hole)
+
+    See Also
+    --------
+    union, intersection
+    """
+
+    def __init__(self, hub: Hub, first: region.Region, second: region.Region):
+        used = slice(0, require_domain(hub).dimension)
+        super().__init__(hub, first.box_lo[used], first.box_hi[used], parts=(first, second))
+
+    def contains(self, x: np.ndarray) -> np.ndarray:
+        first, second = self.parts
+        return first.inside(x) & ~second.inside(x)
+
+    def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
+        first, second = (part.depth(x, reach) for part in self.parts)
+        return np.minimum(first, -second)
