@@ -3,7 +3,7 @@
 from typing import Literal
 
 from karamelo_py.language import registry, signature
-from karamelo_py.language.by_dimension import Forms, number, place_of
+from karamelo_py.language.by_dimension import Forms, number
 from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument
 from karamelo_py.scene.domain import Domain, require_domain
@@ -51,11 +51,17 @@ def dimension(hub: Hub, dimensions: Argument, *bounds: Argument) -> None:
     region, create_domain
     """
     _refuse_second(hub)
-    count = _dimensions(hub, dimensions)
-    if not bounds:
-        hub.announced_dimension = count
-        return
-    hub.domain = _domain(hub, DIMENSION, bounds, count)
+    count = number(hub, dimensions, "the number of dimensions")
+    if count not in DIMENSION.names:
+        raise ScriptError(
+            f"the number of dimensions must be 1, 2 or 3, not {count:g}",
+            place=dimensions.place,
+            expected=" or ".join(DIMENSION.line(d) for d in DIMENSION.names),
+        )
+    if bounds:
+        hub.domain = _domain(hub, DIMENSION, bounds, int(count))
+    else:
+        hub.announced_dimension = int(count)
 
 
 dimension.syntax = "1|2|3, xmin, xmax[, ymin, ymax[, zmin, zmax]], h"
@@ -85,8 +91,7 @@ def create_domain(hub: Hub, *bounds: Argument) -> None:
     dimension
     """
     _refuse_second(hub)
-    count = getattr(hub, "announced_dimension", None) or (len(bounds) // 2)
-    count = min(max(count, 1), 3)
+    count = min(max(hub.announced_dimension or len(bounds) // 2, 1), 3)
     forms = CREATE_DOMAIN_WITHOUT_H if len(bounds) == 2 * count else CREATE_DOMAIN
     hub.domain = _domain(hub, forms, bounds, count)
 
@@ -222,50 +227,38 @@ def _refuse_second(hub: Hub) -> None:
     )
 
 
-def _dimensions(hub: Hub, argument: Argument) -> int:
-    value = number(hub, argument, "the number of dimensions")
-    if value not in DIMENSION.names:
-        raise ScriptError(
-            f"the number of dimensions must be 1, 2 or 3, not {value:g}",
-            place=argument.place,
-            expected=" or ".join(DIMENSION.line(d) for d in DIMENSION.names),
-        )
-    return int(value)
-
-
 def _domain(hub: Hub, forms: Forms, bounds: tuple[Argument, ...], count: int) -> Domain:
     values = forms.read(hub, bounds, count)
-    names = forms.names[count]
+    places = {name: argument.place for name, argument in zip(values, bounds, strict=True)}
     lo = [values[name] for name in _BOUNDS[0 : 2 * count : 2]]
     hi = [values[name] for name in _BOUNDS[1 : 2 * count : 2]]
-    for axis, (a, b) in enumerate(zip(lo, hi, strict=True)):
-        if b <= a:
-            low, high = _BOUNDS[2 * axis : 2 * axis + 2]
+    for low, high in zip(_BOUNDS[::2], _BOUNDS[1 : 2 * count : 2], strict=False):
+        if values[high] <= values[low]:
             raise ScriptError(
-                f"{high} = {b:g} must be above {low} = {a:g}",
-                place=place_of(names, bounds, high),
+                f"{high} = {values[high]:g} must be above {low} = {values[low]:g}",
+                place=places[high],
                 expected=forms.line(count),
             )
     h = values.get("h")
     if h is not None and h <= 0:
         raise ScriptError(
             f"the cell size h = {h:g} must be above 0",
-            place=place_of(names, bounds, "h"),
+            place=places["h"],
             expected=forms.line(count),
         )
     try:
         domain = Domain(count, lo, hi, h)
     except ScriptError as error:
-        error.argument, error.place = None, place_of(names, bounds, "h")
+        error.argument, error.place = None, places.get("h")
         raise
     domain.place = hub.place
-    sides = [b - a for a, b in zip(lo, hi, strict=True)]
+    longest = max(b - a for a, b in zip(lo, hi, strict=True))
     # One cell along a side is a line, or a column; a domain of one cell is an element that deforms.
-    if h is not None and h > max(sides) * (1 + RELATIVE_TOLERANCE) and not own_grids(hub):
+    if h is not None and h > longest * (1 + RELATIVE_TOLERANCE) and not own_grids(hub):
         hub.warn(
-            f"cells of {h:g} are larger than the domain, whose longest side is {max(sides):g}: the "
+            f"cells of {h:g} are larger than the domain, whose longest side is {longest:g}: the "
             "grid is one cell, and its nodes at the upper ends lie outside",
-            place=place_of(names, bounds, "h"),
+            place=places["h"],
             hint="smaller cells, or the same unit of length for both",
         )
     return domain

@@ -264,9 +264,13 @@ def element(
     --------
     load_path, material
     """
-    _check_name(ID)
-    kin = KINEMATICS[kinematics]
-    point = Point(material.law, kin)
+    if not ID.isidentifier():
+        raise ScriptError(
+            f"'{ID}' cannot be part of a file name and of names of values",
+            argument="ID",
+            expected="letters, digits and _, beginning with a letter",
+        )
+    point = Point(material.law, KINEMATICS[kinematics])
     paths = (first, *more)
     for number, path in enumerate(paths):
         _check_components(path, point, kinematics, number)
@@ -298,7 +302,8 @@ def _follow(point: Point, paths: tuple[LoadPath, ...], response: Response) -> No
         try:
             point.follow(path, response.observe)
         except Unreachable as error:
-            reached = ", ".join(f"s{n} = {s:.6g}" for n, s in _stresses(point, path))
+            stresses = zip(COMPONENTS, point.stress, strict=True)
+            reached = ", ".join(f"s{n} = {s:.6g}" for n, s in stresses if n in path.stress)
             raise ScriptError(
                 f"load path '{path.id}' (number {number + 1}), {error}"
                 + (f"; the last increment ended at {reached}" if reached else ""),
@@ -306,20 +311,6 @@ def _follow(point: Point, paths: tuple[LoadPath, ...], response: Response) -> No
                 hint="smaller stresses, or strains in their place" if path.stress
                 else "more increments",
             ) from None  # fmt: skip
-
-
-def _stresses(point: Point, path: LoadPath) -> list[tuple[str, float]]:
-    """The stresses that a path prescribes, as they are."""
-    return [(n, s) for n, s in zip(COMPONENTS, point.stress, strict=True) if n in path.stress]
-
-
-def _check_name(ID: str) -> None:
-    if not ID.isidentifier():
-        raise ScriptError(
-            f"'{ID}' cannot be part of a file name and of names of values",
-            argument="ID",
-            expected="letters, digits and _, beginning with a letter",
-        )
 
 
 def _check_components(path: LoadPath, point: Point, kinematics: str, number: int) -> None:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from typing import Literal
 
 import numpy as np
 
-from karamelo_py.language.by_dimension import Forms, place_of
+from karamelo_py.language.by_dimension import Forms
 from karamelo_py.language.signature import Argument
 from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.group import ALL, ParticleGroup
@@ -61,15 +60,14 @@ def delete_particles(hub: Hub, solids: Solids, by: Literal["region"], region: Re
     translate_particles, boundary, region
     """
     found = {solid: region.inside(solid.x0) for solid in solids}
-    if not any(inside.any() for inside in found.values()) and not region.unknown:
+    found = {solid: inside for solid, inside in found.items() if inside.any()}
+    if not found and not region.unknown:
         hub.warn(f"region '{region.id}' holds no points: nothing is deleted")
         return
     if hub.has_run:
         _delete_later(hub, found)
         return
     for solid, inside in found.items():
-        if not inside.any():
-            continue
         refuse_chosen(hub, solid, "delete_particles")
         if inside.all():
             raise ScriptError(
@@ -78,8 +76,7 @@ def delete_particles(hub: Hub, solids: Solids, by: Literal["region"], region: Re
                 hint="leave out the solid, and delete_particles",
             )
     for solid, inside in found.items():
-        if inside.any():
-            replace_points(hub, solid, _chosen(solid, ~inside))
+        replace_points(hub, solid, _chosen(solid, ~inside))
 
 
 def _delete_later(hub: Hub, found: dict[Solid, np.ndarray]) -> None:
@@ -173,29 +170,20 @@ def _chosen(solid: Solid, kept: np.ndarray) -> Placement:
     )
 
 
-# ---- what commands that replace points share ---------------------------------------------------
-
-
 def refuse_chosen(hub: Hub, solid: Solid, command: str) -> None:
     """Groups of points and contact know points by number, and the numbers from here on change."""
-    for kind, item, affected in _users(hub, solid):
-        if affected:
-            made = "made for" if kind == "fix" else "chosen from"
-            raise ScriptError(
-                f"{kind} '{item.id}' was {made} points that would be replaced or renumbered",
-                argument="solid",
-                expected=f"{kind}({item.id}, ...) after {command}",
-            )
-
-
-def _users(hub: Hub, solid: Solid) -> Iterable[tuple]:
-    """Fixes and groups, and whether they know points of `solid` or of later solids."""
-    for fix in hub.fixes.values():
-        yield "fix", fix, bool(fix.point_fields)
+    later = [one for one in hub.solids.values() if one.index >= solid.index]
+    affected = [("fix", "made for", fix) for fix in hub.fixes.values() if fix.point_fields]
     for group in hub.groups.values():
-        later = (one for one in hub.solids.values() if one.index >= solid.index)
-        of_points = isinstance(group, ParticleGroup)
-        yield "group", group, of_points and any(map(group.touches, later))
+        if isinstance(group, ParticleGroup) and any(map(group.touches, later)):
+            affected.append(("group", "chosen from", group))
+    if affected:
+        kind, made, item = affected[0]
+        raise ScriptError(
+            f"{kind} '{item.id}' was {made} points that would be replaced or renumbered",
+            argument="solid",
+            expected=f"{kind}({item.id}, ...) after {command}",
+        )
 
 
 def replace_points(
@@ -266,9 +254,8 @@ def populate_cylindrical_coordinates(
             expected="populate_cylindrical_coordinates before the first run",
         )
     refuse_chosen(hub, solid, "populate_cylindrical_coordinates")
-    dimension = require_domain(hub).dimension
-    values = FORMS.read(hub, lattice, dimension)
-    placed = _polar(values, FORMS.names[dimension], lattice)
+    values = FORMS.read(hub, lattice, require_domain(hub).dimension)
+    placed = _polar(values, dict(zip(values, (a.place for a in lattice), strict=True)))
     if not region.unknown:
         placed = _kept(hub, region, placed)
     T0, solid.T0 = solid.T0, values["T0"]
@@ -285,11 +272,11 @@ populate_cylindrical_coordinates.syntax = (
 )
 
 
-def _polar(values: dict, names: tuple[str, ...], given: tuple[Argument, ...]) -> Placement:
+def _polar(values: dict, places: dict) -> Placement:
     """The points of all polar cells, slices outermost, then rings, then angles."""
-    check_radius(values["R"], place_of(names, given, "R"))
+    check_radius(values["R"], places["R"])
     counts = [
-        _count(values[name], name, place_of(names, given, name)) if name in names else 1
+        _count(values[name], name, places[name]) if name in values else 1
         for name in ("Ndx", "Ndr", "Ndtheta")
     ]
     total = math.prod(counts)
@@ -317,7 +304,7 @@ def _polar(values: dict, names: tuple[str, ...], given: tuple[Argument, ...]) ->
         if values["hi"] <= values["lo"]:
             raise ScriptError(
                 f"hi = {values['hi']:g} must be above lo = {values['lo']:g}",
-                place=place_of(names, given, "hi"),
+                place=places["hi"],
             )
         dx = (values["hi"] - values["lo"]) / counts[0]
         ring = len(r)

@@ -45,7 +45,6 @@ class PointField:
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> PointField:
-        """The field that `argument` names."""
         known = [*hub.fields.particle_names(), *DISPLACEMENTS, *VECTORS, *TENSORS]
         name = argument.words(known)
         if name not in known:

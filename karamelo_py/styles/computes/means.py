@@ -19,7 +19,6 @@ class Mean(Compute):
     """
 
     def sums(self) -> Sequence[float]:
-        """Add the terms up."""
         return self.hub.fields.added_up(self)
 
     def refresh(self) -> None:
@@ -207,7 +206,6 @@ class PositionQuantile(Compute):
         self.share = share
 
     def refresh(self) -> None:
-        """Measure and publish."""
         d = self.hub.domain.dimension
         # Of the bits of the coordinates, eight at a time: which come first is known so far.
         first, below = [0] * d, np.zeros(d)

@@ -59,7 +59,6 @@ class Probe(Compute):
 
     @property
     def at_place(self) -> bool:
-        """True if the script gave a place."""
         return any(c is not None for c in self.place_xyz)
 
     def refresh(self) -> None:
@@ -73,7 +72,6 @@ class Probe(Compute):
             self.publish(end, value)
 
     def terms(self, points: PointTable) -> list[np.ndarray]:
-        """Volumes of points, and these times their columns."""
         volume = points.particle("volume")
         return [volume, *(volume * points.particle(name) for name in self.columns)]
 

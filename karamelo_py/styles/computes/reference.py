@@ -57,7 +57,6 @@ class GroupOrValue:
 
     @staticmethod
     def from_script(hub: Scene, argument: Argument) -> ParticleGroup | Quantity:
-        """The group of that name if there is one, else the value."""
         name = argument.text.strip().strip('"')
         if name == ALL or name in hub.groups:
             return ParticleGroup.from_script(hub, argument)

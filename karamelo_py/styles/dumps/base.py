@@ -136,7 +136,6 @@ class TableDump(Dump):
             pass
 
     def table(self) -> TableRows:
-        """Give all rows."""
         ids, types, columns = zip(*self.tables(), strict=True)
         joined = (np.concatenate(same) for same in zip(*columns, strict=True))
         return TableRows(np.concatenate(ids), np.concatenate(types), list(joined))

@@ -43,7 +43,6 @@ class Hdf5Dump(TableDump):
     _snapshots = 0
 
     def write(self) -> None:
-        """Write one snapshot."""
         update = self.hub.update
         snapshot = SnapshotRows(update.time, update.step, self.extent()[1], self.tables())
         self._add(self.path(), self._snapshots, snapshot)

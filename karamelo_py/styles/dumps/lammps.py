@@ -93,7 +93,6 @@ class LammpsDump(TableDump):
 
     @staticmethod
     def opened(path: Path) -> BinaryIO:
-        """Open the text of a file."""
         return path.open("rb")
 
     def _snapshot(self) -> Iterator[bytes]:

@@ -1,7 +1,6 @@
 """dump pyplot and movie: pictures of the points, drawn with Matplotlib."""
 
 import re
-from collections.abc import Iterator
 from functools import cached_property
 from typing import Annotated, Any, BinaryIO
 
@@ -12,7 +11,6 @@ from karamelo_py.language.signature import OutputFile, Positive
 from karamelo_py.output.columns import check_columns
 from karamelo_py.output.files import picture_format, savefig, unwarned, whole
 from karamelo_py.output.movies import Frames, movie_format
-from karamelo_py.output.point_table import PointTable
 from karamelo_py.output.rhythm import Every
 from karamelo_py.output.snapshots import Snapshot
 from karamelo_py.output.units import labelled
@@ -128,11 +126,9 @@ class PyPlot(Dump):
                 self._picture.begin_with(limits)
 
     def check_format(self) -> str:
-        """Read the format that the file name asks for."""
         return picture_format(self.file)
 
     def write(self) -> None:
-        """Draw the present state."""
         with unwarned():
             if self.format == "png":
                 with whole(self.path()) as file:
@@ -183,16 +179,13 @@ class PyPlot(Dump):
         """Take what a picture needs of all points, some of them after others."""
         label, domain, update = self._label(), self.hub.domain, self.hub.update
         names = dict.fromkeys(["id", "x", "y", "z", "volume", label])
-        pieces = [[piece.particle(name) for name in names] for piece in self._pieces()]
+        tables = self.hub.fields.pieces(to_first=True)
+        pieces = [[table.particle(name) for name in names] for table in tables]
         columns = dict(zip(names, map(np.concatenate, zip(*pieces, strict=True)), strict=True))
         return Snapshot(update.step, update.time, columns, domain.lo, domain.hi)
 
-    def _pieces(self) -> Iterator[PointTable]:
-        return self.hub.fields.pieces(to_first=True)
-
     def take_part(self) -> None:
-        """Give the first of several processes the own points."""
-        for _ in self._pieces():
+        for _ in self.hub.fields.pieces(to_first=True):
             pass
 
     def side(self, snapshot: Snapshot) -> float:
@@ -214,13 +207,7 @@ class PyPlot(Dump):
 def colours_of(
     column: str, limits: tuple[float | None, float | None], cmap: str | None
 ) -> tuple[bool, str]:
-    """Choose for a column if limits that grow lie about 0, and the colour map.
-
-    Raises
-    ------
-    ScriptError
-        If Matplotlib does not have the map that is asked for.
-    """
+    """Choose for a column if limits that grow lie about 0, and the colour map."""
     signed = SIGNED.fullmatch(column) is not None
     if cmap is not None:
         from matplotlib import colormaps
@@ -279,17 +266,13 @@ class Movie(PyPlot):
 
     @cached_property
     def frames(self) -> Frames:
-        """The pictures so far."""
         return Frames(FRAMES_PER_SECOND)
 
     def check_format(self) -> str:
-        """Read the format that the file name asks for."""
         return movie_format(self.file)
 
     def write(self) -> None:
-        """Draw the present state as the next frame."""
         self.frames.add(self.draw)
 
     def finish(self) -> None:
-        """Write the movie of all frames so far."""
         self.frames.save(self.path())

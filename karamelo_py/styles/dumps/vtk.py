@@ -27,13 +27,7 @@ class VtkDump(TableDump):
     remembers = ("_series",)
     to_first, counts_rows = True, False
 
-    def __init__(
-        self,
-        hub: Hub,
-        every: Every,
-        file: OutputFile,
-        *columns: str,
-    ):
+    def __init__(self, hub: Hub, every: Every, file: OutputFile, *columns: str):
         super().__init__(hub, every, file, *columns)
         if not self.one_file_per_step or self.file.suffix != ".vtu":
             stem = self.file.name.replace("*", "").partition(".")[0]
@@ -103,7 +97,6 @@ class Vtk(OfPoints, VtkDump):
     """
 
     def connect(self, vtu: Vtu, ids: np.ndarray, kept: list[np.ndarray]) -> None:
-        """See `VtkDump.connect`."""
         last = vtu.counts[0]
         vtu.add_cells("vertex", np.arange(last - len(ids), last)[:, None])
 

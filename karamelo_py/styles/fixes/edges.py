@@ -28,7 +28,6 @@ class Faces(NamedTuple):
     middle: np.ndarray  # (m, d)
 
     def some(self, which: np.ndarray) -> Faces:
-        """Those faces."""
         return Faces(*(column[which] for column in self))
 
 

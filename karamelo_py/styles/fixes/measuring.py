@@ -73,7 +73,6 @@ class PointForce(Fix):
         self.publish_components(self.hub.fields.added_up(self))
 
     def terms(self, points: PointTable) -> list[np.ndarray]:
-        """Components of the forces on points."""
         return [points.particle("b" + axis) for axis in "xyz"]
 
 

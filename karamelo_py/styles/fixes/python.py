@@ -204,7 +204,6 @@ class Python(Fix):
             self.publish_components(numbers)
 
     def _agree(self, given: Any) -> None:
-        """See that all processes return the same."""
         own = None if given is None else np.asarray(given, float).tolist()
         first, *others = map(repr, self.hub.simulation.everyone("its end", own))
         other = next((one for one in others if one != first), None)

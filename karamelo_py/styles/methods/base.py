@@ -107,7 +107,6 @@ class Method:
         return nodes
 
     def kinematics(self, hub: Hub) -> Any:
-        """The kinematics of the scene."""
         return Axisymmetric() if hub.domain.axisymmetric else KINEMATICS[hub.domain.dimension]()
 
     def averaging(self, hub: Hub) -> NamedTuple:

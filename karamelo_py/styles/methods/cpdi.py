@@ -38,13 +38,11 @@ class Convected(Method):
     variants: ClassVar[dict[str, type]] = VARIANTS
 
     def shapes(self, kin: Any, solid: Solid) -> np.ndarray:
-        """Return the shapes of the domains of a solid's points, (n, s), as the basis keeps them."""
         self._check_domain(kin.dimension)
         self._check_solid(solid)
         return super().shapes(kin, solid)
 
     def check(self, hub: Hub) -> None:
-        """Refuse what does not go together; called before every run."""
         super().check(hub)
         self._check_domain(hub.domain.dimension)
         for solid in hub.solids.values():

@@ -29,12 +29,10 @@ class OwnGrids(Method):
             )
 
     def lattices(self, hub: Hub) -> list[Lattice]:
-        """A grid over the box of each solid."""
         d = hub.domain.dimension
         return numbered([self._lattice(d, s.lo, s.hi, s.h) for s in hub.solids.values()])
 
     def lattice_of(self, hub: Hub, solid: Solid) -> int:
-        """The grid of a solid has its number."""
         return solid.index
 
 

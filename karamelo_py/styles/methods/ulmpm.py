@@ -31,12 +31,10 @@ class ULMPM(Method):
     """
 
     def welcome(self, hub: Hub, solid: Solid) -> None:
-        """Publish the force on a rigid solid."""
         if can(solid.material.law, constrained_velocity):
             publish_loads(hub, solid)
 
     def contact_between(self, hub: Hub, lattices: Sequence[Lattice]) -> NamedTuple:
-        """Rigid solids lead what they meet."""
         solids = list(hub.solids.values())
         rigid = [can(solid.material.law, constrained_velocity) for solid in solids]
         if not any(rigid):

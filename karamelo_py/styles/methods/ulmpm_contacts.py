@@ -115,18 +115,15 @@ class ULMPMContacts(Method):
     fields_per_solid = True
 
     def lattices(self, hub: Hub) -> list[Lattice]:
-        """The domain's grid once for each velocity field."""
         domain = hub.domain
         count = max(fields(hub), default=0) + 1
         box = domain.dimension, domain.lo, domain.hi, domain.h
         return numbered([self._lattice(*box) for _ in range(count)])
 
     def lattice_of(self, hub: Hub, solid: Solid) -> int:
-        """The field of a solid."""
         return fields(hub)[solid.index]
 
     def welcome(self, hub: Hub, solid: Solid) -> None:
-        """Publish the contact force."""
         publish_loads(hub, solid)
 
     def held_with(self, hub: Hub, nodes: np.ndarray) -> np.ndarray:
