@@ -14,7 +14,7 @@ from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import SEEDS, Expression
 from karamelo_py.script.other_programs import instead
 from karamelo_py.styles.computes.means import CenterOfMass
-from karamelo_py.styles.fixes import measuring
+from karamelo_py.styles.fixes.measuring import COME_FIRST, Measuring
 
 
 def fix(hub: Hub, ID: str, style: StyleOf("fix"), *arguments: Argument) -> None:
@@ -227,10 +227,10 @@ def internal_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expressio
     external_force, xcm, compute reaction
     """
     if isinstance(group, ParticleGroup):
-        before = _total(hub, "momentum_before", measuring.MomentumBefore, group, direction)
-        after = _total(hub, "momentum_after", measuring.MomentumAfter, group, direction)
+        before = _total(hub, "momentum_before", group, direction)
+        after = _total(hub, "momentum_after", group, direction)
         return _component(hub, after.minus(before), direction)
-    force = _total(hub, "internal_force", measuring.ForceBeforeFixes, group, direction)
+    force = _total(hub, "internal_force", group, direction)
     return _component(hub, force, direction)
 
 
@@ -261,21 +261,21 @@ def external_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expressio
     internal_force, xcm, fix body_force
     """
     if isinstance(group, ParticleGroup):
-        force = _total(hub, "external_force", measuring.PointForce, group, direction)
+        force = _total(hub, "external_force", group, direction)
         return _component(hub, force, direction)
-    total = _total(hub, "force", measuring.TotalForce, group, direction)
-    inner = _total(hub, "internal_force", measuring.ForceBeforeFixes, group, direction)
+    total = _total(hub, "force", group, direction)
+    inner = _total(hub, "internal_force", group, direction)
     return _component(hub, total.minus(inner), direction)
 
 
-def _total(hub: Hub, name: str, style: type, group: Group, direction: str) -> Expression:
+def _total(hub: Hub, name: str, group: Group, direction: str) -> Expression:
     """The value of the fix that measures it, which is made when first asked for."""
     ID = f"{name}({group.id})"
     if ID not in hub.fixes:
         others = dict(hub.fixes)
-        if style.comes_first:
+        if name in COME_FIRST:
             hub.fixes.clear()
-        _file(hub, hub.fixes, ID, style(hub, group), name)
+        _file(hub, hub.fixes, ID, Measuring(hub, group, name), name)
         hub.fixes.update(others)
     return Expression.seed(f"{ID}_{direction}")
 

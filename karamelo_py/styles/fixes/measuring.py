@@ -20,57 +20,32 @@ def momentum_rate(mass, v, x_old, x, value, before, dt, kick):
     return v, x, mass * v / kick
 
 
+# What is measured of nodes or points, and when in a step.
+HOOKS = {
+    "internal_force": ("post_particles_to_grid", node_hook(force_of_nodes)),
+    "force": ("post_update_grid_state", node_hook(force_of_nodes)),
+    "momentum_before": ("initial_integrate", point_hook(momentum_rate, publishes=True)),
+    "momentum_after": ("final_integrate", point_hook(momentum_rate, publishes=True)),
+}
+# Before all other fixes, whenever they are defined.
+COME_FIRST = ("internal_force", "momentum_before")
+
+
 class Measuring(Fix):
-    """Base of fixes that only measure.
-
-    Attributes
-    ----------
-    comes_first
-        Whether it acts before all other fixes, whenever it is defined.
-    """
+    """Sum one of `HOOKS`, or the ``external_force`` that fixes put on points, over a group."""
 
     published = ("x", "y", "z")
-    comes_first = False
 
-    def __init__(self, hub: Hub, group: Group):
+    def __init__(self, hub: Hub, group: Group, name: str):
         super().__init__(hub, group)
-        self.formulas = (Expression(0.0),) * hub.domain.dimension
-
-
-class ForceBeforeFixes(Measuring):
-    """Force of nodes before other fixes add to it."""
-
-    comes_first = True
-    post_particles_to_grid = node_hook(force_of_nodes)
-
-
-class TotalForce(Measuring):
-    """Force of nodes with all that fixes have added."""
-
-    post_update_grid_state = node_hook(force_of_nodes)
-
-
-class MomentumBefore(Measuring):
-    """Momentum of points at the start of a step over the step."""
-
-    comes_first = True
-    initial_integrate = point_hook(momentum_rate, publishes=True)
-
-
-class MomentumAfter(Measuring):
-    """Momentum of points at the end of a step over the step."""
-
-    final_integrate = point_hook(momentum_rate, publishes=True)
-
-
-class PointForce(Fix):
-    """Force that fixes put on points."""
-
-    published = ("x", "y", "z")
-    comes_first = False
+        self.name = name
+        if name in HOOKS:
+            self.formulas = (Expression(0.0),) * hub.domain.dimension
+            setattr(self, *HOOKS[name])
 
     def refresh(self) -> None:
-        self.publish_components(self.hub.fields.added_up(self))
+        if self.name not in HOOKS:
+            self.publish_components(self.hub.fields.added_up(self))
 
     def terms(self, points: PointTable) -> list[np.ndarray]:
         return [points.particle("b" + axis) for axis in "xyz"]
