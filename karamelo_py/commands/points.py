@@ -284,10 +284,9 @@ def _polar(values: dict, places: dict) -> Placement:
         raise ScriptError(
             f"about {total:.3g} points would be needed", expected=f"at most {MAX_POINTS}"
         )
-    slices, rings, angles = (np.arange(n) for n in counts)
+    slices, rings, angles = np.indices(counts).reshape(3, -1)
     dr, dtheta = values["R"] / counts[1], 2 * math.pi / counts[2]
-    r = np.repeat((rings + 0.5) * dr, counts[2])
-    theta = np.tile(angles * dtheta, counts[1])
+    r, theta = (rings + 0.5) * dr, angles * dtheta
     cosine, sine = np.cos(theta), np.sin(theta)
     # The box around a cell taken as a rectangle of r dtheta by dr.
     along_r, along_theta = dr / 2, r * dtheta / 2
@@ -303,16 +302,12 @@ def _polar(values: dict, places: dict) -> Placement:
         axis = "xyz".index(values["axis"])
         if values["hi"] <= values["lo"]:
             raise ScriptError(
-                f"hi = {values['hi']:g} must be above lo = {values['lo']:g}",
-                place=places["hi"],
+                f"hi = {values['hi']:g} must be above lo = {values['lo']:g}", place=places["hi"]
             )
         dx = (values["hi"] - values["lo"]) / counts[0]
-        ring = len(r)
-        columns = [np.tile(column, counts[0]) for column in columns]
-        halves = [np.tile(half, counts[0]) for half in halves]
-        columns.insert(axis, np.repeat(values["lo"] + (slices + 0.5) * dx, ring))
-        halves.insert(axis, np.full(len(columns[axis]), dx / 2))
-        volume = np.tile(volume * dx, counts[0])
+        columns.insert(axis, values["lo"] + (slices + 0.5) * dx)
+        halves.insert(axis, np.full(len(r), dx / 2))
+        volume = volume * dx
         lo, hi = np.insert(lo, axis, values["lo"]), np.insert(hi, axis, values["hi"])
     return Placement(np.column_stack(columns), volume, np.column_stack(halves), lo, hi)
 

@@ -8,10 +8,18 @@ from karamelo_py.language.own_words import words_of
 from karamelo_py.language.signature import Argument, NonNegative
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.modify import PointsView
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.formulas import judge_friction, per_direction
-from karamelo_py.styles.fixes.tools import Bodies, PointForceFix, apart, rubbed
+from karamelo_py.styles.fixes.tools import (
+    PointForceFix,
+    apart,
+    face_of,
+    rubbed,
+    side_of,
+    stiffness_of,
+)
 
 
 class Radius(Expression):
@@ -80,13 +88,14 @@ class Indent(PointForceFix):
         self.K, self.R = K, R
         self.centre = per_direction(hub, "", (x, y, z))
 
-    def push(self, bodies: Bodies) -> np.ndarray:
+    def forces(self, points: PointsView) -> np.ndarray:
         K, R = self.now((self.K, self.R))
-        away = bodies.x - self.now(self.centre)
+        away = points.position.astype(float) - self.now(self.centre)
         r = np.linalg.norm(away, axis=1)
         depth = np.maximum(R - r, 0)
-        self.publish("s", bodies.total(depth > 0))
-        size = np.divide(bodies.mass * K * depth**2, r, out=np.zeros_like(r), where=r > 0)
+        self.publish("s", points.total(depth > 0))
+        push = points.mass.astype(float) * K * depth**2
+        size = np.divide(push, r, out=np.zeros_like(r), where=r > 0)
         return size[:, None] * away
 
 
@@ -147,15 +156,16 @@ class IndentMinimizePenetration(PointForceFix):
         self.centre = per_direction(hub, "", (x, y, z))
         self.velocity = per_direction(hub, "v", (vx, vy, vz))
 
-    def push(self, bodies: Bodies) -> np.ndarray:
+    def forces(self, points: PointsView) -> np.ndarray:
         (R,) = self.now((self.R,))
-        away = bodies.x - self.now(self.centre)
+        away = points.position.astype(float) - self.now(self.centre)
         r = np.linalg.norm(away, axis=1, keepdims=True)
         normal = np.divide(away, r, out=np.zeros_like(away), where=r > 0)
-        depth = R + bodies.side / 2 - r[:, 0]
-        self.publish("s", bodies.total(bodies.face * (depth > 0)))
-        push = apart(bodies, depth, normal)
-        return push + rubbed(bodies, push, normal, self.now(self.velocity), self.mu)
+        side = side_of(self.hub, points)
+        depth = R + side / 2 - r[:, 0]
+        self.publish("s", points.total(face_of(self.hub, points, side) * (depth > 0)))
+        push = apart(points, depth, normal)
+        return push + rubbed(points, push, normal, self.now(self.velocity), self.mu)
 
 
 class CuttingTool(PointForceFix):
@@ -225,13 +235,13 @@ class CuttingTool(PointForceFix):
         normals = np.array([[a[1], -a[0]], [-b[1], b[0]]]) * np.sign(turn)
         return normals / np.linalg.norm(normals, axis=1, keepdims=True), tip
 
-    def push(self, bodies: Bodies) -> np.ndarray:
+    def forces(self, points: PointsView) -> np.ndarray:
         (K,) = self.now((self.K,))
         normals, tip = self._faces()
-        depths = (tip - bodies.x) @ normals.T
+        depths = (tip - points.position.astype(float)) @ normals.T
         nearer = depths.argmin(axis=1)
         depth = np.maximum(depths.min(axis=1), 0)
-        return (K * bodies.stiffness * depth)[:, None] * normals[nearer]
+        return (K * stiffness_of(self.hub, points) * depth)[:, None] * normals[nearer]
 
 
 class MeldTool(PointForceFix):
@@ -293,10 +303,10 @@ class MeldTool(PointForceFix):
         self.along = "xyz".index(axis)
         self.across = [k for k in range(3) if k != self.along]
 
-    def push(self, bodies: Bodies) -> np.ndarray:
+    def forces(self, points: PointsView) -> np.ndarray:
         K, w, c1, c2, theta, lo, hi, Rmax = self.now(self.numbers)
-        height = bodies.x[:, self.along] - lo
-        q = bodies.x[:, self.across] - np.array([c1, c2])
+        x = points.position.astype(float)
+        height, q = x[:, self.along] - lo, x[:, self.across] - np.array([c1, c2])
         r = np.linalg.norm(q, axis=1)
         turn = np.array([[np.cos(theta), np.sin(theta)], [-np.sin(theta), np.cos(theta)]])
         own = q @ turn.T
@@ -310,4 +320,4 @@ class MeldTool(PointForceFix):
         shortest = np.linalg.norm(ways, axis=2).argmin(axis=0)
         inside = (height >= 0) & (height <= hi - lo) & (r <= Rmax)
         way = ways[shortest, np.arange(len(r))] * inside[:, None]
-        return (K * bodies.stiffness)[:, None] * way
+        return (K * stiffness_of(self.hub, points))[:, None] * way

@@ -1,7 +1,6 @@
 """Fixes that put forces on points: walls and tractions, and the base of"""
 
 from collections.abc import Sequence
-from functools import cached_property
 from typing import Annotated, Any
 
 import numpy as np
@@ -18,53 +17,8 @@ from karamelo_py.styles.fixes.forces import PointForces
 from karamelo_py.styles.fixes.formulas import judge_friction, per_direction, vector
 
 
-class Bodies:
-    """The points of a group as small cubes (in the plane squares), at one moment.
-
-    What a tool does not ask for is not looked for: positions `x` and velocities `v` (n, d), `mass`,
-    `side` of the cubes, area of one `face` (per radian around an axis), and `stiffness`, the shear
-    modulus less what damage has taken of it, (n,). Forces act for `kick` in a step of `dt`; `total`
-    sums over all points of the group, those of all processes.
-    """
-
-    def __init__(self, hub: Hub, points: PointsView):
-        self._hub, self._points = hub, points
-        self.dt, self.kick, self.total = points.dt, points.kick, points.total
-        self._d = hub.domain.dimension
-
-    @cached_property
-    def x(self) -> np.ndarray:
-        return self._points.position.astype(float)
-
-    @cached_property
-    def v(self) -> np.ndarray:
-        return self._points.velocity.astype(float)
-
-    @cached_property
-    def mass(self) -> np.ndarray:
-        return self._points.mass.astype(float)
-
-    @cached_property
-    def _radius(self) -> np.ndarray:
-        return self.x[:, 0] if self._hub.domain.axisymmetric else np.ones(len(self.x))
-
-    @cached_property
-    def side(self) -> np.ndarray:
-        return (self._points.column("volume") / self._radius) ** (1 / self._d)
-
-    @property
-    def face(self) -> np.ndarray:
-        return self.side ** (self._d - 1) * self._radius
-
-    @property
-    def stiffness(self) -> np.ndarray:
-        solid = self._points.column("type").astype(int) - 1
-        moduli = np.array([_shear_modulus(one) for one in self._hub.solids.values()])
-        return moduli[solid] * (1 - self._points.column("damage"))
-
-
 class PointForceFix(PointForces):
-    """Base of fixes that `push` points as small cubes."""
+    """Base of fixes that push points, which they take for small cubes (in the plane squares)."""
 
     needs_stiffness = False  # whether the force goes with the shear modulus of the point
 
@@ -79,16 +33,30 @@ class PointForceFix(PointForces):
                 expected="a group of points of elastic materials",
             )
 
-    def push(self, bodies: Bodies) -> np.ndarray:
-        """The forces (n, d) on the points."""
-        raise NotImplementedError
-
-    def forces(self, points: PointsView) -> np.ndarray:
-        return self.push(Bodies(self.hub, points))
-
     def now(self, formulas: Sequence[Expression]) -> np.ndarray:
         """The present numbers (d,) of formulas of time, one for each direction."""
         return np.array([formula.evaluate(self.hub.values) for formula in formulas])
+
+
+def side_of(hub: Hub, points: PointsView) -> np.ndarray:
+    """Edges (n,) of the cubes that points are taken for."""
+    return (points.column("volume") / _radius(hub, points)) ** (1 / hub.domain.dimension)
+
+
+def face_of(hub: Hub, points: PointsView, side: np.ndarray) -> np.ndarray:
+    """Areas (n,) of a face of the cubes with these sides, per radian around an axis."""
+    return side ** (hub.domain.dimension - 1) * _radius(hub, points)
+
+
+def stiffness_of(hub: Hub, points: PointsView) -> np.ndarray:
+    """Shear moduli (n,) less what damage has taken of them."""
+    solid = points.column("type").astype(int) - 1
+    moduli = np.array([_shear_modulus(one) for one in hub.solids.values()])
+    return moduli[solid] * (1 - points.column("damage"))
+
+
+def _radius(hub: Hub, points: PointsView) -> np.ndarray | float:
+    return points.position[:, 0].astype(float) if hub.domain.axisymmetric else 1.0
 
 
 def unit(vector: np.ndarray) -> np.ndarray:
@@ -99,26 +67,27 @@ def unit(vector: np.ndarray) -> np.ndarray:
     return vector / length
 
 
-def apart(bodies: Bodies, penetration: np.ndarray, normal: np.ndarray) -> np.ndarray:
+def apart(points: PointsView, penetration: np.ndarray, normal: np.ndarray) -> np.ndarray:
     """Forces (n, d) that undo penetrations (n,) along `normal` within one step.
 
     m p / dt^2, for a point that nothing else holds (de Vaucorbeil & Nguyen 2021).
     """
-    push = bodies.mass * np.maximum(penetration, 0) / (bodies.dt * bodies.kick)
+    push = points.mass.astype(float) * np.maximum(penetration, 0) / (points.dt * points.kick)
     return push[:, None] * normal
 
 
 def rubbed(
-    bodies: Bodies, push: np.ndarray, normal: np.ndarray, velocity: np.ndarray, mu: float
+    points: PointsView, push: np.ndarray, normal: np.ndarray, velocity: np.ndarray, mu: float
 ) -> np.ndarray:
     """Forces (n, d) of friction by something that moves with `velocity` and pushes with `push`.
 
     mu times the pressing force, along the slip, and at most what stops it within the step.
     """
-    slip = velocity - bodies.v
+    slip = velocity - points.velocity.astype(float)
     slip = slip - (slip * normal).sum(axis=1, keepdims=True) * normal
     speed = np.linalg.norm(slip, axis=1)
-    rub = np.minimum(mu * np.linalg.norm(push, axis=1), bodies.mass * speed / bodies.kick)
+    stopping = points.mass.astype(float) * speed / points.kick
+    rub = np.minimum(mu * np.linalg.norm(push, axis=1), stopping)
     return slip * np.divide(rub, speed, out=np.zeros_like(speed), where=speed > 0)[:, None]
 
 
@@ -162,9 +131,9 @@ class NeumannBcMech(PointForces):
         self.traction = per_direction(hub, "t", traction)
 
     def forces(self, points: PointsView) -> np.ndarray:
-        bodies = Bodies(self.hub, points)
-        traction = vector(self.traction, self.hub, bodies.x, lambda: points.reference_position)
-        return bodies.face[:, None] * traction
+        x = points.position.astype(float)
+        face = face_of(self.hub, points, side_of(self.hub, points))
+        return face[:, None] * vector(self.traction, self.hub, x, lambda: points.reference_position)
 
 
 class ImpenetrableSurface(PointForceFix):
@@ -215,11 +184,12 @@ class ImpenetrableSurface(PointForceFix):
         if not hub.rehearsing:  # which does not know all numbers
             unit(self.now(self.normal))
 
-    def push(self, bodies: Bodies) -> np.ndarray:
+    def forces(self, points: PointsView) -> np.ndarray:
         (K,) = self.now((self.K,))
         normal = unit(self.now(self.normal))
-        depth = np.maximum((self.now(self.origin) - bodies.x) @ normal, 0)
-        return (K * bodies.stiffness * depth * bodies.side)[:, None] * normal
+        depth = np.maximum((self.now(self.origin) - points.position.astype(float)) @ normal, 0)
+        stiffness, side = stiffness_of(self.hub, points), side_of(self.hub, points)
+        return (K * stiffness * depth * side)[:, None] * normal
 
 
 class ContactMinimizePenetrationPlane(PointForceFix):
@@ -274,8 +244,8 @@ class ContactMinimizePenetrationPlane(PointForceFix):
         if not hub.rehearsing:  # which does not know all numbers
             unit(self.now(self.normal))
 
-    def push(self, bodies: Bodies) -> np.ndarray:
+    def forces(self, points: PointsView) -> np.ndarray:
         normal = unit(self.now(self.normal))[None, :]
-        depth = bodies.side / 2 - (bodies.x - self.now(self.origin)) @ normal[0]
-        push = apart(bodies, depth, normal)
-        return push + rubbed(bodies, push, normal, np.zeros(len(normal[0])), self.mu)
+        height = (points.position.astype(float) - self.now(self.origin)) @ normal[0]
+        push = apart(points, side_of(self.hub, points) / 2 - height, normal)
+        return push + rubbed(points, push, normal, np.zeros(len(normal[0])), self.mu)
