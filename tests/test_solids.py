@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from meshed import cube_surface, write
 
-from karamelo_py.commands import solids as commands
+from karamelo_py.commands import domain as commands
 from karamelo_py.points.basis.cpdi.parallel import R4
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.basis.ugimp import UGIMP
@@ -20,7 +20,7 @@ from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.meshes import STL, MeshRegion
 from karamelo_py.styles.methods.base import Method
 from karamelo_py.styles.methods.cpdi import ULCPDI
-from karamelo_py.styles.methods.tlmpm import OwnGrids
+from karamelo_py.styles.methods.ulmpm import OwnGrids
 from karamelo_py.styles.regions import (
     BlockRegion,
     Cylinder,

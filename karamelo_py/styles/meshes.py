@@ -21,7 +21,19 @@ from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.solids import Body
 
 
-class MeshRegion(Region):
+class Enclosed(Region):
+    """Base of regions within a surface of `faces`."""
+
+    @cached_property
+    def skin(self) -> Skin:
+        return Skin(self.faces())
+
+    def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
+        distance = self.skin.distance(x[:, : self.dimension], reach)
+        return np.where(self.contains(x), distance, -distance)
+
+
+class MeshRegion(Enclosed):
     """All that lies in an element of a mesh, or of one of its physical groups.
 
     Parameters
@@ -76,22 +88,20 @@ class MeshRegion(Region):
     def contains(self, x: np.ndarray) -> np.ndarray:
         return self.simplices.contain(np.asarray(x)[:, : self.dimension])
 
-    @cached_property
-    def skin(self) -> Skin:
-        return Skin(outer_faces(self.corners))
+    def faces(self) -> np.ndarray:
+        return outer_faces(self.corners)
 
     def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
         if self.simplices.flat:
             return np.full(len(x), -reach)  # nothing lies in a surface or a line
-        distance = self.skin.distance(x[:, : self.dimension], reach)
-        return np.where(self.contains(x), distance, -distance)
+        return super().distance(x, reach)
 
 
 # Binary STL files, and most programs that write the others, have single precision.
 _SINGLE = float(np.finfo(np.float32).eps)
 
 
-class STL(Region):
+class STL(Enclosed):
     """All that a closed surface of triangles encloses, the surface included; in 3D.
 
     Parameters
@@ -140,13 +150,8 @@ class STL(Region):
     def contains(self, x: np.ndarray) -> np.ndarray:
         return self.surface.encloses(np.asarray(x)[:, :3])
 
-    @cached_property
-    def skin(self) -> Skin:
-        return Skin(self.surface.corners)
-
-    def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
-        distance = self.skin.distance(x[:, :3], reach)
-        return np.where(self.contains(x), distance, -distance)
+    def faces(self) -> np.ndarray:
+        return self.surface.corners
 
 
 class MeshSolid(Body):

@@ -1,15 +1,17 @@
-"""Computes of means, extremes and quantiles over points."""
+"""Computes of means, extremes and quantiles over points, and of a column at a place."""
 
 from collections.abc import Sequence
 from typing import Annotated
 
 import numpy as np
 
-from karamelo_py.language.signature import In
+from karamelo_py.language.signature import In, Positive
+from karamelo_py.output.columns import check_columns
 from karamelo_py.output.point_table import COMPONENTS, PointTable
 from karamelo_py.scene.group import AnyGroup, ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Compute
+from karamelo_py.script.errors import ScriptError
 
 
 class Mean(Compute):
@@ -18,13 +20,15 @@ class Mean(Compute):
     Without weight the mean is 0, as the sums of other computes.
     """
 
+    empty = 0.0
+
     def sums(self) -> Sequence[float]:
         return self.hub.fields.added_up(self)
 
     def refresh(self) -> None:
         weight, *totals = self.sums()
         for suffix, total in zip(self.published, totals, strict=False):
-            self.publish(suffix, total / weight if weight > 0 else 0.0)
+            self.publish(suffix, total / weight if weight > 0 else self.empty)
 
 
 class AverageVelocity(Mean):
@@ -246,3 +250,74 @@ def _bits(numbers: np.ndarray) -> np.ndarray:
 def _numbers(bits: np.ndarray) -> np.ndarray:
     """The numbers that have these bits."""
     return np.where(bits >> np.uint64(63) > 0, bits ^ SIGN, ~bits).view(float)
+
+
+class Probe(Mean):
+    """Measure a column of the points: its mean, or its value at a point or a place.
+
+    Published as the plain ID, or with several columns as ID_column each. Without points in the
+    group, and of a point that is not there any more, NaN.
+
+    Parameters
+    ----------
+    column, columns
+        Columns of dump particle. Their mean over the group counts points by their volume.
+    point
+        The id of a point, as dumps show it: its own values instead of the mean.
+    x, y, z
+        A place: the values of the point of the group that is now nearest to it.
+
+    Example
+    -------
+    compute(p, probe, bar, s11)
+    compute(tip, probe, all, y, vy, point=128)
+    compute(gauge, probe, water, s22, x=0.5, y=0)
+    log_modify(custom, time, p, tip_vy, gauge)
+    """
+
+    empty = np.nan
+
+    def __init__(
+        self,
+        hub: Hub,
+        group: ParticleGroup,
+        column: str,
+        *columns: str,
+        point: Annotated[int, Positive] | None = None,
+        x: float | None = None,
+        y: float | None = None,
+        z: float | None = None,
+    ):
+        super().__init__(hub, group if point is None else ParticleGroup(hub, everything=True))
+        self.columns = (column, *columns)
+        check_columns(self.columns, hub.fields.particle_names(), first=1)
+        self.point = point
+        self.at = {axis: c for axis, c in zip("xyz", (x, y, z), strict=True) if c is not None}
+        if point is not None and self.at:
+            raise ScriptError("a probe is at a point or at a place, not both", argument="point")
+        self.published = ("",) if len(self.columns) == 1 else self.columns
+
+    def refresh(self) -> None:
+        if self.point is None and not self.at:
+            super().refresh()
+            return
+        found = self.hub.fields.each(self, "nearest")
+        values = min(found)[2:] if found else [self.empty] * len(self.columns)
+        for end, value in zip(self.published, values, strict=True):
+            self.publish(end, value)
+
+    def terms(self, points: PointTable) -> list[np.ndarray]:
+        volume = points.particle("volume")
+        return [volume, *(volume * points.particle(name) for name in self.columns)]
+
+    def nearest(self, points: PointTable) -> list[float] | None:
+        """Distance, id and columns of the point that is asked for, or of the nearest of these."""
+        ids = points.particle("id")
+        if self.point is not None:
+            distance = np.where(ids == self.point, 0.0, np.inf)
+        else:
+            distance = sum((points.particle(axis) - c) ** 2 for axis, c in self.at.items())
+        if not len(ids) or not np.isfinite(least := distance.min()):
+            return None
+        at = min(np.flatnonzero(distance == least), key=ids.__getitem__)
+        return [least, *(float(points.particle(name)[at]) for name in ("id", *self.columns))]

@@ -38,9 +38,11 @@ def check_pair(solid1: Solid, solid2: Solid) -> None:
 class PairContact(Fix):
     """Base of the fixes by which the points of two solids push each other.
 
-    Of many processes the first looks for pairs among the points of all that may touch.
+    Of many processes the first looks for pairs among the points of all that may touch. The `law` is
+    the tag of :mod:`karamelo_py.points.pairs` that gives the force between two points.
     """
 
+    law: NamedTuple
     published = ("x", "y", "z")
     point_fields = (Force,)
     point_by_point = True
@@ -64,10 +66,6 @@ class PairContact(Fix):
         ranges = [(solid.first_id, solid.first_id + solid.count) for solid in self.solids]
         self._ranges = (*ranges[0], *ranges[1])
         self._reach = max(solid.h for solid in self.solids)
-
-    def law(self) -> NamedTuple:
-        """The tag of :mod:`karamelo_py.points.pairs` that gives the force between two points."""
-        raise NotImplementedError
 
     def initial_integrate(self, points: PointsView) -> None:
         """Find the pairs that touch and give the points their forces."""
@@ -129,7 +127,7 @@ class PairContact(Fix):
         _, mass, radius, *both = np.ascontiguousarray(of_all[order].T)
         x, v = (np.stack(part, axis=1) for part in (both[:d], both[d:]))
         bodies = pairs.TwoBodies(x, v, mass, radius, np.zeros((n, d)), n - int(second.sum()))
-        pairs.push_apart(self.law(), kin, bodies, pairs.cells_for(n), self._reach, dt, kick, total)
+        pairs.push_apart(self.law, kin, bodies, pairs.cells_for(n), self._reach, dt, kick, total)
         force = np.empty((n, d))
         force[order] = bodies.force
         ends = np.cumsum([len(one) for one in found])[:-1]
@@ -183,11 +181,8 @@ class ContactMinimizePenetration(PairContact):
         self, hub: Hub, solid1: Solid, solid2: Solid, mu: Annotated[float, NonNegative] = 0.0
     ):
         super().__init__(hub, solid1, solid2)
-        self.mu = float(mu)
-        judge_friction(hub, self.mu)
-
-    def law(self) -> NamedTuple:
-        return MinimizePenetration(self.mu)
+        self.law = MinimizePenetration(float(mu))
+        judge_friction(hub, mu)
 
 
 def plane_modulus(solid: Solid, argument: str) -> float:
@@ -239,10 +234,7 @@ class ContactHertz(PairContact):
                 expected="fix contact/minimize_penetration, or a scene in 3D",
             )
         moduli = (plane_modulus(solid1, "solid1"), plane_modulus(solid2, "solid2"))
-        self.modulus = 1 / sum(1 / modulus for modulus in moduli)
-
-    def law(self) -> NamedTuple:
-        return Hertz(self.modulus)
+        self.law = Hertz(1 / sum(1 / modulus for modulus in moduli))
 
 
 class ContactFriction(Fix):

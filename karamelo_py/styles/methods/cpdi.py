@@ -15,8 +15,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.methods.base import Method
-from karamelo_py.styles.methods.tlmpm import OwnGrids
-from karamelo_py.styles.methods.ulmpm import ULMPM
+from karamelo_py.styles.methods.ulmpm import ULMPM, OwnGrids
 
 VARIANTS = {"R4": R4, "Q4": Q4, "T3": T3, "R8": R8, "H8": H8, "Tet4": Tet4}
 
