@@ -17,7 +17,7 @@ _NAMES = ("xlo", "xhi", "ylo", "yhi", "zlo", "zhi")
 class PlanesAndRounds(region.Region):
     """Base of what lies between planes across some axes, and near a centre or an axis."""
 
-    slabs: Sequence[tuple[int, float, float]] = ()  # axis, lower and upper end of each
+    slabs: Sequence[tuple] = ()  # axis, lower and upper end of each
     across: Sequence[int] = ()  # the axes along which it is round, with a centre and a radius
 
     def contains(self, x: np.ndarray) -> np.ndarray:

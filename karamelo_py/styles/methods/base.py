@@ -119,7 +119,21 @@ class Method:
 
     def shapes(self, kin: Any, solid: Solid) -> np.ndarray:
         """Return the shapes of the domains of a solid's points, (n, s), as the basis keeps them."""
-        return initial_shape(type(self.basis), solid)
+        basis, half = type(self.basis), solid.half_size
+        n, d = half.shape
+        unit = np.eye(d)
+        parts = [np.empty((n, 0))]
+        for part in getattr(basis, "shape", ()):
+            if part == "corners":
+                corners = _corners(basis.element, solid)
+                parts.append(corners.reshape(n, corners.shape[1] * d))
+            elif part == "half_edges":
+                parts.append((half[:, :, None] * unit).reshape(n, d * d))
+            elif part == "deformation":
+                parts.append(np.tile(unit.ravel(), (n, 1)))
+            else:
+                parts.append(getattr(solid, part))
+        return np.concatenate(parts, axis=1)
 
     def _lattice(
         self, dimension: int, lo: Sequence[float], hi: Sequence[float], h: float
@@ -139,25 +153,6 @@ class Method:
                 "mass",
                 hint="scheme(musl), or quadratic-spline in the place of the basis, or method tlmpm",
             )
-
-
-def initial_shape(basis: type, solid: Solid) -> np.ndarray:
-    """Return the shapes of the domains of a solid's points, (n, s), as `basis` keeps them."""
-    half = solid.half_size
-    n, d = half.shape
-    unit = np.eye(d)
-    parts = [np.empty((n, 0))]
-    for part in getattr(basis, "shape", ()):
-        if part == "corners":
-            corners = _corners(basis.element, solid)
-            parts.append(corners.reshape(n, corners.shape[1] * d))
-        elif part == "half_edges":
-            parts.append((half[:, :, None] * unit).reshape(n, d * d))
-        elif part == "deformation":
-            parts.append(np.tile(unit.ravel(), (n, 1)))
-        else:
-            parts.append(getattr(solid, part))
-    return np.concatenate(parts, axis=1)
 
 
 def _corners(element: Element, solid: Solid) -> np.ndarray:

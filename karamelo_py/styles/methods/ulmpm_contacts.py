@@ -58,11 +58,6 @@ def _around(lattice: Lattice, cells: np.ndarray, steps: range) -> np.ndarray:
     return lattice.first + np.unique(np.concatenate(found))
 
 
-def prescribing(hub: Hub) -> list[Fix]:
-    """Fixes that prescribe the velocity of nodes."""
-    return [fix for fix in hub.fixes.values() if fix.prescribes_velocity]
-
-
 class ULMPMContacts(Method):
     """Updated Lagrangian MPM with contact: each solid has a velocity field of its own on the grid.
 
@@ -113,6 +108,7 @@ class ULMPMContacts(Method):
     """
 
     fields_per_solid = True
+    _prescribed: np.ndarray | None = None
 
     def lattices(self, hub: Hub) -> list[Lattice]:
         domain = hub.domain
@@ -187,9 +183,19 @@ class ULMPMContacts(Method):
         for (a, b), fix in self._rubbing(hub):
             contact.friction[a, b] = contact.friction[b, a] = fix.friction
             contact.pair[a, b] = hub.values.slot(f"{fix.id}_x")
-        self._prescribe(hub, contact.prescribed)
-        slots = [hub.values.slot(f"{fix.id}_x") for fix in prescribing(hub)]
+        fixes = [fix for fix in hub.fixes.values() if fix.prescribes_velocity]
+        slots = [hub.values.slot(f"{fix.id}_x") for fix in fixes]
         contact.reactions[: 1 + len(slots)] = [len(slots), *slots]
+        # Pages that nothing is written to cost no memory.
+        prescribed = contact.prescribed
+        if self._prescribed is prescribed:
+            prescribed[:] = 0
+        self._prescribed = prescribed if fixes else None
+        for fix, slot in zip(fixes, slots, strict=True):
+            nodes = slice(None) if fix.group.all else fix.nodes
+            for k, formula in enumerate(fix.formulas):
+                if formula is not None:
+                    prescribed[nodes, k] = 1 + slot
 
     def remembered(self, contact: NamedTuple, spans: np.ndarray) -> list[np.ndarray]:
         """Return views of the record of last contact: usf and usavg need it when a step starts."""
@@ -230,18 +236,3 @@ class ULMPMContacts(Method):
             if fix.friction is not None:
                 first, second = fix.solids
                 yield (of[first.index], of[second.index]), fix
-
-    def _prescribe(self, hub: Hub, prescribed: np.ndarray) -> None:
-        """Note the nodes whose velocity fixes prescribe, and where each reaction is published."""
-        fixes = prescribing(hub)
-        # Pages that nothing is written to cost no memory.
-        if self._prescribed is prescribed:
-            prescribed[:] = 0
-        self._prescribed = prescribed if fixes else None
-        for fix in fixes:
-            nodes = slice(None) if fix.group.all else fix.nodes
-            for k, formula in enumerate(fix.formulas):
-                if formula is not None:
-                    prescribed[nodes, k] = 1 + hub.values.slot(f"{fix.id}_x")
-
-    _prescribed: np.ndarray | None = None
