@@ -20,7 +20,7 @@ from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.meshes import STL, MeshRegion
 from karamelo_py.styles.methods.base import Method
 from karamelo_py.styles.methods.cpdi import ULCPDI
-from karamelo_py.styles.methods.ulmpm import OwnGrids
+from karamelo_py.styles.methods.ulmpm import TLMPM
 from karamelo_py.styles.regions import (
     BlockRegion,
     Cylinder,
@@ -403,7 +403,7 @@ def test_axisymmetric_volumes_are_times_the_radius():
 
 def own_grids(hub, **attributes):
     """Let the method lay a grid for each solid, as total Lagrangian ones do."""
-    hub.use(OwnGrids, Linear())
+    hub.use(TLMPM, Linear())
     hub.update.method.__dict__.update(attributes)
     return hub
 

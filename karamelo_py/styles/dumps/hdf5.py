@@ -3,7 +3,6 @@
 import os
 import re
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -67,13 +66,18 @@ class Hdf5Dump(TableDump):
 
     def _go_on(self, path: Path, k: int, snapshot: SnapshotRows) -> None:
         """Write snapshot `k` into a file, after those before it."""
-        with _reported(path), _opened_to_append(path) as root:
-            try:
-                self._append(root, k, snapshot)
-            except BaseException:
-                for name in ("time", "step", *self.columns):
-                    root[name].resize(k, axis=0)
-                raise
+        try:
+            with _opened_to_append(path) as root:
+                try:
+                    self._append(root, k, snapshot)
+                except BaseException:
+                    for name in ("time", "step", *self.columns):
+                        root[name].resize(k, axis=0)
+                    raise
+        except (OSError, RuntimeError) as error:  # of HDF5: told in the words of the system
+            reason = re.search("error message = '([^']*)'", str(error))
+            what = reason[1] if reason else str(error).splitlines()[0]
+            raise ScriptError(f"cannot write {path}: {what}") from error
 
     def resumed(self) -> None:
         """Go on in the file of an earlier run, with the snapshots that it had then.
@@ -182,17 +186,6 @@ class Hdf5Dump(TableDump):
                 for name, column in zip(self.columns, table.columns, strict=True):
                     row[rows] = column[here]
                     root[name][k, own] = row
-
-
-@contextmanager
-def _reported(path: Path) -> Iterator[None]:
-    """Turn what HDF5 says against writing `path` into a ScriptError, in the words of the system."""
-    try:
-        yield
-    except (OSError, RuntimeError) as error:
-        reason = re.search("error message = '([^']*)'", str(error))
-        what = reason[1] if reason else str(error).splitlines()[0]
-        raise ScriptError(f"cannot write {path}: {what}") from error
 
 
 def _opened_to_append(path: Path) -> Any:

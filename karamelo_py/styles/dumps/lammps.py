@@ -4,8 +4,8 @@ import gzip
 import struct
 import zlib
 from collections.abc import Iterator
-from pathlib import Path
-from typing import Any, BinaryIO
+from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -47,10 +47,9 @@ class LammpsDump(TableDump):
     _end = 0
     _length = 0
     _encoder: Any = None
-
-    def encoder(self) -> Any:
-        """Make the encoder of the text of a new file."""
-        return Plain()
+    # Makes the encoder of a new file, and opens the text of one.
+    encoder: Any = Plain
+    opened: Any = staticmethod(partial(open, mode="rb"))
 
     def write(self) -> None:
         """Write one snapshot: to a file of its own, or after those before it."""
@@ -90,10 +89,6 @@ class LammpsDump(TableDump):
         with self.opened(path) as file:
             for begin in range(0, self._length, PIECE):
                 self._encoder.compress(file.read(min(PIECE, self._length - begin)))
-
-    @staticmethod
-    def opened(path: Path) -> BinaryIO:
-        return path.open("rb")
 
     def _snapshot(self) -> Iterator[bytes]:
         """Write the text of the present state, piece by piece."""
@@ -141,9 +136,7 @@ class Gzipped:
         """Make a gzip stream without name and date, so that the same run gives the same bytes."""
         return zlib.compressobj(COMPRESSION, zlib.DEFLATED, 16 + zlib.MAX_WBITS)
 
-    @staticmethod
-    def opened(path: Path) -> BinaryIO:
-        return gzip.open(path)
+    opened = staticmethod(gzip.open)
 
 
 class BinaryRows:

@@ -71,6 +71,9 @@ class PyPlot(Dump):
     dump movie
     """
 
+    remembers = carries = ("seen",)
+    format_of = staticmethod(picture_format)
+
     def __init__(
         self,
         hub: Hub,
@@ -91,7 +94,7 @@ class PyPlot(Dump):
         if field is not None:
             check_columns([field], hub.fields.particle_names(), first=4)
         super().__init__(hub, every, file, *([] if field is None else [field]))
-        self.format = self.check_format()
+        self.format = self.format_of(self.file)
         self.size = (_inches("width", width), _inches("height", height))
         if field is not None:
             self.warn_of_absent([field], hub.fields.absent_at_points(), "points")
@@ -109,8 +112,6 @@ class PyPlot(Dump):
         self._picture: Any = None
         self._limits: tuple[float, float] | None = None
 
-    remembers = carries = ("seen",)
-
     @property
     def seen(self) -> tuple[Any, ...]:
         """Limits of the field so far, and what they are those of."""
@@ -124,9 +125,6 @@ class PyPlot(Dump):
             self._limits = limits
             if self._picture is not None:
                 self._picture.begin_with(limits)
-
-    def check_format(self) -> str:
-        return picture_format(self.file)
 
     def write(self) -> None:
         with unwarned():
@@ -263,13 +261,11 @@ class Movie(PyPlot):
     """
 
     remembers = ("frames",)
+    format_of = staticmethod(movie_format)
 
     @cached_property
     def frames(self) -> Frames:
         return Frames(FRAMES_PER_SECOND)
-
-    def check_format(self) -> str:
-        return movie_format(self.file)
 
     def write(self) -> None:
         self.frames.add(self.draw)

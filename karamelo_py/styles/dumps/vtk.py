@@ -65,20 +65,16 @@ class VtkDump(TableDump):
             self.complete(vtu, kept)
             vtu.write(file)
         self._series.append((self.hub.update.time, path.name))
+        rows = [f'<DataSet timestep="{t:.16g}" file={quoteattr(n)}/>\n' for t, n in self._series]
+        head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n<Collection>\n'
         with whole(self.index) as file:
-            file.write(_collection(self._series))
+            file.write((head + "".join(rows) + "</Collection>\n</VTKFile>\n").encode())
 
     def connect(self, vtu: Vtu, ids: np.ndarray, kept: list[np.ndarray]) -> None:
         """Add what is drawn of the last points, or keep what is needed for it."""
 
     def complete(self, vtu: Vtu, kept: list[np.ndarray]) -> None:
         """Add what is drawn between all points."""
-
-
-def _collection(series: list[tuple[float, str]]) -> bytes:
-    rows = [f'<DataSet timestep="{t:.16g}" file={quoteattr(name)}/>\n' for t, name in series]
-    head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n<Collection>\n'
-    return (head + "".join(rows) + "</Collection>\n</VTKFile>\n").encode()
 
 
 class Vtk(OfPoints, VtkDump):

@@ -9,13 +9,12 @@ from karamelo_py.points.basis.cpdi.hexahedron import H8
 from karamelo_py.points.basis.cpdi.parallel import R4, R8
 from karamelo_py.points.basis.cpdi.quadrilateral import Q4
 from karamelo_py.points.basis.cpdi.simplex import T3, Tet4
-from karamelo_py.points.frames import Total
 from karamelo_py.points.transfers.asflip import ASFLIP
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.methods.base import Method
-from karamelo_py.styles.methods.ulmpm import ULMPM, OwnGrids
+from karamelo_py.styles.methods.ulmpm import TLMPM, ULMPM
 
 VARIANTS = {"R4": R4, "Q4": Q4, "T3": T3, "R8": R8, "H8": H8, "Tet4": Tet4}
 
@@ -119,7 +118,7 @@ class ULCPDI(Convected, ULMPM):
     """
 
 
-class TLCPDI(Convected, OwnGrids):
+class TLCPDI(Convected, TLMPM):
     """Total Lagrangian CPDI: the initial domain of every point on a grid of its solid's own.
 
     Domains keep their initial shape, so that none tangles; weights never change. Solids do not see
@@ -134,5 +133,3 @@ class TLCPDI(Convected, OwnGrids):
     -------
     method(tlcpdi, FLIP, linear, 1, Q4)
     """
-
-    frame = Total()

@@ -47,9 +47,21 @@ class ULMPM(Method):
         return RigidBodies(force=force, torque=torque, slots=slots[slots >= 0])
 
 
-class OwnGrids(Method):
-    """A grid of its own for every solid."""
+class TLMPM(Method):
+    """Total Lagrangian MPM: weights belong to reference positions, each solid has its own grid.
 
+    Weights never change: no point crosses a cell face, and a body breaks only where its law says
+    so. Solids do not see each other on the grid: contact is a matter of fixes (contact/hertz,
+    contact/minimize_penetration). For bodies that keep their topology (de Vaucorbeil, Nguyen &
+    Hutchinson 2020, "A Total-Lagrangian material point method for solid mechanics problems
+    involving large deformations").
+
+    Example
+    -------
+    method(tlmpm, FLIP, linear, 0.99)
+    """
+
+    frame = Total()
     own_grids = True
     remembers = ("warned",)
     warned = False
@@ -72,20 +84,3 @@ class OwnGrids(Method):
 
     def lattice_of(self, hub: Hub, solid: Solid) -> int:
         return solid.index
-
-
-class TLMPM(OwnGrids):
-    """Total Lagrangian MPM: weights belong to reference positions, each solid has its own grid.
-
-    Weights never change: no point crosses a cell face, and a body breaks only where its law says
-    so. Solids do not see each other on the grid: contact is a matter of fixes (contact/hertz,
-    contact/minimize_penetration). For bodies that keep their topology (de Vaucorbeil, Nguyen &
-    Hutchinson 2020, "A Total-Lagrangian material point method for solid mechanics problems
-    involving large deformations").
-
-    Example
-    -------
-    method(tlmpm, FLIP, linear, 0.99)
-    """
-
-    frame = Total()
