@@ -293,7 +293,8 @@ class _Call:
         by_name: bool = False,
     ) -> str:
         """The same call with another kind or basis, what it lacks, and `option` at the end."""
-        asked = [p for f in FAMILIES if f in self.styles for p in _numbers(self.styles[f])]
+        styles = [self.styles[family] for family in FAMILIES if family in self.styles]
+        asked = [p for s in styles for p in signature.parameters(s) if not p.kind.words]
         typed = [argument.text for argument in self.options if self._is_number(argument)]
         lacking = [p for p in asked[len(typed) :] if not p.optional]
         known = self._words("method", "transfer")
@@ -351,10 +352,6 @@ class _Call:
 def _variants(style: type) -> Mapping[str, Any]:
     """Words that choose another class (or style, by its name) in the place of a style."""
     return getattr(style, "variants", {})
-
-
-def _numbers(style: type) -> list[Parameter]:
-    return [p for p in signature.parameters(style) if not p.kind.words]
 
 
 def _word(argument: Argument, known: Container[str]) -> str | None:

@@ -14,8 +14,8 @@ from karamelo_py.scene.hub import Hub
 _NAMES = ("xlo", "xhi", "ylo", "yhi", "zlo", "zhi")
 
 
-class PlanesAndRounds(region.Region):
-    """Base of what lies between planes across some axes, and near a centre or an axis."""
+class Primitive(region.Region):
+    """Base of block, cylinder and sphere: between planes across some axes, round along others."""
 
     slabs: Sequence[tuple] = ()  # axis, lower and upper end of each
     across: Sequence[int] = ()  # the axes along which it is round, with a centre and a radius
@@ -43,7 +43,7 @@ class PlanesAndRounds(region.Region):
         return depth
 
 
-class BlockRegion(PlanesAndRounds):
+class BlockRegion(Primitive):
     """A box with faces along the axes; its faces belong to it.
 
     Parameters
@@ -84,7 +84,7 @@ class BlockRegion(PlanesAndRounds):
         super().__init__(hub, ends[::2], ends[1::2], exterior=exterior)
 
 
-class Cylinder(PlanesAndRounds):
+class Cylinder(Primitive):
     """A disk in 2D, a cylinder along one of the axes in 3D; its surface belongs to it.
 
     Parameters
@@ -137,7 +137,7 @@ class Cylinder(PlanesAndRounds):
         super().__init__(hub, lo, hi, exterior=exterior)
 
 
-class Sphere(PlanesAndRounds):
+class Sphere(Primitive):
     """A sphere in 3D, a disk in 2D, an interval in 1D; its surface belongs to it.
 
     Parameters

@@ -13,7 +13,7 @@ from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.formulas import judge_friction, per_direction
 from karamelo_py.styles.fixes.tools import (
-    PointForceFix,
+    ToolFix,
     apart,
     face_of,
     rubbed,
@@ -42,7 +42,7 @@ class Radius(Expression):
         return radius
 
 
-class Indent(PointForceFix):
+class Indent(ToolFix):
     """Push points out of a ball (in the plane a disk) with a force that grows as depth squared.
 
     Parameters
@@ -99,7 +99,7 @@ class Indent(PointForceFix):
         return size[:, None] * away
 
 
-class IndentMinimizePenetration(PointForceFix):
+class IndentMinimizePenetration(ToolFix):
     """Press a rigid ball (in the plane a disk) into points, as stiffly as the step allows.
 
     Parameters
@@ -168,7 +168,7 @@ class IndentMinimizePenetration(PointForceFix):
         return push + rubbed(points, push, normal, self.now(self.velocity), self.mu)
 
 
-class CuttingTool(PointForceFix):
+class CuttingTool(ToolFix):
     """Push points out of the tip of a rigid tool, in the plane.
 
     Parameters
@@ -244,7 +244,7 @@ class CuttingTool(PointForceFix):
         return (K * stiffness_of(self.hub, points) * depth)[:, None] * normals[nearer]
 
 
-class MeldTool(PointForceFix):
+class MeldTool(ToolFix):
     """Push points out of the tool of additive friction stir deposition, in space.
 
     Parameters

@@ -17,7 +17,7 @@ from karamelo_py.styles.fixes.forces import PointForces
 from karamelo_py.styles.fixes.formulas import judge_friction, per_direction, vector
 
 
-class PointForceFix(PointForces):
+class ToolFix(PointForces):
     """Base of fixes that push points, which they take for small cubes (in the plane squares)."""
 
     needs_stiffness = False  # whether the force goes with the shear modulus of the point
@@ -136,7 +136,7 @@ class NeumannBcMech(PointForces):
         return face[:, None] * vector(self.traction, self.hub, x, lambda: points.reference_position)
 
 
-class ImpenetrableSurface(PointForceFix):
+class ImpenetrableSurface(ToolFix):
     """Push points back that come behind a plane, with a force that grows with the depth.
 
     Parameters
@@ -192,7 +192,7 @@ class ImpenetrableSurface(PointForceFix):
         return (K * stiffness * depth * side)[:, None] * normal
 
 
-class ContactMinimizePenetrationPlane(PointForceFix):
+class ContactMinimizePenetrationPlane(ToolFix):
     """Let a solid touch a fixed plane, as stiffly as the step allows, with friction.
 
     Parameters
