@@ -187,7 +187,7 @@ class ULMPMContacts(Method):
         slots = [hub.values.slot(f"{fix.id}_x") for fix in fixes]
         contact.reactions[: 1 + len(slots)] = [len(slots), *slots]
         # Pages that nothing is written to cost no memory.
-        prescribed = contact.prescribed
+        prescribed: np.ndarray = contact.prescribed
         if self._prescribed is prescribed:
             prescribed[:] = 0
         self._prescribed = prescribed if fixes else None
