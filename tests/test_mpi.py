@@ -378,7 +378,7 @@ import re
 from karamelo_py.run import simulation
 from karamelo_py.run.mpi import partition
 from karamelo_py.run.tiles import tiles
-from karamelo_py.styles.computes import linear_momentum
+from karamelo_py.styles.computes import conserved
 tiles.DIRECT_UP_TO = 0
 if os.environ.get("OMPI_COMM_WORLD_RANK") == "1":
     def out_of_memory(*_):
@@ -394,7 +394,7 @@ if os.environ.get("OMPI_COMM_WORLD_RANK") == "1":
     [
         pytest.param("simulation.Simulation._advance", marks=FULL),
         "partition.SharedTiles.give",
-        "linear_momentum.LinearMomentum.terms",
+        "conserved.LinearMomentum.terms",
     ],
 )
 def test_only_one_fails(tmp_path, function):

@@ -13,14 +13,15 @@ from karamelo_py.commands import domain as commands
 from karamelo_py.scene.domain import Domain
 from karamelo_py.scene.lattice import Lattice
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.styles.regions.block import BlockRegion
-from karamelo_py.styles.regions.cylinder import Cylinder
-from karamelo_py.styles.regions.difference import Difference
-from karamelo_py.styles.regions.intersection import Intersection
-from karamelo_py.styles.regions.mesh import MeshRegion
-from karamelo_py.styles.regions.sphere import Sphere
-from karamelo_py.styles.regions.stl import STL
-from karamelo_py.styles.regions.union import Union
+from karamelo_py.styles.meshes import STL, MeshRegion
+from karamelo_py.styles.regions import (
+    BlockRegion,
+    Cylinder,
+    Difference,
+    Intersection,
+    Sphere,
+    Union,
+)
 
 
 def empty_hub():

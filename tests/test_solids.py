@@ -10,23 +10,25 @@ from hypothesis import given
 from hypothesis import strategies as st
 from meshed import cube_surface, write
 
-from karamelo_py.commands import solids as commands
+from karamelo_py.commands import domain as commands
 from karamelo_py.points.basis.cpdi.parallel import R4
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.basis.ugimp import UGIMP
 from karamelo_py.scene.placement import cell_pattern
 from karamelo_py.scene.region import Region
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.styles.methods.base import Method, OwnGrids
-from karamelo_py.styles.methods.ulcpdi import ULCPDI
-from karamelo_py.styles.regions.block import BlockRegion
-from karamelo_py.styles.regions.cylinder import Cylinder
-from karamelo_py.styles.regions.difference import Difference
-from karamelo_py.styles.regions.intersection import Intersection
-from karamelo_py.styles.regions.mesh import MeshRegion
-from karamelo_py.styles.regions.sphere import Sphere
-from karamelo_py.styles.regions.stl import STL
-from karamelo_py.styles.regions.union import Union
+from karamelo_py.styles.meshes import STL, MeshRegion
+from karamelo_py.styles.methods.base import Method
+from karamelo_py.styles.methods.cpdi import ULCPDI
+from karamelo_py.styles.methods.ulmpm import TLMPM
+from karamelo_py.styles.regions import (
+    BlockRegion,
+    Cylinder,
+    Difference,
+    Intersection,
+    Sphere,
+    Union,
+)
 
 
 def whole(hub, ID="whole"):
@@ -401,7 +403,7 @@ def test_axisymmetric_volumes_are_times_the_radius():
 
 def own_grids(hub, **attributes):
     """Let the method lay a grid for each solid, as total Lagrangian ones do."""
-    hub.use(OwnGrids, Linear())
+    hub.use(TLMPM, Linear())
     hub.update.method.__dict__.update(attributes)
     return hub
 

@@ -11,7 +11,7 @@ from test_scene_script import message
 
 from karamelo_py.scene.meshes.inside import Surface
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.styles.regions.stl import STL
+from karamelo_py.styles.meshes import STL
 
 
 @pytest.fixture(params=[True, False], ids=["binary", "text"])

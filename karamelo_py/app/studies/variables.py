@@ -15,8 +15,7 @@ from karamelo_py.output.quantity import KEYWORDS
 from karamelo_py.script.errors import ScriptError, meant, nearest, plural
 from karamelo_py.script.evaluation import evaluate
 from karamelo_py.script.functions import CONSTANTS
-from karamelo_py.script.parser import parse, parse_text
-from karamelo_py.script.reading import scripts_in
+from karamelo_py.script.parser import parse, parse_text, scripts_in
 from karamelo_py.script.syntax import Assignment, CommandCall
 from karamelo_py.script.terms import number_of
 

@@ -1,4 +1,4 @@
-"""Solid style region."""
+"""Solid style region, and the base of solids."""
 
 from functools import partial
 from typing import Annotated, Literal
@@ -14,7 +14,24 @@ from karamelo_py.scene.solid import Solid, own_grids
 from karamelo_py.script.errors import ScriptError
 
 
-class RegionSolid(Solid):
+class Body(Solid):
+    """Base of solids.
+
+    Parameters
+    ----------
+    material
+        What the points are made of.
+    h
+        Cell size. With a grid shared by all solids (ulmpm) it must be that of the domain.
+    T0
+        Initial temperature; that of the material when left out.
+    GlueToSolid
+        A solid that came before, whose velocity field this one shares, in methods where each
+        solid has its own.
+    """
+
+
+class RegionSolid(Body):
     """A body that fills a region, with `ppc` points per cell and direction.
 
     Points are put into the cells of the grid and kept where they lie in the region and in the
@@ -27,12 +44,6 @@ class RegionSolid(Solid):
         The region to fill.
     ppc
         Points per cell in each direction: 2 gives 4 points per cell in 2D, 8 in 3D.
-    material
-        What the points are made of.
-    h
-        Cell size. With a grid shared by all solids (ulmpm) it must be that of the domain.
-    T0
-        Initial temperature; that of the material when left out.
     points
         ``regular``: at equal distances. ``gauss``: at the Gauss points of the cell, whose weights
         share out the volume. Left out: at equal distances with equal volumes, but for ``ppc`` 3,
@@ -49,9 +60,6 @@ class RegionSolid(Solid):
         points are squares or cubes of the right volume, which do not tile the body at its edge;
         cpdi refuses them. For edge_pressure and edge_traction points are whole boxes: they refuse
         these.
-    GlueToSolid
-        A solid that came before, whose velocity field this one shares, in methods where each
-        solid has its own.
 
     Example
     -------
@@ -109,18 +117,15 @@ class RegionSolid(Solid):
             )
 
     def described(self) -> str:
-        """See `Solid.described`."""
         return f"region '{self.region.id}'"
 
     def why_empty(self) -> str:
-        """See `Solid.why_empty`."""
         used = slice(0, self.domain.dimension)
         if (self.region.box_lo > self.region.box_hi)[used].any():
             return f"{self.described()} is empty"
         return f"no point lies in {self.described()}"
 
     def wanted(self) -> str:
-        """See `Solid.wanted`."""
         return (
             f"a region that holds points of the grid with cell size {self.h:g} and "
             f"{self.ppc} per cell and direction, inside the domain"
