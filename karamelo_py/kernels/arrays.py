@@ -12,6 +12,7 @@ import numpy as np
 
 from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.fields import as_rows_of_points, name_of, some_points
+from karamelo_py.compiler.loops import noinline
 from karamelo_py.compiler.tuples import row
 from karamelo_py.kernels.totals import LIMBS, Alone
 from karamelo_py.points.grid import Grid
@@ -392,3 +393,15 @@ def with_nodes(s, nodes, buffers):
     others = {"nodes": nodes, "buffers": buffers}
     items = zip(s._fields, s, strict=True)
     return type(s)(*(others.get(name, item) for name, item in items))
+
+
+@noinline
+def first_from(ascending, begin, end, x):
+    """The first place of these whose number is not below `x`; NumPy's search compiles for 0.4 s."""
+    while begin < end:
+        middle = (begin + end) // 2
+        if ascending[middle] < x:
+            begin = middle + 1
+        else:
+            end = middle
+    return begin

@@ -17,6 +17,7 @@ node sees (`karamelo_py.points.basis.surface`). Bodies may approach until the ga
 stopped where it would be less than nothing at the end of the step.
 """
 
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -25,14 +26,195 @@ from karamelo_py.compiler.compile import point_function
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.loops import kernel, noinline
 from karamelo_py.compiler.tuples import record
-from karamelo_py.kernels import contact_pairs
 from karamelo_py.kernels.arrays import DT, MASS, TIMESTEP, of_change, of_momentum
 from karamelo_py.kernels.loss import FrictionalHeat, warm_node
 from karamelo_py.kernels.p2g import Centre, Normal
-from karamelo_py.kernels.rows import touch, touch_velocity
+from karamelo_py.kernels.table import touch, touch_velocity
 from karamelo_py.kernels.totals import add_to, counts, publish
+from karamelo_py.points.basis.surface import ENTRIES
 from karamelo_py.points.grid import node_position
 from karamelo_py.points.kinematics import dimension
+
+
+class Where(NamedTuple):
+    """A place where fields meet, and the length of the step."""
+
+    x: tuple  # position of the node
+    h: float
+    dt: float
+
+
+class NodePair(NamedTuple):
+    """Two bodies at a place: a node of each, mass and share in the common normal."""
+
+    n: int
+    m: int
+    per_a: float  # 1 / mass
+    per_b: float
+    share_a: float
+    share_b: float
+
+
+@noinline
+def immovable(contact, n, k):
+    """Return True if contact cannot move a node in direction k."""
+    return contact.prescribed[n, k] != 0 or contact.rigid[n // contact.stride]
+
+
+@noinline
+def _shares(contact, d, nodes, n, m):
+    """Weights of the two bodies' outward sums in their common normal.
+
+    The sum of m grad N points out of a body. Where a body has little mass or ends in an edge it
+    says little about the direction: the larger sum decides (after Lemiale, Nairn & Hurmane 2010),
+    equal ones are averaged. A body with a prescribed velocity knows its surface best.
+    """
+    normal = field(nodes.fields, Normal)
+    of_n = 0.0
+    of_m = 0.0
+    prescribed_n = False
+    prescribed_m = False
+    for k in range(d):
+        of_n += normal[n, k] * normal[n, k]
+        of_m += normal[m, k] * normal[m, k]
+        prescribed_n = prescribed_n or immovable(contact, n, k)
+        prescribed_m = prescribed_m or immovable(contact, m, k)
+    if not of_n + of_m > 0:
+        return 0.0, 0.0
+    if prescribed_n != prescribed_m and (of_n if prescribed_n else of_m) > 0:
+        return (1.0, 0.0) if prescribed_n else (0.0, 1.0)
+    share = of_n / (of_n + of_m)
+    return share**4, (1 - share) ** 4
+
+
+@noinline
+def pair_of(contact, d, nodes, n, m):
+    per_a, per_b = 1.0 / nodes.sums[n, MASS], 1.0 / nodes.sums[m, MASS]
+    share_a, share_b = _shares(contact, d, nodes, n, m)
+    return NodePair(n, m, per_a, per_b, share_a, share_b)
+
+
+@noinline
+def yielding_of(contact, pair, k):
+    """Change of the relative velocity with an impulse along direction k."""
+    of_n = 0.0 if immovable(contact, pair.n, k) else pair.per_a
+    of_m = 0.0 if immovable(contact, pair.m, k) else pair.per_b
+    return of_n + of_m
+
+
+@noinline
+def outward_of(nodes, pair, k):
+    """Component k of the common normal, not normalised, from the first body to the second."""
+    normal = field(nodes.fields, Normal)
+    return pair.share_a * normal[pair.n, k] - pair.share_b * normal[pair.m, k]
+
+
+@noinline
+def _left(contact, nodes, pair, k, push):
+    """Component of the relative velocity once the impulse `push` m grad N has been given."""
+    along = push * outward_of(nodes, pair, k)
+    relative = nodes.update[pair.n, k] - nodes.update[pair.m, k]
+    return relative - along * yielding_of(contact, pair, k)
+
+
+@noinline
+def approach_left(contact, d, nodes, pair, push, size):
+    """Return the rest of the approach velocity after `push`, over the length of m grad N.
+
+    Friction does not act on it: bodies that are still apart come together freely.
+    """
+    across = 0.0
+    for k in range(d):
+        across += outward_of(nodes, pair, k) * _left(contact, nodes, pair, k, push)
+    return across / (size * size)
+
+
+@noinline
+def slide_of(contact, nodes, pair, k, push, across):
+    """Component of the relative velocity along the surface, once `push` has been given."""
+    return _left(contact, nodes, pair, k, push) - across * outward_of(nodes, pair, k)
+
+
+@noinline
+def length_of(d, nodes, pair):
+    """Length of the common normal."""
+    size = 0.0
+    for k in range(d):
+        normal = outward_of(nodes, pair, k)
+        size += normal * normal
+    return sqrt(size)
+
+
+@noinline
+def _reach(contact, d, nodes, pair, n, where, side):
+    """Return the distance from node `n` to the surface of its body, along the normal out of it.
+
+    `side` is 1 for the first body of the pair and -1 for the second.
+    """
+    centre = field(nodes.fields, Centre)
+    mean = 0.0
+    for k in range(d):
+        place = centre[n, k] / nodes.sums[n, MASS] - where.x[k]
+        mean += side * outward_of(nodes, pair, k) * place
+    table = contact.surface[n // contact.stride]
+    row = (mean / (length_of(d, nodes, pair) * where.h) + 3) * ENTRIES
+    low = min(max(int(row), 0), table.size - 2)
+    share = min(max(row - low, 0.0), 1.0)
+    return where.h * (table[low] + share * (table[low + 1] - table[low]))
+
+
+@noinline
+def excess_of(contact, d, nodes, pair, where):
+    """Return the excess of the approach velocity over the one that closes the gap in a step."""
+    size = length_of(d, nodes, pair)
+    if not size > 0:
+        return 0.0
+    approach = 0.0
+    for k in range(d):
+        normal = outward_of(nodes, pair, k)
+        approach += normal * (nodes.update[pair.n, k] - nodes.update[pair.m, k])
+    if not approach > 0:
+        return 0.0
+    gap = -_reach(contact, d, nodes, pair, pair.n, where, 1)
+    gap -= _reach(contact, d, nodes, pair, pair.m, where, -1)
+    return approach / size - max(gap, 0.0) / where.dt
+
+
+@noinline
+def compliance_of(contact, d, nodes, pair, size):
+    """Change of the relative velocity along the normal, of length `size`, with an impulse."""
+    compliance = 0.0
+    for k in range(d):
+        normal = outward_of(nodes, pair, k) / size
+        compliance += normal * normal * yielding_of(contact, pair, k)
+    return compliance
+
+
+@noinline
+def friction_of(contact, d, nodes, pair, friction, push, size, across, share):
+    """Impulse along the surface over the speed of sliding, and whether it stops all sliding."""
+    compliance = 0.0
+    slip = 0.0
+    for k in range(d):
+        slide = slide_of(contact, nodes, pair, k, push / size, across)
+        slip += slide * slide
+        compliance += slide * slide * yielding_of(contact, pair, k)
+    if not compliance > 0:
+        return 0.0, False
+    slip = sqrt(slip)
+    stop = share * slip * slip * slip / compliance
+    return min(stop, friction * push) / slip, stop <= friction * push
+
+
+@noinline
+def work_of_friction(contact, d, nodes, pair, push, across, rub):
+    """Return the energy that friction dissipates: impulse times mean of the sliding speeds."""
+    work = 0.0
+    for k in range(d):
+        slide = slide_of(contact, nodes, pair, k, push, across)
+        work += rub * slide * slide * (1.0 - 0.5 * rub * yielding_of(contact, pair, k))
+    return work
+
 
 REPEATS = 16  # at most, where more than two fields meet; what remains falls by a half or more
 
@@ -66,7 +248,7 @@ class SeparateFields(NamedTuple):
 def _take(contact, control, a, i, n, k, impulse, per_mass, x):
     """A node takes a component of an impulse; a fix that prescribes its velocity takes it over."""
     slot = contact.prescribed[n, k]
-    if not contact_pairs.immovable(contact, n, k):
+    if not immovable(contact, n, k):
         contact.change[i, k] += impulse * per_mass
     if not counts(control.ranks, n):
         return
@@ -115,7 +297,7 @@ def _clear_change(contact, d, count):
 class Approaching(NamedTuple):
     """Pairs of bodies that approach each other further than they may."""
 
-    where: contact_pairs.Where
+    where: Where
 
 
 class Touched(NamedTuple):
@@ -132,8 +314,8 @@ def _belongs(which, contact, d, nodes, n, m, b):
 @_belongs.on(Approaching)
 def _belongs_approaching(which, contact, d, nodes, n, m, b):
     return (
-        contact_pairs.excess_of(
-            contact, d, nodes, contact_pairs.pair_of(contact, d, nodes, n, m), which.where
+        excess_of(
+            contact, d, nodes, pair_of(contact, d, nodes, n, m), which.where
         )
         > 0
     )
@@ -169,35 +351,35 @@ def _share(contact, i, j):
 def _touch_pair(contact, d, nodes, control, i, j, place, share, where):
     """`share` of the impulse between the `i`-th and the `j`-th of the fields that meet."""
     a, b = contact.meeting[i], contact.meeting[j]
-    pair = contact_pairs.pair_of(
+    pair = pair_of(
         contact, d, nodes, _node(contact, place, i), _node(contact, place, j)
     )
-    excess = contact_pairs.excess_of(contact, d, nodes, pair, where)
+    excess = excess_of(contact, d, nodes, pair, where)
     if not excess > 0:
         return
-    size = contact_pairs.length_of(d, nodes, pair)
-    compliance = contact_pairs.compliance_of(contact, d, nodes, pair, size)
+    size = length_of(d, nodes, pair)
+    compliance = compliance_of(contact, d, nodes, pair, size)
     if not compliance > 0:
         return  # the fixes move both
     push = share * excess / compliance
     rub, sticks, across = 0.0, False, 0.0
     friction = contact.friction[a, b]
     if friction > 0:
-        across = contact_pairs.approach_left(contact, d, nodes, pair, push / size, size)
-        rub, sticks = contact_pairs.friction_of(
+        across = approach_left(contact, d, nodes, pair, push / size, size)
+        rub, sticks = friction_of(
             contact, d, nodes, pair, friction, push, size, across, share
         )
     step = int(control.values[TIMESTEP]) + 1
     contact.touched[pair.n, b] = -step if sticks else step
     if rub > 0:
-        heat = contact_pairs.work_of_friction(contact, d, nodes, pair, push / size, across, rub)
+        heat = work_of_friction(contact, d, nodes, pair, push / size, across, rub)
         share = contact.warmth[a, b]
         warm_node(field(nodes.fields, FrictionalHeat), pair.n, share * heat * pair.per_a)
         warm_node(field(nodes.fields, FrictionalHeat), pair.m, (1.0 - share) * heat * pair.per_b)
     for k in range(d):
-        impulse = push * contact_pairs.outward_of(nodes, pair, k) / size
+        impulse = push * outward_of(nodes, pair, k) / size
         if rub > 0:
-            impulse += rub * contact_pairs.slide_of(contact, nodes, pair, k, push / size, across)
+            impulse += rub * slide_of(contact, nodes, pair, k, push / size, across)
         _take(contact, control, a, i, pair.n, k, -impulse, pair.per_a, where.x)
         _take(contact, control, b, j, pair.m, k, impulse, pair.per_b, where.x)
         force = impulse / control.clock[0].kick
@@ -245,7 +427,7 @@ def touch_node(contact, kin, grids, nodes, control, n):
     count = _meet(contact, nodes, n)
     if count > 1:
         grid = record(grids, n // contact.stride)
-        where = contact_pairs.Where(node_position(grid, n), grid.h, control.values[DT])
+        where = Where(node_position(grid, n), grid.h, control.values[DT])
         _touch_place(contact, kin, nodes, control, n % contact.stride, count, where)
 
 
@@ -284,20 +466,20 @@ def _stay_pair(contact, d, nodes, i, j, pair, share, sticks):
     across = 0.0
     compliance = 0.0
     for k in range(d):
-        normal = contact_pairs.outward_of(nodes, pair, k)
+        normal = outward_of(nodes, pair, k)
         across += normal * (v[pair.n, k] - v[pair.m, k])
-        compliance += normal * normal * contact_pairs.yielding_of(contact, pair, k)
+        compliance += normal * normal * yielding_of(contact, pair, k)
     push = share * across / compliance if compliance > 0 else 0.0
     for k in range(d):
-        yielding = contact_pairs.yielding_of(contact, pair, k)
+        yielding = yielding_of(contact, pair, k)
         if not yielding > 0:
             continue
-        impulse = push * contact_pairs.outward_of(nodes, pair, k)
+        impulse = push * outward_of(nodes, pair, k)
         if sticks:
             impulse = share * (v[pair.n, k] - v[pair.m, k]) / yielding
-        if not contact_pairs.immovable(contact, pair.n, k):
+        if not immovable(contact, pair.n, k):
             contact.change[i, k] -= impulse * pair.per_a
-        if not contact_pairs.immovable(contact, pair.m, k):
+        if not immovable(contact, pair.m, k):
             contact.change[j, k] += impulse * pair.per_b
 
 
@@ -312,7 +494,7 @@ def _stay_place(contact, d, nodes, place, count, step):
             for j in range(i + 1, count):
                 touched = contact.touched[n, contact.meeting[j]]
                 if abs(touched) == step:
-                    pair = contact_pairs.pair_of(contact, d, nodes, n, _node(contact, place, j))
+                    pair = pair_of(contact, d, nodes, n, _node(contact, place, j))
                     share = _share(contact, i, j)
                     _stay_pair(contact, d, nodes, i, j, pair, share, touched < 0)
         for i in range(count):

@@ -50,58 +50,29 @@ class Strain(NamedTuple):
     writes = ("state", "deformation gradient")
 
 
-class StrainOfLastStep(NamedTuple):
+class StrainOfLastStep(Strain):
     """The same by the velocity that has led here, at the places that it has led to."""
 
-    in_lanes = True
-    not_at_corners = ("moments",)
-    says = "stress"
-    reads = Strain.reads
-    writes = Strain.writes
 
-
-class SecondStrain(NamedTuple):
+class SecondStrain(Strain):
     """The same for the second of two strain increments of a step."""
 
-    in_lanes = True
-    not_at_corners = ("moments",)
     says = "second half of the stress"
-    reads = Strain.reads
-    writes = Strain.writes
 
 
-class StrainInMove(NamedTuple):
+class StrainInMove(Strain):
     """`Strain` in one visit with `Move`, behind it: what v* gave already is not gathered again."""
 
-    in_lanes = True
-    not_at_corners = ("moments",)
-    says = "stress"
-    reads = Strain.reads
-    writes = Strain.writes
 
-
-# Which take averaged volumes, where there are.
-STRAINS = Strain, StrainOfLastStep, SecondStrain, StrainInMove
-
-
-class TrialStrain(NamedTuple):
+class TrialStrain(Strain):
     """Gather the gradient; settle only by what factor it would change the volume (F-bar)."""
 
-    in_lanes = True
-    not_at_corners = ("moments",)
     says = "trial volume"
-    reads = Strain.reads
     writes = ("volume ratio",)
 
 
-class TrialStrainOfLastStep(NamedTuple):
+class TrialStrainOfLastStep(TrialStrain):
     """The same of `StrainOfLastStep`."""
-
-    in_lanes = True
-    not_at_corners = ("moments",)
-    says = "trial volume"
-    reads = Strain.reads
-    writes = TrialStrain.writes
 
 
 class SetMeanStress(NamedTuple):
@@ -142,19 +113,17 @@ def _empty_move(task, w, x):
 @empty.on(Strain)
 @empty.on(StrainOfLastStep)
 @empty.on(SecondStrain)
-def _empty_second_strain(task, w, x):
-    return zero(w.kin, x[0]), averaging.no_ratio(w.averaging, x[0])
-
-
 @empty.on(StrainInMove)
-def _empty_strain_in_move(task, w, x):
+def _empty_strain(task, w, x):
     gradient = zero(w.kin, x[0])
-    return averaging.kept_out(w.averaging, w, gradient), averaging.no_ratio(w.averaging, x[0])
+    if isinstance(task, StrainInMove):
+        gradient = averaging.kept_out(w.averaging, w, gradient)
+    return gradient, averaging.no_ratio(w.averaging, x[0])
 
 
 @empty.on(TrialStrain)
 @empty.on(TrialStrainOfLastStep)
-def _empty_trial_strain_of_last_step(task, w, x):
+def _empty_trial_strain(task, w, x):
     return zero(w.kin, x[0])
 
 
@@ -175,7 +144,7 @@ def _records_of_move(task, nodes):
 
 @visit.records_of.on(Strain)
 @visit.records_of.on(StrainOfLastStep)
-def _records_of_strain_of_last_step(task, nodes):
+def _records_of_strain(task, nodes):
     return nodes.velocity
 
 
@@ -214,24 +183,21 @@ def update_at(kin: Tag, nodes: Nodes, i: Index, like: Number) -> tuple:
 
 
 @shared
-def _gradient(w, stencil, k, grad_v):
+def add_gradient(w, stencil, k, grad_v):
+    """The velocity gradient with the part of the k-th node, where it is gathered at all."""
+    if not len(grad_v):
+        return grad_v
     i, _, grad_N = entry(w.basis, w.kin, w.grid, stencil, k)
     grad_N = transfers.gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, grad_N)
     v = vector_at(w.kin, w.nodes.velocity, i, 0, zero_vector(w.kin, grad_N[0]))
     return grad_v + outer(v, grad_N)
 
 
-@shared
-def add_gradient(w, stencil, k, total):
-    """`_gradient`, where it is gathered at all."""
-    return _gradient(w, stencil, k, total) if len(total) else total
-
-
 @gathered.on(Strain)
 @gathered.on(StrainOfLastStep)
 @gathered.on(SecondStrain)
 @gathered.on(StrainInMove)
-def _gathered_strain_in_move(task, w, stencil, k, total):
+def _gathered_strain(task, w, stencil, k, total):
     return (
         add_gradient(w, stencil, k, total[0]),
         averaging.gathered_ratio(w.averaging, w, stencil, k, total[1]),
@@ -240,8 +206,8 @@ def _gathered_strain_in_move(task, w, stencil, k, total):
 
 @gathered.on(TrialStrain)
 @gathered.on(TrialStrainOfLastStep)
-def _gathered_trial_strain_of_last_step(task, w, stencil, k, total):
-    return _gradient(w, stencil, k, total)
+def _gathered_trial_strain(task, w, stencil, k, total):
+    return add_gradient(w, stencil, k, total)
 
 
 @gathered.on(SetMeanStress)
@@ -260,16 +226,7 @@ def _gathered_series_term(task, w, stencil, k, total):
 
 
 @point_function()
-def settled(
-    task: Tag,
-    w: Work,
-    stencil: tuple,
-    p: Index,
-    dt: Number,
-    total: tuple,
-    totals: tuple,
-    fastest: Number,
-) -> tuple:
+def settled(task, w, stencil, p, dt, total, totals, fastest):
     """Store what follows from `total`; return how far the point moved in cells, and its rate.
 
     The rate, c + max |v_i - common_i|, bounds the stable step; what is returned is the larger of it
@@ -279,36 +236,58 @@ def settled(
 
 
 @settled.on(Strain)
-def _settled_strain(task, w, stencil, p, dt, total, totals, fastest):
-    return _strain(w, w.places.x, p, dt, increment(dt, total[0]), total[1], fastest)
-
-
 @settled.on(StrainOfLastStep)
-def _settled_strain_of_last_step(task, w, stencil, p, dt, total, totals, fastest):
-    dl = frames.of_places_before(w.frame, w.kin, increment(dt, total[0]))
-    return _strain(w, w.places.x, p, dt, dl, total[1], fastest)
-
-
 @settled.on(SecondStrain)
-def _settled_second_strain(task, w, stencil, p, dt, total, totals, fastest):
-    return _strain(w, w.places.y, p, dt, increment(dt, total[0]), total[1], fastest)
-
-
 @settled.on(StrainInMove)
-def _settled_strain_in_move(task, w, stencil, p, dt, total, totals, fastest):
-    gradient = averaging.known_gradient(w.averaging, w, totals[0][2], total[0])
-    return _strain(w, w.places.x, p, dt, increment(dt, gradient), total[1], fastest)
+def _settled_strain(task, w, stencil, p, dt, total, totals, fastest):
+    """State of the law and shape of the domain after a step; growth in cells, and rate."""
+    gradient, ratio = total
+    if isinstance(task, StrainInMove):
+        gradient = averaging.known_gradient(w.averaging, w, totals[0][2], gradient)
+    dl = increment(dt, gradient)
+    if isinstance(task, StrainOfLastStep):
+        dl = frames.of_places_before(w.frame, w.kin, dl)
+    dl = averaging.averaged(w.averaging, w, p, dl, ratio)
+    law = visit.law_of(w, p)
+    old = visit.state_of(w, law, p, dt)
+    f = visit.deformation_of(w.frame, w.kin, law, old, w.points, p)
+    growth = frames.spatial_increment(w.frame, w.kin, dl, f)
+    state = advance(law, w.kin, old, growth, dt)
+    store(w.points.state, p, state)
+    now = frames.strained(w.frame, w.kin, f, dl)
+    store(field(w.points.fields, frames.DeformationGradient), p, now)
+    j = jacobian(law, w.kin, state)
+    grown = real(0, j)
+    if frames.follows(w.frame) and carried(w.basis, w.kin) == 0:
+        x = w.places.y if isinstance(task, SecondStrain) else w.places.x
+        before = visit.place_at(w.basis, w.kin, x, p)
+        after = deformed(w.basis, w.kin, before, growth)
+        store_from(w.places.y, p, w.kin.dimension, after)
+        grown = grown + further_reach(w.basis, w.kin, w.grid, before, after)
+    if not all_lanes(j > 0):
+        return where(j > 0, grown, inf), fastest
+    # The speed of waves is only asked of the few points that may be faster than all before them.
+    shorter = frames.inverse_stretch_squared(w.frame, w.kin, now, dt)
+    most = wave_speed_bound(law, w.kin, state) * shorter
+    speed = (load_vector(w.kin, w.points.v, p) - w.common).largest()
+    slack = fastest - speed
+    if all_lanes((slack >= 0) & (most <= slack * slack)):  # so written, NaN is noticed too
+        return grown, fastest
+    rate = sqrt(wave_speed_squared(law, w.kin, state) * shorter) + speed
+    return grown, where(fastest > rate, fastest, rate)
 
 
 @settled.on(TrialStrain)
-def _settled_trial_strain(task, w, stencil, p, dt, total, totals, fastest):
-    _keep_ratio(w, p, dt, increment(dt, total))
-    return real(0, dt), fastest
-
-
 @settled.on(TrialStrainOfLastStep)
-def _settled_trial_strain_of_last_step(task, w, stencil, p, dt, total, totals, fastest):
-    _keep_ratio(w, p, dt, frames.of_places_before(w.frame, w.kin, increment(dt, total)))
+def _settled_trial_strain(task, w, stencil, p, dt, total, totals, fastest):
+    dl = increment(dt, total)
+    if isinstance(task, TrialStrainOfLastStep):
+        dl = frames.of_places_before(w.frame, w.kin, dl)
+    law = visit.law_of(w, p)
+    state = visit.state_of(w, law, p, dt)
+    f = visit.deformation_of(w.frame, w.kin, law, state, w.points, p)
+    dl = frames.spatial_increment(w.frame, w.kin, dl, f)
+    field(w.points.fields, averaging.VolumeRatio)[0, p] = det(I + dl)
     return real(0, dt), fastest
 
 
@@ -316,15 +295,6 @@ def _settled_trial_strain_of_last_step(task, w, stencil, p, dt, total, totals, f
 def increment(dt, grad_v):
     """dl = dt grad v, as numbers: F + dl is a sum of two of them."""
     return grad_v._make(dt * grad_v)
-
-
-@shared
-def _keep_ratio(w, p, dt, dl):
-    law = visit.law_of(w, p)
-    state = visit.state_of(w, law, p, dt)
-    f = visit.deformation_of(w.frame, w.kin, law, state, w.points, p)
-    dl = frames.spatial_increment(w.frame, w.kin, dl, f)
-    field(w.points.fields, averaging.VolumeRatio)[0, p] = det(I + dl)
 
 
 @settled.on(SetMeanStress)
@@ -349,11 +319,6 @@ def further_reach(basis, kin, grid, before, after):
 
 @settled.on(Move)
 def _settled_move(task, w, stencil, p, dt, total, totals, fastest):
-    return _move(w, stencil, p, dt, total), fastest
-
-
-@shared
-def _move(w, stencil, p, dt, total):
     """New velocity, position and carried corners; how far that is in cells."""
     law = visit.law_of(w, p)
     v_pic, dv, moment, *corners = total
@@ -374,7 +339,7 @@ def _move(w, stencil, p, dt, total):
     store(w.places.y, p, y)
     moved = (y - x).largest() * w.grid.inv_h
     if not frames.follows(w.frame):
-        return moved
+        return moved, fastest
     if carried(w.basis, w.kin) > 0:
         before = visit.place_at(w.basis, w.kin, w.places.x, p)
         new = (*(x + step), *before[len(x) :])
@@ -387,49 +352,7 @@ def _move(w, stencil, p, dt, total):
             new = carry(w.basis, w.kin, new, before, corner, dt * u)
         store(w.places.y, p, new)
         moved += further_reach(w.basis, w.kin, w.grid, before, new)
-    return where(inside(w.grid, w.kin, y), moved, inf)
-
-
-@shared
-def _strain(w, x, p, dt, dl, ratio, fastest):
-    """State of the law and shape of the domain after a step; growth in cells, and rate.
-
-    `dl` is dt times the gradient of velocity, `x` are the places whose shapes grow.
-    """
-    dl = averaging.averaged(w.averaging, w, p, dl, ratio)
-    law = visit.law_of(w, p)
-    old = visit.state_of(w, law, p, dt)
-    f = visit.deformation_of(w.frame, w.kin, law, old, w.points, p)
-    growth = frames.spatial_increment(w.frame, w.kin, dl, f)
-    state = advance(law, w.kin, old, growth, dt)
-    store(w.points.state, p, state)
-    now = frames.strained(w.frame, w.kin, f, dl)
-    store_optional(field(w.points.fields, frames.DeformationGradient), p, now)
-    j = jacobian(law, w.kin, state)
-    grown = real(0, j)
-    if frames.follows(w.frame) and carried(w.basis, w.kin) == 0:
-        before = visit.place_at(w.basis, w.kin, x, p)
-        after = deformed(w.basis, w.kin, before, growth)
-        store_from(w.places.y, p, w.kin.dimension, after)
-        grown = grown + further_reach(w.basis, w.kin, w.grid, before, after)
-    if not all_lanes(j > 0):
-        return where(j > 0, grown, inf), fastest
-    # The speed of waves is only asked of the few points that may be faster than all before them.
-    shorter = frames.inverse_stretch_squared(w.frame, w.kin, now, dt)
-    most = wave_speed_bound(law, w.kin, state) * shorter
-    speed = (load_vector(w.kin, w.points.v, p) - w.common).largest()
-    slack = fastest - speed
-    if all_lanes((slack >= 0) & (most <= slack * slack)):  # so written, NaN is noticed too
-        return grown, fastest
-    rate = sqrt(wave_speed_squared(law, w.kin, state) * shorter) + speed
-    return grown, where(fastest > rate, fastest, rate)
-
-
-@shared
-def store_optional(array, p, value):
-    """Store a value where there is an array for it."""
-    if array is not None:
-        store(array, p, value)
+    return where(inside(w.grid, w.kin, y), moved, inf), fastest
 
 
 empty_all = visit.for_tags(empty, "w, x")

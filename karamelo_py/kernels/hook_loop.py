@@ -19,9 +19,9 @@ from karamelo_py.compiler.threads import Serial, Threaded, shared_out
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels import arrays, totals
 from karamelo_py.kernels import hooks as kinds
+from karamelo_py.kernels.arrays import first_from
 from karamelo_py.kernels.clock import kick, step_size
 from karamelo_py.kernels.loss import FrictionalHeat
-from karamelo_py.kernels.searching import first_from
 from karamelo_py.kernels.walls import FRICTION, rub, stick
 from karamelo_py.points.basis import placed
 from karamelo_py.points.frames import follows

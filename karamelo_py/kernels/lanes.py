@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import by_type, index, point_function
+from karamelo_py.compiler.compile import by_type, index, shared
 from karamelo_py.compiler.fingerprint import classes_in
-from karamelo_py.compiler.lanes import EightLanes, FourLanes, group, lanes_for, spread
+from karamelo_py.compiler.lanes import EightLanes, group, lanes_for, spread
 from karamelo_py.kernels.arrays import Block, Index, Number, Tag
-from karamelo_py.kernels.g2p import SecondStrain, Strain, StrainOfLastStep
+from karamelo_py.kernels.g2p import Strain
 
 
 class OneByOne(NamedTuple):
@@ -56,85 +56,38 @@ def _lanes_of_law(laws, mass):
     return lambda laws, mass: made()
 
 
-def points_at_once(lanes: Tag) -> int:
-    """Return the number of points visited at once; constant at compile time."""
-    return lanes.width
-
-
-@by_type(points_at_once)
-def _points_at_once(lanes):
-    number = lanes.instance_class.width
-    return lambda lanes: number
-
-
-@point_function()
+@shared
 def points_from(lanes: Tag, q: int, end: int) -> Index:
     """Return the point `q`, or the points in lanes from there on, before `end`."""
+    if isinstance(lanes, OneByOne):
+        return index(q)
+    return group(lanes, q, min(lanes.width, end - q))
 
 
-@points_from.on(OneByOne)
-def _points_from_one_by_one(lanes, q, end):
-    return index(q)
-
-
-@points_from.on(FourLanes)
-@points_from.on(EightLanes)
-def _points_from_lanes(lanes, q, end):
-    return group(lanes, q, min(points_at_once(lanes), end - q))
-
-
+@shared
 def one_loop_each(lanes: Tag, visit: NamedTuple) -> bool:
     """Choose three loops over a stretch of points: gather, update, scatter; else one for all.
 
     Three short loops are faster than a long one where there is much to update: processors keep
-    some thousand instructions at hand, and a law alone may have as many.
+    some thousand instructions at hand, and a law alone may have as many. That is so in lanes, of
+    visits that do nothing but strain. Where points move stretches cost more than they bring: there
+    is little to update, and stencils are found twice.
     """
-    return False
+    strains = [isinstance(task, Strain) for task in visit.tasks]
+    return not isinstance(lanes, OneByOne) and any(strains) and all(strains)
 
 
-@by_type(one_loop_each)
-def _one_loop_each(lanes, visit):
-    only_strains = _only_strains(lanes, visit)
-    return lambda lanes, visit: only_strains
-
-
-def _only_strains(lanes, visit):
-    """Return True for a visit in lanes that does nothing but strain.
-
-    Where points move stretches cost more than they bring: there is little to update, and stencils
-    are found twice.
-    """
-    tasks = {task.instance_class for task in visit[0]}
-    strains = {Strain, StrainOfLastStep, SecondStrain}
-    return lanes.instance_class is not OneByOne and bool(tasks) and tasks <= strains
-
-
+@shared
 def lanes_of_update(lanes: Tag, visit: NamedTuple) -> Tag:
     """Choose the lanes of the particle update: in stretches of doubles twice those of the gather.
 
     Chains of operations that wait for each other serve eight points in the time of four. To gather
     and to scatter, four are faster.
     """
-    return lanes
+    return EightLanes() if one_loop_each(lanes, visit) else lanes
 
 
-@by_type(lanes_of_update)
-def _lanes_of_update(lanes, visit):
-    made = EightLanes if _only_strains(lanes, visit) else lanes.instance_class
-    return lambda lanes, visit: made()
-
-
-@point_function()
+@shared
 def zero_of(lanes: Tag, like: Number) -> Number:
     """Return 0 as a number of a visit: of the type of `like`, or of lanes of it."""
-
-
-@zero_of.on(OneByOne)
-def _zero_of_one_by_one(lanes, like):
-    return like - like
-
-
-@zero_of.on(FourLanes)
-@zero_of.on(EightLanes)
-def _zero_of_lanes(lanes, like):
-    return spread(lanes, like - like)
+    return like - like if isinstance(lanes, OneByOne) else spread(lanes, like - like)

@@ -16,7 +16,7 @@ from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
 from karamelo_py.kernels.clock import kick
 from karamelo_py.kernels.p2g import RigidSums
-from karamelo_py.kernels.rows import touch, touch_velocity
+from karamelo_py.kernels.table import touch, touch_velocity
 from karamelo_py.kernels.totals import add_to, publish
 from karamelo_py.kernels.visit import place_at
 from karamelo_py.points.basis import entry, locate, support

@@ -7,31 +7,266 @@ from karamelo_py.compiler.compile import (
     all_lanes,
     point_function,
     prefetch_records,
+    real,
     shared,
 )
+from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.lanes import EightLanes, FourLanes
-from karamelo_py.kernels.affine import (
-    affine_parts,
-    gathered_at_once_all,
-    gathered_by_arms,
-    give_affine,
-)
-from karamelo_py.kernels.arrays import Tag
-from karamelo_py.kernels.corners import (
-    all_by_corners,
-    gather_corners,
-    in_block,
-    scatter_corners,
-    shows_corners,
-)
-from karamelo_py.kernels.g2p import empty_all, gathered_all
+from karamelo_py.compiler.lanes.records import accumulate_affine
+from karamelo_py.kernels import g2p, p2g
+from karamelo_py.kernels.arrays import MASS, Tag, of_force
+from karamelo_py.kernels.averaging import NodalStress
+from karamelo_py.kernels.g2p import Move, empty_all, gathered_all, update_at
 from karamelo_py.kernels.lanes import OneByOne
+from karamelo_py.kernels.loss import EnergyLoss
 from karamelo_py.kernels.p2g import scattered_all
-from karamelo_py.kernels.visit import Work, all_records_of
-from karamelo_py.points.basis import entry, support
-from karamelo_py.points.basis.cpdi.block import block_of, is_one_block, is_whole, of_one
-from karamelo_py.points.basis.cpdi.corners import CornerStencil
-from karamelo_py.points.basis.product import Stencil, evenly, sees_same_nodes, with_one_node
+from karamelo_py.kernels.visit import Work, all_records_of, for_tags
+from karamelo_py.points.basis import carried, entry, reach, support
+from karamelo_py.points.basis.cpdi.block import InBlock, block_of, is_one_block, is_whole, of_one
+from karamelo_py.points.basis.cpdi.corners import AtCorners, CornerStencil
+from karamelo_py.points.basis.product import (
+    Stencil,
+    evenly,
+    inverse_spread,
+    sees_same_nodes,
+    spacing,
+    with_one_node,
+)
+from karamelo_py.points.kinematics import dimension, from_columns, zero_vector
+from karamelo_py.points.transfers import (
+    add_moment,
+    affine_velocity,
+    by_arms,
+    forces_by_arms,
+    gradient_weight,
+    nodal_momentum,
+)
+
+
+@point_function(otherwise=True)
+def affine_part(quantity, w, stencil, load):
+    """(array, first component, value at the first node, growths from node to node) of a quantity.
+
+    One growth for each direction, or none where all nodes see the same. () for what is not affine.
+    """
+    return ()
+
+
+@shared
+def _lacks(w, kinds):
+    """Return True if the nodes have none of these fields."""
+    return not any(field(w.nodes.fields, kind) is not None for kind in kinds)
+
+
+@shared
+def _affine(w, stencil, value, growths):
+    """Value at the first node, and growth a node, of `value` at the point and growths a length."""
+    arm = reach(w.basis, w.kin, w.grid, stencil, 0)
+    for growth, way in zip(growths, arm, strict=True):
+        value = value + way * growth
+    step = w.grid.h * spacing(w.basis)
+    return value, tuple([step * growth for growth in growths])
+
+
+@shared
+def _momentum(w, stencil, mass, v, moment):
+    """The momentum at the first node, and its growth; () where nobody knows."""
+    momentum = mass * v
+    if not len(moment):
+        return () if nodal_momentum.defined(type(w.transfer)) else (momentum, ())
+    c = affine_velocity(w.transfer, moment, inverse_spread(w.basis, w.grid))
+    if not len(c):
+        return ()
+    return _affine(w, stencil, momentum, (mass * c).columns())
+
+
+@affine_part.on(p2g.MassMomentum)
+def _affine_part_mass_momentum(quantity, w, stencil, load):
+    mass, v, moment, _, _ = load
+    given = _momentum(w, stencil, mass, v, moment)
+    if not (
+        len(given)
+        and _lacks(w, (EnergyLoss, p2g.RigidSums, p2g.Centre, p2g.Normal, p2g.SquaredMass))
+    ):
+        return ()
+    momentum, growths = given
+    return w.nodes.sums, MASS, (mass, *momentum), tuple([(mass - mass, *g) for g in growths])
+
+
+@affine_part.on(p2g.MomentumAgain)
+def _affine_part_momentum_again(quantity, w, stencil, load):
+    given = _momentum(w, stencil, *load)
+    return (w.nodes.velocity, 0, *given) if len(given) else ()
+
+
+@affine_part.on(p2g.InternalForce)
+def _affine_part_internal_force(quantity, w, stencil, load):
+    inverse_d = inverse_spread(w.basis, w.grid)
+    if not (len(inverse_d) and forces_by_arms(w.transfer, w.kin) and _lacks(w, (NodalStress,))):
+        return ()
+    stress, outer, _ = load
+    own = outer if len(outer) else zero_vector(w.kin, stress[0])
+    growths = [inverse_d[0] * column for column in stress.columns()]
+    return w.nodes.sums, of_force(w.kin), *_affine(w, stencil, own, tuple(growths))
+
+
+@shared
+def _beside(a, b):
+    """`b` behind `a` and zeros, from the fifth component on."""
+    return (*a, *((a[0] - a[0],) * (4 - len(a))), *b)
+
+
+@point_function(otherwise=True)
+def joined(width, kin, parts):
+    """Momentum and force as one part, where both grow and a register takes both."""
+    return parts
+
+
+@joined.on(FourLanes)
+@joined.on(EightLanes)
+def _joined_eights(width, kin, parts):
+    if len(parts) != 2 or of_force(kin) != 4:
+        return parts
+    array, first, a, to_a = parts[0]
+    _, _, b, to_b = parts[1]
+    of_sums = len(a) == 1 + dimension(kin) and len(b) == dimension(kin)
+    if not (of_sums and len(to_a) and len(to_b)):
+        return parts
+    growths = [_beside(x, y) for x, y in zip(to_a, to_b, strict=True)]
+    return ((array, first, _beside(a, b), tuple(growths)),)
+
+
+@shared
+def give_affine(width, w, stencil, parts):
+    """Give the nodes of a stencil what is affine."""
+    seen = [entry(w.basis, w.kin, w.grid, stencil, k)[:2] for k in range(support(w.basis, w.kin))]
+    nodes, weights = tuple([node for node, _ in seen]), tuple([weight for _, weight in seen])
+    for array, first, value, growths in joined(width, w.kin, parts):
+        value, growths = (*value,), tuple([(*growth,) for growth in growths])
+        accumulate_affine(array, nodes, first, weights, value, growths)
+
+
+@shared
+def gathered_by_arms(w):
+    """(a,), where what a point keeps is a sum_I N_I v*_I (X_I - x)^T away from walls; else ()."""
+    return by_arms(w.transfer, inverse_spread(w.basis, w.grid))
+
+
+@point_function(otherwise=True)
+def gathered_at_once(task: Tag, w: Work, stencil: tuple, total: tuple) -> tuple:
+    """Return the total of a gather over all nodes of a stencil; () where that goes node by node."""
+    return ()
+
+
+@gathered_at_once.on(Move)
+def _gathered_at_once_move(task, w, stencil, total):
+    factor = gathered_by_arms(w)
+    if not len(factor):
+        return ()
+    nodes = [entry(w.basis, w.kin, w.grid, stencil, k)[0] for k in range(support(w.basis, w.kin))]
+    found = [update_at(w.kin, w.nodes, i, total[0]) for i in nodes]
+    # sum N v (X - x)^T from sum N v and sum N v k, X being k nodes from the first: of rows, then of
+    # planes, as the weights are products.
+    sums = tuple([(v,) for v, _ in found])
+    changes = tuple([dv for _, dv in found])
+    for line in reversed(stencil.lines):
+        rows = range(0, len(sums), len(line.weights))
+        sums = tuple([_with_moment(line.weights, sums[k:]) for k in rows])
+        changes = tuple([_tails(line.weights, changes[k:])[-1] for k in rows])
+    v, *moments = sums[0]
+    arm = reach(w.basis, w.kin, w.grid, stencil, 0)
+    step = w.grid.h * spacing(w.basis)
+    pairs = zip(moments, arm, strict=True)
+    moment = from_columns([step * m + way * v for m, way in pairs])
+    return v, total[1] + changes[0], real(factor[0], step) * moment
+
+
+@shared
+def _tails(weights, vectors):
+    """Sums of weights times vectors: of the last one, of the last two, ... of all."""
+    last = len(weights) - 1
+    sums = (weights[last] * vectors[last],)
+    for k in range(last - 1, -1, -1):
+        sums = (*sums, sums[-1] + weights[k] * vectors[k])
+    return sums
+
+
+@shared
+def _with_moment(weights, row):
+    """Of the sums of the nodes of a row: the sum of the first, and k times that; all the others."""
+    first, *others = zip(*row[: len(weights)], strict=True)
+    *tails, total = _tails(weights, first)
+    return total, _sum(tuple(tails)), *[_tails(weights, other)[-1] for other in others]
+
+
+@shared
+def _sum(vectors):
+    total = vectors[0]
+    for vector in vectors[1:]:
+        total = total + vector
+    return total
+
+
+gathered_at_once_all = for_tags(gathered_at_once, "w, stencil, totals", each="totals")
+affine_parts = for_tags(affine_part, "w, stencil, loads", each="loads")
+
+
+@shared
+def by_corners(part, w):
+    """Tell whether a task or quantity takes the weight or gradient of a node once, as a factor.
+
+    Those that do say so by `not_at_corners`: with what in the visit they do not. Moments are of the
+    velocities and places of nodes.
+    """
+    unless = getattr(type(part), "not_at_corners", None)
+    if unless is None:
+        return False
+    asked = add_moment, nodal_momentum, gradient_weight
+    moments = any(function.defined(type(w.transfer)) for function in asked)
+    loss = field(w.nodes.fields, EnergyLoss) is not None
+    return not ("moments" in unless and moments) and not ("loss" in unless and loss)
+
+
+@shared
+def all_by_corners(parts, w):
+    """Return True if all tasks or quantities of a visit go by corners."""
+    return all(by_corners(part, w) for part in parts)
+
+
+@shared
+def _seeing(basis, w):
+    """The work with something in the place of the basis."""
+    items = zip(w._fields, w, strict=True)
+    return type(w)(*[basis if name == "basis" else item for name, item in items])
+
+
+@shared
+def in_block(w):
+    """The work of points that see blocks of nodes."""
+    return _seeing(InBlock(w.basis), w)
+
+
+@shared
+def shows_corners(tasks, w):
+    """Return True if the visit needs the velocities of the corners themselves."""
+    return carried(w.basis, w.kin) > 0 and any(isinstance(task, g2p.Move) for task in tasks)
+
+
+@shared
+def gather_corners(tasks, w, stencil, totals):
+    """The totals of the tasks over all corners."""
+    at = _seeing(AtCorners(w.basis), w)
+    for c in range(support(at.basis, w.kin)):
+        totals = g2p.gathered_all(tasks, at, stencil, c, totals)
+    return totals
+
+
+@shared
+def scatter_corners(quantities, w, stencil, loads):
+    """Give all corners their parts."""
+    at = _seeing(AtCorners(w.basis), w)
+    for c in range(support(at.basis, w.kin)):
+        p2g.scattered_all(quantities, at, stencil, c, loads)
 
 
 @shared

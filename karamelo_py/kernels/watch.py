@@ -5,7 +5,7 @@ to the middles of steps and stresses to their ends, more or less by the scheme: 
 steps in a row give those of one time, to second order. Sums go through the points in the order of
 their tiles, the same on any number of threads.
 
-Growth (`karamelo_py.kernels.growth`) is measured by the energy that bodies have besides their
+Growth (`karamelo_py.kernels.watch`) is measured by the energy that bodies have besides their
 drift, the motion of their centres of mass: large as that may be, from the start or by loads, it
 cannot hide what vibrates.
 """
@@ -27,10 +27,8 @@ from karamelo_py.compiler.loops import kernel, noinline
 from karamelo_py.compiler.threads import shared_out
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels import totals
-from karamelo_py.kernels.arrays import TIMESTEP, known_to_laws
-from karamelo_py.kernels.growth import growth
-from karamelo_py.kernels.lanes import lanes_of_law, points_at_once, points_from
-from karamelo_py.kernels.searching import first_from
+from karamelo_py.kernels.arrays import TIMESTEP, first_from, known_to_laws
+from karamelo_py.kernels.lanes import lanes_of_law, points_from
 from karamelo_py.points.kinematics import dimension, free_from
 from karamelo_py.points.laws import (
     dissipated_energy,
@@ -45,6 +43,7 @@ LOOK = 10  # steps between two looks
 FEW = 3  # looks that are compared where no window is whole: the present and the two before
 LOOKS = 10  # looks that are averaged, in a window of 100 steps
 GROWTH = 0.01  # of the largest energy so far, in a window: more is told
+WITHIN = 0.1  # of the unit: more growth than that since the start is told, and is not kept
 DRIFTING = 1e-3  # of the energy of bodies that drift: what they vibrate by and matters is more
 BOUND = 10.0  # times the energy that there was and that loads have brought: more stops the run
 ROUND_OFF = 1e-14  # of m c^2: energies below are noise
@@ -100,7 +99,7 @@ def _look_at_share(kin, points, laws, tiling, firsts, k):
         begin, behind = firsts[solid], _behind(firsts, solid)
         kinetic = stored = 0.0
         total = _nothing(kin)
-        for q in range(start, end, points_at_once(lanes)):
+        for q in range(start, end, lanes.width):
             p = points_from(lanes, q, end)
             law = record(laws, index(points.material[p]))
             own = of_present(p, points.mass[p])
@@ -236,6 +235,16 @@ def _sum_before(s, mode, step):
     clock.stored_before = clock.stored
     clock.moving_before = clock.kinetic - clock.work
     clock.stored_at = step
+
+
+def growth(first, later, unit):
+    """Share of the unit by which a later mean exceeds the first."""
+    return (later - first) / unit
+
+
+def keeps(first, later, unit, within=WITHIN):
+    """Compare growth with a share of the unit; NaN is not kept."""
+    return later - first <= within * unit
 
 
 @shared

@@ -9,8 +9,17 @@ from karamelo_py.kernels.arrays import (
     POST_VELOCITIES_TO_GRID,
 )
 from karamelo_py.kernels.g2p import Strain
-from karamelo_py.kernels.rows import ACCELERATE, CONTACT_AFTER, MOMENTUM_AGAIN, MOVE, SERIES, SUMS
-from karamelo_py.kernels.table import AtNodes, AtPoints, Gather
+from karamelo_py.kernels.table import (
+    ACCELERATE,
+    CONTACT_AFTER,
+    MOMENTUM_AGAIN,
+    MOVE,
+    SERIES,
+    SUMS,
+    AtNodes,
+    AtPoints,
+    Gather,
+)
 
 
 class MUSL(NamedTuple):

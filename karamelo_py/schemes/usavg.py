@@ -10,7 +10,7 @@ from karamelo_py.kernels.arrays import (
     POST_VELOCITIES_TO_GRID,
 )
 from karamelo_py.kernels.g2p import SecondStrain, Strain
-from karamelo_py.kernels.rows import (
+from karamelo_py.kernels.table import (
     ACCELERATE,
     CONTACT_AFTER,
     CONTACT_BEFORE,
@@ -19,8 +19,10 @@ from karamelo_py.kernels.rows import (
     MOVE,
     SERIES,
     VELOCITY_BEFORE,
+    AtNodes,
+    AtPoints,
+    Gather,
 )
-from karamelo_py.kernels.table import AtNodes, AtPoints, Gather
 
 
 class USAVG(NamedTuple):

@@ -9,15 +9,17 @@ from karamelo_py.kernels.arrays import (
     POST_UPDATE_GRID_STATE,
 )
 from karamelo_py.kernels.g2p import Strain
-from karamelo_py.kernels.rows import (
+from karamelo_py.kernels.table import (
     ACCELERATE,
     CONTACT_BEFORE,
     FORCE,
     MOVE,
     SERIES,
     VELOCITY_BEFORE,
+    AtNodes,
+    AtPoints,
+    Gather,
 )
-from karamelo_py.kernels.table import AtNodes, AtPoints, Gather
 
 
 class USF(NamedTuple):

@@ -7,8 +7,16 @@ from karamelo_py.kernels.arrays import FINAL_INTEGRATE, INITIAL_INTEGRATE, MASS
 from karamelo_py.kernels.g2p import Strain
 from karamelo_py.kernels.nodes import UpdateToVelocity
 from karamelo_py.kernels.p2g import SquaredMass
-from karamelo_py.kernels.rows import ACCELERATE, MOVE, SERIES, SUMS, light_node
-from karamelo_py.kernels.table import AtPoints, Gather, NodeTask
+from karamelo_py.kernels.table import (
+    ACCELERATE,
+    MOVE,
+    SERIES,
+    SUMS,
+    AtPoints,
+    Gather,
+    NodeTask,
+    light_node,
+)
 from karamelo_py.language.rules import known_failure
 from karamelo_py.points.transfers import gradient_weight
 

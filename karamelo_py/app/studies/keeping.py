@@ -10,7 +10,7 @@ import numpy as np
 from karamelo_py.app.logs import read_log
 from karamelo_py.app.studies import stretches
 from karamelo_py.app.studies.curves import missing
-from karamelo_py.kernels.growth import WITHIN
+from karamelo_py.kernels.watch import WITHIN
 
 SHARE = 0.2  # of the run: means over its first and its last part are compared
 WRONG = ("gains", "breaks")

@@ -4,7 +4,7 @@ from math import ceil, inf
 
 import numpy as np
 
-from karamelo_py.kernels.growth import growth
+from karamelo_py.kernels.watch import growth
 
 
 def grown(first: float, later: float) -> float:
