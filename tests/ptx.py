@@ -63,7 +63,7 @@ def visit_point(visit, s, block, p, report):
     width = OneByOne()
     stencil = locate(s.basis, s.kin, grid, place_at(s.basis, s.kin, places.where, p))
     totals = empty_all(visit.tasks, w, load_vector(s.kin, places.x, p))
-    totals = gather_nodes(width, stencil, visit.tasks, w, totals)
+    totals = gather_nodes(stencil, width, visit.tasks, w, totals)
     moved, rate = settled_all(visit.tasks, w, stencil, p, dt, totals, zero_of(width, dt))
     report[p, 0] = moved
     report[p, 1] = rate
@@ -71,7 +71,7 @@ def visit_point(visit, s, block, p, report):
         return
     stencil = recompute_stencil(visit.weights, w, stencil, p)
     loads = load_all(visit.quantities, w, p, dt)
-    scatter_nodes(width, stencil, visit.quantities, w, loads)
+    scatter_nodes(stencil, width, visit.quantities, w, loads)
 
 
 def visit_node(task, kin, nodes, n, dt):

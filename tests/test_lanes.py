@@ -24,7 +24,7 @@ from karamelo_py.compiler.powers import exponential, logarithm, logarithm_near_o
 from karamelo_py.compiler.threads import Serial
 from karamelo_py.compiler.trace import CannotCompile
 from karamelo_py.compiler.tuples import flat, nested_as, row
-from karamelo_py.kernels.arrays import arrays_of, with_nodes
+from karamelo_py.kernels.arrays import arrays_of, with_items_of
 from karamelo_py.kernels.averaging import NodalMean
 from karamelo_py.kernels.g2p import empty, gathered, settled
 from karamelo_py.kernels.heat import HeatContent, HeatFlow, TemperatureGradient, Warming
@@ -554,7 +554,7 @@ def _visited(*more):
     heat = setup.heat
     mean = NodalMean(np.zeros_like(field(heat.nodes.fields, NodalMean)))
     to = heat.buffers.nodes._replace(sums=np.zeros_like(heat.nodes.sums), fields=(mean,))
-    s = with_nodes(setup, heat.nodes, heat.buffers._replace(nodes=to))
+    s = with_items_of(setup, heat._replace(buffers=heat.buffers._replace(nodes=to)))
     rng = np.random.default_rng(5)
     points = s.blocks[0].points
     given = [one.array for one in (*points.fields, *s.nodes.fields)]

@@ -102,16 +102,11 @@ def known_to_laws(points):
     )  # fmt: skip
 
 
-def own_arrays_of(points: Points) -> Iterator[tuple[str, np.ndarray]]:
-    """Every array that all points have, with its name; the points come last in its shape."""
+def arrays_of(points: Points) -> Iterator[tuple[str, np.ndarray]]:
+    """Every array of the points, with its name; the points come last in its shape."""
     for name, array in points._asdict().items():
         if name != "fields" and array is not None:
             yield name, array
-
-
-def arrays_of(points: Points) -> Iterator[tuple[str, np.ndarray]]:
-    """The same, and the declared fields."""
-    yield from own_arrays_of(points)
     for one in points.fields:
         yield name_of(type(one)), one.array
 
@@ -119,12 +114,8 @@ def arrays_of(points: Points) -> Iterator[tuple[str, np.ndarray]]:
 def made_of(points: Points, found: Iterable[np.ndarray]) -> Points:
     """Points of the kind of `points` with such arrays as `arrays_of` has given."""
     arrays = iter(found)
-    own: dict[str, Any] = {
-        name: None if array is None else next(arrays)
-        for name, array in points._asdict().items()
-        if name != "fields"
-    }
-    return Points(**own, fields=tuple(type(one)(next(arrays)) for one in points.fields))
+    own = [None if array is None else next(arrays) for array in points[:-1]]
+    return Points(*own, tuple(type(one)(next(arrays)) for one in points.fields))
 
 
 class Tiling(NamedTuple):
@@ -388,11 +379,11 @@ class Setup(NamedTuple):
 
 
 @shared
-def with_nodes(s, nodes, buffers):
-    """The setup with other nodes and their buffers."""
-    others = {"nodes": nodes, "buffers": buffers}
-    items = zip(s._fields, s, strict=True)
-    return type(s)(*(others.get(name, item) for name, item in items))
+def with_items_of(values, others):
+    """Put the items of another NamedTuple in the place of those with their names."""
+    new = dict(zip(others._fields, others, strict=True))
+    items = zip(values._fields, values, strict=True)
+    return type(values)(*[new.get(name, item) for name, item in items])
 
 
 @noinline

@@ -338,7 +338,7 @@ def _at_heated_points_hooks(hooks, s):
 @shared
 def visit_for_heat(heat, s, mode, visit, gathers, scatters):
     """Visit the points for heat: the nodes are those of heat."""
-    here = arrays.with_nodes(s, heat.nodes, heat.buffers)
+    here = arrays.with_items_of(s, heat)
     sweep(here, mode, visit, step_size(s), gathers, scatters, False)
 
 

@@ -15,7 +15,7 @@ from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.formula import BLOCK, call_evaluate
 from karamelo_py.compiler.held import hold
 from karamelo_py.compiler.loops import kernel, noinline
-from karamelo_py.compiler.threads import Serial, Threaded, shared_out
+from karamelo_py.compiler.threads import Threaded, shared_out
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels import arrays, totals
 from karamelo_py.kernels import hooks as kinds
@@ -133,7 +133,7 @@ def _act_apart(what, task, hooks, control, dt, h, share, k):
     there.set_low, there.set_high = clock.set_low, clock.set_high
     there.rise, there.fall = clock.rise, clock.fall
     there.coldest, there.hottest = clock.coldest, clock.hottest
-    here, mine = hold(_with_items_of(hooks, own)), hold(_with_items_of(control, own))
+    here, mine = hold(arrays.with_items_of(hooks, own)), hold(arrays.with_items_of(control, own))
     _act_on_part(what, task, here, mine, dt, h, share, k, hooks.apart.chosen.shape[0])
     totals.hand_over(own.totals, control.totals, totals.WORK)
     # Of nodes that others have held before, their totals change, too.
@@ -144,29 +144,16 @@ def _act_apart(what, task, hooks, control, dt, h, share, k):
             totals.hand_over(own.totals, control.totals, row)
 
 
-@shared
-def _with_items_of(values, others):
-    """Put the items of another NamedTuple in the place of those with their names."""
-    new = dict(zip(others._fields, others, strict=True))
-    items = zip(values._fields, values, strict=True)
-    return type(values)(*(new.get(name, item) for name, item in items))
-
-
 _act_on_parts = shared_out(_act_apart, "what, task, hooks, control, dt, h, share")
 
 
-@point_function()
-def act_on_all(mode, what, task, hooks, control, dt, h, share):
+@shared
+def _act_on_all(what, task, hooks, control, dt, h, share):
     """Do `task` with all members of a hook."""
-
-
-@act_on_all.on(Serial)
-def _act_on_all_serial(mode, what, task, hooks, control, dt, h, share):
-    _act_on_part(what, task, hooks, control, dt, h, share, NONE, NONE + 1)
-
-
-@act_on_all.on(Threaded)
-def _act_on_all_threaded(mode, what, task, hooks, control, dt, h, share):
+    mode = hooks.mode
+    if not isinstance(mode, Threaded):
+        _act_on_part(what, task, hooks, control, dt, h, share, NONE, NONE + 1)
+        return
     parts = hooks.apart.chosen.shape[0]
     _act_on_parts(mode, parts, what, task, hooks, control, dt, h, share)
     clock = control.clock[0]
@@ -458,23 +445,17 @@ def _work_at_nodes(what, hooks, control, dt, count):
 
 
 @shared
-def _rubbed_alone(nodes):
-    """Return the nodes with that of their declared fields which walls know."""
-    fields = tuple([one for one in nodes.fields if type(one) is FrictionalHeat])
-    return arrays.Nodes(nodes.sums, nodes.update, nodes.velocity, fields)
-
-
-@shared
 def node_hooks(stage, target, kin, grids, nodes, ranges, hooks, control, dt, kept):
     """Call the node functions of `stage` on the members that have mass.
 
     `kept` is the share of its own velocity that a point keeps, and changes by what nodes change by.
     Of `LOADS` the work is added up: here, so that the way through the nodes is compiled once.
     """
-    _node_hooks(
-        stage, target, planar(kin), grids, _rubbed_alone(nodes), ranges, hooks, control, float(dt),
-        kept,
-    )  # fmt: skip
+    # Of declared fields walls know one; others would have all this compiled anew.
+    fields = tuple([one for one in nodes.fields if type(one) is FrictionalHeat])
+    nodes = arrays.Nodes(nodes.sums, nodes.update, nodes.velocity, fields)
+    kin, dt = planar(kin), float(dt)
+    _node_hooks(stage, target, kin, grids, nodes, ranges, hooks, control, dt, kept)
 
 
 @kernel
@@ -482,7 +463,7 @@ def _node_hooks(stage, target, kin, grids, nodes, ranges, hooks, control, dt, ke
     what = hold(HookedNodes(target, kin, grids, nodes, ranges, kept))
     if target == LOADS:
         if hooks.loads.size > 0:
-            act_on_all(hooks.mode, what, ACT, hooks, control, dt, NONE, 1.0)
+            _act_on_all(what, ACT, hooks, control, dt, NONE, 1.0)
             totals.carry(control.totals[totals.WORK])
         return
     if target == arrays.ON_UPDATE:
@@ -495,7 +476,7 @@ def _node_hooks(stage, target, kin, grids, nodes, ranges, hooks, control, dt, ke
         if hooks.table[h].uses_share:
             heavy = _act_on_part(what, COUNT, hooks, control, dt, h, share, NONE, NONE + 1)
             share = 1.0 / max(totals.number_of_all(control.ranks, control, heavy), 1)
-        act_on_all(hooks.mode, what, ACT, hooks, control, dt, h, share)
+        _act_on_all(what, ACT, hooks, control, dt, h, share)
         _publish_total(hooks, h, control)
     # Walls rub when it is known which of them hold a node.
     for h in range(len(hooks.table)):
@@ -503,7 +484,7 @@ def _node_hooks(stage, target, kin, grids, nodes, ranges, hooks, control, dt, ke
             continue
         rubs = hooks.programs[h, FRICTION].begin >= 0
         if rubs:
-            act_on_all(hooks.mode, what, RUB, hooks, control, dt, h, 1.0)
+            _act_on_all(what, RUB, hooks, control, dt, h, 1.0)
         if rubs or (hooks.table[h].holds and hooks.held.size > 0):
             _publish_total(hooks, h, control)
 
@@ -637,7 +618,7 @@ def point_hooks(stage, what, hooks, control, dt):
     dt = float(dt)
     for h in range(len(hooks.table)):
         if hooks.table[h].stage == stage:
-            act_on_all(hooks.mode, what, ACT, hooks, control, dt, h, 1.0)
+            _act_on_all(what, ACT, hooks, control, dt, h, 1.0)
 
 
 @kernel

@@ -68,26 +68,25 @@ def warm_node(rubbed, n, heat):
 
 
 @shared
+def _nodes_of(w, stencil):
+    """(node, weight, gradient) of the nodes that a point sees."""
+    return [entry(w.basis, w.kin, w.grid, stencil, k) for k in range(support(w.basis, w.kin))]
+
+
+@shared
 def warm_by_friction(rubbed, w, stencil, p, like):
     """Point `p` takes the heat of friction at its nodes by its weights: none is lost."""
     if rubbed is not None:
         law = law_of(w, p)
         state = state_of(w, law, p, like)
-        heat = _heat_of_nodes(rubbed, w, stencil, like)
+        heat = like - like
+        for i, weight, _ in _nodes_of(w, stencil):
+            heat += weight * rubbed[i, 0]
         capacity = heat_capacity(law, like)
         warms = capacity > 0
         rise = where(warms, heat, like - like) / where(warms, capacity, real(1, like))
         T = temperature(law, w.kin, state) + rise
         fields.store(w.points.state, p, with_temperature(law, w.kin, state, T))
-
-
-@shared
-def _heat_of_nodes(rubbed, w, stencil, like):
-    heat = like - like
-    for k in range(support(w.basis, w.kin)):
-        i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
-        heat += weight * rubbed[i, 0]
-    return heat
 
 
 @shared
@@ -160,8 +159,7 @@ def in_company(w, stencil, p, moment):
 def _own_share(lost, w, stencil, mass):
     """The share of a point of this mass in what its nodes have, by its weights."""
     share = mass - mass
-    for k in range(support(w.basis, w.kin)):
-        i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
+    for i, weight, _ in _nodes_of(w, stencil):
         share += weight * weight * mass / max(lost[i, 2], real(1e-36, mass))
     return share
 
@@ -197,8 +195,7 @@ def reflect(reflected, w, stencil, p, term, k):
 @shared
 def gathered_term(w, stencil, term):
     """The present term of XPIC's series at a point."""
-    for k in range(support(w.basis, w.kin)):
-        i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
+    for i, weight, _ in _nodes_of(w, stencil):
         term = term + weight * term_at(w, i, term)
     return term
 
@@ -207,8 +204,7 @@ def gathered_term(w, stencil, term):
 def _spread(w, stencil, term):
     """sum_i N_i |w_i - term|^2 of the present term w of XPIC's series."""
     spread = term[0] - term[0]
-    for k in range(support(w.basis, w.kin)):
-        i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
+    for i, weight, _ in _nodes_of(w, stencil):
         spread += weight * (term_at(w, i, term) - term).squared()
     return spread
 
@@ -229,11 +225,10 @@ def _before(w, i, like):
 @shared
 def _moment_before(w, stencil, v, moment):
     """Gather the moment of the velocity that the nodes had before the update."""
-    for k in range(support(w.basis, w.kin)):
-        i, weight, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
-        g = gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, gradient)
+    for k, (i, N, grad_N) in enumerate(_nodes_of(w, stencil)):
+        grad_N = gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, grad_N)
         u = _before(w, i, v)
-        moment = add_moment(w.transfer, w.kin, w.basis, w.grid, stencil, k, weight, g, u, moment)
+        moment = add_moment(w.transfer, w.kin, w.basis, w.grid, stencil, k, N, grad_N, u, moment)
     return moment
 
 
@@ -242,17 +237,9 @@ def _gone(lost, w, stencil, v, moment):
     """Kinetic energy per mass that a point has lost at the nodes and on the way back."""
     gone = v[0] - v[0]
     there, here = lost_shares(w.transfer, gone)
-    for k in range(support(w.basis, w.kin)):
-        i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
-        gone += _part_gone(lost, w, stencil, k, i, weight, v, moment, there, here)
+    one = real(1, gone)
+    for k, (i, N, _) in enumerate(_nodes_of(w, stencil)):
+        kept = nodal_momentum(w.transfer, w.kin, w.basis, w.grid, stencil, k, N, one, v - v, moment)
+        apart = 0.5 * N * (_before(w, i, v) - v).squared()
+        gone += there * N * lost[i, 1] + here * (apart - energy_of(N, kept))
     return gone
-
-
-@shared
-def _part_gone(lost, w, stencil, k, i, weight, v, moment, there, here):
-    one = real(1, weight)
-    held = nodal_momentum(
-        w.transfer, w.kin, w.basis, w.grid, stencil, k, weight, one, v - v, moment
-    )
-    apart = 0.5 * weight * (_before(w, i, v) - v).squared()
-    return there * weight * lost[i, 1] + here * (apart - energy_of(weight, held))

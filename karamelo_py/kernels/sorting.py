@@ -10,7 +10,7 @@ from karamelo_py.compiler.loops import kernel, noinline
 from karamelo_py.compiler.rows import pick_items, put_items
 from karamelo_py.compiler.threads import by_team, shared_out
 from karamelo_py.compiler.tuples import record
-from karamelo_py.kernels.arrays import Number, Tag, Tiling
+from karamelo_py.kernels.arrays import Number
 from karamelo_py.kernels.visit import place_at
 from karamelo_py.points.basis import extent
 from karamelo_py.points.grid import Grid, cells_along, in_cells
@@ -249,18 +249,7 @@ _sort_by_team = by_team(_sort, "kin, grids, sight, tiles, x, of, ids, found, row
 
 
 @kernel
-def sort_points(
-    mode: Tag,
-    kin: Tag,
-    grids: Grid,
-    sight: Neighbourhood,
-    tiles: TileGrid,
-    x: np.ndarray,
-    of: np.ndarray,
-    ids: np.ndarray,
-    found: SortedOrder,
-    rows: tuple,
-) -> None:
+def sort_points(mode, kin, grids, sight, tiles, x, of, ids, found, rows):
     """Sort points at places `x` (w, n) by tile, and within by the first node that they see.
 
     They are on the grids `of` (n,) and have the numbers `ids` (n,). Of all that they carry, these
@@ -271,16 +260,7 @@ def sort_points(
 
 
 @kernel
-def find_tiles(
-    mode: Tag,
-    kin: Tag,
-    grids: Grid,
-    tiles: TileGrid,
-    x: np.ndarray,
-    of: np.ndarray,
-    ends: np.ndarray,
-    tile: np.ndarray,
-) -> None:
+def find_tiles(mode, kin, grids, tiles, x, of, ends, tile):
     """Find the tile of each point at `x` (w, n), on the grids `of` (n,).
 
     `tile` (n,) takes them; `ends` (parts, T) is scratch.
@@ -289,21 +269,13 @@ def find_tiles(
 
 
 @kernel
-def find_rows(
-    mode: Tag,
-    kin: Tag,
-    grids: Grid,
-    sight: Neighbourhood,
-    x: np.ndarray,
-    tiling: Tiling,
-    parts: int,
-) -> None:
+def find_rows(mode, kin, grids, sight, x, tiling, parts):
     """Find the range of each row of a tile's box that its sorted points at `x` (w, n) may reach."""
     _find_all_rows(mode, parts, kin, grids, sight, x, tiling, parts)
 
 
 @kernel
-def widest(kin: Tag, basis: Tag, grids: Grid, x: np.ndarray, of: np.ndarray) -> float:
+def widest(kin, basis, grids, x, of):
     """Return the largest distance of a corner of a domain from its point, in cells."""
     grids = at_hand(grids)
     far = 0.0

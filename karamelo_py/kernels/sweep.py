@@ -194,7 +194,7 @@ def scatter_point(
     """Scatter the quantities of a point, or of points in lanes, to the nodes of `out`."""
     stencil = recompute_stencil(visit.weights, w, stencil, p)
     loads = load_all(visit.quantities, w, p, dt)
-    scatter_nodes(lanes, stencil, visit.quantities, out, loads)
+    scatter_nodes(stencil, lanes, visit.quantities, out, loads)
 
 
 @noinline

@@ -17,7 +17,7 @@ from karamelo_py.compiler.compile import point_function, real, shared
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.tuples import clear_first
-from karamelo_py.kernels import arrays, p2g
+from karamelo_py.kernels import arrays, nodes, p2g
 from karamelo_py.kernels.arrays import Number, Setup, Tag
 from karamelo_py.kernels.averaging import FBar
 from karamelo_py.kernels.clock import step_size
@@ -31,18 +31,6 @@ from karamelo_py.kernels.g2p import (
 )
 from karamelo_py.kernels.hook_loop import add_work
 from karamelo_py.kernels.loss import EnergyLoss, FrictionalHeat
-from karamelo_py.kernels.nodes import (
-    ClearFrictionalHeat,
-    ExtendSeries,
-    KeepLoss,
-    MomentumToVelocity,
-    NodalUpdate,
-    StartSeries,
-    SumsToVelocity,
-    TakeMean,
-    TakeMeanStress,
-    UpdateToVelocity,
-)
 from karamelo_py.kernels.sweep import OldWeights, PresentWeights, Visit, sweep, sweep_nodes
 from karamelo_py.points.kinematics import Axisymmetric, dimension
 from karamelo_py.points.transfers.xpic import XPIC
@@ -114,19 +102,17 @@ def _tasks(gathers: list[Gather]) -> tuple:
     Strain behind a move knows what that gathered. By the velocity of the last step, points are
     strained where that has led them.
     """
-    moves = any(isinstance(g.task, Move) for g in gathers)
-
-    def known(g: Gather) -> NamedTuple:
-        if not isinstance(g.task, Strain) or not (moves or g.of_last_step):
-            return g.task
-        return StrainInMove() if moves else StrainOfLastStep()
-
-    return tuple(known(g) for g in gathers)
+    strain: type = Strain
+    if any(isinstance(g.task, Move) for g in gathers):
+        strain = StrainInMove
+    elif any(g.of_last_step for g in gathers):
+        strain = StrainOfLastStep
+    return tuple(strain() if type(g.task) is Strain else g.task for g in gathers)
 
 
-def _kinds(tags: tuple) -> tuple:
+def _kinds(tags: Any) -> Any:
     """Return the classes of tags: as tuples, tags without numbers are all equal."""
-    return tuple(type(tag) for tag in tags)
+    return tuple(_kinds(tag) if type(tag) is tuple else type(tag) for tag in tags)
 
 
 def fused(rows: Iterable[Any]) -> list[Any]:
@@ -137,30 +123,25 @@ def fused(rows: Iterable[Any]) -> list[Any]:
     out: list[Any] = []
     waiting: list[Gather] = []
 
-    def sweep(scatter: Scatter | None, more: bool = False) -> Sweep:
+    def sweep(scatter: Scatter | None, more: bool = False) -> None:
         found = scatter or Scatter((), OldWeights())
         visit = Visit(_tasks(waiting), found.quantities, found.weights)
         share, of_last_step = waiting[0][1:] if waiting else (1.0, False)
         # The new places are read by a scatter of the next step, whoever made them.
         moves = bool(waiting) or more
         scatters = scatter is not None
-        return Sweep(visit, share, of_last_step, bool(waiting), scatters, moves, more)
+        out.append(Sweep(visit, share, of_last_step, bool(waiting), scatters, moves, more))
+        waiting.clear()
 
     for row in kept:
-        if isinstance(row, Gather):
-            if waiting and waiting[0][1:] != row[1:]:
-                out.append(sweep(None))
-                waiting = []
-            waiting.append(row)
-        elif isinstance(row, Scatter):
-            out.append(sweep(row))
-            waiting = []
-        else:
-            if waiting:
-                out.append(sweep(None))
-                waiting = []
-            out.append(row)
-    out.append(sweep(next_sums, more=True))
+        if isinstance(row, Scatter):
+            sweep(row)
+            continue
+        goes_along = isinstance(row, Gather) and all(row[1:] == other[1:] for other in waiting)
+        if waiting and not goes_along:
+            sweep(None)
+        (waiting if isinstance(row, Gather) else out).append(row)
+    sweep(next_sums, more=True)
     return out
 
 
@@ -169,26 +150,18 @@ def staged(rows: Iterable[Any]) -> list[Any]:
     rows = list(rows)
     loops = [row.visit for row in fused(rows) if isinstance(row, Sweep)]
 
-    def loop_of(tasks: tuple, scatter: Scatter | None) -> Visit:
-        for visit in loops:
-            if scatter is None and _kinds(visit.tasks) == _kinds(tasks):
-                return visit
-            if scatter is not None and (*_kinds(visit.quantities), type(visit.weights)) == (
-                *_kinds(scatter.quantities),
-                type(scatter.weights),
-            ):
-                return visit
-        if scatter is None:
-            return Visit(tasks, (), OldWeights())
-        return Visit(tasks, scatter.quantities, scatter.weights)
+    def loop_of(own: Visit) -> Visit:
+        """The visit of the fused step with such tasks, or such quantities; else its own."""
+        part = slice(0, 1) if own.tasks else slice(1, 3)
+        return next((visit for visit in loops if _kinds(visit[part]) == _kinds(own[part])), own)
 
     out: list[Any] = []
     for row in rows:
         if isinstance(row, Gather):
-            out.append(Sweep(loop_of(_tasks([row]), None), *row[1:], True, False))
+            visit = loop_of(Visit(_tasks([row]), (), OldWeights()))
+            out.append(Sweep(visit, *row[1:], gathers=True, scatters=False))
         elif isinstance(row, Scatter):
-            visit = loop_of((), row)
-            out.append(Sweep(visit, gathers=False, moves=False))
+            out.append(Sweep(loop_of(Visit((), *row)), gathers=False, moves=False))
         else:
             out.append(row)
     return out
@@ -265,11 +238,11 @@ def sum_series(transfer: Tag, s: Setup, mode: Tag) -> None:
 def _sum_series_xpic(transfer, s, mode):
     # (I - (I - S S+)^m) v_p = S sum_k (I - S+ S)^k S+ v, the sum from 0 to m - 1
     dt = step_size(s)
-    sweep_nodes(mode, StartSeries(), s.kin, s.nodes, s.ranges, dt)
+    sweep_nodes(mode, nodes.StartSeries(), s.kin, s.nodes, s.ranges, dt)
     for k in range(transfer.order - 1):
         visit = Visit((SeriesTerm(k),), (p2g.SeriesBack(),), OldWeights())
         sweep(s, mode, visit, dt, True, True, False)
-        sweep_nodes(mode, ExtendSeries(), s.kin, s.nodes, s.ranges, dt)
+        sweep_nodes(mode, nodes.ExtendSeries(), s.kin, s.nodes, s.ranges, dt)
     hold_axis(s.kin, s)
 
 
@@ -285,7 +258,7 @@ def average_volumes(averaging: Tag, s: Setup, mode: Tag, dt: Number, trial: Tag)
 def _average_volumes_f_bar(averaging, s, mode, dt, trial):
     visit = Visit((trial,), (p2g.Volumes(),), OldWeights())
     sweep(s, mode, visit, dt, True, True, False)
-    sweep_nodes(mode, TakeMean(), s.kin, s.nodes, s.ranges, dt)
+    sweep_nodes(mode, nodes.TakeMean(), s.kin, s.nodes, s.ranges, dt)
 
 
 @point_function(otherwise=True)
@@ -296,7 +269,7 @@ def average_stress(averaging: Tag, s: Setup, mode: Tag) -> None:
 @average_stress.on(FBar)
 def _average_stress_f_bar(averaging, s, mode):
     dt = step_size(s)
-    sweep_nodes(mode, TakeMeanStress(), s.kin, s.nodes, s.ranges, dt)
+    sweep_nodes(mode, nodes.TakeMeanStress(), s.kin, s.nodes, s.ranges, dt)
     visit = Visit((SetMeanStress(),), (p2g.AveragedForce(),), OldWeights())
     sweep(s, mode, visit, dt, True, True, False)
 
@@ -305,9 +278,9 @@ def _average_stress_f_bar(averaging, s, mode):
 def sum_loss(s: Setup, mode: Tag) -> None:
     """At the nodes, what they do not keep of kinetic energy, where it becomes heat."""
     if field(s.nodes.fields, FrictionalHeat) is not None:
-        sweep_nodes(mode, ClearFrictionalHeat(), s.kin, s.nodes, s.ranges, step_size(s))
+        sweep_nodes(mode, nodes.ClearFrictionalHeat(), s.kin, s.nodes, s.ranges, step_size(s))
     if field(s.nodes.fields, EnergyLoss) is not None:
-        sweep_nodes(mode, KeepLoss(), s.kin, s.nodes, s.ranges, step_size(s))
+        sweep_nodes(mode, nodes.KeepLoss(), s.kin, s.nodes, s.ranges, step_size(s))
 
 
 @shared
@@ -320,62 +293,66 @@ def light_node(s):
     clock = s.control.clock[0]
     courant = clock.rate * s.control.values[arrays.DT] / clock.spacing
     masses = min(dimension(s.kin) * courant * courant, 1.0)
-    return UpdateToVelocity(real(masses, s.nodes.sums[0, arrays.MASS]))
+    return nodes.UpdateToVelocity(real(masses, s.nodes.sums[0, arrays.MASS]))
 
 
-light_node.goes_through = UpdateToVelocity.goes_through  # type: ignore[attr-defined]
+light_node.goes_through = nodes.UpdateToVelocity.goes_through  # type: ignore[attr-defined]
 
 
-def _call(do: Any, says: Callable[[Any], str | None]) -> SceneTask:
-    """A row that does something; `says` tells what in a scene."""
-    do.says = says
-    return SceneTask(do)
+def _call(
+    function: Any, says: str | None = None, where: Callable[[Any], bool] = lambda s: True
+) -> SceneTask:
+    """A row that calls a function; `says` tells what it does in scenes where it does anything."""
+    function.says = lambda s: says if where(s) else None
+    return SceneTask(function)
 
 
 HEAT = _call(
     lambda s, mode, hooks: conduct(s.heat, s, mode, hooks),
-    lambda s: (
-        None
-        if isinstance(s.heat, Insulated)
-        else "heat to the nodes, its flow, temperature of the points"
-    ),
+    "heat to the nodes, its flow, temperature of the points",
+    lambda s: conduct.defined(type(s.heat)),
 )
 LOSS = _call(
     lambda s, mode, hooks: sum_loss(s, mode),
-    lambda s: (
-        None
-        if field(s.nodes.fields, EnergyLoss) is None
-        else "kinetic energy that the nodes do not keep, as heat to the points"
-    ),
+    "kinetic energy that the nodes do not keep, as heat to the points",
+    lambda s: field(s.nodes.fields, EnergyLoss) is not None,
 )
 AVERAGED = _call(
     lambda s, mode, hooks: average_stress(s.averaging, s, mode),
-    lambda s: (
-        "force of the averaged mean stress in one visit of the points"
-        if isinstance(s.averaging, FBar)
-        else None
-    ),
+    "force of the averaged mean stress in one visit of the points",
+    lambda s: average_stress.defined(type(s.averaging)),
 )
 CONTACT = _call(
     lambda s, mode, hooks: touch(s.contact, s),
-    lambda s: "contact of v*" if touch.defined(type(s.contact)) else None,
+    "contact of v*",
+    lambda s: touch.defined(type(s.contact)),
 )
-WORK_OF_LOADS = _call(lambda s, mode, hooks: add_work(hooks, s), lambda s: None)
-CONTACT_BEFORE = _call(lambda s, mode, hooks: touch_velocity(s.contact, s, 0), lambda s: None)
-CONTACT_AFTER = _call(lambda s, mode, hooks: touch_velocity(s.contact, s, 1), lambda s: None)
+WORK_OF_LOADS = _call(lambda s, mode, hooks: add_work(hooks, s))
+CONTACT_BEFORE = _call(lambda s, mode, hooks: touch_velocity(s.contact, s, 0))
+CONTACT_AFTER = _call(lambda s, mode, hooks: touch_velocity(s.contact, s, 1))
 AXIS = _call(
     lambda s, mode, hooks: hold_axis(s.kin, s),
-    lambda s: "v_r = 0 on the axis" if hold_axis.defined(type(s.kin)) else None,
+    "v_r = 0 on the axis",
+    lambda s: hold_axis.defined(type(s.kin)),
 )
 SERIES = _call(
     lambda s, mode, hooks: sum_series(s.transfer, s, mode),
-    lambda s: "series of XPIC" if isinstance(s.transfer, XPIC) else None,
+    "series of XPIC",
+    lambda s: sum_series.defined(type(s.transfer)),
 )
 
+BEGIN = AtPoints(arrays.INITIAL_INTEGRATE, 0)
+END = AtPoints(arrays.FINAL_INTEGRATE, 1)
 SUMS = Scatter((p2g.MassMomentum(), p2g.InternalForce()))
 MASS_AND_MOMENTUM = Scatter((p2g.MassMomentum(),))
-# For schemes that strain first.
-VELOCITY_BEFORE = (MASS_AND_MOMENTUM, AXIS, NodeTask(SumsToVelocity()))
+# For schemes that strain first: the nodal velocity before the forces.
+VELOCITY_BEFORE = (
+    MASS_AND_MOMENTUM,
+    AXIS,
+    NodeTask(nodes.SumsToVelocity()),
+    AtNodes(arrays.POST_UPDATE_GRID_STATE, arrays.ON_VELOCITY),
+    CONTACT_BEFORE,
+)
 FORCE = Scatter((p2g.InternalForce(),), OldWeights())
 # v* = v + dt f / m, with what the fixes add and prescribe; and heat flows.
 ACCELERATE = (
@@ -384,7 +361,7 @@ ACCELERATE = (
     HEAT,
     AtNodes(arrays.POST_PARTICLES_TO_GRID, arrays.ON_SUMS),
     AXIS,
-    NodeTask(NodalUpdate()),
+    NodeTask(nodes.NodalUpdate()),
     AtNodes(arrays.POST_UPDATE_GRID_STATE, arrays.ON_UPDATE),
     CONTACT,
     WORK_OF_LOADS,
@@ -398,6 +375,8 @@ MOVE = (
 # The velocity of the moved points, at the nodes once more.
 MOMENTUM_AGAIN = (
     Scatter((p2g.MomentumAgain(),), OldWeights()),
-    NodeTask(MomentumToVelocity()),
+    NodeTask(nodes.MomentumToVelocity()),
     AXIS,
+    AtNodes(arrays.POST_VELOCITIES_TO_GRID, arrays.ON_VELOCITY),
+    CONTACT_AFTER,
 )

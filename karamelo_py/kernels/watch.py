@@ -25,7 +25,7 @@ from karamelo_py.compiler.fields import load, load_vector
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import kernel, noinline
 from karamelo_py.compiler.threads import shared_out
-from karamelo_py.compiler.tuples import record
+from karamelo_py.compiler.tuples import put_at, record
 from karamelo_py.kernels import totals
 from karamelo_py.kernels.arrays import TIMESTEP, first_from, known_to_laws
 from karamelo_py.kernels.lanes import lanes_of_law, points_from
@@ -58,30 +58,6 @@ BORNE = 4.0
 
 
 @shared
-def _squared(v):
-    return sum([real(x, 0.0) * real(x, 0.0) for x in v])
-
-
-@shared
-def _nothing(kin):
-    """No mass and no momentum."""
-    return (0.0,) * (1 + kin.dimension)
-
-
-@shared
-def _carried(total, mass, v):
-    """Mass and momentum with those of more points."""
-    more = (mass, *[mass * real(x, 0.0) for x in v])
-    return tuple([added(part, x) for part, x in zip(total, more, strict=True)])
-
-
-@shared
-def _note(report, t, total):
-    for k, part in enumerate(total):
-        report[t, OF_SOLID + 1 + k] = part
-
-
-@shared
 def _solid_of(firsts, number):
     """The solid that a point of this id belongs to."""
     return first_from(firsts, 0, firsts.size, number + 1) - 1
@@ -98,24 +74,22 @@ def _look_at_share(kin, points, laws, tiling, firsts, k):
         solid = _solid_of(firsts, points.id[start])
         begin, behind = firsts[solid], _behind(firsts, solid)
         kinetic = stored = 0.0
-        total = _nothing(kin)
+        total = (0.0,) * (1 + kin.dimension)
         for q in range(start, end, lanes.width):
             p = points_from(lanes, q, end)
             law = record(laws, index(points.material[p]))
             own = of_present(p, points.mass[p])
             state = load(points.state, p, initial_state(law, kin, own))
-            v = load_vector(kin, points.v, p)
             mass = real(own, 0.0)
-            kinetic = added(kinetic, 0.5 * mass * _squared(v))
+            v = [real(x, 0.0) for x in load_vector(kin, points.v, p)]
+            kinetic = added(kinetic, 0.5 * mass * sum([x * x for x in v]))
             energy = energy_density(law, kin, state) + dissipated_energy(law, kin, state)
             stored = added(stored, mass * real(specific_volume(law), 0.0) * real(energy, 0.0))
-            total = _carried(total, mass, v)
+            more = zip(total, (mass, *[mass * x for x in v]), strict=True)
+            total = tuple([added(part, x) for part, x in more])
             if not all_lanes((points.id[p] >= begin) & (points.id[p] < behind)):
                 solid = -1
-        tiling.report[t, ENERGIES] = kinetic
-        tiling.report[t, ENERGIES + 1] = stored
-        tiling.report[t, OF_SOLID] = solid
-        _note(tiling.report, t, total)
+        put_at(tiling.report, t, ENERGIES, (kinetic, stored, solid, *total))
 
 
 _look_at_shares = shared_out(_look_at_share, "kin, points, laws, tiling, firsts")
@@ -135,27 +109,16 @@ def _sum_blocks(block, s, mode):
     _sum_energies(mode, s.kin, points, block.laws, block.tiling, s.control)
 
 
-@kernel
-def _clear(control):
-    control.totals[totals.KINETIC] = 0
-    control.totals[totals.STORED] = 0
-
-
-@kernel
-def _take_sums(control):
-    clock, answer = control.clock[0], control.answer
-    clock.kinetic = answer[totals.KINETIC]
-    clock.stored = answer[totals.STORED] + clock.born_with
-    clock.work = answer[totals.WORK]
-
-
 @shared
 def sum_energies(s, mode):
     """Energies of all points, kinetic and stored plus dissipated, and the work into the clock."""
-    _clear(s.control)
+    s.control.totals[: totals.WORK] = 0
     _sum_blocks(s, mode)
     totals.collect(s.control.ranks, s.control, totals.KINETIC, 3)
-    _take_sums(s.control)
+    clock, answer = s.control.clock[0], s.control.answer
+    clock.kinetic = answer[totals.KINETIC]
+    clock.stored = answer[totals.STORED] + clock.born_with
+    clock.work = answer[totals.WORK]
 
 
 @kernel
@@ -201,30 +164,21 @@ def _add_blocks(block, s):
     _add_momenta(dimension(s.kin), points.id, points.mass, points.v, block.tiling, s.control)
 
 
-@kernel
-def _clear_momenta(control):
-    control.totals[control.values.size :] = 0
-
-
-@kernel
-def _take_drift(kin, control):
-    d, energy = dimension(kin), 0.0
-    for k in range(control.firsts.size):
-        mass = control.answer[k * (1 + d)]
-        for i in range(free_from(kin), d):
-            momentum = control.answer[k * (1 + d) + 1 + i]
-            energy += 0.5 * momentum * momentum / mass if mass > 0 else 0.0
-    control.clock[0].of_drift = energy
-
-
 @shared
 def _sum_drift(s):
     """Kinetic energy of the centres of mass of the solids, into the clock; after `sum_energies`."""
-    _clear_momenta(s.control)
+    control, d = s.control, dimension(s.kin)
+    own = control.values.size
+    control.totals[own:] = 0
     _add_blocks(s)
-    own = s.control.values.size
-    totals.collect(s.control.ranks, s.control, own, s.control.totals.shape[0] - own)
-    _take_drift(s.kin, s.control)
+    totals.collect(control.ranks, control, own, control.totals.shape[0] - own)
+    energy = 0.0
+    for k in range(control.firsts.size):
+        mass = control.answer[k * (1 + d)]
+        for i in range(free_from(s.kin), d):
+            momentum = control.answer[k * (1 + d) + 1 + i]
+            energy += 0.5 * momentum * momentum / mass if mass > 0 else 0.0
+    control.clock[0].of_drift = energy
 
 
 @shared
