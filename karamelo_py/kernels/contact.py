@@ -292,7 +292,7 @@ def _touch_pair(contact, kin, nodes, control, i, j, place, share, where):
     if not excess > 0:
         return
     size = sqrt(_dot(pair.outward, pair.outward))
-    normal = [outward / size for outward in pair.outward]
+    normal = pair.outward._make([outward / size for outward in pair.outward])
     compliance = _dot(normal, normal, pair.yielding)
     if not compliance > 0:
         return  # the fixes move both

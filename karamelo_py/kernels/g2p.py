@@ -14,19 +14,12 @@ from karamelo_py.kernels import averaging, visit
 from karamelo_py.kernels.arrays import Index, Nodes, Number, Tag, of_change, vector_at
 from karamelo_py.kernels.loss import FrictionalHeat, in_company, reflect, warm, warm_by_friction
 from karamelo_py.kernels.visit import Work
-from karamelo_py.points import frames, transfers
+from karamelo_py.points import frames, laws, transfers
 from karamelo_py.points.basis import carried, carrier, carry, deformed, entry, extent
 from karamelo_py.points.basis.cpdi.corners import AtCorners
 from karamelo_py.points.boundary import Bounces, reflected
 from karamelo_py.points.grid import inside
 from karamelo_py.points.kinematics import I, det, outer, vector, zero, zero_vector
-from karamelo_py.points.laws import (
-    advance,
-    constrained_velocity,
-    jacobian,
-    wave_speed_bound,
-    wave_speed_squared,
-)
 from karamelo_py.points.transfers.xpic import Reflected, Series, TermOfSeries
 
 
@@ -252,11 +245,11 @@ def _settled_strain(task, w, stencil, p, dt, total, totals, fastest):
     old = visit.state_of(w, law, p, dt)
     f = visit.deformation_of(w.frame, w.kin, law, old, w.points, p)
     growth = frames.spatial_increment(w.frame, w.kin, dl, f)
-    state = advance(law, w.kin, old, growth, dt)
+    state = laws.advance(law, w.kin, old, growth, dt)
     store(w.points.state, p, state)
     now = frames.strained(w.frame, w.kin, f, dl)
     store(field(w.points.fields, frames.DeformationGradient), p, now)
-    j = jacobian(law, w.kin, state)
+    j = laws.jacobian(law, w.kin, state)
     grown = real(0, j)
     if frames.follows(w.frame) and carried(w.basis, w.kin) == 0:
         x = w.places.y if isinstance(task, SecondStrain) else w.places.x
@@ -268,12 +261,12 @@ def _settled_strain(task, w, stencil, p, dt, total, totals, fastest):
         return where(j > 0, grown, inf), fastest
     # The speed of waves is only asked of the few points that may be faster than all before them.
     shorter = frames.inverse_stretch_squared(w.frame, w.kin, now, dt)
-    most = wave_speed_bound(law, w.kin, state) * shorter
+    most = laws.wave_speed_bound(law, w.kin, state) * shorter
     speed = (load_vector(w.kin, w.points.v, p) - w.common).largest()
     slack = fastest - speed
     if all_lanes((slack >= 0) & (most <= slack * slack)):  # so written, NaN is noticed too
         return grown, fastest
-    rate = sqrt(wave_speed_squared(law, w.kin, state) * shorter) + speed
+    rate = sqrt(laws.wave_speed_squared(law, w.kin, state) * shorter) + speed
     return grown, where(fastest > rate, fastest, rate)
 
 
@@ -323,11 +316,11 @@ def _settled_move(task, w, stencil, p, dt, total, totals, fastest):
     law = visit.law_of(w, p)
     v_pic, dv, moment, *corners = total
     old = load_vector(w.kin, w.points.v, p)
-    v = constrained_velocity(law, old, transfers.updated_velocity(w.transfer, old, v_pic, dv))
+    v = laws.constrained_velocity(law, old, transfers.updated_velocity(w.transfer, old, v_pic, dv))
     x = load_vector(w.kin, w.places.x, p)
     j = transfers.known_volume(w.transfer, law, w.kin, visit.state_of(w, law, p, dt))
     displacing = transfers.displacing_velocity(w.transfer, v, v_pic, j)
-    step = vector(w.kin, dt * constrained_velocity(law, v, displacing))
+    step = vector(w.kin, dt * laws.constrained_velocity(law, v, displacing))
     y = x + step
     warm_by_friction(field(w.nodes.fields, FrictionalHeat), w, stencil, p, v[0])
     warm(w, stencil, p, v_pic - dv)

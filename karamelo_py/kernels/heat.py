@@ -25,18 +25,11 @@ from karamelo_py.compiler.compile import (
     where,
 )
 from karamelo_py.compiler.fields import Field, StepField, field, load, load_vector, store, vector
-from karamelo_py.kernels import arrays
+from karamelo_py.kernels import arrays, hook_loop
 from karamelo_py.kernels.arrays import MASS, Buffers, Nodes, of_force
 from karamelo_py.kernels.averaging import NodalMean
 from karamelo_py.kernels.clock import read_reports, step_size
 from karamelo_py.kernels.g2p import empty, gathered, settled
-from karamelo_py.kernels.hook_loop import (
-    HeatedPoints,
-    clear_totals,
-    node_hooks,
-    point_hooks,
-    publish_totals,
-)
 from karamelo_py.kernels.nodes import NodalUpdate, SumsToVelocity, TakeMean
 from karamelo_py.kernels.p2g import load_of, scattered
 from karamelo_py.kernels.sweep import OldWeights, Visit, sweep, sweep_nodes
@@ -109,10 +102,7 @@ class HeatContent(NamedTuple):
     says = "heat to grid"
     reads = ("x", "mass", "state", "material", "heat gradient")
 
-    @staticmethod
-    def fills(kin):
-        """See `kernels.sums`."""
-        return ("sums", 0, of_force(Line())), (NodalMean, 0, 2)
+    fills = staticmethod(lambda kin: (("sums", 0, of_force(Line())), (NodalMean, 0, 2)))
 
 
 class TemperatureGradient(NamedTuple):
@@ -131,10 +121,7 @@ class HeatFlow(NamedTuple):
     says = "heat flow"
     reads = ("state", "material", "deformation gradient", "heat gradient", "conductance")
 
-    @staticmethod
-    def fills(kin):
-        """See `kernels.sums`."""
-        return (("sums", of_force(Line()), of_force(Line()) + 1),)
+    fills = staticmethod(lambda kin: (("sums", of_force(Line()), of_force(Line()) + 1),))
 
 
 class Warming(NamedTuple):
@@ -293,7 +280,7 @@ def _at_heat_nodes_hooks(hooks, stage, target, s):
     # Temperatures are always kept: FLIP, whatever the transfer of velocity.
     clock = s.control.clock[0]
     clock.set_low, clock.set_high = np.inf, -np.inf
-    node_hooks(
+    hook_loop.node_hooks(
         stage, target, Line(), s.grids, s.heat.nodes, s.ranges, hooks, s.control, step_size(s), 1.0
     )
     agree_on_heat(s.control.ranks, s.control)
@@ -304,18 +291,10 @@ def _at_heat_nodes_hooks(hooks, stage, target, s):
 @over_blocks
 def _supply_blocks(block, s, hooks):
     points = block.points
-    fields = points.fields
-    warmth = HeatedPoints(
-        points.id,
-        s.kin,
-        field(fields, Capacity),
-        field(fields, Temperature),
-        field(fields, Volume),
-        field(fields, Supply),
-        field(fields, TemperatureShare),
-        points.x[s.control.clock[0].now],
-    )
-    point_hooks(arrays.SUPPLY_HEAT, warmth, hooks, s.control, step_size(s))
+    kinds = Capacity, Temperature, Volume, Supply, TemperatureShare
+    own = [field(points.fields, kind) for kind in kinds]
+    warmth = hook_loop.HeatedPoints(points.id, s.kin, *own, points.x[s.control.clock[0].now])
+    hook_loop.point_hooks(arrays.SUPPLY_HEAT, warmth, hooks, s.control, step_size(s))
 
 
 @point_function(otherwise=True)
@@ -327,9 +306,9 @@ def at_heated_points(hooks, s):
 def _at_heated_points_hooks(hooks, s):
     clock = s.control.clock[0]
     clock.rise = clock.fall = 0.0
-    clear_totals(arrays.SUPPLY_HEAT, hooks, s.control)
+    hook_loop.clear_totals(arrays.SUPPLY_HEAT, hooks, s.control)
     _supply_blocks(s, hooks)
-    publish_totals(arrays.SUPPLY_HEAT, hooks, s.control)
+    hook_loop.publish_totals(arrays.SUPPLY_HEAT, hooks, s.control)
     agree_on_heat(s.control.ranks, s.control)
     clock.hottest += step_size(s) * clock.rise
     clock.coldest += step_size(s) * clock.fall
@@ -342,12 +321,8 @@ def visit_for_heat(heat, s, mode, visit, gathers, scatters):
     sweep(here, mode, visit, step_size(s), gathers, scatters, False)
 
 
-@shared
-def map_heat(heat, s, mode, gathers, scatters):
-    """Heat capacity and heat of the nodes from the points now, or temperature from the nodes."""
-    # One loop for both.
-    visit = Visit((Warming(),), (HeatContent(),), OldWeights())
-    visit_for_heat(heat, s, mode, visit, gathers, scatters)
+MAP = Visit((Warming(),), (HeatContent(),), OldWeights())  # one loop for both ways
+FLOW = Visit((TemperatureGradient(),), (HeatFlow(),), OldWeights())
 
 
 @point_function(otherwise=True)
@@ -357,25 +332,21 @@ def show_heat(heat, s, mode):
 
 @show_heat.on(Conducting)
 def _show_heat_conducting(heat, s, mode):
-    map_heat(heat, s, mode, False, True)
+    visit_for_heat(heat, s, mode, MAP, False, True)
     sweep_nodes(mode, SumsToVelocity(), Line(), heat.nodes, s.ranges, step_size(s))
 
 
 @conduct.on(Conducting)
 def _conduct_conducting(heat, s, mode, hooks):
     dt = step_size(s)
-    nodes = heat.nodes
-    kin = Line()
-    map_heat(heat, s, mode, False, True)
-    sweep_nodes(mode, SumsToVelocity(), kin, nodes, s.ranges, dt)
-    sweep_nodes(mode, TakeMean(), kin, nodes, s.ranges, dt)
+    show_heat(heat, s, mode)
+    sweep_nodes(mode, TakeMean(), Line(), heat.nodes, s.ranges, dt)
     at_heat_nodes(hooks, arrays.POST_HEAT_TO_GRID, arrays.ON_VELOCITY, s)
     at_heated_points(hooks, s)
-    flow = Visit((TemperatureGradient(),), (HeatFlow(),), OldWeights())
-    visit_for_heat(heat, s, mode, flow, True, True)
-    sweep_nodes(mode, NodalUpdate(), kin, nodes, s.ranges, dt)
+    visit_for_heat(heat, s, mode, FLOW, True, True)
+    sweep_nodes(mode, NodalUpdate(), Line(), heat.nodes, s.ranges, dt)
     at_heat_nodes(hooks, arrays.POST_UPDATE_GRID_HEAT, arrays.ON_UPDATE, s)
-    map_heat(heat, s, mode, True, False)
+    visit_for_heat(heat, s, mode, MAP, True, False)
     # What `Warming` reports as a rate is by what factor conduction has become faster.
     read_reports(s)
     clock = s.control.clock[0]

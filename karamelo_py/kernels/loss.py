@@ -24,22 +24,9 @@ from karamelo_py.compiler import fields
 from karamelo_py.compiler.compile import accumulate, real, round_off, shared, where
 from karamelo_py.kernels.arrays import MASS, of_change, of_momentum, vector_at
 from karamelo_py.kernels.visit import law_of, state_of
+from karamelo_py.points import laws, transfers
 from karamelo_py.points.basis import entry, support
 from karamelo_py.points.kinematics import dimension
-from karamelo_py.points.laws import (
-    heat_capacity,
-    specific_volume,
-    temperature,
-    warmed,
-    with_temperature,
-)
-from karamelo_py.points.transfers import (
-    add_moment,
-    gradient_weight,
-    lost_shares,
-    nodal_momentum,
-    zero_moment,
-)
 from karamelo_py.points.transfers.xpic import Reflected, Series
 
 # Share of the mass at its nodes from where on a point loses its moment, to the power of dimensions:
@@ -70,7 +57,8 @@ def warm_node(rubbed, n, heat):
 @shared
 def _nodes_of(w, stencil):
     """(node, weight, gradient) of the nodes that a point sees."""
-    return [entry(w.basis, w.kin, w.grid, stencil, k) for k in range(support(w.basis, w.kin))]
+    nodes = range(support(w.basis, w.kin))
+    return tuple([entry(w.basis, w.kin, w.grid, stencil, k) for k in nodes])
 
 
 @shared
@@ -82,11 +70,11 @@ def warm_by_friction(rubbed, w, stencil, p, like):
         heat = like - like
         for i, weight, _ in _nodes_of(w, stencil):
             heat += weight * rubbed[i, 0]
-        capacity = heat_capacity(law, like)
+        capacity = laws.heat_capacity(law, like)
         warms = capacity > 0
         rise = where(warms, heat, like - like) / where(warms, capacity, real(1, like))
-        T = temperature(law, w.kin, state) + rise
-        fields.store(w.points.state, p, with_temperature(law, w.kin, state, T))
+        T = laws.temperature(law, w.kin, state) + rise
+        fields.store(w.points.state, p, laws.with_temperature(law, w.kin, state, T))
 
 
 @shared
@@ -129,7 +117,7 @@ def warm(w, stencil, p, v):
     lost = fields.field(w.nodes.fields, EnergyLoss)
     reflected = fields.field(w.points.fields, Reflected)
     if lost is not None:
-        moment = _moment_before(w, stencil, v, zero_moment(w.transfer, w.kin, v[0]))
+        moment = _moment_before(w, stencil, v, transfers.zero_moment(w.transfer, w.kin, v[0]))
         moment = in_company(w, stencil, p, moment)
         _heat(w, p, _gone(lost, w, stencil, v, moment))
     if reflected is not None:
@@ -169,7 +157,9 @@ def _heat(w, p, gone):
     """Give point `p` the energy per mass that is gone."""
     law = law_of(w, p)
     state = state_of(w, law, p, gone)
-    fields.store(w.points.state, p, warmed(law, w.kin, state, gone / specific_volume(law)))
+    fields.store(
+        w.points.state, p, laws.warmed(law, w.kin, state, gone / laws.specific_volume(law))
+    )
 
 
 @shared
@@ -226,9 +216,11 @@ def _before(w, i, like):
 def _moment_before(w, stencil, v, moment):
     """Gather the moment of the velocity that the nodes had before the update."""
     for k, (i, N, grad_N) in enumerate(_nodes_of(w, stencil)):
-        grad_N = gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, grad_N)
+        grad_N = transfers.gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, grad_N)
         u = _before(w, i, v)
-        moment = add_moment(w.transfer, w.kin, w.basis, w.grid, stencil, k, N, grad_N, u, moment)
+        moment = transfers.add_moment(
+            w.transfer, w.kin, w.basis, w.grid, stencil, k, N, grad_N, u, moment
+        )
     return moment
 
 
@@ -236,10 +228,12 @@ def _moment_before(w, stencil, v, moment):
 def _gone(lost, w, stencil, v, moment):
     """Kinetic energy per mass that a point has lost at the nodes and on the way back."""
     gone = v[0] - v[0]
-    there, here = lost_shares(w.transfer, gone)
+    there, here = transfers.lost_shares(w.transfer, gone)
     one = real(1, gone)
     for k, (i, N, _) in enumerate(_nodes_of(w, stencil)):
-        kept = nodal_momentum(w.transfer, w.kin, w.basis, w.grid, stencil, k, N, one, v - v, moment)
+        mine = transfers.nodal_momentum(
+            w.transfer, w.kin, w.basis, w.grid, stencil, k, N, one, v - v, moment
+        )
         apart = 0.5 * N * (_before(w, i, v) - v).squared()
-        gone += there * N * lost[i, 1] + here * (apart - energy_of(N, kept))
+        gone += there * N * lost[i, 1] + here * (apart - energy_of(N, mine))
     return gone

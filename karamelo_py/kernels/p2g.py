@@ -30,15 +30,11 @@ from karamelo_py.kernels.arrays import (
 from karamelo_py.kernels.averaging import AveragedStress, FBar, NodalMean, NodalStress, VolumeRatio
 from karamelo_py.kernels.loss import EnergyLoss, bring_energy
 from karamelo_py.kernels.visit import Work, deformation_of, for_tags, law_of, records_of, state_of
+from karamelo_py.points import laws
 from karamelo_py.points.basis import entry, mapped_again
 from karamelo_py.points.frames import Total, force_stress
 from karamelo_py.points.kinematics import I, dimension, nothing
-from karamelo_py.points.laws import (
-    constrained_velocity,
-    jacobian,
-    kirchhoff_stress,
-    specific_volume,
-)
+from karamelo_py.points.laws import constrained_velocity
 from karamelo_py.points.transfers import Moment, gradient_weight, nodal_momentum, zero_moment
 from karamelo_py.points.transfers.xpic import Series, TermOfSeries
 
@@ -224,8 +220,8 @@ def mean_stress(averaging, kin, law, state, volume):
 
 @mean_stress.on(FBar)
 def _mean_stress_f_bar(averaging, kin, law, state, volume):
-    tau = kirchhoff_stress(law, kin, state).mean_of_stretching()
-    return volume * tau, volume * jacobian(law, kin, state)
+    tau = laws.kirchhoff_stress(law, kin, state).mean_of_stretching()
+    return volume * tau, volume * laws.jacobian(law, kin, state)
 
 
 @load_of.on(AveragedForce)
@@ -233,7 +229,7 @@ def _load_of_averaged_force(quantity, w, p, like):
     law = law_of(w, p)
     state = state_of(w, law, p, like)
     f = deformation_of(w.frame, w.kin, law, state, w.points, p)
-    volume = _mass(w, p) * specific_volume(law)
+    volume = _mass(w, p) * laws.specific_volume(law)
     own, present = mean_stress(w.averaging, w.kin, law, state, volume)
     change = present * field(w.points.fields, AveragedStress)[0, p] - own
     return force_stress(w.frame, w.kin, nothing(w.kin) - change * I, f)
@@ -251,9 +247,9 @@ def _load_of_internal_force(quantity, w, p, like):
     law = law_of(w, p)
     state = state_of(w, law, p, like)
     f = deformation_of(w.frame, w.kin, law, state, w.points, p)
-    volume = _mass(w, p) * specific_volume(law)
+    volume = _mass(w, p) * laws.specific_volume(law)
     # Minus volume times stress, with the sign of the internal force.
-    stress = -volume * force_stress(w.frame, w.kin, kirchhoff_stress(law, w.kin, state), f)
+    stress = -volume * force_stress(w.frame, w.kin, laws.kirchhoff_stress(law, w.kin, state), f)
     force = load(field(w.points.fields, Force), p, load_vector(w.kin, w.points.v, p))
     mean = mean_stress(w.averaging, w.kin, law, state, volume)
     here = of_present(p, real(1, volume))
@@ -303,7 +299,7 @@ def _scattered_momentum_again(quantity, w, stencil, k, load):
 def _load_of_volumes(quantity, w, p, like):
     law = law_of(w, p)
     state = state_of(w, law, p, like)
-    volume = _mass(w, p) * specific_volume(law) * jacobian(law, w.kin, state)
+    volume = _mass(w, p) * laws.specific_volume(law) * laws.jacobian(law, w.kin, state)
     return volume * field(w.points.fields, VolumeRatio)[0, p], volume
 
 

@@ -17,18 +17,10 @@ from karamelo_py.compiler.compile import point_function, real, shared
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.tuples import clear_first
-from karamelo_py.kernels import arrays, nodes, p2g
+from karamelo_py.kernels import arrays, g2p, nodes, p2g
 from karamelo_py.kernels.arrays import Number, Setup, Tag
 from karamelo_py.kernels.averaging import FBar
 from karamelo_py.kernels.clock import step_size
-from karamelo_py.kernels.g2p import (
-    Move,
-    SeriesTerm,
-    SetMeanStress,
-    Strain,
-    StrainInMove,
-    StrainOfLastStep,
-)
 from karamelo_py.kernels.hook_loop import add_work
 from karamelo_py.kernels.loss import EnergyLoss, FrictionalHeat
 from karamelo_py.kernels.sweep import OldWeights, PresentWeights, Visit, sweep, sweep_nodes
@@ -102,12 +94,12 @@ def _tasks(gathers: list[Gather]) -> tuple:
     Strain behind a move knows what that gathered. By the velocity of the last step, points are
     strained where that has led them.
     """
-    strain: type = Strain
-    if any(isinstance(g.task, Move) for g in gathers):
-        strain = StrainInMove
+    strain: type = g2p.Strain
+    if any(isinstance(g.task, g2p.Move) for g in gathers):
+        strain = g2p.StrainInMove
     elif any(g.of_last_step for g in gathers):
-        strain = StrainOfLastStep
-    return tuple(strain() if type(g.task) is Strain else g.task for g in gathers)
+        strain = g2p.StrainOfLastStep
+    return tuple(strain() if type(g.task) is g2p.Strain else g.task for g in gathers)
 
 
 def _kinds(tags: Any) -> Any:
@@ -240,7 +232,7 @@ def _sum_series_xpic(transfer, s, mode):
     dt = step_size(s)
     sweep_nodes(mode, nodes.StartSeries(), s.kin, s.nodes, s.ranges, dt)
     for k in range(transfer.order - 1):
-        visit = Visit((SeriesTerm(k),), (p2g.SeriesBack(),), OldWeights())
+        visit = Visit((g2p.SeriesTerm(k),), (p2g.SeriesBack(),), OldWeights())
         sweep(s, mode, visit, dt, True, True, False)
         sweep_nodes(mode, nodes.ExtendSeries(), s.kin, s.nodes, s.ranges, dt)
     hold_axis(s.kin, s)
@@ -270,7 +262,7 @@ def average_stress(averaging: Tag, s: Setup, mode: Tag) -> None:
 def _average_stress_f_bar(averaging, s, mode):
     dt = step_size(s)
     sweep_nodes(mode, nodes.TakeMeanStress(), s.kin, s.nodes, s.ranges, dt)
-    visit = Visit((SetMeanStress(),), (p2g.AveragedForce(),), OldWeights())
+    visit = Visit((g2p.SetMeanStress(),), (p2g.AveragedForce(),), OldWeights())
     sweep(s, mode, visit, dt, True, True, False)
 
 
@@ -367,7 +359,7 @@ ACCELERATE = (
     WORK_OF_LOADS,
 )
 MOVE = (
-    Gather(Move()),
+    Gather(g2p.Move()),
     AtPoints(arrays.POST_GRID_TO_POINT, 1),
     AtPoints(arrays.POST_ADVANCE_PARTICLES, 1),
     Check(),
