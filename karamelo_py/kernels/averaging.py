@@ -2,13 +2,12 @@
 
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import fma, point_function, real
+from karamelo_py.compiler.compile import fma, real, shared
 from karamelo_py.compiler.fields import StepField, SummedField, field, pair
 from karamelo_py.compiler.tuples import row
 from karamelo_py.kernels.visit import deformation_of, law_of, state_of
 from karamelo_py.points.basis import entry
 from karamelo_py.points.frames import scaled_increment
-from karamelo_py.points.transfers import kept_gradient, straining
 
 
 class VolumeRatio(StepField):
@@ -55,38 +54,27 @@ class FBar(NamedTuple):
     node_fields = (NodalMean, NodalStress)
 
 
-@point_function(otherwise=True)
-def no_ratio(averaging, like):
+@shared
+def no_ratio(w, like):
     """Return the start of the gather of the averaged volume ratio; () where none is averaged."""
-    return ()
+    return (real(0, like),) if isinstance(w.averaging, FBar) else ()
 
 
-@no_ratio.on(FBar)
-def _no_ratio_f_bar(averaging, like):
-    return (real(0, like),)
-
-
-@point_function(otherwise=True)
-def gathered_ratio(averaging, w, stencil, k, total):
-    """`total` with the ratio of volumes at the k-th node."""
-    return total
-
-
-@gathered_ratio.on(FBar)
-def _gathered_ratio_f_bar(averaging, w, stencil, k, total):
+@shared
+def gathered_ratio(w, stencil, k, total):
+    """`total` with the ratio of volumes at the k-th node, where it is averaged."""
+    if not len(total):
+        return total
     i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
     (mean,) = row(field(w.nodes.fields, NodalMean), i, 0, total)
     return (fma(weight, mean, total[0]),)
 
 
-@point_function(otherwise=True)
-def averaged(averaging, w, p, dl, ratio):
-    """`dl` with the change of volume that the surroundings have on average."""
-    return dl
-
-
-@averaged.on(FBar)
-def _averaged_f_bar(averaging, w, p, dl, ratio):
+@shared
+def averaged(w, p, dl, ratio):
+    """`dl` with the change of volume that the surroundings have on average, where there is one."""
+    if not len(ratio):
+        return dl
     # The ratio of volumes of the increment is replaced by its average over the points nearby,
     # weighted with their volumes (after Coombs et al. 2018, "Overcoming volumetric locking in
     # material point methods", eq. 23; there over the points of a cell). In the total frame, `dl`
@@ -96,25 +84,3 @@ def _averaged_f_bar(averaging, w, p, dl, ratio):
     f = deformation_of(w.frame, w.kin, law, state, w.points, p)
     own = field(w.points.fields, VolumeRatio)[0, p]
     return scaled_increment(w.frame, w.kin, dl, f, ratio[0] / own)
-
-
-@point_function(otherwise=True)
-def kept_out(averaging, w, gradient):
-    """The gradient to gather, or nothing where the transfer has it from v* already."""
-    return straining(w.transfer, w.kin, gradient)
-
-
-@kept_out.on(FBar)
-def _kept_out_f_bar(averaging, w, gradient):
-    return gradient
-
-
-@point_function(otherwise=True)
-def known_gradient(averaging, w, moment, gradient):
-    """The velocity gradient, gathered or kept by the transfer."""
-    return kept_gradient(w.transfer, w.kin, moment, gradient)
-
-
-@known_gradient.on(FBar)
-def _known_gradient_f_bar(averaging, w, moment, gradient):
-    return gradient

@@ -103,15 +103,21 @@ def _empty_move(task, w, x):
     return x - x, x - x, transfers.zero_moment(w.transfer, w.kin, x[0])
 
 
+@shared
+def _is_known(task, w):
+    """Return True for a gradient that the transfer may have from v* already."""
+    return isinstance(task, StrainInMove) and not isinstance(w.averaging, averaging.FBar)
+
+
 @empty.on(Strain)
 @empty.on(StrainOfLastStep)
 @empty.on(SecondStrain)
 @empty.on(StrainInMove)
 def _empty_strain(task, w, x):
     gradient = zero(w.kin, x[0])
-    if isinstance(task, StrainInMove):
-        gradient = averaging.kept_out(w.averaging, w, gradient)
-    return gradient, averaging.no_ratio(w.averaging, x[0])
+    if _is_known(task, w):
+        gradient = transfers.straining(w.transfer, w.kin, gradient)
+    return gradient, averaging.no_ratio(w, x[0])
 
 
 @empty.on(TrialStrain)
@@ -193,7 +199,7 @@ def add_gradient(w, stencil, k, grad_v):
 def _gathered_strain(task, w, stencil, k, total):
     return (
         add_gradient(w, stencil, k, total[0]),
-        averaging.gathered_ratio(w.averaging, w, stencil, k, total[1]),
+        averaging.gathered_ratio(w, stencil, k, total[1]),
     )
 
 
@@ -235,12 +241,12 @@ def settled(task, w, stencil, p, dt, total, totals, fastest):
 def _settled_strain(task, w, stencil, p, dt, total, totals, fastest):
     """State of the law and shape of the domain after a step; growth in cells, and rate."""
     gradient, ratio = total
-    if isinstance(task, StrainInMove):
-        gradient = averaging.known_gradient(w.averaging, w, totals[0][2], gradient)
+    if _is_known(task, w):
+        gradient = transfers.kept_gradient(w.transfer, w.kin, totals[0][2], gradient)
     dl = increment(dt, gradient)
     if isinstance(task, StrainOfLastStep):
         dl = frames.of_places_before(w.frame, w.kin, dl)
-    dl = averaging.averaged(w.averaging, w, p, dl, ratio)
+    dl = averaging.averaged(w, p, dl, ratio)
     law = visit.law_of(w, p)
     old = visit.state_of(w, law, p, dt)
     f = visit.deformation_of(w.frame, w.kin, law, old, w.points, p)

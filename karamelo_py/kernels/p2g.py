@@ -32,7 +32,7 @@ from karamelo_py.kernels.loss import EnergyLoss, bring_energy
 from karamelo_py.kernels.visit import Work, deformation_of, for_tags, law_of, records_of, state_of
 from karamelo_py.points import laws
 from karamelo_py.points.basis import entry, mapped_again
-from karamelo_py.points.frames import Total, force_stress
+from karamelo_py.points.frames import follows, force_stress
 from karamelo_py.points.kinematics import I, dimension, nothing
 from karamelo_py.points.laws import constrained_velocity
 from karamelo_py.points.transfers import Moment, gradient_weight, nodal_momentum, zero_moment
@@ -212,14 +212,9 @@ def _scattered_mass_momentum(quantity, w, stencil, k, load):
     accumulate_optional(field(w.nodes.fields, SquaredMass), i, (N * mass * mass,))
 
 
-@point_function(otherwise=True)
-def mean_stress(averaging, kin, law, state, volume):
-    """Volume times mean stress, and volume, of a point of reference `volume`; () without F-bar."""
-    return ()
-
-
-@mean_stress.on(FBar)
-def _mean_stress_f_bar(averaging, kin, law, state, volume):
+@shared
+def _mean_stress(kin, law, state, volume):
+    """Volume times mean stress, and volume, of a point of reference `volume`."""
     tau = laws.kirchhoff_stress(law, kin, state).mean_of_stretching()
     return volume * tau, volume * laws.jacobian(law, kin, state)
 
@@ -230,7 +225,7 @@ def _load_of_averaged_force(quantity, w, p, like):
     state = state_of(w, law, p, like)
     f = deformation_of(w.frame, w.kin, law, state, w.points, p)
     volume = _mass(w, p) * laws.specific_volume(law)
-    own, present = mean_stress(w.averaging, w.kin, law, state, volume)
+    own, present = _mean_stress(w.kin, law, state, volume)
     change = present * field(w.points.fields, AveragedStress)[0, p] - own
     return force_stress(w.frame, w.kin, nothing(w.kin) - change * I, f)
 
@@ -251,7 +246,8 @@ def _load_of_internal_force(quantity, w, p, like):
     # Minus volume times stress, with the sign of the internal force.
     stress = -volume * force_stress(w.frame, w.kin, laws.kirchhoff_stress(law, w.kin, state), f)
     force = load(field(w.points.fields, Force), p, load_vector(w.kin, w.points.v, p))
-    mean = mean_stress(w.averaging, w.kin, law, state, volume)
+    of_mean = isinstance(w.averaging, FBar)
+    mean = _mean_stress(w.kin, law, state, volume) if of_mean else ()
     here = of_present(p, real(1, volume))
     return stress, here * force if len(force) else (), mean
 
@@ -268,22 +264,11 @@ def _scattered_internal_force(quantity, w, stencil, k, load):
     accumulate_optional(field(w.nodes.fields, NodalStress), i, tuple([N * a for a in mean]))
 
 
-@point_function(otherwise=True)
-def mapped_again_in(frame, basis, grid, moment):
-    """The part of the moment of velocity that MUSL maps again: all where weights never change."""
-    return mapped_again(basis, grid, moment)
-
-
-@mapped_again_in.on(Total)
-def _mapped_again_in_total(frame, basis, grid, moment):
-    return moment
-
-
 @load_of.on(MomentumAgain)
 def _load_of_momentum_again(quantity, w, p, like):
     moment = _moment(w, p, like)
-    if len(moment):
-        moment = mapped_again_in(w.frame, w.basis, w.grid, moment)
+    if len(moment) and follows(w.frame):  # of weights that never change, all is mapped again
+        moment = mapped_again(w.basis, w.grid, moment)
     return _mass(w, p), load_vector(w.kin, w.points.v, p), moment
 
 

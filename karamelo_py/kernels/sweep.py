@@ -59,15 +59,9 @@ from karamelo_py.kernels.nodes import at_node
 from karamelo_py.kernels.p2g import adds, load_all, sum_share
 from karamelo_py.kernels.stencils import gathered_by, scatter_nodes
 from karamelo_py.kernels.totals import take_over
-from karamelo_py.kernels.visit import (
-    Work,
-    ask_ahead,
-    ask_ahead_of_stretch,
-    place_at,
-    present_stencil,
-)
+from karamelo_py.kernels.visit import Work, ask_ahead, place_at
 from karamelo_py.points.basis import locate
-from karamelo_py.points.frames import Total, Updated, follows
+from karamelo_py.points.frames import follows
 from karamelo_py.points.grid import Grid, inside, renumbered
 from karamelo_py.points.kinematics import zero_vector
 
@@ -121,55 +115,31 @@ def work_of(s: Context, grid: Grid, nodes: Nodes, block: Block, places: Places) 
     )  # fmt: skip
 
 
-@point_function()
+@shared
 def recompute_stencil(weights: Tag, w: Work, stencil: tuple, p: Index) -> tuple:
-    """Return the stencil of the scatter from that of the gather."""
+    """Return the stencil of the scatter from that of the gather; of reference places it stays."""
+    if isinstance(weights, OldWeights) or not follows(w.frame):
+        return stencil
+    return locate(w.basis, w.kin, w.grid, place_at(w.basis, w.kin, w.places.y, p))
 
 
-@recompute_stencil.on(OldWeights)
-def _recompute_stencil_old_weights(weights, w, stencil, p):
-    return stencil
-
-
-@recompute_stencil.on(PresentWeights)
-def _recompute_stencil_present_weights(weights, w, stencil, p):
-    return present_stencil(w.frame, w, stencil, p)
-
-
-@point_function()
+@shared
 def stays_in_box(weights: Tag, room: Number, moved: Number) -> bool:
     """Return True while points give to nodes of their tile's box.
 
     Points that left it are sorted before the next step, and give then what they would give now.
     """
+    return isinstance(weights, OldWeights) or all_lanes(moved <= room)
 
 
-@stays_in_box.on(OldWeights)
-def _stays_in_box_old_weights(weights, room, moved):
-    return True
-
-
-@stays_in_box.on(PresentWeights)
-def _stays_in_box_present_weights(weights, room, moved):
-    return all_lanes(moved <= room)
-
-
-@point_function()
+@shared
 def places_of(frame: Tag, points: Points, now: int, then: int) -> Places:
     """Return the places of the weights of a sweep, and of the points before and after it.
 
     `now` and `then` are rows of `Points.x`.
     """
-
-
-@places_of.on(Updated)
-def _places_of_updated(frame, points, now, then):
-    return Places(points.x[now], points.x[now], points.x[then])
-
-
-@places_of.on(Total)
-def _places_of_total(frame, points, now, then):
-    return Places(points.home, points.x[now], points.x[then])
+    x = points.x[now]
+    return Places(x if follows(frame) else points.home, x, points.x[then])
 
 
 # --- tiles of points ---------------------------------------------------------------------------
@@ -230,13 +200,13 @@ def visit_tile(visit: Visit, s: Context, block: Block, t: int) -> None:
             for q in range(first, last, lanes.width):
                 p = points_from(lanes, q, last)
                 if (q - first) % wide.width == 0:
-                    ask_ahead_of_stretch(w, p, dt)
+                    ask_ahead(w, p, dt, apart)
                 totals = gathered_by(lanes, visit.tasks, w, stencil_of(w, p), position_of(w, p))
                 store(room, points_from(lanes, q - first, last - first), flat(totals))
         for q in range(first, last, wide.width):
             p = points_from(wide, q, last)
             if not apart:
-                ask_ahead(w, p, dt)
+                ask_ahead(w, p, dt, apart)
             stencil = () if apart else stencil_of(w, p)
             moved = zero_of(wide, dt)
             rate = fastest

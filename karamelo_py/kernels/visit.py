@@ -15,8 +15,8 @@ from karamelo_py.compiler.compile import index, point_function, prefetch, real, 
 from karamelo_py.compiler.fields import field, load, load_vector
 from karamelo_py.compiler.tuples import count_in, record
 from karamelo_py.kernels.arrays import Index, Nodes, Number, Places, Points, Tag
-from karamelo_py.points.basis import blank, locate
-from karamelo_py.points.frames import DeformationGradient, Total
+from karamelo_py.points.basis import blank
+from karamelo_py.points.frames import DeformationGradient, follows
 from karamelo_py.points.grid import Grid
 from karamelo_py.points.kinematics import zero
 from karamelo_py.points.laws import deformation, initial_state
@@ -58,46 +58,24 @@ def state_of(w: Work, law: Tag, p: Index, like: Number) -> tuple:
 
 
 @shared
-def stored_or_own(f: tuple, law: Tag, kin: Tag, state: tuple) -> tuple:
-    """Return the deformation gradient `f` if it is stored, else that of the law's state."""
-    return f if len(f) else deformation(law, kin, state)
+def ask_ahead(w: Work, p: Index, like: Number, apart: bool) -> None:
+    """Ask the memory for the data of the next points, in space.
 
-
-@shared
-def ask_ahead(w: Work, p: Index, like: Number) -> None:
-    """Ask the memory for the data of the next points, where they keep moments of velocity.
-
-    These are visited once a step, with all they have: in space that is more arrays side by side
-    than a processor sees the pattern of.
+    Those that keep moments of velocity are visited once a step, with all they have: that is more
+    arrays side by side than a processor sees the pattern of. So is what the update of a stretch of
+    points needs (`apart`), while it gathers.
     """
-    moment = zero_moment(w.transfer, w.kin, like)
-    if w.kin.dimension == 3 and len(moment):
-        _ask_for_motion(w, p)
-        _ask(field(w.points.fields, Moment), len(moment), p)
-        _ask(w.points.state, count_in(initial_state(law_of(w, p), w.kin, like)), p)
-
-
-@shared
-def ask_ahead_of_stretch(w: Work, p: Index, like: Number) -> None:
-    """Ask the memory for the data of the update of a stretch of points, while it gathers."""
-    if w.kin.dimension == 3:
-        _ask_for_motion(w, p)
-        _ask(w.points.state, count_in(initial_state(law_of(w, p), w.kin, like)), p)
-        f = field(w.points.fields, DeformationGradient)
-        if f is not None:
-            _ask(f, w.kin.tensor_size, p)
-
-
-@shared
-def _ask_for_motion(w, p):
-    _ask(w.places.x, w.kin.dimension, p)
-    _ask(w.points.v, w.kin.dimension, p)
-
-
-@shared
-def _ask(array, rows, p):
-    for k in range(rows):
-        prefetch(array, (k, p))
+    d, fields = w.kin.dimension, w.points.fields
+    moment = len(zero_moment(w.transfer, w.kin, like))
+    if d == 3 and (apart or moment):
+        state = count_in(initial_state(law_of(w, p), w.kin, like))
+        more = (field(fields, Moment), moment)
+        if apart:
+            more = (field(fields, DeformationGradient), w.kin.tensor_size)
+        for array, rows in ((w.places.x, d), (w.points.v, d), more, (w.points.state, state)):
+            if array is not None:
+                for k in range(rows):
+                    prefetch(array, (k, p))
 
 
 @point_function(otherwise=True)
@@ -109,27 +87,13 @@ def records_of(tag: Tag, nodes: Nodes) -> np.ndarray | None:
     return None
 
 
-@point_function(otherwise=True)
+@shared
 def deformation_of(frame: Tag, kin: Tag, law: Tag, state: tuple, points: Points, p: Index) -> tuple:
     """Return the deformation gradient F of a point where the frame needs it, else ()."""
-    return ()
-
-
-@deformation_of.on(Total)
-def _deformation_of_total(frame, kin, law, state, points, p):
+    if follows(frame):
+        return ()
     f = load(field(points.fields, DeformationGradient), p, zero(kin, points.mass[p]))
-    return stored_or_own(f, law, kin, state)
-
-
-@point_function(otherwise=True)
-def present_stencil(frame: Tag, w: Work, stencil: tuple, p: Index) -> tuple:
-    """Return the stencil of the place after the move; in the total frame it never changes."""
-    return locate(w.basis, w.kin, w.grid, place_at(w.basis, w.kin, w.places.y, p))
-
-
-@present_stencil.on(Total)
-def _present_stencil_total(frame, w, stencil, p):
-    return stencil
+    return f if len(f) else deformation(law, kin, state)
 
 
 # --- loops over tags, written out -------------------------------------------------------------
