@@ -311,23 +311,6 @@ def beside(first: int, steps: int) -> int:
 implements(beside)(lambda first, steps: numba.uint64(first + steps))
 
 
-def over_blocks(per_block: Callable) -> Callable:
-    """Make of ``f(block, setup, ...)`` an ``f(setup, ...)`` that does so for each of setup.blocks.
-
-    The blocks have different types (one for each constitutive law), which a loop in a kernel cannot
-    run over: the calls are written out once per number of blocks.
-    """
-
-    shared(per_block)
-
-    @shared
-    def loop(setup: Any, *arguments: Any) -> None:
-        for block in setup.blocks:
-            per_block(block, setup, *arguments)
-
-    return loop
-
-
 def define(parameters: str, *lines: str, **names: Any) -> Callable:
     """The function with these `parameters` and body `lines`, which may use `names`."""
     body = "\n    ".join(lines or ("pass",))

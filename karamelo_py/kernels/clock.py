@@ -3,7 +3,7 @@
 from math import inf
 from typing import Any
 
-from karamelo_py.compiler.compile import over_blocks, real, shared
+from karamelo_py.compiler.compile import real, shared
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import kernel, noinline
@@ -127,18 +127,14 @@ def _read_reports(tiling, control):
     clock.new_rate = max(clock.new_rate, rate)
 
 
-@over_blocks
-def _survey_blocks(block, s):
-    _read_reports(block.tiling, s.control)
-
-
 @shared
 def read_reports(s: Setup) -> None:
     """Gather the reports of all tiles in the clock: largest rate and move, and any wrong point."""
     clock = s.control.clock[0]
     clock.new_rate = 0.0
     clock.new_move = 0.0
-    _survey_blocks(s)
+    for block in s.blocks:
+        _read_reports(block.tiling, s.control)
     agree_on_reports(s.control.ranks, s.control)
 
 
@@ -187,14 +183,10 @@ def _check_points(mode, frame, kin, grids, points, tiling, control):
             clock.wrong = 1
 
 
-@over_blocks
-def _check_blocks(block, s, mode):
-    _check_points(mode, s.frame, s.kin, s.grids, block.points, block.tiling, s.control)
-
-
 @shared
 def check_moves(s: Setup, mode: Tag) -> bool:
     """Look at the new positions again, after hooks that may have changed them."""
-    _check_blocks(s, mode)
+    for block in s.blocks:
+        _check_points(mode, s.frame, s.kin, s.grids, block.points, block.tiling, s.control)
     agree_on_reports(s.control.ranks, s.control)
     return s.control.clock[0].wrong == 0

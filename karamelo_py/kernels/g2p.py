@@ -356,4 +356,13 @@ def _settled_move(task, w, stencil, p, dt, total, totals, fastest):
 
 empty_all = visit.for_tags(empty, "w, x")
 gathered_all = visit.for_tags(gathered, "w, stencil, k, totals", each="totals")
-settled_all = visit.in_turn(settled)
+
+
+@shared
+def settled_all(tasks, w, stencil, p, dt, totals, fastest):
+    """Settle the tasks in turn: distances add up, and the rate goes from one to the next."""
+    moved = real(0, fastest)
+    for task, total in zip(tasks, totals, strict=True):
+        further, fastest = settled(task, w, stencil, p, dt, total, totals, fastest)
+        moved += further
+    return moved, fastest

@@ -17,7 +17,6 @@ from karamelo_py.compiler.compile import (
     accumulate,
     fma,
     of_present,
-    over_blocks,
     point_function,
     real,
     round_off,
@@ -288,13 +287,7 @@ def _at_heat_nodes_hooks(hooks, stage, target, s):
     clock.hottest = max(clock.hottest, clock.set_high)
 
 
-@over_blocks
-def _supply_blocks(block, s, hooks):
-    points = block.points
-    kinds = Capacity, Temperature, Volume, Supply, TemperatureShare
-    own = [field(points.fields, kind) for kind in kinds]
-    warmth = hook_loop.HeatedPoints(points.id, s.kin, *own, points.x[s.control.clock[0].now])
-    hook_loop.point_hooks(arrays.SUPPLY_HEAT, warmth, hooks, s.control, step_size(s))
+HEATED = Capacity, Temperature, Volume, Supply, TemperatureShare  # arrays of `HeatedPoints`
 
 
 @point_function(otherwise=True)
@@ -307,7 +300,11 @@ def _at_heated_points_hooks(hooks, s):
     clock = s.control.clock[0]
     clock.rise = clock.fall = 0.0
     hook_loop.clear_totals(arrays.SUPPLY_HEAT, hooks, s.control)
-    _supply_blocks(s, hooks)
+    for block in s.blocks:
+        points = block.points
+        own = [field(points.fields, kind) for kind in HEATED]
+        warmth = hook_loop.HeatedPoints(points.id, s.kin, *own, points.x[clock.now])
+        hook_loop.point_hooks(arrays.SUPPLY_HEAT, warmth, hooks, s.control, step_size(s))
     hook_loop.publish_totals(arrays.SUPPLY_HEAT, hooks, s.control)
     agree_on_heat(s.control.ranks, s.control)
     clock.hottest += step_size(s) * clock.rise
@@ -325,15 +322,12 @@ MAP = Visit((Warming(),), (HeatContent(),), OldWeights())  # one loop for both w
 FLOW = Visit((TemperatureGradient(),), (HeatFlow(),), OldWeights())
 
 
-@point_function(otherwise=True)
+@shared
 def show_heat(heat, s, mode):
-    """See that the nodes show the temperature before the first step."""
-
-
-@show_heat.on(Conducting)
-def _show_heat_conducting(heat, s, mode):
-    visit_for_heat(heat, s, mode, MAP, False, True)
-    sweep_nodes(mode, SumsToVelocity(), Line(), heat.nodes, s.ranges, step_size(s))
+    """See that the nodes of heat, where there are some, show the temperature."""
+    if isinstance(heat, Conducting):
+        visit_for_heat(heat, s, mode, MAP, False, True)
+        sweep_nodes(mode, SumsToVelocity(), Line(), heat.nodes, s.ranges, step_size(s))
 
 
 @conduct.on(Conducting)

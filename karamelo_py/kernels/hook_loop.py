@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.compiler.addresses import caller_of
-from karamelo_py.compiler.compile import over_blocks, point_function, shared
+from karamelo_py.compiler.compile import point_function, shared
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.formula import BLOCK, call_evaluate
 from karamelo_py.compiler.held import hold
@@ -86,19 +86,23 @@ class HeatedPoints(NamedTuple):
 # --- the loop ---------------------------------------------------------------------------------
 
 
-@point_function()
-def turns(what, k, parts):
+@shared
+def _turns(what, k, parts):
     """Return where the turns of thread `k` of so many begin and end, and the step between them."""
+    if isinstance(what, HookedNodes):
+        shares = what.ranges[0, 0]
+        return shares * k // parts, shares * (k + 1) // parts, NONE + 1
+    # By turns: members may lie beside each other.
+    size = TURN if parts > 1 else max(what.ids.size, 1)
+    return k * size, what.ids.size, parts * size
 
 
-@point_function()
-def bounds(what, turn, parts):
+@shared
+def _bounds(what, turn, parts):
     """Return from where to before where members are chosen in a turn."""
-
-
-@point_function()
-def choose(what, hooks, h, place, end, member):
-    """Choose the next members, up to a block; return how many, and where to go on."""
+    if isinstance(what, HookedNodes):
+        return what.ranges[turn, 0], what.ranges[turn, 1]
+    return turn, min(turn + TURN, what.ids.size) if parts > 1 else what.ids.size
 
 
 @point_function()
@@ -111,12 +115,15 @@ def _act_on_part(what, task, hooks, control, dt, h, share, k, parts):
     """Do `task` with the members of hook `h` in the part of thread `k`; how many count."""
     found = 0
     hooks.scratch[:6] = 0.0
-    first, last, step = turns(what, k, parts)
+    first, last, step = _turns(what, k, parts)
     for turn in range(first, last, step):
-        place, end = bounds(what, turn, parts)
+        place, end = _bounds(what, turn, parts)
         count, member = BLOCK, NONE
         while count == BLOCK:
-            count, place, member = choose(what, hooks, h, place, end, member)
+            if isinstance(what, HookedNodes):
+                count, place, member = _choose_nodes(what, hooks, h, place, end, member)
+            else:
+                count, place = _choose_points(what, hooks, h, place, end)
             if count > 0:
                 found += act(what, task, hooks, control, dt, h, count, share)
     return found
@@ -238,20 +245,12 @@ def _publish_total(hooks, h, control):
 # --- nodes ------------------------------------------------------------------------------------
 
 
-@turns.on(HookedNodes)
-def _turns_of_nodes(what, k, parts):
-    shares = what.ranges[0, 0]
-    return shares * k // parts, shares * (k + 1) // parts, NONE + 1
-
-
-@bounds.on(HookedNodes)
-def _bounds_of_nodes(what, turn, parts):
-    return what.ranges[turn, 0], what.ranges[turn, 1]
-
-
-@choose.on(HookedNodes)
+@shared
 def _choose_nodes(what, hooks, h, row, end, member):
-    """Take those in use, with mass. Members ascend as rows do: a wall may have more than in use."""
+    """Choose up to a block of members in use, with mass; how many, and where to go on.
+
+    Members ascend as rows do: a wall may have more than in use.
+    """
     ranges, sums = what.ranges, what.nodes.sums
     of_all = what.target == LOADS or hooks.table[h].begin < 0
     behind = hooks.table[h].end
@@ -503,34 +502,19 @@ def _at_nodes_hooks(hooks, stage, target, s):
     clock.set_low = clock.set_high = 0.0  # of temperatures only
 
 
-@point_function(otherwise=True)
+@shared
 def add_work(hooks, s):
     """Add up the work of the loads on nodes."""
-
-
-@add_work.on(arrays.Hooks)
-def _add_work_hooks(hooks, s):
-    node_hooks(NONE, LOADS, s.kin, s.grids, s.nodes, s.ranges, hooks, s.control, kick(s), 0.0)
+    if isinstance(hooks, arrays.Hooks):
+        node_hooks(NONE, LOADS, s.kin, s.grids, s.nodes, s.ranges, hooks, s.control, kick(s), 0.0)
 
 
 # --- points -----------------------------------------------------------------------------------
 
 
 @shared
-def _turns_of_points(what, k, parts):
-    # By turns: members may lie beside each other.
-    size = TURN if parts > 1 else max(what.ids.size, 1)
-    return k * size, what.ids.size, parts * size
-
-
-@shared
-def _bounds_of_points(what, turn, parts):
-    return turn, min(turn + TURN, what.ids.size) if parts > 1 else what.ids.size
-
-
-@shared
-def _choose_points(what, hooks, h, p, end, member):
-    """Take those from `p` to before `end`; note where they are before the step."""
+def _choose_points(what, hooks, h, p, end):
+    """Choose up to a block of members; how many, where to go on. Note places before the step."""
     begin, ids, where = hooks.table[h].begin, what.ids, hooks.scratch
     count = 0
     while p < end and count < BLOCK:
@@ -543,13 +527,7 @@ def _choose_points(what, hooks, h, p, end, member):
                         where[3 + c, count] = hooks.x0[ids[p], c]
             count += 1
         p += 1
-    return count, p, member
-
-
-for kind in (MovingPoints, HeatedPoints):
-    turns.on(kind)(_turns_of_points)
-    bounds.on(kind)(_bounds_of_points)
-    choose.on(kind)(_choose_points)
+    return count, p
 
 
 @act.on(MovingPoints)
@@ -643,14 +621,6 @@ def corners_that_move(s):
     return placed(s.basis, s.kin) if follows(s.frame) else 0
 
 
-@over_blocks
-def _hook_points(block, s, hooks, stage, now, then):
-    points = block.points
-    corners = corners_that_move(s)
-    motion = MovingPoints(points.id, points.v, points.mass, points.x[now], points.x[then], corners)
-    point_hooks(stage, motion, hooks, s.control, step_size(s))
-
-
 @point_function(otherwise=True)
 def at_points(hooks, stage, then, s):
     """Let the fixes act on the points; `then` is 1 when their new positions are known, else 0."""
@@ -660,5 +630,10 @@ def at_points(hooks, stage, then, s):
 def _at_points_hooks(hooks, stage, then, s):
     clear_totals(stage, hooks, s.control)
     now = s.control.clock[0].now
-    _hook_points(s, hooks, stage, now, 1 - now if then else now)
+    y = 1 - now if then else now
+    corners = corners_that_move(s)
+    for block in s.blocks:
+        points = block.points
+        motion = MovingPoints(points.id, points.v, points.mass, points.x[now], points.x[y], corners)
+        point_hooks(stage, motion, hooks, s.control, step_size(s))
     publish_totals(stage, hooks, s.control)

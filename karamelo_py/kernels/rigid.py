@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import over_blocks
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.tuples import record
@@ -92,23 +91,18 @@ def _sum_forces(basis, kin, grids, places, points, led, forces, torques, totals)
                 add_to(totals, turning + i, x[j] * force[k] - x[k] * force[j])
 
 
-@over_blocks
-def _sum_forces_of_blocks(block, s, led):
-    if isinstance(block.laws, Rigid):
-        places = block.points.x[s.control.clock[0].now]
-        _sum_forces(
-            s.basis, s.kin, s.grids, places, block.points, led, s.contact.force, s.contact.torque,
-            s.control.totals,
-        )  # fmt: skip
-
-
 @touch.on(RigidBodies)
 def _touch_rigid_bodies(contact, s):
     led = field(s.nodes.fields, RigidSums)
     _lead(s.kin, s.nodes, led, s.spans, kick(s), s.control.clock[0].kept)
     for slot in contact.slots:
         s.control.totals[slot : slot + 3] = 0
-    _sum_forces_of_blocks(s, led)
+    for block in s.blocks:
+        if isinstance(block.laws, Rigid):
+            _sum_forces(
+                s.basis, s.kin, s.grids, block.points.x[s.control.clock[0].now], block.points, led,
+                contact.force, contact.torque, s.control.totals,
+            )  # fmt: skip
     for slot in contact.slots:
         publish(s.control, slot, 3)
 

@@ -8,7 +8,7 @@ import functools
 from math import sqrt
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import by_type, over_blocks, real, shared
+from karamelo_py.compiler.compile import by_type, real, shared
 from karamelo_py.compiler.fields import load, load_vector
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import kernel
@@ -79,7 +79,7 @@ def _visit(row, s, mode, more):
     dt = whole if row.share == 1 else real(row.share, whole) * whole
     if row.gathers and any(isinstance(task, Strain) for task in row.visit.tasks):
         trial = TrialStrainOfLastStep() if row.of_last_step else TrialStrain()
-        average_volumes(s.averaging, s, mode, dt, trial)
+        average_volumes(s, mode, dt, trial)
     scatters = more if row.only_if_more else row.scatters
     sweep(s, mode, row.visit, dt, row.gathers, scatters, row.moves)
     return all_well(s)
@@ -195,13 +195,9 @@ def _fastest(frame, kin, points, laws, control):
     clock.rate = max(clock.rate, rate)
 
 
-@over_blocks
-def measure_blocks(block, s):
-    _fastest(s.frame, s.kin, block.points, block.laws, s.control)
-
-
 @shared
 def measure(s: Setup) -> None:
     """The rate of the present state, for the first dt."""
     s.control.clock[0].rate = 0.0
-    measure_blocks(s)
+    for block in s.blocks:
+        _fastest(s.frame, s.kin, block.points, block.laws, s.control)

@@ -209,61 +209,50 @@ def _clear_radial(kin, nodes, grids):
                 clear_first(field(nodes.fields, p2g.Normal), n)
 
 
-@point_function(otherwise=True)
-def hold_axis(kin: Tag, s: Setup) -> None:
-    """Let no node on an axis of symmetry leave it; by default there is none."""
-
-
-@hold_axis.on(Axisymmetric)
-def _hold_axis_axisymmetric(kin, s):
+@shared
+def hold_axis(s: Setup) -> None:
+    """Let no node on an axis of symmetry leave it, where there is one."""
     # v_r = 0 at r = 0: N / r of a node there grows without bound where a point comes near. And a
     # body that touches another on the axis has a normal along it.
-    _clear_radial(kin, s.nodes, s.grids)
+    if isinstance(s.kin, Axisymmetric):
+        _clear_radial(s.kin, s.nodes, s.grids)
 
 
-@point_function(otherwise=True)
-def sum_series(transfer: Tag, s: Setup, mode: Tag) -> None:
+@shared
+def sum_series(s: Setup, mode: Tag) -> None:
     """Put the new velocity of XPIC in the place of the change of velocity; others need nothing."""
-
-
-@sum_series.on(XPIC)
-def _sum_series_xpic(transfer, s, mode):
+    if not isinstance(s.transfer, XPIC):
+        return
     # (I - (I - S S+)^m) v_p = S sum_k (I - S+ S)^k S+ v, the sum from 0 to m - 1
     dt = step_size(s)
     sweep_nodes(mode, nodes.StartSeries(), s.kin, s.nodes, s.ranges, dt)
-    for k in range(transfer.order - 1):
+    for k in range(s.transfer.order - 1):
         visit = Visit((g2p.SeriesTerm(k),), (p2g.SeriesBack(),), OldWeights())
         sweep(s, mode, visit, dt, True, True, False)
         sweep_nodes(mode, nodes.ExtendSeries(), s.kin, s.nodes, s.ranges, dt)
-    hold_axis(s.kin, s)
+    hold_axis(s)
 
 
-@point_function(otherwise=True)
-def average_volumes(averaging: Tag, s: Setup, mode: Tag, dt: Number, trial: Tag) -> None:
-    """Average the change of volume of the strain to come at the nodes; by default it is not.
+@shared
+def average_volumes(s: Setup, mode: Tag, dt: Number, trial: Tag) -> None:
+    """Average the change of volume of the strain to come at the nodes, with F-bar.
 
     `trial` is the task that finds it.
     """
+    if isinstance(s.averaging, FBar):
+        visit = Visit((trial,), (p2g.Volumes(),), OldWeights())
+        sweep(s, mode, visit, dt, True, True, False)
+        sweep_nodes(mode, nodes.TakeMean(), s.kin, s.nodes, s.ranges, dt)
 
 
-@average_volumes.on(FBar)
-def _average_volumes_f_bar(averaging, s, mode, dt, trial):
-    visit = Visit((trial,), (p2g.Volumes(),), OldWeights())
-    sweep(s, mode, visit, dt, True, True, False)
-    sweep_nodes(mode, nodes.TakeMean(), s.kin, s.nodes, s.ranges, dt)
-
-
-@point_function(otherwise=True)
-def average_stress(averaging: Tag, s: Setup, mode: Tag) -> None:
-    """Put the averaged mean stress in the place of the points' own; by default each has its own."""
-
-
-@average_stress.on(FBar)
-def _average_stress_f_bar(averaging, s, mode):
-    dt = step_size(s)
-    sweep_nodes(mode, nodes.TakeMeanStress(), s.kin, s.nodes, s.ranges, dt)
-    visit = Visit((g2p.SetMeanStress(),), (p2g.AveragedForce(),), OldWeights())
-    sweep(s, mode, visit, dt, True, True, False)
+@shared
+def average_stress(s: Setup, mode: Tag) -> None:
+    """Put the averaged mean stress in the place of the points' own, with F-bar."""
+    if isinstance(s.averaging, FBar):
+        dt = step_size(s)
+        sweep_nodes(mode, nodes.TakeMeanStress(), s.kin, s.nodes, s.ranges, dt)
+        visit = Visit((g2p.SetMeanStress(),), (p2g.AveragedForce(),), OldWeights())
+        sweep(s, mode, visit, dt, True, True, False)
 
 
 @shared
@@ -310,9 +299,9 @@ LOSS = _call(
     lambda s: field(s.nodes.fields, EnergyLoss) is not None,
 )
 AVERAGED = _call(
-    lambda s, mode, hooks: average_stress(s.averaging, s, mode),
+    lambda s, mode, hooks: average_stress(s, mode),
     "force of the averaged mean stress in one visit of the points",
-    lambda s: average_stress.defined(type(s.averaging)),
+    lambda s: isinstance(s.averaging, FBar),
 )
 CONTACT = _call(
     lambda s, mode, hooks: touch(s.contact, s),
@@ -323,14 +312,14 @@ WORK_OF_LOADS = _call(lambda s, mode, hooks: add_work(hooks, s))
 CONTACT_BEFORE = _call(lambda s, mode, hooks: touch_velocity(s.contact, s, 0))
 CONTACT_AFTER = _call(lambda s, mode, hooks: touch_velocity(s.contact, s, 1))
 AXIS = _call(
-    lambda s, mode, hooks: hold_axis(s.kin, s),
+    lambda s, mode, hooks: hold_axis(s),
     "v_r = 0 on the axis",
-    lambda s: hold_axis.defined(type(s.kin)),
+    lambda s: isinstance(s.kin, Axisymmetric),
 )
 SERIES = _call(
-    lambda s, mode, hooks: sum_series(s.transfer, s, mode),
+    lambda s, mode, hooks: sum_series(s, mode),
     "series of XPIC",
-    lambda s: sum_series.defined(type(s.transfer)),
+    lambda s: isinstance(s.transfer, XPIC),
 )
 
 BEGIN = AtPoints(arrays.INITIAL_INTEGRATE, 0)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import index, point_function, prefetch, real, shared
+from karamelo_py.compiler.compile import index, point_function, prefetch, shared
 from karamelo_py.compiler.fields import field, load, load_vector
 from karamelo_py.compiler.tuples import count_in, record
 from karamelo_py.kernels.arrays import Index, Nodes, Number, Places, Points, Tag
@@ -113,23 +113,6 @@ def for_tags(function: Callable, names: str, each: str | None = None) -> Callabl
             return tuple([function(tag, *arguments) for tag in tags])
         before, items, after = arguments[:own], arguments[own], arguments[own + 1 :]
         return tuple([function(t, *before, items[k], *after) for k, t in enumerate(tags)])
-
-    return loop
-
-
-def in_turn(function: Callable) -> Callable:
-    """Make ``f(tags, w, stencil, p, dt, totals, fastest)`` of settling functions, in turn.
-
-    Distances add up, and the rate goes from one to the next (see `g2p.settled`).
-    """
-
-    @shared
-    def loop(tags, w, stencil, p, dt, totals, fastest):
-        moved = real(0, fastest)
-        for k, tag in enumerate(tags):
-            further, fastest = function(tag, w, stencil, p, dt, totals[k], totals, fastest)
-            moved += further
-        return moved, fastest
 
     return loop
 

@@ -17,7 +17,6 @@ from karamelo_py.compiler.compile import (
     all_lanes,
     index,
     of_present,
-    over_blocks,
     real,
     shared,
 )
@@ -103,17 +102,13 @@ def _sum_energies(mode, kin, points, laws, tiling, control):
         totals.add_to(control.totals, totals.STORED, tiling.report[t, ENERGIES + 1])
 
 
-@over_blocks
-def _sum_blocks(block, s, mode):
-    points = known_to_laws(block.points)
-    _sum_energies(mode, s.kin, points, block.laws, block.tiling, s.control)
-
-
 @shared
 def sum_energies(s, mode):
     """Energies of all points, kinetic and stored plus dissipated, and the work into the clock."""
     s.control.totals[: totals.WORK] = 0
-    _sum_blocks(s, mode)
+    for block in s.blocks:
+        points = known_to_laws(block.points)
+        _sum_energies(mode, s.kin, points, block.laws, block.tiling, s.control)
     totals.collect(s.control.ranks, s.control, totals.KINETIC, 3)
     clock, answer = s.control.clock[0], s.control.answer
     clock.kinetic = answer[totals.KINETIC]
@@ -158,19 +153,15 @@ def _add_momentum(control, solid, d):
         control.answer[k] = 0
 
 
-@over_blocks
-def _add_blocks(block, s):
-    points = block.points
-    _add_momenta(dimension(s.kin), points.id, points.mass, points.v, block.tiling, s.control)
-
-
 @shared
 def _sum_drift(s):
     """Kinetic energy of the centres of mass of the solids, into the clock; after `sum_energies`."""
     control, d = s.control, dimension(s.kin)
     own = control.values.size
     control.totals[own:] = 0
-    _add_blocks(s)
+    for block in s.blocks:
+        points = block.points
+        _add_momenta(d, points.id, points.mass, points.v, block.tiling, control)
     totals.collect(control.ranks, control, own, control.totals.shape[0] - own)
     energy = 0.0
     for k in range(control.firsts.size):
@@ -272,17 +263,13 @@ def _range_of_heat(kin, points, laws, control):
             clock.own_heat = max(clock.own_heat, float(work) / float(capacity))
 
 
-@over_blocks
-def _range_blocks(block, s):
-    _range_of_heat(s.kin, known_to_laws(block.points), block.laws, s.control)
-
-
 @shared
 def measure_heat(s):
     """Lowest and highest temperature of all points, into the clock."""
     clock = s.control.clock[0]
     clock.T_low, clock.T_high, clock.own_heat = inf, -inf, 0.0
-    _range_blocks(s)
+    for block in s.blocks:
+        _range_of_heat(s.kin, known_to_laws(block.points), block.laws, s.control)
 
 
 @shared
