@@ -5,7 +5,7 @@ from typing import NamedTuple
 from karamelo_py.compiler.compile import fma, real, shared
 from karamelo_py.compiler.fields import StepField, SummedField, field, pair
 from karamelo_py.compiler.tuples import row
-from karamelo_py.kernels.visit import deformation_of, law_of, state_of
+from karamelo_py.kernels.visit import deformed_state
 from karamelo_py.points.basis import entry
 from karamelo_py.points.frames import scaled_increment
 
@@ -79,8 +79,6 @@ def averaged(w, p, dl, ratio):
     # weighted with their volumes (after Coombs et al. 2018, "Overcoming volumetric locking in
     # material point methods", eq. 23; there over the points of a cell). In the total frame, `dl`
     # is dt Fdot, and F + dl is scaled.
-    law = law_of(w, p)
-    state = state_of(w, law, p, ratio[0])
-    f = deformation_of(w.frame, w.kin, law, state, w.points, p)
+    _, _, f = deformed_state(w, p, ratio[0])
     own = field(w.points.fields, VolumeRatio)[0, p]
     return scaled_increment(w.frame, w.kin, dl, f, ratio[0] / own)

@@ -247,9 +247,7 @@ def _settled_strain(task, w, stencil, p, dt, total, totals, fastest):
     if isinstance(task, StrainOfLastStep):
         dl = frames.of_places_before(w.frame, w.kin, dl)
     dl = averaging.averaged(w, p, dl, ratio)
-    law = visit.law_of(w, p)
-    old = visit.state_of(w, law, p, dt)
-    f = visit.deformation_of(w.frame, w.kin, law, old, w.points, p)
+    law, old, f = visit.deformed_state(w, p, dt)
     growth = frames.spatial_increment(w.frame, w.kin, dl, f)
     state = laws.advance(law, w.kin, old, growth, dt)
     store(w.points.state, p, state)
@@ -282,9 +280,7 @@ def _settled_trial_strain(task, w, stencil, p, dt, total, totals, fastest):
     dl = increment(dt, total)
     if isinstance(task, TrialStrainOfLastStep):
         dl = frames.of_places_before(w.frame, w.kin, dl)
-    law = visit.law_of(w, p)
-    state = visit.state_of(w, law, p, dt)
-    f = visit.deformation_of(w.frame, w.kin, law, state, w.points, p)
+    _, _, f = visit.deformed_state(w, p, dt)
     dl = frames.spatial_increment(w.frame, w.kin, dl, f)
     field(w.points.fields, averaging.VolumeRatio)[0, p] = det(I + dl)
     return real(0, dt), fastest
@@ -319,12 +315,12 @@ def further_reach(basis, kin, grid, before, after):
 @settled.on(Move)
 def _settled_move(task, w, stencil, p, dt, total, totals, fastest):
     """New velocity, position and carried corners; how far that is in cells."""
-    law = visit.law_of(w, p)
+    law, state = visit.law_and_state(w, p, dt)
     v_pic, dv, moment, *corners = total
     old = load_vector(w.kin, w.points.v, p)
     v = laws.constrained_velocity(law, old, transfers.updated_velocity(w.transfer, old, v_pic, dv))
     x = load_vector(w.kin, w.places.x, p)
-    j = transfers.known_volume(w.transfer, law, w.kin, visit.state_of(w, law, p, dt))
+    j = transfers.known_volume(w.transfer, law, w.kin, state)
     displacing = transfers.displacing_velocity(w.transfer, v, v_pic, j)
     step = vector(w.kin, dt * laws.constrained_velocity(law, v, displacing))
     y = x + step

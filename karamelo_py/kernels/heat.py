@@ -34,7 +34,7 @@ from karamelo_py.kernels.p2g import load_of, scattered
 from karamelo_py.kernels.sweep import OldWeights, Visit, sweep, sweep_nodes
 from karamelo_py.kernels.table import conduct
 from karamelo_py.kernels.totals import agree_on_heat
-from karamelo_py.kernels.visit import deformation_of, law_of, state_of
+from karamelo_py.kernels.visit import deformed_state, law_and_state
 from karamelo_py.points import laws
 from karamelo_py.points.basis import entry, reach
 from karamelo_py.points.frames import inverse_stretch_squared, pulled_back
@@ -155,8 +155,7 @@ def at_least_round_off(weight):
 
 @load_of.on(HeatContent)
 def _load_of_heat_content(quantity, w, p, like):
-    law = law_of(w, p)
-    state = state_of(w, law, p, like)
+    law, state = law_and_state(w, p, like)
     mass = w.points.mass[p]
     volume = mass * laws.specific_volume(law) * laws.jacobian(law, w.kin, state)
     T = laws.temperature(law, w.kin, state)
@@ -195,9 +194,7 @@ def _scattered_heat_content(quantity, w, stencil, k, load):
 
 @load_of.on(HeatFlow)
 def _load_of_heat_flow(quantity, w, p, like):
-    law = law_of(w, p)
-    state = state_of(w, law, p, like)
-    f = deformation_of(w.frame, w.kin, law, state, w.points, p)
+    _, _, f = deformed_state(w, p, like)
     against = pulled_back(w.frame, w.kin, _gradient(w, p), f)
     fields = w.points.fields
     conductance = of_present(p, field(fields, Conductance)[0, p])
@@ -252,8 +249,7 @@ def _gathered_warming(task, w, stencil, k, total):
 
 @settled.on(Warming)
 def _settled_warming(task, w, stencil, p, dt, total, totals, fastest):
-    law = law_of(w, p)
-    state = state_of(w, law, p, dt)
+    law, state, f = deformed_state(w, p, dt)
     fields = w.points.fields
     T = field(fields, Temperature)[0, p]
     capacity = field(fields, Capacity)[0, p]
@@ -264,7 +260,6 @@ def _settled_warming(task, w, stencil, p, dt, total, totals, fastest):
     T = where(some, fma(field(fields, TemperatureShare)[0, p], change, T), T)
     store(w.points.state, p, laws.with_temperature(law, w.kin, state, T))
     # By what factor conduction has become faster than in the undeformed body.
-    f = deformation_of(w.frame, w.kin, law, state, w.points, p)
     faster = laws.jacobian(law, w.kin, state) * inverse_stretch_squared(w.frame, w.kin, f, dt)
     return real(0, dt) * T, max(fastest, faster)
 

@@ -23,7 +23,7 @@ move (not with splines), and that usl strains by dv, which may only cost.
 from karamelo_py.compiler import fields
 from karamelo_py.compiler.compile import accumulate, real, round_off, shared, where
 from karamelo_py.kernels.arrays import MASS, of_change, of_momentum, vector_at
-from karamelo_py.kernels.visit import law_of, state_of
+from karamelo_py.kernels.visit import law_and_state
 from karamelo_py.points import laws, transfers
 from karamelo_py.points.basis import entry, support
 from karamelo_py.points.kinematics import dimension
@@ -65,8 +65,7 @@ def _nodes_of(w, stencil):
 def warm_by_friction(rubbed, w, stencil, p, like):
     """Point `p` takes the heat of friction at its nodes by its weights: none is lost."""
     if rubbed is not None:
-        law = law_of(w, p)
-        state = state_of(w, law, p, like)
+        law, state = law_and_state(w, p, like)
         heat = like - like
         for i, weight, _ in _nodes_of(w, stencil):
             heat += weight * rubbed[i, 0]
@@ -155,8 +154,7 @@ def _own_share(lost, w, stencil, mass):
 @shared
 def _heat(w, p, gone):
     """Give point `p` the energy per mass that is gone."""
-    law = law_of(w, p)
-    state = state_of(w, law, p, gone)
+    law, state = law_and_state(w, p, gone)
     fields.store(
         w.points.state, p, laws.warmed(law, w.kin, state, gone / laws.specific_volume(law))
     )

@@ -29,7 +29,14 @@ from karamelo_py.kernels.arrays import (
 )
 from karamelo_py.kernels.averaging import AveragedStress, FBar, NodalMean, NodalStress, VolumeRatio
 from karamelo_py.kernels.loss import EnergyLoss, bring_energy
-from karamelo_py.kernels.visit import Work, deformation_of, for_tags, law_of, records_of, state_of
+from karamelo_py.kernels.visit import (
+    Work,
+    deformed_state,
+    for_tags,
+    law_and_state,
+    law_of,
+    records_of,
+)
 from karamelo_py.points import laws
 from karamelo_py.points.basis import entry, mapped_again
 from karamelo_py.points.frames import follows, force_stress
@@ -221,9 +228,7 @@ def _mean_stress(kin, law, state, volume):
 
 @load_of.on(AveragedForce)
 def _load_of_averaged_force(quantity, w, p, like):
-    law = law_of(w, p)
-    state = state_of(w, law, p, like)
-    f = deformation_of(w.frame, w.kin, law, state, w.points, p)
+    law, state, f = deformed_state(w, p, like)
     volume = _mass(w, p) * laws.specific_volume(law)
     own, present = _mean_stress(w.kin, law, state, volume)
     change = present * field(w.points.fields, AveragedStress)[0, p] - own
@@ -239,9 +244,7 @@ def _scattered_averaged_force(quantity, w, stencil, k, load):
 
 @load_of.on(InternalForce)
 def _load_of_internal_force(quantity, w, p, like):
-    law = law_of(w, p)
-    state = state_of(w, law, p, like)
-    f = deformation_of(w.frame, w.kin, law, state, w.points, p)
+    law, state, f = deformed_state(w, p, like)
     volume = _mass(w, p) * laws.specific_volume(law)
     # Minus volume times stress, with the sign of the internal force.
     stress = -volume * force_stress(w.frame, w.kin, laws.kirchhoff_stress(law, w.kin, state), f)
@@ -282,8 +285,7 @@ def _scattered_momentum_again(quantity, w, stencil, k, load):
 
 @load_of.on(Volumes)
 def _load_of_volumes(quantity, w, p, like):
-    law = law_of(w, p)
-    state = state_of(w, law, p, like)
+    law, state = law_and_state(w, p, like)
     volume = _mass(w, p) * laws.specific_volume(law) * laws.jacobian(law, w.kin, state)
     return volume * field(w.points.fields, VolumeRatio)[0, p], volume
 

@@ -52,9 +52,17 @@ def law_of(w: Work, p: Index) -> Tag:
 
 
 @shared
-def state_of(w: Work, law: Tag, p: Index, like: Number) -> tuple:
-    """Load the state (s,) of the law at point `p`."""
-    return load(w.points.state, p, initial_state(law, w.kin, like))
+def law_and_state(w: Work, p: Index, like: Number) -> tuple:
+    """Load the law of point `p` and its state (s,)."""
+    law = law_of(w, p)
+    return law, load(w.points.state, p, initial_state(law, w.kin, like))
+
+
+@shared
+def deformed_state(w: Work, p: Index, like: Number) -> tuple:
+    """Load the law of point `p`, its state, and F as `deformation_of`."""
+    law, state = law_and_state(w, p, like)
+    return law, state, deformation_of(w.frame, w.kin, law, state, w.points, p)
 
 
 @shared
