@@ -17,7 +17,6 @@ from karamelo_py.compiler.compile import define, index, shared
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Nodes, Setup
-from karamelo_py.kernels.averaging import FBar
 from karamelo_py.kernels.g2p import SeriesTerm, SetMeanStress, TrialStrain, empty_all, settled_all
 from karamelo_py.kernels.heat import HeatContent, HeatFlow, TemperatureGradient, Warming
 from karamelo_py.kernels.lanes import OneByOne, zero_of
@@ -33,7 +32,7 @@ from karamelo_py.kernels.sweep import (
     work_of,
 )
 from karamelo_py.kernels.table import Insulated, Sweep, fused, staged
-from karamelo_py.kernels.visit import place_at
+from karamelo_py.kernels.visit import FBar, place_at
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.points.basis import locate

@@ -25,11 +25,10 @@ from karamelo_py.compiler.threads import Serial
 from karamelo_py.compiler.trace import CannotCompile
 from karamelo_py.compiler.tuples import flat, nested_as, row
 from karamelo_py.kernels.arrays import arrays_of, with_items_of
-from karamelo_py.kernels.averaging import NodalMean
 from karamelo_py.kernels.g2p import empty, gathered, settled
 from karamelo_py.kernels.heat import HeatContent, HeatFlow, TemperatureGradient, Warming
 from karamelo_py.kernels.sweep import OldWeights, Visit, context_of, sweep_points
-from karamelo_py.kernels.visit import place_at
+from karamelo_py.kernels.visit import NodalMean, place_at
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.points.basis import (

@@ -174,19 +174,16 @@ _check_shares = shared_out(_check_share, "frame, kin, grids, points, tiling, now
 
 
 @kernel
-def _check_points(mode, frame, kin, grids, points, tiling, control):
-    clock = control.clock[0]
-    _check_shares(mode, tiling.count[1], frame, kin, grids, points, tiling, clock.now)
-    for t in range(tiling.count[0]):
-        clock.move = max(clock.move, tiling.report[t, 0])
-        if tiling.report[t, 2] > 0:
-            clock.wrong = 1
+def _check_points(mode, frame, kin, grids, points, tiling, now):
+    _check_shares(mode, tiling.count[1], frame, kin, grids, points, tiling, now)
 
 
 @shared
 def check_moves(s: Setup, mode: Tag) -> bool:
     """Look at the new positions again, after hooks that may have changed them."""
+    clock = s.control.clock[0]
     for block in s.blocks:
-        _check_points(mode, s.frame, s.kin, s.grids, block.points, block.tiling, s.control)
-    agree_on_reports(s.control.ranks, s.control)
-    return s.control.clock[0].wrong == 0
+        _check_points(mode, s.frame, s.kin, s.grids, block.points, block.tiling, clock.now)
+    read_reports(s)
+    clock.move = max(clock.move, clock.new_move)
+    return clock.wrong == 0

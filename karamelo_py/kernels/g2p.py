@@ -10,7 +10,7 @@ from typing import NamedTuple
 from karamelo_py.compiler.compile import all_lanes, fma, point_function, real, shared, where
 from karamelo_py.compiler.fields import field, increase, load_vector, store, store_from
 from karamelo_py.compiler.tuples import row
-from karamelo_py.kernels import averaging, visit
+from karamelo_py.kernels import visit
 from karamelo_py.kernels.arrays import Index, Nodes, Number, Tag, of_change, vector_at
 from karamelo_py.kernels.loss import FrictionalHeat, in_company, reflect, warm, warm_by_friction
 from karamelo_py.kernels.visit import Work
@@ -106,7 +106,7 @@ def _empty_move(task, w, x):
 @shared
 def _is_known(task, w):
     """Return True for a gradient that the transfer may have from v* already."""
-    return isinstance(task, StrainInMove) and not isinstance(w.averaging, averaging.FBar)
+    return isinstance(task, StrainInMove) and not isinstance(w.averaging, visit.FBar)
 
 
 @empty.on(Strain)
@@ -117,7 +117,7 @@ def _empty_strain(task, w, x):
     gradient = zero(w.kin, x[0])
     if _is_known(task, w):
         gradient = transfers.straining(w.transfer, w.kin, gradient)
-    return gradient, averaging.no_ratio(w, x[0])
+    return gradient, visit.no_ratio(w, x[0])
 
 
 @empty.on(TrialStrain)
@@ -199,7 +199,7 @@ def add_gradient(w, stencil, k, grad_v):
 def _gathered_strain(task, w, stencil, k, total):
     return (
         add_gradient(w, stencil, k, total[0]),
-        averaging.gathered_ratio(w, stencil, k, total[1]),
+        visit.gathered_ratio(w, stencil, k, total[1]),
     )
 
 
@@ -212,7 +212,7 @@ def _gathered_trial_strain(task, w, stencil, k, total):
 @gathered.on(SetMeanStress)
 def _gathered_average_stress(task, w, stencil, k, total):
     i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
-    return fma(weight, row(field(w.nodes.fields, averaging.NodalStress), i, 0, (total,))[0], total)
+    return fma(weight, row(field(w.nodes.fields, visit.NodalStress), i, 0, (total,))[0], total)
 
 
 @gathered.on(SeriesTerm)
@@ -246,7 +246,7 @@ def _settled_strain(task, w, stencil, p, dt, total, totals, fastest):
     dl = increment(dt, gradient)
     if isinstance(task, StrainOfLastStep):
         dl = frames.of_places_before(w.frame, w.kin, dl)
-    dl = averaging.averaged(w, p, dl, ratio)
+    dl = visit.averaged(w, p, dl, ratio)
     law, old, f = visit.deformed_state(w, p, dt)
     growth = frames.spatial_increment(w.frame, w.kin, dl, f)
     state = laws.advance(law, w.kin, old, growth, dt)
@@ -282,7 +282,7 @@ def _settled_trial_strain(task, w, stencil, p, dt, total, totals, fastest):
         dl = frames.of_places_before(w.frame, w.kin, dl)
     _, _, f = visit.deformed_state(w, p, dt)
     dl = frames.spatial_increment(w.frame, w.kin, dl, f)
-    field(w.points.fields, averaging.VolumeRatio)[0, p] = det(I + dl)
+    field(w.points.fields, visit.VolumeRatio)[0, p] = det(I + dl)
     return real(0, dt), fastest
 
 
@@ -294,7 +294,7 @@ def increment(dt, grad_v):
 
 @settled.on(SetMeanStress)
 def _settled_average_stress(task, w, stencil, p, dt, total, totals, fastest):
-    field(w.points.fields, averaging.AveragedStress)[0, p] = total
+    field(w.points.fields, visit.AveragedStress)[0, p] = total
     return real(0, dt), fastest
 
 

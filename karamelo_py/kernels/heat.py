@@ -26,7 +26,6 @@ from karamelo_py.compiler.compile import (
 from karamelo_py.compiler.fields import Field, StepField, field, load, load_vector, store, vector
 from karamelo_py.kernels import arrays, hook_loop
 from karamelo_py.kernels.arrays import MASS, Buffers, Nodes, of_force
-from karamelo_py.kernels.averaging import NodalMean
 from karamelo_py.kernels.clock import read_reports, step_size
 from karamelo_py.kernels.g2p import empty, gathered, settled
 from karamelo_py.kernels.nodes import NodalUpdate, SumsToVelocity, TakeMean
@@ -34,7 +33,7 @@ from karamelo_py.kernels.p2g import load_of, scattered
 from karamelo_py.kernels.sweep import OldWeights, Visit, sweep, sweep_nodes
 from karamelo_py.kernels.table import conduct
 from karamelo_py.kernels.totals import agree_on_heat
-from karamelo_py.kernels.visit import deformed_state, law_and_state
+from karamelo_py.kernels.visit import NodalMean, deformed_state, law_and_state
 from karamelo_py.points import laws
 from karamelo_py.points.basis import entry, reach
 from karamelo_py.points.frames import inverse_stretch_squared, pulled_back

@@ -21,8 +21,8 @@ move (not with splines), and that usl strains by dv, which may only cost.
 """
 
 from karamelo_py.compiler import fields
-from karamelo_py.compiler.compile import accumulate, real, round_off, shared, where
-from karamelo_py.kernels.arrays import MASS, of_change, of_momentum, vector_at
+from karamelo_py.compiler.compile import accumulate, real, shared, where
+from karamelo_py.kernels.arrays import of_change, vector_at
 from karamelo_py.kernels.visit import law_and_state
 from karamelo_py.points import laws, transfers
 from karamelo_py.points.basis import entry, support
@@ -88,23 +88,6 @@ def bring_energy(lost, i, mass, momentum):
     """Give node `i` the energy of what a point gives it, where the array `lost` is there for it."""
     if lost is not None:
         accumulate(lost, i, 0, (energy_of(mass, momentum),))
-
-
-@shared
-def keep_loss(lost, kin, sums, n):
-    """In `lost` at node `n`, what it does not keep of the energy it was brought, per mass."""
-    mass = sums[n, MASS]
-    if mass > 0:
-        one = real(1, mass)
-        factor = one / mass
-        kinetic = mass - mass
-        for k in range(dimension(kin)):
-            v = sums[n, of_momentum(kin) + k] * factor
-            kinetic += real(0.5, mass) * v * v
-        # Of bodies that fly as one, the difference is round-off of either sign, and no heat.
-        noise = real(8, mass) * round_off(mass) * kinetic
-        lost[n, 1] = max(lost[n, 0] * factor - kinetic - noise, mass - mass)
-        lost[n, 2] = mass
 
 
 @shared

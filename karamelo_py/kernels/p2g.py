@@ -27,9 +27,13 @@ from karamelo_py.kernels.arrays import (
     Tag,
     of_force,
 )
-from karamelo_py.kernels.averaging import AveragedStress, FBar, NodalMean, NodalStress, VolumeRatio
 from karamelo_py.kernels.loss import EnergyLoss, bring_energy
 from karamelo_py.kernels.visit import (
+    AveragedStress,
+    FBar,
+    NodalMean,
+    NodalStress,
+    VolumeRatio,
     Work,
     deformed_state,
     for_tags,

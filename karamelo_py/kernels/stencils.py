@@ -8,12 +8,11 @@ from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.lanes.records import accumulate_affine
 from karamelo_py.kernels import g2p, p2g
 from karamelo_py.kernels.arrays import MASS, Tag, of_force
-from karamelo_py.kernels.averaging import NodalStress
 from karamelo_py.kernels.g2p import Move, empty_all, gathered_all, update_at
 from karamelo_py.kernels.lanes import OneByOne
 from karamelo_py.kernels.loss import EnergyLoss
 from karamelo_py.kernels.p2g import scattered_all
-from karamelo_py.kernels.visit import Work, all_records_of, for_tags
+from karamelo_py.kernels.visit import NodalStress, Work, all_records_of, for_tags
 from karamelo_py.points import transfers
 from karamelo_py.points.basis import carried, entry, product, reach, support
 from karamelo_py.points.basis.cpdi.block import InBlock, block_of, is_one_block, is_whole, of_one
@@ -168,15 +167,7 @@ def _with_moment(weights, row):
     """Of the sums of the nodes of a row: the sum of the first, and k times that; all the others."""
     first, *others = zip(*row[: len(weights)], strict=True)
     *tails, total = _tails(weights, first)
-    return total, _sum(tuple(tails)), *[_tails(weights, other)[-1] for other in others]
-
-
-@shared
-def _sum(vectors):
-    total = vectors[0]
-    for vector in vectors[1:]:
-        total = total + vector
-    return total
+    return total, sum(tails[1:], tails[0]), *[_tails(weights, other)[-1] for other in others]
 
 
 gathered_at_once_all = for_tags(gathered_at_once, "w, stencil, totals", each="totals")

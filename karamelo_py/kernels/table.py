@@ -19,11 +19,11 @@ from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.tuples import clear_first
 from karamelo_py.kernels import arrays, g2p, nodes, p2g
 from karamelo_py.kernels.arrays import Number, Setup, Tag
-from karamelo_py.kernels.averaging import FBar
 from karamelo_py.kernels.clock import step_size
 from karamelo_py.kernels.hook_loop import add_work
 from karamelo_py.kernels.loss import EnergyLoss, FrictionalHeat
 from karamelo_py.kernels.sweep import OldWeights, PresentWeights, Visit, sweep, sweep_nodes
+from karamelo_py.kernels.visit import FBar
 from karamelo_py.points.kinematics import Axisymmetric, dimension
 from karamelo_py.points.transfers.xpic import XPIC
 

@@ -8,7 +8,6 @@ import numpy as np
 
 from karamelo_py.compiler import fields
 from karamelo_py.kernels.arrays import MASS, Block, Points, Setup, known_to_laws, some_of
-from karamelo_py.kernels.averaging import FBar
 from karamelo_py.kernels.export import (
     ENERGY,
     EXPORTED,
@@ -19,6 +18,7 @@ from karamelo_py.kernels.export import (
     export_velocity_moment,
 )
 from karamelo_py.kernels.heat import Conducting
+from karamelo_py.kernels.visit import FBar
 from karamelo_py.language.scene import Scene
 from karamelo_py.points.boundary import ReflectingGrid
 from karamelo_py.points.laws import columns_of
