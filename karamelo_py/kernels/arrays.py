@@ -114,7 +114,7 @@ def arrays_of(points: Points) -> Iterator[tuple[str, np.ndarray]]:
 def made_of(points: Points, found: Iterable[np.ndarray]) -> Points:
     """Points of the kind of `points` with such arrays as `arrays_of` has given."""
     arrays = iter(found)
-    own = [None if array is None else next(arrays) for array in points[:-1]]
+    own: list[Any] = [None if array is None else next(arrays) for array in points[:-1]]
     return Points(*own, tuple(type(one)(next(arrays)) for one in points.fields))
 
 

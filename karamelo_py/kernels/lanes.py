@@ -3,14 +3,14 @@
 One by one, or in lanes: four or eight, where all parts of the visit know them.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from karamelo_py.compiler.compile import by_type, index, shared
 from karamelo_py.compiler.fingerprint import classes_in
 from karamelo_py.compiler.lanes import EightLanes, group, lanes_for, spread
-from karamelo_py.kernels.arrays import Block, Index, Number, Tag
+from karamelo_py.kernels.arrays import Index, Number, Tag
 from karamelo_py.kernels.g2p import Strain
 
 
@@ -20,40 +20,20 @@ class OneByOne(NamedTuple):
     width = 1
 
 
-def lanes_of_visit(visit: NamedTuple, s: NamedTuple, block: Block) -> Tag:
-    """Choose `OneByOne`, `FourLanes` or `EightLanes` for a visit in the context `s`.
+def lanes_with(parts: tuple, laws: NamedTuple, mass: np.ndarray) -> Tag:
+    """Choose `OneByOne`, `FourLanes` or `EightLanes` for a loop with these parts over points.
 
-    Interpreted, and where a part of the visit does not know lanes, it is one by one.
+    Interpreted, and where a part or a law does not know lanes, it is one by one.
     """
     return OneByOne()
 
 
-@by_type(lanes_of_visit)
-def _lanes_of_visit(visit, s, block):
-    tasks, quantities = visit[0], visit[1]
-    of_scene = (s[s.fields.index(name)] for name in ("basis", "transfer", "averaging"))
-    law = block[block.fields.index("laws")]
-    parts = {part.instance_class for part in (*tasks, *quantities, *of_scene)}
-    made = _lanes_if_known(parts, law, block[0][block[0].fields.index("mass")])
-    return lambda visit, s, block: made()
-
-
-def _lanes_if_known(parts, laws, mass):
-    """Choose lanes for points of such `mass`; `OneByOne` where a part does not know lanes."""
-    if all(getattr(part, "in_lanes", False) for part in (*parts, *classes_in(laws))):
-        return lanes_for(mass.dtype.bitwidth)
-    return OneByOne
-
-
-def lanes_of_law(laws: NamedTuple, mass: np.ndarray) -> Tag:
-    """Choose lanes for a loop that asks only a law, as `lanes_of_visit` does for a visit."""
-    return OneByOne()
-
-
-@by_type(lanes_of_law)
-def _lanes_of_law(laws, mass):
-    made = _lanes_if_known((), laws, mass)
-    return lambda laws, mass: made()
+@by_type(lanes_with)
+def _lanes_with(parts, laws, mass):
+    known = (*(part.instance_class for part in parts), *classes_in(laws))
+    in_lanes = all(getattr(part, "in_lanes", False) for part in known)
+    made = lanes_for(mass.dtype.bitwidth) if in_lanes else OneByOne
+    return lambda parts, laws, mass: made()
 
 
 @shared
@@ -65,7 +45,7 @@ def points_from(lanes: Tag, q: int, end: int) -> Index:
 
 
 @shared
-def one_loop_each(lanes: Tag, visit: NamedTuple) -> bool:
+def one_loop_each(lanes: Tag, visit: Any) -> bool:
     """Choose three loops over a stretch of points: gather, update, scatter; else one for all.
 
     Three short loops are faster than a long one where there is much to update: processors keep
@@ -78,7 +58,7 @@ def one_loop_each(lanes: Tag, visit: NamedTuple) -> bool:
 
 
 @shared
-def lanes_of_update(lanes: Tag, visit: NamedTuple) -> Tag:
+def lanes_of_update(lanes: Tag, visit: Any) -> Tag:
     """Choose the lanes of the particle update: in stretches of doubles twice those of the gather.
 
     Chains of operations that wait for each other serve eight points in the time of four. To gather

@@ -16,7 +16,7 @@ sums are made in one order, whatever the number of threads.
 import inspect
 from collections.abc import Callable
 from math import inf
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -50,7 +50,7 @@ from karamelo_py.kernels.clock import common_velocity
 from karamelo_py.kernels.g2p import empty_all, settled_all
 from karamelo_py.kernels.lanes import (
     lanes_of_update,
-    lanes_of_visit,
+    lanes_with,
     one_loop_each,
     points_from,
     zero_of,
@@ -138,8 +138,8 @@ def places_of(frame: Tag, points: Points, now: int, then: int) -> Places:
 
     `now` and `then` are rows of `Points.x`.
     """
-    x = points.x[now]
-    return Places(x if follows(frame) else points.home, x, points.x[then])
+    where: Any = points.x[now] if follows(frame) else points.home
+    return Places(where, points.x[now], points.x[then])
 
 
 # --- tiles of points ---------------------------------------------------------------------------
@@ -183,7 +183,8 @@ def visit_tile(visit: Visit, s: Context, block: Block, t: int) -> None:
     box = tiling.buffer
     numbered = renumbered(grid, box[t, 2], box[t, 3], box[t, 4])
     out = work_of(s, numbered, s.buffers, block, places)
-    lanes = lanes_of_visit(visit, s, block)
+    parts = (*visit.tasks, *visit.quantities, s.basis, s.transfer, s.averaging)
+    lanes = lanes_with(parts, block.laws, points.mass)
     wide = lanes_of_update(lanes, visit)
     apart = one_loop_each(lanes, visit)
     stretch = STRETCH if apart else WHOLE

@@ -27,7 +27,7 @@ from karamelo_py.compiler.threads import shared_out
 from karamelo_py.compiler.tuples import put_at, record
 from karamelo_py.kernels import totals
 from karamelo_py.kernels.arrays import TIMESTEP, first_from, known_to_laws
-from karamelo_py.kernels.lanes import lanes_of_law, points_from
+from karamelo_py.kernels.lanes import lanes_with, points_from
 from karamelo_py.points.kinematics import dimension, free_from
 from karamelo_py.points.laws import (
     dissipated_energy,
@@ -66,7 +66,7 @@ def _solid_of(firsts, number):
 def _look_at_share(kin, points, laws, tiling, firsts, k):
     """Energies, mass and momentum of the points of each tile of the k-th share, for its report."""
     points, laws, tiling = at_hand(points), at_hand(laws), at_hand(tiling)
-    lanes = lanes_of_law(laws, points.mass)
+    lanes = lanes_with((), laws, points.mass)
     for place in range(tiling.share[k], tiling.share[k + 1]):
         t = tiling.order[place]
         start, end = tiling.range[t, 0], tiling.range[t, 1]
