@@ -138,8 +138,8 @@ def places_of(frame: Tag, points: Points, now: int, then: int) -> Places:
 
     `now` and `then` are rows of `Points.x`.
     """
-    where: Any = points.x[now] if follows(frame) else points.home
-    return Places(where, points.x[now], points.x[then])
+    weighed: Any = points.x[now] if follows(frame) else points.home
+    return Places(weighed, points.x[now], points.x[then])
 
 
 # --- tiles of points ---------------------------------------------------------------------------
