@@ -333,6 +333,7 @@ CLOCK = np.dtype(
     ]
 )
 TIME, TIMESTEP, DT = 0, 1, 2  # the first of the published values
+LAST = 2**62  # no id of a point is so large
 
 
 class Control(NamedTuple):
@@ -344,7 +345,7 @@ class Control(NamedTuple):
     #                     and behind them mass and momentum of each solid, 1 + d
     digits: np.ndarray  # (LIMBS,) scratch
     answer: np.ndarray  # rounded totals, and what processes agree on
-    firsts: np.ndarray  # (S,) int64: id of the first point of each solid
+    firsts: np.ndarray  # (S + 1,) int64: id of the first point of each solid; LAST
     ranks: Tag  # whether there are other processes
 
 
@@ -355,7 +356,8 @@ def new_control(values: np.ndarray, firsts: Sequence[int] = (), d: int = 0) -> C
     more = (1 + d) * len(firsts)
     totals = np.zeros((len(values) + more, LIMBS), np.int64)
     digits, answer = np.zeros(LIMBS, np.int64), np.zeros(max(16, more))
-    return Control(values, clock, totals, digits, answer, np.array(firsts, np.int64), Alone())
+    ids = np.array([*firsts, LAST], np.int64)
+    return Control(values, clock, totals, digits, answer, ids, Alone())
 
 
 class Setup(NamedTuple):

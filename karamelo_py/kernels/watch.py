@@ -47,7 +47,6 @@ DRIFTING = 1e-3  # of the energy of bodies that drift: what they vibrate by and 
 BOUND = 10.0  # times the energy that there was and that loads have brought: more stops the run
 ROUND_OFF = 1e-14  # of m c^2: energies below are noise
 COARSE = 1000.0  # round-off errors: a strain of so many is noise, too
-LAST = 2**62  # no id of a point is so large
 ENERGIES, OF_SOLID = 3, 5  # columns of the reports of tiles
 HEAT_NOISE = 1e-4  # of a temperature: what does not count where all are alike
 OVERSHOOT = 0.1  # of the range of temperatures that sources allow: more stops the run
@@ -71,7 +70,7 @@ def _look_at_share(kin, points, laws, tiling, firsts, k):
         t = tiling.order[place]
         start, end = tiling.range[t, 0], tiling.range[t, 1]
         solid = _solid_of(firsts, points.id[start])
-        begin, behind = firsts[solid], _behind(firsts, solid)
+        begin, behind = firsts[solid], firsts[solid + 1]
         kinetic = stored = 0.0
         total = (0.0,) * (1 + kin.dimension)
         for q in range(start, end, lanes.width):
@@ -131,18 +130,12 @@ def _add_momenta(d, ids, masses, v, tiling, control):
                 if not begin <= ids[p] < end:
                     _add_momentum(control, solid, d)
                     solid = _solid_of(firsts, ids[p])
-                    begin, end = firsts[solid], _behind(firsts, solid)
+                    begin, end = firsts[solid], firsts[solid + 1]
                 mass = float(masses[p])
                 sums[0] += mass
                 for k in range(d):
                     sums[1 + k] += mass * float(v[k, p])
         _add_momentum(control, solid, d)
-
-
-@shared
-def _behind(firsts, solid):
-    """The id behind those of the points of a solid."""
-    return firsts[solid + 1] if solid + 1 < firsts.size else LAST
 
 
 @noinline
@@ -164,7 +157,7 @@ def _sum_drift(s):
         _add_momenta(d, points.id, points.mass, points.v, block.tiling, control)
     totals.collect(control.ranks, control, own, control.totals.shape[0] - own)
     energy = 0.0
-    for k in range(control.firsts.size):
+    for k in range(control.firsts.size - 1):
         mass = control.answer[k * (1 + d)]
         for i in range(free_from(s.kin), d):
             momentum = control.answer[k * (1 + d) + 1 + i]
