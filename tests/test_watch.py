@@ -13,8 +13,7 @@ from selection import covering, parameters
 from karamelo_py.app.cli import main
 from karamelo_py.app.studies import keeping, stability
 from karamelo_py.kernels.arrays import new_control
-from karamelo_py.kernels.growth import WITHIN
-from karamelo_py.kernels.watch import LOOKS, judge
+from karamelo_py.kernels.watch import LOOKS, WITHIN, judge
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.scene.hub import Hub

@@ -282,18 +282,3 @@ def beside(first: int, steps: int) -> int:
 implements(beside)(lambda first, steps: numba.uint64(first + steps))
 
 
-def over_blocks(per_block: Callable) -> Callable:
-    """Make of ``f(block, setup, ...)`` an ``f(setup, ...)`` that does so for each of setup.blocks.
-
-    The blocks have different types (one for each constitutive law), which a loop in a kernel cannot
-    run over: the calls are written out once per number of blocks.
-    """
-
-    shared(per_block)
-
-    @shared
-    def loop(setup: Any, *arguments: Any) -> None:
-        for block in setup.blocks:
-            per_block(block, setup, *arguments)
-
-    return loop

@@ -18,7 +18,7 @@ start
     number for each component;
 summed
     whether points give to this field of the nodes (`False` by default): what they give is summed
-    tile by tile (:mod:`karamelo_py.kernels.sums`);
+    tile by tile (:mod:`karamelo_py.kernels.p2g`);
 columns
     names under which dumps, the log, plots and pictures show its components.
 

@@ -195,11 +195,5 @@ def take_over(ranks, due):
 def publish(control, slot, count):
     """The published values from `slot` on become those of their totals."""
     collect(control.ranks, control, slot, count)
-    take_answer(control.values, control.answer, slot, count)
-
-
-@kernel
-def take_answer(values, answer, slot, count):
-    """The values from `slot` on become the answers."""
     for k in range(count):
-        values[slot + k] = answer[k]
+        control.values[slot + k] = control.answer[k]

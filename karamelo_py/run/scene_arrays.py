@@ -12,13 +12,12 @@ from karamelo_py.compiler import fields
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.threads import Serial, Threaded, new_team
 from karamelo_py.kernels.arrays import DT, TIME, TIMESTEP, some_of
-from karamelo_py.kernels.clock import step_size
-from karamelo_py.kernels.conduction import show_heat
+from karamelo_py.kernels.clock import all_well, step_size
+from karamelo_py.kernels.heat import show_heat
 from karamelo_py.kernels.nodes import SumsToVelocity
 from karamelo_py.kernels.p2g import Force
-from karamelo_py.kernels.reports import all_well
-from karamelo_py.kernels.rows import SUMS
 from karamelo_py.kernels.sweep import Visit, sweep, sweep_nodes
+from karamelo_py.kernels.table import SUMS
 from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.plastic_rate import without_rate
 from karamelo_py.run.access.nodes_by_number import ByNumber

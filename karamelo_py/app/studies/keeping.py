@@ -10,7 +10,7 @@ import numpy as np
 from karamelo_py.app.plot import read_log
 from karamelo_py.app.studies.case import said_in, worded
 from karamelo_py.app.studies.curves import Table, missing
-from karamelo_py.kernels.growth import WITHIN, growth
+from karamelo_py.kernels.watch import WITHIN, growth
 
 SHARE = 0.2  # of the run: means over its first and its last part are compared
 WRONG = ("gains", "breaks")

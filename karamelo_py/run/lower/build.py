@@ -24,11 +24,11 @@ from karamelo_py.kernels.arrays import (
     new_control,
     some_of,
 )
-from karamelo_py.kernels.averaging import NodalMean
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.laws import elastic_law, law_in, law_on, law_table
 from karamelo_py.kernels.loss import EnergyLoss, FrictionalHeat
-from karamelo_py.kernels.rows import Insulated
+from karamelo_py.kernels.table import Insulated
+from karamelo_py.kernels.visit import NodalMean
 from karamelo_py.language.scene import Scene
 from karamelo_py.output.point_table import owners_of_fields
 from karamelo_py.points.basis import carried, deformed

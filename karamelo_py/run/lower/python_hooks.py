@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.kernels.arrays import INITIAL_INTEGRATE, ON_VELOCITY, SUPPLY_HEAT, Setup
-from karamelo_py.kernels.conduction import at_heat_nodes, at_heated_points
+from karamelo_py.kernels.heat import at_heat_nodes, at_heated_points
 from karamelo_py.kernels.hook_loop import at_nodes, at_points
 from karamelo_py.kernels.hooks import STAGES, CompiledHook
 from karamelo_py.run.lower.hook_tables import lower_hooks
