@@ -5,7 +5,7 @@ from typing import Any
 from cycler import cycler
 
 from karamelo_py.app.studies import look
-from karamelo_py.output.plot_style import real_ticks
+from karamelo_py.output.plots import real_ticks
 
 # Black is what is exact or measured.
 LINES = cycler(color=look.PALETTE[1:7]) + cycler(linestyle=look.DASHES)

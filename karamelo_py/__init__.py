@@ -9,6 +9,5 @@ __all__ = ["KarameloWarning", "Simulation", "SimulationError"]
 def __getattr__(name):
     """Import what is for programs only when one asks for it: the command line starts faster."""
     if name in __all__:
-        home = "simulation" if name == "Simulation" else "interface"
-        return getattr(import_module(f"karamelo_py.app.{home}"), name)
+        return getattr(import_module("karamelo_py.app.simulation"), name)
     raise AttributeError(f"module 'karamelo_py' has no attribute '{name}'")

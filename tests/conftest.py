@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from textwrap import dedent
 
 import numpy as np
@@ -160,3 +161,29 @@ def state_interpreted(tmp_path, _interpreter) -> Callable[..., dict[str, np.ndar
             return dict(arrays)
 
     return run
+
+
+@pytest.fixture(scope="session")
+def _forking() -> Iterator[str]:
+    if os.name != "posix":
+        yield sys.executable
+        return
+    with TemporaryDirectory() as folder:  # a socket has a short path
+        words = [sys.executable, str(TESTS / "forking.py"), f"{folder}/door"]
+        python = Path(folder) / "python"
+        start = " ".join([words[0], "-ISs", *words[1:]])
+        python.write_text(f'#!/bin/sh\nexec {start} "$0" "$@"\n', encoding="utf-8")
+        python.chmod(0o755)
+        environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
+        process = subprocess.Popen(words, stdout=subprocess.PIPE, env=environment)
+        process.stdout.readline()
+        yield str(python)
+        process.kill()
+        process.communicate()
+
+
+@pytest.fixture
+def starts_are_cheap(_forking, monkeypatch) -> None:
+    """Runs and code, interpreted, start as forks of a process that has the program at hand."""
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
+    monkeypatch.setattr(sys, "executable", _forking)

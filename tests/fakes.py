@@ -6,8 +6,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from karamelo_py.output import node_columns, point_table
 from karamelo_py.output.console import Console
-from karamelo_py.output.fields import ABSENT_AT_NODES, ABSENT_AT_POINTS
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.lattice import Lattice
 
@@ -46,10 +46,10 @@ class FakeFields:
         hub.lattices = [Lattice(dimension, hub.domain.lo, hub.domain.hi, hub.domain.h)]
 
     def absent_at_points(self):
-        return list(ABSENT_AT_POINTS)
+        return point_table.absent(point_table.COLUMNS)
 
     def absent_at_nodes(self):
-        return list(ABSENT_AT_NODES)
+        return point_table.absent(node_columns.COLUMNS)
 
     @property
     def present(self):

@@ -224,8 +224,8 @@ SCENES = {
     "single": "precision(single)\n" + block(
         2, "fix(v, initial_velocity_particles, all, sin(9*x0), 0)", "run(6)"
     ),
-    "deleted": thrown(2, "delete", "run(8)", "run(22)"),
-    "reflected": thrown(2, "reflect", "run(8)", "run(22)"),
+    "deleted": thrown(2, "delete", "run(8)", "run(12)"),
+    "reflected": thrown(2, "reflect", "run(8)", "run(12)"),
     "tools": block(2, *TOOLS),
     "groups": block(2, GROUPS, "run(7)"),
     "functions in Python": block(2, PYTHON, "run(5)"),

@@ -5,7 +5,7 @@ from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.parser import parse
-from karamelo_py.styles.solids.region import RegionSolid
+from karamelo_py.styles.solids import RegionSolid
 
 DENSITY = 1000.0
 

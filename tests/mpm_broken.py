@@ -4,7 +4,7 @@ import sys
 from typing import Any, NamedTuple
 
 from karamelo_py.compiler.fields import scalar
-from karamelo_py.kernels.rows import ACCELERATE, SUMS
+from karamelo_py.kernels.table import ACCELERATE, SUMS
 from karamelo_py.points.basis.product import along, register
 from karamelo_py.points.laws import (
     advance,
@@ -217,6 +217,10 @@ class Doubled(Group):
 
 class Lost(Group):
     node_fields = (Unshaped,)
+
+
+class Nodal(Group):
+    node_fields = (Taken,)
 
 
 class First(Group):

@@ -12,20 +12,17 @@ from cuda.bindings import nvjitlink
 from numba import typeof
 
 from karamelo_py.compiler import loops, machine
-from karamelo_py.compiler.argument_buffer import ArgumentBuffer
-from karamelo_py.compiler.compile import define, index, shared
+from karamelo_py.compiler.argument_buffer import plan_for
+from karamelo_py.compiler.compile import index, shared
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Nodes, Setup
-from karamelo_py.kernels.averaging import FBar
 from karamelo_py.kernels.g2p import SeriesTerm, SetMeanStress, TrialStrain, empty_all, settled_all
 from karamelo_py.kernels.heat import HeatContent, HeatFlow, TemperatureGradient, Warming
 from karamelo_py.kernels.lanes import OneByOne, zero_of
 from karamelo_py.kernels.nodes import at_node
-from karamelo_py.kernels.p2g import AveragedForce, SeriesBack, Volumes, load_all
-from karamelo_py.kernels.rows import Insulated
+from karamelo_py.kernels.p2g import AveragedForce, SeriesBack, Volumes, load_all, sum_share
 from karamelo_py.kernels.stencils import gather_nodes, scatter_nodes
-from karamelo_py.kernels.sums import sum_share
 from karamelo_py.kernels.sweep import (
     Context,
     OldWeights,
@@ -34,8 +31,8 @@ from karamelo_py.kernels.sweep import (
     recompute_stencil,
     work_of,
 )
-from karamelo_py.kernels.table import Sweep, fused, staged
-from karamelo_py.kernels.visit import place_at
+from karamelo_py.kernels.table import Insulated, Sweep, fused, staged
+from karamelo_py.kernels.visit import FBar, place_at
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.points.basis import locate
@@ -55,17 +52,17 @@ class Compiled(NamedTuple):
     spilled: int  # bytes that registers did not hold, stored and loaded
 
 
-def visit_point(visit, s, block, then, dt, p, report):
+def visit_point(visit, s, block, p, report):
     """What `kernels.sweep.visit_tile` does for one point, in doubles or singles."""
-    points = block.points
+    points, dt = block.points, s.dt
     p = index(p)
     grid = record(s.grids, index(points.grid[p]))
-    places = places_of(s.frame, points, s.now, then)
+    places = places_of(s.frame, points, s.now, s.then)
     w = work_of(s, grid, s.nodes, block, places)
     width = OneByOne()
     stencil = locate(s.basis, s.kin, grid, place_at(s.basis, s.kin, places.where, p))
     totals = empty_all(visit.tasks, w, load_vector(s.kin, places.x, p))
-    totals = gather_nodes(width, stencil, visit.tasks, w, totals)
+    totals = gather_nodes(stencil, width, visit.tasks, w, totals)
     moved, rate = settled_all(visit.tasks, w, stencil, p, dt, totals, zero_of(width, dt))
     report[p, 0] = moved
     report[p, 1] = rate
@@ -73,7 +70,7 @@ def visit_point(visit, s, block, then, dt, p, report):
         return
     stencil = recompute_stencil(visit.weights, w, stencil, p)
     loads = load_all(visit.quantities, w, p, dt)
-    scatter_nodes(width, stencil, visit.quantities, w, loads)
+    scatter_nodes(stencil, width, visit.quantities, w, loads)
 
 
 def visit_node(task, kin, nodes, n, dt):
@@ -110,7 +107,7 @@ def visits_of(setup: Setup, scheme: Any, in_stages: bool = False) -> list[Visit]
 
 def compiled(function: Any, *arguments: Any) -> Compiled:
     """A kernel for arguments of these types."""
-    kinds = ArgumentBuffer(arguments).plan(arguments).types
+    kinds = plan_for(arguments).types
     module, _ = loops.written(shared(function), kinds)
     main = module.globals[loops.NAME]
     main.linkage = "internal"
@@ -140,13 +137,14 @@ def compiled(function: Any, *arguments: Any) -> Compiled:
 
 
 def calling(function: Callable, count: int) -> Callable:
-    """A kernel that writes down what a function of so many numbers gives, another tuple of them."""
-    names = ", ".join(f"a{k}" for k in range(count))
-    return define(
-        f"out, {names}",
-        f"for k, value in enumerate(function({names})): out[k] = value",
-        function=shared(function),
-    )
+    """A kernel that writes down what a function of numbers gives, another tuple of them."""
+    shared(function)
+
+    def write(out, *numbers):
+        for k, value in enumerate(function(*numbers)):
+            out[k] = value
+
+    return write
 
 
 def nodes_of(visit: Visit, setup: Setup) -> Nodes:
@@ -168,7 +166,7 @@ def compiled_visit(visit: Visit, setup: Setup) -> Compiled:
     real = s.nodes.sums.dtype.type
     context = Context(
         s.frame, s.kin, s.basis, s.transfer, s.averaging, s.grids, nodes, nodes, 0, real(0),
-        (real(0),) * s.kin.dimension,
+        (real(0),) * s.kin.dimension, 0, True, True, real(1),
     )  # fmt: skip
     report = np.zeros((1, 2), real)
-    return compiled(visit_point, visit, context, s.blocks[0], 0, real(1), 0, report)
+    return compiled(visit_point, visit, context, s.blocks[0], 0, report)

@@ -8,7 +8,7 @@ from tempfile import mkdtemp
 import numpy as np
 from comms import together
 
-from karamelo_py.app.together import share
+from karamelo_py.app.launch import share
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.run.mpi.comm import MpiComm

@@ -8,8 +8,7 @@ import pytest
 
 from karamelo_py.app.cli import main
 from karamelo_py.app.studies import records
-from karamelo_py.app.studies.advise import Adviser, ChoiceRuns, carry_out
-from karamelo_py.app.studies.forecast import forecast
+from karamelo_py.app.studies.advise import Adviser, ChoiceRuns, carry_out, forecast
 
 INPUTS = Path(__file__).parent.parent / "inputs"
 # A block at rest. Its "error" is a law of N and of the choice, its steps are the cost.
@@ -32,9 +31,8 @@ run(price*N)
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
+def folder(tmp_path, monkeypatch, starts_are_cheap):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
     (tmp_path / "in.law").write_text(SCRIPT, encoding="utf-8")
     return tmp_path
 

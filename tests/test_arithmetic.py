@@ -1,5 +1,6 @@
 """Operations of kernels on numbers of every type give what Python gives."""
 
+import math
 import operator
 from itertools import product
 
@@ -28,6 +29,11 @@ def _compared(a, b, out):
 
 
 @kernel
+def _powers(x, k):
+    return x**2, x**3, x**4, x**5, x**-2, k**3, math.pow(k, 3), math.pow(k, x)
+
+
+@kernel
 def _flag(k, out):
     out[0] = FLAGS[k]
 
@@ -50,6 +56,16 @@ def test_comparisons(first, second):
     for a, b in product(values(first), values(second)):
         _compared(a, b, out)
         assert out.tolist() == [holds(a.item(), b.item()) for holds in COMPARISONS]
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.float64])
+def test_powers(kind):
+    """Those of known exponents are products; `math.pow` gives a real number."""
+    x = 1.5
+    expected = [x**2, x**3, x**4, x**5, x**-2, 27, 27.0, 3**x]
+    found = _powers(kind(x), 3)
+    assert found == pytest.approx(expected, rel=1e-6)
+    assert [type(number) for number in found[-3:]] == [int, float, float]
 
 
 def test_truth_values_that_are_part_of_the_code():

@@ -8,7 +8,7 @@ import pytest
 
 import karamelo_py
 from karamelo_py.app.cli import main
-from karamelo_py.app.studies import atlas, histories
+from karamelo_py.app.studies import atlas, pictures
 
 ROOT = Path(__file__).parent.parent
 SCRIPT = """
@@ -45,9 +45,8 @@ commands = ["sweep {inputs}/in.law -var M=1"]
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
+def folder(tmp_path, monkeypatch, starts_are_cheap):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
     (tmp_path / "in.law").write_text(SCRIPT, encoding="utf-8")
     (tmp_path / "a.toml").write_text(ATLAS, encoding="utf-8")
     return tmp_path
@@ -150,16 +149,15 @@ def test_the_atlas_of_the_pages_names_scripts_and_commands_that_exist():
     import shlex
 
     from karamelo_py.app.cli import ELSEWHERE
-    from karamelo_py.app.studies.options import zipped
     from karamelo_py.app.studies.records import recorded
-    from karamelo_py.app.studies.variables import cases, check_script, choices, logged
+    from karamelo_py.app.studies.variables import ScriptFiles, cases, choices, zipped
 
     entries, inputs = atlas.read(ROOT / "docs" / "atlas.toml")
     assert len({entry.name for entry in entries}) == len(entries)
     parser = argparse.ArgumentParser()
     commands = parser.add_subparsers()
     for name in ("sweep", "chart", "stability", "bench", "advise"):
-        importlib.import_module(ELSEWHERE[name][0]).add_parser(commands)
+        importlib.import_module(ELSEWHERE[name][0]).add_options(commands.add_parser(name))
     for entry in entries:
         for small in (False, True):
             for line in entry.lines(str(inputs), small=small):
@@ -168,9 +166,9 @@ def test_the_atlas_of_the_pages_names_scripts_and_commands_that_exist():
                 assert script is None or script.is_file(), line
                 if line.startswith("sweep"):
                     values = choices(options.var, {n for g in zipped(options) for n in g})
-                    check_script(script, values)
+                    ScriptFiles(script).check(values)
                     assert cases(values, zipped(options), options.where)
-                    recorded(options.record, logged(script), script, values)
+                    recorded(options.record, ScriptFiles(script), values)
 
 
 def test_curves_of_a_sweep(folder, capsys):
@@ -194,8 +192,8 @@ def test_curves_of_a_sweep(folder, capsys):
 
 def test_rows_that_a_run_gave_up_are_no_part_of_its_curve():
     time = np.array([0.0, 1.0, 2.0, 3.0, 1.0, 1.5])
-    assert list(time[histories.forward(time, stopped=True)]) == [0, 1, 2, 3]
-    assert list(time[histories.forward(time, stopped=False)]) == [0, 1, 1.5]
+    assert list(time[pictures.forward(time, stopped=True)]) == [0, 1, 2, 3]
+    assert list(time[pictures.forward(time, stopped=False)]) == [0, 1, 1.5]
 
 
 @pytest.mark.full

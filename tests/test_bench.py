@@ -10,9 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from karamelo_py.app.bench import apart, measure, record, scaling
-from karamelo_py.app.bench.measure import Measured
-from karamelo_py.app.bench.workloads import WORKLOADS
+from karamelo_py.app.bench import apart, command, measure
+from karamelo_py.app.bench.measure import WORKLOADS, Measured
 from karamelo_py.app.cli import main
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.scene.hub import Hub
@@ -224,7 +223,7 @@ def test_the_commit_is_that_of_the_repository():
         head = subprocess.run(words, capture_output=True, text=True, check=True).stdout.strip()
     except (OSError, subprocess.CalledProcessError):
         pytest.skip("there is no repository here")
-    assert record.commit() in (head, head + "-dirty")
+    assert command.commit() in (head, head + "-dirty")
 
 
 # --- several workloads ----------------------------------------------------------------------------
@@ -293,7 +292,7 @@ def test_an_interrupt_ends_the_process_of_a_workload(capfd, monkeypatch):
     monkeypatch.setattr(measure, "bandwidth", lambda threads, size=1: 2e10)
     monkeypatch.setattr(apart, "COMMAND", (sys.executable, "-c", "import time; time.sleep(600)"))
     monkeypatch.setattr(apart.subprocess, "Popen", Interrupted)
-    monkeypatch.setattr(record, "commit", lambda: None)  # of which another process tells
+    monkeypatch.setattr(command, "commit", lambda: None)  # of which another process tells
     assert main([*TWO, "10"]) == 130
     assert capfd.readouterr().err == "error: interrupted\n"
     assert len(begun) == 1 and begun[0].returncode not in (0, None)
@@ -312,9 +311,9 @@ def test_processes_beside_threads(tmp_path, monkeypatch, capsys):
     def measured(part, *, weak=False):
         parts.append(part)
         best = 1e6 * part.ranks**0.5
-        return scaling.Scaled(part.ranks, part.threads, weak, 100, best, 0.02, 0.125)
+        return apart.Scaled(part.ranks, part.threads, weak, 100, best, 0.02, 0.125)
 
-    monkeypatch.setattr(scaling, "_measured", measured)
+    monkeypatch.setattr(apart, "measured_with_ranks", measured)
     assert main(["bench", "block-3d-mls", "--ranks", "4,2", "-o", "a.json"]) == 0
     out = capsys.readouterr().out
     assert [(p.ranks, p.threads) for p in parts] == [(1, 1), (2, 1), (1, 2), (4, 1), (2, 1), (4, 1)]
@@ -329,7 +328,7 @@ def test_processes_beside_threads(tmp_path, monkeypatch, capsys):
 def test_scenes_grow_with_processes():
     points = {}
     for times in (1, 4):
-        found = scaling.grown(WORKLOADS["bar-3d-ul"].script, {"coarser": "4"}, times)
+        found = apart.grown(WORKLOADS["bar-3d-ul"].script, {"coarser": "4"}, times)
         hub = Hub()
         Interpreter(hub, presets=found).run_text(WORKLOADS["bar-3d-ul"].script)
         points[times] = sum(solid.count for solid in hub.solids.values())

@@ -399,7 +399,7 @@ def test_what_threads_do_is_followed(tmp_path, monkeypatch):
     def put(tag, out, i):
         out[i] = answer(tag)
 
-    put_all = shared_out(shared(put), "tag, out")
+    put_all = shared_out(shared(put))
     found = []
     contents = choices.contents
     monkeypatch.setattr(loops, "contents", lambda parts: found.append(contents(parts)) or found[-1])

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from karamelo_py.app.cli import main
 from karamelo_py.app.studies import look, pictures
-from karamelo_py.app.studies.curves import Family, order
-from karamelo_py.output.plot_style import blank_figure, tick_text, tidy
+from karamelo_py.app.studies.curves import Family, Table, order
+from karamelo_py.output.plots import blank_figure, tick_text, tidy
 
 ORDERS = {"linear": 1, "quadratic-spline": 2, "cubic-spline": 4}
 
@@ -83,7 +83,7 @@ def test_the_table_tells_orders_and_front(table, capsys):
 @given(st.lists(st.tuples(st.floats(1e-3, 1e3), st.floats(1e-9, 1)), min_size=1, max_size=30))
 def test_nothing_beats_the_front_and_the_front_beats_the_rest(runs):
     table = [{"c": str(c), "e": str(e), "k": str(k)} for k, (c, e) in enumerate(runs)]
-    front = Family(table, ["k"], "e", "c").front()
+    front = Family(Table(table, ["k"]), "e", "c").front()
     chosen = [(float(row["c"]), float(row["e"])) for row in front]
     for cost, error in runs:
         beaten = any(c <= cost and e <= error for c, e in chosen)
@@ -242,7 +242,7 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 def test_a_page_comes_to_life_in_a_browser(table):
     """What Chromium makes of the file: a chart of all runs with a value, and the facts of one."""
     assert main(["chart", "sweep.csv", "-accuracy", "err", "-by", "basis", "-o", "page.html"]) == 0
-    front = Family(rows(), ["N", "basis"], "err", "seconds").front()
+    front = Family(Table(rows(), ["N", "basis"]), "err", "seconds").front()
     browser = next(filter(None, map(shutil.which, BROWSERS)))
     command = [browser, "--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=5000"]
     done = subprocess.run(

@@ -8,7 +8,7 @@ import warnings
 import pytest
 from scenes import block
 
-from karamelo_py.app.bench.workloads import WORKLOADS
+from karamelo_py.app.bench.measure import WORKLOADS
 from karamelo_py.app.cli import main
 from karamelo_py.app.simulation import Simulation
 

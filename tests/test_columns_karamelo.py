@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scenes import block
 
-from karamelo_py.styles.fixes.body_force import accelerate
+from karamelo_py.styles.fixes.forces import accelerate
 
 SHEAR = """
 eos(bulk, linear, 2, 100)

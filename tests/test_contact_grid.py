@@ -46,10 +46,10 @@ def test_one_solid_is_as_in_ulmpm(state_interpreted, d, scheme):
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_blocks_separate_freely(run_interpreted, scheme):
     """Two blocks that touch and move apart do not feel each other; in ulmpm they hold together."""
-    lines = ("dt_factor(0.5)", "log_modify(custom, step, va_x, vb_x, k)", "run(20)")
+    lines = ("dt_factor(0.5)", "log_modify(custom, step, va_x, vb_x, k)", "run(12)")
     free = run_interpreted(bars(0, *lines, v=-0.1, scheme=scheme, d=2)).log
-    assert free.va_x == pytest.approx(np.full(21, -0.1), rel=1e-12)
-    assert free.vb_x == pytest.approx(np.full(21, 0.1), rel=1e-12)
+    assert free.va_x == pytest.approx(np.full(13, -0.1), rel=1e-12)
+    assert free.vb_x == pytest.approx(np.full(13, 0.1), rel=1e-12)
     stuck = run_interpreted(bars(0, *lines, v=-0.1, scheme=scheme, d=2, method="ulmpm")).log
     assert abs(stuck.va_x[-1]) < 0.09
 

@@ -537,5 +537,5 @@ def test_torn_apart_in_any_way(state_interpreted):
     assert whole["nodal mass"] == pytest.approx(whole["mass"].sum(), rel=1e-13)
     pieces = TORN.format("Q4") + "run(13)\nrun(13)"
     assert same_bits(whole, state_interpreted(pieces, boxes=True))
-    whole = state_interpreted(TORN.format("R4") + "run(26)")
-    assert same_bits(whole, state_interpreted(TORN.format("R4") + "run(13)\nrun(13)"))
+    whole = state_interpreted(TORN.format("R4") + "run(12)")
+    assert same_bits(whole, state_interpreted(TORN.format("R4") + "run(6)\nrun(6)"))

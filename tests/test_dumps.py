@@ -16,12 +16,8 @@ from karamelo_py.output.rhythm import ByTime, is_due, next_step
 from karamelo_py.output.units import Units
 from karamelo_py.script.errors import Place, ScriptError
 from karamelo_py.styles.dumps import lammps
-from karamelo_py.styles.dumps.grid import GridDump
-from karamelo_py.styles.dumps.grid_gz import GridGz
-from karamelo_py.styles.dumps.movie import Movie
-from karamelo_py.styles.dumps.particle import Particle
-from karamelo_py.styles.dumps.particle_gz import ParticleGz
-from karamelo_py.styles.dumps.pyplot import PyPlot
+from karamelo_py.styles.dumps.lammps import GridDump, GridGz, Particle, ParticleGz
+from karamelo_py.styles.dumps.pyplot import Movie, PyPlot
 
 
 @pytest.fixture(params=[1, 2, 3])

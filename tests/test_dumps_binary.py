@@ -14,10 +14,8 @@ from PIL import Image
 
 from karamelo_py.output.vtu import Vtu
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.styles.dumps.grid_hdf5 import GridHdf5
-from karamelo_py.styles.dumps.grid_vtk import GridVtk
-from karamelo_py.styles.dumps.hdf5 import Hdf5, Hdf5Dump
-from karamelo_py.styles.dumps.vtk import Vtk
+from karamelo_py.styles.dumps.hdf5 import GridHdf5, Hdf5, Hdf5Dump
+from karamelo_py.styles.dumps.vtk import GridVtk, Vtk
 
 
 @pytest.fixture(params=[1, 2, 3])

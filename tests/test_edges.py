@@ -130,7 +130,7 @@ def test_affine_transfer_without_a_second_mapping_is_refused(run_interpreted):
     assert "unstable" not in run_interpreted(text.replace("scheme(usl)", "scheme(musl)")).err
 
 
-def test_a_hook_that_moves_points_moves_their_mass(tmp_path):
+def test_a_hook_that_moves_points_moves_their_mass(tmp_path, starts_are_cheap):
     """Points put elsewhere by initial_integrate give to the nodes there, and leave no trace."""
     code = """
         from karamelo_py.output.console import Console

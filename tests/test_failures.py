@@ -306,7 +306,7 @@ except SimulationError as error:
 """
 
 
-def test_the_last_good_state_is_from_before_energy_grew(tmp_path):
+def test_the_last_good_state_is_from_before_energy_grew(tmp_path, starts_are_cheap):
     """The block leaves at step 313; it has grown from 250 on, the start of the second run."""
     scene = block(1, "fix(v, initial_velocity_particles, all, 2)", "set_dt(0.001)", *OUTPUT)
     done = subprocess.run(

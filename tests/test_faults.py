@@ -25,8 +25,8 @@ pytestmark = pytest.mark.xdist_group("faults")
 
 FAMILIES = {
     "fix": "spring light misplaced swapped cold hot many few undirected viewless idle misspelt "
-    "silent stop weigh bare formless oneword clashing first again doubled lost leaving silenced "
-    "orphan",
+    "silent stop weigh bare formless oneword clashing nodal first again doubled lost leaving "
+    "silenced orphan",
     "compute": "gauge",
     "material": "motionless growing raising short uncompiled hiding double",
     "strength": "forgetful",
@@ -95,6 +95,7 @@ def test_init(hub):
         ("doubled", "the field Sized: it starts from 2 numbers and has 1 components"),
         ("lost", "the field Unshaped: AttributeError: 'Line' object has no attribute 'dimensions'"),
         ("clashing", "Taken: the column 'vx' is one of every scene"),
+        ("nodal", "Taken: the column 'vx' is one of every scene"),
     ],
 )
 def test_a_fix_that_cannot_be_meant(hub, style, message):

@@ -7,17 +7,15 @@ import numpy as np
 import pytest
 from hubs import SmallHub, arguments
 
-from karamelo_py.commands.solids import group
+from karamelo_py.commands.domain import group
 from karamelo_py.points.basis.bernstein_quadratic import BernsteinQuadratic
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.scene.group import AnyGroup, NodeGroup, ParticleGroup
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.methods.base import Method
-from karamelo_py.styles.methods.tlmpm import TLMPM
+from karamelo_py.styles.methods.ulmpm import TLMPM
 from karamelo_py.styles.methods.ulmpm_contacts import ULMPMContacts
-from karamelo_py.styles.regions.block import BlockRegion
-from karamelo_py.styles.regions.cylinder import Cylinder
-from karamelo_py.styles.regions.difference import Difference
+from karamelo_py.styles.regions import BlockRegion, Cylinder, Difference
 
 
 def scene():

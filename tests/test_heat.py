@@ -350,7 +350,7 @@ def test_messages_of_methods(run_interpreted):
     assert "no solid has a temperature" in said
 
 
-def test_hooks_in_python(tmp_path):
+def test_hooks_in_python(tmp_path, starts_are_cheap):
     """A fix in Python supplies heat and holds a temperature as the built-in ones do."""
     code = """
         from karamelo_py.output.console import Console

@@ -186,7 +186,7 @@ def _count_up(out, factor, k):
     out.a[k] += factor * k
 
 
-_counted = shared_out(noinline(_count_up), "out, factor")
+_counted = shared_out(noinline(_count_up))
 
 
 @kernel
@@ -213,7 +213,7 @@ def _count_often(mode, out, factor, times):
     return done
 
 
-_often = by_team(_count_often, "out, factor, times")
+_often = by_team(_count_often)
 
 
 @kernel

@@ -3,23 +3,30 @@
 import ast
 import re
 from collections import Counter, defaultdict
+from functools import cache
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "karamelo_py"
-TREES = {path: ast.parse(path.read_text("utf-8")) for path in sorted(PACKAGE.rglob("*.py"))}
 PAGE = (ROOT / "docs" / "house-numbers.md").read_text("utf-8")
 LIMITS = {name: int(n) for name, n in re.findall(r"^\| ([^|]+) \| (\d+) \|$", PAGE, re.M)}
+# They read the package once, in one process.
+pytestmark = pytest.mark.xdist_group("house")
 RIDDLE = re.compile(r"(What|Who|Whether|How|That|Where|Which)\b")
+
+
+@cache
+def trees() -> dict[Path, ast.Module]:
+    return {path: ast.parse(path.read_text("utf-8")) for path in sorted(PACKAGE.rglob("*.py"))}
 
 
 def nodes(*kinds: type):
     """All nodes of these kinds in the package, with their files."""
     return (
         (path, node)
-        for path, tree in TREES.items()
+        for path, tree in trees().items()
         for node in ast.walk(tree)
         if isinstance(node, kinds)
     )
@@ -86,7 +93,7 @@ def test_counts_do_not_grow(count):
 def test_lines_of_the_rooms():
     """Shown with ``pytest -s -n 0``."""
     lines = Counter()
-    for path in TREES:
+    for path in trees():
         lines[room_of(path)] += len(path.read_text("utf-8").splitlines())
     print("", *(f"{n:6} {room}" for room, n in lines.most_common()), sep="\n")
     assert sum(lines.values()) <= LIMITS["lines of Python"]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from karamelo_py.language import registry
-from karamelo_py.script.other_programs import instead, table
+from karamelo_py.script.errors import instead, table
 
 PAGE = Path(__file__).parents[1] / "docs" / "from-karamelo.md"
 

@@ -57,13 +57,12 @@ def test_what_goes_wrong_in_silence_is_named(tmp_path, values, status, err, word
 ORDERS = "musl", "leapfrog"  # there is no such scheme as the second
 
 
-def test_the_energy_table_reduced(tmp_path, monkeypatch, capsys):
+def test_the_energy_table_reduced(tmp_path, monkeypatch, capsys, starts_are_cheap):
     """The command of docs/energy.md on a coarse disk, one period, with a scheme that there is not.
 
     PIC takes what nodes have averaged away in every step: it damps by its definition.
     """
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
     entries, _ = atlas.read(ROOT / "docs" / "atlas.toml")
     assert {e.name for e in entries} >= {"energy/FLIP", "energy/transfers"}
     entry = next(e for e in entries if e.name == "energy/transfers")
@@ -81,10 +80,9 @@ def test_the_energy_table_reduced(tmp_path, monkeypatch, capsys):
     assert "refused: 2 of 4" in capsys.readouterr().out
 
 
-def test_a_part_of_the_energy_gains_nothing(tmp_path, monkeypatch, capsys):
+def test_a_part_of_the_energy_gains_nothing(tmp_path, monkeypatch, capsys, starts_are_cheap):
     """A block falls from rest: Ek = m g^2 t^2/2, while Ek + m g y stays."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
     script = """speed = 1
 method(ulmpm, FLIP, linear, 1)
 dimension(1, 0, 10, 1)
@@ -140,7 +138,7 @@ def gaining() -> list[tuple[str, ...]]:
     ]
 
 
-def test_what_gains_is_told_beforehand(tmp_path, monkeypatch, capsys):
+def test_what_gains_is_told_beforehand(tmp_path, monkeypatch, capsys, starts_are_cheap):
     """Of every transfer and scheme a cell that gains or breaks, on a coarser disk, as fast."""
     monkeypatch.chdir(tmp_path)
     cells = gaining()

@@ -5,8 +5,8 @@ import re
 import pytest
 
 from karamelo_py.language import registry
+from karamelo_py.script.errors import table
 from karamelo_py.script.lammps import line_of
-from karamelo_py.script.other_programs import table
 
 SCRIPT = """\
 units           si

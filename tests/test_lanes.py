@@ -21,14 +21,14 @@ from karamelo_py.compiler.lanes import EightLanes, FourLanes, group
 from karamelo_py.compiler.lanes.records import accumulate_affine
 from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.powers import exponential, logarithm, logarithm_near_one, power
+from karamelo_py.compiler.threads import Serial
 from karamelo_py.compiler.trace import CannotCompile
 from karamelo_py.compiler.tuples import flat, nested_as, row
-from karamelo_py.kernels.arrays import arrays_of, with_nodes
-from karamelo_py.kernels.averaging import NodalMean
+from karamelo_py.kernels.arrays import arrays_of, with_items_of
 from karamelo_py.kernels.g2p import empty, gathered, settled
 from karamelo_py.kernels.heat import HeatContent, HeatFlow, TemperatureGradient, Warming
-from karamelo_py.kernels.sweep import OldWeights, Serial, Visit, sweep_points
-from karamelo_py.kernels.visit import place_at
+from karamelo_py.kernels.sweep import OldWeights, Visit, context_of, sweep_points
+from karamelo_py.kernels.visit import NodalMean, place_at
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.points.basis import (
@@ -553,7 +553,7 @@ def _visited(*more):
     heat = setup.heat
     mean = NodalMean(np.zeros_like(field(heat.nodes.fields, NodalMean)))
     to = heat.buffers.nodes._replace(sums=np.zeros_like(heat.nodes.sums), fields=(mean,))
-    s = with_nodes(setup, heat.nodes, heat.buffers._replace(nodes=to))
+    s = with_items_of(setup, heat._replace(buffers=heat.buffers._replace(nodes=to)))
     rng = np.random.default_rng(5)
     points = s.blocks[0].points
     given = [one.array for one in (*points.fields, *s.nodes.fields)]
@@ -561,7 +561,7 @@ def _visited(*more):
         array[:] = 1 + 0.1 * rng.uniform(size=array.shape)
     tasks = (TemperatureGradient(), Warming(), *more)
     visit = Visit(tasks, (HeatContent(), HeatFlow()), OldWeights())
-    sweep_points(Serial(), visit, s, s.blocks[0], 1, True, True, 1e-3)
+    sweep_points(Serial(), visit, context_of(s, 1e-3, True, True, True), s.blocks[0])
     assert (s.blocks[0].tiling.report[:, 2] == 0).all()
     return dict(arrays_of(points)), (to.sums, mean.array)
 

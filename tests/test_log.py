@@ -91,7 +91,7 @@ def test_a_rehearsal_writes_nothing(hub):
 
 
 def test_nothing_is_refreshed_for_dumps_alone(hub):
-    from karamelo_py.styles.dumps.particle import Particle
+    from karamelo_py.styles.dumps.lammps import Particle
 
     hub.output.log.every = 10
     hub.dumps["d"] = Particle(hub, 2, "d.dump")

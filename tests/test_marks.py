@@ -122,7 +122,7 @@ for script in sys.argv[1:]:
 """
 
 
-def test_no_more_states_are_marked_than_a_run_may_go_back_to(tmp_path):
+def test_no_more_states_are_marked_than_a_run_may_go_back_to(tmp_path, starts_are_cheap):
     """Those since the last good one; none where that is the start, as the step is too large.
 
     Those behind the good one that half the step begins at are not marked any more.

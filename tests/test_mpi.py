@@ -378,7 +378,7 @@ import re
 from karamelo_py.run import simulation
 from karamelo_py.run.mpi import partition
 from karamelo_py.run.tiles import tiles
-from karamelo_py.styles.computes import linear_momentum
+from karamelo_py.styles.computes import conserved
 tiles.DIRECT_UP_TO = 0
 if os.environ.get("OMPI_COMM_WORLD_RANK") == "1":
     def out_of_memory(*_):
@@ -394,7 +394,7 @@ if os.environ.get("OMPI_COMM_WORLD_RANK") == "1":
     [
         pytest.param("simulation.Simulation._advance", marks=FULL),
         "partition.SharedTiles.give",
-        "linear_momentum.LinearMomentum.terms",
+        "conserved.LinearMomentum.terms",
     ],
 )
 def test_only_one_fails(tmp_path, function):
@@ -449,9 +449,10 @@ def test_the_first_fails(tmp_path, line, says):
     assert not list((tmp_path / "run").glob("*.part"))
 
 
+@pytest.mark.full
 @needs_mpi
 def test_a_run_that_goes_wrong(tmp_path):
-    """All processes know what is wrong: one message, and the files of one."""
+    """All processes know what is wrong: one message, and the files of one; as in test_ranks.py."""
     (tmp_path / "sitecustomize.py").write_text(SMALL_TILES, encoding="utf-8")
     folders = os.pathsep.join([str(tmp_path), os.environ["PYTHONPATH"]])
     lines = "dump(d, all, movie, 5, d.gif, 2, 2, vx)", "set_dt(0.004)", "run(60)"
@@ -502,7 +503,11 @@ PART_OF_ALL = """
 @pytest.mark.parametrize(
     "line, says",
     [
-        ("second and points.total(points.mass)", "to its end on one process, and to a total on"),
+        pytest.param(
+            "second and points.total(points.mass)",
+            "to its end on one process, and to a total on",
+            marks=pytest.mark.full,  # test_ranks.py has it of a function
+        ),
         ("self.publish('x', points.position[:, 0].sum())", "fix drag: air_x is "),
         ("self.publish('x', points.total(points.mass))", ""),
     ],

@@ -16,9 +16,9 @@ from conftest import INPUTS, ROOT
 from karamelo_py.app.cli import main
 from karamelo_py.compiler.fields import name_of, rows_of_points, some_points
 from karamelo_py.compiler.fingerprint import classes_in
-from karamelo_py.kernels.averaging import NodalMean
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.step import advance
+from karamelo_py.kernels.visit import NodalMean
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.run.advice.report import bytes_per_point

@@ -173,7 +173,7 @@ def test_quantities(hub):
     assert columns[5].read() == 5.0
     assert columns[6].read() == 1000.0
     assert columns[8].read() == 8.0
-    (total, share) = hub.output.plots
+    (total, share) = hub.output.plots.values()
     assert (total.x.read(), total.y.read()) == (0.0, 5.0)
     assert share.x.read() == pytest.approx(0.002)
     say(hub, "log_modify(default)")
@@ -185,7 +185,7 @@ def test_output_by_time(hub):
     say(hub, "plot(p, time(T), time, Ek_s)")
     assert hub.output.log.every.span == 0.5
     assert hub.dumps["d"].every.span == 0.25
-    assert next(iter(hub.output.plots)).every.span == 2
+    assert next(iter(hub.output.plots.values())).every.span == 2
 
 
 def test_the_log_as_csv(hub, tmp_path):

@@ -28,7 +28,7 @@ def add(hub, ID, every, x, y):
 def test_points_of_both_runs_are_collected_once(hub):
     hub.run(5)
     hub.run(2)
-    (curve,) = hub.output.plots
+    (curve,) = hub.output.plots.values()
     time, energy = np.array(curve.points).T
     np.testing.assert_allclose(time, [0, 0.2, 0.4, 0.5, 0.6, 0.7])
     np.testing.assert_allclose(energy, np.cos(time) ** 2)

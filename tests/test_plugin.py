@@ -12,6 +12,7 @@ from math import exp
 import numpy as np
 import pytest
 from conftest import interpreting
+from going_on import goes_on, same_files
 from plugged import PLUGIN, install
 from scenes import block
 
@@ -102,7 +103,7 @@ def test_pip_installs_it_and_styles_and_help_tell_of_it(tmp_path):
     lines = [line for line in done.stdout.splitlines() if "mpm-examples 0.1.0" in line]
     listed = {line.split()[0]: line for line in lines}
     page = (PLUGIN / "README.md").read_text("utf-8")
-    assert len(listed) == 17
+    assert len(listed) == 18
     assert all(name in page for name in listed)
     assert "Slow points down" in listed["drag"]
     done = karamelo_py(tmp_path / "site", tmp_path, "help", "drag")
@@ -292,6 +293,42 @@ def test_a_field_of_a_fix_and_its_column(run_interpreted, cut):
     np.testing.assert_allclose(log[:, 1], dose_of(x0[0], log[:, 0]), rtol=1e-8)
     assert (done.folder / "curve.png").stat().st_size > 1000
     assert (done.folder / "picture.100.png").stat().st_size > 1000
+
+
+# A body that flies freely from left to right over a grid that it leaves behind.
+FLYING = """
+method(ulmpm, FLIP, linear, 1)
+dimension(2, 0, 6, 0, 2, 0.25)
+region(bar, block, 1, 2, 0.5, 1.5)
+material(m, linear, 3, 100, 0.3)
+solid(bar, region, bar, 2, m, 0.25)
+fix(start, initial_velocity_particles, all, 10, 0)
+fix(p, peak_speed, all)
+set_dt(1e-2)
+set_output(1000)
+log_modify(custom, step, time)
+dump(n, all, grid, 1000, n.*.LAMMPS, peak, mass)
+dump(o, all, grid/hdf5, 15, o.h5, peak)
+restart(6, r.*.h5)
+"""
+LATE = """
+region(late, block, 1, 1.5, 0.5, 1.5)
+solid(late, region, late, 2, m, 0.25)
+"""
+
+
+@pytest.mark.parametrize("cut", ["run(30)", f"run(15){LATE}run(15)"])
+def test_a_field_of_nodes_and_its_column(state_interpreted, run_interpreted, tmp_path, cut):
+    """Free flight: all nodes that the body has come over know its speed, exactly."""
+    goes_on(run_interpreted, FLYING + cut)
+    rows = np.loadtxt(tmp_path / "whole" / "n.30.LAMMPS", skiprows=11, ndmin=2)
+    _, _, x, y, _, peak, mass = rows.T
+    passed = (x > 0.75) & (x < 5.25) & (y > 0.25) & (y < 1.75)
+    np.testing.assert_allclose(peak, np.where(passed, 10, 0), rtol=1e-9)  # ten digits
+    assert (mass[passed] == 0).any()
+    state_interpreted(FLYING + cut, out="one", boxes=True)
+    state_interpreted(FLYING + cut, out="two", ranks=2, boxes=True)
+    same_files(tmp_path / "one", tmp_path / "two")
 
 
 def test_check_counts_the_field_and_the_log_says_how_to_read_it(run_interpreted, site, tmp_path):

@@ -28,7 +28,7 @@ run(4)
 
 
 @pytest.fixture
-def interpreted(tmp_path):
+def interpreted(tmp_path, starts_are_cheap):
     """Run Python code that compiles nothing, in a folder; returns what it prints."""
 
     def run(code: str) -> str:

@@ -13,14 +13,15 @@ from karamelo_py.commands import domain as commands
 from karamelo_py.scene.domain import Domain
 from karamelo_py.scene.lattice import Lattice
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.styles.regions.block import BlockRegion
-from karamelo_py.styles.regions.cylinder import Cylinder
-from karamelo_py.styles.regions.difference import Difference
-from karamelo_py.styles.regions.intersection import Intersection
-from karamelo_py.styles.regions.mesh import MeshRegion
-from karamelo_py.styles.regions.sphere import Sphere
-from karamelo_py.styles.regions.stl import STL
-from karamelo_py.styles.regions.union import Union
+from karamelo_py.styles.meshes import STL, MeshRegion
+from karamelo_py.styles.regions import (
+    BlockRegion,
+    Cylinder,
+    Difference,
+    Intersection,
+    Sphere,
+    Union,
+)
 
 
 def empty_hub():
@@ -38,8 +39,8 @@ def test_dimension_sets_box_and_grid():
     np.testing.assert_array_equal(domain.lo, [-0.5, 0, 0])
     np.testing.assert_array_equal(domain.hi, [0.5, 0.4, 0])
     assert domain.h == 0.1
-    assert domain.cells == (10, 4, 1)
-    assert domain.shape == (11, 5, 1)
+    assert domain.lattice.cells == (10, 4, 1)
+    assert domain.lattice.shape == (11, 5, 1)
 
 
 def test_node_counts_of_the_reference():
@@ -62,9 +63,9 @@ def test_node_positions_have_z_fastest(dimension):
 @given(st.floats(0.1, 10), st.floats(0.01, 2))
 def test_grid_covers_a_domain_whose_size_is_no_multiple_of_h(length, h):
     domain = Domain(1, [0.0], [length], h)
-    end = domain.cells[0] * h
+    end = domain.lattice.cells[0] * h
     assert end >= length - 1e-8 * h
-    assert domain.cells[0] == 1 or end < length + h
+    assert domain.lattice.cells[0] == 1 or end < length + h
 
 
 @pytest.mark.parametrize(
@@ -114,7 +115,7 @@ def test_the_older_form():
     with pytest.raises(ScriptError, match="no size yet"):
         BlockRegion(hub, *arguments(0, 1, 0, 1))
     commands.create_domain(hub, *arguments(-0.5, 0.5, -0.5, 0.5, 0.05))
-    assert hub.domain.shape == (21, 21, 1)
+    assert hub.domain.lattice.shape == (21, 21, 1)
 
 
 @pytest.mark.parametrize("dimension", [1, 2, 3])
@@ -141,7 +142,7 @@ def test_without_h_the_first_solid_lays_the_grid():
     commands.create_domain(hub, *arguments(0, 1, 0, 1))
     hub.solid("s1", hub.region("r", BlockRegion, 0, 0.5, 0, 0.5), h=0.1)
     assert hub.domain.h == 0.1
-    assert hub.domain.shape == (11, 11, 1)
+    assert hub.domain.lattice.shape == (11, 11, 1)
 
 
 def test_the_domain_comes_once():

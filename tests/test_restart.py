@@ -56,7 +56,7 @@ def test_every_way(run_interpreted, tmp_path, way):
 def test_every_part(run_interpreted, tmp_path, name):
     """Contact, heat, damage, edges, tools, computes that look back."""
     (tmp_path / "curve.csv").write_text(CURVE, encoding="utf-8")
-    goes_on(run_interpreted, with_files(SCENES[name]), files=3)
+    goes_on(run_interpreted, with_files(SCENES[name]))
 
 
 CHANGING = {
@@ -146,7 +146,7 @@ print(told(fresh))
 """
 
 
-def test_growth_of_energy_is_told_once(tmp_path):
+def test_growth_of_energy_is_told_once(tmp_path, starts_are_cheap):
     """In runs in pieces, too, and behind a file; anew where a balance begins anew."""
     (tmp_path / "scene").write_text(FLY.partition("set_dt")[0])
     said = subprocess.run(
@@ -472,7 +472,7 @@ print("done")
 """
 
 
-def test_all_that_changes_is_remembered(tmp_path):
+def test_all_that_changes_is_remembered(tmp_path, starts_are_cheap):
     """What parts keep in plain attributes, and a run changes, they name in `remembers`."""
     path = os.pathsep.join([str(Path(__file__).parent), os.environ["PYTHONPATH"]])
     said = subprocess.run(

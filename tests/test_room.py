@@ -21,6 +21,7 @@ from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.run.lower.memory import check_room, least_bytes
 from karamelo_py.run.lower.sizes import memory_of, point_fields
+from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.machine_memory import SLACK, MachineMemory, machine_memory
 from karamelo_py.script.errors import Quit, ScriptError
@@ -326,7 +327,8 @@ def test_of_processes_those_of_one_machine_count(small, on_machine, refused):
     hub.interpreter = Interpreter(hub)
     hub.interpreter.run_text(block(2))
     whole = least_bytes(hub, np.float64, True)
-    hub.settings.comm = SimpleNamespace(size=4, on_machine=on_machine)
+    hub.settings.comm = comm = SerialComm()
+    comm.size, comm.on_machine = 4, on_machine
     small(0.6 * whole)
     with pytest.raises(ScriptError, match="24 points") if refused else nullcontext():
         check_room(hub, copied=True)

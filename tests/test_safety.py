@@ -11,7 +11,7 @@ import pytest
 from scenes import block
 
 from karamelo_py import Simulation, SimulationError
-from karamelo_py.scene.meshes.geometry import refuse_commands
+from karamelo_py.scene.meshes.reading import refuse_commands
 from karamelo_py.script.errors import ScriptError
 
 RUN = block(2, "fix(v, initial_velocity_particles, all, 0.1, 0)", "set_dt(0.001)", "run(2)")

@@ -8,7 +8,7 @@ from scenes import block
 from karamelo_py.language import registry
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.scene.hub import Hub
-from karamelo_py.script import other_programs
+from karamelo_py.script import errors
 from karamelo_py.script.errors import Place, ScriptError, nearest, render_message
 
 SCENE = """\
@@ -298,7 +298,7 @@ def test_words_of_lammps(text, column, part, tmp_path):
 
 
 def test_hints_for_words_of_lammps_are_words_of_ours():
-    for family, words in other_programs.table()["instead"].items():
+    for family, words in errors.table()["instead"].items():
         for word, hint in words.items():
             assert not registry.knows(family, word)
             for command in re.findall(r"(\w+)\(", hint):

@@ -10,23 +10,25 @@ from hypothesis import given
 from hypothesis import strategies as st
 from meshed import cube_surface, write
 
-from karamelo_py.commands import solids as commands
+from karamelo_py.commands import domain as commands
 from karamelo_py.points.basis.cpdi.parallel import R4
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.basis.ugimp import UGIMP
 from karamelo_py.scene.placement import cell_pattern
 from karamelo_py.scene.region import Region
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.styles.methods.base import Method, OwnGrids
-from karamelo_py.styles.methods.ulcpdi import ULCPDI
-from karamelo_py.styles.regions.block import BlockRegion
-from karamelo_py.styles.regions.cylinder import Cylinder
-from karamelo_py.styles.regions.difference import Difference
-from karamelo_py.styles.regions.intersection import Intersection
-from karamelo_py.styles.regions.mesh import MeshRegion
-from karamelo_py.styles.regions.sphere import Sphere
-from karamelo_py.styles.regions.stl import STL
-from karamelo_py.styles.regions.union import Union
+from karamelo_py.styles.meshes import STL, MeshRegion
+from karamelo_py.styles.methods.base import Method
+from karamelo_py.styles.methods.cpdi import ULCPDI
+from karamelo_py.styles.methods.ulmpm import TLMPM
+from karamelo_py.styles.regions import (
+    BlockRegion,
+    Cylinder,
+    Difference,
+    Intersection,
+    Sphere,
+    Union,
+)
 
 
 def whole(hub, ID="whole"):
@@ -42,9 +44,9 @@ def karamelo_points(region, domain, ppc, dimension):
         3: [(a, b, c) for c in along for a in along for b in along],
     }[dimension]
     points = []
-    for i in range(domain.cells[0]):
-        for j in range(domain.cells[1]):
-            for k in range(domain.cells[2]):
+    for i in range(domain.lattice.cells[0]):
+        for j in range(domain.lattice.cells[1]):
+            for k in range(domain.lattice.cells[2]):
                 for offset in pattern:
                     x = [
                         domain.lo[axis] + (cell + 0.5 + offset[axis]) * domain.h
@@ -87,11 +89,11 @@ def test_places_and_order(dimension, ppc):
 def test_order_within_a_cell():
     """Reference, section 3.2: 2D (-,-),(-,+),(+,-),(+,+); in 3D the lower z quad first."""
     quad = [(-0.25, -0.25), (-0.25, 0.25), (0.25, -0.25), (0.25, 0.25)]
-    np.testing.assert_array_equal(cell_pattern(2, 2).places, quad)
+    np.testing.assert_array_equal(cell_pattern(2, 2)[0], quad)
     np.testing.assert_array_equal(
-        cell_pattern(2, 3).places, [(*xy, z) for z in (-0.25, 0.25) for xy in quad]
+        cell_pattern(2, 3)[0], [(*xy, z) for z in (-0.25, 0.25) for xy in quad]
     )
-    np.testing.assert_array_equal(cell_pattern(2, 1).places, [[-0.25], [0.25]])
+    np.testing.assert_array_equal(cell_pattern(2, 1)[0], [[-0.25], [0.25]])
 
 
 def test_points_do_not_depend_on_chunks(monkeypatch):
@@ -100,7 +102,7 @@ def test_points_do_not_depend_on_chunks(monkeypatch):
         return hub.solid("s", hub.region("r", Sphere, 0.5, 0.5, 0.5, 0.4)).x0
 
     whole_at_once = points()
-    monkeypatch.setattr("karamelo_py.scene.domain.CHUNK", 100)
+    monkeypatch.setattr("karamelo_py.scene.lattice.CHUNK", 100)
     np.testing.assert_array_equal(points(), whole_at_once)
 
 
@@ -401,7 +403,7 @@ def test_axisymmetric_volumes_are_times_the_radius():
 
 def own_grids(hub, **attributes):
     """Let the method lay a grid for each solid, as total Lagrangian ones do."""
-    hub.use(OwnGrids, Linear())
+    hub.use(TLMPM, Linear())
     hub.update.method.__dict__.update(attributes)
     return hub
 

@@ -9,9 +9,9 @@ import pytest
 from selection import covering, parameters
 
 from karamelo_py.app.cli import main
-from karamelo_py.app.logs import read_log
-from karamelo_py.app.studies import stability
-from karamelo_py.app.studies.frontier import explore, unseen
+from karamelo_py.app.plot import read_log
+from karamelo_py.app.studies import stability, variables
+from karamelo_py.app.studies.stability import explore, unseen
 from karamelo_py.script.errors import ScriptError
 
 # An elastic bar on a Lagrangian grid of equal cells, a point in the middle of each. A wave of
@@ -37,9 +37,8 @@ run(200)
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
+def folder(tmp_path, monkeypatch, starts_are_cheap):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
     (tmp_path / "in.bar").write_text(SCRIPT, encoding="utf-8")
     return tmp_path
 
@@ -190,10 +189,14 @@ def test_growth():
 
 
 def test_energies_by_name(tmp_path):
-    assert stability.energy_column(None, ["Step", "Ek", "Ek+Es"], tmp_path) == "Ek+Es"
-    assert stability.energy_column("Ek", ["Step", "Ek"], tmp_path) == "Ek"
+    def column(asked: str | None, logged: str) -> str:
+        (tmp_path / "in.script").write_text(f"log_modify(custom, step, {logged})\n")
+        return stability.energy_column(asked, variables.ScriptFiles(tmp_path / "in.script"))
+
+    assert column(None, "Ek, Ek + Es") == "Ek+Es"
+    assert column("Ek", "Ek") == "Ek"
     with pytest.raises(ScriptError, match="logs no energy"):
-        stability.energy_column(None, ["Step", "v_x"], tmp_path)
+        column(None, "v_x")
 
 
 @pytest.mark.parametrize(

@@ -9,9 +9,9 @@ from hubs import SmallHub
 from meshed import cube_surface, enclosed_volume, sphere_surface, write
 from test_scene_script import message
 
-from karamelo_py.scene.meshes.surface import Surface
+from karamelo_py.scene.meshes.inside import Surface
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.styles.regions.stl import STL
+from karamelo_py.styles.meshes import STL
 
 
 @pytest.fixture(params=[True, False], ids=["binary", "text"])

@@ -13,7 +13,7 @@ import pandas
 import pytest
 
 from karamelo_py.app.cli import main
-from karamelo_py.app.logs import read_log
+from karamelo_py.app.plot import read_log
 from karamelo_py.app.studies import case, records, study, variables
 from karamelo_py.script.errors import ScriptError
 
@@ -47,6 +47,7 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.mark.usefixtures("starts_are_cheap")
 def test_a_sweep_is_a_table_that_pandas_reads(folder, capsys):
     words = ["-var", "N=2,4", "-var", "kind=linear,cubic", "-var", "speed=3", "-jobs", "2"]
     recorded = "v_x,mean:c_x,min:c_x,max:Step,when:c_x:1.575,way=max(max:c_x - first:c_x, 0)/N"
@@ -78,6 +79,7 @@ def test_a_sweep_is_a_table_that_pandas_reads(folder, capsys):
     assert beside["threads"] == 1 and beside["versions"]["numba"] and beside["processor"]
 
 
+@pytest.mark.usefixtures("starts_are_cheap")
 def test_a_run_that_breaks_off_has_no_values(folder):
     words = ["-var", "speed=3,300", "-record", "v_x,max:c_x"]
     assert main(["sweep", "in.flight", *words]) == 0
@@ -87,12 +89,14 @@ def test_a_run_that_breaks_off_has_no_values(folder):
     assert bad["v_x"] == bad["max:c_x"] == ""
 
 
+@pytest.mark.usefixtures("starts_are_cheap")
 def test_a_sweep_of_which_nothing_is_done_fails(folder, capsys):
     assert main(["sweep", "in.flight", "-var", "kind=linaer,lin"]) == 1
     assert "error: no run is done: method: unknown basis style 'linaer'" in capsys.readouterr().err
     assert [row["status"] for row in records.read(folder / "sweep.csv")] == ["refused"] * 2
 
 
+@pytest.mark.usefixtures("starts_are_cheap")
 def test_what_is_known_is_not_run_again(folder, capsys):
     command = ["sweep", "in.flight", "-var", "speed=3,4", "-record", "v_x", "-o", "s.csv"]
     assert main(command) == 0
@@ -147,6 +151,7 @@ def test_an_interrupted_sweep_goes_on(folder, capsys):
     assert rows[1]["reason"] == "given up after 3 s"
 
 
+@pytest.mark.usefixtures("starts_are_cheap")
 def test_times_are_medians_of_repetitions(folder):
     command = ["sweep", "in.flight", "-var", "N=2,4", "-time", "-repeat", "2", "-record", "v_x"]
     assert main(command) == 0
@@ -210,11 +215,11 @@ def test_combinations():
 def test_variables_of_included_scripts_count(tmp_path):
     (tmp_path / "in.main").write_text("include(part)\nN = 3\n", encoding="utf-8")
     (tmp_path / "part").write_text('print("speed")\nh = 1/N\nk = 2*h', encoding="utf-8")
-    variables.check_script(tmp_path / "in.main", ["N", "h"])
+    variables.ScriptFiles(tmp_path / "in.main").check(["N", "h"])
     with pytest.raises(ScriptError, match=r"-var k: .* never reads it"):
-        variables.check_script(tmp_path / "in.main", ["k"])
+        variables.ScriptFiles(tmp_path / "in.main").check(["k"])
     with pytest.raises(ScriptError, match="has no such variable"):
-        variables.check_script(tmp_path / "in.main", ["speed"])
+        variables.ScriptFiles(tmp_path / "in.main").check(["speed"])
 
 
 def test_the_time_that_remains_grows_as_the_runs_do():

@@ -5,9 +5,17 @@ import pytest
 from karamelo_py.kernels.g2p import Move, SecondStrain, Strain, StrainInMove, StrainOfLastStep
 from karamelo_py.kernels.nodes import NodalUpdate
 from karamelo_py.kernels.p2g import InternalForce, MassMomentum
-from karamelo_py.kernels.rows import FORCE, MASS_AND_MOMENTUM, SUMS
 from karamelo_py.kernels.sweep import OldWeights, PresentWeights
-from karamelo_py.kernels.table import Gather, NodeTask, Sweep, fused, staged
+from karamelo_py.kernels.table import (
+    FORCE,
+    MASS_AND_MOMENTUM,
+    SUMS,
+    Gather,
+    NodeTask,
+    Sweep,
+    fused,
+    staged,
+)
 from karamelo_py.schemes.musl import MUSL
 from karamelo_py.schemes.usavg import USAVG
 from karamelo_py.schemes.usf import USF

@@ -19,7 +19,7 @@ def put(out, limit, k):
     out[k] = k * k
 
 
-_put_all = shared_out(put, "out, limit")
+_put_all = shared_out(put)
 
 
 @kernel
@@ -47,7 +47,7 @@ def several(mode, out, limit, times):
     return times
 
 
-_by_team = by_team(several, "out, limit, times")
+_by_team = by_team(several)
 
 
 @kernel

@@ -259,7 +259,7 @@ def test_what_a_light_node_is_depends_on_the_points_near_it(state_interpreted):
 
 
 def shaken(run_interpreted, scheme, ppc, factor, method="tlmpm, FLIP, linear, 1", status=0):
-    """Energy of a small free body, shaken a little, after 150 steps over the one at the start.
+    """Energy of a small free body, shaken a little, after 100 steps over the one at the start.
 
     With `status` 1 what is said where the watch over the energy stops it.
     """
@@ -276,7 +276,7 @@ def shaken(run_interpreted, scheme, ppc, factor, method="tlmpm, FLIP, linear, 1"
         dt_factor({factor})
         set_output(1000)
         log_modify(custom, step, Ek, Es)
-        run(150)
+        run(100)
     """, folder=f"{scheme}{ppc}{factor}", status=status)  # fmt: skip
     if status:
         return result.err
@@ -494,13 +494,13 @@ def test_a_ball_on_the_axis_stays_whole(run_interpreted, scheme, basis):
         compute(Es, strain_energy, all)
         set_output(1)
         log_modify(custom, step, Ek, Es)
-        dump(g, all, grid, 15, grid.*.LAMMPS, x, vx)
-        run(15)
+        dump(g, all, grid, 10, grid.*.LAMMPS, x, vx)
+        run(10)
     """)
     total = result.log.Ek + result.log.Es
     # Kinetic and stored energy are half a step apart, and a period has about ten.
     assert total.max() < 1.5 * total[0]
-    nodes = result.dump("grid.15.LAMMPS")
+    nodes = result.dump("grid.10.LAMMPS")
     assert (nodes.vx[nodes.x == 0] == 0).all()
     assert np.abs(nodes.vx).max() > 1e-3
 

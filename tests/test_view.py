@@ -7,12 +7,11 @@ from PIL import Image
 
 from karamelo_py.app import view
 from karamelo_py.app.cli import main
-from karamelo_py.app.logs import read_rows
+from karamelo_py.app.plot import read_rows
 from karamelo_py.output.rhythm import ByTime
 from karamelo_py.output.snapshots import read
 from karamelo_py.styles.dumps.hdf5 import Hdf5
-from karamelo_py.styles.dumps.particle import Particle
-from karamelo_py.styles.dumps.particle_gz import ParticleGz
+from karamelo_py.styles.dumps.lammps import Particle, ParticleGz
 from karamelo_py.styles.dumps.vtk import Vtk
 
 FORMS = {"p.dump": Particle, "p.dump.gz": ParticleGz, "p.h5": Hdf5, "p.*.vtu": Vtk}

@@ -27,13 +27,7 @@ def families() -> list[str]:
 
 
 def help_of(family: str, name: str) -> Help:
-    """Gather the help about a command or style.
-
-    Raises
-    ------
-    ScriptError
-        If there is none of this name, or its package is broken.
-    """
+    """Gather the help about a command or style."""
     target = registry.find(family, name)
     try:
         return describe(target, name if family == COMMAND else f"{family} {name}")
@@ -54,15 +48,13 @@ def describe_parameter(parameter: Parameter) -> str:
         parts.append("any number of them")
     if parameter.keyword:
         parts.append(f"written {parameter.name}=...")
-    if parameter.optional and parameter.default is None:
-        parts.append("may be left out")
-    elif parameter.optional:
+    if parameter.optional:
         default = parameter.default
         if isinstance(default, bool):
             default = str(default).lower()
         elif isinstance(default, float):
             default = f"{default:g}"
-        parts.append(f"{default} when left out")
+        parts.append("may be left out" if default is None else f"{default} when left out")
     return ", ".join(parts)
 
 
@@ -70,23 +62,11 @@ def describe_parameter(parameter: Parameter) -> str:
 
 
 def print_styles(given: Sequence[str]) -> int:
-    """List commands and styles, a line each, with where they come from; returns the exit status.
-
-    Parameters
-    ----------
-    given
-        Nothing, or the family to list.
-
-    Raises
-    ------
-    ScriptError
-        For an unknown family, or more than one argument.
-    """
+    """List commands and styles, or a family, with where they come from; returns the exit status."""
     if len(given) > 1:
         raise ScriptError(f"too many arguments: {' '.join(given)}", expected=STYLES_USAGE)
-    chosen = [_family(given[0])] if given else families()
     page = _Page()
-    for index, family in enumerate(chosen):
+    for index, family in enumerate([_family(given[0])] if given else families()):
         if index:
             page.line()
         page.line(_plural(family), "bold")
@@ -99,18 +79,7 @@ def print_styles(given: Sequence[str]) -> int:
 
 
 def print_help(given: Sequence[str]) -> int:
-    """Explain a command or a style; returns the exit status.
-
-    Parameters
-    ----------
-    given
-        The name of a command, style, family or argument, or a family and a name.
-
-    Raises
-    ------
-    ScriptError
-        For an unknown name, or one that means several things.
-    """
+    """Explain what a name means, or a family and a name; returns the exit status."""
     if len(given) > 2:
         raise ScriptError(f"too many arguments: {' '.join(given)}", expected=HELP_USAGE)
     if len(given) == 2:
@@ -145,9 +114,8 @@ def _singular(word: str) -> str:
 
 
 def _plural(family: str) -> str:
-    if family in ("basis", "eos"):
-        return {"basis": "bases", "eos": "eos"}[family]
-    return family + ("es" if family.endswith(("x", "s")) else "s")
+    usual = family + ("es" if family.endswith(("x", "s")) else "s")
+    return {"basis": "bases", "eos": "eos"}.get(family, usual)
 
 
 def _unknown(what: str, name: str, known: Iterable[str]) -> ScriptError:

@@ -4,34 +4,32 @@ from __future__ import annotations
 
 import argparse
 import gc
+import os
 import re
+import signal
 import sys
-import traceback
 from collections.abc import Callable, Sequence
-from contextlib import nullcontext
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from karamelo_py import __version__
-from karamelo_py.app.launch import launch
-from karamelo_py.app.leaving import INTERRUPTED, SIGNALLED, leaving_at_once, telling_of_the_end
-from karamelo_py.app.options import (
-    VARIABLE,
-    add_output_options,
-    add_variables,
-    direct,
-    positive,
-    threads_option,
+from karamelo_py.app.launch import (
+    ERROR,
+    has_terminal,
+    keep_to_oneself,
+    launch,
+    outcome_of,
+    share,
+    together,
 )
-from karamelo_py.app.together import Outcome, has_terminal, keep_to_oneself, share, together
-from karamelo_py.run.mpi.comm import MpiComm, launched
-from karamelo_py.script.errors import FAILURES, ScriptError, nearest, render_message
+from karamelo_py.app.leaving import SIGNALLED, leaving_at_once
+from karamelo_py.app.options import VARIABLE, add_variables, make_folder, positive, threads_option
+from karamelo_py.run.mpi.comm import ENDING, MpiComm, handled_signals, launched
+from karamelo_py.script.errors import ScriptError, nearest, render_message
 
 if TYPE_CHECKING:  # which takes most of the time that the program needs to begin
     from karamelo_py.scene.hub import Hub
-
-ERROR = 1
 
 RUN = "The log goes to the terminal and to log.mpm; files are written to the current folder."
 CHECK = """\
@@ -62,42 +60,19 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit status."""
     arguments = list(sys.argv[1:] if argv is None else argv)
     keep_to_oneself()
-    # Where there are several, their launcher tells of it.
-    with nullcontext() if launched()[0] > 1 else telling_of_the_end():
+    # A word where a batch system ends the program, outside of runs; launchers say one of several.
+    unhandled = [number for number in ENDING if signal.getsignal(number) == signal.SIG_DFL]
+    with handled_signals(_end, () if launched()[0] > 1 else unhandled):
         status, text = outcome_of(lambda: _dispatch(arguments), debugging="--debug" in arguments)
     if text:
         _complain(text)
     return status
 
 
-def outcome_of(act: Callable[[], int], *, debugging: bool = False) -> Outcome:
-    """Run something and tell how it ends."""
-    try:
-        return Outcome(act())
-    except KeyboardInterrupt:
-        return Outcome(INTERRUPTED, render_message("error", "interrupted"))
-    except FAILURES as error:
-        # Rich makes a SystemExit of it.
-        if isinstance(error, BrokenPipeError) or isinstance(error.__context__, BrokenPipeError):
-            # Whoever read our output has gone; what was written stays.
-            sys.stderr.close()
-            return Outcome(ERROR)
-        if debugging:
-            traceback.print_exc()
-        return Outcome(ERROR, _rendered(error))
-
-
-def _rendered(error: BaseException) -> str:
-    """Write an exception for the user: no traceback, also where the fault is not the user's."""
-    if isinstance(error, ScriptError):
-        return error.render()
-    if isinstance(error, MemoryError):
-        message = "the scene does not fit into memory"
-        hint = "a coarser grid, fewer points per cell, or precision(single)"
-    else:
-        message = f"internal error: {type(error).__name__}: {error}"
-        hint = "run again with --debug to see where, and please report it"
-    return render_message("error", message, hint=hint)
+def _end(number: int, _: Any) -> NoReturn:
+    # All that is open is whole: files have their names when they are complete.
+    os.write(2, f"error: ended by {signal.Signals(number).name}\n".encode())
+    os._exit(SIGNALLED + number)
 
 
 def _complain(text: str) -> None:
@@ -105,13 +80,13 @@ def _complain(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-# Subcommands with a module of their own, which is imported when it is asked for: its function
-# add_parser(subparsers) adds a parser whose default `act` takes the options.
+# Subcommands with a module of their own, which is imported when it is asked for: DESCRIPTION,
+# add_options(parser) and run(options), which returns the exit status.
 ELSEWHERE = {
     "bench": ("karamelo_py.app.bench.command", "Measure the speed of this machine."),
     "view": ("karamelo_py.app.view", "Draw pictures or a movie of dumps."),
     "plot": ("karamelo_py.app.plot", "Draw columns of a log."),
-    "sweep": ("karamelo_py.app.studies.sweep", "Run a family of variants into one table."),
+    "sweep": ("karamelo_py.app.studies.study", "Run a family of variants into one table."),
     "chart": ("karamelo_py.app.studies.chart", "Draw a table of runs: what accuracy costs."),
     "advise": ("karamelo_py.app.studies.advise", "Find the cheapest variant that is good enough."),
     "stability": ("karamelo_py.app.studies.stability", "Map where a method is stable."),
@@ -135,6 +110,8 @@ def _dispatch(arguments: list[str]) -> int:
         arguments = ["run", *arguments]
     if first == "help" and len(arguments) == 2 and arguments[1] in COMMANDS[1:]:
         arguments = [arguments[1], "-h"]
+    elif arguments == ["help"]:
+        arguments = ["help", "-h"]
     if arguments[0] in ("run", "check"):
         arguments = _one_file(arguments)
     parser, commands = _parser(arguments[0])
@@ -166,13 +143,7 @@ def begun() -> None:
 
 
 def _one_file(arguments: list[str]) -> list[str]:
-    """Take the last of the files behind -restart where a shell has put all that match a pattern.
-
-    Raises
-    ------
-    ScriptError
-        For ``-var NAME=VALUE``.
-    """
+    """Take the last of the files behind -restart where a shell has put all that match a pattern."""
     chosen: list[str] = []
     for word in arguments:
         before = chosen[-1] if chosen else ""
@@ -181,19 +152,12 @@ def _one_file(arguments: list[str]) -> list[str]:
                 f"-var takes a name and a value, with a blank between them, not {word}",
                 hint=f"-var {given[1]} {given[2]}",
             )
-        if chosen[-2:-1] and chosen[-2] in RESTART and _unnumbered(word) == _unnumbered(before):
-            chosen[-1] = max(word, before, key=_numbers)
+        unnumbered = [re.sub(r"\d+", "#", name) for name in (word, before)]
+        if chosen[-2:-1] and chosen[-2] in RESTART and unnumbered[0] == unnumbered[1]:
+            chosen[-1] = max(word, before, key=lambda name: [*map(int, re.findall(r"\d+", name))])
         else:
             chosen.append(word)
     return chosen
-
-
-def _unnumbered(name: str) -> str:
-    return re.sub(r"\d+", "#", name)
-
-
-def _numbers(name: str) -> list[int]:
-    return [int(digits) for digits in re.findall(r"\d+", name)]
 
 
 def _surplus(words: list[str], command: str, parser: CommandLine) -> ScriptError:
@@ -207,7 +171,7 @@ def _surplus(words: list[str], command: str, parser: CommandLine) -> ScriptError
     close = nearest(option, parser.options()) if option else None
     if (same := MPI_OPTIONS.get((option or "").rstrip("0123456789"))) in parser.options():
         close = f"{same} N"
-    usage = USAGE if command == "run" else parser.format_usage().removeprefix("usage: ").rstrip()
+    usage = USAGE if command == "run" else parser.plain_usage()
     return ScriptError(
         f"there is no option {option}" if option else f"one word too many: {words[0]}",
         expected=usage,
@@ -226,8 +190,12 @@ class CommandLine(argparse.ArgumentParser):
         """List all words that begin an option."""
         return [word for action in self._actions for word in action.option_strings]
 
+    def plain_usage(self) -> str:
+        """Write the usage without that word."""
+        return self.format_usage().removeprefix("usage: ").rstrip()
+
     def error(self, message: str) -> NoReturn:
-        expected = self.format_usage().removeprefix("usage: ").rstrip()
+        expected = self.plain_usage()
         if of := re.match(r"argument (-\S+): ", message):
             spelled = of[1].split("/")
             action = next(a for a in self._actions if spelled[0] in a.option_strings)
@@ -275,23 +243,38 @@ def _parser(command: str) -> tuple[CommandLine, Any]:
             "--trust-geometries", action="store_true",
             help="let .geo files run programs and write files",
         )  # fmt: skip
-        add_output_options(script)
+        script.add_argument(
+            "-log", "--log", type=Path, metavar="FILE",
+            help="where the log goes (default: log.mpm); with the ending .csv it has commas",
+        )  # fmt: skip
+        script.add_argument(
+            "-out", "--out", type=Path, metavar="FOLDER",
+            help="where all files go; it is made if need be (default: the current folder)",
+        )  # fmt: skip
         if name == "run":
             script.add_argument(
                 *RESTART, type=Path, metavar="FILE",
                 help="go on from a file that restart(...) has written",
             )  # fmt: skip
         script.add_argument("--quiet", action="store_true", help="write warnings and errors only")
-    styles = add("styles", _styles, "List commands and styles, and where they come from.")
+    summary = "List commands and styles, and where they come from."
+    styles = add("styles", lambda given: _catalogue().print_styles(given.family), summary)
     styles.add_argument("family", metavar="FAMILY", nargs="*", help="fix, compute, region, ...")
-    explain = add("help", _help, "Explain a command or a style.", HELP)
+    summary = "Explain a command or a style."
+    explain = add("help", lambda given: _catalogue().print_help(given.words), summary, HELP)
     explain.add_argument("words", metavar="WORD", nargs="*")
     for name, (module, summary) in ELSEWHERE.items():
+        added = commands.add_parser(name, help=summary)
         if name == command:
-            import_module(module).add_parser(commands)
-        else:
-            commands.add_parser(name, help=summary)
+            found = import_module(module)
+            added.description = found.DESCRIPTION
+            added.set_defaults(act=found.run)
+            found.add_options(added)
     return parser, commands
+
+
+def _catalogue() -> Any:
+    return import_module("karamelo_py.app.catalogue")
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -299,18 +282,15 @@ def _run(options: argparse.Namespace) -> int:
     if script is None:
         command = "karamelo-py check" if options.checking else "karamelo-py"
         raise ScriptError("no script is named", expected=f"{command} SCRIPT")
-    if options.checking:
-        return _carry_out(options, script)
-    if launched()[0] > 1:
+    if launched()[0] > 1 and not options.checking:
         with leaving_at_once():  # before they know of each other
             import_module("karamelo_py.scene.hub")
-        debugging = options.debug
         return together(
             options.ranks,
             lambda comm: _carry_out(options, script, comm),
-            lambda act: outcome_of(act, debugging=debugging),
+            debugging=options.debug,
         )
-    if (options.ranks or 1) > 1:
+    if (options.ranks or 1) > 1 and not options.checking:
         return launch(options.ranks, options.command_line)
     return _carry_out(options, script)
 
@@ -331,7 +311,7 @@ def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = 
     hub.settings.debug = options.debug
     hub.settings.trusts = options.trust_geometries
     hub.checking = options.checking
-    direct(hub, options)
+    _direct(hub, options)
     presets = dict(options.var)
     if getattr(options, "restart", None) is not None:
         from karamelo_py.run.checkpoint.restart_file import Restart
@@ -355,14 +335,24 @@ def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = 
     return 0
 
 
-def _tell_of_no_run(hub: Hub, script: str) -> None:
-    """Tell of a script without a run: one that makes a scene may have forgotten it.
+def _direct(hub: Hub, options: argparse.Namespace) -> None:
+    """Send the files of a scene where the options say."""
+    if options.out is not None:
+        if not hub.checking:
+            make_folder(options.out, "-out {}")
+        hub.folder = options.out.absolute()
+    if options.log is not None:
+        hub.output.log.file = options.log
+        hub.output.log.is_asked_for = True
+        if not hub.output.log.path.parent.is_dir() or hub.output.log.path.is_dir():
+            raise ScriptError(
+                f"the log cannot be written to {options.log}",
+                expected="the name of a file in a folder that exists",
+            )
 
-    Raises
-    ------
-    ScriptError
-        For bodies that nothing was done with: whoever started that waits for what it computes.
-    """
+
+def _tell_of_no_run(hub: Hub, script: str) -> None:
+    """Tell of a script without a run: one that makes a scene may have forgotten it."""
     message = f"{script} runs nothing: there is no run command in it"
     if hub.checking:
         if hub.solids:
@@ -375,20 +365,6 @@ def _tell_of_no_run(hub: Hub, script: str) -> None:
     elif hub.domain is not None or not hub.interpreter.variables:
         hub.place = None
         hub.warn(message, hint=RUN_COMMANDS)
-
-
-def _styles(options: argparse.Namespace) -> int:
-    from karamelo_py.app.catalogue import print_styles
-
-    return print_styles(options.family)
-
-
-def _help(options: argparse.Namespace) -> int:
-    from karamelo_py.app.catalogue import print_help
-
-    if not options.words:
-        return _dispatch(["help", "-h"])
-    return print_help(options.words)
 
 
 if __name__ == "__main__":

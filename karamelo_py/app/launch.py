@@ -1,9 +1,11 @@
-"""karamelo-py --ranks N: mpiexec starts the processes, and this one stands for them all.
+"""karamelo-py --ranks N: mpiexec starts the processes, one stands for them, and all end together.
 
-Each process reports to this one through a socket (:mod:`karamelo_py.app.together`). The first gets
-the terminal, or whatever output and errors go to, and the signals that come; the others say what
-they know that it does not. What mpiexec says is shown only where no process was started.
+Each process reports through a socket to the `Launcher`, the process that the user has started. The
+first gets the terminal, or whatever output and errors go to, and the signals that come; the others
+say what they know that it does not. What mpiexec says is shown only where no process was started.
 """
+
+from __future__ import annotations
 
 import json
 import os
@@ -14,16 +16,31 @@ import socket
 import subprocess
 import sys
 import tempfile
+import threading
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+import traceback
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from math import inf
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple, TextIO
 
-from karamelo_py.app.leaving import SIGNALLED
-from karamelo_py.run.mpi.comm import ENDING, INSTALL, handled_signals
-from karamelo_py.script.errors import ScriptError, render_message
+from karamelo_py.app.leaving import INTERRUPTED, SIGNALLED
+from karamelo_py.run.mpi.comm import (
+    ENDING,
+    FAILED,
+    INSTALL,
+    WELL,
+    MpiComm,
+    handled_signals,
+    launched,
+)
+from karamelo_py.script.errors import FAILURES, ScriptError, render_message
 
+if TYPE_CHECKING:
+    from karamelo_py.scene.hub import Hub
+
+ERROR = 1
 # Where the launcher of this program waits for the processes to report.
 SOCKET = "KARAMELO_PY_LAUNCHER"
 # What Open MPI is told: more processes than cores are the user's choice, each has threads of its
@@ -43,18 +60,55 @@ GRACE = 2.0  # seconds that processes have to end after it
 LONGEST = 15.0  # ... after one of them has failed; twice that where mpiexec does not heed
 LOOK, STANDS = 1.0, 10.0  # seconds between two looks at processes, and until one is told of
 AT_ONCE = 3  # so many signals end all without waiting for the step
-LONGEST_NAME = 90  # of a socket
+LONGEST_FOLDER = 70  # of a socket, whose name may not be long
 A_CORE = 16  # processes at most: who asks for more means another number
+# Seconds that one that has failed waits for the others, before it ends them. The first tells what
+# is wrong; others do where it does not know.
+PATIENCE, LONGER = 2.0, 6.0
+
+
+class Outcome(NamedTuple):
+    """The end of a command line."""
+
+    status: int
+    text: str = ""  # what is left to be said
+
+
+def outcome_of(act: Callable[[], int], *, debugging: bool = False) -> Outcome:
+    """Run something and tell how it ends."""
+    try:
+        return Outcome(act())
+    except KeyboardInterrupt:
+        return Outcome(INTERRUPTED, render_message("error", "interrupted"))
+    except FAILURES as error:
+        # Rich makes a SystemExit of it.
+        if isinstance(error, BrokenPipeError) or isinstance(error.__context__, BrokenPipeError):
+            # Whoever read our output has gone; what was written stays.
+            sys.stderr.close()
+            return Outcome(ERROR)
+        if debugging:
+            traceback.print_exc()
+        return Outcome(ERROR, _rendered(error))
+
+
+def _rendered(error: BaseException) -> str:
+    """Write an exception for the user: no traceback, also where the fault is not the user's."""
+    if isinstance(error, ScriptError):
+        return error.render()
+    if isinstance(error, MemoryError):
+        message = "the scene does not fit into memory"
+        hint = "a coarser grid, fewer points per cell, or precision(single)"
+    else:
+        message = f"internal error: {type(error).__name__}: {error}"
+        hint = "run again with --debug to see where, and please report it"
+    return render_message("error", message, hint=hint)
+
+
+# ---- the launcher -------------------------------------------------------------------------------
 
 
 def launch(ranks: int, arguments: Sequence[str], module: str = "karamelo_py.app.start") -> int:
-    """Run a program on so many processes of this machine; returns the exit status.
-
-    Raises
-    ------
-    ScriptError
-        If there is no mpiexec, or no mpi4py, or not the cores for so many.
-    """
+    """Run a program on so many processes of this machine; returns the exit status."""
     cores = os.cpu_count() or 1
     if ranks > A_CORE * cores:
         raise ScriptError(
@@ -74,18 +128,13 @@ def launch(ranks: int, arguments: Sequence[str], module: str = "karamelo_py.app.
         import mpi4py  # noqa: F401
     except ImportError:
         raise ScriptError(f"--ranks {ranks} needs mpi4py", hint=INSTALL) from None
-    command = [mpiexec, "-n", str(ranks), sys.executable, "-m", module]
-    with tempfile.TemporaryFile() as said, _folder() as folder:
-        return Launcher(ranks, [*command, *arguments], f"{folder}/s", said).run()
-
-
-@contextmanager
-def _folder() -> Iterator[str]:
-    """Make a folder for a socket, whose name may not be long."""
-    usual = tempfile.gettempdir()
-    place = usual if len(usual) < LONGEST_NAME - 20 else "/tmp"
-    with tempfile.TemporaryDirectory(prefix="karamelo-", dir=place) as folder:
-        yield folder
+    command = [mpiexec, "-n", str(ranks), sys.executable, "-m", module, *arguments]
+    place = tempfile.gettempdir() if len(tempfile.gettempdir()) < LONGEST_FOLDER else "/tmp"
+    with (
+        tempfile.TemporaryFile() as said,
+        tempfile.TemporaryDirectory(prefix="karamelo-", dir=place) as folder,
+    ):
+        return Launcher(ranks, command, f"{folder}/s", said).run()
 
 
 class Launcher:
@@ -93,15 +142,13 @@ class Launcher:
 
     def __init__(self, ranks: int, command: list[str], name: str, said: BinaryIO):
         self.ranks, self.command, self.name, self.said = ranks, command, name, said
-        self.unknown: list[socket.socket] = []  # have not said yet who they are
-        self.links: dict[socket.socket, dict[str, Any]] = {}
+        self.links: dict[socket.socket, dict[str, Any]] = {}  # empty until they say who they are
         self.reports: dict[int, dict[str, Any]] = {}
         self.lost: list[dict[str, Any]] = []  # ended without a report, in this order
         self.over = False  # the first has done all
         self.failed = 0.0  # when one has told that it failed
         self.signals: list[int] = []
-        self.stopped: dict[int, float] = {}  # since when
-        self.told: set[int] = set()  # of these
+        self.stopped: dict[int, float] = {}  # since when; infinite when the user knows
         self.looked = 0.0
         self.process: Any = None
 
@@ -123,7 +170,7 @@ class Launcher:
             end = time.monotonic() + GRACE
             while self.links and time.monotonic() < end:
                 self._listen()
-            for one in self.links.values():  # mpiexec was ended, and not they
+            for one in filter(None, self.links.values()):  # mpiexec was ended, and not they
                 with suppress(ProcessLookupError):
                     os.kill(one["pid"], signal.SIGKILL)
         status = self._outcome()
@@ -135,9 +182,9 @@ class Launcher:
 
     def _pass_on(self, number: int, _: Any) -> None:
         self.signals.append(number)
-        first = next((link for link, one in self.links.items() if one["rank"] == 0), None)
-        for pid in self._stopped():  # the run ends with their part of its last state
-            os.kill(pid, signal.SIGCONT)
+        first = next((link for link, one in self.links.items() if one.get("rank") == 0), None)
+        for one in self._stopped():  # the run ends with their part of its last state
+            os.kill(one["pid"], signal.SIGCONT)
         if first is not None and 0 not in self.reports and len(self.signals) < AT_ONCE:
             with suppress(OSError):
                 first.sendall(bytes([number]))
@@ -154,13 +201,13 @@ class Launcher:
             elif late > LONGEST:
                 self.process.terminate()
 
-    def _stopped(self) -> list[int]:
-        """Processes that somebody has stopped, as far as the system tells."""
+    def _stopped(self) -> list[dict[str, Any]]:
+        """Find processes that somebody has stopped, as far as the system tells."""
         found = []
-        for one in self.links.values():
+        for one in filter(None, self.links.values()):
             with suppress(OSError):
                 state = Path(f"/proc/{one['pid']}/stat").read_text().rpartition(")")[2].split()[0]
-                found += [one["pid"]] * (state == "T")
+                found += [one] * (state == "T")
         return found
 
     def _tell_of_those_that_stand(self) -> None:
@@ -169,39 +216,37 @@ class Launcher:
         if now < self.looked + LOOK:
             return
         self.looked, stopped = now, self._stopped()
-        self.stopped = {pid: self.stopped.get(pid, now) for pid in stopped}
-        for pid, since in self.stopped.items():
-            if now - since > STANDS and pid not in self.told:
-                self.told.add(pid)
-                rank = next(one["rank"] for one in self.links.values() if one["pid"] == pid)
-                text = f"process {rank + 1} of {self.ranks} (pid {pid}) is stopped: all wait for it"
+        self.stopped = {one["pid"]: self.stopped.get(one["pid"], now) for one in stopped}
+        for one in stopped:
+            pid = one["pid"]
+            if now - self.stopped[pid] > STANDS:
+                self.stopped[pid] = inf
+                who = f"process {one['rank'] + 1} of {self.ranks} (pid {pid})"
+                text = f"{who} is stopped: all wait for it"
                 self._say(render_message("warning", text, hint=f"kill -CONT {pid}"))
 
     def _listen(self) -> None:
-        ready, *_ = select.select([self.door, *self.unknown, *self.links], [], [], PAUSE)
+        ready, *_ = select.select([self.door, *self.links], [], [], PAUSE)
         for link in ready:
             if link is self.door:
-                self.unknown.append(link.accept()[0])
+                self.links[link.accept()[0]] = {}
                 continue
             for line in _received(link).splitlines():
                 self._heard(link, json.loads(line))
             if link.fileno() < 0:
-                self.unknown = [one for one in self.unknown if one is not link]
-                one = self.links.pop(link, None)
-                if one is not None and one["rank"] not in self.reports:
+                one = self.links.pop(link)
+                if one and one["rank"] not in self.reports:
                     self.lost.append(one)
 
     def _heard(self, link: socket.socket, message: dict[str, Any]) -> None:
         if "over" in message:
             self.over = True
-            return
-        if link in self.links:
+        elif self.links[link]:
             self.reports[self.links[link]["rank"]] = message
-            return
-        self.unknown.remove(link)
-        self.links[link] = message
-        if message["rank"] == 0:
-            socket.send_fds(link, [b"0"], [1, 2])
+        else:
+            self.links[link] = message
+            if message["rank"] == 0:
+                socket.send_fds(link, [b"0"], [1, 2])
 
     # --- when they have ended ---------------------------------------------------------------------
 
@@ -224,7 +269,9 @@ class Launcher:
             return SIGNALLED + self.signals[0]
         status = self.process.returncode
         status = SIGNALLED - status if status < 0 else status or 1
-        self._say(self._loss(status) if self.lost else self._no_start())
+        unstarted = f"{self.command[0]} has not started {self.ranks} processes"
+        text = f"{render_message('error', unstarted)}\n{self._words()}".rstrip()
+        self._say(self._loss(status) if self.lost else text)
         return status
 
     def _loss(self, status: int) -> str:
@@ -233,17 +280,9 @@ class Launcher:
         who = f"process {one['rank'] + 1} of {self.ranks} (pid {one['pid']}) was ended{by}"
         if self.over:
             return render_message("error", f"{who} when the runs were over: all files are complete")
-        return render_message(
-            "error",
-            f"{who}, and the run with it: files are complete up to there",
-            hint="the system does that to who takes too much memory"
-            if sent not in ENDING
-            else None,
-        )
-
-    def _no_start(self) -> str:
-        text = f"{self.command[0]} has not started {self.ranks} processes"
-        return "\n".join([render_message("error", text), self._words()]).rstrip()
+        hint = "the system does that to who takes too much memory" if sent not in ENDING else None
+        who += ", and the run with it: files are complete up to there"
+        return render_message("error", who, hint=hint)
 
     def _words(self) -> str:
         """Read what mpiexec said, and libraries of C through it."""
@@ -265,3 +304,153 @@ def _received(link: socket.socket) -> bytes:
                 return found
     link.close()
     return found
+
+
+# ---- one of the processes -----------------------------------------------------------------------
+
+_link: socket.socket | None = None  # to the launcher, where that has started this process
+
+
+def keep_to_oneself() -> None:
+    """All processes but the first are silent, and the first reports to its launcher."""
+    size, rank = launched()
+    if size > 1:
+        _report_to_launcher(rank)
+        if rank > 0:
+            sys.stdout = sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+
+
+def _report_to_launcher(rank: int) -> None:
+    """Tell the launcher of this process; the first gets its output and errors, and its signals."""
+    global _link
+    name = os.environ.pop(SOCKET, None)
+    if name is None:
+        return
+    link = socket.socket(socket.AF_UNIX)
+    try:
+        link.connect(name)
+        link.sendall(_line(rank=rank, pid=os.getpid()))
+        if rank == 0:
+            # What libraries write to the usual ones is left to mpiexec.
+            out, err = (_stream(fd) for fd in socket.recv_fds(link, 1, 2)[1])
+            sys.stdout = sys.__stdout__ = out
+            sys.stderr = sys.__stderr__ = err
+    except OSError:  # it is on another machine
+        return
+    _link = link
+    if rank == 0:
+        threading.Thread(target=_heed, args=(link,), daemon=True).start()
+
+
+def _stream(fd: int) -> TextIO:
+    usual = sys.__stderr__  # shows what it cannot encode
+    return open(fd, "w", buffering=1, encoding=usual.encoding, errors=usual.errors)
+
+
+def _heed(link: socket.socket) -> None:
+    """Take signals from the launcher; where that has gone, the run is to end."""
+    with suppress(OSError):
+        while number := link.recv(1):
+            os.kill(os.getpid(), number[0])
+    os.kill(os.getpid(), signal.SIGTERM)
+
+
+def _line(**message: Any) -> bytes:
+    return json.dumps(message).encode() + b"\n"
+
+
+def _report(**message: Any) -> None:
+    """Tell the launcher, where there is one."""
+    if _link is not None:
+        with suppress(OSError):
+            _link.sendall(_line(**message))
+
+
+def has_terminal() -> bool | None:
+    """False where mpiexec passes on what this process writes: it pretends to be a terminal."""
+    return False if "OMPI_COMM_WORLD_SIZE" in os.environ and _link is None else None
+
+
+def together(asked: int | None, run: Callable[[MpiComm], int], *, debugging: bool = False) -> int:
+    """Carry out `run` as one of all processes, as many as were `asked` for; returns the status."""
+    size, rank = launched()
+    comm: MpiComm | None = None
+
+    def act() -> int:
+        nonlocal comm
+        comm = _join(asked, fail)
+        return run(comm)
+
+    def fail(error: BaseException) -> None:
+        def again() -> int:
+            raise error
+
+        end(*outcome_of(again, debugging=debugging), tells=True, stays=False)
+
+    def end(status: int, text: str, *, tells: bool, stays: bool) -> int:
+        if text and tells:
+            _tell(text, rank, size)
+        _report(status=status, text=_signed(text, rank, size) if tells and rank else "")
+        sys.stdout.flush()
+        if not stays:
+            comm.abort(status)
+        # mpiexec would have its own say about a status, and the launcher knows it.
+        return 0 if _link is not None and comm is not None else status
+
+    status, text = outcome_of(act, debugging=debugging)
+    if comm is None:
+        end(status, text, tells=rank == 0, stays=True)
+        if status == INTERRUPTED:  # while others join: they would be waited for at the end
+            os._exit(status)
+        return status
+    if comm.parted:
+        return end(status, text, tells=True, stays=True)
+    patience = inf
+    if not status and rank == 0:
+        _report(over=True)  # and the others are waited for
+    if status:
+        patience = LONGER if rank else PATIENCE
+        if status == INTERRUPTED or comm.failed_within:
+            patience = 0.0
+        if comm.at_end:
+            patience = inf
+    words = comm.agree(FAILED if status else WELL, patience)
+    alone = words is None
+    return end(status, text, tells=alone or rank == int(words.argmin()), stays=not alone)
+
+
+def _tell(text: str, rank: int, size: int) -> None:
+    with suppress(OSError, ValueError):
+        if rank == 0:
+            print(text, file=sys.stderr, flush=True)
+        elif _link is None:
+            print(_signed(text, rank, size), file=sys.__stderr__, flush=True)
+
+
+def _signed(text: str, rank: int, size: int) -> str:
+    return f"{text}\nin process {rank + 1} of {size}" if text else ""
+
+
+def _join(asked: int | None, ends: Callable[[BaseException], None]) -> MpiComm:
+    """Join the processes that mpiexec has started; `ends` as of `MpiComm`."""
+    size, _ = launched()
+    if asked is not None and asked != size:
+        raise ScriptError(
+            f"--ranks {asked}: mpiexec has started {size} processes",
+            expected="one of the two: mpiexec -n N, or --ranks N",
+        )
+    comm = MpiComm(ends)
+    if comm.size != size:
+        raise ScriptError(
+            f"{size} processes were started, and mpi4py sees {comm.size} of them",
+            expected="the mpiexec of the MPI that mpi4py has found; with Slurm, srun --mpi=pmix",
+        )
+    return comm
+
+
+def share(hub: Hub, comm: MpiComm) -> None:
+    """Let all processes step a scene together, of which the first writes. One needs no other."""
+    if comm.size > 1:
+        hub.settings.comm = comm
+    if not comm.leads:
+        hub.output.writes = False

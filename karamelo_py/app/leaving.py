@@ -22,36 +22,8 @@ except KeyboardInterrupt:
     _leave()
 
 
-class telling_of_the_end:
-    """Say a word where a signal of a batch system ends the program, outside of runs."""
-
-    def __init__(self) -> None:
-        self.before: dict = {}
-
-    def __enter__(self) -> None:
-        for name in ("SIGTERM", "SIGHUP"):
-            number = getattr(signal, name, None)
-            try:
-                if number is not None and signal.getsignal(number) == signal.SIG_DFL:
-                    self.before[number] = signal.signal(number, _end)
-            except ValueError:  # not in the main thread, which gets the signals
-                return
-
-    def __exit__(self, *_) -> None:
-        for number, handler in self.before.items():
-            signal.signal(number, handler)
-
-
-def _end(number, _):
-    # All that is open is whole: files have their names when they are complete.
-    os.write(2, f"error: ended by {signal.Signals(number).name}\n".encode())
-    os._exit(SIGNALLED + number)
-
-
 class leaving_at_once:
     """Let Ctrl-C end the program on the spot: for imports."""
-
-    before = None
 
     def __enter__(self) -> None:
         try:

@@ -1,15 +1,10 @@
-"""Options that subcommands share: variables, numbers, where the files of a run go."""
-
-from __future__ import annotations
+"""Options that subcommands share: variables, numbers, folders."""
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from karamelo_py.script.errors import ScriptError
-
-if TYPE_CHECKING:
-    from karamelo_py.scene.hub import Hub
 
 VARIABLE = ("-var", "--var", "-v")
 
@@ -66,33 +61,8 @@ def above_zero(text: str) -> float:
     return value
 
 
-def add_output_options(parser: argparse.ArgumentParser) -> None:
-    """Add -log and -out."""
-    parser.add_argument(
-        "-log", "--log", type=Path, metavar="FILE",
-        help="where the log goes (default: log.mpm); with the ending .csv it has commas",
-    )  # fmt: skip
-    parser.add_argument(
-        "-out", "--out", type=Path, metavar="FOLDER",
-        help="where all files go; it is made if need be (default: the current folder)",
-    )  # fmt: skip
-
-
 def make_folder(folder: Path, option: str) -> None:
-    """Make a folder for the files of a scene, unless it is there.
-
-    Parameters
-    ----------
-    folder
-        Its path.
-    option
-        How one is named: ``-out {}``.
-
-    Raises
-    ------
-    ScriptError
-        If it cannot be made.
-    """
+    """Make a folder for the files of a scene, unless it is there; `option` asks for it: -out {}."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -102,25 +72,3 @@ def make_folder(folder: Path, option: str) -> None:
             expected="a folder, or the name of one that can be made",
             hint=f"{option.format(name)} is a folder in this one",
         ) from error
-
-
-def direct(hub: Hub, options: argparse.Namespace) -> None:
-    """Send the files of a scene where the options say.
-
-    Raises
-    ------
-    ScriptError
-        If the folder cannot be made, or that of the log is not there.
-    """
-    if options.out is not None:
-        if not hub.checking:
-            make_folder(options.out, "-out {}")
-        hub.folder = options.out.absolute()
-    if options.log is not None:
-        hub.output.log.file = options.log
-        hub.output.log.is_asked_for = True
-        if not hub.output.log.path.parent.is_dir() or hub.output.log.path.is_dir():
-            raise ScriptError(
-                f"the log cannot be written to {options.log}",
-                expected="the name of a file in a folder that exists",
-            )

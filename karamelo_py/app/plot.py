@@ -1,24 +1,74 @@
-"""karamelo-py plot: columns of the log of an earlier run against each other."""
+"""Logs of earlier runs, read back, and karamelo-py plot: their columns against each other."""
 
 import argparse
+import csv
+from math import nan
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
-from karamelo_py.app.logs import read_rows
+import numpy as np
+
 from karamelo_py.output.files import picture_format
 from karamelo_py.output.plots import Plots, PlottedCurve
 from karamelo_py.script.errors import ScriptError, nearest_few
+from karamelo_py.script.terms import number_of
 
-SUMMARY = "Draw columns of a log."
-TEXT = """\
+DESCRIPTION = """\
+Draw columns of a log.
 The log is log.mpm or log.csv. Without columns, lists those that there are. The command of scripts
 is explained by karamelo-py help command plot."""
 
 
-def add_parser(subparsers: Any) -> argparse.ArgumentParser:
-    """Add the subcommand to the command line."""
-    parser = subparsers.add_parser("plot", help=SUMMARY, description=f"{SUMMARY}\n{TEXT}")
+def read_text(path: Path, expected: str | None = None) -> str:
+    """Read a file of an earlier run; nothing where it is no text."""
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        reason = error.strerror or error
+        raise ScriptError(f"cannot read {path}: {reason}", expected=expected) from None
+    except UnicodeDecodeError:
+        return ""
+
+
+def read_rows(path: Path) -> list[dict[str, float]]:
+    """Read the rows of a log, by column; words, such as what limits the step, are NaN.
+
+    A line that begins with # names the columns anew; one that a killed run has left half is passed
+    over.
+    """
+    names: list[str] = []
+    rows = []
+    lines = read_text(path).splitlines()
+    for cells in filter(
+        None, csv.reader(lines) if path.suffix == ".csv" else map(str.split, lines)
+    ):
+        if not names or cells[0].startswith("#"):
+            names = [name for name in (cells[0].lstrip("# "), *cells[1:]) if name]
+            continue
+        numbers = [number_of(cell) for cell in cells]
+        if len(cells) == len(names) and any(number is not None for number in numbers):
+            kept = (nan if number is None else number for number in numbers)
+            rows.append(dict(zip(names, kept, strict=True)))
+    if not rows:
+        raise ScriptError(f"{path} is not a log", expected="log.mpm or log.csv of a run")
+    return rows
+
+
+def read_log(folder: Path, name: str = "log.mpm") -> dict[str, np.ndarray]:
+    """Read the columns of a log in a folder, those of no log where it cannot be read.
+
+    Where they change between runs, all rows of a column.
+    """
+    try:
+        rows = read_rows(folder / name)
+    except ScriptError:
+        return {}
+    names = dict.fromkeys(name for row in rows for name in row)
+    return {name: np.array([row[name] for row in rows if name in row]) for name in names}
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add what the subcommand takes."""
     parser.add_argument("log", metavar="LOG", type=Path)
     parser.add_argument("columns", metavar="Y", nargs="*", help="columns to draw")
     parser.add_argument("-x", default="Time", help="column to draw over (default: Time)")
@@ -31,8 +81,6 @@ def add_parser(subparsers: Any) -> argparse.ArgumentParser:
         help="ending in .png, .pdf or .svg (default: log.png)",
     )  # fmt: skip
     parser.add_argument("--debug", action="store_true", help=argparse.SUPPRESS)
-    parser.set_defaults(act=run)
-    return parser
 
 
 def run(options: argparse.Namespace) -> int:

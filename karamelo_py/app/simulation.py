@@ -6,7 +6,11 @@ import gc
 import io
 import itertools
 import os
-from collections.abc import Callable, Iterator
+import re
+import sys
+import warnings
+from argparse import ArgumentTypeError
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
@@ -15,27 +19,92 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 
-from karamelo_py.app.interface import (
-    Quiet,
-    SimulationError,
-    as_script_text,
-    as_simulation_error,
-    refuse_copies,
-    threads_of,
-)
-from karamelo_py.app.options import make_folder
-from karamelo_py.app.shown import Columns, ShownPicture
+from karamelo_py.app.options import make_folder, threads_option
 from karamelo_py.language import registry, signature
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
+from karamelo_py.run.mpi.comm import launched
 from karamelo_py.run.runner import Interrupted
 from karamelo_py.scene.hub import Hub
-from karamelo_py.script.errors import Pause, Quit, ScriptError, nearest
+from karamelo_py.script.errors import NoItem, Pause, Quit, ScriptError, nearest, nearest_few
 from karamelo_py.script.expressions import Expression, shown
 from karamelo_py.script.parser import parse, parse_text
 
 SCRIPT = "the name of a script, or its text: statements, as in name = 1"
 _folders: WeakValueDictionary[Path, Simulation] = WeakValueDictionary()
+
+
+class SimulationError(ScriptError):
+    """An error of a script or a command: the whole message, with its place.
+
+    Attributes
+    ----------
+    message, place, expected, hint
+        The parts of the message; `place` has file, line, column and the line itself.
+    """
+
+    def __str__(self) -> str:
+        return self.render()
+
+
+class KarameloWarning(UserWarning):
+    """A warning as the command line shows it."""
+
+
+class Quiet(Console):
+    """Shows nothing; warnings are those of Python."""
+
+    def __init__(self) -> None:
+        super().__init__(quiet=True)
+
+    def warn(self, text: str) -> None:
+        warnings.warn(text, KarameloWarning, stacklevel=2)
+
+
+class Columns(Mapping):
+    """Columns by name: arrays of numbers."""
+
+    def __init__(self, names: Callable[[], list[str]], column: Callable[[str], np.ndarray]):
+        self._names = names
+        self._column = column
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        names = self._names()
+        if name not in names:
+            close = nearest_few(str(name), names)
+            hint = f"did you mean {' or '.join(map(repr, close))}? " if close else ""
+            raise NoItem(f"there is no '{name}'; {hint}there are {', '.join(names) or 'none'}")
+        with _as_simulation_error():
+            return self._column(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names())
+
+    def __len__(self) -> int:
+        return len(self._names())
+
+    def __repr__(self) -> str:
+        return f"<columns {', '.join(self)}>"
+
+    def to_pandas(self) -> Any:
+        """Give the columns as a DataFrame."""
+        import pandas
+
+        return pandas.DataFrame(dict(self))
+
+
+class ShownPicture:
+    """A picture of the points, which a notebook shows."""
+
+    def __init__(self, png: bytes):
+        self.png = png
+
+    def _repr_png_(self) -> bytes:
+        return self.png
+
+    def save(self, file: str | PathLike) -> None:
+        """Write it to a file (PNG)."""
+        Path(file).write_bytes(self.png)
 
 
 class Simulation:
@@ -96,7 +165,7 @@ class Simulation:
         **variables: Any,
     ):
         if not alone:
-            refuse_copies()
+            _refuse_copies()
         self.hub = hub = Hub(Console() if verbose else Quiet())
         hub.settings.trusts = trust_geometries
         hub.pausing = hub.open_ended = True
@@ -104,11 +173,11 @@ class Simulation:
         hub.output.writes = out is not None
         self._numbers = itertools.count(1)
         self._name = "a scene"
-        with as_simulation_error():
-            hub.settings.threads = threads_of(threads)
+        with _as_simulation_error():
+            hub.settings.threads = _threads_of(threads)
             if out is not None:
                 hub.folder = self._claimed(out)
-            presets = {name: as_script_text(value) for name, value in variables.items()}
+            presets = {name: _as_script_text(value) for name, value in variables.items()}
             self._interpreter = Interpreter(hub, presets)
             if script is not None:
                 self._read(script)
@@ -170,7 +239,7 @@ class Simulation:
         """Make runs at once, and end them as the user wants."""
         pausing, self.hub.pausing = self.hub.pausing, False
         try:
-            with as_simulation_error():
+            with _as_simulation_error():
                 yield
         except Quit:
             pass
@@ -181,7 +250,7 @@ class Simulation:
 
     def evaluate(self, expression: str) -> float | str:
         """Compute the present value of an expression of the language."""
-        with as_simulation_error():
+        with _as_simulation_error():
             raw, node = parse_text(expression, "evaluate")
             found = self._interpreter.evaluate(node, raw)
             if isinstance(found, Expression):
@@ -196,9 +265,7 @@ class Simulation:
             raise AttributeError(f"there is no command '{name}'{hint}")
 
         def call(*arguments: Any, **named: Any) -> None:
-            words = [self._word(argument) for argument in arguments]
-            words += [f"{key}={self._word(value)}" for key, value in named.items()]
-            self._do(f"{name}({', '.join(words)})", f"Simulation.{name}")
+            self._do(f"{name}({self._words(*arguments, **named)})", f"Simulation.{name}")
 
         call.__name__ = name
         call.__doc__ = registry.find("command", name).__doc__
@@ -207,20 +274,24 @@ class Simulation:
     def __dir__(self) -> list[str]:
         return [*super().__dir__(), *registry.names("command")]
 
+    def _words(self, *arguments: Any, **named: Any) -> str:
+        words = [self._word(argument) for argument in arguments]
+        return ", ".join([*words, *(f"{key}={self._word(v)}" for key, v in named.items())])
+
     def _word(self, value: Any) -> str:
         """Write a value as a script would."""
         if callable(value) and not isinstance(value, type):
             name = f"{getattr(value, '__name__', 'function').strip('<>')}_{next(self._numbers)}"
             self.hub.functions[name] = value
             return name
-        return as_script_text(value)
+        return _as_script_text(value)
 
     # -- time -------------------------------------------------------------------------------------
 
     def run(self, steps: int | None = None) -> None:
         """Take a number of steps; without one, carry out the rest of the script, with its runs."""
         if steps is not None:
-            self._do(f"run({as_script_text(steps)})", "Simulation.run")
+            self._do(f"run({_as_script_text(steps)})", "Simulation.run")
             return
         if not self._interpreter.waits:
             raise SimulationError(
@@ -249,14 +320,12 @@ class Simulation:
     @property
     def points(self) -> Columns:
         """Columns of the points by name (x, vy, s11, seq ...): arrays (n,) in the order of ids."""
-        fields = self.hub.fields
-        return Columns(fields.particle_names, as_simulation_error()(fields.particle))
+        return Columns(self.hub.fields.particle_names, self.hub.fields.particle)
 
     @property
     def nodes(self) -> Columns:
         """Columns of the nodes by name (x, vx, mass ...): arrays (n,)."""
-        fields = self.hub.fields
-        return Columns(fields.node_names, as_simulation_error()(fields.node))
+        return Columns(self.hub.fields.node_names, self.hub.fields.node)
 
     @property
     def log(self) -> Columns:
@@ -278,7 +347,7 @@ class Simulation:
                 self.hub.refresh_values()
             return self.hub.values.get(name)
 
-        return Columns(self.hub.values.names, as_simulation_error()(read))
+        return Columns(self.hub.values.names, read)
 
     @property
     def variables(self) -> dict[str, Any]:
@@ -300,11 +369,10 @@ class Simulation:
         """
         from karamelo_py.styles.dumps.pyplot import PyPlot
 
-        with as_simulation_error():
+        with _as_simulation_error():
             given = [] if field is None else [field]
-            words = ["1", "shown.png", *(self._word(v) for v in (width, height, *given))]
-            words += [f"{key}={self._word(value)}" for key, value in look.items()]
-            (call,) = parse(f"show({', '.join(words)})", "Simulation.show")
+            words = self._words(1, "shown.png", width, height, *given, **look)
+            (call,) = parse(f"show({words})", "Simulation.show")
             arguments = [signature.Argument(raw, self._interpreter) for raw in call.arguments]
             dump = signature.call(PyPlot, self.hub, arguments, "dump pyplot")
             file = io.BytesIO()
@@ -325,3 +393,63 @@ class Simulation:
     def __repr__(self) -> str:
         count = sum(solid.count for solid in self.hub.solids.values())
         return f"<{self._name}: {count} points, step {self.step}, time {self.time:.6g}>"
+
+
+# ---- values and errors between Python and a scene, which speaks as a script does ----------------
+
+
+@contextmanager
+def _as_simulation_error() -> Iterator[None]:
+    """Raise errors as those whose text is the whole message."""
+    try:
+        yield
+    except ScriptError as error:
+        whole = SimulationError.__new__(SimulationError)
+        whole.__dict__.update(vars(error))
+        whole.args = error.args
+        raise whole from error.__cause__
+
+
+def _refuse_copies() -> None:
+    """Refuse several processes that were started: the first tells that none shares a scene here."""
+    size, rank = launched()
+    if size == 1:
+        return
+    if rank > 0:
+        sys.exit()
+    raise SimulationError(
+        f"{size} processes were started, and a scene in Python is of one: they would do the same",
+        expected=f"mpiexec -n {size} karamelo-py SCRIPT, by which they share a scene",
+        hint="Simulation(..., alone=True) where each is to have a scene of its own",
+    )
+
+
+def _threads_of(given: Any) -> int | None:
+    """Read the number of threads, as `--threads` takes it; None for auto."""
+    try:
+        return None if given is None else threads_option(str(given))
+    except ArgumentTypeError:
+        raise ScriptError(
+            f"threads={given!r} is not a number of threads",
+            expected="1, 2, ..., or None: all cores where the scene is large enough",
+        ) from None
+
+
+def _as_script_text(value: Any) -> str:
+    """Write a value of Python as a script would."""
+    if value is None:
+        return "NULL"
+    if isinstance(value, (bool, np.bool_)):
+        return str(bool(value)).lower()
+    if isinstance(value, PathLike):
+        return f'"{value}"'
+    if isinstance(value, (int, np.integer)):
+        return str(int(value))
+    if isinstance(value, (float, np.floating)):
+        return repr(float(value))
+    if isinstance(value, str):
+        words = value.split()
+        texts = len(words) > 1 and all(re.fullmatch(r"[\w.:'-]+", word) for word in words)
+        # Words with nothing but blanks between them are no formula.
+        return f'"{value}"' if texts and not {"and", "or", "not"} & set(words) else value
+    raise TypeError(f"{value!r} is no number, text, True, False, None or function")

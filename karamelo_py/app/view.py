@@ -3,29 +3,28 @@
 import argparse
 import glob
 from collections.abc import Iterable
+from itertools import chain
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from karamelo_py.output.columns import unknown_column
-from karamelo_py.output.files import picture_format, unwarned, whole
-from karamelo_py.output.movies import Frames, movie_format
+from karamelo_py.output.fields import unknown_column
+from karamelo_py.output.files import Frames, movie_format, picture_format, unwarned, whole
 from karamelo_py.output.snapshots import Snapshot, read
 from karamelo_py.script.errors import ScriptError
 
-SUMMARY = "Draw pictures or a movie of dumps of points."
-TEXT = """\
+DESCRIPTION = """\
+Draw pictures or a movie of dumps of points.
 Files are those of dump particle, particle/gz, hdf5 and vtk (its .pvd). The pictures are those of
 dump pyplot."""
 DPI = 100
 SAMPLE = 400  # points whose nearest neighbours are looked for
 
 
-def add_parser(subparsers: Any) -> argparse.ArgumentParser:
-    """Add the subcommand to the command line."""
-    parser = subparsers.add_parser("view", help=SUMMARY, description=f"{SUMMARY}\n{TEXT}")
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add what the subcommand takes."""
     parser.add_argument("files", metavar="FILE", nargs="+", type=Path)
     parser.add_argument("-c", "--column", help="what colours the points (default: their solid)")
     parser.add_argument(
@@ -43,8 +42,6 @@ def add_parser(subparsers: Any) -> argparse.ArgumentParser:
     parser.add_argument("--elevation", type=float, default=30.0, help="in 3D, degrees")
     parser.add_argument("--fps", type=float, default=25.0, help="frames a second of a movie")
     parser.add_argument("--debug", action="store_true", help=argparse.SUPPRESS)
-    parser.set_defaults(act=run)
-    return parser
 
 
 def run(options: argparse.Namespace) -> int:
@@ -60,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
     drawn = 0
     with unwarned():
         picture = None
-        for snapshot in (snapshot for file in files for snapshot in read(file)):
+        for snapshot in chain.from_iterable(map(read, files)):
             picture = picture or _picture(snapshot, files, options)
             time = "" if np.isnan(snapshot.time) else f", time {snapshot.time:.6g}"
             # As they stand in the file, whatever their ids.
@@ -82,22 +79,15 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _matching(names: Iterable[Path]) -> set[Path]:
-    """Find the files of these names; a pattern stands for all files that match it.
-
-    Raises
-    ------
-    ScriptError
-        If none does.
-    """
+    """Find the files of these names; a pattern stands for all files that match it."""
     found: set[Path] = set()
     for name in names:
-        if name.exists() or not glob.has_magic(str(name)):
-            found.add(name)
-            continue
-        there = glob.glob(str(name))
+        there = [name]
+        if not name.exists() and glob.has_magic(str(name)):
+            there = [Path(file) for file in glob.glob(str(name))]
         if not there:
             raise ScriptError(f"no file matches {name}", expected="dumps of an earlier run")
-        found |= {Path(file) for file in there}
+        found.update(there)
     return found
 
 
@@ -142,7 +132,7 @@ def _all(files: Iterable[Path], column: str) -> tuple[np.ndarray, np.ndarray, An
     from karamelo_py.output.pictures import grown
 
     corners, ends = [], []
-    for snapshot in (snapshot for file in files for snapshot in read(file)):
+    for snapshot in chain.from_iterable(map(read, files)):
         corners.append((snapshot.lo, snapshot.hi))
         values = snapshot.columns.get(column, np.empty(0))
         values = values[np.isfinite(values)]

@@ -1,16 +1,22 @@
-"""Commands about space: dimension, create_domain, axisymmetric, region."""
+"""Commands about space and what fills it: dimension, boundary, region, solid, group."""
 
+import copy
+from collections.abc import Sequence
 from typing import Literal
 
 from karamelo_py.language import registry, signature
-from karamelo_py.language.by_dimension import Forms, number, place_of
+from karamelo_py.language.by_dimension import Forms, number
 from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument
+from karamelo_py.language.unknown import SHAPES, filled, in_own_words
 from karamelo_py.scene.domain import Domain, require_domain
+from karamelo_py.scene.group import ALL, KINDS, NOTHING_THERE
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import RELATIVE_TOLERANCE
-from karamelo_py.scene.solid import own_grids
+from karamelo_py.scene.region import Region
+from karamelo_py.scene.solid import Solid, own_grids, warn_of_coinciding
 from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.parser import parse_text
 
 _BOUNDS = ("xmin", "xmax", "ymin", "ymax", "zmin", "zmax")
 _WITH_H = {d: (*_BOUNDS[: 2 * d], "h") for d in (1, 2, 3)}
@@ -51,11 +57,17 @@ def dimension(hub: Hub, dimensions: Argument, *bounds: Argument) -> None:
     region, create_domain
     """
     _refuse_second(hub)
-    count = _dimensions(hub, dimensions)
-    if not bounds:
-        hub.announced_dimension = count
-        return
-    hub.domain = _domain(hub, DIMENSION, bounds, count)
+    count = number(hub, dimensions, "the number of dimensions")
+    if count not in DIMENSION.names:
+        raise ScriptError(
+            f"the number of dimensions must be 1, 2 or 3, not {count:g}",
+            place=dimensions.place,
+            expected=" or ".join(DIMENSION.line(d) for d in DIMENSION.names),
+        )
+    if bounds:
+        hub.domain = _domain(hub, DIMENSION, bounds, int(count))
+    else:
+        hub.announced_dimension = int(count)
 
 
 dimension.syntax = "1|2|3, xmin, xmax[, ymin, ymax[, zmin, zmax]], h"
@@ -85,8 +97,7 @@ def create_domain(hub: Hub, *bounds: Argument) -> None:
     dimension
     """
     _refuse_second(hub)
-    count = getattr(hub, "announced_dimension", None) or (len(bounds) // 2)
-    count = min(max(count, 1), 3)
+    count = min(max(hub.announced_dimension or len(bounds) // 2, 1), 3)
     forms = CREATE_DOMAIN_WITHOUT_H if len(bounds) == 2 * count else CREATE_DOMAIN
     hub.domain = _domain(hub, forms, bounds, count)
 
@@ -222,50 +233,199 @@ def _refuse_second(hub: Hub) -> None:
     )
 
 
-def _dimensions(hub: Hub, argument: Argument) -> int:
-    value = number(hub, argument, "the number of dimensions")
-    if value not in DIMENSION.names:
-        raise ScriptError(
-            f"the number of dimensions must be 1, 2 or 3, not {value:g}",
-            place=argument.place,
-            expected=" or ".join(DIMENSION.line(d) for d in DIMENSION.names),
-        )
-    return int(value)
-
-
 def _domain(hub: Hub, forms: Forms, bounds: tuple[Argument, ...], count: int) -> Domain:
     values = forms.read(hub, bounds, count)
-    names = forms.names[count]
+    places = {name: argument.place for name, argument in zip(values, bounds, strict=True)}
     lo = [values[name] for name in _BOUNDS[0 : 2 * count : 2]]
     hi = [values[name] for name in _BOUNDS[1 : 2 * count : 2]]
-    for axis, (a, b) in enumerate(zip(lo, hi, strict=True)):
-        if b <= a:
-            low, high = _BOUNDS[2 * axis : 2 * axis + 2]
+    for low, high in zip(_BOUNDS[::2], _BOUNDS[1 : 2 * count : 2], strict=False):
+        if values[high] <= values[low]:
             raise ScriptError(
-                f"{high} = {b:g} must be above {low} = {a:g}",
-                place=place_of(names, bounds, high),
+                f"{high} = {values[high]:g} must be above {low} = {values[low]:g}",
+                place=places[high],
                 expected=forms.line(count),
             )
     h = values.get("h")
     if h is not None and h <= 0:
         raise ScriptError(
             f"the cell size h = {h:g} must be above 0",
-            place=place_of(names, bounds, "h"),
+            place=places["h"],
             expected=forms.line(count),
         )
     try:
         domain = Domain(count, lo, hi, h)
     except ScriptError as error:
-        error.argument, error.place = None, place_of(names, bounds, "h")
+        error.argument, error.place = None, places.get("h")
         raise
     domain.place = hub.place
-    sides = [b - a for a, b in zip(lo, hi, strict=True)]
+    longest = max(b - a for a, b in zip(lo, hi, strict=True))
     # One cell along a side is a line, or a column; a domain of one cell is an element that deforms.
-    if h is not None and h > max(sides) * (1 + RELATIVE_TOLERANCE) and not own_grids(hub):
+    if h is not None and h > longest * (1 + RELATIVE_TOLERANCE) and not own_grids(hub):
         hub.warn(
-            f"cells of {h:g} are larger than the domain, whose longest side is {max(sides):g}: the "
+            f"cells of {h:g} are larger than the domain, whose longest side is {longest:g}: the "
             "grid is one cell, and its nodes at the upper ends lie outside",
-            place=place_of(names, bounds, "h"),
+            place=places["h"],
             hint="smaller cells, or the same unit of length for both",
         )
     return domain
+
+
+def solid(hub: Hub, ID: str, kind: StyleOf("solid"), *arguments: Argument) -> None:
+    """Make a body of material points: fill a region with them, or put them into a mesh.
+
+    Parameters
+    ----------
+    ID
+        Name of the solid.
+    kind
+        Where the points come from.
+    arguments
+        What the style asks for, see the page of the style. For ``region``:
+        ``regionID, ppc, material, h[, T0]``, the region to fill, the points per cell in each
+        direction, the material, the cell size (that of the domain), and the initial temperature
+        (that of the material when left out). For ``mesh``: ``file, material, h[, T0]``.
+
+    Example
+    -------
+    solid(s1, region, disk, 2, steel, 0.05, 0)
+
+    Notes
+    -----
+    The method, the domain, the region and the material come before.
+
+    See Also
+    --------
+    region, material, dimension, group
+    """
+    if hub.update.method is None:
+        raise ScriptError(
+            "there is no method yet",
+            expected="method(...) before the first solid, such as method(ulmpm, FLIP, linear, 1)",
+            hint=in_own_words(hub.interpreter, "method_modify"),
+        )
+    require_domain(hub)
+    hub.solids.refuse(ID)
+    if not registry.knows("solid", kind):
+        # The forms of 2020: solid(ID, regionID, ppc, ...) and solid(ID, cylinder, regionID, ...).
+        if kind in hub.regions:
+            arguments = (Argument(parse_text(kind)[0], hub.interpreter), *arguments)
+            kind = "region"
+        elif kind in SHAPES and arguments and arguments[0].word() in hub.regions:
+            _refuse_counts(hub, ID, arguments)
+            kind = "region"
+        elif hint := filled(hub.interpreter.statement):
+            raise ScriptError(
+                f"unknown solid style '{kind}'",
+                argument="kind",
+                expected="one of " + ", ".join(registry.names("solid")),
+                hint=hint,
+            )
+    target = registry.called("solid", ID, kind)
+    new = signature.call(target, hub, list(arguments), f"solid {kind}")
+    warn_of_coinciding(hub, new, ID)
+    hub.solids.add(ID, new)
+    hub.update.method.welcome(hub, new)
+
+
+solid.syntax = "ID, region, regionID, ppc, material, h[, T0] | ID, mesh, file, material, h[, T0]"
+
+
+def _refuse_counts(hub: Hub, ID: str, arguments: Sequence[Argument]) -> None:
+    """Tell of the form that gave the number of points along each direction of a region."""
+    region, *counts, material, h = (argument.text for argument in arguments)
+    if len(counts) == hub.domain.dimension > 1:
+        raise ScriptError(
+            f"{', '.join(counts)} points along the sides: points are counted in a cell here",
+            place=arguments[1].place,
+            expected=solid.syntax,
+            hint=f"solid({ID}, region, {region}, 1, {material}, {h}), or more than 1 in each "
+            "direction of a cell",
+        )
+
+
+def group(
+    hub: Hub,
+    ID: str,
+    kind: Literal["particles", "nodes"],
+    by: Literal["region"],
+    region: Region,
+    of: Literal["all", "solid"],
+    *solids: Solid,
+) -> None:
+    """Name a set of points or of nodes.
+
+    Which points belong to it is decided here, once, by their reference positions. Nodes belong to
+    it by their positions; where solids have nodes of their own, those of solids that are made
+    later do, too, unless solids are named. The group ``all`` of everything is always there.
+
+    Parameters
+    ----------
+    ID
+        Name of the group. A name that is in use gets the new members, too.
+    kind
+        ``particles`` or ``nodes``.
+    by
+        The word ``region``.
+    region
+        ID of the region, which says who belongs.
+    of
+        ``all``, or ``solid`` followed by the IDs of the solids whose points may belong.
+    solids
+        IDs of solids. Where these share one grid, for nodes it makes no difference which are
+        named.
+
+    Example
+    -------
+    group(left, nodes, region, wall, all)
+    group(impactor, particles, region, box, solid, s1)
+
+    See Also
+    --------
+    region, fix, compute
+    """
+    if ID == ALL:
+        raise ScriptError(
+            "'all' is the group of everything and cannot be changed",
+            argument="ID",
+            expected="another name",
+        )
+    if of == "solid" and not solids:
+        raise ScriptError(
+            "no solid is named",
+            argument="of",
+            expected=f"group({ID}, {kind}, region, {region.id}, solid, solidID, ...)",
+        )
+    if of == "all" and solids:
+        raise ScriptError(
+            "nothing can follow 'all'",
+            argument="solids",
+            expected=f"group({ID}, {kind}, region, {region.id}, all)",
+        )
+    if ID in hub.groups:
+        members = hub.groups[ID]
+        if members.kind != kind:
+            raise ScriptError(
+                f"group '{ID}' is a group of {members.kind}",
+                argument="kind",
+                expected=f"{members.kind}, or another ID",
+            )
+        if hub.rehearsing:  # The real group gets its members when the script comes here.
+            members = copy.copy(members)
+    else:
+        members = hub.groups.add(ID, KINDS[kind](hub))
+    found = members.add(region, solids or None)
+    if found or region.unknown:
+        return
+    if kind == "nodes" and not solids and own_grids(hub):
+        members.awaits_solids = True  # the run tells when none came
+    else:
+        none_yet = kind == "particles" and not hub.solids
+        hub.warn(
+            f"group '{ID}': region '{region.id}' holds no {kind}; {NOTHING_THERE}",
+            hint="no solid is made yet: groups of particles come after the solids"
+            if none_yet
+            else None,
+        )
+
+
+group.syntax = "ID, particles|nodes, region, regionID, all | solid, solidID, ..."

@@ -1,16 +1,19 @@
-"""Commands that define what acts and what is measured: fix, compute."""
+"""Commands that define what acts and what is measured: fix, compute, functions of groups."""
 
-from typing import Any
+from typing import Any, Literal
 
 from karamelo_py.language import registry, signature
 from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument
 from karamelo_py.language.unknown import MEANINGS
+from karamelo_py.scene.domain import require_domain
+from karamelo_py.scene.group import AnyGroup, Group, ParticleGroup
 from karamelo_py.scene.hub import Catalogue, Hub
 from karamelo_py.scene.plugins import check_fix
-from karamelo_py.script.errors import ScriptError
-from karamelo_py.script.expressions import SEEDS
-from karamelo_py.script.other_programs import instead
+from karamelo_py.script.errors import ScriptError, instead
+from karamelo_py.script.expressions import SEEDS, Expression
+from karamelo_py.styles.computes.means import CenterOfMass
+from karamelo_py.styles.fixes.measuring import COME_FIRST, Measuring
 
 
 def fix(hub: Hub, ID: str, style: StyleOf("fix"), *arguments: Argument) -> None:
@@ -162,3 +165,127 @@ def _check_names(hub: Hub, kind: str, ID: str, style: type) -> None:
                 "formulas will use the variable",
                 hint=f"choose another ID, such as {ID}_1",
             )
+
+
+Direction = Literal["x", "y", "z"]
+
+
+def xcm(hub: Hub, group: AnyGroup, direction: Direction) -> Expression:
+    """Give the centre of mass of a group, as a formula that follows it.
+
+    Parameters
+    ----------
+    group
+        Group of points or of nodes, or ``all`` points.
+    direction
+        x, y or z.
+
+    Example
+    -------
+    height = xcm(body, y)
+    log_modify(custom, time, height, xcm(body, x))
+
+    Notes
+    -----
+    It is measured when the log is written and where a condition asks for it, as a compute is.
+
+    See Also
+    --------
+    internal_force, external_force, compute center_of_mass
+    """
+    ID = f"xcm({group.id})"
+    if ID not in hub.computes:
+        _file(hub, hub.computes, ID, CenterOfMass(hub, group), "center_of_mass")
+    return _component(hub, Expression.seed(f"{ID}_{direction}"), direction)
+
+
+def internal_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expression:
+    """Give the force that acts in a group, as a formula that follows it.
+
+    Parameters
+    ----------
+    group
+        Group of points or of nodes, or ``all`` points.
+    direction
+        x, y or z.
+
+    Example
+    -------
+    pull = internal_force(grip, y)
+    log_modify(custom, time, pull)
+
+    Notes
+    -----
+    Of nodes: the sum of what points bring to them, which is the divergence of stress and what
+    fixes put on the points (contact, tools, tractions). At nodes that are held and hardly
+    accelerate it is the opposite of the reaction. Of points: the rate of their momentum in the
+    last step, sum m a. Before the first step it is 0.
+
+    See Also
+    --------
+    external_force, xcm, compute reaction
+    """
+    if isinstance(group, ParticleGroup):
+        before = _total(hub, "momentum_before", group, direction)
+        after = _total(hub, "momentum_after", group, direction)
+        return _component(hub, after.minus(before), direction)
+    force = _total(hub, "internal_force", group, direction)
+    return _component(hub, force, direction)
+
+
+def external_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expression:
+    """Give the force that fixes apply to a group, as a formula that follows it.
+
+    Parameters
+    ----------
+    group
+        Group of points or of nodes, or ``all`` points.
+    direction
+        x, y or z.
+
+    Example
+    -------
+    weight = external_force(nodes, y)
+    log_modify(custom, time, weight)
+
+    Notes
+    -----
+    Of nodes: what fixes such as body_force and force_nodes add to the force of the nodes. Of
+    points: what fixes put on the points (contact, tools, tractions). Velocities that are
+    prescribed are no forces: the fixes publish their reactions. Before the first step it is 0.
+    Karamelo gives the internal force here.
+
+    See Also
+    --------
+    internal_force, xcm, fix body_force
+    """
+    if isinstance(group, ParticleGroup):
+        force = _total(hub, "external_force", group, direction)
+        return _component(hub, force, direction)
+    total = _total(hub, "force", group, direction)
+    inner = _total(hub, "internal_force", group, direction)
+    return _component(hub, total.minus(inner), direction)
+
+
+def _total(hub: Hub, name: str, group: Group, direction: str) -> Expression:
+    """The value of the fix that measures it, which is made when first asked for."""
+    ID = f"{name}({group.id})"
+    if ID not in hub.fixes:
+        others = dict(hub.fixes)
+        if name in COME_FIRST:
+            hub.fixes.clear()
+        _file(hub, hub.fixes, ID, Measuring(hub, group, name), name)
+        hub.fixes.update(others)
+    return Expression.seed(f"{ID}_{direction}")
+
+
+def _file(hub: Hub, catalogue: Any, ID: str, item: Any, style: str) -> None:
+    item.style = style
+    catalogue.add(ID, item)
+    hub.values.publish_vector(ID, item.published)
+
+
+def _component(hub: Hub, formula: Expression, direction: str) -> Expression:
+    """`formula`, or 0 in a direction that the domain does not have."""
+    d = require_domain(hub).dimension
+    return Expression(formula if "xyz".index(direction) < d else 0.0)

@@ -34,13 +34,12 @@ def print_(hub: Hub, first: Argument, *more: Argument) -> None:
         if isinstance(value, str) and argument.text.startswith('"'):
             parts.append(value)
             continue
-        parts.append(f"{argument.text} = {shown(value)}")
+        words = [argument.text, shown(value)]
         if isinstance(value, Expression) and not value.names.intersection(POINT_SEEDS):
             _refresh(hub, value)
-            if value.text != argument.text:
-                parts[-1] += f" = {value.evaluate(hub.values):.10g}"
-            else:
-                parts[-1] = f"{argument.text} = {value.evaluate(hub.values):.10g}"
+            words = [argument.text] if value.text == argument.text else words
+            words.append(f"{value.evaluate(hub.values):.10g}")
+        parts.append(" = ".join(words))
     hub.answered = True
     hub.console.say(", ".join(parts))
 

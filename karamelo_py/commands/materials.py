@@ -1,11 +1,17 @@
-"""Commands about materials and the parts of composed ones: eos, strength, damage, temperature."""
+"""Commands about materials, their parts, and what shows them: element."""
 
 from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Annotated, Literal
 
 from karamelo_py.language import registry, signature
 from karamelo_py.language.kinds import StyleOf
-from karamelo_py.language.own_words import longer
-from karamelo_py.language.signature import Argument
+from karamelo_py.language.signature import Argument, Positive
+from karamelo_py.language.unknown import longer
+from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
+from karamelo_py.run.element.load_path import COMPONENTS, NORMAL, LoadPath
+from karamelo_py.run.element.point import Point, Unreachable
+from karamelo_py.run.element.response import Response
 from karamelo_py.scene.hub import Catalogue, Hub
 from karamelo_py.scene.material import Material, MaterialPart
 from karamelo_py.scene.plugins import check_columns
@@ -110,3 +116,225 @@ def define(hub: Hub, catalogue: Catalogue, ID: str, style: str, arguments: Seque
     entry = (Material if kind == "material" else MaterialPart)(kind, style, made)
     check_columns(hub, f"{kind} {style}", entry.law)
     catalogue.add(ID, entry)
+
+
+KINEMATICS = {kin.word: kin for kin in (Space(), PlaneStrain(), Axisymmetric(), Line())}
+
+
+def load_path(
+    hub: Hub,
+    ID: str,
+    increments: Annotated[int, Positive],
+    *,
+    exx: float | None = None,
+    eyy: float | None = None,
+    ezz: float | None = None,
+    exy: float | None = None,
+    exz: float | None = None,
+    eyz: float | None = None,
+    gxy: float | None = None,
+    gxz: float | None = None,
+    gyz: float | None = None,
+    sxx: float | None = None,
+    syy: float | None = None,
+    szz: float | None = None,
+    sxy: float | None = None,
+    sxz: float | None = None,
+    syz: float | None = None,
+    volumetric: float | None = None,
+    turn: float = 0.0,
+    duration: Annotated[float, Positive] = 1.0,
+) -> None:
+    """Describe a piece of a load path: what an element is brought to, from wherever it is.
+
+    Strains and stresses are those at the end of the piece; they are reached in equal increments.
+    A strain whose component is not named at all stays as it is.
+
+    Parameters
+    ----------
+    ID
+        Name of the load path.
+    increments
+        How many increments.
+    exx, eyy, ezz, exy, exz, eyz
+        Strain: the sum of the increments, so ln(length over first length) with many of them. Shear
+        strain is that of the tensor, half the angle.
+    gxy, gxz, gyz
+        Angle of simple shear, twice the strain of the tensor: gxy moves x along y and turns the
+        point by half of it, where exy does not turn it.
+    sxx, syy, szz, sxy, sxz, syz
+        Cauchy stress, tension positive; the strain of this component is found for it.
+    volumetric
+        exx + eyy + ezz: the normal strains that are not named share what it takes.
+    turn
+        Angle about z by which the point turns meanwhile, in radians. Strains and stresses are
+        about axes that do not turn.
+    duration
+        How long it takes, for laws that depend on the rate of strain.
+
+    Example
+    -------
+    load_path(pull, 100, exx=0.01, syy=0, szz=0)
+    load_path(release, 100, sxx=0, syy=0, szz=0)
+    load_path(confine, 50, sxx=-1e5, syy=-1e5, szz=-1e5)
+    load_path(squeeze, 200, exx=-0.05, syy=-1e5, szz=-1e5)
+    load_path(undrained, 200, exx=-0.05, volumetric=0)
+    load_path(shear, 100, gxy=0.2)
+    load_path(quarter, 1000, turn=PI/2)
+
+    See Also
+    --------
+    element
+    """
+    strains = dict(zip(COMPONENTS, (exx, eyy, ezz, exy, exz, eyz), strict=True))
+    stresses = dict(zip(COMPONENTS, (sxx, syy, szz, sxy, sxz, syz), strict=True))
+    angles = {"xy": gxy, "xz": gxz, "yz": gyz}
+    shear = [name for name, value in angles.items() if value is not None]
+    for name in shear:
+        if strains[name] is not None:
+            raise ScriptError(
+                f"g{name} and e{name} are the same strain, with and without a turn",
+                argument=f"g{name}",
+                expected="one of them",
+            )
+        strains[name] = angles[name] / 2
+    path = LoadPath(
+        increments=increments,
+        duration=duration,
+        strain={name: value for name, value in strains.items() if value is not None},
+        stress={name: value for name, value in stresses.items() if value is not None},
+        shear=shear,
+        volumetric=volumetric,
+        turn=turn,
+    )
+    hub.load_paths.add(ID, path)
+
+
+load_path.syntax = (
+    "ID, increments[, exx=..., sxx=..., gxy=..., volumetric=..., turn=..., duration=...]"
+)
+
+
+def element(
+    hub: Hub,
+    ID: str,
+    material: Material,
+    first: LoadPath,
+    *more: LoadPath,
+    kinematics: Literal["3D", "plane-strain", "axisymmetric", "1D"] = "3D",
+) -> None:
+    """Take one point of a material along a load path, to see its law before using it.
+
+    Writes what the point answers to the table element_ID.txt and draws it to element_ID.png. Needs
+    no domain and compiles nothing. The point begins at rest, without stress.
+
+    Parameters
+    ----------
+    ID
+        Name of the element, which names its files.
+    material
+        ID of a material.
+    first, more
+        IDs of load paths, one after another; a path may come again.
+    kinematics
+        Which strains there can be: ``3D``; ``plane-strain`` (none out of the plane xy);
+        ``axisymmetric`` (x the radius, y the axis, z around it); ``1D`` (exx only).
+
+    Example
+    -------
+    material(rubber, neo-hookean, 1000, 1e6, 0.3)
+    load_path(pull, 100, exx=0.5, syy=0, szz=0)
+    load_path(release, 100, sxx=0, syy=0, szz=0)
+    element(tension, rubber, pull, release)
+
+    Notes
+    -----
+    The table has the form of the log, and a row for each increment: time; strain exx ...; Cauchy
+    stress sxx ...; pressure p and von Mises stress q; J = det F; the stored energy and the work of
+    the stress, per reference volume; and what the law has beside that, such as ep, the equivalent
+    plastic strain. The last row is published as ID_exx, ID_sxx and so on.
+
+    The law gets dt grad v as in a run, so that det F of n increments e is (1 + e)^n. An increment
+    of a turn is skew to first order; to second order it has the form in which it stores the least
+    energy, since laws in rate form and laws in F take different ones for rigid. Strains whose
+    stress is prescribed follow from Newton's iteration with a numerical tangent; an increment that
+    does not converge is halved, up to eight times. Where that fails, files show what was reached.
+
+    See Also
+    --------
+    load_path, material
+    """
+    if not ID.isidentifier():
+        raise ScriptError(
+            f"'{ID}' cannot be part of a file name and of names of values",
+            argument="ID",
+            expected="letters, digits and _, beginning with a letter",
+        )
+    point = Point(material.law, KINEMATICS[kinematics])
+    paths = (first, *more)
+    for number, path in enumerate(paths):
+        _check_components(path, point, kinematics, number)
+    response = Response(point)
+    table, picture = (Path(f"element_{ID}.{ending}") for ending in ("txt", "png"))
+    for file in (table, picture):
+        hub.output.check_file(file)
+    hub.elements.add(ID, response)
+    hub.values.publish_vector(ID, response.names)
+    if hub.rehearsing:
+        return
+    hub.rehearse()
+    what = f"element {ID}: {material.words}, {kinematics}"
+    try:
+        _follow(point, paths, response)
+    finally:
+        for name, value in response.last().items():
+            hub.values.set(f"{ID}_{name}", value)
+        # What was reached before an error shows where the law gives way.
+        if not hub.checking:
+            response.write(hub.folder / table)
+            response.draw(hub.folder / picture, what)
+    files = "" if hub.checking else f": {table}, {picture}"
+    hub.console.say(f"{what}, {len(response.rows) - 1} increments{files}")
+
+
+def _follow(point: Point, paths: tuple[LoadPath, ...], response: Response) -> None:
+    for number, path in enumerate(paths):
+        try:
+            point.follow(path, response.observe)
+        except Unreachable as error:
+            stresses = zip(COMPONENTS, point.stress, strict=True)
+            reached = ", ".join(f"s{n} = {s:.6g}" for n, s in stresses if n in path.stress)
+            raise ScriptError(
+                f"load path '{path.id}' (number {number + 1}), {error}"
+                + (f"; the last increment ended at {reached}" if reached else ""),
+                argument=2 + number,
+                hint="smaller stresses, or strains in their place" if path.stress
+                else "more increments",
+            ) from None  # fmt: skip
+
+
+def _check_components(path: LoadPath, point: Point, kinematics: str, number: int) -> None:
+    """Refuse strains that the kinematics does not have, and stresses that need them."""
+    for kind, names in (("e", path.strain), ("s", path.stress)):
+        for name in names:
+            if name not in point.free:
+                raise ScriptError(
+                    f"load path '{path.id}' prescribes {kind}{name}, and {kinematics} has no "
+                    f"strain e{name}",
+                    argument=2 + number,
+                    expected="components of " + " ".join(point.free),
+                    hint="kinematics=3D",
+                )
+    if path.volumetric is not None and set(NORMAL) & set(point.free) <= set(path.strain):
+        raise ScriptError(
+            f"load path '{path.id}' prescribes every normal strain that {kinematics} has, and "
+            "volumetric as well",
+            argument=2 + number,
+            hint="leave out volumetric, or one of the strains",
+        )
+    if path.turn and "xy" not in point.free:
+        raise ScriptError(
+            f"load path '{path.id}' turns the point, and {kinematics} cannot turn",
+            argument=2 + number,
+            hint="kinematics=3D",
+        )

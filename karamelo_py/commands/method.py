@@ -211,19 +211,19 @@ class _Call:
         rest = self._choose("basis", self._choose("transfer", self.options))
         slots = [(f, p) for f in FAMILIES for p in signature.parameters(self.styles[f])]
         numbers = [slot for slot in slots if not slot[1].kind.words]
-        given: dict[str, dict[str, Argument]] = {family: {} for family in FAMILIES}
+        given: dict[tuple[str, str], Argument] = {}
         for argument in rest:
             slot = next((s for s in slots if _word(argument, s[1].kind.words)), None)
             if slot is None and not numbers:
                 raise self._unknown(argument, slots)
             family, parameter = slot or numbers.pop(0)
-            before, words = given[family].get(parameter.name), parameter.kind.words
+            before, words = given.get((family, parameter.name)), parameter.kind.words
             # Scripts with variables in the place of options may say the same word twice.
             if before and not (words and _word(before, words) == _word(argument, words)):
                 raise _chosen_twice(before, argument)
-            given[family][parameter.name] = argument
+            given[family, parameter.name] = argument
         for family, parameter in slots:
-            if not parameter.optional and parameter.name not in given[family]:
+            if not parameter.optional and (family, parameter.name) not in given:
                 word = next((a.text for a in self.options if a not in rest), None)
                 raise ScriptError(
                     f"{self.names[family]} needs {parameter.name} after the basis",
@@ -232,8 +232,8 @@ class _Call:
                 )
         values: dict[str, dict[str, Any]] = {family: {} for family in FAMILIES}
         for family, p in slots:
-            if p.name in given[family]:
-                values[family][p.name] = signature.convert(self.hub, p, given[family][p.name])
+            if argument := given.get((family, p.name)):
+                values[family][p.name] = signature.convert(self.hub, p, argument)
         return {
             family: signature.make(
                 style, self.hub, f"{family} {self.names[family]}", **values[family]
@@ -295,7 +295,8 @@ class _Call:
         by_name: bool = False,
     ) -> str:
         """The same call with another kind or basis, what it lacks, and `option` at the end."""
-        asked = [p for f in FAMILIES if f in self.styles for p in _numbers(self.styles[f])]
+        styles = [self.styles[family] for family in FAMILIES if family in self.styles]
+        asked = [p for s in styles for p in signature.parameters(s) if not p.kind.words]
         typed = [argument.text for argument in self.options if self._is_number(argument)]
         lacking = [p for p in asked[len(typed) :] if not p.optional]
         known = self._words("method", "transfer")
@@ -353,10 +354,6 @@ class _Call:
 def _variants(style: type) -> Mapping[str, Any]:
     """Words that choose another class (or style, by its name) in the place of a style."""
     return getattr(style, "variants", {})
-
-
-def _numbers(style: type) -> list[Parameter]:
-    return [p for p in signature.parameters(style) if not p.kind.words]
 
 
 def _word(argument: Argument, known: Container[str]) -> str | None:

@@ -236,7 +236,7 @@ def plot(
     save_plot
     """
     plots = hub.output.plots
-    if ID in plots.ids():
+    if ID in plots:
         raise ScriptError(f"plot ID '{ID}' is already used", argument="ID", expected="another ID")
     curve = PlottedCurve(every, x, y, axis, scale)
     curve.place = hub.place

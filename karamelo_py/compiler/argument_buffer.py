@@ -5,6 +5,7 @@ Python writes the arguments into memory as kernels hold them
 """
 
 import ctypes
+import functools
 import struct
 import weakref
 from collections.abc import Callable, Iterator
@@ -42,19 +43,16 @@ def _array(array: np.ndarray) -> _Array:
         )  # fmt: skip
         words = (array.ctypes.data, *array.shape, *array.strides)
         kept = _kinds.setdefault(kind, len(_kinds))
-        known = _Array(weakref.ref(array, _gone(number)), array.shape, kept, words)
+        alive = weakref.ref(array, functools.partial(_drop, number))
+        known = _Array(alive, array.shape, kept, words)
         _arrays[number] = known
     return known
 
 
-def _gone(number: int) -> Callable[[weakref.ref], None]:
-    """Make what is done when an array is gone that had this number, unless another has it."""
-
-    def drop(alive: weakref.ref) -> None:
-        if number in _arrays and _arrays[number].alive is alive:
-            del _arrays[number]
-
-    return drop
+def _drop(number: int, alive: weakref.ref) -> None:
+    """Forget an array that is gone, unless another one has its number."""
+    if number in _arrays and _arrays[number].alive is alive:
+        del _arrays[number]
 
 
 def forget(array: np.ndarray) -> None:
@@ -72,21 +70,13 @@ class Plan(NamedTuple):
 
 
 class ArgumentBuffer:
-    """Collect what is written for some arguments: held tuples one after another, inner first.
-
-    Attributes
-    ----------
-    kinds
-        What decides on the types of the arguments.
-    words
-        The numbers in the tuples; 0 for a tuple in a tuple.
-    """
+    """Collect what is written for some arguments: held tuples one after another, inner first."""
 
     __slots__ = ("kinds", "words")
 
     def __init__(self, arguments: tuple):
-        self.kinds: list = []
-        self.words: list = []
+        self.kinds: list = []  # what decides on the types of the arguments
+        self.words: list = []  # the numbers in the tuples; 0 for a tuple in a tuple
         own, _ = self._of(arguments)
         self.words += own
 
@@ -123,10 +113,6 @@ class ArgumentBuffer:
                 kinds.append(item)
                 own.append(0)
         return own, arrays
-
-    def plan(self, arguments: tuple) -> Plan:
-        """Lay out memory for arguments of these types."""
-        return _plan(arguments)
 
     def in_memory(self, plan: Plan) -> tuple[bytearray, int]:
         """Write the arguments into memory; where the items of the outermost tuple are."""
@@ -168,7 +154,8 @@ def _lay(kind: ir.Type, at: int, places: list[tuple[int, str]]) -> tuple[int, in
     return at + size, size
 
 
-def _plan(arguments: tuple) -> Plan:
+def plan_for(arguments: tuple) -> Plan:
+    """Lay out memory for arguments of these types."""
     places: list[tuple[int, str]] = []
     tuples: list[tuple[int, int]] = []
     end = 0

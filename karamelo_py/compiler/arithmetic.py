@@ -1,10 +1,12 @@
 """Operations on numbers: the type of the result, and the code."""
 
 import ctypes
+import functools
 import math
 import operator
 import sys
 from collections.abc import Callable
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,27 +14,18 @@ from llvmlite import ir
 from numba import types
 
 from karamelo_py.compiler import code, failing, machine
+from karamelo_py.compiler.code import Lanes, scalar_of
 
 
 class Operation(NamedTuple):
-    """Describe what a function of numbers of some types is.
-
-    Attributes
-    ----------
-    result
-        The type of what it gives.
-    arguments
-        The types that its arguments are cast to.
-    code
-        ``code(builder, values)`` writes it.
-    """
+    """Describe what a function of numbers of some types is."""
 
     result: types.Type
-    arguments: tuple[types.Type, ...]
-    code: Callable
+    arguments: tuple[types.Type, ...]  # what its arguments are cast to
+    code: Callable  # ``code(builder, values)`` writes it
 
 
-_NUMBER = (types.Number, types.Boolean)
+_NUMBER = (types.Number, types.Boolean, Lanes)
 _TYPES = {
     **{getattr(np, name): getattr(types, name) for name in (
         "float32", "float64", "int8", "int16", "int32", "int64",
@@ -44,13 +37,12 @@ _TYPES = {
 
 def common(*kinds: types.Type) -> types.Type:
     """Give the type of a sum of numbers of these types."""
-    wide = kinds[0]
-    for kind in kinds[1:]:
-        wide = _wider(wide, kind)
-    return wide
+    return functools.reduce(_wider, kinds)
 
 
 def _wider(a: types.Type, b: types.Type) -> types.Type:
+    if isinstance(a, Lanes) or isinstance(b, Lanes):
+        return _wider_lanes(a, b)
     if types.uint64 in (a, b) and types.boolean in (a, b):
         return types.uint64
     if a == b and not isinstance(a, types.Boolean) and a.bitwidth >= 32 + 32 * _is_whole(a):
@@ -65,70 +57,101 @@ def _wider(a: types.Type, b: types.Type) -> types.Type:
     return types.float32 if singles else types.float64
 
 
+def _wider_lanes(a: types.Type, b: types.Type) -> Lanes:
+    """Choose the lanes of what two give, at least one of them lanes; literals are of their type."""
+    if isinstance(a, Lanes) and isinstance(b, Lanes):
+        if a == b:
+            return a
+        if isinstance(a.scalar, types.Integer) and isinstance(b.scalar, types.Integer):
+            return a if a.scalar.bitwidth >= b.scalar.bitwidth else b
+        raise TypeError("lanes of several types")
+    lanes, other = (a, b) if isinstance(a, Lanes) else (b, a)
+    # Numbers of cells beside a real number would be cut off: `real(i, x)` makes lanes of reals.
+    if isinstance(other, types.Float) and _is_whole(lanes):
+        raise TypeError("whole lanes and a real number")
+    return lanes
+
+
 def _is_whole(kind: types.Type) -> bool:
-    return isinstance(kind, types.Integer | types.Boolean)
+    return isinstance(scalar_of(kind), types.Integer | types.Boolean)
 
 
 # --- operators --------------------------------------------------------------------------------
 
 
-def _binary(of_reals: str | None, of_whole: str | None, flags: tuple = ()) -> Callable:
-    def operation(a: types.Type, b: types.Type) -> Operation | None:
-        kind = common(a, b)
-        name = of_reals if isinstance(kind, types.Float) else of_whole
-        if name is None:
-            return None
-        more = {"flags": flags} if flags and name == of_whole and kind.signed else {}
-        return Operation(kind, (kind, kind), lambda builder, v: getattr(builder, name)(*v, **more))
+def _unary(kind_of: Callable, write: Callable, result: types.Type | None = None) -> Callable:
+    """Make an operation on one number, cast to a type: ``write(builder, kind, value)``."""
+
+    def operation(a: types.Type) -> Operation | None:
+        kind = kind_of(a)
+        return kind and Operation(
+            result or kind, (kind,), lambda builder, values: write(builder, kind, *values)
+        )
 
     return operation
 
 
-def _true_division(a: types.Type, b: types.Type) -> Operation:
-    kind = common(a, b)
-    kind = kind if isinstance(kind, types.Float) else types.float64
-    return Operation(kind, (kind, kind), lambda builder, v: builder.fdiv(*v))
+def _binary(kind_of: Callable, write: Callable) -> Callable:
+    """Make an operation on two numbers likewise."""
 
-
-def _bitwise(name: str) -> Callable:
     def operation(a: types.Type, b: types.Type) -> Operation | None:
+        kind = kind_of(a, b)
+        return kind and Operation(
+            kind, (kind, kind), lambda builder, values: write(builder, kind, *values)
+        )
+
+    return operation
+
+
+def _sum(of_reals: str, of_whole: str) -> Callable:
+    def write(builder: Any, kind: types.Type, *values: Any) -> Any:
+        return getattr(builder, of_whole if _is_whole(kind) else of_reals)(*values)
+
+    return _binary(common, write)
+
+
+def _bits(name: str) -> Callable:
+    def kind_of(a: types.Type, b: types.Type) -> types.Type | None:
         if not (_is_whole(a) and _is_whole(b)):
             return None
-        both = isinstance(a, types.Boolean) and isinstance(b, types.Boolean)
-        kind = types.boolean if both else common(a, b)
-        kind = types.int64 if isinstance(kind, types.Float) else kind
-        return Operation(kind, (kind, kind), lambda builder, v: getattr(builder, name)(*v))
+        kind = types.boolean if a == b == types.boolean else common(a, b)
+        return types.int64 if isinstance(kind, types.Float) else kind
 
-    return operation
+    return _binary(kind_of, lambda builder, kind, *values: getattr(builder, name)(*values))
 
 
-def _shift(left: bool) -> Callable:
-    def operation(a: types.Type, b: types.Type) -> Operation | None:
-        if not (_is_whole(a) and _is_whole(b)):
-            return None
-        kind = common(a, a)
-        name = "shl" if left else "ashr" if kind.signed else "lshr"
-        return Operation(kind, (kind, kind), lambda builder, v: getattr(builder, name)(*v))
+def _shift(write: Callable) -> Callable:
+    return _binary(lambda a, b: common(a, a) if _is_whole(a) and _is_whole(b) else None, write)
 
-    return operation
+
+def _shifted_right(builder: Any, kind: types.Integer, *values: Any) -> Any:
+    return (builder.ashr if kind.signed else builder.lshr)(*values)
 
 
 def _comparison(sign: str) -> Callable:
     def operation(a: types.Type, b: types.Type) -> Operation:
         kind = common(a, b)
-        if isinstance(kind, types.Float) and _is_whole(a) and _is_whole(b):
+        if not _is_whole(kind) and _is_whole(a) and _is_whole(b):
             return Operation(types.boolean, (a, b), _mixed(sign, a.signed))
-
-        def compared(builder: Any, values: list) -> Any:
-            if isinstance(kind, types.Float):
-                compare = builder.fcmp_unordered if sign == "!=" else builder.fcmp_ordered
-            else:
-                compare = builder.icmp_signed if kind.signed else builder.icmp_unsigned
-            return compare(sign, *values)
-
-        return Operation(types.boolean, (kind, kind), compared)
+        return Operation(_truth_of(kind), (kind, kind), _compared(sign, kind))
 
     return operation
+
+
+def _truth_of(kind: types.Type) -> types.Type:
+    return Lanes(types.boolean, kind.width) if isinstance(kind, Lanes) else types.boolean
+
+
+def _compared(sign: str, kind: types.Type) -> Callable:
+    def compared(builder: Any, values: list) -> Any:
+        if not _is_whole(kind):
+            compare = builder.fcmp_unordered if sign == "!=" else builder.fcmp_ordered
+        else:
+            unsigned = isinstance(kind, types.Integer) and not kind.signed
+            compare = builder.icmp_unsigned if unsigned else builder.icmp_signed
+        return compare(sign, *values)
+
+    return compared
 
 
 def _mixed(sign: str, first_signed: bool) -> Callable:
@@ -148,14 +171,11 @@ def _mixed(sign: str, first_signed: bool) -> Callable:
 def _whole_division(remainder: bool) -> Callable:
     """Python's division without a fraction; 0 where it is by 0."""
 
-    def operation(a: types.Type, b: types.Type) -> Operation:
-        kind = common(a, b)
-        of = _real_parts if isinstance(kind, types.Float) else _whole_parts
-        return Operation(
-            kind, (kind, kind), lambda builder, values: of(builder, kind, *values)[remainder]
-        )
+    def write(builder: Any, kind: types.Type, *values: Any) -> Any:
+        of = _whole_parts if _is_whole(kind) else _real_parts
+        return of(builder, kind, *values)[remainder]
 
-    return operation
+    return _binary(common, write)
 
 
 def _whole_parts(builder: Any, kind: types.Integer, x: Any, y: Any) -> tuple[Any, Any]:
@@ -217,7 +237,7 @@ def _power(a: types.Type, b: types.Type) -> Operation | None:
     kind = common(types.unliteral(a), types.unliteral(b))
     if _is_whole(kind):
         return None
-    return Operation(kind, (kind, kind), _of_library("llvm.pow"))
+    return Operation(kind, (kind, kind), of_library("llvm.pow"))
 
 
 def _product(kind: types.Type, exponent: int) -> Callable:
@@ -235,37 +255,35 @@ def _product(kind: types.Type, exponent: int) -> Callable:
     return power
 
 
-def _negation(a: types.Type) -> Operation:
-    kind = common(a, a)
-    name = "neg" if _is_whole(kind) else "fneg"
-    return Operation(kind, (kind,), lambda builder, values: getattr(builder, name)(*values))
+def _alone(a: types.Type) -> types.Type:
+    return common(a, a)
 
 
-def _inversion(a: types.Type) -> Operation | None:
+def _negative(builder: Any, kind: types.Type, value: Any) -> Any:
+    return builder.neg(value) if _is_whole(kind) else builder.fneg(value)
+
+
+def _inverted(a: types.Type) -> types.Type | None:
     if not _is_whole(a):
         return None
-    kind = a if isinstance(a, types.Boolean) else common(a, a)
-    return Operation(kind, (kind,), lambda builder, values: builder.not_(*values))
+    return a if isinstance(a, types.Boolean) else common(a, a)
 
 
-def _truth(a: types.Type) -> Operation:
-    return Operation(types.boolean, (types.boolean,), lambda builder, values: values[0])
+def _not(builder: Any, kind: types.Type, value: Any) -> Any:
+    return builder.not_(value)
 
 
-def _untruth(a: types.Type) -> Operation:
-    return Operation(types.boolean, (types.boolean,), lambda builder, values: builder.not_(*values))
+def _sized(a: types.Type) -> types.Type | None:
+    if isinstance(a, Lanes) and _is_whole(a):
+        return None
+    return common(a, a) if isinstance(a, types.Boolean) else a
 
 
-def _size(a: types.Type) -> Operation:
-    def size(builder: Any, values: list) -> Any:
-        (value,) = values
-        if isinstance(kind, types.Float):
-            return _call(builder, "llvm.fabs", value.type, [value])
-        below = builder.icmp_signed("<", value, value.type(0))
-        return builder.select(below, builder.neg(value), value) if kind.signed else value
-
-    kind = common(a, a) if isinstance(a, types.Boolean) else a
-    return Operation(kind, (kind,), size)
+def _size(builder: Any, kind: types.Type, value: Any) -> Any:
+    if not _is_whole(kind):
+        return _call(builder, "llvm.fabs", value.type, [value])
+    below = builder.icmp_signed("<", value, value.type(0))
+    return builder.select(below, builder.neg(value), value) if kind.signed else value
 
 
 def _extreme(sign: str) -> Callable:
@@ -275,16 +293,12 @@ def _extreme(sign: str) -> Callable:
         if len(kinds) < 2:
             return None
         kind = common(*kinds)
+        better = _compared(sign, kind)
 
         def extreme(builder: Any, values: list) -> Any:
             best = values[0]
             for value in values[1:]:
-                if isinstance(kind, types.Float):
-                    better = builder.fcmp_ordered(sign, value, best)
-                else:
-                    compare = builder.icmp_signed if kind.signed else builder.icmp_unsigned
-                    better = compare(sign, value, best)
-                best = builder.select(better, value, best)
+                best = builder.select(better(builder, [value, best]), value, best)
             return best
 
         return Operation(kind, (kind,) * len(kinds), extreme)
@@ -292,22 +306,23 @@ def _extreme(sign: str) -> Callable:
     return operation
 
 
-def _as_it_is(builder: Any, values: list) -> Any:
-    return values[0]
+def _as_it_is(builder: Any, kind: types.Type, value: Any) -> Any:
+    return value
 
 
 def _to(kind: types.Type) -> Callable:
-    return lambda a: Operation(kind, (kind,), _as_it_is)
+    return _unary(lambda a: kind, _as_it_is)
 
 
-def _to_whole(a: types.Type) -> Operation:
-    kind = a if isinstance(a, types.Integer) else types.int64
-    return Operation(kind, (kind,), _as_it_is)
+def _whole_of(kind: types.Type) -> types.Type:
+    return kind if isinstance(kind, types.Integer) else types.int64
 
 
-def _to_real(a: types.Type) -> Operation:
-    kind = a if isinstance(a, types.Float) else types.float64
-    return Operation(kind, (kind,), _as_it_is)
+def _real_of(kind: types.Type) -> types.Type | None:
+    """Give the type of real numbers that those of a type become; whole ones in lanes do not."""
+    if isinstance(kind, Lanes):
+        return None if _is_whole(kind) else kind
+    return kind if isinstance(kind, types.Float) else types.float64
 
 
 # --- functions of math ------------------------------------------------------------------------
@@ -317,7 +332,7 @@ def _call(builder: Any, name: str, result: ir.Type, values: list) -> Any:
     """Call a function of LLVM's (whose name tells the type), or of the library of C."""
     kinds = [value.type for value in values]
     if name.startswith("llvm."):
-        name += f".{kinds[0].intrinsic_name}"
+        name += f".{code.overloaded(kinds[0])}"
     elif isinstance(kinds[0], ir.FloatType):
         name += "f"
     function = code.external(builder, name, result, kinds)
@@ -328,7 +343,7 @@ def _call(builder: Any, name: str, result: ir.Type, values: list) -> Any:
     return builder.call(function, values)
 
 
-def _of_library(name: str) -> Callable:
+def of_library(name: str) -> Callable:
     return lambda builder, values: _call(builder, name, values[0].type, values)
 
 
@@ -336,44 +351,34 @@ def _of_reals(name: str, count: int = 1) -> Callable:
     def operation(*kinds: types.Type) -> Operation | None:
         if len(kinds) != count:
             return None
-        kind = _to_real(common(*kinds)).result
-        return Operation(kind, (kind,) * count, _of_library(name))
+        kind = _real_of(common(*kinds))
+        return kind and Operation(kind, (kind,) * count, of_library(name))
 
     return operation
 
 
 def _rounding(name: str) -> Callable:
-    def operation(a: types.Type) -> Operation:
-        kind = _to_real(a).result
+    def rounded(builder: Any, kind: types.Type, value: Any) -> Any:
+        return builder.fptosi(_call(builder, name, value.type, [value]), code.I64)
 
-        def rounded(builder: Any, values: list) -> Any:
-            return builder.fptosi(_call(builder, name, values[0].type, values), code.I64)
-
-        return Operation(types.int64, (kind,), rounded)
-
-    return operation
+    return _unary(_real_of, rounded, types.int64)
 
 
-def _question(asked: Callable) -> Callable:
-    def operation(a: types.Type) -> Operation:
-        kind = _to_real(a).result
-        return Operation(types.boolean, (kind,), lambda builder, values: asked(builder, *values))
-
-    return operation
+def _is_no_number(builder: Any, kind: types.Type, x: Any) -> Any:
+    return builder.fcmp_unordered("uno", x, x)
 
 
-def _is_infinite(builder: Any, x: Any) -> Any:
-    size = _call(builder, "llvm.fabs", x.type, [x])
-    return builder.fcmp_ordered("==", size, x.type(math.inf))
+def _is_infinite(builder: Any, kind: types.Type, x: Any) -> Any:
+    return builder.fcmp_ordered("==", _size(builder, kind, x), x.type(math.inf))
 
 
-def _is_finite(builder: Any, x: Any) -> Any:
+def _is_finite(builder: Any, kind: types.Type, x: Any) -> Any:
     rest = builder.fsub(x, x)
     return builder.fcmp_ordered("ord", rest, rest)
 
 
 def _frexp(a: types.Type) -> Operation:
-    kind = _to_real(a).result
+    kind = _real_of(a)
     result = types.Tuple((kind, types.int32))
 
     def parts(builder: Any, values: list) -> Any:
@@ -385,16 +390,12 @@ def _frexp(a: types.Type) -> Operation:
 
 
 def _ldexp(a: types.Type, b: types.Type) -> Operation:
-    kind = _to_real(a).result
-    return Operation(kind, (kind, types.int32), _of_library("ldexp"))
+    kind = _real_of(a)
+    return Operation(kind, (kind, types.int32), of_library("ldexp"))
 
 
 def _scaled(factor: float) -> Callable:
-    def operation(a: types.Type) -> Operation:
-        kind = _to_real(a).result
-        return Operation(kind, (kind,), lambda builder, v: builder.fmul(v[0], v[0].type(factor)))
-
-    return operation
+    return _unary(_real_of, lambda builder, kind, x: builder.fmul(x, x.type(factor)))
 
 
 def _numpy_extreme(sign: str) -> Callable:
@@ -425,20 +426,15 @@ def _gamma_of_python(x: float) -> float:
         return math.copysign(math.inf, x) if x == 0 else math.nan
 
 
-_REAL = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)
-machine.publish_python("karamelo_gamma", _REAL, failing.noting(_gamma_of_python))
+_OF_DOUBLE = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)
+machine.publish_python("karamelo_gamma", _OF_DOUBLE, failing.noting(_gamma_of_python))
 
 
-def _gamma(a: types.Type) -> Operation:
+def _gamma(builder: Any, kind: types.Type, x: Any) -> Any:
     """Python's function, whose bits do not depend on the library of C."""
-    kind = _to_real(a).result
-
-    def gamma(builder: Any, values: list) -> Any:
-        value = code.cast(builder, values[0], kind, types.float64)
-        found = _call(builder, "karamelo_gamma", value.type, [value])
-        return code.cast(builder, found, types.float64, kind)
-
-    return Operation(kind, (kind,), gamma)
+    double = code.cast(builder, x, kind, types.float64)
+    found = _call(builder, "karamelo_gamma", double.type, [double])
+    return code.cast(builder, found, types.float64, kind)
 
 
 _HYPOT = "_hypot" if sys.platform == "win32" else "hypot"
@@ -448,48 +444,57 @@ _IN_C = (
     "atanh", "sinh", "cosh", "tanh", "lgamma", "cbrt",
 )  # fmt: skip
 
+for _name, (_real, _ending) in product(
+    _IN_C, ((ctypes.c_double, ""), (ctypes.c_float, "f"))
+):  # what this library of C lacks
+    if not machine.is_known(_name + _ending):
+        _kind = ctypes.CFUNCTYPE(_real, _real)
+        machine.publish_python(_name + _ending, _kind, failing.noting(getattr(math, _name)))
+
 OPERATIONS: dict[Any, Callable] = {
-    operator.add: _binary("fadd", "add"),
-    operator.sub: _binary("fsub", "sub"),
-    operator.mul: _binary("fmul", "mul"),
-    operator.truediv: _true_division,
+    operator.add: _sum("fadd", "add"),
+    operator.sub: _sum("fsub", "sub"),
+    operator.mul: _sum("fmul", "mul"),
+    operator.truediv: _binary(
+        lambda a, b: _real_of(common(a, b)), lambda builder, kind, *values: builder.fdiv(*values)
+    ),
     operator.floordiv: _whole_division(False),
     operator.mod: _whole_division(True),
     operator.pow: _power,
-    operator.and_: _bitwise("and_"),
-    operator.or_: _bitwise("or_"),
-    operator.xor: _bitwise("xor"),
-    operator.lshift: _shift(True),
-    operator.rshift: _shift(False),
-    operator.neg: _negation,
-    operator.pos: lambda a: _to(common(a, a))(a),
-    operator.invert: _inversion,
-    operator.not_: _untruth,
+    operator.and_: _bits("and_"),
+    operator.or_: _bits("or_"),
+    operator.xor: _bits("xor"),
+    operator.lshift: _shift(lambda builder, kind, *values: builder.shl(*values)),
+    operator.rshift: _shift(_shifted_right),
+    operator.neg: _unary(_alone, _negative),
+    operator.pos: _unary(_alone, _as_it_is),
+    operator.invert: _unary(_inverted, _not),
+    operator.not_: _unary(_truth_of, _not),
     operator.lt: _comparison("<"),
     operator.le: _comparison("<="),
     operator.gt: _comparison(">"),
     operator.ge: _comparison(">="),
     operator.eq: _comparison("=="),
     operator.ne: _comparison("!="),
-    abs: _size,
-    bool: _truth,
-    float: _to_real,
-    int: _to_whole,
+    abs: _unary(_sized, _size),
+    bool: _to(types.boolean),
+    float: _unary(_real_of, _as_it_is),
+    int: _unary(_whole_of, _as_it_is),
     max: _extreme(">"),
     min: _extreme("<"),
     round: lambda *kinds: _rounding("llvm.rint")(*kinds) if len(kinds) == 1 else None,
     math.floor: _rounding("llvm.floor"),
     math.ceil: _rounding("llvm.ceil"),
     math.trunc: _rounding("llvm.trunc"),
-    math.isnan: _question(lambda builder, x: builder.fcmp_unordered("uno", x, x)),
-    math.isinf: _question(_is_infinite),
-    math.isfinite: _question(_is_finite),
-    math.pow: _power,
+    math.isnan: _unary(_real_of, _is_no_number, types.boolean),
+    math.isinf: _unary(_real_of, _is_infinite, types.boolean),
+    math.isfinite: _unary(_real_of, _is_finite, types.boolean),
+    math.pow: lambda a, b: _power(_real_of(types.unliteral(a)), b),
     math.copysign: _of_reals("llvm.copysign", 2),
     math.atan2: _of_reals("atan2", 2),
     math.hypot: _of_reals(_HYPOT, 2),
     math.fmod: _of_reals("fmod", 2),
-    math.gamma: _gamma,
+    math.gamma: _unary(_real_of, _gamma),
     math.frexp: _frexp,
     math.ldexp: _ldexp,
     math.degrees: _scaled(180 / math.pi),
@@ -504,7 +509,7 @@ OPERATIONS: dict[Any, Callable] = {
 # NumPy's names of the same, and of what is rounded to a real number.
 _IN_NUMPY = {
     "absolute": abs, "add": operator.add, "subtract": operator.sub, "multiply": operator.mul,
-    "true_divide": operator.truediv, "negative": operator.neg, "power": math.pow,
+    "true_divide": operator.truediv, "negative": operator.neg, "power": operator.pow,
     "arcsin": math.asin, "arccos": math.acos, "arctan": math.atan, "arctan2": math.atan2,
     "arcsinh": math.asinh, "arccosh": math.acosh, "arctanh": math.atanh,
 }  # fmt: skip
@@ -520,19 +525,24 @@ OPERATIONS |= {
 }
 OPERATIONS |= {np.minimum: _numpy_extreme("<"), np.maximum: _numpy_extreme(">")}
 
-ON_LANES: dict[Any, Callable] = {}  # the same of numbers in lanes (`karamelo_py.compiler.lanes`)
+IN_LANES = {
+    operator.add, operator.sub, operator.mul, operator.truediv, operator.and_, operator.or_,
+    operator.neg, operator.not_, operator.lt, operator.le, operator.gt, operator.ge, operator.eq,
+    operator.ne, abs, max, min, math.sqrt,
+}  # fmt: skip
+
+
+_POWERS = {operator.pow, math.pow, np.power}  # by products, where the exponent is known
 
 
 def operation(function: Callable, kinds: tuple[types.Type, ...]) -> Operation | None:
     """Give what a function of numbers is for these types; None where it is nothing."""
-    if any(hasattr(kind, "width") for kind in kinds):
-        return ON_LANES[function](*kinds) if function in ON_LANES else None
-    made = OPERATIONS.get(function)
-    if made is None or not all(isinstance(k, _NUMBER) for k in map(types.unliteral, kinds)):
+    made, plain = OPERATIONS.get(function), tuple(map(types.unliteral, kinds))
+    if made is None or not all(isinstance(kind, _NUMBER) for kind in plain):
         return None
-    if made is not _power:
-        kinds = tuple(map(types.unliteral, kinds))
+    if function not in IN_LANES and any(isinstance(kind, Lanes) for kind in plain):
+        return None
     try:
-        return made(*kinds)
-    except TypeError:  # of another number of arguments
+        return made(*(kinds if function in _POWERS else plain))
+    except TypeError:  # of another number of arguments, or of lanes that do not agree
         return None

@@ -17,7 +17,7 @@ import tempfile
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import llvmlite
 import numba
@@ -79,42 +79,28 @@ def telling(tell: Callable[[str], None]) -> Iterator[None]:
 # --- kernels ------------------------------------------------------------------------------------
 
 
-class Place(NamedTuple):
-    """Hold a kernel on disk, or None; and what keeps one that was compiled."""
-
-    found: Any
-    keep: Callable | None
-
-
 class KernelFiles:
-    """Keep the kernels of one function in files.
+    """Keep the kernels of one function in files; what `load` cannot bring into memory is none."""
 
-    Parameters
-    ----------
-    function
-        What is compiled.
-    """
+    def __init__(self, function: Callable, load: Callable[[Any], Any]):
+        self._function, self._load = function, load
 
-    def __init__(self, function: Callable):
-        self._function = function
-
-    @contextlib.contextmanager
-    def for_types(self, kinds: tuple, result: Any) -> Iterator["Place"]:
-        """Look for a kernel on disk; others wait where this process will compile it."""
+    def kernel(self, kinds: tuple, result: Any, compiled: Callable[[], tuple[Any, Any]]) -> Any:
+        """Read a kernel; where there is none, compile it, while others wait for the file."""
         try:
             key = self._key(kinds, result)
-        except Unknown as error:
-            what = error
-            yield Place(None, lambda unit, codes: self._tell_of_unknown(what))
-            return
+        except Unknown as what:
+            self._tell_of_unknown(what)
+            return compiled()[0]
         found = self._found(kinds, key)
-        if found is not None:
-            yield Place(found, None)
-            return
-        with compile_lock.lock(folder() / f"{key}{_LOCK}"):
-            # Another process may have compiled it since the first look.
-            found = self._found(kinds, key)
-            yield Place(found, lambda unit, codes: self._save(kinds, key, unit, codes))
+        if found is None:
+            with compile_lock.lock(folder() / f"{key}{_LOCK}"):
+                # Another process may have compiled it since the first look.
+                found = self._found(kinds, key)
+                if found is None:
+                    found, codes = compiled()
+                    self._save(kinds, key, found, codes)
+        return found
 
     def _found(self, kinds: tuple, key: str) -> Any:
         """Read the kernel in a file."""
@@ -124,6 +110,7 @@ class KernelFiles:
                 continue
             try:
                 unit = pickle.loads(data)
+                self._load(unit)
             except Exception:
                 _discard(path)
                 continue
@@ -137,14 +124,12 @@ class KernelFiles:
             if isinstance(codes, Unknown):
                 raise codes
             stamp = fingerprint([self._function], kinds, unit.choices, codes)
-        except Unknown as what:
-            self._tell_of_unknown(what)
-            return
-        content = pickle.dumps((tuple(sorted(unit.choices)), pickle.dumps(unit)))
-        try:
+            content = pickle.dumps((tuple(sorted(unit.choices)), pickle.dumps(unit)))
             path = folder() / f"{key}-{stamp[:24]}{_ENDING}"
             write(path, hashlib.sha256(content).digest() + content)
             self._forget(key)
+        except Unknown as what:
+            self._tell_of_unknown(what)
         except OSError as error:
             _trouble(error)
 
@@ -159,8 +144,7 @@ class KernelFiles:
         """Give the name of the function with a hash of the types and of the machine."""
         words = [name_of(self._function), *map(describe, kinds)]
         words += [describe(result) if result is not None else "", repr(machine.describe())]
-        words += [_SETTING]
-        digest = hashlib.sha256("|".join(words).encode()).hexdigest()
+        digest = hashlib.sha256("|".join([*words, _SETTING]).encode()).hexdigest()
         return f"{self._name()}-{digest[:24]}"
 
     def _stamp(self, kinds: tuple, choices: frozenset[Choice]) -> str | None:
@@ -199,14 +183,8 @@ class KernelFiles:
             path.unlink(missing_ok=True)
 
 
-def _setting() -> str:
-    """Name what all kernels depend on."""
-    versions = (platform.python_version(), numba.__version__, llvmlite.__version__, np.__version__)
-    whole = [Path(file).read_bytes() for file in WHOLE]
-    return repr((versions, whole))
-
-
-_SETTING = _setting()
+_VERSIONS = platform.python_version(), numba.__version__, llvmlite.__version__, np.__version__
+_SETTING = repr((_VERSIONS, [Path(file).read_bytes() for file in WHOLE]))  # of all kernels
 
 
 def write(path: Path, content: bytes) -> None:

@@ -6,7 +6,11 @@ import types as python
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
+
+from numba import config
+
+INTERPRETED = bool(config.DISABLE_JIT)  # nothing is compiled
 
 # Known by name: their versions are part of every key.
 _OPAQUE = {"numba", "llvmlite", "numpy", *sys.stdlib_module_names}
@@ -16,7 +20,6 @@ _HERE = Path(__file__).parent
 WHOLE = sorted(
     map(str, [*_HERE.rglob("*.py"), _HERE.parent / "points" / "kinematics" / "tensors.py"])
 )
-SPELLED = "<spelled>"  # the file of functions that are written at compile time
 
 
 class Unknown(Exception):
@@ -48,19 +51,19 @@ def declare_point_function(dispatch: Callable) -> None:
     point_functions.setdefault(name_of(dispatch), []).append(dispatch)
 
 
-# Of the functions that are made, innermost last: what was asked of point functions, and the code
-# of functions that were run for them.
-_noted: list[set[tuple[Callable, tuple] | python.CodeType]] = []
+# What was asked of a point function, or code of a function that was run.
+Part: TypeAlias = "tuple[Callable, tuple] | Choice | python.CodeType"
+_noted: list[set[Part]] = []  # of the functions that are made, innermost last
 
 
-def note(parts: Iterable[tuple[Callable, tuple] | python.CodeType]) -> None:
+def note(parts: Iterable[Part]) -> None:
     """Note what the function that is compiled now consists of."""
     if _noted:
         _noted[-1].update(parts)
 
 
 @contextmanager
-def parts_noted() -> Iterator[set[tuple[Callable, tuple] | python.CodeType]]:
+def parts_noted() -> Iterator[set[Part]]:
     """Collect what is noted meanwhile."""
     _noted.append(set())
     try:
@@ -92,22 +95,21 @@ def class_name(tag: type | None) -> str:
     return name
 
 
-def contents(parts: Iterable) -> tuple[frozenset[Choice], frozenset[python.CodeType]]:
+def contents(parts: Iterable[Part]) -> tuple[frozenset[Choice], frozenset[python.CodeType]]:
     """Sort what code consists of: choices, and the Python functions that it was made of."""
     codes = {part for part in parts if isinstance(part, python.CodeType)}
-    choices = {part if isinstance(part, Choice) else _choice(part) for part in {*parts} - codes}
-    # What was spelled out at compile time was spelled by a function that is followed itself.
-    own = (code for code in codes if code.co_filename not in (SPELLED, *WHOLE))
-    return frozenset(choices), frozenset(own)
+    choices = {part if isinstance(part, Choice) else _choice(*part) for part in {*parts} - codes}
+    return frozenset(choices), frozenset(c for c in codes if c.co_filename not in WHOLE)
 
 
-def _choice(part: tuple[Callable, tuple]) -> Choice:
-    dispatch, classes = part
+def _choice(dispatch: Callable, classes: tuple) -> Choice:
     return Choice(name_of(dispatch), tuple(class_name(c) for c in classes))
 
 
 def is_opaque(thing: Any) -> bool:
-    module = getattr(thing, "__module__", None)
+    """Tell whether a thing is known by name: it belongs to a library."""
+    is_module = isinstance(thing, python.ModuleType)
+    module = thing.__name__ if is_module else getattr(thing, "__module__", None)
     if module is None:
         return not isinstance(thing, python.FunctionType)
     return module.partition(".")[0] in _OPAQUE

@@ -1,7 +1,7 @@
 """Types of kernels as LLVM has them, in registers and in memory, and code that takes them apart."""
 
 import functools
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -12,6 +12,17 @@ from numba import types
 I1, I8, I32, I64 = (ir.IntType(bits) for bits in (1, 8, 32, 64))
 NOTHING = I8.as_pointer()  # what None, classes and functions are
 _REALS = {32: ir.FloatType(), 64: ir.DoubleType()}
+
+
+class Lanes(types.Type):
+    """`width` numbers of a scalar type, side by side in a vector register."""
+
+    def __init__(self, scalar: types.Type, width: int):
+        self.scalar, self.width = scalar, width
+        super().__init__(name=f"Lanes({scalar}, {width})")
+
+    def register_type(self) -> ir.VectorType:
+        return ir.VectorType(register_type(self.scalar), self.width)
 
 
 @functools.cache
@@ -51,7 +62,7 @@ def is_empty(kind: types.Type) -> bool:
     """Tell whether there is nothing in a value of a type, as in None and in tuples of tags."""
     if isinstance(kind, types.BaseTuple) and not hasattr(kind, "register_type"):
         return all(map(is_empty, kind))
-    return register_type(kind) == NOTHING
+    return register_type(kind) == NOTHING and not isinstance(kind, types.Record)
 
 
 def nothing() -> ir.Constant:
@@ -73,13 +84,18 @@ def _constant_array(builder: Any, kind: types.Array, value: np.ndarray) -> Any:
     item = memory_type(kind.dtype)
     value = value.view(np.uint8) if value.dtype == np.bool_ else value
     content = ir.Constant(ir.ArrayType(item, value.size), value.ravel().tolist())
-    name = builder.module.get_unique_name("array")
-    place = ir.GlobalVariable(builder.module, content.type, name)
-    place.initializer, place.global_constant, place.linkage = content, True, "internal"
-    data = builder.bitcast(place, item.as_pointer())
+    data = builder.bitcast(in_module(builder, content, "array"), item.as_pointer())
     return make_array(
         builder, kind, data, [I64(n) for n in value.shape], [I64(n) for n in value.strides]
     )
+
+
+def in_module(builder: Any, content: ir.Constant, name: str) -> ir.GlobalVariable:
+    """Put a constant into memory; where it is."""
+    name = builder.module.get_unique_name(name)
+    place = ir.GlobalVariable(builder.module, content.type, name)
+    place.initializer, place.global_constant, place.linkage = content, True, "internal"
+    return place
 
 
 def cast(builder: Any, value: Any, kind: types.Type, wanted: types.Type) -> Any:
@@ -88,39 +104,82 @@ def cast(builder: Any, value: Any, kind: types.Type, wanted: types.Type) -> Any:
         wanted = types.unliteral(wanted)
     if kind == wanted:
         return value
-    to = register_type(wanted)
     if isinstance(wanted, types.BaseTuple) and isinstance(kind, types.BaseTuple):
-        items = [
-            cast(builder, builder.extract_value(value, k), *pair)
-            for k, pair in enumerate(zip(kind, wanted, strict=True))
-        ]
-        return make_tuple(builder, wanted, items)
-    if isinstance(kind, types.Boolean) and isinstance(wanted, types.Integer):
-        return builder.zext(value, to)
-    if isinstance(kind, types.Boolean) and isinstance(wanted, types.Float):
-        return builder.uitofp(value, to)
-    whole, real = isinstance(kind, types.Integer), isinstance(kind, types.Float)
-    if isinstance(wanted, types.Boolean) and whole:
+        parts = zip(unpack(builder, value), kind, wanted, strict=True)
+        return make_tuple(builder, wanted, [cast(builder, *part) for part in parts])
+    if isinstance(wanted, Lanes) and not isinstance(kind, Lanes):
+        return splat(builder, cast(builder, value, kind, wanted.scalar), wanted)
+    to, of = register_type(wanted), kind
+    if isinstance(kind, Lanes) and isinstance(wanted, Lanes):
+        kind, wanted = kind.scalar, wanted.scalar
+    if isinstance(wanted, types.Boolean) and isinstance(kind, types.Integer):
         return builder.icmp_signed("!=", value, value.type(0))
-    if isinstance(wanted, types.Boolean) and real:
+    if isinstance(wanted, types.Boolean) and isinstance(kind, types.Float):
         return builder.fcmp_unordered("!=", value, value.type(0.0))
-    if whole and isinstance(wanted, types.Integer):
-        if to.width <= value.type.width:
-            return value if to == value.type else builder.trunc(value, to)
-        return builder.sext(value, to) if kind.signed else builder.zext(value, to)
-    if whole and isinstance(wanted, types.Float):
-        return builder.sitofp(value, to) if kind.signed else builder.uitofp(value, to)
-    if real and isinstance(wanted, types.Integer):
-        return builder.fptosi(value, to) if wanted.signed else builder.fptoui(value, to)
-    if real and isinstance(wanted, types.Float):
-        return (
-            builder.fpext(value, to)
-            if kind.bitwidth < wanted.bitwidth
-            else builder.fptrunc(value, to)
-        )
-    if register_type(kind) != to:
-        raise TypeError(f"{kind} is no {wanted}")
+    conversion = _conversion(kind, wanted)
+    if conversion is not None:
+        if conversion == "sitofp" and isinstance(of, Lanes) and kind.bitwidth > 32:
+            value = builder.trunc(value, ir.VectorType(I32, of.width))  # what every processor can
+        return getattr(builder, conversion)(value, to)
+    if register_type(of) != to:
+        raise TypeError(f"{of} is no {wanted}")
     return value
+
+
+def _conversion(kind: types.Type, wanted: types.Type) -> str | None:
+    """Name LLVM's instruction that converts a number; None where there is nothing to do."""
+    whole, real = types.Integer | types.Boolean, types.Float
+    signed, width = getattr(kind, "signed", False), getattr(kind, "bitwidth", 1)
+    if isinstance(kind, whole) and isinstance(wanted, types.Integer) and width != wanted.bitwidth:
+        return "trunc" if width > wanted.bitwidth else "sext" if signed else "zext"
+    if isinstance(kind, whole) and isinstance(wanted, real):
+        return "sitofp" if signed else "uitofp"
+    if isinstance(kind, real) and isinstance(wanted, types.Integer):
+        return "fptosi" if wanted.signed else "fptoui"
+    if isinstance(kind, real) and isinstance(wanted, real):
+        return "fpext" if width < wanted.bitwidth else "fptrunc"
+    return None
+
+
+# --- lanes ----------------------------------------------------------------------------------------
+
+
+def scalar_of(kind: types.Type) -> types.Type:
+    """Give the type of the numbers in lanes; of other types, themselves."""
+    return kind.scalar if isinstance(kind, Lanes) else kind
+
+
+def splat(builder: Any, value: Any, lanes: Lanes) -> Any:
+    """Put the same number into all lanes."""
+    vector = register_type(lanes)
+    none = ir.Constant(vector, ir.Undefined)
+    one = builder.insert_element(none, value, I32(0))
+    return shuffle(builder, one, none, [0] * lanes.width)
+
+
+def lane(builder: Any, value: Any, k: int) -> Any:
+    """Give the number of lane `k`."""
+    return builder.extract_element(value, I32(k))
+
+
+def pack(builder: Any, values: list, lanes: Lanes) -> Any:
+    """Put a number into each lane."""
+    made = ir.Constant(register_type(lanes), ir.Undefined)
+    for k, value in enumerate(values):
+        made = builder.insert_element(made, value, I32(k))
+    return made
+
+
+def shuffle(builder: Any, a: Any, b: Any, order: list[int]) -> Any:
+    """Choose lanes of two vectors."""
+    return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(I32, len(order)), order))
+
+
+def overloaded(kind: ir.Type) -> str:
+    """Name a type as LLVM's functions do: f64, v4f64."""
+    if isinstance(kind, ir.VectorType):
+        return f"v{kind.count}{kind.element.intrinsic_name}"
+    return kind.intrinsic_name
 
 
 # --- memory ---------------------------------------------------------------------------------------
@@ -148,27 +207,22 @@ def get(builder: Any, kind: types.Type, pointer: Any, align: int | None = None) 
 
 
 def _as_in_memory(builder: Any, kind: types.Type, value: Any) -> Any:
-    if register_type(kind) == memory_type(kind):
-        return value
-    if not isinstance(kind, types.BaseTuple):
-        return builder.zext(value, I8)
-    made = ir.Constant(memory_type(kind), ir.Undefined)
-    for k, item in enumerate(kind):
-        part = _as_in_memory(builder, item, builder.extract_value(value, k))
-        made = builder.insert_value(made, part, k)
-    return made
+    return _converted(builder, kind, value, memory_type, lambda truth: builder.zext(truth, I8))
 
 
 def _as_in_register(builder: Any, kind: types.Type, value: Any) -> Any:
+    return _converted(builder, kind, value, register_type, lambda byte: builder.trunc(byte, I1))
+
+
+def _converted(builder: Any, kind: types.Type, value: Any, to: Callable, truth: Callable) -> Any:
+    """Convert each truth value among nested tuples."""
     if register_type(kind) == memory_type(kind):
         return value
     if not isinstance(kind, types.BaseTuple):
-        return builder.trunc(value, I1)
-    items = [
-        _as_in_register(builder, item, builder.extract_value(value, k))
-        for k, item in enumerate(kind)
-    ]
-    return make_tuple(builder, kind, items)
+        return truth(value)
+    items = zip(kind, unpack(builder, value), strict=True)
+    parts = [_converted(builder, item, part, to, truth) for item, part in items]
+    return make_struct(builder, to(kind), parts)
 
 
 # --- tuples and arrays ----------------------------------------------------------------------------

@@ -1,38 +1,33 @@
 """Decorators that compile kernels, and point functions that are chosen by type."""
 
+import functools
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numba
-from numba import config
 
+from karamelo_py.compiler import arithmetic
 from karamelo_py.compiler.choices import (
-    SPELLED,
+    INTERPRETED,
     choosers,
     declare_point_function,
     note,
     of_numbers,
     tag_class,
 )
-from karamelo_py.compiler.intrinsics import intrinsic
 from karamelo_py.compiler.trace import INSTEAD, Undefined, forget, run_for_kernel, traced
-from karamelo_py.compiler.values import OF_REALS, at_work, now
+from karamelo_py.compiler.values import OF_REALS, at_work, intrinsic, now
 
 
 def by_type(function: Callable) -> Callable:
     """Decorate the chooser of what `function` is in a kernel, from the types of its arguments."""
-
-    def register(chooser: Callable) -> Callable:
-        traced(function, chooser)
-        return chooser
-
-    return register
+    return functools.partial(traced, function)
 
 
 def implements(function: Callable, *numbers: type) -> Callable:
     """Decorate what `function` is in a kernel: for these types of numbers, or for all others.
 
-    A type of numbers is a NamedTuple with operators (:func:`~.algebra.number_type`), or lanes. It
+    A type of numbers is a NamedTuple with operators (:func:`~.algebra.algebra`), or lanes. It
     is looked for in tuples, too. What is decorated is traced, or code written by hand.
     """
 
@@ -54,11 +49,6 @@ def shared(function: Callable) -> Callable:
     return implements(function)(function)
 
 
-def in_each_lane(function: Callable, arguments: tuple) -> Any:
-    """Do a function of numbers for each lane among its arguments."""
-    raise TypeError("only compiled kernels know lanes")
-
-
 def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Callable], Any]:
     """Declare a pure function of one point, selected by the classes of its first `tags` arguments.
 
@@ -74,73 +64,58 @@ def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Calla
     def declare(stub: Callable) -> Callable:
         table: dict[tuple[type, ...], Callable] = {}
         fallback = stub if otherwise else None
-        memo: dict[Any, Callable] = {}  # what was found before, for speed where interpreted
 
         def find(classes: tuple) -> Callable | None:
             return table.get(classes, fallback)
 
-        def select(classes: tuple) -> Callable:
-            chosen = find(classes)
+        def plain(*arguments: Any) -> Any:
+            classes = tuple([a.__class__ for a in arguments[:tags]])
+            chosen = table.get(classes, fallback)
             if chosen is None:
                 raise Undefined(stub.__name__, classes)
-            memo[classes if tags > 1 else classes[0]] = chosen
-            return chosen
-
-        if tags == 1:
-
-            def plain(*arguments: Any) -> Any:
-                kind = arguments[0].__class__
-                return (memo.get(kind) or select((kind,)))(*arguments)
-        else:
-
-            def plain(*arguments: Any) -> Any:
-                classes = tuple([a.__class__ for a in arguments[:tags]])
-                return (memo.get(classes) or select(classes))(*arguments)
+            return chosen(*arguments)
 
         def watched(*arguments: Any) -> Any:
             return run_for_kernel(dispatch, arguments) if at_work() else plain(*arguments)
 
-        dispatch = plain if config.DISABLE_JIT else watched
-        dispatch.__name__ = stub.__name__
-        dispatch.__qualname__ = stub.__qualname__
-        dispatch.__module__ = stub.__module__
-        dispatch.__doc__ = stub.__doc__
+        dispatch = plain if INTERPRETED else watched
+        for name in ("__name__", "__qualname__", "__module__", "__doc__"):
+            setattr(dispatch, name, getattr(stub, name))
 
         def choose(*arguments: Any) -> Callable | None:
             classes = tuple(tag_class(a) for a in arguments[:tags])
             found = find(classes)
             apart = any(stub.__name__ in getattr(tag, "scalarised", ()) for tag in classes)
-            return _scalarised(dispatch) if apart and lanes_of(arguments) else found
+            return _in_each_lane(dispatch) if apart and lanes_of(arguments) else found
 
         by_type(dispatch)(choose)
 
         def on(*classes: type) -> Callable[[Callable], Callable]:
             def register(implementation: Callable) -> Callable:
                 table[classes] = implementation
-                memo.clear()
                 forget()
                 return implementation
 
             return register
 
-        dispatch.tags = tags
-        dispatch.find = find
-        declare_point_function(dispatch)
-        dispatch.on = on
-
         def defined(*classes: type) -> bool:
             note([(dispatch, classes)])
             return classes in table
 
-        dispatch.defined = defined
+        dispatch.tags, dispatch.find, dispatch.on, dispatch.defined = tags, find, on, defined
+        declare_point_function(dispatch)
         return dispatch
 
     return declare
 
 
-def _scalarised(function: Callable) -> Callable:
-    """Make a function of arguments, some in lanes, that does `function` for each lane."""
-    return lambda *arguments: in_each_lane(function, arguments)
+def lane_by_lane(function: Callable, unrolled: bool, arguments: tuple) -> Any:
+    """Do a function of numbers for each lane among its arguments."""
+    raise TypeError("only compiled kernels know lanes")
+
+
+def _in_each_lane(function: Callable) -> Callable:
+    return lambda *arguments: lane_by_lane(function, False, arguments)
 
 
 def real(value: float, like: Any) -> Any:
@@ -166,17 +141,13 @@ INSTEAD[lanes_of] = lambda thing: lanes_of(now().kind_of(thing))
 
 @by_type(real)
 def _real(value, like):
-    if like is numba.types.float32:
-        return lambda value, like: numba.float32(value)
-    return lambda value, like: numba.float64(value)
+    number = numba.float32 if like is numba.types.float32 else numba.float64
+    return lambda value, like: number(value)
 
 
 def round_off(like: Any) -> Any:
     """Give the relative error of one operation, in the number type of `like`."""
-    return type(like)(_ROUND_OFF.get(type(like).__name__, 2.0**-52))
-
-
-_ROUND_OFF = {"float32": 2.0**-23}
+    return type(like)(2.0**-23 if type(like).__name__ == "float32" else 2.0**-52)
 
 
 @by_type(round_off)
@@ -194,15 +165,15 @@ def fma(a: float, b: float, c: float) -> float:
 
 @intrinsic
 def _fused(a, b, c):
-    def codegen(builder, signature, arguments):
-        return builder.fma(*arguments)
-
-    return a(a, b, c), codegen
+    kind = arithmetic.common(a, b, c)
+    call = arithmetic.of_library("llvm.fma")
+    return kind(kind, kind, kind), lambda builder, *values: call(builder, values)
 
 
 @by_type(fma)
 def _fma(a, b, c):
-    return _fused if a == b == c and isinstance(a, numba.types.Float) else None
+    real = a == b == c and isinstance(a, numba.types.Float)
+    return _fused if real or lanes_of((a, b, c)) else None
 
 
 @shared
@@ -313,28 +284,3 @@ def beside(first: int, steps: int) -> int:
 implements(beside)(lambda first, steps: numba.uint64(first + steps))
 
 
-def over_blocks(per_block: Callable) -> Callable:
-    """Make of ``f(block, setup, ...)`` an ``f(setup, ...)`` that does so for each of setup.blocks.
-
-    The blocks have different types (one for each constitutive law), which a loop in a kernel cannot
-    run over: the calls are written out once per number of blocks.
-    """
-
-    shared(per_block)
-
-    @shared
-    def loop(setup: Any, *arguments: Any) -> None:
-        for block in setup.blocks:
-            per_block(block, setup, *arguments)
-
-    return loop
-
-
-def define(parameters: str, *lines: str, **names: Any) -> Callable:
-    """The function with these `parameters` and body `lines`, which may use `names`."""
-    body = "\n    ".join(lines or ("pass",))
-    text = f"def spelled({parameters}):\n    {body}"
-    exec(compile(text, SPELLED, "exec"), names)
-    made = names["spelled"]
-    made.text = text  # for who walks through it
-    return made

@@ -55,12 +55,12 @@ def _taken(path: Path) -> int | None:
         if not locked and waits:
             with waiting():
                 waits = locked = _locked_in_time(file)
+        return file if locked else None
     except OSError:  # a file system without locks
-        pass
+        return None
     finally:
         if not locked:
             os.close(file)
-    return file if locked else None
 
 
 def _locked(file: int) -> bool:

@@ -22,22 +22,12 @@ BINARY = {
 
 
 class ExpressionCompiler:
-    """Compile expressions, by what the names in them stand for.
+    """Compile expressions, by what the names in them stand for."""
 
-    Attributes
-    ----------
-    function, free
-        The function that they are of, with the globals that it is to see, and its closure.
-    flow
-        Writes the code of ways.
-    names
-        What the function's own names stand for.
-    """
-
-    function: Callable
-    free: dict[str, Any]
-    flow: Flow
-    names: dict[str, Any]
+    function: Callable  # that they are of, with the globals that it is to see
+    free: dict[str, Any]  # its closure
+    flow: Flow  # writes the code of ways
+    names: dict[str, Any]  # what the function's own names stand for
 
     def branch(self, condition: Any, then: Callable, otherwise: Callable) -> None:
         """Go both ways, and on from where they meet."""
@@ -130,10 +120,10 @@ class ExpressionCompiler:
         """Compile one comparison."""
         if isinstance(op, ast.Is | ast.IsNot):
             return (a is b) == isinstance(op, ast.Is)
-        if isinstance(op, ast.In | ast.NotIn):
-            return (
-                self.among(a, b) if isinstance(op, ast.In) else self.flow.negate(self.among(a, b))
-            )
+        if isinstance(op, ast.In):
+            return self.among(a, b)
+        if isinstance(op, ast.NotIn):
+            return self.flow.negate(self.among(a, b))
         return BINARY[type(op)](a, b)
 
     def among(self, a: Any, things: Any) -> Any:
@@ -165,14 +155,10 @@ class ExpressionCompiler:
 
             return put
 
-        outer = self.names.get("?", _NOTHING)
         self.branch(condition, of(then), of(otherwise))
         if "?" not in self.names:
             raise Untraceable("an expression gives things of two kinds")
-        value = self.names.pop("?")
-        if outer is not _NOTHING:
-            self.names["?"] = outer
-        return value
+        return self.names.pop("?")
 
     def IfExp(self, node: ast.IfExp) -> Any:
         condition = self.do(node.test)
@@ -230,4 +216,3 @@ _WORDS = {
     "Global": "`global`", "Nonlocal": "`nonlocal`", "Match": "`match`", "ClassDef": "`class`",
     "Raise": "`raise` of this kind", "FunctionDef": "function within of this kind",
 }  # fmt: skip
-_NOTHING = object()

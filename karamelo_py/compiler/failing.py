@@ -66,10 +66,7 @@ def fail(builder: ir.IRBuilder, kind: Callable, arguments: tuple) -> None:
     """Write what notes an exception and returns."""
     text = pickle.dumps((kind, arguments))
     constant = ir.Constant(ir.ArrayType(code.I8, len(text)), bytearray(text))
-    place = ir.GlobalVariable(
-        builder.module, constant.type, builder.module.get_unique_name("exception")
-    )
-    place.initializer, place.global_constant, place.linkage = constant, True, "internal"
+    place = code.in_module(builder, constant, "exception")
     function = code.external(builder, "karamelo_fail", ir.VoidType(), [code.I64] * 2)
     builder.call(function, [builder.ptrtoint(place, code.I64), code.I64(len(text))])
     builder.function.raises = True

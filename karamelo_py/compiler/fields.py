@@ -18,7 +18,7 @@ start
     number for each component;
 summed
     whether points give to this field of the nodes (`False` by default): what they give is summed
-    tile by tile (:mod:`karamelo_py.kernels.sums`);
+    tile by tile (:mod:`karamelo_py.kernels.p2g`);
 columns
     names under which dumps, the log, plots and pictures show its components.
 
@@ -26,15 +26,20 @@ A part names its fields in ``point_fields`` or ``node_fields``. Arrays of points
 (components, points), those of nodes (nodes, components).
 """
 
+import ctypes
 import re
 from collections.abc import Iterable
 from math import prod
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba import types
 
-from karamelo_py.compiler.compile import shared
+from karamelo_py.compiler import code
+from karamelo_py.compiler.code import I64
+from karamelo_py.compiler.compile import implements, index, shared
 from karamelo_py.compiler.tuples import count_in, flat, nested_as
+from karamelo_py.compiler.values import intrinsic
 
 LINE = 64  # bytes that caches get at once
 
@@ -125,8 +130,12 @@ def rows_of_points(
         room = np.empty(length_of_rows(shape, dtype), dtype)
     *rows, count = shape
     stride = _distance_of_rows(count, dtype)
-    first = -room.ctypes.data % LINE // room.itemsize
+    first = _first_of_line(room)
     return room[first : first + prod(rows) * stride].reshape(*rows, stride)[..., :count]
+
+
+def _first_of_line(room: np.ndarray) -> int:
+    return -room.ctypes.data % LINE // room.itemsize
 
 
 def length_of_rows(shape: tuple[int, ...], dtype: type) -> int:
@@ -161,24 +170,31 @@ def some_points(array: np.ndarray, points: np.ndarray) -> np.ndarray:
 def at_points(kind: type, kin: Any, count: int, real: type) -> NamedTuple:
     """The field of `count` points, (components, count), as it starts."""
     array = rows_of_points((kind.shape(kin), count), real)
-    start = getattr(kind, "start", 0.0)
-    array[:] = np.array(start(kin) if callable(start) else [start], real)[:, None]
+    array[:] = _start(kind, kin, real)[:, None]
     return kind(array)
+
+
+def _start(kind: type, kin: Any, real: type) -> np.ndarray:
+    """The number, or those of all components, that a field starts from."""
+    start = getattr(kind, "start", 0.0)
+    return np.array(start(kin) if callable(start) else [start], real)
 
 
 def records(count: int, width: int, real: type) -> np.ndarray:
     """(count, width) zeros of nodes; untouched pages cost no memory, no record is in two lines."""
-    size = np.dtype(real).itemsize
-    room = np.zeros(count * width + LINE // size, real)
-    first = -room.ctypes.data % LINE // size
+    room = np.zeros(count * width + LINE // np.dtype(real).itemsize, real)
+    first = _first_of_line(room)
     return room[first : first + count * width].reshape(count, width)
 
 
 def at_nodes(kind: type, kin: Any, count: int, real: type) -> NamedTuple:
-    """The field of `count` nodes, (count, components), zero."""
+    """The field of `count` nodes, (count, components), as it starts."""
     width = kind.shape(kin)
     # Three numbers, wherever they begin, are loaded and stored as four, the width of a register.
-    return kind(records(count, width if width < 3 else -(-(width + 1) // 4) * 4, real))
+    array = records(count, width if width < 3 else -(-(width + 1) // 4) * 4, real)
+    if (start := _start(kind, kin, real)).any():
+        array[:, :width] = start
+    return kind(array)
 
 
 @shared
@@ -230,3 +246,78 @@ def increase(array, p, values):
 def load_vector(kin, array, p):
     """The first components of point `p` as a vector."""
     return kin.Vector._make([array[k, p] for k in range(kin.dimension)])
+
+
+# --- rows by where they lie: what goes through them knows no number and types of arrays -----------
+
+
+def addresses_of_rows(arrays: Iterable[np.ndarray]) -> np.ndarray:
+    """(m, 2) int64: the address of each row of some arrays (..., n), and the bytes of an item.
+
+    Arrays of nothing have none. Addresses are good as long as the arrays live and are not resized.
+
+    Raises
+    ------
+    ValueError
+        If items do not lie one after another, or do not have 4 or 8 bytes.
+    """
+    found: list[tuple[int, int]] = []
+    for array in arrays:
+        if not array.size:
+            continue
+        if array.strides[-1] != array.itemsize:
+            raise ValueError("items of a row do not lie one after another")
+        if array.itemsize not in (4, 8):
+            raise ValueError(f"items of {array.itemsize} bytes, not of 4 or 8")
+        places = [array.ctypes.data]
+        for count, stride in zip(array.shape[:-1], array.strides[:-1], strict=True):
+            places = [place + k * stride for place in places for k in range(count)]
+        found += [(place, array.itemsize) for place in places]
+    return np.array(found, np.int64).reshape(-1, 2)
+
+
+def _row(address: int, like: Any, count: int) -> np.ndarray:
+    """The `count` items from an address on, whole numbers of the type of `like`."""
+    memory = (ctypes.c_char * int(count * like.itemsize)).from_address(int(address))
+    return np.frombuffer(memory, like.dtype)
+
+
+@implements(_row)
+@intrinsic
+def _row_in_kernels(address, like, count):
+    row = types.Array(like, 1, "C")
+
+    def codegen(builder, place, _, size):
+        data = builder.inttoptr(place, code.memory_type(like).as_pointer())
+        return code.make_array(builder, row, data, [size], [I64(like.bitwidth // 8)])
+
+    return row(types.int64, like, types.int64), codegen
+
+
+def pick_items(
+    address: int, like: Any, order: np.ndarray, room: np.ndarray, c: int, begin: int, end: int
+) -> None:
+    """``room[c, p]`` becomes item ``order[p]`` of a row, from `begin` to `end`.
+
+    The row has whole numbers of the type of `like`.
+    """
+    room[c, begin:end] = _row(address, like, order.size)[order[begin:end]]
+
+
+@implements(pick_items)
+def _pick(address, like, order, room, c, begin, end):
+    row = _row(address, like, order.size)
+    for p in range(begin, end):
+        room[c, p] = row[index(order[p])]
+
+
+def put_items(address: int, like: Any, room: np.ndarray, c: int, begin: int, end: int) -> None:
+    """Item p of such a row becomes ``room[c, p]``, from `begin` to `end`."""
+    _row(address, like, end)[begin:end] = room[c, begin:end]
+
+
+@implements(put_items)
+def _put(address, like, room, c, begin, end):
+    row = _row(address, like, end)
+    for p in range(begin, end):
+        row[index(p)] = room[c, p]

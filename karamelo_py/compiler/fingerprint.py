@@ -19,7 +19,6 @@ import numpy as np
 from numba import types
 
 from karamelo_py.compiler.choices import (
-    _OPAQUE,
     WHOLE,
     Choice,
     Unknown,
@@ -31,7 +30,7 @@ from karamelo_py.compiler.choices import (
     of_numbers,
     point_functions,
 )
-from karamelo_py.compiler.intrinsics import Intrinsic
+from karamelo_py.compiler.values import Intrinsic
 
 _HERE = f"{__package__}."  # the text of all these modules is in every key
 _PLAIN = (type(None), bool, int, float, complex, str, bytes, type(Ellipsis), range, slice)
@@ -42,17 +41,16 @@ _PLAIN = (type(None), bool, int, float, complex, str, bytes, type(Ellipsis), ran
 
 def describe(numba_type: Any) -> str:
     """Describe a type in words that mean the same in every process; tags with their fields."""
+    how = type(numba_type).__name__  # held or a value
     if isinstance(numba_type, types.BaseNamedTuple):
         items = zip(numba_type.fields, numba_type, strict=True)
         inner = ",".join(f"{name}={describe(item)}" for name, item in items)
-        how = type(numba_type).__name__  # held or a value
         return f"{how} {class_name(numba_type.instance_class)}({inner})"
     if isinstance(numba_type, types.BaseTuple):
-        how = type(numba_type).__name__
-        return f"{how}({','.join(describe(item) for item in numba_type)},)"
+        return f"{how}({','.join(map(describe, numba_type))},)"
     if isinstance(numba_type, (types.Callable, types.Opaque)) and numba_type != types.none:
         raise Unknown(str(numba_type))
-    return f"{type(numba_type).__name__}:{numba_type}"
+    return f"{how}:{numba_type}"
 
 
 def classes_in(numba_type: Any) -> Iterable[type]:
@@ -73,23 +71,10 @@ def fingerprint(
     choices: frozenset[Choice],
     codes: frozenset[python.CodeType] = frozenset(),
 ) -> str:
-    """Hash of all that code made of `roots` depends on, for these types and choices.
+    """Hash of all that code made of `roots` depends on, for these types of arguments and choices.
 
-    Parameters
-    ----------
-    roots
-        The function that is compiled, and what else its code depends on.
-    arguments
-        Types of its arguments.
-    choices
-        What its point functions were asked for.
-    codes
-        What must be among all that is followed.
-
-    Raises
-    ------
-    Unknown
-        Where something cannot be followed, or is no longer there; where one of `codes` is missed.
+    Raises `Unknown` where something cannot be followed, or is no longer there, and where one of
+    `codes` is not among what is followed.
     """
     ahead = [*roots]
     for argument in arguments:
@@ -138,30 +123,29 @@ def _look(thing: Any) -> tuple[str, list]:
     if isinstance(thing, (np.ndarray, np.generic)):
         array = np.asarray(thing)
         return f"{kind} {array.dtype} {array.shape}", [array.tobytes()]
-    if isinstance(thing, (tuple, list)):
-        return kind, [type(thing), *thing]
-    if hasattr(type(thing), "made_of"):  # a memo
+    for one, parts in _PARTS.items():
+        if isinstance(thing, one):
+            return kind, parts(thing)
+    if hasattr(type(thing), "made_of"):  # a kernel
         return kind, list(thing.made_of)
-    if isinstance(thing, (dict, python.MappingProxyType)):
-        return kind, [part for item in thing.items() for part in item]
-    if isinstance(thing, (set, frozenset)):
-        return kind, sorted(thing, key=repr)
-    if isinstance(thing, property):
-        return kind, [thing.fget]
-    if isinstance(thing, (staticmethod, classmethod)):
-        return kind, [thing.__func__]
-    if isinstance(thing, functools._lru_cache_wrapper):
-        return kind, [thing.__wrapped__]
-    if isinstance(thing, functools.partial):
-        return kind, [thing.func, thing.args, thing.keywords]
-    if isinstance(thing, Intrinsic):
-        return kind, [thing.definition]
     if hasattr(thing, "__name__") and is_opaque(thing):
         return f"{kind} {getattr(thing, '__module__', '')} {thing.__name__}", []
     try:
         return kind, [type(thing), pickle.dumps(thing)]
     except Exception as error:
         raise Unknown(f"{thing!r}") from error
+
+
+_PARTS: dict[Any, Callable] = {
+    tuple | list: lambda thing: [type(thing), *thing],
+    dict | python.MappingProxyType: lambda thing: [p for item in thing.items() for p in item],
+    set | frozenset: lambda thing: sorted(thing, key=repr),
+    property: lambda thing: [thing.fget],
+    staticmethod | classmethod: lambda thing: [thing.__func__],
+    functools._lru_cache_wrapper: lambda thing: [thing.__wrapped__],
+    functools.partial: lambda thing: [thing.func, thing.args, thing.keywords],
+    Intrinsic: lambda thing: [thing.definition],
+}
 
 
 def _function(function: Callable) -> tuple[str, list]:
@@ -179,21 +163,19 @@ def _function(function: Callable) -> tuple[str, list]:
         value = function.__globals__.get(name, _NOWHERE)
         if value is _NOWHERE:
             continue
-        parts += [name, value]
-        parts += _from_module(value, names, ())
+        parts += [name, value, *_from_module(value, names, ())]
     for cell in function.__closure__ or ():
         try:
             parts.append(cell.cell_contents)
         except ValueError:
             parts.append("empty")
-    return f"function {digest}", parts + _choosers(function) + of_numbers.get(function, [])
+    chosen = map(inspect.unwrap, choosers.get(function, ()))
+    return f"function {digest}", [*parts, *chosen, *of_numbers.get(function, ())]
 
 
 def _from_module(value: Any, names: tuple[str, ...], above: tuple) -> list:
     """List the things in a module, and in modules of it, that a function's code names."""
-    if not isinstance(value, python.ModuleType) or value in above:
-        return []
-    if value.__name__.partition(".")[0] in _OPAQUE:
+    if not isinstance(value, python.ModuleType) or value in above or is_opaque(value):
         return []
     found = [vars(value)[name] for name in names if name in vars(value)]
     inner = (_from_module(one, names, (*above, value)) for one in found)
@@ -201,11 +183,6 @@ def _from_module(value: Any, names: tuple[str, ...], above: tuple) -> list:
 
 
 _NOWHERE = object()
-
-
-def _choosers(function: Callable) -> list:
-    """List the choosers that decide on the code of a function that is chosen by type."""
-    return [inspect.unwrap(chooser) for chooser in choosers.get(function, ())]
 
 
 @functools.cache

@@ -8,6 +8,7 @@ import numpy as np
 from numba import types
 
 from karamelo_py.compiler import failing
+from karamelo_py.compiler.code import scalar_of
 from karamelo_py.compiler.values import (
     HeldValue,
     Untraceable,
@@ -15,10 +16,12 @@ from karamelo_py.compiler.values import (
     counting,
     emit,
     is_literal,
+    rebuilt,
     words,
 )
 
 _PLAIN = (bool, int, float, str, np.generic, type(None))
+_MERGED = (Value, HeldValue, *_PLAIN)  # what may differ from way to way
 _DROPPED = object()
 IN_A_LOOP = " from turn to turn of a loop"
 
@@ -72,10 +75,7 @@ def is_real(thing: Any) -> bool:
 
 
 def _is_same(a: Any, b: Any) -> bool:
-    if a is b:
-        return True
-    plain = isinstance(a, _PLAIN) and type(a) is type(b)
-    return plain and repr(a) == repr(b)
+    return a is b or (isinstance(a, _PLAIN) and type(a) is type(b) and repr(a) == repr(b))
 
 
 class Grows(Untraceable):
@@ -181,30 +181,26 @@ class Flow:
             if len({len(t) for t in things}) > 1:
                 return _DROPPED
             items = [self._merged(list(item), phis) for item in zip(*things, strict=True)]
-            if any(item is _DROPPED for item in items):
-                return _DROPPED
-            return type(first)(*items) if hasattr(first, "_fields") else tuple(items)
+            return _DROPPED if any(i is _DROPPED for i in items) else rebuilt(first, items)
         numbers = [t for t in things if is_number_type(t)]
         plain = [t for t in things if not is_number_type(t)]
         if numbers and all(isinstance(t, Value) or is_literal(t) for t in plain):
             wide = [t if is_number_type(t) else numbers[0].constant(t) for t in things]
             return self._merged(wide, phis)
-        if any(t is None or not isinstance(t, (Value, HeldValue, *_PLAIN)) for t in things):
+        if any(t is None or not isinstance(t, _MERGED) for t in things):
             return _DROPPED
         kinds = [types.unliteral(self.lowering.kind_of(t)) for t in things]
-        kind = kinds[0]
-        real = [k for t, k in zip(things, kinds, strict=True) if is_real(t)]
-        if (
-            real
-            and all(k == real[0] for k in real)
-            and all(is_real(t) or is_literal(t) for t in things)
-        ):
-            kind = real[0]  # literals have no precision of their own
-        elif any(k != kind for k in kinds):
+        real = {k for t, k in zip(things, kinds, strict=True) if is_real(t)}
+        if len(real) == 1 and all(is_real(t) or is_literal(t) for t in things):
+            (kind,) = real  # literals have no precision of their own
+        else:
             kind = self.lowering.unify(*kinds)
         if kind is None or isinstance(kind, types.Optional | types.UnicodeType):
             return _DROPPED
-        made = (HeldValue if isinstance(first, HeldValue) else Value)(kind, None)
+        return self._phi(first, kind, things, phis)
+
+    def _phi(self, like: Any, kind: types.Type, things: list, phis: list[Phi]) -> Any:
+        made = (HeldValue if isinstance(like, HeldValue) else Value)(kind, None)
         phis.append(Phi(made, things))
         return made
 
@@ -223,70 +219,62 @@ class Flow:
         `grown` is what numbers among these become, as `Grows` tells it.
         """
         phis: list[Phi] = []
-        self.grown, self.paths = grown, []
-        inside = dict(names)
-        for name in sorted(changed & names.keys()):
-            inside[name] = self._carried(names[name], phis, (name,))
+        paths: list[tuple] = []
+
+        def begun(thing: Any, path: tuple) -> Any:
+            become = grown.get(path)
+            if is_number_type(become) and not isinstance(thing, tuple):
+                thing = become.constant(thing)
+            if isinstance(thing, tuple):
+                return rebuilt(thing, [begun(item, (*path, k)) for k, item in enumerate(thing)])
+            if thing is None or not isinstance(thing, _MERGED):
+                return thing
+            paths.append(path)
+            kind = become or types.unliteral(self.lowering.kind_of(thing))
+            return self._phi(thing, kind, [thing], phis)
+
+        carried = {name: begun(names[name], (name,)) for name in sorted(changed & names.keys())}
         block = self._block()
         self._enter(block, phis, [phi.on[0] for phi in phis])
-        carried = {name: inside[name] for name in sorted(changed & names.keys())}
         self.start(Edge(block, {}, dict(self.lowering.read)))
-        return LoopHeader(block, phis, carried, self.paths), inside
-
-    def _carried(self, thing: Any, phis: list[Phi], path: tuple) -> Any:
-        if isinstance(thing, tuple):
-            items = [self._carried(item, phis, (*path, k)) for k, item in enumerate(thing)]
-            return type(thing)(*items) if hasattr(thing, "_fields") else tuple(items)
-        if thing is None or not isinstance(thing, (Value, HeldValue, *_PLAIN)):
-            return thing
-        grown = self.grown.get(path)
-        if is_number_type(grown):
-            return self._carried(grown.constant(thing), phis, path)
-        kind = grown or types.unliteral(self.lowering.kind_of(thing))
-        self.paths.append(path)
-        made = (HeldValue if isinstance(thing, HeldValue) else Value)(kind, None)
-        phis.append(Phi(made, [thing]))
-        return made
+        return LoopHeader(block, phis, carried, paths), names | carried
 
     def close(self, head: LoopHeader, names: dict[str, Any]) -> None:
         """Go back to where a loop begins."""
         values: list = []
-        self.growing: dict[tuple, Any] = {}
-        self.paths = head.paths
-        self.began = [phi.on[0] for phi in head.phis]
+        grown: dict[tuple, Any] = {}
         for name, before in head.names.items():
             if name not in names:
                 raise Untraceable(f"'{name}' is not known on all ways through a loop")
-            self._close_phi(before, names[name], values)
-        if self.growing:
-            raise Grows(self.growing)
+            self._close_phis(head, before, names[name], values, grown)
+        if grown:
+            raise Grows(grown)
         self._enter(head.block, head.phis, values)
 
-    def _close_phi(self, before: Any, after: Any, values: list) -> None:
+    def _close_phis(
+        self, head: LoopHeader, before: Any, after: Any, values: list, grown: dict
+    ) -> None:
         """Collect what the phis of `before` become, in their order."""
         if isinstance(before, Value | HeldValue):
-            path = self.paths[len(values)]
+            path = head.paths[len(values)]
             if is_number_type(after):
                 raise Grows({path: after})
             kind = types.unliteral(self.lowering.kind_of(after))
-            if (
-                kind != before._kind
-                and is_literal(self.began[len(values)])
-                and isinstance(getattr(kind, "scalar", kind), types.Float)
-            ):
-                self.growing[path] = kind
+            is_real = isinstance(scalar_of(kind), types.Float)
+            if kind != before._kind and is_real and is_literal(head.phis[len(values)].on[0]):
+                grown[path] = kind
             both = self.lowering.unify(kind, before._kind)
             if both != before._kind:
                 if isinstance(both, types.Integer):
-                    self.growing[path] = both
-                elif path not in self.growing:
+                    grown[path] = both
+                elif path not in grown:
                     raise Untraceable(f"{words(before._kind)} becomes {words(kind)}{IN_A_LOOP}")
             values.append(after)
         elif isinstance(before, tuple):
             if type(before) is not type(after) or len(before) != len(after):
                 raise Untraceable(f"a tuple becomes a tuple of another kind{IN_A_LOOP}")
             for one, other in zip(before, after, strict=True):
-                self._close_phi(one, other, values)
+                self._close_phis(head, one, other, values, grown)
         elif not _is_same(before, after):
             raise Untraceable(f"{before!r} becomes something else{IN_A_LOOP}")
 

@@ -11,30 +11,17 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import config, types
+from numba import types
 
-from karamelo_py.compiler.addresses import caller_of
-from karamelo_py.compiler.compile import implements
-from karamelo_py.compiler.loops import kernel, noinline
+from karamelo_py.compiler.compile import implements, shared
+from karamelo_py.compiler.loops import caller_of, kernel, noinline
 from karamelo_py.compiler.operations import (
-    ABS,
-    ADD,
-    COS,
-    DIV,
-    EXP,
     FIRST_BINARY,
     IN_NUMPY,
-    LOG,
-    MAX,
-    MIN,
-    MUL,
-    NEG,
-    POW,
+    OPERATIONS,
     SELECT,
-    SIN,
-    SQRT,
-    SUB,
     function_of,
+    in_kernels,
     operation_of,
 )
 
@@ -54,43 +41,25 @@ KEEP, KEPT = 150, 151
 
 
 class Program(NamedTuple):
-    """A formula, ready to be evaluated.
+    """A formula, ready to be evaluated."""
 
-    Attributes
-    ----------
-    code : ndarray (n, 2) int64
-        Operation and operand of each instruction.
-    constants : ndarray (m,) float64
-        The numbers that CONSTANT instructions push.
-    """
-
-    code: np.ndarray
-    constants: np.ndarray
+    code: np.ndarray  # (n, 2) int64: operation and operand of each instruction
+    constants: np.ndarray  # (m,) float64, which CONSTANT instructions push
 
 
-# Rows of numbers: in Python by NumPy, in kernels by loops.
+# --- rows of numbers ----------------------------------------------------------------------------
 
 
+@noinline
 def _copy(n, a, b):
     """Copy the first `n` numbers of `b` to `a`."""
     a[:n] = b[:n]
 
 
-@implements(_copy)
-def _copy_in_kernels(n, a, b):
-    for i in range(n):
-        a[i] = b[i]
-
-
+@noinline
 def _fill(n, a, value):
     """Give the first `n` numbers of `a` a value."""
     a[:n] = value
-
-
-@implements(_fill)
-def _fill_in_kernels(n, a, value):
-    for i in range(n):
-        a[i] = value
 
 
 def _select(n, a, b, c):
@@ -104,107 +73,79 @@ def _select_in_kernels(n, a, b, c):
         a[i] = b[i] if a[i] != 0.0 else c[i]
 
 
+# What has a loop of its own in kernels; others share one, which chooses for each number.
+_UNARY_LOOPS = in_kernels("neg", "sqrt", "sin", "cos", "exp", "log", "abs")
+_BINARY_LOOPS = in_kernels("+", "-", "*", "/", "min", "max")
+_POWER = OPERATIONS["^"]
+
+
 def _unary(op, n, a):
     """Replace the first `n` numbers of `a` by a function of them."""
-    a[:n] = IN_NUMPY[op](a[:n])
-
-
-def _binary(op, n, a, b):
-    """Replace the first `n` numbers of `a` by what `op` makes of them and those of `b`."""
-    a[:n] = IN_NUMPY[op](a[:n], b[:n])
+    with np.errstate(all="ignore"):
+        a[:n] = IN_NUMPY[op](a[:n])
 
 
 @noinline
 def _unary_in_kernels(op, n, a):
-    if op == NEG:
-        for i in range(n):
-            a[i] = -a[i]
-    elif op == SQRT:
-        for i in range(n):
-            a[i] = math.sqrt(a[i])
-    elif op == SIN:
-        for i in range(n):
-            a[i] = math.sin(a[i])
-    elif op == COS:
-        for i in range(n):
-            a[i] = math.cos(a[i])
-    elif op == EXP:
-        for i in range(n):
-            a[i] = math.exp(a[i])
-    elif op == LOG:
-        for i in range(n):
-            a[i] = math.log(a[i])
-    elif op == ABS:
-        for i in range(n):
-            a[i] = abs(a[i])
-    else:
-        for i in range(n):
-            a[i] = function_of(op, a[i])
+    for number, do in _UNARY_LOOPS:
+        if op == number:
+            for i in range(n):
+                a[i] = do(a[i])
+            return
+    for i in range(n):
+        a[i] = function_of(op, a[i])
+
+
+def _binary(op, n, a, b):
+    """Replace the first `n` numbers of `a` by what `op` makes of them and those of `b`."""
+    with np.errstate(all="ignore"):
+        a[:n] = IN_NUMPY[op](a[:n], b[:n])
 
 
 @noinline
 def _binary_in_kernels(op, n, a, b):
-    if op == ADD:
-        for i in range(n):
-            a[i] += b[i]
-    elif op == SUB:
-        for i in range(n):
-            a[i] -= b[i]
-    elif op == MUL:
-        for i in range(n):
-            a[i] *= b[i]
-    elif op == DIV:
-        for i in range(n):
-            a[i] /= b[i]
-    elif op == POW:
-        # Small whole powers are the common case, and pow costs ten multiplications.
-        power = b[0]
-        same = True
-        for i in range(n):
-            same = same and b[i] == power
-        if same and power == 2.0:
+    for number, do in _BINARY_LOOPS:
+        if op == number:
             for i in range(n):
-                a[i] *= a[i]
-        elif same and power == 3.0:
-            for i in range(n):
-                a[i] *= a[i] * a[i]
-        else:
-            for i in range(n):
-                a[i] = math.pow(a[i], b[i])
-    elif op == MIN:
+                a[i] = do(a[i], b[i])
+            return
+    if op == _POWER:
+        _powers(n, a, b)
+        return
+    for i in range(n):
+        a[i] = operation_of(op, a[i], b[i])
+
+
+@shared
+def _powers(n, a, b):
+    """Powers; small whole ones are the common case, and pow costs ten multiplications."""
+    power = b[0]
+    same = True
+    for i in range(n):
+        same = same and b[i] == power
+    if same and power == 2.0:
         for i in range(n):
-            a[i] = b[i] if b[i] < a[i] else a[i]
-    elif op == MAX:
+            a[i] *= a[i]
+    elif same and power == 3.0:
         for i in range(n):
-            a[i] = b[i] if b[i] > a[i] else a[i]
+            a[i] *= a[i] * a[i]
     else:
         for i in range(n):
-            a[i] = operation_of(op, a[i], b[i])
+            a[i] = math.pow(a[i], b[i])
 
 
 implements(_unary)(lambda op, n, a: _unary_in_kernels(op, n, a))
 implements(_binary)(lambda op, n, a, b: _binary_in_kernels(op, n, a, b))
 
 
-def _evaluate(program, globals_, points, count, out, stack):
-    """Evaluate `program` at `count` points.
+@kernel
+def evaluate(program, globals_, points, count, out, stack):
+    """Evaluate `program` at `count` points, the rows x, y, z, x0, y0, z0 of `points` (6, BLOCK).
 
-    Parameters
-    ----------
-    program : Program
-    globals_ : ndarray (n,) float64
-        Published values, see :class:`karamelo_py.script.values.Values`.
-    points : ndarray (6, BLOCK) float64
-        Rows x, y, z, x0, y0, z0.
-    count : int
-        Number of points, at most BLOCK.
-    out : ndarray (BLOCK,) float64
-        Gets the `count` results.
-    stack : ndarray (ROWS, BLOCK) float64
-        Scratch.
+    `globals_` are published values (:class:`karamelo_py.script.values.Values`), `out` (BLOCK,) gets
+    the results, `stack` (ROWS, BLOCK) is scratch.
     """
-    code = program.code
-    constants = program.constants
+    code, constants = program
     top = -1
     uniform = False
     for k in range(code.shape[0]):
@@ -246,14 +187,6 @@ def _evaluate(program, globals_, points, count, out, stack):
         _copy(count, out, stack[0])
 
 
-def _evaluate_in_python(*arguments):
-    with np.errstate(all="ignore"):
-        _evaluate(*arguments)
-
-
-evaluate = _evaluate_in_python if config.DISABLE_JIT else kernel(_evaluate)
-
-
 # How kernels of hooks call the evaluator: by address, so that none of them has to contain it, and
 # with whole tables, since every slice in a kernel is dear to compile.
 _TABLE = types.float64[:, ::1]
@@ -277,18 +210,9 @@ def evaluate_in_table(code, constants, globals_, scratch, begin, end, first, las
 
 @kernel
 def evaluate_all(program, globals_, x, x0, out, scratch):
-    """Evaluate `program` at any number of positions.
+    """Evaluate `program` at any number of positions (n, 3), now and in the beginning.
 
-    Parameters
-    ----------
-    program : Program
-    globals_ : ndarray (n,) float64
-        Published values.
-    x, x0 : ndarray (n, 3) float64
-        Positions now and in the beginning.
-    out : ndarray (n,) float64
-        Gets the results.
-    scratch : ndarray (6 + ROWS, BLOCK) float64
+    `out` (n,) gets the results; `scratch` is (6 + ROWS, BLOCK).
     """
     points = scratch[:6]
     stack = scratch[6:]

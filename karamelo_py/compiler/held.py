@@ -8,15 +8,14 @@ name and number, point functions are chosen by its class); tuples without arrays
 """
 
 import hashlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from llvmlite import ir
 from numba import types
 
 from karamelo_py.compiler import code
-from karamelo_py.compiler.intrinsics import builtin, intrinsic
-from karamelo_py.compiler.values import HeldValue, Value
+from karamelo_py.compiler.values import HeldValue, builtin
 
 
 def _words(numba_type: Any) -> str:
@@ -73,7 +72,7 @@ class HeldNamedTuple(_Held, types.BaseNamedTuple):
 
     @property
     def key(self):
-        return self.instance_class, self.types
+        return getattr(self, "instance_class", None), self.types
 
 
 def _has_arrays(numba_type: Any) -> bool:
@@ -108,10 +107,13 @@ def hold(value: Any) -> Any:
 def _hold(lowering: Any, thing: Any) -> Any:
     kind = types.unliteral(lowering.kind_of(thing))
     held = held_type(kind)
-    if held == kind:
-        return thing
+    return thing if held == kind else held_as(lowering, thing, held)
+
+
+def held_as(lowering: Any, things: Iterable, held: _Held) -> HeldValue:
+    """Put things into memory as a held tuple of this type."""
     builder = lowering.builder
-    items = [_hold(lowering, item) for item in thing]
+    items = [_hold(lowering, thing) for thing in things]
     place = builder and code.room(builder, held.register_type().pointee)
     if builder:
         for k, (item, part) in enumerate(zip(held, items, strict=True)):
@@ -150,33 +152,6 @@ def _copy(builder: Any, held: _Held, there: Any) -> Any:
     return place
 
 
-# --- threads take numbers and arrays only -------------------------------------------------------
-
-
 def is_held(numba_type: Any) -> bool:
     """Tell whether a type is that of a held tuple."""
     return isinstance(numba_type, _Held)
-
-
-def address(held: Any) -> int:
-    """Give the address of the items of a held tuple."""
-    raise NotImplementedError
-
-
-@builtin(address)
-def _address(lowering: Any, held: Any) -> Value:
-    builder = lowering.builder
-    return Value(types.intp, builder and builder.ptrtoint(held._value, code.I64))
-
-
-def at_address(held: _Held) -> Callable:
-    """Make the function that takes such a number to the held tuple."""
-
-    @intrinsic
-    def typed(number: types.Type) -> Any:
-        def codegen(builder: Any, signature: Any, values: list) -> Any:
-            return builder.inttoptr(values[0], held.register_type())
-
-        return held(types.intp), codegen
-
-    return typed

@@ -1,7 +1,6 @@
 """Items of arrays, parts of arrays, fields of records."""
 
 import math
-import operator
 from typing import Any
 
 import numpy as np
@@ -9,6 +8,7 @@ from llvmlite import ir
 from numba import types
 
 from karamelo_py.compiler import code
+from karamelo_py.compiler.arithmetic import OPERATIONS
 from karamelo_py.compiler.values import Untraceable, Value
 
 
@@ -33,18 +33,26 @@ def part_type(kind: types.Array, place: Any) -> types.Array:
     return kind.copy(ndim=kind.ndim - len(places) + len(slices), layout=layout)
 
 
-def _index(lowering: Any, thing: Any, count: Any) -> Any:
-    """Give the code of an index; those that may be negative count from the end."""
+def _index_type(lowering: Any, thing: Any) -> types.Type:
     kind = types.unliteral(lowering.kind_of(thing))
     if not isinstance(kind, types.Integer | types.Boolean):
         raise Untraceable(f"{kind} is no index")
-    builder = lowering.builder
+    return kind
+
+
+def _index(lowering: Any, thing: Any, count: Any) -> Any:
+    """Give the code of an index; those that may be negative count from the end."""
+    kind = _index_type(lowering, thing)
     value = lowering.lowered(thing, types.intp)
     known = isinstance(thing, int) and thing >= 0
     if known or isinstance(kind, types.Boolean) or not kind.signed:
         return value
+    return _from_the_end(lowering.builder, value, count)
+
+
+def _from_the_end(builder: Any, value: Any, count: Any) -> Any:
     negative = builder.icmp_signed("<", value, code.I64(0))
-    return builder.select(negative, builder.add(count, value), value)
+    return builder.select(negative, builder.add(value, count), value)
 
 
 def item_place(lowering: Any, array: Value, place: Any) -> Any:
@@ -67,10 +75,7 @@ def get(lowering: Any, array: Value, place: Any) -> Any:
         return Value(made, builder and _part(lowering, array, place, made))
     if builder is None:
         for one in _places(place):
-            if not isinstance(
-                types.unliteral(lowering.kind_of(one)), types.Integer | types.Boolean
-            ):
-                raise Untraceable(f"{lowering.kind_of(one)} is no index")
+            _index_type(lowering, one)
         return lowering.wrapped(kind.dtype, None)
     at = item_place(lowering, array, place)
     if isinstance(kind.dtype, types.Record):
@@ -125,9 +130,7 @@ def _bounds(lowering: Any, one: slice, count: Any) -> tuple[Any, Any, Any]:
     def bound(thing: Any, otherwise: Any) -> Any:
         if thing is None:
             return otherwise
-        value = lowering.lowered(thing, types.intp)
-        negative = builder.icmp_signed("<", value, zero)
-        value = builder.select(negative, builder.add(value, count), value)
+        value = _from_the_end(builder, lowering.lowered(thing, types.intp), count)
         value = builder.select(builder.icmp_signed("<", value, zero), zero, value)
         return builder.select(builder.icmp_signed(">", value, count), count, value)
 
@@ -226,7 +229,7 @@ def set_attribute(lowering: Any, thing: Value, name: str, value: Any) -> None:
 
 def _seen_as(lowering: Any, thing: Value, number: Any) -> Value:
     """See the bits of a number as another number."""
-    wanted = lowering.number_type(number)
+    wanted = OPERATIONS[getattr(number, "seen", number)](types.int64).result
     if wanted.bitwidth != thing._kind.bitwidth:
         raise Untraceable("numbers of other widths have other bits")
     builder = lowering.builder
@@ -248,6 +251,3 @@ def item_of_tuple(lowering: Any, things: tuple, place: Value) -> Any:
         code.put(builder, kind, value, code.at(builder, room, 0, k))
     found = builder.gep(room, [code.I64(0), index], inbounds=True)
     return lowering.wrapped(kind, code.get(builder, kind, found))
-
-
-GET, PUT = operator.getitem, operator.setitem

@@ -16,47 +16,39 @@ from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 from llvmlite import ir
-from numba import config, types
+from numba import types
 
 from karamelo_py.compiler import cache, code, compile_lock, machine
-from karamelo_py.compiler.argument_buffer import ArgumentBuffer, reader
-from karamelo_py.compiler.choices import Choice, Unknown, choosers, contents, note, parts_noted
+from karamelo_py.compiler.argument_buffer import ArgumentBuffer, plan_for, reader
+from karamelo_py.compiler.choices import (
+    INTERPRETED,
+    Choice,
+    Unknown,
+    choosers,
+    contents,
+    note,
+    parts_noted,
+)
 from karamelo_py.compiler.compile import shared
-from karamelo_py.compiler.failing import raise_noted
+from karamelo_py.compiler.failing import noting, raise_noted
 from karamelo_py.compiler.held import HeldTuple, hold, item_of
-from karamelo_py.compiler.intrinsics import builtin
 from karamelo_py.compiler.lowering import function_type
 from karamelo_py.compiler.trace import alone, formula, write_into
+from karamelo_py.compiler.values import builtin, intrinsic
 
 _CALL = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64)  # free of the interpreter lock
 NAME, ENTRY = "$kernel", ".entry"  # what functions of a module are called until it has a name
 
 
 class Unit(NamedTuple):
-    """Hold the machine code of a function for arguments of some types.
+    """Hold the machine code of a function for arguments of some types."""
 
-    Attributes
-    ----------
-    name
-        Of the function; that of its entry for Python has an ending more.
-    result
-        The type of what it gives.
-    code
-        An object file.
-    needs
-        The units that it calls.
-    choices
-        What its point functions were asked for, and those of its needs.
-    raises
-        Whether something in it raises exceptions.
-    """
-
-    name: str
+    name: str  # that of its entry for Python has an ending more
     result: types.Type
-    code: bytes
-    needs: tuple
-    choices: frozenset[Choice]
-    raises: bool
+    code: bytes  # an object file
+    needs: tuple  # the units that it calls
+    choices: frozenset[Choice]  # what point functions were asked for, also those of its needs
+    raises: bool  # whether something in it raises exceptions
 
 
 _loaded: dict[str, list[int]] = {}
@@ -164,17 +156,11 @@ def _write_entry(module: ir.Module, main: ir.Function, kinds: tuple, result: typ
 
 
 class Kernel:
-    """Compile a function for the types of its arguments, and keep it on disk.
-
-    Parameters
-    ----------
-    function
-        What is traced.
-    """
+    """Compile a function for the types of its arguments, and keep it on disk."""
 
     def __init__(self, function: Callable):
         self.function = function
-        self.files = cache.KernelFiles(function)
+        self.files = cache.KernelFiles(function, load)
         self.units: dict[tuple, Unit] = {}
         self._plans: dict[tuple, tuple] = {}
 
@@ -185,21 +171,18 @@ class Kernel:
 
     def unit(self, kinds: tuple, result: types.Type | None = None) -> Unit:
         """Give the machine code for arguments of these types."""
-        if kinds in self.units:
+        with _alone:
+            if kinds not in self.units:
+                self.units[kinds] = self.files.kernel(
+                    kinds, result, lambda: _compiled(self.function, kinds, result)
+                )
             return self.units[kinds]
-        with _alone, self.files.for_types(kinds, result) as place:
-            unit = place.found
-            if unit is None:
-                unit, codes = _compiled(self.function, kinds, result)
-                place.keep(unit, codes)
-            self.units[kinds] = unit
-        return unit
 
     def __call__(self, *arguments: Any) -> Any:
         written = ArgumentBuffer(arguments)
         kinds = tuple(written.kinds)
         if kinds not in self._plans:
-            plan = written.plan(arguments)
+            plan = plan_for(arguments)
             unit = self.unit(plan.types)
             self._plans[kinds] = plan, _CALL(load(unit)[1]), *reader(unit.result)
         plan, entry, size, read = self._plans[kinds]
@@ -211,7 +194,7 @@ class Kernel:
 
     def compile(self, *arguments: Any) -> None:
         """Have it compiled for arguments of these types."""
-        load(self.unit(ArgumentBuffer(arguments).plan(arguments).types))
+        load(self.unit(plan_for(arguments).types))
 
 
 def kernel(function: Callable) -> Callable:
@@ -220,7 +203,7 @@ def kernel(function: Callable) -> Callable:
     No fast mathematics: where products and sums contract would depend on what a loop is inlined
     into. `fma` says where.
     """
-    if config.DISABLE_JIT:
+    if INTERPRETED:
         return function
     made = Kernel(shared(function))
 
@@ -252,14 +235,64 @@ def kernel(function: Callable) -> Callable:
 
 def noinline(function: Callable) -> Callable:
     """Mark a function that kernels call, too large to be written into each place that calls it."""
-    if not config.DISABLE_JIT:
+    if not INTERPRETED:
         alone(function)
         shared(function)
     return function
 
 
-def address_in_memory(function: Callable, kinds: tuple, result: types.Type) -> int:
-    """Compile a function of these types; give its address."""
-    if function not in choosers:
-        shared(function)
-    return load(Kernel(function).unit(kinds, result))[0]
+# --- functions that kernels call by their address, and do not contain -----------------------------
+
+_uncompiled: list[Callable] = []
+_addresses: dict[Callable, int] = {}
+_keep_alive: list = []
+
+
+def address_of(function: Callable, signature: types.Type) -> int:
+    """Compile `function` (cached on disk) and return the address that kernels call it by.
+
+    Whoever calls by address does not contain the function: it need not be compiled anew for
+    another one, and the function is compiled once for all its callers.
+    """
+    if function not in _addresses:
+        if INTERPRETED:
+            _addresses[function] = address_of_python(function, signature)
+        else:
+            if function not in choosers:
+                shared(function)
+            unit = Kernel(function).unit(signature.args, signature.return_type)
+            _addresses[function] = load(unit)[0]
+    return _addresses[function]
+
+
+def address_of_python(function: Callable, signature: types.Type) -> int:
+    """Give the address by which kernels call a function of Python, of whole numbers.
+
+    What is raised in it is raised again behind the kernel.
+    """
+    if INTERPRETED:
+        _uncompiled.append(function)
+        return len(_uncompiled) - 1
+    made = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * len(signature.args))(
+        noting(function)
+    )
+    _keep_alive.append(made)
+    return ctypes.cast(made, ctypes.c_void_p).value
+
+
+def caller_of(signature: Any) -> Callable:
+    """Make ``call(address, ...)``, which calls a function of this signature by its address."""
+    result, parameters = signature.return_type, signature.args
+
+    if INTERPRETED:
+        return lambda address, *arguments: _uncompiled[address](*arguments)
+
+    @intrinsic
+    def call(address, *arguments):
+        def codegen(builder, place, *values):
+            kind = function_type(parameters, result)
+            return builder.call(builder.inttoptr(place, kind.as_pointer()), values)
+
+        return result(types.int64, *parameters), codegen
+
+    return call

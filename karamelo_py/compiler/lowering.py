@@ -1,5 +1,6 @@
 """Code of what meets a value, by the table of operations and by intrinsics."""
 
+import operator
 from collections.abc import Callable
 from typing import Any
 
@@ -9,8 +10,16 @@ from numba import typeof, types
 
 from karamelo_py.compiler import arithmetic, code, failing, indexing
 from karamelo_py.compiler.held import _Held, item_of
-from karamelo_py.compiler.intrinsics import BUILTINS, Intrinsic
-from karamelo_py.compiler.values import Emitted, HeldValue, Untraceable, Value, words, writing
+from karamelo_py.compiler.values import (
+    BUILTINS,
+    Emitted,
+    HeldValue,
+    Intrinsic,
+    Untraceable,
+    Value,
+    words,
+    writing,
+)
 
 MOST_OPERATIONS = 10_000  # of one formula; beyond, a loop is better left to the compiler
 
@@ -26,33 +35,17 @@ class FunctionType(types.Type):
 class Lowering:
     """Write code with a builder, or none while only types are asked for.
 
-    Parameters
-    ----------
-    seen
-        What takes the place of a function in functions that are run.
-    builder
-        LLVM's.
-
-    Attributes
-    ----------
-    classes
-        Of the tuples that were met.
-    read
-        What was read of held tuples on the way to here.
-    regardless
-        Whether the function goes on where one that it calls raises an exception.
+    ``seen(function)`` takes the place of a function in functions that are run.
     """
 
-    spread: Callable  # what makes lanes of a number
-    converted: Callable  # what makes lanes of real numbers of lanes of whole ones
     dispatch: Callable  # what calls functions that are chosen by type
 
     def __init__(self, seen: Callable, builder: ir.IRBuilder | None = None):
         self.seen, self.builder = seen, builder
-        self.classes: set[type] = set()
+        self.classes: set[type] = set()  # of the tuples that were met
         self.operations = 0
-        self.regardless = False
-        self.read: dict[tuple, Any] = {}
+        self.regardless = False  # whether it goes on where what it calls raises an exception
+        self.read: dict[tuple, Any] = {}  # what was read of held tuples on the way to here
 
     # --- what point functions see, and its types
 
@@ -68,7 +61,7 @@ class Lowering:
             return HeldValue(kind, value)
         if isinstance(kind, types.BaseTuple):
             inner = [
-                self.wrapped(item, self.builder and self.builder.extract_value(value, k))
+                self.wrapped(item, value and self.builder.extract_value(value, k))
                 for k, item in enumerate(kind)
             ]
             made = getattr(kind, "instance_class", None)
@@ -85,28 +78,19 @@ class Lowering:
             return thing._kind
         if isinstance(thing, int):
             return types.literal(thing)
-        if isinstance(thing, float):
-            return types.float64
         if isinstance(thing, tuple):
             kinds = tuple(types.unliteral(self.kind_of(item)) for item in thing)
             made = type(thing) if hasattr(thing, "_fields") else None
             if made:
                 self.classes.add(made)
             return types.BaseTuple.from_types(kinds, made)
-        if thing is None:
-            return types.none
-        if isinstance(thing, np.generic):
+        if thing is None or isinstance(thing, float | np.generic):
             return typeof(thing)
         if isinstance(thing, Emitted):
             return FunctionType(thing.seen)
         if isinstance(thing, type) and issubclass(thing, tuple) and hasattr(thing, "_fields"):
             return types.NamedTupleClass(thing)
         raise Untraceable(f"{thing!r} is nothing that a kernel knows")
-
-    def number_type(self, number: Any) -> types.Type:
-        """Give the type of the numbers of a class."""
-        made = arithmetic.OPERATIONS.get(getattr(number, "seen", number))
-        return made(types.int64).result
 
     def lowered(self, thing: Any, wanted: types.Type) -> Any:
         """Give code of what point functions see, in the type `wanted`."""
@@ -116,11 +100,10 @@ class Lowering:
             items = [self.lowered(a, k) for a, k in zip(thing, wanted, strict=True)]
             return code.make_tuple(self.builder, wanted, items)
         if isinstance(thing, int | float | np.generic):
-            if hasattr(wanted, "width"):
-                made = code.constant(self.builder, wanted.scalar, thing)
-                return self.spread(self.builder, made, wanted)
-            if isinstance(types.unliteral(wanted), types.Number | types.Boolean):
-                return code.constant(self.builder, types.unliteral(wanted), thing)
+            scalar = types.unliteral(code.scalar_of(wanted))
+            if isinstance(scalar, types.Number | types.Boolean):
+                made = code.constant(self.builder, scalar, thing)
+                return code.cast(self.builder, made, scalar, wanted)
         return code.nothing()
 
     def constant(self, array: np.ndarray) -> Value:
@@ -135,9 +118,9 @@ class Lowering:
             return first
         if all(isinstance(kind, types.Number | types.Boolean) for kind in kinds):
             return arithmetic.common(*kinds)
-        if all(isinstance(kind, types.Array) for kind in kinds):
-            alike = all((k.dtype, k.ndim) == (first.dtype, first.ndim) for k in kinds)
-            return first.copy(layout="A", readonly=True) if alike else None
+        arrays = all(isinstance(kind, types.Array) for kind in kinds)
+        if arrays and len({(k.dtype, k.ndim) for k in kinds}) == 1:
+            return first.copy(layout="A", readonly=True)
         return None
 
     # --- operations
@@ -146,10 +129,8 @@ class Lowering:
         """Give what `function` gives for these arguments."""
         if function in BUILTINS:
             return BUILTINS[function](self, *arguments)
-        if function is slice:
-            return slice(*arguments)
         if function in _OF_ITEMS and _has_slice(arguments[1]):
-            return self.of_item(function, *arguments)
+            return self.of_item(*arguments)
         found = self.dispatch(function, arguments)
         if found is not NotImplemented:
             return found
@@ -157,7 +138,7 @@ class Lowering:
         if self.operations > MOST_OPERATIONS and self.builder is None:
             raise Untraceable(f"it has more than {MOST_OPERATIONS} operations: take a loop")
         if function in _OF_ITEMS:
-            return self.of_item(function, *arguments)
+            return self.of_item(*arguments)
         kinds = tuple(map(self.kind_of, arguments))
         operation = self.operation(function, kinds)
         if operation is None:
@@ -187,7 +168,7 @@ class Lowering:
             f"{name_of(function)} is not defined for ({', '.join(map(words, kinds))})"
         )
 
-    def of_item(self, function: Callable, things: Any, place: Any, *value: Any) -> Any:
+    def of_item(self, things: Any, place: Any, *value: Any) -> Any:
         """Read or write an item of an array or of a tuple."""
         if isinstance(things, Value) and isinstance(things._kind, types.Array):
             do = indexing.put if value else indexing.get
@@ -198,19 +179,13 @@ class Lowering:
 
     def in_type_of(self, thing: Any, like: Any) -> Any:
         """Give a whole number as a real one of the type of `like`."""
-        if hasattr(thing._kind, "width"):
-            return self.call(self.converted, (thing, like))
-        kind = getattr(like._kind, "scalar", like._kind)
+        kind = code.scalar_of(like._kind)
+        if isinstance(thing._kind, code.Lanes):
+            kind = code.Lanes(kind, thing._kind.width)
         value = self.builder and code.cast(self.builder, thing._value, thing._kind, kind)
         return Value(kind, value)
 
-    def attribute(self, thing: Value, name: str) -> Any:
-        """Give an attribute of an array, a record or a number."""
-        return indexing.attribute(self, thing, name)
-
-    def set_attribute(self, thing: Value, name: str, value: Any) -> None:
-        """Set an attribute of a record."""
-        indexing.set_attribute(self, thing, name, value)
+    attribute, set_attribute = indexing.attribute, indexing.set_attribute
 
     def item(self, held: HeldValue, k: int) -> Any:
         """Give an item of a held tuple."""
@@ -241,10 +216,7 @@ class Lowering:
         given = iter(values)
         with writing(self):
             found = run(
-                *(
-                    self.wrapped(k, _undefined(k) if code.is_empty(k) else next(given))
-                    for k in kinds
-                )
+                *(self.wrapped(k, None if code.is_empty(k) else next(given)) for k in kinds)
             )
             if code.is_empty(result):
                 self.builder.ret_void()
@@ -257,8 +229,7 @@ class Lowering:
         """Call the function of its own that does what `run` does."""
         if self.builder is None:
             return self.wrapped(result, None)
-        function = self.function(name, run, kinds, result)
-        return self.call_function(function, kinds, result, arguments)
+        return self.call_function(self.function(name, run, kinds, result), kinds, result, arguments)
 
     def call_function(
         self, function: Any, kinds: tuple, result: types.Type, arguments: tuple
@@ -267,9 +238,8 @@ class Lowering:
         pairs = zip(arguments, kinds, strict=True)
         values = [self.lowered(a, k) for a, k in pairs if not code.is_empty(k)]
         made = self.builder.call(function, values)
-        made = _undefined(result) if code.is_empty(result) else made
         failing.go_on(self.builder, function, self.regardless)
-        return self.wrapped(result, made)
+        return self.wrapped(result, None if code.is_empty(result) else made)
 
 
 def function_type(kinds: tuple, result: types.Type) -> ir.FunctionType:
@@ -278,11 +248,7 @@ def function_type(kinds: tuple, result: types.Type) -> ir.FunctionType:
     return ir.FunctionType(gives, [code.register_type(k) for k in kinds if not code.is_empty(k)])
 
 
-def _undefined(kind: types.Type) -> ir.Constant:
-    return ir.Constant(code.register_type(kind), ir.Undefined)
-
-
-_OF_ITEMS = {indexing.GET, indexing.PUT}
+_OF_ITEMS = {operator.getitem, operator.setitem}
 _operations: dict[tuple, arithmetic.Operation | None] = {}
 
 
@@ -296,11 +262,9 @@ def _of_intrinsic(function: Intrinsic, kinds: tuple) -> arithmetic.Operation | N
     if found is None:
         return None
     signature, codegen = found
-
-    def write(builder: Any, values: list) -> Any:
-        return codegen(builder, signature, values)
-
-    return arithmetic.Operation(signature.return_type, signature.args, write)
+    return arithmetic.Operation(
+        signature.return_type, signature.args, lambda builder, values: codegen(builder, *values)
+    )
 
 
 def name_of(function: Callable) -> str:

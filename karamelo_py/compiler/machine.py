@@ -6,6 +6,7 @@ so that results would differ between one thread and two, or a run in pieces and 
 
 import ctypes
 import functools
+import sys
 from collections.abc import Callable
 
 from llvmlite import binding as llvm
@@ -96,6 +97,11 @@ def load(code: bytes, *names: str) -> list[int]:
 def publish(name: str, address: int) -> None:
     """Let code that is loaded from now on call a function by its name."""
     llvm.add_symbol(name, address)
+
+
+def is_known(name: str) -> bool:
+    """Tell whether code that is loaded can call a function by its name."""
+    return sys.platform == "win32" or hasattr(ctypes.CDLL(None), name)
 
 
 _callbacks: list = []  # code may call them as long as the process lives

@@ -1,166 +1,67 @@
 """The operations of formulas: their numbers, and what they do in kernels and in NumPy."""
 
 import math
+import operator
+from collections.abc import Callable
 
 import numpy as np
 
 from karamelo_py.compiler.compile import implements
 from karamelo_py.compiler.loops import noinline
 
-# fmt: off
-UNARY = (
-    "neg", "not", "abs", "sign", "step", "sqrt", "cbrt", "exp", "log", "log10", "log2",
-    "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh",
-    "asinh", "acosh", "atanh", "erf", "erfc", "gamma", "lgamma", "expm1", "log1p",
-    "floor", "ceil", "round", "trunc",
-)
-BINARY = (
-    "+", "-", "*", "/", "^", "%", "<", "<=", ">", ">=", "==", "!=",
-    "&&", "||", "min", "max", "atan2", "hypot",
-)
-# fmt: on
-
-_FIRST_UNARY = 4
-FIRST_BINARY = 64
-SELECT = 128
-OPERATIONS = (
-    {name: _FIRST_UNARY + k for k, name in enumerate(UNARY)}
-    | {name: FIRST_BINARY + k for k, name in enumerate(BINARY)}
-    | {"if": SELECT}
-)
-
-(NEG, NOT, ABS, SIGN, STEP, SQRT, CBRT, EXP, LOG, LOG10, LOG2) = range(4, 15)
-(SIN, COS, TAN, ASIN, ACOS, ATAN, SINH, COSH, TANH) = range(15, 24)
-(ASINH, ACOSH, ATANH, ERF, ERFC, GAMMA, LGAMMA, EXPM1, LOG1P) = range(24, 33)
-(FLOOR, CEIL, ROUND, TRUNC) = range(33, 37)
-(ADD, SUB, MUL, DIV, POW, MOD, LT, LE, GT, GE, EQ, NE) = range(64, 76)
-(AND, OR, MIN, MAX, ATAN2, HYPOT) = range(76, 82)
-
 
 @noinline
-def _whole(op, a):
-    """A number without its fraction; by sums, which every processor has."""
+def _whole(a, down, up):
+    """A number rounded to a whole one; by sums, which every processor has."""
     if not abs(a) < 2.0**52:
         return a  # whole, or no number
     far = math.copysign(2.0**52, a)
     near = (a + far) - far
-    if near > a and (op == FLOOR or (op == TRUNC and a > 0.0)):
+    if near > a and down:
         near -= 1.0
-    elif near < a and (op == CEIL or (op == TRUNC and a < 0.0)):
+    elif near < a and up:
         near += 1.0
     return math.copysign(near, a)  # -0.0 too
 
 
-@noinline
-def function_of(op, a):
-    """Any function of one number: one chain of choices, where a loop for each would be too much."""
-    if op == NEG:
-        return -a
-    if op == NOT:
-        return 1.0 if a == 0.0 else 0.0
-    if op == ABS:
-        return abs(a)
-    if op == SIGN:
-        return 1.0 if a > 0.0 else (-1.0 if a < 0.0 else a)
-    if op == STEP:
-        return 0.0 if a < 0.0 else (1.0 if a >= 0.0 else a)
-    if op == SQRT:
-        return math.sqrt(a)
-    if op == EXP:
-        return math.exp(a)
-    if op == LOG:
-        return math.log(a)
-    if op == SIN:
-        return math.sin(a)
-    if op == COS:
-        return math.cos(a)
-    if FLOOR <= op <= TRUNC:
-        return _whole(op, a)
-    if op == CBRT:
-        return math.copysign(math.pow(abs(a), 1.0 / 3.0), a)
-    if op == LOG10:
-        return math.log10(a)
-    if op == LOG2:
-        return math.log2(a)
-    if op == TAN:
-        return math.tan(a)
-    if op == ASIN:
-        return math.asin(a)
-    if op == ACOS:
-        return math.acos(a)
-    if op == ATAN:
-        return math.atan(a)
-    if op == SINH:
-        return math.sinh(a)
-    if op == COSH:
-        return math.cosh(a)
-    if op == TANH:
-        return math.tanh(a)
-    if op == ASINH:
-        return math.asinh(a)
-    if op == ACOSH:
-        return math.acosh(a)
-    if op == ATANH:
-        return math.atanh(a)
-    if op == ERF:
-        return math.erf(a)
-    if op == ERFC:
-        return math.erfc(a)
-    if op == GAMMA:
-        return math.gamma(a)
-    if op == LGAMMA:
-        return math.lgamma(a)
-    if op == EXPM1:
-        return math.expm1(a)
-    return math.log1p(a)
+def _not(a):
+    return 1.0 if a == 0.0 else 0.0
 
 
-@noinline
-def operation_of(op, a, b):
-    """Any operation on two numbers: comparisons and logical ones give 1.0 or 0.0."""
-    if op == ADD:
-        return a + b
-    if op == SUB:
-        return a - b
-    if op == MUL:
-        return a * b
-    if op == DIV:
-        return a / b
-    if op == POW:
-        return math.pow(a, b)
-    if op == MIN:
-        return b if b < a else a
-    if op == MAX:
-        return b if b > a else a
-    if op == MOD:
-        return a % b  # the sign of the divisor, as in Python
-    if op == ATAN2:
-        return math.atan2(a, b)
-    if op == HYPOT:
-        return math.hypot(a, b)
-    if op == LT:
-        result = a < b
-    elif op == LE:
-        result = a <= b
-    elif op == GT:
-        result = a > b
-    elif op == GE:
-        result = a >= b
-    elif op == EQ:
-        result = a == b
-    elif op == NE:
-        result = a != b
-    elif op == AND:
-        result = (a != 0.0) and (b != 0.0)
-    else:
-        result = (a != 0.0) or (b != 0.0)
-    return 1.0 if result else 0.0
+def _sign(a):
+    return 1.0 if a > 0.0 else (-1.0 if a < 0.0 else a)
 
 
-# ---- the same in NumPy, for runs without compilation --------------------------------------------
+def _step(a):
+    return 0.0 if a < 0.0 else (1.0 if a >= 0.0 else a)
 
 
-def _each(function, nan=math.nan):
+def _and(a, b):
+    return 1.0 if (a != 0.0) and (b != 0.0) else 0.0
+
+
+def _or(a, b):
+    return 1.0 if (a != 0.0) or (b != 0.0) else 0.0
+
+
+def _min(a, b):
+    return b if b < a else a
+
+
+def _max(a, b):
+    return b if b > a else a
+
+
+def _truth(compare: Callable) -> Callable:
+    """A comparison that gives 1.0 or 0.0."""
+
+    def truth(a, b):
+        return 1.0 if compare(a, b) else 0.0
+
+    return truth
+
+
+def _each(function: Callable, nan: float = math.nan) -> Callable:
     """`function` of the standard library for arrays, NaN where it refuses."""
 
     def safe(value):
@@ -174,41 +75,79 @@ def _each(function, nan=math.nan):
     return np.vectorize(safe, otypes=[float])
 
 
-_NUMPY = {
-    "neg": np.negative,
-    "not": lambda a: (a == 0.0) * 1.0,
-    "step": lambda a: np.where(np.isnan(a), a, (a >= 0.0) * 1.0),
-    "asin": np.arcsin,
-    "acos": np.arccos,
-    "atan": np.arctan,
-    "asinh": np.arcsinh,
-    "acosh": np.arccosh,
-    "atanh": np.arctanh,
-    "erf": _each(math.erf),
-    "erfc": _each(math.erfc),
-    "gamma": _each(math.gamma),
-    "lgamma": _each(math.lgamma, nan=math.inf),
-    "round": np.rint,
-    "+": np.add,
-    "-": np.subtract,
-    "*": np.multiply,
-    "/": np.divide,
-    "^": np.power,
-    "%": np.mod,
-    "<": np.less,
-    "<=": np.less_equal,
-    ">": np.greater,
-    ">=": np.greater_equal,
-    "==": np.equal,
-    "!=": np.not_equal,
-    "&&": lambda a, b: (a != 0.0) & (b != 0.0),
-    "||": lambda a, b: (a != 0.0) | (b != 0.0),
-    "min": lambda a, b: np.where(b < a, b, a),
-    "max": lambda a, b: np.where(b > a, b, a),
-    "atan2": np.arctan2,
-    "if": lambda c, a, b: np.where(c != 0.0, a, b),
+# What they do to a number in kernels, and to arrays of them in NumPy.
+UNARY = {
+    "neg": (operator.neg, np.negative),
+    "not": (_not, lambda a: (a == 0.0) * 1.0),
+    "abs": (abs, np.abs),
+    "sign": (_sign, np.sign),
+    "step": (_step, lambda a: np.where(np.isnan(a), a, (a >= 0.0) * 1.0)),
+    "sqrt": (math.sqrt, np.sqrt),
+    "cbrt": (lambda a: math.copysign(math.pow(abs(a), 1.0 / 3.0), a), np.cbrt),
+    "exp": (math.exp, np.exp),
+    "log": (math.log, np.log),
+    "log10": (math.log10, np.log10),
+    "log2": (math.log2, np.log2),
+    "sin": (math.sin, np.sin),
+    "cos": (math.cos, np.cos),
+    "tan": (math.tan, np.tan),
+    "asin": (math.asin, np.arcsin),
+    "acos": (math.acos, np.arccos),
+    "atan": (math.atan, np.arctan),
+    "sinh": (math.sinh, np.sinh),
+    "cosh": (math.cosh, np.cosh),
+    "tanh": (math.tanh, np.tanh),
+    "asinh": (math.asinh, np.arcsinh),
+    "acosh": (math.acosh, np.arccosh),
+    "atanh": (math.atanh, np.arctanh),
+    "erf": (math.erf, _each(math.erf)),
+    "erfc": (math.erfc, _each(math.erfc)),
+    "gamma": (math.gamma, _each(math.gamma)),
+    "lgamma": (math.lgamma, _each(math.lgamma, nan=math.inf)),
+    "expm1": (math.expm1, np.expm1),
+    "log1p": (math.log1p, np.log1p),
+    "floor": (lambda a: _whole(a, True, False), np.floor),
+    "ceil": (lambda a: _whole(a, False, True), np.ceil),
+    "round": (lambda a: _whole(a, False, False), np.rint),
+    "trunc": (lambda a: _whole(a, a > 0.0, a < 0.0), np.trunc),
 }
-IN_NUMPY = {number: _NUMPY.get(name) or getattr(np, name) for name, number in OPERATIONS.items()}
+BINARY = {
+    "+": (operator.add, np.add),
+    "-": (operator.sub, np.subtract),
+    "*": (operator.mul, np.multiply),
+    "/": (operator.truediv, np.divide),
+    "^": (math.pow, np.power),
+    "%": (operator.mod, np.mod),  # the sign of the divisor, as in Python
+    "<": (_truth(operator.lt), np.less),
+    "<=": (_truth(operator.le), np.less_equal),
+    ">": (_truth(operator.gt), np.greater),
+    ">=": (_truth(operator.ge), np.greater_equal),
+    "==": (_truth(operator.eq), np.equal),
+    "!=": (_truth(operator.ne), np.not_equal),
+    "&&": (_and, lambda a, b: (a != 0.0) & (b != 0.0)),
+    "||": (_or, lambda a, b: (a != 0.0) | (b != 0.0)),
+    "min": (_min, lambda a, b: np.where(b < a, b, a)),
+    "max": (_max, lambda a, b: np.where(b > a, b, a)),
+    "atan2": (math.atan2, np.arctan2),
+    "hypot": (math.hypot, np.hypot),
+}
+
+FIRST_UNARY, FIRST_BINARY, SELECT = 4, 64, 128
+OPERATIONS = (
+    {name: FIRST_UNARY + k for k, name in enumerate(UNARY)}
+    | {name: FIRST_BINARY + k for k, name in enumerate(BINARY)}
+    | {"if": SELECT}
+)
+IN_NUMPY = {OPERATIONS[name]: function for name, (_, function) in (UNARY | BINARY).items()}
+
+
+def in_kernels(*names: str) -> tuple[tuple[int, Callable], ...]:
+    """The numbers of some operations, and what they are in kernels."""
+    return tuple((OPERATIONS[name], (UNARY | BINARY)[name][0]) for name in names)
+
+
+_UNARY_IN_KERNELS = in_kernels(*UNARY)
+_BINARY_IN_KERNELS = in_kernels(*BINARY)
 
 
 def of_one(op, a):
@@ -217,7 +156,14 @@ def of_one(op, a):
         return float(IN_NUMPY[op](a))
 
 
-implements(of_one)(function_of)
+@implements(of_one)
+@noinline
+def function_of(op, a):
+    """Any function of one number: one chain of choices, where a loop for each would be too much."""
+    for number, do in _UNARY_IN_KERNELS:
+        if op == number:
+            return do(a)
+    return a
 
 
 def of_two(op, a, b):
@@ -226,4 +172,11 @@ def of_two(op, a, b):
         return float(IN_NUMPY[op](np.float64(a), b))
 
 
-implements(of_two)(operation_of)
+@implements(of_two)
+@noinline
+def operation_of(op, a, b):
+    """Any operation on two numbers: comparisons and logical ones give 1.0 or 0.0."""
+    for number, do in _BINARY_IN_KERNELS:
+        if op == number:
+            return do(a, b)
+    return a

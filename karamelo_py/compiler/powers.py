@@ -8,16 +8,15 @@ Interpreted, they are Python's.
 
 import math
 from math import factorial, inf, nan
-from typing import Any
+from typing import Any, NamedTuple
 
 from llvmlite import ir
 from numba import types
 
 from karamelo_py.compiler import code
+from karamelo_py.compiler.code import I32, Lanes
 from karamelo_py.compiler.compile import all_lanes, by_type, fma, implements, real, shared, where
-from karamelo_py.compiler.intrinsics import intrinsic
-from karamelo_py.compiler.lanes.registers import Lanes, element, vector_of
-from karamelo_py.compiler.values import OF_REALS
+from karamelo_py.compiler.values import OF_REALS, intrinsic
 
 
 def logarithm(x: float) -> float:
@@ -43,23 +42,23 @@ def power(x: float, y: float) -> float:
 OF_REALS |= {power}
 
 
-def _bits(kind: Any) -> tuple[Any, Any, int, int]:
-    """Types of the bits of a number, or of numbers in lanes; bits of the mantissa; the bias."""
-    scalar = kind.scalar if isinstance(kind, Lanes) else kind
-    whole = ir.IntType(scalar.bitwidth)
+class _Bits(NamedTuple):
+    """Describe the bits of a number, or of each number in lanes."""
+
+    number: ir.Type
+    whole: ir.Type  # the same bits
+    short: ir.Type  # whole numbers of 32 bits, from which every processor makes real ones
+    mantissa: int
+    bias: int
+
+
+def _bits(kind: Any) -> _Bits:
+    scalar = code.scalar_of(kind)
+    whole, short = ir.IntType(scalar.bitwidth), I32
     if isinstance(kind, Lanes):
-        whole = ir.VectorType(whole, kind.width)
-    return (
-        (vector_of(kind) if isinstance(kind, Lanes) else element(kind)),
-        whole,
-        *((52, 1023) if scalar.bitwidth == 64 else (23, 127)),
-    )
-
-
-def _short(whole: ir.Type) -> ir.Type:
-    """Whole numbers of 32 bits, from which every processor makes real ones."""
-    short = ir.IntType(32)
-    return ir.VectorType(short, whole.count) if isinstance(whole, ir.VectorType) else short
+        whole, short = (ir.VectorType(one, kind.width) for one in (whole, short))
+    parts = (52, 1023) if scalar.bitwidth == 64 else (23, 127)
+    return _Bits(code.register_type(kind), whole, short, *parts)
 
 
 def _constant(whole: ir.Type, value: int) -> ir.Constant:
@@ -70,16 +69,16 @@ def _constant(whole: ir.Type, value: int) -> ir.Constant:
 def _taken_apart(x):
     """m between the roots of 1/2 and of 2, and e as a real number, with x = m 2^e."""
     made = types.UniTuple(x, 2)
+    number, whole, short, mantissa, _ = _bits(x)
+    root = 0x3FE6A09E667F3BCD if mantissa == 52 else 0x3F3504F3  # of 1/2
 
-    def codegen(builder, sig, arguments):
-        number, whole, mantissa, _bias = _bits(x)
-        root = 0x3FE6A09E667F3BCD if mantissa == 52 else 0x3F3504F3  # of 1/2
-        bits = builder.bitcast(arguments[0], whole)
+    def codegen(builder, given):
+        bits = builder.bitcast(given, whole)
         shift = _constant(whole, mantissa)
         e = builder.ashr(builder.sub(bits, _constant(whole, root)), shift)
         m = builder.bitcast(builder.sub(bits, builder.shl(e, shift)), number)
         if mantissa == 52:
-            e = builder.trunc(e, _short(whole))
+            e = builder.trunc(e, short)
         return code.make_tuple(builder, made, [m, builder.sitofp(e, number)])
 
     return made(x), codegen
@@ -88,16 +87,14 @@ def _taken_apart(x):
 @intrinsic
 def _scaled(x, n):
     """x 2^n, n a whole number in the type of x, up to 2000 in size."""
+    number, whole, short, mantissa, bias = _bits(x)
 
-    def codegen(builder, sig, arguments):
-        number, whole, mantissa, bias = _bits(x)
-        narrow = _short(whole)
-        n = builder.fptosi(arguments[1], narrow)
-        half = builder.ashr(n, _constant(narrow, 1))
-        value = arguments[0]
+    def codegen(builder, value, n):
+        n = builder.fptosi(n, short)
+        half = builder.ashr(n, _constant(short, 1))
         for part in (half, builder.sub(n, half)):
             # Twice half of the way: results go on to infinity and to the smallest numbers.
-            e = builder.add(part, _constant(narrow, bias))
+            e = builder.add(part, _constant(short, bias))
             if mantissa == 52:
                 e = builder.sext(e, whole)
             factor = builder.bitcast(builder.shl(e, _constant(whole, mantissa)), number)
@@ -151,7 +148,7 @@ def _logarithm_near_one(x):
 @by_type(exponential)
 def _exponential(x):
     # So far from 0 that the next number is 1 away; all targets know how to add, but not to round.
-    most, far = (1000, 1.5 * 2**52) if _bits(x)[3] == 1023 else (130, 1.5 * 2**23)
+    most, far = (1000, 1.5 * 2**52) if _bits(x).mantissa == 52 else (130, 1.5 * 2**23)
 
     def exponential(x):
         """e^x = 2^n e^r with |r| up to ln 2 / 2; beyond `most` it is 0 or infinite."""

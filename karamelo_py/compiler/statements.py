@@ -11,6 +11,11 @@ import builtins
 import copy
 import functools
 import inspect
+import itertools
+import linecache
+import os
+import textwrap
+import time
 import types as python
 from collections.abc import Callable, Iterable
 from typing import Any
@@ -19,7 +24,6 @@ from numba import types
 
 from karamelo_py.compiler.expressions import BINARY, CHANGING, ON_ALL_WAYS, ExpressionCompiler
 from karamelo_py.compiler.flow import Counter, Edge, Flow, Grows, Range, is_value
-from karamelo_py.compiler.source import source_of
 from karamelo_py.compiler.values import LONG, DataDependentBranch, Untraceable
 
 
@@ -39,18 +43,55 @@ def place_in_text(frame: python.FrameType) -> tuple[str, int] | None:
     return walk.walked.__code__.co_filename, statement.lineno
 
 
+# --- text -----------------------------------------------------------------------------------------
+
+_LONGEST_END = 40  # lines of closing brackets, at most, behind the last one with code
+_began = time.time()
+
+
+def _codes(code: python.CodeType) -> list[python.CodeType]:
+    """List code, and that of all functions in it."""
+    inner = (_codes(c) for c in code.co_consts if isinstance(c, python.CodeType))
+    return [code, *itertools.chain.from_iterable(inner)]
+
+
+def _is_as_read(code: python.CodeType, lines: list[str]) -> bool:
+    """Tell whether a file is as Python has read it; what was typed in lies in no file."""
+    try:
+        about = os.stat(code.co_filename)
+    except OSError:
+        return True
+    if max(about.st_ctime, about.st_mtime) < _began:
+        return True
+    return code in _codes(compile("".join(lines), code.co_filename, "exec", dont_inherit=True))
+
+
+def source_of(function: Callable) -> ast.FunctionDef:
+    """Parse the text of a function."""
+    code = function.__code__
+    lines = linecache.getlines(code.co_filename)
+    if not _is_as_read(code, lines):
+        raise Untraceable("its file has changed since Python read it: start anew")
+    first = code.co_firstlineno - 1
+    last = max(line for one in _codes(code) for _, _, line in one.co_lines() if line is not None)
+    for end in range(last, min(last + _LONGEST_END, len(lines)) + 1):
+        try:
+            (definition,) = ast.parse(textwrap.dedent("".join(lines[first:end]))).body
+        except (SyntaxError, ValueError):  # longer and longer, until it can be parsed
+            continue
+        if isinstance(definition, ast.FunctionDef):
+            return ast.increment_lineno(definition, first)
+        break
+    raise Untraceable("its text is not known: write it into a file")
+
+
 # --- the walk -------------------------------------------------------------------------------------
 
 
 class AstFunction:
     """Compile a function from its text, statement by statement, where it is called.
 
-    Parameters
-    ----------
-    function
-        With the globals that it is to see.
-    flow
-        Makes what writes the code of edges, when a call begins.
+    The function has the globals that it is to see; `flow` makes what writes the code of a call.
     """
 
     def __init__(self, function: Callable, flow: Callable[[], Flow]):
@@ -71,20 +112,12 @@ class AstFunction:
 
 
 class AstCompiler(ExpressionCompiler):
-    """Compile one call of a function.
-
-    Attributes
-    ----------
-    names
-        What the function's own names stand for.
-    goes
-        Whether anything is done after the statement before.
-    """
+    """Compile one call of a function."""
 
     def __init__(self, walked: AstFunction, flow: Flow, names: dict[str, Any]):
         self.walked, self.flow, self.names = walked, flow, names
         self.function, self.free = walked.function, walked.free
-        self.goes = True
+        self.goes = True  # whether anything is done after the statement before
         self.returns: list[Edge] = []
         self.breaks: list[Edge] = []
         self.continues: list[Edge] = []
@@ -106,6 +139,10 @@ class AstCompiler(ExpressionCompiler):
         """End a way here."""
         return self.flow.edge(self.names)
 
+    def here(self) -> list[Edge]:
+        """List the way that goes on here, if one does."""
+        return [self.edge()] if self.goes else []
+
     def leave(self, edges: list[Edge]) -> None:
         """End this way here: it goes on where `ways` meet."""
         edges.append(self.edge())
@@ -126,8 +163,7 @@ class AstCompiler(ExpressionCompiler):
             self.goes = True
             self.flow.start(begin)
             do()
-            if self.goes:
-                edges.append(self.edge())
+            edges += self.here()
         self.meet(edges)
 
     # --- statements
@@ -211,12 +247,16 @@ class AstCompiler(ExpressionCompiler):
         elif isinstance(target, ast.Attribute):
             setattr(self.do(target.value), target.attr, value)
         elif isinstance(target, ast.Subscript):
-            array = self.do(target.value)
-            if isinstance(array, CHANGING):
-                raise Untraceable(ON_ALL_WAYS)
-            array[self.do(target.slice)] = value
+            self.changed(target)[self.do(target.slice)] = value
         else:
             self.unknown(target)
+
+    def changed(self, target: ast.Subscript) -> Any:
+        """Compile what has an item that is to be changed."""
+        things = self.do(target.value)
+        if isinstance(things, CHANGING):
+            raise Untraceable(ON_ALL_WAYS)
+        return things
 
     def AugAssign(self, node: ast.AugAssign) -> None:
         operation = BINARY[type(node.op)]
@@ -226,11 +266,8 @@ class AstCompiler(ExpressionCompiler):
             made = operation(getattr(thing, target.attr), self.do(node.value))
             setattr(thing, target.attr, made)
         elif isinstance(target, ast.Subscript):
-            array = self.do(target.value)
-            place = self.do(target.slice)
-            if isinstance(array, CHANGING):
-                raise Untraceable(ON_ALL_WAYS)
-            array[place] = operation(array[place], self.do(node.value))
+            things, place = self.changed(target), self.do(target.slice)
+            things[place] = operation(things[place], self.do(node.value))
         else:
             before = self.name(target.id)
             if is_value(before) and isinstance(before._kind, types.Array):  # it would change
@@ -261,7 +298,7 @@ class AstCompiler(ExpressionCompiler):
         if len(through) <= LONG or node in self.walked.unrolled:
             return False
         if not self.flow.builder:
-            state = dict(self.names), self.breaks, self.continues, [*self.returns]
+            go_back = self.state()
             bounds = through.start, through.stop, through.step
             try:
                 self.roll(node, self.flow.counted(bounds), lambda k: k)
@@ -269,9 +306,20 @@ class AstCompiler(ExpressionCompiler):
                 raise
             except (Exception, Untraceable):
                 self.walked.unrolled.add(node)
-            self.names, self.breaks, self.continues, self.returns = state
-            self.goes = True
+            go_back()
         return node not in self.walked.unrolled
+
+    def state(self) -> Callable[[], None]:
+        """Make what goes back to here, where something is to be tried."""
+        names, breaks, continues = dict(self.names), self.breaks, self.continues
+        returns, read = [*self.returns], dict(self.flow.lowering.read)
+
+        def go_back() -> None:
+            self.names, self.breaks, self.continues = dict(names), breaks, continues
+            self.returns, self.flow.lowering.read = [*returns], dict(read)
+            self.goes = True
+
+        return go_back
 
     def unroll(self, node: ast.For, through: Iterable) -> None:
         """Write a loop out."""
@@ -280,13 +328,13 @@ class AstCompiler(ExpressionCompiler):
         for item in through:
             self.give(node.target, item)
             self.block(node.body)
-            self.meet([*self.continues, *([self.edge()] if self.goes else [])])
+            self.meet([*self.continues, *self.here()])
             self.continues = []
             if not self.goes:
                 break
         breaks, (self.breaks, self.continues) = self.breaks, outer
         self.block(node.orelse)
-        self.meet([*breaks, *([self.edge()] if self.goes else [])])
+        self.meet([*breaks, *self.here()])
 
     def While(self, node: ast.While) -> None:
         self.roll(node, None)
@@ -300,8 +348,7 @@ class AstCompiler(ExpressionCompiler):
         """
         kinds = tuple(sorted((n, v._kind._code) for n, v in self.names.items() if is_value(v)))
         grown = self.walked.grown.setdefault((node, kinds), {})
-        state = dict(self.names), self.breaks, self.continues, [*self.returns]
-        read = dict(self.flow.lowering.read)
+        go_back = self.state()
         while True:
             try:
                 self.rolled(node, counter, item, grown)
@@ -310,13 +357,7 @@ class AstCompiler(ExpressionCompiler):
                 if self.flow.builder:
                     raise
                 grown |= number.grown
-                self.names, self.breaks, self.continues, self.returns = (
-                    dict(state[0]),
-                    state[1],
-                    state[2],
-                    [*state[3]],
-                )
-                self.goes, self.flow.lowering.read = True, dict(read)
+                go_back()
 
     def rolled(
         self, node: ast.For | ast.While, counter: Counter | None, item: Callable | None, grown: dict
@@ -340,7 +381,7 @@ class AstCompiler(ExpressionCompiler):
         if counter:
             self.give(node.target, item(count))
         self.block(node.body)
-        self.meet([*self.continues, *([self.edge()] if self.goes else [])])
+        self.meet([*self.continues, *self.here()])
         if self.goes:
             if counter:
                 self.names[_COUNT] = counter.after(count)
@@ -349,7 +390,7 @@ class AstCompiler(ExpressionCompiler):
         if node.orelse and edges:
             self.meet(edges)
             self.block(node.orelse)
-            edges = [self.edge()] if self.goes else []
+            edges = self.here()
         self.meet([*edges, *breaks])
         self.names.pop(_COUNT, None)
 

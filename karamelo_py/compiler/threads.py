@@ -13,6 +13,8 @@ for threads: one that another program keeps from running holds nobody up.
 import ctypes
 import functools
 import os
+import platform
+import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
@@ -23,14 +25,14 @@ from llvmlite import ir
 from numba import config, types
 
 from karamelo_py.compiler import code, machine
-from karamelo_py.compiler.atomics import I64, add, pause, read, replaced, write
-from karamelo_py.compiler.compile import by_type, define, shared
+from karamelo_py.compiler.choices import tag_class
+from karamelo_py.compiler.code import I32, I64
+from karamelo_py.compiler.compile import by_type, implements, shared
 from karamelo_py.compiler.failing import note, noting
-from karamelo_py.compiler.held import HeldTuple, address, at_address, held_type, hold
-from karamelo_py.compiler.intrinsics import builtin, intrinsic
+from karamelo_py.compiler.held import HeldTuple, held_as, held_type
 from karamelo_py.compiler.loops import noinline
 from karamelo_py.compiler.trace import formula
-from karamelo_py.compiler.values import Value
+from karamelo_py.compiler.values import HeldValue, Value, in_kernels, intrinsic, now
 
 
 class Serial(NamedTuple):
@@ -41,6 +43,91 @@ class Threaded(NamedTuple):
     """All threads that there are; `team` is where what a team shares lies (`new_team`)."""
 
     team: int = 0
+
+
+# --- words of memory that threads share -------------------------------------------------------
+
+
+def _word(builder: Any, place: Any) -> Any:
+    return builder.inttoptr(place, I64.as_pointer())
+
+
+@intrinsic
+def read(place):
+    """Read the word at an address; all is seen that was written before it was."""
+
+    def codegen(builder, at):
+        return builder.load_atomic(_word(builder, at), "acquire", 8)
+
+    return types.intp(types.intp), codegen
+
+
+@intrinsic
+def write(place, value):
+    """Write a word; who sees it sees all that was written before."""
+
+    def codegen(builder, at, number):
+        builder.store_atomic(number, _word(builder, at), "release", 8)
+
+    return types.none(types.intp, types.intp), codegen
+
+
+@intrinsic
+def add(place, value):
+    """Add to a word, which others may do, too."""
+
+    def codegen(builder, at, number):
+        builder.atomic_rmw("add", _word(builder, at), number, "acq_rel")
+
+    return types.none(types.intp, types.intp), codegen
+
+
+@intrinsic
+def replaced(place, old, new):
+    """Put `new` in the place of `old`; false if the word was another one."""
+
+    def codegen(builder, at, *numbers):
+        found = builder.cmpxchg(_word(builder, at), *numbers, "acq_rel", "acquire")
+        return builder.extract_value(found, 1)
+
+    return types.boolean(types.intp, types.intp, types.intp), codegen
+
+
+@intrinsic
+def pause(long):
+    """Wait a moment; if `long`, sleep."""
+
+    def codegen(builder, sleeps):
+        def call(name, result, *numbers):
+            function = code.external(builder, name, result, [I32] * len(numbers))
+            builder.call(function, [I32(number) for number in numbers])
+
+        with builder.if_else(sleeps) as (then, otherwise):
+            with then:
+                if sys.platform == "win32":
+                    call("Sleep", ir.VoidType(), 0)
+                else:
+                    call("usleep", I32, 10)
+            with otherwise:
+                if platform.machine().lower() in ("x86_64", "amd64"):
+                    call("llvm.x86.sse2.pause", ir.VoidType())
+
+    return types.none(types.boolean), codegen
+
+
+def add_among(array, i, j, value):
+    """Add a whole number to an item of an array, which other threads may do, too."""
+    array[i, j] += value
+
+
+@implements(add_among)
+@intrinsic
+def _add_among(array, i, j, value):
+    def codegen(builder, table, i, j, number):
+        at = code.item_pointer(builder, array, table, (i, j))
+        builder.atomic_rmw("add", at, number, "acq_rel")
+
+    return types.none(array, types.int64, types.int64, types.int64), codegen
 
 
 # --- threads ----------------------------------------------------------------------------------
@@ -91,53 +178,51 @@ def _share_out(count: int, part: int, task: int, arguments: int) -> None:
 machine.publish_python("karamelo_share_out", _PART, noting(_share_out))
 
 
-def _address_of(function: Callable, *like: int) -> int:
-    """Give the address of a function of as many whole numbers."""
-    raise NotImplementedError
+class _Task(NamedTuple):
+    """Do something with the items of a held tuple, which lies at a place, and a number."""
+
+    function: Callable
+    held: HeldTuple
+
+    def __call__(self, place: Value, number: Value) -> None:
+        lowering = now()
+        pointer = lowering.builder.inttoptr(place._value, self.held.register_type())
+        lowering.seen(self.function)(*HeldValue(self.held, pointer), number)
 
 
-@builtin(_address_of)
-def _address_of_code(lowering: Any, function: Any, count: int) -> Value:
-    kinds = (types.intp,) * count
-    found = formula(function.seen, kinds)
-    if lowering.builder is None:
-        return Value(types.intp, None)
-    made = lowering.function(found.name, found.run, kinds, types.none)
+def _address(lowering: Any, name: str, run: Callable, count: int) -> Value:
+    """Give the address of a function of its own, of as many whole numbers."""
+    made = lowering.function(name, run, (types.intp,) * count, types.none)
     if getattr(made, "raises", False):
         lowering.builder.function.raises = True
     return Value(types.intp, lowering.builder.ptrtoint(made, I64))
+
+
+@in_kernels
+def _task(lowering: Any, function: Any, items: tuple) -> tuple[Value, Value]:
+    """Put items into memory; the address of what does a function of them and a number; theirs."""
+    held = HeldTuple(tuple(held_type(types.unliteral(lowering.kind_of(item))) for item in items))
+    found = formula(function.seen, (*held, types.intp))
+    there = held_as(lowering, items, held)
+    if lowering.builder is None:
+        return Value(types.intp, None), Value(types.intp, None)
+    task = _address(lowering, found.name, _Task(function.seen, held), 2)
+    return task, Value(types.intp, lowering.builder.ptrtoint(there._value, I64))
 
 
 @intrinsic
 def _call(task, arguments, number):
     """Call the task at an address."""
 
-    def codegen(builder, signature, values):
-        builder.call(builder.inttoptr(values[0], _TASK.as_pointer()), values[1:])
-        return code.nothing()
+    def codegen(builder, task, *numbers):
+        builder.call(builder.inttoptr(task, _TASK.as_pointer()), numbers)
 
     return types.none(types.intp, types.intp, types.intp), codegen
 
 
-@intrinsic
-def _call_python(count, part, task, arguments):
-    """Call `_share_out`."""
-
-    def codegen(builder, signature, values):
-        function = code.external(builder, "karamelo_share_out", ir.VoidType(), [I64] * 4)
-        builder.call(function, values)
-        return code.nothing()
-
-    return types.none(*[types.intp] * 4), codegen
-
-
-def _regardless(function: Callable, *arguments: Any) -> Any:
+@in_kernels
+def _regardless(lowering: Any, function: Callable, *arguments: Any) -> Any:
     """Call a function; an exception in it is left to who called this one."""
-    raise NotImplementedError
-
-
-@builtin(_regardless)
-def _call_regardless(lowering: Any, function: Callable, *arguments: Any) -> Any:
     lowering.regardless = True
     try:
         return function(*arguments)
@@ -151,10 +236,15 @@ def _do_part(task, arguments, begin, end):
         _call(task, arguments, number)
 
 
-@noinline
-def _in_parallel(count, task, arguments):
-    """Do a task for each number below `count`, by threads that begin for it."""
-    _call_python(count, _address_of(_do_part, 4), task, arguments)
+@in_kernels
+def _in_parallel(lowering: Any, count: Any, task: Value, arguments: Value) -> None:
+    """Do a task for each number below `count`, by threads that begin for it (`_share_out`)."""
+    found = formula(_do_part, (types.intp,) * 4)
+    if lowering.builder:
+        part = _address(lowering, found.name, found.run, 4)
+        numbers = [lowering.lowered(n, types.intp) for n in (count, part, task, arguments)]
+        function = code.external(lowering.builder, "karamelo_share_out", ir.VoidType(), [I64] * 4)
+        lowering.builder.call(function, numbers)
 
 
 # --- teams ------------------------------------------------------------------------------------
@@ -264,91 +354,54 @@ def _distribute(team, count, task, arguments):
         _call(task, arguments, 0)
 
 
-@noinline
-def _begin_and_end(team, body, arguments):
-    """Let threads do `body`: one of them leads."""
-    _in_parallel(read(team + _SIZE), body, arguments)
-
-
-def _task_of(name: str, items: Any, lines: tuple, **names: Any) -> Callable:
-    """Make a function of the address of these items, `a` in its lines, and of a number k."""
-    held = HeldTuple(tuple(map(held_type, items)))
-    task = define("arguments, k", "a = at(arguments)", *lines, at=at_address(held), **names)
-    task.__qualname__ = f"{name}.task.{held.name}"
-    return shared(task)
-
-
-def shared_out(function: Callable, parameters: str) -> Callable:
-    """Make ``f(mode, count, ...)``: ``function(..., k)`` for each k below `count`.
-
-    `parameters` are the names of what stands before k.
-    """
+def shared_out(function: Callable) -> Callable:
+    """Make ``f(mode, count, ...)``: ``function(..., k)`` for each k below `count`."""
 
     def loop(mode, count, *arguments):
         for k in range(count):
             function(*arguments, k)
 
+    def by_all(mode, count, *arguments):
+        _distribute(mode.team, count, *_task(function, arguments))
+
     @by_type(loop)
-    def _loop_by_type(mode, count, *arguments):
-        names = f"mode, count, {parameters}"
-        if mode.instance_class is not Threaded:
-            lines = "for k in range(count):", f"    function({parameters}, k)"
-            return define(names, *lines, function=function)
-        items = ", ".join(f"a[{k}]" for k in range(len(arguments)))
-        call = (f"function({items}, k)",)
-        return define(
-            names,
-            f"distribute(mode.team, count, address_of(body, 2), address(hold(({parameters},))))",
-            distribute=_distribute, address_of=_address_of, address=address, hold=hold,
-            body=_task_of(function.__qualname__, arguments, call, function=function),
-        )  # fmt: skip
+    def _loop_by_type(mode, *_):
+        return by_all if tag_class(mode) is Threaded else loop
 
     return loop
 
 
-def by_team(function: Callable, parameters: str) -> Callable:
+def by_team(function: Callable) -> Callable:
     """Make ``f(mode, ...)``: ``function(mode, ...)``, a whole number, by a team where there is one.
 
-    `parameters` are the names of what stands behind the mode.
+    Its first thread does it, the others serve it.
     """
-
-    def run(mode, *arguments):
-        return function(mode, *arguments)
-
     inner = noinline(function)
 
-    @by_type(run)
-    def _run_by_type(mode, *arguments):
-        names = f"mode, {parameters}"
-        if mode.instance_class is not Threaded:
-            return define(names, f"return function({names})", function=inner)
-        items = ", ".join(f"a[{k}]" for k in range(1 + len(arguments)))
-        names_of_words = {
-            "STATE": _STATE, "LEADS": _LEADS, "ENDED": _ENDED, "RESULT": _RESULT,
-            "SIZE": _SIZE, "WAITS": _WAITS, "read": read, "write": write, "function": inner,
-        }  # fmt: skip
-        lines = (
-            "team = a[0].team",
-            "if k > 0:",
-            "    serve(team, k)",
-            "else:",
-            "    write(team + STATE, LEADS)",
-            f"    write(team + RESULT, regardless(function, {items}))",
-            "    write(team + STATE, ENDED)",
-        )
-        body = _task_of(
-            function.__qualname__, (mode, *arguments), lines, serve=_serve, regardless=_regardless,
-            **names_of_words,
-        )  # fmt: skip
-        return define(
-            names,
-            "team = mode.team",
-            f"if team == 0: return function({names})",
-            "write(team + STATE, WAITS)",
-            f"begin_and_end(team, address_of(body, 2), address(hold(({names}))))",
-            "return read(team + RESULT)",
-            begin_and_end=_begin_and_end, address_of=_address_of, address=address, hold=hold,
-            body=body, **names_of_words,
-        )  # fmt: skip
+    def alone(mode, *arguments):
+        return inner(mode, *arguments)
 
-    return run
+    @shared
+    def member(mode, *arguments):
+        *given, k = arguments
+        team = mode.team
+        if k > 0:
+            _serve(team, k)
+        else:
+            write(team + _STATE, _LEADS)
+            write(team + _RESULT, _regardless(inner, mode, *given))
+            write(team + _STATE, _ENDED)
+
+    def together(mode, *arguments):
+        team = mode.team
+        if team == 0:
+            return inner(mode, *arguments)
+        write(team + _STATE, _WAITS)
+        _in_parallel(read(team + _SIZE), *_task(member, (mode, *arguments)))
+        return read(team + _RESULT)
+
+    @by_type(alone)
+    def _run_by_type(mode, *_):
+        return together if tag_class(mode) is Threaded else alone
+
+    return alone

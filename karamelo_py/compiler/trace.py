@@ -3,22 +3,19 @@
 Where a kernel calls a function marked for it, it is run by Python itself, on a
 :class:`~karamelo_py.compiler.values.Value` in the place of each number, and every operation that
 meets one is lowered at once, into the function that calls. Tuples are Python's own, so that what
-only takes them apart costs nothing. The bits are the same. A function that asks what only a run can
-know (`if x > 0`) is walked through instead, statement by statement
-(:mod:`~karamelo_py.compiler.statements`). What cannot be written so is refused:
-:class:`CannotCompile`.
+only takes them apart costs nothing. A function that asks what only a run can know (`if x > 0`) is
+walked through instead, statement by statement (:mod:`~karamelo_py.compiler.statements`).
 
-Functions run here see their globals through :class:`~karamelo_py.compiler.values.Globals`: what
-other code chooses by type is lowered for the types at hand, Python's functions are run in the same
-way. Only what the key of a kernel on disk follows may be run
-(:mod:`karamelo_py.compiler.fingerprint`): functions that come by another way than a global name or
-a closure, as methods do, are refused.
+Functions see their globals through :class:`~karamelo_py.compiler.values.Globals`. Only what the key
+of a kernel on disk follows may be run (:mod:`karamelo_py.compiler.fingerprint`): functions that
+come by another way than a global name or a closure, as methods do, are refused.
 """
 
 import dis
 import functools
 import inspect
 import types as python
+from collections import namedtuple
 from collections.abc import Callable, Hashable, Iterable, Iterator
 from traceback import walk_tb
 from typing import Any, NamedTuple
@@ -29,27 +26,23 @@ from numba import types
 from karamelo_py.compiler.arithmetic import OPERATIONS
 from karamelo_py.compiler.choices import choosers, note, parts_noted, tag_class
 from karamelo_py.compiler.flow import Flow
-from karamelo_py.compiler.intrinsics import BUILTINS, Intrinsic
 from karamelo_py.compiler.lowering import Lowering, name_of, numbers_of
-from karamelo_py.compiler.methods import refuse_methods
 from karamelo_py.compiler.statements import AstFunction, place_in_text
 from karamelo_py.compiler.values import (
-    OF_REALS,
-    OF_WHOLE,
+    BUILTINS,
     DataDependentBranch,
     Emitted,
     Globals,
     HeldValue,
+    Intrinsic,
     Untraceable,
     Value,
-    alike,
     at_work,
     branching,
     counting,
-    emit,
-    implemented,
     is_literal,
     now,
+    rebuilt,
     words,
     writing,
 )
@@ -109,22 +102,6 @@ class Module:
         return self._seen(getattr(self._module, name))
 
 
-class _Dispatched(Emitted):
-    """Call what the classes of tags, or the types of numbers, choose."""
-
-    def __call__(self, *arguments: Any) -> Any:
-        if self.counts(arguments):
-            return self.seen(*arguments)
-        made = implemented(self.seen, arguments)
-        if made is not None:
-            return _seen(made)(*arguments)
-        return emit(self.seen, *(alike(arguments) if self.seen in OF_REALS else arguments))
-
-    def defined(self, *classes: type) -> bool:
-        """Tell whether a point function has an implementation for these classes."""
-        return self.seen.defined(*classes)
-
-
 def _class_of(thing: Any) -> type:
     if isinstance(thing, Value):
         raise Untraceable("a kernel cannot ask for the type of a number: ask for that of a tag")
@@ -147,7 +124,6 @@ def _attribute(thing: Any, *name: Any) -> Any:
     return getattr(thing, *name)
 
 
-_OF_NUMBERS = {*OF_WHOLE, float}
 INSTEAD = {
     is_literal: is_literal,
     type: _class_of,
@@ -156,22 +132,9 @@ INSTEAD = {
     getattr: _attribute,
 }
 _SAFE = {
-    callable,
-    len,
-    zip,
-    enumerate,
-    tuple,
-    list,
-    dict,
-    set,
-    sum,
-    reversed,
-    any,
-    all,
-    map,
-    slice,
+    callable, len, zip, enumerate, tuple, list, dict, set, sum, reversed, any, all, map, slice,
     hasattr,
-}
+}  # fmt: skip
 _CONSTANT = (type(None), type(NotImplemented), bool, int, float, str, np.number, np.bool_)
 
 
@@ -182,8 +145,7 @@ def _seen(thing: Any) -> Any:
     if isinstance(thing, python.ModuleType):
         return Module(thing, _seen)
     if isinstance(thing, tuple):
-        inner = [_seen(item) for item in thing]
-        return type(thing)(*inner) if hasattr(thing, "_fields") else tuple(inner)
+        return rebuilt(thing, map(_seen, thing))
     if isinstance(thing, list):
         return list(map(_seen, thing))
     if isinstance(thing, np.ndarray):
@@ -193,9 +155,7 @@ def _seen(thing: Any) -> Any:
     if thing not in _copies:
         _copies[thing] = _copy(thing)
     made = _copies[thing]
-    if isinstance(made, AstFunction) or (
-        isinstance(made, python.FunctionType) and type(made.__globals__) is Globals
-    ):
+    if isinstance(made, AstFunction) or type(getattr(made, "__globals__", None)) is Globals:
         note([made.__code__])
     if isinstance(made, type):
         now().classes.add(made)
@@ -208,16 +168,10 @@ def _copy(thing: Any) -> Any:
         return INSTEAD[thing]
     if thing in _SAFE:
         return thing
-    if thing in BUILTINS or isinstance(thing, Intrinsic):
-        return Emitted(thing)
-    if thing in choosers:
-        return _Dispatched(thing)
-    number = isinstance(thing, type) and issubclass(thing, np.generic)
-    if number or thing in _OF_NUMBERS or isinstance(thing, types.Number):
-        return Emitted(thing)
     if isinstance(thing, type) and issubclass(thing, tuple):
         return thing
-    if thing in OPERATIONS or isinstance(thing, type):
+    known = thing in choosers or thing in BUILTINS or thing in OPERATIONS
+    if known or isinstance(thing, Intrinsic | type):
         return Emitted(thing)
     if isinstance(thing, python.FunctionType):
         return _copied(thing)
@@ -251,6 +205,37 @@ def _copied(function: Callable) -> Callable:
     return AstFunction(made, lambda: Flow(now()))
 
 
+# --- methods, which nothing follows ---------------------------------------------------------------
+
+_GENERATED = {*vars(namedtuple("_", ())), "__orig_bases__", "__annotations__", "__annotate_func__"}
+_METHODS = python.FunctionType | property | classmethod | staticmethod
+
+
+@functools.cache
+def _methods_of(one: type) -> frozenset[str]:
+    """List the names of the functions that a class of tuples has of its own."""
+    if not getattr(one, "_fields", ()) or getattr(one, "is_followed", False):
+        return frozenset()
+    own = {name: value for base in one.__mro__[:-2] for name, value in vars(base).items()}
+    return frozenset(name for name in own.keys() - _GENERATED if isinstance(own[name], _METHODS))
+
+
+def _names_in(code: python.CodeType) -> set[str]:
+    inner = (c for c in code.co_consts if isinstance(c, python.CodeType))
+    return set(code.co_names).union(*map(_names_in, inner))
+
+
+def _refuse_methods(codes: Iterable[python.CodeType], classes: set[type]) -> None:
+    """Refuse methods of tuples: they would run as they are, and nothing would follow them."""
+    functions = frozenset().union(*map(_methods_of, classes))
+    named = functions & set().union(*map(_names_in, codes))
+    for name in sorted(name for name in functions if name.startswith("__") or name in named):
+        raise Untraceable(
+            f"'{name}' is a method of a class of tuples, which kernels cannot call: "
+            "write a function, or mark the class with `algebra`"
+        )
+
+
 def run_for_kernel(dispatch: Callable, arguments: tuple) -> Any:
     """Call a point function for one that nothing sees through, as methods do."""
     return _seen(dispatch)(*arguments)
@@ -275,11 +260,6 @@ _begun: set[tuple] = set()  # of what is written now
 _own: set[Callable] = set()  # functions that are not written into what calls them
 
 
-def _kinds_of(dispatch: Callable, kinds: Iterable[types.Type]) -> tuple[types.Type, ...]:
-    """List the types of arguments: one function serves all numbers."""
-    return tuple(map(types.unliteral, kinds) if dispatch in _own else kinds)
-
-
 def _is_plain(thing: Any) -> bool:
     if isinstance(thing, tuple):
         return all(map(_is_plain, thing))
@@ -300,7 +280,7 @@ def _written(dispatch: Callable, kinds: tuple) -> _Formula | None:
             found = run(*(lowering.wrapped(kind, None) for kind in kinds))
             result = types.unliteral(lowering.kind_of(found))
         codes = {part for part in parts if isinstance(part, python.CodeType)}
-        refuse_methods(codes, lowering.classes)
+        _refuse_methods(codes, lowering.classes)
         if hasattr(dispatch, "tags"):
             parts.add((dispatch, tuple(map(tag_class, kinds[: dispatch.tags]))))
         return _Formula(run, result, frozenset(parts), _is_plain(found), dispatch.__qualname__)
@@ -335,6 +315,9 @@ def formula(dispatch: Callable, kinds: tuple) -> _Formula | None:
 def forget() -> None:
     """Find anew what is run: a point function has another implementation than was known."""
     _formulas.clear()
+    if not at_work():
+        _copies.clear()
+        _modules.clear()
 
 
 def _number_types(kinds: Iterable[types.Type]) -> Iterator[type]:
@@ -357,12 +340,9 @@ def _chosen(dispatch: Callable, kinds: tuple) -> Callable | None:
         if found is not None:
             return found
     if hasattr(dispatch, "tags"):
-        raise Undefined(dispatch.__name__, tuple(map(_class_in_words, kinds[: dispatch.tags])))
+        classes = [tag_class(kind) or words(kind) for kind in kinds[: dispatch.tags]]
+        raise Undefined(dispatch.__name__, tuple(classes))
     return None
-
-
-def _class_in_words(kind: types.Type) -> Any:
-    return tag_class(kind) or words(kind)
 
 
 def alone(dispatch: Callable) -> None:
@@ -370,16 +350,14 @@ def alone(dispatch: Callable) -> None:
     _own.add(dispatch)
 
 
-def traced(dispatch: Callable, chooser: Callable, last: bool = False) -> None:
+def traced(dispatch: Callable, chooser: Callable, last: bool = False) -> Callable:
     """Let kernels run what `chooser` makes of `dispatch` for types; None if it has nothing.
 
     It is asked before those that are known already, or as the `last`.
     """
-    if dispatch in choosers:
-        known = choosers[dispatch]
-        known.insert(len(known) if last else 0, chooser)
-        return
-    choosers[dispatch] = [chooser]
+    known = choosers.setdefault(dispatch, [])
+    known.insert(len(known) if last else 0, chooser)
+    return chooser
 
 
 def _call(function: Callable, arguments: tuple) -> Any:
@@ -387,7 +365,9 @@ def _call(function: Callable, arguments: tuple) -> Any:
     if function not in choosers:
         return NotImplemented
     lowering = now()
-    kinds = _kinds_of(function, map(lowering.kind_of, arguments))
+    kinds = tuple(map(lowering.kind_of, arguments))
+    if function in _own:  # one serves all numbers
+        kinds = tuple(map(types.unliteral, kinds))
     found = formula(function, kinds)
     if found is None:
         return NotImplemented

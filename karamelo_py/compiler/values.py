@@ -5,16 +5,20 @@ meets one becomes code of the function that is compiled.
 """
 
 import builtins
+import functools
 import math
 import operator
 import sys
 import types as python
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 from numba import types
+
+from karamelo_py.compiler.choices import choosers
+from karamelo_py.compiler.code import Lanes, scalar_of
 
 
 class Untraceable(BaseException):
@@ -29,7 +33,7 @@ def words(kind: types.Type) -> str:
     """Name a type as a user would."""
     if isinstance(kind, types.BaseTuple):
         return getattr(getattr(kind, "instance_class", None), "__name__", "a tuple")
-    if hasattr(kind, "width"):
+    if isinstance(kind, Lanes):
         return f"numbers in lanes ({kind})"
     for one, name in _WORDS:
         if isinstance(kind, one):
@@ -107,8 +111,7 @@ def at_work() -> bool:
 
 def _real_kind(thing: Any) -> Any:
     """Find the number type of a real number or of lanes of these; None of all else."""
-    kind = thing._kind if isinstance(thing, Value) else None
-    kind = getattr(kind, "scalar", kind)
+    kind = scalar_of(thing._kind) if isinstance(thing, Value) else None
     return kind if isinstance(kind, types.Float) else None
 
 
@@ -131,7 +134,7 @@ def _in_type_of(like: Any, kind: Any, thing: Any) -> Any:
             return thing if kind.bitwidth == 64 else np.float32(thing)
     if not isinstance(thing, Value):
         return thing
-    own = getattr(thing._kind, "scalar", thing._kind)
+    own = scalar_of(thing._kind)
     if isinstance(own, types.Integer) and not isinstance(own, types.Boolean):
         return now().in_type_of(thing, like)
     return thing
@@ -140,6 +143,45 @@ def _in_type_of(like: Any, kind: Any, thing: Any) -> Any:
 def emit(function: Callable, *arguments: Any) -> Any:
     """Write a call: of an operation, or of what was chosen by type."""
     return now().call(function, arguments)
+
+
+# --- functions whose code is written by hand ------------------------------------------------------
+
+BUILTINS: dict[Callable, Callable] = {}
+
+
+def builtin(function: Callable) -> Callable[[Callable], Callable]:
+    """Decorate what `function` is in kernels: ``made(lowering, *arguments)``, of what is traced."""
+
+    def register(made: Callable) -> Callable:
+        BUILTINS[function] = made
+        return made
+
+    return register
+
+
+def in_kernels(made: Callable) -> Callable:
+    """Decorate a function that only kernels know, and that is written so: it is its own code."""
+    return builtin(made)(made)
+
+
+class Intrinsic:
+    """Define a function of values: by its signature for types, and by what writes the code.
+
+    ``definition(*types)`` returns ``result(*arguments)`` and ``codegen(builder, *values)``, or None
+    where it is not defined. Types of whole numbers that are known are given where it is not
+    defined for others.
+    """
+
+    def __init__(self, definition: Callable):
+        self.definition = definition
+        functools.update_wrapper(self, definition)
+
+    def __call__(self, *arguments: Any) -> Any:
+        raise NotImplementedError(f"only kernels can call {self.__qualname__}")
+
+
+intrinsic = Intrinsic
 
 
 # --- values -------------------------------------------------------------------------------------
@@ -166,26 +208,16 @@ class Value:
             now().set_attribute(self, name, value)
 
     def __getitem__(self, place: Any) -> Any:
-        return emit(operator.getitem, self, _place(place))
+        return emit(operator.getitem, self, place)
 
     def __setitem__(self, place: Any, value: Any) -> None:
-        emit(operator.setitem, self, _place(place), value)
+        emit(operator.setitem, self, place, value)
 
     __bool__ = _only_at_run_time("a condition in an expression within an expression")
     __int__ = __index__ = __float__ = _only_at_run_time("a number that has to be written")
     __iter__ = __len__ = __contains__ = _only_at_run_time("what is gone through or counted")
     __hash__ = _only_at_run_time("a key")
     __str__ = __repr__ = __format__ = _only_at_run_time("a number in a text")
-
-
-def _place(place: Any) -> Any:
-    """Write what stands in the brackets of an array."""
-    if isinstance(place, tuple):
-        return tuple(map(_place, place))
-    if isinstance(place, slice):
-        bounds = place.start, place.stop, place.step
-        return emit(slice, *(bounds if bounds[2] is not None else bounds[:2]))
-    return place
 
 
 _BINARY = ("add", "sub", "mul", "truediv", "floordiv", "mod", "pow")
@@ -197,8 +229,8 @@ def _operated(operation: Callable, a: Any, b: Any) -> Any:
     if isinstance(a if isinstance(b, Value) else b, tuple):
         return NotImplemented
     if operation is operator.pow and type(b) is int and 1 < b <= 4 and _real_kind(a):
-        half = a * a if b != 3 else a
-        return half * half if b == 4 else (half * a if b == 3 else half)
+        square = a * a
+        return square if b == 2 else square * (a if b == 3 else square)
     return emit(operation, *alike((a, b)))
 
 
@@ -228,6 +260,18 @@ def _operators() -> None:
 
 
 _operators()
+
+
+def rebuilt(like: tuple, items: Iterable) -> tuple:
+    """Make a tuple of the class of another."""
+    return type(like)(*items) if hasattr(like, "_fields") else tuple(items)
+
+
+def mapped(change: Callable, thing: Any) -> Any:
+    """Change each thing in nested tuples."""
+    if isinstance(thing, tuple):
+        return rebuilt(thing, [mapped(change, item) for item in thing])
+    return change(thing)
 
 
 class HeldValue:
@@ -287,20 +331,20 @@ class Emitted:
         self.seen = function
 
     def __call__(self, *arguments: Any) -> Any:
-        if self.counts(arguments):
-            return self.seen(*arguments)
+        if self.seen in OF_WHOLE and all(isinstance(a, int) for a in arguments):
+            return self.seen(*arguments)  # of numbers that are known, as lengths of loops are
         made = implemented(self.seen, arguments)
         if made is not None:
             return now().seen(made)(*arguments)
         if self.seen in OF_REALS:
-            if all(type(a) in (int, float) for a in arguments):
+            if self.seen not in choosers and all(map(is_literal, arguments)):
                 return self.seen(*arguments)  # known already
             arguments = alike(arguments)
         return emit(self.seen, *arguments)
 
-    def counts(self, arguments: tuple) -> bool:
-        """Tell whether all arguments are whole numbers that are known, as lengths of loops are."""
-        return self.seen in OF_WHOLE and all(isinstance(a, int) for a in arguments)
+    def defined(self, *classes: type) -> bool:
+        """Tell whether a point function has an implementation for these classes."""
+        return self.seen.defined(*classes)
 
 
 OF_WHOLE = {min, max, abs, int, bool}

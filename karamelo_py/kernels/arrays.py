@@ -12,6 +12,7 @@ import numpy as np
 
 from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.fields import as_rows_of_points, name_of, some_points
+from karamelo_py.compiler.loops import noinline
 from karamelo_py.compiler.tuples import row
 from karamelo_py.kernels.totals import LIMBS, Alone
 from karamelo_py.points.grid import Grid
@@ -101,16 +102,11 @@ def known_to_laws(points):
     )  # fmt: skip
 
 
-def own_arrays_of(points: Points) -> Iterator[tuple[str, np.ndarray]]:
-    """Every array that all points have, with its name; the points come last in its shape."""
+def arrays_of(points: Points) -> Iterator[tuple[str, np.ndarray]]:
+    """Every array of the points, with its name; the points come last in its shape."""
     for name, array in points._asdict().items():
         if name != "fields" and array is not None:
             yield name, array
-
-
-def arrays_of(points: Points) -> Iterator[tuple[str, np.ndarray]]:
-    """The same, and the declared fields."""
-    yield from own_arrays_of(points)
     for one in points.fields:
         yield name_of(type(one)), one.array
 
@@ -118,12 +114,8 @@ def arrays_of(points: Points) -> Iterator[tuple[str, np.ndarray]]:
 def made_of(points: Points, found: Iterable[np.ndarray]) -> Points:
     """Points of the kind of `points` with such arrays as `arrays_of` has given."""
     arrays = iter(found)
-    own: dict[str, Any] = {
-        name: None if array is None else next(arrays)
-        for name, array in points._asdict().items()
-        if name != "fields"
-    }
-    return Points(**own, fields=tuple(type(one)(next(arrays)) for one in points.fields))
+    own: list[Any] = [None if array is None else next(arrays) for array in points[:-1]]
+    return Points(*own, tuple(type(one)(next(arrays)) for one in points.fields))
 
 
 class Tiling(NamedTuple):
@@ -341,6 +333,7 @@ CLOCK = np.dtype(
     ]
 )
 TIME, TIMESTEP, DT = 0, 1, 2  # the first of the published values
+LAST = 2**62  # no id of a point is so large
 
 
 class Control(NamedTuple):
@@ -352,7 +345,7 @@ class Control(NamedTuple):
     #                     and behind them mass and momentum of each solid, 1 + d
     digits: np.ndarray  # (LIMBS,) scratch
     answer: np.ndarray  # rounded totals, and what processes agree on
-    firsts: np.ndarray  # (S,) int64: id of the first point of each solid
+    firsts: np.ndarray  # (S + 1,) int64: id of the first point of each solid; LAST
     ranks: Tag  # whether there are other processes
 
 
@@ -363,7 +356,8 @@ def new_control(values: np.ndarray, firsts: Sequence[int] = (), d: int = 0) -> C
     more = (1 + d) * len(firsts)
     totals = np.zeros((len(values) + more, LIMBS), np.int64)
     digits, answer = np.zeros(LIMBS, np.int64), np.zeros(max(16, more))
-    return Control(values, clock, totals, digits, answer, np.array(firsts, np.int64), Alone())
+    ids = np.array([*firsts, LAST], np.int64)
+    return Control(values, clock, totals, digits, answer, ids, Alone())
 
 
 class Setup(NamedTuple):
@@ -387,8 +381,20 @@ class Setup(NamedTuple):
 
 
 @shared
-def with_nodes(s, nodes, buffers):
-    """The setup with other nodes and their buffers."""
-    others = {"nodes": nodes, "buffers": buffers}
-    items = zip(s._fields, s, strict=True)
-    return type(s)(*(others.get(name, item) for name, item in items))
+def with_items_of(values, others):
+    """Put the items of another NamedTuple in the place of those with their names."""
+    new = dict(zip(others._fields, others, strict=True))
+    items = zip(values._fields, values, strict=True)
+    return type(values)(*[new.get(name, item) for name, item in items])
+
+
+@noinline
+def first_from(ascending, begin, end, x):
+    """The first place of these whose number is not below `x`; NumPy's search compiles for 0.4 s."""
+    while begin < end:
+        middle = (begin + end) // 2
+        if ascending[middle] < x:
+            begin = middle + 1
+        else:
+            end = middle
+    return begin

@@ -4,8 +4,15 @@ from math import inf
 from typing import Any
 
 from karamelo_py.compiler.compile import real, shared
-from karamelo_py.compiler.loops import kernel
+from karamelo_py.compiler.fields import load_vector
+from karamelo_py.compiler.held import at_hand
+from karamelo_py.compiler.loops import kernel, noinline
+from karamelo_py.compiler.threads import shared_out
+from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import DT, MASS, TIME, TIMESTEP, Control, Number, Setup, Tag
+from karamelo_py.kernels.totals import agree_on_reports
+from karamelo_py.points.frames import follows
+from karamelo_py.points.grid import inside
 from karamelo_py.points.kinematics import vector
 
 
@@ -104,3 +111,79 @@ def finish(control: Control) -> None:
     if clock.path > STILL:
         clock.courant, clock.dt_factor = clock.courant_moving, clock.dt_factor_moving
     choose_dt(control)
+
+
+@kernel
+def _read_reports(tiling, control):
+    clock = control.clock[0]
+    rate = 0.0
+    moved = 0.0
+    for t in range(tiling.count[0]):
+        moved = max(moved, tiling.report[t, 0])
+        rate = max(rate, tiling.report[t, 1])
+        if tiling.report[t, 2] > 0:
+            clock.wrong = 1
+    clock.new_move = max(clock.new_move, moved)
+    clock.new_rate = max(clock.new_rate, rate)
+
+
+@shared
+def read_reports(s: Setup) -> None:
+    """Gather the reports of all tiles in the clock: largest rate and move, and any wrong point."""
+    clock = s.control.clock[0]
+    clock.new_rate = 0.0
+    clock.new_move = 0.0
+    for block in s.blocks:
+        _read_reports(block.tiling, s.control)
+    agree_on_reports(s.control.ranks, s.control)
+
+
+@shared
+def all_well(s: Setup) -> bool:
+    """Take over the reports of a sweep of a step; return True if no point went wrong."""
+    clock = s.control.clock[0]
+    read_reports(s)
+    # Points move in one sweep of a step, and their domains may grow in another.
+    clock.move += clock.new_move
+    if clock.new_rate > 0:
+        clock.rate = clock.new_rate
+    return clock.wrong == 0
+
+
+@noinline
+def _check_share(frame, kin, grids, points, tiling, now, k):
+    """Report the largest move of the points of the k-th share, and the point that went wrong."""
+    grids, points, tiling = at_hand(grids), at_hand(points), at_hand(tiling)
+    for place in range(tiling.share[k], tiling.share[k + 1]):
+        t = tiling.order[place]
+        furthest = 0.0
+        wrong = 0
+        for p in range(tiling.range[t, 0], tiling.range[t, 1]):
+            grid = record(grids, points.grid[p])
+            y = load_vector(kin, points.x[1 - now], p)
+            step = (y - load_vector(kin, points.x[now], p)).largest()
+            cells = float(step * grid.inv_h)
+            furthest = max(furthest, cells)
+            if not (cells <= 1 and (inside(grid, kin, y) or not follows(frame))):
+                wrong = p + 1
+        tiling.report[t, 0] = furthest
+        tiling.report[t, 2] = wrong
+
+
+_check_shares = shared_out(_check_share)
+
+
+@kernel
+def _check_points(mode, frame, kin, grids, points, tiling, now):
+    _check_shares(mode, tiling.count[1], frame, kin, grids, points, tiling, now)
+
+
+@shared
+def check_moves(s: Setup, mode: Tag) -> bool:
+    """Look at the new positions again, after hooks that may have changed them."""
+    clock = s.control.clock[0]
+    for block in s.blocks:
+        _check_points(mode, s.frame, s.kin, s.grids, block.points, block.tiling, clock.now)
+    read_reports(s)
+    clock.move = max(clock.move, clock.new_move)
+    return clock.wrong == 0

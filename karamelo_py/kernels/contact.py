@@ -17,22 +17,23 @@ node sees (`karamelo_py.points.basis.surface`). Bodies may approach until the ga
 stopped where it would be less than nothing at the end of the step.
 """
 
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import point_function
+from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.loops import kernel, noinline
 from karamelo_py.compiler.tuples import record
-from karamelo_py.kernels import contact_pairs
-from karamelo_py.kernels.arrays import DT, MASS, TIMESTEP, of_change, of_momentum
+from karamelo_py.kernels.arrays import DT, MASS, TIMESTEP, of_change, of_momentum, vector_at
 from karamelo_py.kernels.loss import FrictionalHeat, warm_node
 from karamelo_py.kernels.p2g import Centre, Normal
-from karamelo_py.kernels.rows import touch, touch_velocity
+from karamelo_py.kernels.table import touch, touch_velocity
 from karamelo_py.kernels.totals import add_to, counts, publish
+from karamelo_py.points.basis.surface import ENTRIES
 from karamelo_py.points.grid import node_position
-from karamelo_py.points.kinematics import dimension
+from karamelo_py.points.kinematics import dimension, vector, zero_vector
 
 REPEATS = 16  # at most, where more than two fields meet; what remains falls by a half or more
 
@@ -62,21 +63,148 @@ class SeparateFields(NamedTuple):
     change: np.ndarray  # (F, d) scratch: of the velocity of each of them
 
 
+# --- two bodies at a place --------------------------------------------------------------------
+
+
+class Where(NamedTuple):
+    """A place where fields meet, and the length of the step."""
+
+    x: tuple  # position of the node
+    h: float
+    dt: float
+
+
+class Touched(NamedTuple):
+    """In the place of `Where`: pairs of bodies that contact acted between in a step."""
+
+    step: int
+
+
+class NodePair(NamedTuple):
+    """Two bodies at a place: a node of each, and vectors of both."""
+
+    n: int
+    m: int
+    per_n: float  # 1 / mass
+    per_m: float
+    outward: tuple  # common normal, not normalised, from the first body to the second
+    yielding: tuple  # change of the relative velocity with an impulse along each direction
+    relative: tuple  # velocity of the first body as the second one sees it
+
+
+@shared
+def _dot(*vectors):
+    """sum_k a_k b_k, or of the products of three vectors."""
+    total = 0
+    for components in zip(*vectors, strict=True):
+        product = components[0]
+        for component in components[1:]:
+            product = product * component
+        total = total + product
+    return total
+
+
 @noinline
-def _take(contact, control, a, i, n, k, impulse, per_mass, x):
-    """A node takes a component of an impulse; a fix that prescribes its velocity takes it over."""
-    slot = contact.prescribed[n, k]
-    if not contact_pairs.immovable(contact, n, k):
-        contact.change[i, k] += impulse * per_mass
-    if not counts(control.ranks, n):
-        return
-    force = impulse / control.clock[0].kick
-    add_to(control.totals, contact.slot[a] + k, force)
-    # A force along k turns about the two other axes.
-    add_to(control.totals, contact.torque[a] + (k + 1) % 3, x[(k + 2) % 3] * force)
-    add_to(control.totals, contact.torque[a] + (k + 2) % 3, -x[(k + 1) % 3] * force)
-    if slot:
-        add_to(control.totals, slot - 1 + k, -force)
+def _immovable(contact, n, k):
+    """Return True if contact cannot move a node in direction k."""
+    return contact.prescribed[n, k] != 0 or contact.rigid[n // contact.stride]
+
+
+@shared
+def _yielding(contact, n, k, per_mass):
+    return 0.0 if _immovable(contact, n, k) else per_mass
+
+
+@noinline
+def _shares(contact, kin, nodes, n, m):
+    """Weights of the two bodies' outward sums in their common normal.
+
+    The sum of m grad N points out of a body. Where a body has little mass or ends in an edge it
+    says little about the direction: the larger sum decides (after Lemiale, Nairn & Hurmane 2010),
+    equal ones are averaged. A body with a prescribed velocity knows its surface best.
+    """
+    of_n, of_m = _normal(kin, nodes, n), _normal(kin, nodes, m)
+    of_n, of_m = _dot(of_n, of_n), _dot(of_m, of_m)
+    prescribed_n = prescribed_m = False
+    for k in range(dimension(kin)):
+        prescribed_n = prescribed_n or _immovable(contact, n, k)
+        prescribed_m = prescribed_m or _immovable(contact, m, k)
+    if not of_n + of_m > 0:
+        return 0.0, 0.0
+    if prescribed_n != prescribed_m and (of_n if prescribed_n else of_m) > 0:
+        return (1.0, 0.0) if prescribed_n else (0.0, 1.0)
+    share = of_n / (of_n + of_m)
+    return share**4, (1 - share) ** 4
+
+
+@shared
+def _normal(kin, nodes, n):
+    return vector_at(kin, field(nodes.fields, Normal), n, 0, zero_vector(kin, 0.0))
+
+
+@noinline
+def _pair_of(contact, kin, nodes, records, n, m):
+    """The two bodies with nodes `n` and `m`; velocities are the first components of `records`."""
+    per_n, per_m = 1.0 / nodes.sums[n, MASS], 1.0 / nodes.sums[m, MASS]
+    share_n, share_m = _shares(contact, kin, nodes, n, m)
+    outward = share_n * _normal(kin, nodes, n) - share_m * _normal(kin, nodes, m)
+    axes = range(dimension(kin))
+    yielding = [_yielding(contact, n, k, per_n) + _yielding(contact, m, k, per_m) for k in axes]
+    like = zero_vector(kin, 0.0)
+    relative = vector_at(kin, records, n, 0, like) - vector_at(kin, records, m, 0, like)
+    return NodePair(n, m, per_n, per_m, outward, vector(kin, yielding), relative)
+
+
+@shared
+def _left(pair, push):
+    """The relative velocity once the impulse `push` m grad N has been given."""
+    items = zip(pair.relative, pair.outward, pair.yielding, strict=True)
+    return pair.relative._make([v - push * n * yielding for v, n, yielding in items])
+
+
+@noinline
+def _reach(contact, nodes, pair, n, where, side):
+    """Return the distance from node `n` to the surface of its body, along the normal out of it.
+
+    `side` is 1 for the first body of the pair and -1 for the second.
+    """
+    centre = field(nodes.fields, Centre)
+    mean = 0.0
+    for k, outward in enumerate(pair.outward):
+        mean += side * outward * (centre[n, k] / nodes.sums[n, MASS] - where.x[k])
+    table = contact.surface[n // contact.stride]
+    row = (mean / (sqrt(_dot(pair.outward, pair.outward)) * where.h) + 3) * ENTRIES
+    low = min(max(int(row), 0), table.size - 2)
+    share = min(max(row - low, 0.0), 1.0)
+    return where.h * (table[low] + share * (table[low + 1] - table[low]))
+
+
+@noinline
+def _excess_of(contact, nodes, pair, where):
+    """Return the excess of the approach velocity over the one that closes the gap in a step."""
+    size = sqrt(_dot(pair.outward, pair.outward))
+    if not size > 0:
+        return 0.0
+    approach = _dot(pair.outward, pair.relative)
+    if not approach > 0:
+        return 0.0
+    gap = -_reach(contact, nodes, pair, pair.n, where, 1)
+    gap -= _reach(contact, nodes, pair, pair.m, where, -1)
+    return approach / size - max(gap, 0.0) / where.dt
+
+
+@noinline
+def _friction_of(pair, friction, push, slide, share):
+    """Impulse along the surface over the speed of sliding, and whether it stops all sliding."""
+    compliance = _dot(slide, slide, pair.yielding)
+    if not compliance > 0:
+        return 0.0, False
+    slip = sqrt(_dot(slide, slide))
+    stop = share * slip * slip * slip / compliance
+    return min(stop, friction * push) / slip, stop <= friction * push
+
+
+# --- all bodies at a place --------------------------------------------------------------------
 
 
 @noinline
@@ -106,54 +234,23 @@ def _node(contact, place, i):
 
 
 @noinline
-def _clear_change(contact, d, count):
-    for i in range(count):
-        for k in range(d):
-            contact.change[i, k] = 0.0
+def _count_partners(which, contact, kin, nodes, place, count):
+    """Note in how many pairs each of the fields that meet is; whether any is.
 
-
-class Approaching(NamedTuple):
-    """Pairs of bodies that approach each other further than they may."""
-
-    where: contact_pairs.Where
-
-
-class Touched(NamedTuple):
-    """Pairs of bodies that contact acted between in a step."""
-
-    step: int
-
-
-@point_function()
-def _belongs(which, contact, d, nodes, n, m, b):
-    """Return True if the bodies at `n` and `m`, the latter of field `b`, are such a pair."""
-
-
-@_belongs.on(Approaching)
-def _belongs_approaching(which, contact, d, nodes, n, m, b):
-    return (
-        contact_pairs.excess_of(
-            contact, d, nodes, contact_pairs.pair_of(contact, d, nodes, n, m), which.where
-        )
-        > 0
-    )
-
-
-@_belongs.on(Touched)
-def _belongs_touched(which, contact, d, nodes, n, m, b):
-    return abs(contact.touched[n, b]) == which.step
-
-
-@noinline
-def _count_partners(which, contact, d, nodes, place, count):
-    """Note in how many such pairs each of the fields that meet is; whether any is."""
+    Those count that approach each other further than they may, or that have `Touched`.
+    """
     found = False
     contact.partners[:count] = 0
     for i in range(count):
         n = _node(contact, place, i)
         for j in range(i + 1, count):
-            m = _node(contact, place, j)
-            if _belongs(which, contact, d, nodes, n, m, contact.meeting[j]):
+            if isinstance(which, Touched):
+                belongs = abs(contact.touched[n, contact.meeting[j]]) == which.step
+            else:
+                m = _node(contact, place, j)
+                pair = _pair_of(contact, kin, nodes, nodes.update, n, m)
+                belongs = _excess_of(contact, nodes, pair, which) > 0
+            if belongs:
                 contact.partners[i] += 1
                 contact.partners[j] += 1
                 found = True
@@ -165,78 +262,87 @@ def _share(contact, i, j):
     return 1.0 / max(contact.partners[i], contact.partners[j], 1)
 
 
+# --- v* ---------------------------------------------------------------------------------------
+
+
 @noinline
-def _touch_pair(contact, d, nodes, control, i, j, place, share, where):
+def _take(contact, control, a, i, n, k, impulse, per_mass, x):
+    """A node takes a component of an impulse; a fix that prescribes its velocity takes it over."""
+    slot = contact.prescribed[n, k]
+    if not _immovable(contact, n, k):
+        contact.change[i, k] += impulse * per_mass
+    if not counts(control.ranks, n):
+        return
+    force = impulse / control.clock[0].kick
+    add_to(control.totals, contact.slot[a] + k, force)
+    # A force along k turns about the two other axes.
+    add_to(control.totals, contact.torque[a] + (k + 1) % 3, x[(k + 2) % 3] * force)
+    add_to(control.totals, contact.torque[a] + (k + 2) % 3, -x[(k + 1) % 3] * force)
+    if slot:
+        add_to(control.totals, slot - 1 + k, -force)
+
+
+@noinline
+def _touch_pair(contact, kin, nodes, control, i, j, place, share, where):
     """`share` of the impulse between the `i`-th and the `j`-th of the fields that meet."""
     a, b = contact.meeting[i], contact.meeting[j]
-    pair = contact_pairs.pair_of(
-        contact, d, nodes, _node(contact, place, i), _node(contact, place, j)
-    )
-    excess = contact_pairs.excess_of(contact, d, nodes, pair, where)
+    n, m = _node(contact, place, i), _node(contact, place, j)
+    pair = _pair_of(contact, kin, nodes, nodes.update, n, m)
+    excess = _excess_of(contact, nodes, pair, where)
     if not excess > 0:
         return
-    size = contact_pairs.length_of(d, nodes, pair)
-    compliance = contact_pairs.compliance_of(contact, d, nodes, pair, size)
+    size = sqrt(_dot(pair.outward, pair.outward))
+    normal = pair.outward._make([outward / size for outward in pair.outward])
+    compliance = _dot(normal, normal, pair.yielding)
     if not compliance > 0:
         return  # the fixes move both
     push = share * excess / compliance
-    rub, sticks, across = 0.0, False, 0.0
-    friction = contact.friction[a, b]
-    if friction > 0:
-        across = contact_pairs.approach_left(contact, d, nodes, pair, push / size, size)
-        rub, sticks = contact_pairs.friction_of(
-            contact, d, nodes, pair, friction, push, size, across, share
-        )
+    left = _left(pair, push / size)
+    # Friction does not act on the rest of the approach: bodies that are apart come together freely.
+    slide = left - _dot(pair.outward, left) / (size * size) * pair.outward
+    rub, sticks = 0.0, False
+    if contact.friction[a, b] > 0:
+        rub, sticks = _friction_of(pair, contact.friction[a, b], push, slide, share)
     step = int(control.values[TIMESTEP]) + 1
-    contact.touched[pair.n, b] = -step if sticks else step
+    contact.touched[n, b] = -step if sticks else step
     if rub > 0:
-        heat = contact_pairs.work_of_friction(contact, d, nodes, pair, push / size, across, rub)
-        share = contact.warmth[a, b]
-        warm_node(field(nodes.fields, FrictionalHeat), pair.n, share * heat * pair.per_a)
-        warm_node(field(nodes.fields, FrictionalHeat), pair.m, (1.0 - share) * heat * pair.per_b)
-    for k in range(d):
-        impulse = push * contact_pairs.outward_of(nodes, pair, k) / size
+        # The energy that friction dissipates: impulse times the mean of the sliding speeds.
+        heat = 0.0
+        for speed, yielding in zip(slide, pair.yielding, strict=True):
+            heat += rub * speed * speed * (1.0 - 0.5 * rub * yielding)
+        warmth = contact.warmth[a, b]
+        warm_node(field(nodes.fields, FrictionalHeat), n, warmth * heat * pair.per_n)
+        warm_node(field(nodes.fields, FrictionalHeat), m, (1.0 - warmth) * heat * pair.per_m)
+    for k in range(dimension(kin)):
+        impulse = push * pair.outward[k] / size
         if rub > 0:
-            impulse += rub * contact_pairs.slide_of(contact, nodes, pair, k, push / size, across)
-        _take(contact, control, a, i, pair.n, k, -impulse, pair.per_a, where.x)
-        _take(contact, control, b, j, pair.m, k, impulse, pair.per_b, where.x)
+            impulse += rub * slide[k]
+        _take(contact, control, a, i, n, k, -impulse, pair.per_n, where.x)
+        _take(contact, control, b, j, m, k, impulse, pair.per_m, where.x)
         force = impulse / control.clock[0].kick
-        if contact.pair[a, b] >= 0 and counts(control.ranks, pair.n):
+        if contact.pair[a, b] >= 0 and counts(control.ranks, n):
             add_to(control.totals, contact.pair[a, b] + k, -force)
-        if contact.pair[b, a] >= 0 and counts(control.ranks, pair.n):
+        if contact.pair[b, a] >= 0 and counts(control.ranks, n):
             add_to(control.totals, contact.pair[b, a] + k, force)
 
 
 @noinline
 def _touch_place(contact, kin, nodes, control, place, count, where):
     """Resolve contact where `count` fields meet."""
-    d = dimension(kin)
     contact.partners[:count] = 1  # whether a single pair approaches, it looks itself
     for _ in range(REPEATS if count > 2 else 1):
-        which = Approaching(where)
-        if count > 2 and not _count_partners(which, contact, d, nodes, place, count):
+        if count > 2 and not _count_partners(where, contact, kin, nodes, place, count):
             return
-        _clear_change(contact, d, count)
+        contact.change[:count] = 0.0
         for i in range(count):
             for j in range(i + 1, count):
-                _touch_pair(contact, d, nodes, control, i, j, place, _share(contact, i, j), where)
+                share = _share(contact, i, j)
+                _touch_pair(contact, kin, nodes, control, i, j, place, share, where)
         for i in range(count):
             n = _node(contact, place, i)
-            for k in range(d):
+            for k in range(dimension(kin)):
                 nodes.update[n, k] += contact.change[i, k]
                 nodes.update[n, of_change(kin) + k] += contact.change[i, k]
-
-
-@kernel
-def _keep_rigid(contact, kin, nodes, spans):
-    """Rigid bodies have their velocity, whatever acts on the nodes."""
-    for s in range(1, 1 + spans[0, 0]):
-        for n in range(spans[s, 0], spans[s, 1]):
-            if contact.rigid[n // contact.stride] and nodes.sums[n, MASS] > 0:
-                for k in range(dimension(kin)):
-                    v = nodes.sums[n, of_momentum(kin) + k] / nodes.sums[n, MASS]
-                    nodes.update[n, k] = v
-                    nodes.update[n, of_change(kin) + k] = 0
 
 
 @noinline
@@ -245,16 +351,27 @@ def touch_node(contact, kin, grids, nodes, control, n):
     count = _meet(contact, nodes, n)
     if count > 1:
         grid = record(grids, n // contact.stride)
-        where = contact_pairs.Where(node_position(grid, n), grid.h, control.values[DT])
+        where = Where(node_position(grid, n), grid.h, control.values[DT])
         _touch_place(contact, kin, nodes, control, n % contact.stride, count, where)
+
+
+@noinline
+def _keep_rigid(contact, kin, nodes, n):
+    """Rigid bodies have their velocity, whatever acts on the nodes."""
+    if contact.rigid[n // contact.stride] and nodes.sums[n, MASS] > 0:
+        for k in range(dimension(kin)):
+            nodes.update[n, k] = nodes.sums[n, of_momentum(kin) + k] / nodes.sums[n, MASS]
+            nodes.update[n, of_change(kin) + k] = 0
 
 
 @kernel
 def _touch_nodes(contact, kin, grids, nodes, spans, control):
     """Resolve contact in v* and the change of velocity of this step; publish the forces."""
-    d = dimension(kin)
     fields = contact.slot.size
     values, totals = control.values, control.totals
+    for s in range(1, 1 + spans[0, 0]):
+        for n in range(spans[s, 0], spans[s, 1]):
+            _keep_rigid(contact, kin, nodes, n)
     for a in range(fields):
         totals[contact.slot[a] : contact.slot[a] + 3] = 0
         totals[contact.torque[a] : contact.torque[a] + 3] = 0
@@ -271,62 +388,61 @@ def _touch_nodes(contact, kin, grids, nodes, spans, control):
             if contact.pair[a, b] >= 0:
                 publish(control, contact.pair[a, b], 3)
     for c in range(contact.reactions[0]):
-        publish(control, contact.reactions[1 + c], d)
+        publish(control, contact.reactions[1 + c], dimension(kin))
     for c in range(len(contact.copies)):
         for k in range(3):
             values[contact.copies[c, 1] + k] = values[contact.copies[c, 0] + k]
 
 
+@touch.on(SeparateFields)
+def _touch_separate_fields(contact, s):
+    _touch_nodes(contact, s.kin, s.grids, s.nodes, s.spans, s.control)
+
+
+# --- the velocity that deforms ----------------------------------------------------------------
+
+
 @noinline
-def _stay_pair(contact, d, nodes, i, j, pair, share, sticks):
+def _stay_pair(contact, i, j, pair, share, sticks):
     """Take `share` of the relative velocity across the surface, or of all where the pair sticks."""
-    v = nodes.velocity
-    across = 0.0
-    compliance = 0.0
-    for k in range(d):
-        normal = contact_pairs.outward_of(nodes, pair, k)
-        across += normal * (v[pair.n, k] - v[pair.m, k])
-        compliance += normal * normal * contact_pairs.yielding_of(contact, pair, k)
+    across = _dot(pair.outward, pair.relative)
+    compliance = _dot(pair.outward, pair.outward, pair.yielding)
     push = share * across / compliance if compliance > 0 else 0.0
-    for k in range(d):
-        yielding = contact_pairs.yielding_of(contact, pair, k)
-        if not yielding > 0:
-            continue
-        impulse = push * contact_pairs.outward_of(nodes, pair, k)
-        if sticks:
-            impulse = share * (v[pair.n, k] - v[pair.m, k]) / yielding
-        if not contact_pairs.immovable(contact, pair.n, k):
-            contact.change[i, k] -= impulse * pair.per_a
-        if not contact_pairs.immovable(contact, pair.m, k):
-            contact.change[j, k] += impulse * pair.per_b
+    for k, yielding in enumerate(pair.yielding):
+        if yielding > 0:
+            impulse = share * pair.relative[k] / yielding if sticks else push * pair.outward[k]
+            if not _immovable(contact, pair.n, k):
+                contact.change[i, k] -= impulse * pair.per_n
+            if not _immovable(contact, pair.m, k):
+                contact.change[j, k] += impulse * pair.per_m
 
 
 @noinline
-def _stay_place(contact, d, nodes, place, count, step):
-    if not _count_partners(Touched(step), contact, d, nodes, place, count):
+def _stay_place(contact, kin, nodes, place, count, step):
+    if not _count_partners(Touched(step), contact, kin, nodes, place, count):
         return
     for _ in range(REPEATS if count > 2 else 1):
-        _clear_change(contact, d, count)
+        contact.change[:count] = 0.0
         for i in range(count):
             n = _node(contact, place, i)
             for j in range(i + 1, count):
                 touched = contact.touched[n, contact.meeting[j]]
                 if abs(touched) == step:
-                    pair = contact_pairs.pair_of(contact, d, nodes, n, _node(contact, place, j))
-                    share = _share(contact, i, j)
-                    _stay_pair(contact, d, nodes, i, j, pair, share, touched < 0)
+                    m = _node(contact, place, j)
+                    pair = _pair_of(contact, kin, nodes, nodes.velocity, n, m)
+                    _stay_pair(contact, i, j, pair, _share(contact, i, j), touched < 0)
         for i in range(count):
             n = _node(contact, place, i)
-            for k in range(d):
+            for k in range(dimension(kin)):
                 nodes.velocity[n, k] += contact.change[i, k]
 
 
 @noinline
 def stay_node(contact, kin, nodes, step, n):
-    """The same for the velocity that deforms, where contact acted in `step`."""
+    """Do at the place of node `n` as `touch_velocity` says, where contact acted in `step`."""
     count = _meet(contact, nodes, n)
     if count > 1:
-        _stay_place(contact, dimension(kin), nodes, n % contact.stride, count, step)
+        _stay_place(contact, kin, nodes, n % contact.stride, count, step)
 
 
 @kernel
@@ -342,12 +458,6 @@ def _stay_nodes(contact, kin, nodes, spans, step):
     for s in range(1, 1 + spans[0, 0]):
         for n in range(spans[s, 0], spans[s, 1]):
             stay_node(contact, kin, nodes, step, n)
-
-
-@touch.on(SeparateFields)
-def _touch_separate_fields(contact, s):
-    _keep_rigid(contact, s.kin, s.nodes, s.spans)
-    _touch_nodes(contact, s.kin, s.grids, s.nodes, s.spans, s.control)
 
 
 @touch_velocity.on(SeparateFields)

@@ -10,23 +10,16 @@ from typing import NamedTuple
 from karamelo_py.compiler.compile import all_lanes, fma, point_function, real, shared, where
 from karamelo_py.compiler.fields import field, increase, load_vector, store, store_from
 from karamelo_py.compiler.tuples import row
-from karamelo_py.kernels import averaging, visit
+from karamelo_py.kernels import visit
 from karamelo_py.kernels.arrays import Index, Nodes, Number, Tag, of_change, vector_at
 from karamelo_py.kernels.loss import FrictionalHeat, in_company, reflect, warm, warm_by_friction
 from karamelo_py.kernels.visit import Work
-from karamelo_py.points import frames, transfers
+from karamelo_py.points import frames, laws, transfers
 from karamelo_py.points.basis import carried, carrier, carry, deformed, entry, extent
 from karamelo_py.points.basis.cpdi.corners import AtCorners
 from karamelo_py.points.boundary import Bounces, reflected
 from karamelo_py.points.grid import inside
 from karamelo_py.points.kinematics import I, det, outer, vector, zero, zero_vector
-from karamelo_py.points.laws import (
-    advance,
-    constrained_velocity,
-    jacobian,
-    wave_speed_bound,
-    wave_speed_squared,
-)
 from karamelo_py.points.transfers.xpic import Reflected, Series, TermOfSeries
 
 
@@ -50,58 +43,29 @@ class Strain(NamedTuple):
     writes = ("state", "deformation gradient")
 
 
-class StrainOfLastStep(NamedTuple):
+class StrainOfLastStep(Strain):
     """The same by the velocity that has led here, at the places that it has led to."""
 
-    in_lanes = True
-    not_at_corners = ("moments",)
-    says = "stress"
-    reads = Strain.reads
-    writes = Strain.writes
 
-
-class SecondStrain(NamedTuple):
+class SecondStrain(Strain):
     """The same for the second of two strain increments of a step."""
 
-    in_lanes = True
-    not_at_corners = ("moments",)
     says = "second half of the stress"
-    reads = Strain.reads
-    writes = Strain.writes
 
 
-class StrainInMove(NamedTuple):
+class StrainInMove(Strain):
     """`Strain` in one visit with `Move`, behind it: what v* gave already is not gathered again."""
 
-    in_lanes = True
-    not_at_corners = ("moments",)
-    says = "stress"
-    reads = Strain.reads
-    writes = Strain.writes
 
-
-# Which take averaged volumes, where there are.
-STRAINS = Strain, StrainOfLastStep, SecondStrain, StrainInMove
-
-
-class TrialStrain(NamedTuple):
+class TrialStrain(Strain):
     """Gather the gradient; settle only by what factor it would change the volume (F-bar)."""
 
-    in_lanes = True
-    not_at_corners = ("moments",)
     says = "trial volume"
-    reads = Strain.reads
     writes = ("volume ratio",)
 
 
-class TrialStrainOfLastStep(NamedTuple):
+class TrialStrainOfLastStep(TrialStrain):
     """The same of `StrainOfLastStep`."""
-
-    in_lanes = True
-    not_at_corners = ("moments",)
-    says = "trial volume"
-    reads = Strain.reads
-    writes = TrialStrain.writes
 
 
 class SetMeanStress(NamedTuple):
@@ -139,22 +103,26 @@ def _empty_move(task, w, x):
     return x - x, x - x, transfers.zero_moment(w.transfer, w.kin, x[0])
 
 
+@shared
+def _is_known(task, w):
+    """Return True for a gradient that the transfer may have from v* already."""
+    return isinstance(task, StrainInMove) and not isinstance(w.averaging, visit.FBar)
+
+
 @empty.on(Strain)
 @empty.on(StrainOfLastStep)
 @empty.on(SecondStrain)
-def _empty_second_strain(task, w, x):
-    return zero(w.kin, x[0]), averaging.no_ratio(w.averaging, x[0])
-
-
 @empty.on(StrainInMove)
-def _empty_strain_in_move(task, w, x):
+def _empty_strain(task, w, x):
     gradient = zero(w.kin, x[0])
-    return averaging.kept_out(w.averaging, w, gradient), averaging.no_ratio(w.averaging, x[0])
+    if _is_known(task, w):
+        gradient = transfers.straining(w.transfer, w.kin, gradient)
+    return gradient, visit.no_ratio(w, x[0])
 
 
 @empty.on(TrialStrain)
 @empty.on(TrialStrainOfLastStep)
-def _empty_trial_strain_of_last_step(task, w, x):
+def _empty_trial_strain(task, w, x):
     return zero(w.kin, x[0])
 
 
@@ -175,7 +143,7 @@ def _records_of_move(task, nodes):
 
 @visit.records_of.on(Strain)
 @visit.records_of.on(StrainOfLastStep)
-def _records_of_strain_of_last_step(task, nodes):
+def _records_of_strain(task, nodes):
     return nodes.velocity
 
 
@@ -214,40 +182,37 @@ def update_at(kin: Tag, nodes: Nodes, i: Index, like: Number) -> tuple:
 
 
 @shared
-def _gradient(w, stencil, k, grad_v):
+def add_gradient(w, stencil, k, grad_v):
+    """The velocity gradient with the part of the k-th node, where it is gathered at all."""
+    if not len(grad_v):
+        return grad_v
     i, _, grad_N = entry(w.basis, w.kin, w.grid, stencil, k)
     grad_N = transfers.gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, grad_N)
     v = vector_at(w.kin, w.nodes.velocity, i, 0, zero_vector(w.kin, grad_N[0]))
     return grad_v + outer(v, grad_N)
 
 
-@shared
-def add_gradient(w, stencil, k, total):
-    """`_gradient`, where it is gathered at all."""
-    return _gradient(w, stencil, k, total) if len(total) else total
-
-
 @gathered.on(Strain)
 @gathered.on(StrainOfLastStep)
 @gathered.on(SecondStrain)
 @gathered.on(StrainInMove)
-def _gathered_strain_in_move(task, w, stencil, k, total):
+def _gathered_strain(task, w, stencil, k, total):
     return (
         add_gradient(w, stencil, k, total[0]),
-        averaging.gathered_ratio(w.averaging, w, stencil, k, total[1]),
+        visit.gathered_ratio(w, stencil, k, total[1]),
     )
 
 
 @gathered.on(TrialStrain)
 @gathered.on(TrialStrainOfLastStep)
-def _gathered_trial_strain_of_last_step(task, w, stencil, k, total):
-    return _gradient(w, stencil, k, total)
+def _gathered_trial_strain(task, w, stencil, k, total):
+    return add_gradient(w, stencil, k, total)
 
 
 @gathered.on(SetMeanStress)
 def _gathered_average_stress(task, w, stencil, k, total):
     i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
-    return fma(weight, row(field(w.nodes.fields, averaging.NodalStress), i, 0, (total,))[0], total)
+    return fma(weight, row(field(w.nodes.fields, visit.NodalStress), i, 0, (total,))[0], total)
 
 
 @gathered.on(SeriesTerm)
@@ -260,16 +225,7 @@ def _gathered_series_term(task, w, stencil, k, total):
 
 
 @point_function()
-def settled(
-    task: Tag,
-    w: Work,
-    stencil: tuple,
-    p: Index,
-    dt: Number,
-    total: tuple,
-    totals: tuple,
-    fastest: Number,
-) -> tuple:
+def settled(task, w, stencil, p, dt, total, totals, fastest):
     """Store what follows from `total`; return how far the point moved in cells, and its rate.
 
     The rate, c + max |v_i - common_i|, bounds the stable step; what is returned is the larger of it
@@ -279,36 +235,54 @@ def settled(
 
 
 @settled.on(Strain)
-def _settled_strain(task, w, stencil, p, dt, total, totals, fastest):
-    return _strain(w, w.places.x, p, dt, increment(dt, total[0]), total[1], fastest)
-
-
 @settled.on(StrainOfLastStep)
-def _settled_strain_of_last_step(task, w, stencil, p, dt, total, totals, fastest):
-    dl = frames.of_places_before(w.frame, w.kin, increment(dt, total[0]))
-    return _strain(w, w.places.x, p, dt, dl, total[1], fastest)
-
-
 @settled.on(SecondStrain)
-def _settled_second_strain(task, w, stencil, p, dt, total, totals, fastest):
-    return _strain(w, w.places.y, p, dt, increment(dt, total[0]), total[1], fastest)
-
-
 @settled.on(StrainInMove)
-def _settled_strain_in_move(task, w, stencil, p, dt, total, totals, fastest):
-    gradient = averaging.known_gradient(w.averaging, w, totals[0][2], total[0])
-    return _strain(w, w.places.x, p, dt, increment(dt, gradient), total[1], fastest)
+def _settled_strain(task, w, stencil, p, dt, total, totals, fastest):
+    """State of the law and shape of the domain after a step; growth in cells, and rate."""
+    gradient, ratio = total
+    if _is_known(task, w):
+        gradient = transfers.kept_gradient(w.transfer, w.kin, totals[0][2], gradient)
+    dl = increment(dt, gradient)
+    if isinstance(task, StrainOfLastStep):
+        dl = frames.of_places_before(w.frame, w.kin, dl)
+    dl = visit.averaged(w, p, dl, ratio)
+    law, old, f = visit.deformed_state(w, p, dt)
+    growth = frames.spatial_increment(w.frame, w.kin, dl, f)
+    state = laws.advance(law, w.kin, old, growth, dt)
+    store(w.points.state, p, state)
+    now = frames.strained(w.frame, w.kin, f, dl)
+    store(field(w.points.fields, frames.DeformationGradient), p, now)
+    j = laws.jacobian(law, w.kin, state)
+    grown = real(0, j)
+    if frames.follows(w.frame) and carried(w.basis, w.kin) == 0:
+        x = w.places.y if isinstance(task, SecondStrain) else w.places.x
+        before = visit.place_at(w.basis, w.kin, x, p)
+        after = deformed(w.basis, w.kin, before, growth)
+        store_from(w.places.y, p, w.kin.dimension, after)
+        grown = grown + further_reach(w.basis, w.kin, w.grid, before, after)
+    if not all_lanes(j > 0):
+        return where(j > 0, grown, inf), fastest
+    # The speed of waves is only asked of the few points that may be faster than all before them.
+    shorter = frames.inverse_stretch_squared(w.frame, w.kin, now, dt)
+    most = laws.wave_speed_bound(law, w.kin, state) * shorter
+    speed = (load_vector(w.kin, w.points.v, p) - w.common).largest()
+    slack = fastest - speed
+    if all_lanes((slack >= 0) & (most <= slack * slack)):  # so written, NaN is noticed too
+        return grown, fastest
+    rate = sqrt(laws.wave_speed_squared(law, w.kin, state) * shorter) + speed
+    return grown, where(fastest > rate, fastest, rate)
 
 
 @settled.on(TrialStrain)
-def _settled_trial_strain(task, w, stencil, p, dt, total, totals, fastest):
-    _keep_ratio(w, p, dt, increment(dt, total))
-    return real(0, dt), fastest
-
-
 @settled.on(TrialStrainOfLastStep)
-def _settled_trial_strain_of_last_step(task, w, stencil, p, dt, total, totals, fastest):
-    _keep_ratio(w, p, dt, frames.of_places_before(w.frame, w.kin, increment(dt, total)))
+def _settled_trial_strain(task, w, stencil, p, dt, total, totals, fastest):
+    dl = increment(dt, total)
+    if isinstance(task, TrialStrainOfLastStep):
+        dl = frames.of_places_before(w.frame, w.kin, dl)
+    _, _, f = visit.deformed_state(w, p, dt)
+    dl = frames.spatial_increment(w.frame, w.kin, dl, f)
+    field(w.points.fields, visit.VolumeRatio)[0, p] = det(I + dl)
     return real(0, dt), fastest
 
 
@@ -318,18 +292,9 @@ def increment(dt, grad_v):
     return grad_v._make(dt * grad_v)
 
 
-@shared
-def _keep_ratio(w, p, dt, dl):
-    law = visit.law_of(w, p)
-    state = visit.state_of(w, law, p, dt)
-    f = visit.deformation_of(w.frame, w.kin, law, state, w.points, p)
-    dl = frames.spatial_increment(w.frame, w.kin, dl, f)
-    field(w.points.fields, averaging.VolumeRatio)[0, p] = det(I + dl)
-
-
 @settled.on(SetMeanStress)
 def _settled_average_stress(task, w, stencil, p, dt, total, totals, fastest):
-    field(w.points.fields, averaging.AveragedStress)[0, p] = total
+    field(w.points.fields, visit.AveragedStress)[0, p] = total
     return real(0, dt), fastest
 
 
@@ -349,20 +314,15 @@ def further_reach(basis, kin, grid, before, after):
 
 @settled.on(Move)
 def _settled_move(task, w, stencil, p, dt, total, totals, fastest):
-    return _move(w, stencil, p, dt, total), fastest
-
-
-@shared
-def _move(w, stencil, p, dt, total):
     """New velocity, position and carried corners; how far that is in cells."""
-    law = visit.law_of(w, p)
+    law, state = visit.law_and_state(w, p, dt)
     v_pic, dv, moment, *corners = total
     old = load_vector(w.kin, w.points.v, p)
-    v = constrained_velocity(law, old, transfers.updated_velocity(w.transfer, old, v_pic, dv))
+    v = laws.constrained_velocity(law, old, transfers.updated_velocity(w.transfer, old, v_pic, dv))
     x = load_vector(w.kin, w.places.x, p)
-    j = transfers.known_volume(w.transfer, law, w.kin, visit.state_of(w, law, p, dt))
+    j = transfers.known_volume(w.transfer, law, w.kin, state)
     displacing = transfers.displacing_velocity(w.transfer, v, v_pic, j)
-    step = vector(w.kin, dt * constrained_velocity(law, v, displacing))
+    step = vector(w.kin, dt * laws.constrained_velocity(law, v, displacing))
     y = x + step
     warm_by_friction(field(w.nodes.fields, FrictionalHeat), w, stencil, p, v[0])
     warm(w, stencil, p, v_pic - dv)
@@ -374,7 +334,7 @@ def _move(w, stencil, p, dt, total):
     store(w.places.y, p, y)
     moved = (y - x).largest() * w.grid.inv_h
     if not frames.follows(w.frame):
-        return moved
+        return moved, fastest
     if carried(w.basis, w.kin) > 0:
         before = visit.place_at(w.basis, w.kin, w.places.x, p)
         new = (*(x + step), *before[len(x) :])
@@ -387,51 +347,18 @@ def _move(w, stencil, p, dt, total):
             new = carry(w.basis, w.kin, new, before, corner, dt * u)
         store(w.places.y, p, new)
         moved += further_reach(w.basis, w.kin, w.grid, before, new)
-    return where(inside(w.grid, w.kin, y), moved, inf)
-
-
-@shared
-def _strain(w, x, p, dt, dl, ratio, fastest):
-    """State of the law and shape of the domain after a step; growth in cells, and rate.
-
-    `dl` is dt times the gradient of velocity, `x` are the places whose shapes grow.
-    """
-    dl = averaging.averaged(w.averaging, w, p, dl, ratio)
-    law = visit.law_of(w, p)
-    old = visit.state_of(w, law, p, dt)
-    f = visit.deformation_of(w.frame, w.kin, law, old, w.points, p)
-    growth = frames.spatial_increment(w.frame, w.kin, dl, f)
-    state = advance(law, w.kin, old, growth, dt)
-    store(w.points.state, p, state)
-    now = frames.strained(w.frame, w.kin, f, dl)
-    store_optional(field(w.points.fields, frames.DeformationGradient), p, now)
-    j = jacobian(law, w.kin, state)
-    grown = real(0, j)
-    if frames.follows(w.frame) and carried(w.basis, w.kin) == 0:
-        before = visit.place_at(w.basis, w.kin, x, p)
-        after = deformed(w.basis, w.kin, before, growth)
-        store_from(w.places.y, p, w.kin.dimension, after)
-        grown = grown + further_reach(w.basis, w.kin, w.grid, before, after)
-    if not all_lanes(j > 0):
-        return where(j > 0, grown, inf), fastest
-    # The speed of waves is only asked of the few points that may be faster than all before them.
-    shorter = frames.inverse_stretch_squared(w.frame, w.kin, now, dt)
-    most = wave_speed_bound(law, w.kin, state) * shorter
-    speed = (load_vector(w.kin, w.points.v, p) - w.common).largest()
-    slack = fastest - speed
-    if all_lanes((slack >= 0) & (most <= slack * slack)):  # so written, NaN is noticed too
-        return grown, fastest
-    rate = sqrt(wave_speed_squared(law, w.kin, state) * shorter) + speed
-    return grown, where(fastest > rate, fastest, rate)
-
-
-@shared
-def store_optional(array, p, value):
-    """Store a value where there is an array for it."""
-    if array is not None:
-        store(array, p, value)
+    return where(inside(w.grid, w.kin, y), moved, inf), fastest
 
 
 empty_all = visit.for_tags(empty, "w, x")
 gathered_all = visit.for_tags(gathered, "w, stencil, k, totals", each="totals")
-settled_all = visit.in_turn(settled)
+
+
+@shared
+def settled_all(tasks, w, stencil, p, dt, totals, fastest):
+    """Settle the tasks in turn: distances add up, and the rate goes from one to the next."""
+    moved = real(0, fastest)
+    for task, total in zip(tasks, totals, strict=True):
+        further, fastest = settled(task, w, stencil, p, dt, total, totals, fastest)
+        moved += further
+    return moved, fastest

@@ -2,7 +2,7 @@
 
 A temperature is to a heat capacity what a velocity is to a mass: the nodes of heat are `Nodes` with
 one component, and the loops over nodes and the fixes of velocities serve them, too. The steps
-that they take together are those of :mod:`karamelo_py.kernels.conduction`.
+that they take together are those of :mod:`karamelo_py.kernels.heat`.
 
 Sources: Sulsky, Zhou & Schreyer 1995 for FLIP; Wallstedt & Guilkey 2007 for points that bring their
 gradient along; Tao et al. 2016, "A generalized interpolation material point method for coupled
@@ -11,21 +11,29 @@ thermo-mechanical processes", for heat.
 
 from typing import NamedTuple
 
+import numpy as np
+
 from karamelo_py.compiler.compile import (
     accumulate,
     fma,
     of_present,
+    point_function,
     real,
     round_off,
     shared,
     where,
 )
 from karamelo_py.compiler.fields import Field, StepField, field, load, load_vector, store, vector
+from karamelo_py.kernels import arrays, hook_loop
 from karamelo_py.kernels.arrays import MASS, Buffers, Nodes, of_force
-from karamelo_py.kernels.averaging import NodalMean
+from karamelo_py.kernels.clock import read_reports, step_size
 from karamelo_py.kernels.g2p import empty, gathered, settled
+from karamelo_py.kernels.nodes import NodalUpdate, SumsToVelocity, TakeMean
 from karamelo_py.kernels.p2g import load_of, scattered
-from karamelo_py.kernels.visit import deformation_of, law_of, state_of
+from karamelo_py.kernels.sweep import OldWeights, Visit, sweep, sweep_nodes
+from karamelo_py.kernels.table import conduct
+from karamelo_py.kernels.totals import agree_on_heat
+from karamelo_py.kernels.visit import NodalMean, deformed_state, law_and_state
 from karamelo_py.points import laws
 from karamelo_py.points.basis import entry, reach
 from karamelo_py.points.frames import inverse_stretch_squared, pulled_back
@@ -92,10 +100,7 @@ class HeatContent(NamedTuple):
     says = "heat to grid"
     reads = ("x", "mass", "state", "material", "heat gradient")
 
-    @staticmethod
-    def fills(kin):
-        """See `kernels.sums`."""
-        return ("sums", 0, of_force(Line())), (NodalMean, 0, 2)
+    fills = staticmethod(lambda kin: (("sums", 0, of_force(Line())), (NodalMean, 0, 2)))
 
 
 class TemperatureGradient(NamedTuple):
@@ -114,10 +119,7 @@ class HeatFlow(NamedTuple):
     says = "heat flow"
     reads = ("state", "material", "deformation gradient", "heat gradient", "conductance")
 
-    @staticmethod
-    def fills(kin):
-        """See `kernels.sums`."""
-        return (("sums", of_force(Line()), of_force(Line()) + 1),)
+    fills = staticmethod(lambda kin: (("sums", of_force(Line()), of_force(Line()) + 1),))
 
 
 class Warming(NamedTuple):
@@ -152,8 +154,7 @@ def at_least_round_off(weight):
 
 @load_of.on(HeatContent)
 def _load_of_heat_content(quantity, w, p, like):
-    law = law_of(w, p)
-    state = state_of(w, law, p, like)
+    law, state = law_and_state(w, p, like)
     mass = w.points.mass[p]
     volume = mass * laws.specific_volume(law) * laws.jacobian(law, w.kin, state)
     T = laws.temperature(law, w.kin, state)
@@ -192,9 +193,7 @@ def _scattered_heat_content(quantity, w, stencil, k, load):
 
 @load_of.on(HeatFlow)
 def _load_of_heat_flow(quantity, w, p, like):
-    law = law_of(w, p)
-    state = state_of(w, law, p, like)
-    f = deformation_of(w.frame, w.kin, law, state, w.points, p)
+    _, _, f = deformed_state(w, p, like)
     against = pulled_back(w.frame, w.kin, _gradient(w, p), f)
     fields = w.points.fields
     conductance = of_present(p, field(fields, Conductance)[0, p])
@@ -249,8 +248,7 @@ def _gathered_warming(task, w, stencil, k, total):
 
 @settled.on(Warming)
 def _settled_warming(task, w, stencil, p, dt, total, totals, fastest):
-    law = law_of(w, p)
-    state = state_of(w, law, p, dt)
+    law, state, f = deformed_state(w, p, dt)
     fields = w.points.fields
     T = field(fields, Temperature)[0, p]
     capacity = field(fields, Capacity)[0, p]
@@ -261,6 +259,83 @@ def _settled_warming(task, w, stencil, p, dt, total, totals, fastest):
     T = where(some, fma(field(fields, TemperatureShare)[0, p], change, T), T)
     store(w.points.state, p, laws.with_temperature(law, w.kin, state, T))
     # By what factor conduction has become faster than in the undeformed body.
-    f = deformation_of(w.frame, w.kin, law, state, w.points, p)
     faster = laws.jacobian(law, w.kin, state) * inverse_stretch_squared(w.frame, w.kin, f, dt)
     return real(0, dt) * T, max(fastest, faster)
+
+
+@point_function(otherwise=True)
+def at_heat_nodes(hooks, stage, target, s):
+    """Let the fixes act on the nodes of heat."""
+
+
+@at_heat_nodes.on(arrays.Hooks)
+def _at_heat_nodes_hooks(hooks, stage, target, s):
+    # Temperatures are always kept: FLIP, whatever the transfer of velocity.
+    clock = s.control.clock[0]
+    clock.set_low, clock.set_high = np.inf, -np.inf
+    hook_loop.node_hooks(
+        stage, target, Line(), s.grids, s.heat.nodes, s.ranges, hooks, s.control, step_size(s), 1.0
+    )
+    agree_on_heat(s.control.ranks, s.control)
+    clock.coldest = min(clock.coldest, clock.set_low)
+    clock.hottest = max(clock.hottest, clock.set_high)
+
+
+HEATED = Capacity, Temperature, Volume, Supply, TemperatureShare  # arrays of `HeatedPoints`
+
+
+@point_function(otherwise=True)
+def at_heated_points(hooks, s):
+    """Let the fixes supply heat to points, or set their temperature."""
+
+
+@at_heated_points.on(arrays.Hooks)
+def _at_heated_points_hooks(hooks, s):
+    clock = s.control.clock[0]
+    clock.rise = clock.fall = 0.0
+    hook_loop.clear_totals(arrays.SUPPLY_HEAT, hooks, s.control)
+    for block in s.blocks:
+        points = block.points
+        own = [field(points.fields, kind) for kind in HEATED]
+        warmth = hook_loop.HeatedPoints(points.id, s.kin, *own, points.x[clock.now])
+        hook_loop.point_hooks(arrays.SUPPLY_HEAT, warmth, hooks, s.control, step_size(s))
+    hook_loop.publish_totals(arrays.SUPPLY_HEAT, hooks, s.control)
+    agree_on_heat(s.control.ranks, s.control)
+    clock.hottest += step_size(s) * clock.rise
+    clock.coldest += step_size(s) * clock.fall
+
+
+@shared
+def visit_for_heat(heat, s, mode, visit, gathers, scatters):
+    """Visit the points for heat: the nodes are those of heat."""
+    here = arrays.with_items_of(s, heat)
+    sweep(here, mode, visit, step_size(s), gathers, scatters, False)
+
+
+MAP = Visit((Warming(),), (HeatContent(),), OldWeights())  # one loop for both ways
+FLOW = Visit((TemperatureGradient(),), (HeatFlow(),), OldWeights())
+
+
+@shared
+def show_heat(heat, s, mode):
+    """See that the nodes of heat, where there are some, show the temperature."""
+    if isinstance(heat, Conducting):
+        visit_for_heat(heat, s, mode, MAP, False, True)
+        sweep_nodes(mode, SumsToVelocity(), Line(), heat.nodes, s.ranges, step_size(s))
+
+
+@conduct.on(Conducting)
+def _conduct_conducting(heat, s, mode, hooks):
+    dt = step_size(s)
+    show_heat(heat, s, mode)
+    sweep_nodes(mode, TakeMean(), Line(), heat.nodes, s.ranges, dt)
+    at_heat_nodes(hooks, arrays.POST_HEAT_TO_GRID, arrays.ON_VELOCITY, s)
+    at_heated_points(hooks, s)
+    visit_for_heat(heat, s, mode, FLOW, True, True)
+    sweep_nodes(mode, NodalUpdate(), Line(), heat.nodes, s.ranges, dt)
+    at_heat_nodes(hooks, arrays.POST_UPDATE_GRID_HEAT, arrays.ON_UPDATE, s)
+    visit_for_heat(heat, s, mode, MAP, True, False)
+    # What `Warming` reports as a rate is by what factor conduction has become faster.
+    read_reports(s)
+    clock = s.control.clock[0]
+    clock.heat_limit = clock.heat_reference / clock.new_rate

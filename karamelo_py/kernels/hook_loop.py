@@ -9,19 +9,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.addresses import caller_of
-from karamelo_py.compiler.compile import over_blocks, point_function, shared
+from karamelo_py.compiler.compile import point_function, shared
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.formula import BLOCK, call_evaluate
 from karamelo_py.compiler.held import hold
-from karamelo_py.compiler.loops import kernel, noinline
-from karamelo_py.compiler.threads import Serial, Threaded, shared_out
+from karamelo_py.compiler.loops import caller_of, kernel, noinline
+from karamelo_py.compiler.threads import Threaded, shared_out
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels import arrays, totals
 from karamelo_py.kernels import hooks as kinds
+from karamelo_py.kernels.arrays import first_from
 from karamelo_py.kernels.clock import kick, step_size
 from karamelo_py.kernels.loss import FrictionalHeat
-from karamelo_py.kernels.searching import first_from
 from karamelo_py.kernels.walls import FRICTION, rub, stick
 from karamelo_py.points.basis import placed
 from karamelo_py.points.frames import follows
@@ -86,19 +85,23 @@ class HeatedPoints(NamedTuple):
 # --- the loop ---------------------------------------------------------------------------------
 
 
-@point_function()
-def turns(what, k, parts):
+@shared
+def _turns(what, k, parts):
     """Return where the turns of thread `k` of so many begin and end, and the step between them."""
+    if isinstance(what, HookedNodes):
+        shares = what.ranges[0, 0]
+        return shares * k // parts, shares * (k + 1) // parts, NONE + 1
+    # By turns: members may lie beside each other.
+    size = TURN if parts > 1 else max(what.ids.size, 1)
+    return k * size, what.ids.size, parts * size
 
 
-@point_function()
-def bounds(what, turn, parts):
+@shared
+def _bounds(what, turn, parts):
     """Return from where to before where members are chosen in a turn."""
-
-
-@point_function()
-def choose(what, hooks, h, place, end, member):
-    """Choose the next members, up to a block; return how many, and where to go on."""
+    if isinstance(what, HookedNodes):
+        return what.ranges[turn, 0], what.ranges[turn, 1]
+    return turn, min(turn + TURN, what.ids.size) if parts > 1 else what.ids.size
 
 
 @point_function()
@@ -111,12 +114,15 @@ def _act_on_part(what, task, hooks, control, dt, h, share, k, parts):
     """Do `task` with the members of hook `h` in the part of thread `k`; how many count."""
     found = 0
     hooks.scratch[:6] = 0.0
-    first, last, step = turns(what, k, parts)
+    first, last, step = _turns(what, k, parts)
     for turn in range(first, last, step):
-        place, end = bounds(what, turn, parts)
+        place, end = _bounds(what, turn, parts)
         count, member = BLOCK, NONE
         while count == BLOCK:
-            count, place, member = choose(what, hooks, h, place, end, member)
+            if isinstance(what, HookedNodes):
+                count, place, member = _choose_nodes(what, hooks, h, place, end, member)
+            else:
+                count, place = _choose_points(what, hooks, h, place, end)
             if count > 0:
                 found += act(what, task, hooks, control, dt, h, count, share)
     return found
@@ -133,7 +139,7 @@ def _act_apart(what, task, hooks, control, dt, h, share, k):
     there.set_low, there.set_high = clock.set_low, clock.set_high
     there.rise, there.fall = clock.rise, clock.fall
     there.coldest, there.hottest = clock.coldest, clock.hottest
-    here, mine = hold(_with_items_of(hooks, own)), hold(_with_items_of(control, own))
+    here, mine = hold(arrays.with_items_of(hooks, own)), hold(arrays.with_items_of(control, own))
     _act_on_part(what, task, here, mine, dt, h, share, k, hooks.apart.chosen.shape[0])
     totals.hand_over(own.totals, control.totals, totals.WORK)
     # Of nodes that others have held before, their totals change, too.
@@ -144,29 +150,16 @@ def _act_apart(what, task, hooks, control, dt, h, share, k):
             totals.hand_over(own.totals, control.totals, row)
 
 
+_act_on_parts = shared_out(_act_apart)
+
+
 @shared
-def _with_items_of(values, others):
-    """Put the items of another NamedTuple in the place of those with their names."""
-    new = dict(zip(others._fields, others, strict=True))
-    items = zip(values._fields, values, strict=True)
-    return type(values)(*(new.get(name, item) for name, item in items))
-
-
-_act_on_parts = shared_out(_act_apart, "what, task, hooks, control, dt, h, share")
-
-
-@point_function()
-def act_on_all(mode, what, task, hooks, control, dt, h, share):
+def _act_on_all(what, task, hooks, control, dt, h, share):
     """Do `task` with all members of a hook."""
-
-
-@act_on_all.on(Serial)
-def _act_on_all_serial(mode, what, task, hooks, control, dt, h, share):
-    _act_on_part(what, task, hooks, control, dt, h, share, NONE, NONE + 1)
-
-
-@act_on_all.on(Threaded)
-def _act_on_all_threaded(mode, what, task, hooks, control, dt, h, share):
+    mode = hooks.mode
+    if not isinstance(mode, Threaded):
+        _act_on_part(what, task, hooks, control, dt, h, share, NONE, NONE + 1)
+        return
     parts = hooks.apart.chosen.shape[0]
     _act_on_parts(mode, parts, what, task, hooks, control, dt, h, share)
     clock = control.clock[0]
@@ -251,20 +244,12 @@ def _publish_total(hooks, h, control):
 # --- nodes ------------------------------------------------------------------------------------
 
 
-@turns.on(HookedNodes)
-def _turns_of_nodes(what, k, parts):
-    shares = what.ranges[0, 0]
-    return shares * k // parts, shares * (k + 1) // parts, NONE + 1
-
-
-@bounds.on(HookedNodes)
-def _bounds_of_nodes(what, turn, parts):
-    return what.ranges[turn, 0], what.ranges[turn, 1]
-
-
-@choose.on(HookedNodes)
+@shared
 def _choose_nodes(what, hooks, h, row, end, member):
-    """Take those in use, with mass. Members ascend as rows do: a wall may have more than in use."""
+    """Choose up to a block of members in use, with mass; how many, and where to go on.
+
+    Members ascend as rows do: a wall may have more than in use.
+    """
     ranges, sums = what.ranges, what.nodes.sums
     of_all = what.target == LOADS or hooks.table[h].begin < 0
     behind = hooks.table[h].end
@@ -458,23 +443,17 @@ def _work_at_nodes(what, hooks, control, dt, count):
 
 
 @shared
-def _rubbed_alone(nodes):
-    """Return the nodes with that of their declared fields which walls know."""
-    fields = tuple([one for one in nodes.fields if type(one) is FrictionalHeat])
-    return arrays.Nodes(nodes.sums, nodes.update, nodes.velocity, fields)
-
-
-@shared
 def node_hooks(stage, target, kin, grids, nodes, ranges, hooks, control, dt, kept):
     """Call the node functions of `stage` on the members that have mass.
 
     `kept` is the share of its own velocity that a point keeps, and changes by what nodes change by.
     Of `LOADS` the work is added up: here, so that the way through the nodes is compiled once.
     """
-    _node_hooks(
-        stage, target, planar(kin), grids, _rubbed_alone(nodes), ranges, hooks, control, float(dt),
-        kept,
-    )  # fmt: skip
+    # Of declared fields walls know one; others would have all this compiled anew.
+    fields = tuple([one for one in nodes.fields if type(one) is FrictionalHeat])
+    nodes = arrays.Nodes(nodes.sums, nodes.update, nodes.velocity, fields)
+    kin, dt = planar(kin), float(dt)
+    _node_hooks(stage, target, kin, grids, nodes, ranges, hooks, control, dt, kept)
 
 
 @kernel
@@ -482,7 +461,7 @@ def _node_hooks(stage, target, kin, grids, nodes, ranges, hooks, control, dt, ke
     what = hold(HookedNodes(target, kin, grids, nodes, ranges, kept))
     if target == LOADS:
         if hooks.loads.size > 0:
-            act_on_all(hooks.mode, what, ACT, hooks, control, dt, NONE, 1.0)
+            _act_on_all(what, ACT, hooks, control, dt, NONE, 1.0)
             totals.carry(control.totals[totals.WORK])
         return
     if target == arrays.ON_UPDATE:
@@ -495,7 +474,7 @@ def _node_hooks(stage, target, kin, grids, nodes, ranges, hooks, control, dt, ke
         if hooks.table[h].uses_share:
             heavy = _act_on_part(what, COUNT, hooks, control, dt, h, share, NONE, NONE + 1)
             share = 1.0 / max(totals.number_of_all(control.ranks, control, heavy), 1)
-        act_on_all(hooks.mode, what, ACT, hooks, control, dt, h, share)
+        _act_on_all(what, ACT, hooks, control, dt, h, share)
         _publish_total(hooks, h, control)
     # Walls rub when it is known which of them hold a node.
     for h in range(len(hooks.table)):
@@ -503,7 +482,7 @@ def _node_hooks(stage, target, kin, grids, nodes, ranges, hooks, control, dt, ke
             continue
         rubs = hooks.programs[h, FRICTION].begin >= 0
         if rubs:
-            act_on_all(hooks.mode, what, RUB, hooks, control, dt, h, 1.0)
+            _act_on_all(what, RUB, hooks, control, dt, h, 1.0)
         if rubs or (hooks.table[h].holds and hooks.held.size > 0):
             _publish_total(hooks, h, control)
 
@@ -522,34 +501,19 @@ def _at_nodes_hooks(hooks, stage, target, s):
     clock.set_low = clock.set_high = 0.0  # of temperatures only
 
 
-@point_function(otherwise=True)
+@shared
 def add_work(hooks, s):
     """Add up the work of the loads on nodes."""
-
-
-@add_work.on(arrays.Hooks)
-def _add_work_hooks(hooks, s):
-    node_hooks(NONE, LOADS, s.kin, s.grids, s.nodes, s.ranges, hooks, s.control, kick(s), 0.0)
+    if isinstance(hooks, arrays.Hooks):
+        node_hooks(NONE, LOADS, s.kin, s.grids, s.nodes, s.ranges, hooks, s.control, kick(s), 0.0)
 
 
 # --- points -----------------------------------------------------------------------------------
 
 
 @shared
-def _turns_of_points(what, k, parts):
-    # By turns: members may lie beside each other.
-    size = TURN if parts > 1 else max(what.ids.size, 1)
-    return k * size, what.ids.size, parts * size
-
-
-@shared
-def _bounds_of_points(what, turn, parts):
-    return turn, min(turn + TURN, what.ids.size) if parts > 1 else what.ids.size
-
-
-@shared
-def _choose_points(what, hooks, h, p, end, member):
-    """Take those from `p` to before `end`; note where they are before the step."""
+def _choose_points(what, hooks, h, p, end):
+    """Choose up to a block of members; how many, where to go on. Note places before the step."""
     begin, ids, where = hooks.table[h].begin, what.ids, hooks.scratch
     count = 0
     while p < end and count < BLOCK:
@@ -562,13 +526,7 @@ def _choose_points(what, hooks, h, p, end, member):
                         where[3 + c, count] = hooks.x0[ids[p], c]
             count += 1
         p += 1
-    return count, p, member
-
-
-for kind in (MovingPoints, HeatedPoints):
-    turns.on(kind)(_turns_of_points)
-    bounds.on(kind)(_bounds_of_points)
-    choose.on(kind)(_choose_points)
+    return count, p
 
 
 @act.on(MovingPoints)
@@ -637,7 +595,7 @@ def point_hooks(stage, what, hooks, control, dt):
     dt = float(dt)
     for h in range(len(hooks.table)):
         if hooks.table[h].stage == stage:
-            act_on_all(hooks.mode, what, ACT, hooks, control, dt, h, 1.0)
+            _act_on_all(what, ACT, hooks, control, dt, h, 1.0)
 
 
 @kernel
@@ -662,14 +620,6 @@ def corners_that_move(s):
     return placed(s.basis, s.kin) if follows(s.frame) else 0
 
 
-@over_blocks
-def _hook_points(block, s, hooks, stage, now, then):
-    points = block.points
-    corners = corners_that_move(s)
-    motion = MovingPoints(points.id, points.v, points.mass, points.x[now], points.x[then], corners)
-    point_hooks(stage, motion, hooks, s.control, step_size(s))
-
-
 @point_function(otherwise=True)
 def at_points(hooks, stage, then, s):
     """Let the fixes act on the points; `then` is 1 when their new positions are known, else 0."""
@@ -679,5 +629,10 @@ def at_points(hooks, stage, then, s):
 def _at_points_hooks(hooks, stage, then, s):
     clear_totals(stage, hooks, s.control)
     now = s.control.clock[0].now
-    _hook_points(s, hooks, stage, now, 1 - now if then else now)
+    y = 1 - now if then else now
+    corners = corners_that_move(s)
+    for block in s.blocks:
+        points = block.points
+        motion = MovingPoints(points.id, points.v, points.mass, points.x[now], points.x[y], corners)
+        point_hooks(stage, motion, hooks, s.control, step_size(s))
     publish_totals(stage, hooks, s.control)

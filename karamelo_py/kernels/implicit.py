@@ -21,7 +21,7 @@ from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.slopes import seeded, slopes_of
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Block, Setup
-from karamelo_py.kernels.lanes import lanes_of_law, points_at_once, points_from
+from karamelo_py.kernels.lanes import lanes_with, points_from
 from karamelo_py.kernels.sweep import places_of
 from karamelo_py.kernels.visit import deformation_of, place_at
 from karamelo_py.points.basis import entry, locate, support
@@ -129,9 +129,9 @@ if config.DISABLE_JIT:  # type: ignore[attr-defined]
 def respond(kin, points, laws, dt, response):
     """Stress and tangent of each point after its increment."""
     points, laws = at_hand(points), at_hand(laws)
-    lanes = lanes_of_law(laws, points.mass)
+    lanes = lanes_with((), laws, points.mass)
     count = points.mass.size
-    for q in range(0, count, points_at_once(lanes)):
+    for q in range(0, count, lanes.width):
         p = points_from(lanes, q, count)
         law = record(laws, index(points.material[p]))
         mass = points.mass[p]

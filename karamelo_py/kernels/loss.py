@@ -21,25 +21,12 @@ move (not with splines), and that usl strains by dv, which may only cost.
 """
 
 from karamelo_py.compiler import fields
-from karamelo_py.compiler.compile import accumulate, real, round_off, shared, where
-from karamelo_py.kernels.arrays import MASS, of_change, of_momentum, vector_at
-from karamelo_py.kernels.visit import law_of, state_of
+from karamelo_py.compiler.compile import accumulate, real, shared, where
+from karamelo_py.kernels.arrays import of_change, vector_at
+from karamelo_py.kernels.visit import law_and_state
+from karamelo_py.points import laws, transfers
 from karamelo_py.points.basis import entry, support
 from karamelo_py.points.kinematics import dimension
-from karamelo_py.points.laws import (
-    heat_capacity,
-    specific_volume,
-    temperature,
-    warmed,
-    with_temperature,
-)
-from karamelo_py.points.transfers import (
-    add_moment,
-    gradient_weight,
-    lost_shares,
-    nodal_momentum,
-    zero_moment,
-)
 from karamelo_py.points.transfers.xpic import Reflected, Series
 
 # Share of the mass at its nodes from where on a point loses its moment, to the power of dimensions:
@@ -68,26 +55,25 @@ def warm_node(rubbed, n, heat):
 
 
 @shared
-def warm_by_friction(rubbed, w, stencil, p, like):
-    """Point `p` takes the heat of friction at its nodes by its weights: none is lost."""
-    if rubbed is not None:
-        law = law_of(w, p)
-        state = state_of(w, law, p, like)
-        heat = _heat_of_nodes(rubbed, w, stencil, like)
-        capacity = heat_capacity(law, like)
-        warms = capacity > 0
-        rise = where(warms, heat, like - like) / where(warms, capacity, real(1, like))
-        T = temperature(law, w.kin, state) + rise
-        fields.store(w.points.state, p, with_temperature(law, w.kin, state, T))
+def _nodes_of(w, stencil):
+    """(node, weight, gradient) of the nodes that a point sees."""
+    nodes = range(support(w.basis, w.kin))
+    return tuple([entry(w.basis, w.kin, w.grid, stencil, k) for k in nodes])
 
 
 @shared
-def _heat_of_nodes(rubbed, w, stencil, like):
-    heat = like - like
-    for k in range(support(w.basis, w.kin)):
-        i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
-        heat += weight * rubbed[i, 0]
-    return heat
+def warm_by_friction(rubbed, w, stencil, p, like):
+    """Point `p` takes the heat of friction at its nodes by its weights: none is lost."""
+    if rubbed is not None:
+        law, state = law_and_state(w, p, like)
+        heat = like - like
+        for i, weight, _ in _nodes_of(w, stencil):
+            heat += weight * rubbed[i, 0]
+        capacity = laws.heat_capacity(law, like)
+        warms = capacity > 0
+        rise = where(warms, heat, like - like) / where(warms, capacity, real(1, like))
+        T = laws.temperature(law, w.kin, state) + rise
+        fields.store(w.points.state, p, laws.with_temperature(law, w.kin, state, T))
 
 
 @shared
@@ -105,23 +91,6 @@ def bring_energy(lost, i, mass, momentum):
 
 
 @shared
-def keep_loss(lost, kin, sums, n):
-    """In `lost` at node `n`, what it does not keep of the energy it was brought, per mass."""
-    mass = sums[n, MASS]
-    if mass > 0:
-        one = real(1, mass)
-        factor = one / mass
-        kinetic = mass - mass
-        for k in range(dimension(kin)):
-            v = sums[n, of_momentum(kin) + k] * factor
-            kinetic += real(0.5, mass) * v * v
-        # Of bodies that fly as one, the difference is round-off of either sign, and no heat.
-        noise = real(8, mass) * round_off(mass) * kinetic
-        lost[n, 1] = max(lost[n, 0] * factor - kinetic - noise, mass - mass)
-        lost[n, 2] = mass
-
-
-@shared
 def warm(w, stencil, p, v):
     """Give point `p` as heat what it has lost on the way to the nodes and back.
 
@@ -130,7 +99,7 @@ def warm(w, stencil, p, v):
     lost = fields.field(w.nodes.fields, EnergyLoss)
     reflected = fields.field(w.points.fields, Reflected)
     if lost is not None:
-        moment = _moment_before(w, stencil, v, zero_moment(w.transfer, w.kin, v[0]))
+        moment = _moment_before(w, stencil, v, transfers.zero_moment(w.transfer, w.kin, v[0]))
         moment = in_company(w, stencil, p, moment)
         _heat(w, p, _gone(lost, w, stencil, v, moment))
     if reflected is not None:
@@ -160,8 +129,7 @@ def in_company(w, stencil, p, moment):
 def _own_share(lost, w, stencil, mass):
     """The share of a point of this mass in what its nodes have, by its weights."""
     share = mass - mass
-    for k in range(support(w.basis, w.kin)):
-        i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
+    for i, weight, _ in _nodes_of(w, stencil):
         share += weight * weight * mass / max(lost[i, 2], real(1e-36, mass))
     return share
 
@@ -169,9 +137,10 @@ def _own_share(lost, w, stencil, mass):
 @shared
 def _heat(w, p, gone):
     """Give point `p` the energy per mass that is gone."""
-    law = law_of(w, p)
-    state = state_of(w, law, p, gone)
-    fields.store(w.points.state, p, warmed(law, w.kin, state, gone / specific_volume(law)))
+    law, state = law_and_state(w, p, gone)
+    fields.store(
+        w.points.state, p, laws.warmed(law, w.kin, state, gone / laws.specific_volume(law))
+    )
 
 
 @shared
@@ -197,8 +166,7 @@ def reflect(reflected, w, stencil, p, term, k):
 @shared
 def gathered_term(w, stencil, term):
     """The present term of XPIC's series at a point."""
-    for k in range(support(w.basis, w.kin)):
-        i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
+    for i, weight, _ in _nodes_of(w, stencil):
         term = term + weight * term_at(w, i, term)
     return term
 
@@ -207,8 +175,7 @@ def gathered_term(w, stencil, term):
 def _spread(w, stencil, term):
     """sum_i N_i |w_i - term|^2 of the present term w of XPIC's series."""
     spread = term[0] - term[0]
-    for k in range(support(w.basis, w.kin)):
-        i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
+    for i, weight, _ in _nodes_of(w, stencil):
         spread += weight * (term_at(w, i, term) - term).squared()
     return spread
 
@@ -229,11 +196,12 @@ def _before(w, i, like):
 @shared
 def _moment_before(w, stencil, v, moment):
     """Gather the moment of the velocity that the nodes had before the update."""
-    for k in range(support(w.basis, w.kin)):
-        i, weight, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
-        g = gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, gradient)
+    for k, (i, N, grad_N) in enumerate(_nodes_of(w, stencil)):
+        grad_N = transfers.gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, grad_N)
         u = _before(w, i, v)
-        moment = add_moment(w.transfer, w.kin, w.basis, w.grid, stencil, k, weight, g, u, moment)
+        moment = transfers.add_moment(
+            w.transfer, w.kin, w.basis, w.grid, stencil, k, N, grad_N, u, moment
+        )
     return moment
 
 
@@ -241,18 +209,12 @@ def _moment_before(w, stencil, v, moment):
 def _gone(lost, w, stencil, v, moment):
     """Kinetic energy per mass that a point has lost at the nodes and on the way back."""
     gone = v[0] - v[0]
-    there, here = lost_shares(w.transfer, gone)
-    for k in range(support(w.basis, w.kin)):
-        i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
-        gone += _part_gone(lost, w, stencil, k, i, weight, v, moment, there, here)
+    there, here = transfers.lost_shares(w.transfer, gone)
+    one = real(1, gone)
+    for k, (i, N, _) in enumerate(_nodes_of(w, stencil)):
+        mine = transfers.nodal_momentum(
+            w.transfer, w.kin, w.basis, w.grid, stencil, k, N, one, v - v, moment
+        )
+        apart = 0.5 * N * (_before(w, i, v) - v).squared()
+        gone += there * N * lost[i, 1] + here * (apart - energy_of(N, mine))
     return gone
-
-
-@shared
-def _part_gone(lost, w, stencil, k, i, weight, v, moment, there, here):
-    one = real(1, weight)
-    held = nodal_momentum(
-        w.transfer, w.kin, w.basis, w.grid, stencil, k, weight, one, v - v, moment
-    )
-    apart = 0.5 * weight * (_before(w, i, v) - v).squared()
-    return there * weight * lost[i, 1] + here * (apart - energy_of(weight, held))

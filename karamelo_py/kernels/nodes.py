@@ -2,22 +2,14 @@
 
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import point_function, real, shared
+from karamelo_py.compiler.compile import point_function, real, round_off, shared
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.tuples import clear_first
-from karamelo_py.kernels.arrays import (
-    MASS,
-    Index,
-    Nodes,
-    Number,
-    Tag,
-    of_change,
-    of_force,
-    of_momentum,
-)
-from karamelo_py.kernels.averaging import NodalMean, NodalStress
-from karamelo_py.kernels.loss import EnergyLoss, FrictionalHeat, keep_loss
+from karamelo_py.kernels import arrays
+from karamelo_py.kernels.arrays import Index, Nodes, Number, Tag
+from karamelo_py.kernels.loss import EnergyLoss, FrictionalHeat
 from karamelo_py.kernels.p2g import SquaredMass
+from karamelo_py.kernels.visit import NodalMean, NodalStress
 from karamelo_py.points.kinematics import dimension
 from karamelo_py.points.transfers.xpic import Series
 
@@ -28,7 +20,7 @@ class TakeMean(NamedTuple):
     goes_through = ("nodal mean", "nodal mean")
 
 
-class TakeMeanStress(NamedTuple):
+class TakeMeanStress(TakeMean):
     """The same of the mean stress."""
 
     goes_through = ("nodal stress", "nodal stress")
@@ -101,17 +93,29 @@ def at_node(task: Tag, kin: Tag, nodes: Nodes, n: Index, dt: Number) -> None:
 @shared
 def per_mass(nodes: Nodes, n: Index, like: Number) -> Number:
     """One over the mass of a node, 0 where it has none."""
-    mass = nodes.sums[n, MASS]
+    mass = nodes.sums[n, arrays.MASS]
     return real(1, like) / mass if mass > 0 else real(0, like)
 
 
 @at_node.on(KeepLoss)
 def _at_node_keep_loss(task, kin, nodes, n, dt):
-    keep_loss(field(nodes.fields, EnergyLoss), kin, nodes.sums, n)
+    """Keep per mass what the node does not have of the energy that it was brought."""
+    lost, mass = field(nodes.fields, EnergyLoss), nodes.sums[n, arrays.MASS]
+    if mass > 0:
+        one = real(1, mass)
+        factor = one / mass
+        kinetic = mass - mass
+        for k in range(dimension(kin)):
+            v = nodes.sums[n, arrays.of_momentum(kin) + k] * factor
+            kinetic += real(0.5, mass) * v * v
+        # Of bodies that fly as one, the difference is round-off of either sign, and no heat.
+        noise = real(8, mass) * round_off(mass) * kinetic
+        lost[n, 1] = max(lost[n, 0] * factor - kinetic - noise, mass - mass)
+        lost[n, 2] = mass
 
 
 @at_node.on(ClearFrictionalHeat)
-def _at_node_clear_rubbed(task, kin, nodes, n, dt):
+def _at_node_clear_frictional_heat(task, kin, nodes, n, dt):
     clear_first(field(nodes.fields, FrictionalHeat), n)
 
 
@@ -119,9 +123,9 @@ def _at_node_clear_rubbed(task, kin, nodes, n, dt):
 def _at_node_update(task, kin, nodes, n, dt):
     factor = per_mass(nodes, n, dt)
     for k in range(dimension(kin)):
-        dv = dt * nodes.sums[n, of_force(kin) + k] * factor
-        nodes.update[n, k] = nodes.sums[n, of_momentum(kin) + k] * factor + dv
-        nodes.update[n, of_change(kin) + k] = dv
+        dv = dt * nodes.sums[n, arrays.of_force(kin) + k] * factor
+        nodes.update[n, k] = nodes.sums[n, arrays.of_momentum(kin) + k] * factor + dv
+        nodes.update[n, arrays.of_change(kin) + k] = dv
 
 
 @at_node.on(MomentumToVelocity)
@@ -135,7 +139,7 @@ def _at_node_momentum_to_velocity(task, kin, nodes, n, dt):
 def _at_node_sums_to_velocity(task, kin, nodes, n, dt):
     factor = per_mass(nodes, n, dt)
     for k in range(dimension(kin)):
-        nodes.velocity[n, k] = nodes.sums[n, of_momentum(kin) + k] * factor
+        nodes.velocity[n, k] = nodes.sums[n, arrays.of_momentum(kin) + k] * factor
 
 
 @shared
@@ -153,24 +157,16 @@ def _at_node_update_to_velocity(task, kin, nodes, n, dt):
     # See UpdateToVelocity.light: the change of a light node's velocity enters the gradient by the
     # share of its mass. Points take the whole change: momentum is kept.
     one = real(1, dt)
-    share = unlimited(field(nodes.fields, SquaredMass), n, nodes.sums[n, MASS], task.light)
+    share = unlimited(field(nodes.fields, SquaredMass), n, nodes.sums[n, arrays.MASS], task.light)
     for k in range(dimension(kin)):
-        dv = nodes.update[n, of_change(kin) + k]
+        dv = nodes.update[n, arrays.of_change(kin) + k]
         nodes.velocity[n, k] = nodes.update[n, k] - (one - share) * dv
 
 
 @at_node.on(TakeMean)
-def _at_node_take_mean(task, kin, nodes, n, dt):
-    _take_mean(field(nodes.fields, NodalMean), n)
-
-
 @at_node.on(TakeMeanStress)
-def _at_node_take_mean_stress(task, kin, nodes, n, dt):
-    _take_mean(field(nodes.fields, NodalStress), n)
-
-
-@shared
-def _take_mean(sums, n):
+def _at_node_take_mean(task, kin, nodes, n, dt):
+    sums = field(nodes.fields, NodalStress if isinstance(task, TakeMeanStress) else NodalMean)
     if sums[n, 1] > 0:
         sums[n, 0] /= sums[n, 1]
 
@@ -181,9 +177,9 @@ def _at_node_start_series(task, kin, nodes, n, dt):
     series = field(nodes.fields, Series)
     factor = per_mass(nodes, n, dt)
     for k in range(d):
-        v = nodes.sums[n, of_momentum(kin) + k] * factor
+        v = nodes.sums[n, arrays.of_momentum(kin) + k] * factor
         series[n, k] = v
-        nodes.update[n, of_change(kin) + k] = nodes.update[n, k]
+        nodes.update[n, arrays.of_change(kin) + k] = nodes.update[n, k]
 
 
 @at_node.on(ExtendSeries)
@@ -194,4 +190,4 @@ def _at_node_extend_series(task, kin, nodes, n, dt):
     for k in range(d):
         v = series[n, k] - series[n, d + k] * factor
         series[n, k] = v
-        nodes.update[n, of_change(kin) + k] += v
+        nodes.update[n, arrays.of_change(kin) + k] += v

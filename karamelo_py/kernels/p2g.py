@@ -1,30 +1,51 @@
-"""Points to grid: what a visit of the points scatters to the nodes."""
+"""Points to grid: what a visit of the points scatters to the nodes, and its sums there.
 
+A quantity says in ``fills(kin)`` which columns of the nodes' arrays take it: (array, first column,
+end), the array a name in `Nodes` or the class of a field, which a scene may not have. With
+``adds = True`` it adds to what is there.
+"""
+
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import accumulate, of_present, point_function, real, shared
+from karamelo_py.compiler.compile import accumulate, index, of_present, point_function, real, shared
 from karamelo_py.compiler.fields import StepField, SummedField, field, load, load_vector, vector
+from karamelo_py.compiler.held import at_hand
+from karamelo_py.compiler.lanes.records import move_record
+from karamelo_py.compiler.loops import noinline
+from karamelo_py.compiler.tuples import put_at
 from karamelo_py.kernels.arrays import (
+    ADD,
+    CLEAR,
     MASS,
     SUMS_WIDTH,
     VELOCITY_WIDTH,
+    Buffers,
     Index,
+    Nodes,
     Number,
     Tag,
     of_force,
 )
-from karamelo_py.kernels.averaging import AveragedStress, FBar, NodalMean, NodalStress, VolumeRatio
 from karamelo_py.kernels.loss import EnergyLoss, bring_energy
-from karamelo_py.kernels.visit import Work, deformation_of, for_tags, law_of, records_of, state_of
-from karamelo_py.points.basis import entry, mapped_again
-from karamelo_py.points.frames import Total, force_stress
-from karamelo_py.points.kinematics import I, dimension, nothing
-from karamelo_py.points.laws import (
-    constrained_velocity,
-    jacobian,
-    kirchhoff_stress,
-    specific_volume,
+from karamelo_py.kernels.visit import (
+    AveragedStress,
+    FBar,
+    NodalMean,
+    NodalStress,
+    VolumeRatio,
+    Work,
+    deformed_state,
+    for_tags,
+    law_and_state,
+    law_of,
+    records_of,
 )
+from karamelo_py.points import laws
+from karamelo_py.points.basis import entry, mapped_again
+from karamelo_py.points.frames import follows, force_stress
+from karamelo_py.points.kinematics import I, dimension, nothing
+from karamelo_py.points.laws import constrained_velocity
 from karamelo_py.points.transfers import Moment, gradient_weight, nodal_momentum, zero_moment
 from karamelo_py.points.transfers.xpic import Series, TermOfSeries
 
@@ -39,16 +60,10 @@ class MassMomentum(NamedTuple):
 
     @staticmethod
     def fills(kin):
-        """See `kernels.sums`."""
-        d = dimension(kin)
-        own = (
-            (Normal, 0, d),
-            (SquaredMass, 0, 1),
-            (Centre, 0, d),
-            (RigidSums, 0, of_force(kin)),
-            (EnergyLoss, 0, 1),
-        )
-        return ("sums", 0, of_force(kin)), *own
+        """Name the columns of the nodes that it adds to, see `columns_of`."""
+        vectors = [(kind, 0, dimension(kin)) for kind in (Normal, Centre)]
+        numbers = [(kind, 0, 1) for kind in (SquaredMass, EnergyLoss)]
+        return ("sums", 0, of_force(kin)), (RigidSums, 0, of_force(kin)), *vectors, *numbers
 
 
 class InternalForce(NamedTuple):
@@ -59,10 +74,9 @@ class InternalForce(NamedTuple):
     says = "internal force"
     reads = ("mass", "state", "material", "deformation gradient", "force")
 
-    @staticmethod
-    def fills(kin):
-        """See `kernels.sums`."""
-        return ("sums", of_force(kin), SUMS_WIDTH[dimension(kin)]), (NodalStress, 0, 2)
+    fills = staticmethod(
+        lambda kin: (("sums", of_force(kin), SUMS_WIDTH[dimension(kin)]), (NodalStress, 0, 2))
+    )
 
 
 class MomentumAgain(NamedTuple):
@@ -73,10 +87,7 @@ class MomentumAgain(NamedTuple):
     says = "momentum to grid"
     reads = ("mass", "v", "moment")
 
-    @staticmethod
-    def fills(kin):
-        """See `kernels.sums`."""
-        return (("velocity", 0, VELOCITY_WIDTH[dimension(kin)]),)
+    fills = staticmethod(lambda kin: (("velocity", 0, VELOCITY_WIDTH[dimension(kin)]),))
 
 
 class Volumes(NamedTuple):
@@ -87,10 +98,7 @@ class Volumes(NamedTuple):
     says = "volumes to grid"
     reads = ("mass", "state", "material", "volume ratio")
 
-    @staticmethod
-    def fills(kin):
-        """See `kernels.sums`."""
-        return ((NodalMean, 0, 2),)
+    fills = staticmethod(lambda kin: ((NodalMean, 0, 2),))
 
 
 class AveragedForce(NamedTuple):
@@ -102,10 +110,7 @@ class AveragedForce(NamedTuple):
     reads = ("mass", "state", "material", "deformation gradient", "averaged stress")
     adds = True  # to a force that is there
 
-    @staticmethod
-    def fills(kin):
-        """See `kernels.sums`."""
-        return (("sums", of_force(kin), SUMS_WIDTH[dimension(kin)]),)
+    fills = staticmethod(lambda kin: (("sums", of_force(kin), SUMS_WIDTH[dimension(kin)]),))
 
 
 class SeriesBack(NamedTuple):
@@ -116,10 +121,7 @@ class SeriesBack(NamedTuple):
     says = "term of the series to the grid"
     reads = ("mass", "term of series")
 
-    @staticmethod
-    def fills(kin):
-        """See `kernels.sums`."""
-        return ((Series, dimension(kin), 2 * dimension(kin)),)
+    fills = staticmethod(lambda kin: ((Series, dimension(kin), 2 * dimension(kin)),))
 
 
 class Force(StepField):
@@ -185,83 +187,54 @@ def _moment(w, p, like):
 
 
 @shared
-def _own_mass(w, p):
-    return of_present(p, w.points.mass[p])
-
-
-@shared
-def shared_mass(led, law, mass):
-    """The mass that a point gives to the sums of all solids: of rigid points none, if `led`."""
-    rigid = led is not None and constrained_velocity.defined(type(law))
-    return mass - mass if rigid else mass
-
-
-@shared
-def loaded_for(nodal, kin, array, p):
-    """The vector of a point, where there is a nodal array for it; else ()."""
-    return () if nodal is None else load_vector(kin, array, p)
-
-
-@shared
-def led_mass(led, law, mass):
-    """(mass,) of rigid points, which have sums of their own if `led`; () of others."""
-    return (mass,) if led is not None and constrained_velocity.defined(type(law)) else ()
+def _is_apart(w, law):
+    """Return True for rigid points whose nodes have sums of their own for them."""
+    return field(w.nodes.fields, RigidSums) is not None and constrained_velocity.defined(type(law))
 
 
 @shared
 def _mass(w, p):
-    return shared_mass(field(w.nodes.fields, RigidSums), law_of(w, p), _own_mass(w, p))
+    """The mass that a point gives to the sums of all solids."""
+    mass = of_present(p, w.points.mass[p])
+    return mass - mass if _is_apart(w, law_of(w, p)) else mass
 
 
 @load_of.on(MassMomentum)
 def _load_of_mass_momentum(quantity, w, p, like):
     v = load_vector(w.kin, w.points.v, p)
-    led = led_mass(field(w.nodes.fields, RigidSums), law_of(w, p), _own_mass(w, p))
-    x = loaded_for(field(w.nodes.fields, Centre), w.kin, w.places.y, p)
-    return _mass(w, p), v, _moment(w, p, like), led, x
-
-
-@shared
-def momentum_part(
-    w: Work, stencil: tuple, k: int, weight: Number, mass: Number, v: tuple, moment: tuple
-) -> tuple:
-    """The momentum that a point gives to the k-th node."""
-    return nodal_momentum(w.transfer, w.kin, w.basis, w.grid, stencil, k, weight, mass, v, moment)
+    rigid = (of_present(p, w.points.mass[p]),) if _is_apart(w, law_of(w, p)) else ()
+    x = () if field(w.nodes.fields, Centre) is None else load_vector(w.kin, w.places.y, p)
+    return _mass(w, p), v, _moment(w, p, like), rigid, x
 
 
 @scattered.on(MassMomentum)
 def _scattered_mass_momentum(quantity, w, stencil, k, load):
     i, N, grad_N = entry(w.basis, w.kin, w.grid, stencil, k)
-    mass, v, moment, led, x = load
-    momentum = momentum_part(w, stencil, k, N, mass, v, moment)
+    mass, v, moment, rigid, x = load
+    momentum = nodal_momentum(w.transfer, w.kin, w.basis, w.grid, stencil, k, N, mass, v, moment)
     accumulate(w.nodes.sums, i, MASS, (N * mass, *momentum))
     bring_energy(field(w.nodes.fields, EnergyLoss), i, N * mass, momentum)
-    accumulate_led(field(w.nodes.fields, RigidSums), i, N, led, v)
+    if len(rigid):
+        part = N * rigid[0]
+        accumulate(field(w.nodes.fields, RigidSums), i, MASS, (part, *(part * v)))
     if len(x):
         accumulate_optional(field(w.nodes.fields, Centre), i, N * mass * x)
     accumulate_optional(field(w.nodes.fields, Normal), i, mass * grad_N.planar())
     accumulate_optional(field(w.nodes.fields, SquaredMass), i, (N * mass * mass,))
 
 
-@point_function(otherwise=True)
-def mean_stress(averaging, kin, law, state, volume):
-    """Volume times mean stress, and volume, of a point of reference `volume`; () without F-bar."""
-    return ()
-
-
-@mean_stress.on(FBar)
-def _mean_stress_f_bar(averaging, kin, law, state, volume):
-    tau = kirchhoff_stress(law, kin, state).mean_of_stretching()
-    return volume * tau, volume * jacobian(law, kin, state)
+@shared
+def _mean_stress(kin, law, state, volume):
+    """Volume times mean stress, and volume, of a point of reference `volume`."""
+    tau = laws.kirchhoff_stress(law, kin, state).mean_of_stretching()
+    return volume * tau, volume * laws.jacobian(law, kin, state)
 
 
 @load_of.on(AveragedForce)
 def _load_of_averaged_force(quantity, w, p, like):
-    law = law_of(w, p)
-    state = state_of(w, law, p, like)
-    f = deformation_of(w.frame, w.kin, law, state, w.points, p)
-    volume = _mass(w, p) * specific_volume(law)
-    own, present = mean_stress(w.averaging, w.kin, law, state, volume)
+    law, state, f = deformed_state(w, p, like)
+    volume = _mass(w, p) * laws.specific_volume(law)
+    own, present = _mean_stress(w.kin, law, state, volume)
     change = present * field(w.points.fields, AveragedStress)[0, p] - own
     return force_stress(w.frame, w.kin, nothing(w.kin) - change * I, f)
 
@@ -275,14 +248,13 @@ def _scattered_averaged_force(quantity, w, stencil, k, load):
 
 @load_of.on(InternalForce)
 def _load_of_internal_force(quantity, w, p, like):
-    law = law_of(w, p)
-    state = state_of(w, law, p, like)
-    f = deformation_of(w.frame, w.kin, law, state, w.points, p)
-    volume = _mass(w, p) * specific_volume(law)
+    law, state, f = deformed_state(w, p, like)
+    volume = _mass(w, p) * laws.specific_volume(law)
     # Minus volume times stress, with the sign of the internal force.
-    stress = -volume * force_stress(w.frame, w.kin, kirchhoff_stress(law, w.kin, state), f)
+    stress = -volume * force_stress(w.frame, w.kin, laws.kirchhoff_stress(law, w.kin, state), f)
     force = load(field(w.points.fields, Force), p, load_vector(w.kin, w.points.v, p))
-    mean = mean_stress(w.averaging, w.kin, law, state, volume)
+    of_mean = isinstance(w.averaging, FBar)
+    mean = _mean_stress(w.kin, law, state, volume) if of_mean else ()
     here = of_present(p, real(1, volume))
     return stress, here * force if len(force) else (), mean
 
@@ -299,38 +271,26 @@ def _scattered_internal_force(quantity, w, stencil, k, load):
     accumulate_optional(field(w.nodes.fields, NodalStress), i, tuple([N * a for a in mean]))
 
 
-@point_function(otherwise=True)
-def mapped_again_in(frame, basis, grid, moment):
-    """The part of the moment of velocity that MUSL maps again: all where weights never change."""
-    return mapped_again(basis, grid, moment)
-
-
-@mapped_again_in.on(Total)
-def _mapped_again_in_total(frame, basis, grid, moment):
-    return moment
-
-
 @load_of.on(MomentumAgain)
 def _load_of_momentum_again(quantity, w, p, like):
     moment = _moment(w, p, like)
-    if len(moment):
-        moment = mapped_again_in(w.frame, w.basis, w.grid, moment)
+    if len(moment) and follows(w.frame):  # of weights that never change, all is mapped again
+        moment = mapped_again(w.basis, w.grid, moment)
     return _mass(w, p), load_vector(w.kin, w.points.v, p), moment
 
 
 @scattered.on(MomentumAgain)
 def _scattered_momentum_again(quantity, w, stencil, k, load):
-    i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
+    i, N, _ = entry(w.basis, w.kin, w.grid, stencil, k)
     mass, v, moment = load
-    momentum = momentum_part(w, stencil, k, weight, mass, v, moment)
+    momentum = nodal_momentum(w.transfer, w.kin, w.basis, w.grid, stencil, k, N, mass, v, moment)
     accumulate(w.nodes.velocity, i, 0, (*momentum,))
 
 
 @load_of.on(Volumes)
 def _load_of_volumes(quantity, w, p, like):
-    law = law_of(w, p)
-    state = state_of(w, law, p, like)
-    volume = _mass(w, p) * specific_volume(law) * jacobian(law, w.kin, state)
+    law, state = law_and_state(w, p, like)
+    volume = _mass(w, p) * laws.specific_volume(law) * laws.jacobian(law, w.kin, state)
     return volume * field(w.points.fields, VolumeRatio)[0, p], volume
 
 
@@ -355,14 +315,6 @@ def _scattered_series_back(quantity, w, stencil, k, load):
 
 
 @shared
-def accumulate_led(array, i, weight, led, v):
-    """Give a node the mass and momentum of a rigid point."""
-    if len(led):
-        part = weight * led[0]
-        accumulate(array, i, MASS, (part, *(part * v)))
-
-
-@shared
 def accumulate_optional(array, i, values):
     """Add to a node, where there is an array for it."""
     if array is not None:
@@ -371,3 +323,76 @@ def accumulate_optional(array, i, values):
 
 load_all = for_tags(load_of, "w, p, like")
 scattered_all = for_tags(scattered, "w, stencil, k, loads", each="loads")
+
+
+def adds(quantity: NamedTuple) -> bool:
+    """Return True if a quantity adds to the values at the nodes."""
+    return getattr(type(quantity), "adds", False)
+
+
+def columns_of(quantities: tuple, kin: NamedTuple) -> list[tuple[Any, int, int]]:
+    """The columns that take all the quantities; those that follow each other are one entry."""
+    found: dict[tuple[Any, int], int] = {}  # the first column of each array that ends there
+    for quantity in quantities:
+        for array, first, end in quantity.fills(kin):
+            found[array, end] = found.pop((array, first), first)
+    return [(array, first, end) for (array, end), first in found.items()]
+
+
+@shared
+def given(quantities: tuple, kin: Tag) -> int:
+    """Add up the kinds of arrays that take the quantities: 1 the sums, 2 velocities, 4 fields."""
+    names = {name for name, _, _ in columns_of(quantities, kin)}
+    fields = any(not isinstance(name, str) for name in names)
+    return ("sums" in names) + 2 * ("velocity" in names) + 4 * fields
+
+
+def _array(nodes: Nodes, name: Any) -> Any:
+    return getattr(nodes, name) if isinstance(name, str) else field(nodes.fields, name)
+
+
+def _columns(quantities: tuple, kin: NamedTuple) -> Iterator[tuple]:
+    for kind in (False, True):
+        chosen = tuple(q for q in quantities if adds(q) == kind)
+        yield from ((*columns, kind) for columns in columns_of(chosen, kin))
+
+
+@shared
+def _take_record(quantities, kin, nodes, n, buffers, m, keep):
+    """Add what record `m` of the buffers has to node `n`, or put it there; it is zero then."""
+    for name, first, end, add in _columns(quantities, kin):
+        array = _array(nodes, name)
+        if array is not None:
+            like = (0,) * (end - first)
+            move_record(array, n, _array(buffers, name), m, first, like, add or keep)
+
+
+@shared
+def _clear_record(quantities, kin, nodes, n):
+    """Clear the columns of node `n` that take the quantities, but those that they add to."""
+    for name, first, end, add in _columns(quantities, kin):
+        array = _array(nodes, name)
+        if array is not None and not add:
+            put_at(array, n, first, (0,) * (end - first))
+
+
+@noinline
+def sum_share(quantities: tuple, kin: Tag, nodes: Nodes, buffers: Buffers, share: int) -> None:
+    """Sum the quantities at the nodes of a share, tile after tile, box after box."""
+    nodes, buffers = at_hand(nodes), at_hand(buffers)
+    first, parts = buffers.first, buffers.parts
+    for part in range(first[share], first[share + 1]):
+        what, count = parts[part, 9], parts[part, 4]
+        for i in range(parts[part, 2]):
+            for j in range(parts[part, 3]):
+                n = parts[part, 0] + i * parts[part, 5] + j * parts[part, 6]
+                m = parts[part, 1] + i * parts[part, 7] + j * parts[part, 8]
+                if what == CLEAR:
+                    for k in range(count):
+                        _clear_record(quantities, kin, nodes, index(n + k))
+                else:
+                    for k in range(count):
+                        _take_record(
+                            quantities, kin, nodes, index(n + k), buffers.nodes, index(m + k),
+                            what == ADD,
+                        )  # fmt: skip

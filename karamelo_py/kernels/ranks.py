@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from karamelo_py.compiler.addresses import caller_of
-from karamelo_py.compiler.loops import kernel
+from karamelo_py.compiler.compile import shared
+from karamelo_py.compiler.loops import caller_of, kernel
 from karamelo_py.kernels import totals
-from karamelo_py.kernels.sums import given
-from karamelo_py.kernels.sweep import context_of, sweep_blocks, sweep_points, visit_shares
+from karamelo_py.kernels.p2g import given
+from karamelo_py.kernels.sweep import sweep_blocks, visit_shares
 
 CALL = types.int64(types.int64, types.int64, types.int64)
 SWEEP, NEXT, GIVE, TAKE, TOTALS, LARGEST, NUMBER = range(7)
@@ -26,20 +26,6 @@ class Linked(NamedTuple):
 
     address: int  # of the function ``(what, a, b) -> number``
     foreign: np.ndarray  # (N,) uint8: 1 where another process adds up what a node gives
-
-
-class Border(NamedTuple):
-    """A sweep over the tiles that other processes wait for."""
-
-    mode: NamedTuple
-    address: int
-
-
-class Inside(NamedTuple):
-    """A sweep over the other tiles."""
-
-    mode: NamedTuple
-    address: int
 
 
 @kernel
@@ -107,33 +93,25 @@ def _take_over_linked(ranks, due):
     _ask_if(due, ranks.address, TAKE, 0, 0)
 
 
+@shared
+def _sweep_tiles(address, s, mode, visit, context, of_border):
+    """Sweep over the tiles that other processes wait for, or over the others."""
+    for block in s.blocks:
+        border = block.tiling.count[2]
+        if of_border:
+            visit_shares(mode, border, visit, context, block, 0)
+        else:
+            visit_shares(mode, block.tiling.count[1] - border, visit, context, block, border)
+        if len(s.blocks) > 1:
+            _ask(address, NEXT, 0, 0)
+
+
 @sweep_blocks.on(Linked)
-def _sweep_blocks_linked(ranks, s, mode, visit, then, gathers, scatters, dt):
+def _sweep_blocks_linked(ranks, s, mode, visit, context):
     address = ranks.address
     _ask(address, SWEEP, 0, 0)
-    for block in s.blocks:
-        sweep_points(Border(mode, address), visit, s, block, then, gathers, scatters, dt)
+    _sweep_tiles(address, s, mode, visit, context, True)
     if len(visit.quantities):
-        due = scatters & (s.buffers.count[1] == 0)
+        due = context.scatters & (s.buffers.count[1] == 0)
         _ask_if(due, address, GIVE, s.buffers.number, given(visit.quantities, s.kin))
-    for block in s.blocks:
-        sweep_points(Inside(mode, address), visit, s, block, then, gathers, scatters, dt)
-
-
-@sweep_points.on(Border)
-def _sweep_points_border(mode, visit, s, block, then, gathers, scatters, dt):
-    border = block.tiling.count[2]
-    context = context_of(s, dt)
-    visit_shares(mode.mode, border, visit, context, block, then, gathers, scatters, dt, 0)
-    if len(s.blocks) > 1:
-        _ask(mode.address, NEXT, 0, 0)
-
-
-@sweep_points.on(Inside)
-def _sweep_points_inside(mode, visit, s, block, then, gathers, scatters, dt):
-    border = block.tiling.count[2]
-    inside = block.tiling.count[1] - border
-    context = context_of(s, dt)
-    visit_shares(mode.mode, inside, visit, context, block, then, gathers, scatters, dt, border)
-    if len(s.blocks) > 1:
-        _ask(mode.address, NEXT, 0, 0)
+    _sweep_tiles(address, s, mode, visit, context, False)

@@ -9,14 +9,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import over_blocks, point_function
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
 from karamelo_py.kernels.clock import kick
 from karamelo_py.kernels.p2g import RigidSums
-from karamelo_py.kernels.rows import touch, touch_velocity
+from karamelo_py.kernels.table import touch, touch_velocity
 from karamelo_py.kernels.totals import add_to, publish
 from karamelo_py.kernels.visit import place_at
 from karamelo_py.points.basis import entry, locate, support
@@ -71,68 +70,41 @@ def _lead_velocity(kin, nodes, led, spans):
                     nodes.velocity[n, k] = led[n, of_momentum(kin) + k] / led[n, MASS]
 
 
-@point_function(otherwise=True)
-def sum_forces(laws, contact, s, points, led):
-    """Add up the forces on rigid points, and their torques about the origin."""
-
-
 @kernel
-def _sum_forces(basis, kin, grids, places, points, led, force, torque, totals):
+def _sum_forces(basis, kin, grids, places, points, led, forces, torques, totals):
+    """Add up the forces on rigid points, and their torques about the origin."""
     d = dimension(kin)
     for p in range(points.mass.size):
         grid = record(grids, points.grid[p])
         stencil = locate(basis, kin, grid, place_at(basis, kin, places, p))
-        first, turning = force[points.id[p]], torque[points.id[p]]
-        for k in range(support(basis, kin)):
-            n, weight, _ = entry(basis, kin, grid, stencil, k)
+        first, turning = forces[points.id[p]], torques[points.id[p]]
+        for node in range(support(basis, kin)):
+            n, weight, _ = entry(basis, kin, grid, stencil, node)
             if not weight > 0:
                 continue
             share = weight * points.mass[p] / led[n, MASS]
             x = node_position(grid, n)
-            fx = share * led[n, of_force(kin)]
-            fy = share * led[n, of_force(kin) + 1] if d > 1 else 0.0
-            fz = share * led[n, of_force(kin) + 2] if d > 2 else 0.0
-            add_to(totals, first, fx)
-            add_to(totals, first + 1, fy)
-            add_to(totals, first + 2, fz)
-            add_to(totals, turning, x[1] * fz - x[2] * fy)
-            add_to(totals, turning + 1, x[2] * fx - x[0] * fz)
-            add_to(totals, turning + 2, x[0] * fy - x[1] * fx)
-
-
-@sum_forces.on(Rigid)
-def _sum_forces_rigid(laws, contact, s, points, led):
-    places = points.x[s.control.clock[0].now]
-    _sum_forces(
-        s.basis, s.kin, s.grids, places, points, led, contact.force, contact.torque,
-        s.control.totals,
-    )  # fmt: skip
-
-
-@over_blocks
-def _sum_forces_of_blocks(block, s, led):
-    sum_forces(block.laws, s.contact, s, block.points, led)
-
-
-@kernel
-def _clear(slots, totals):
-    for slot in slots:
-        totals[slot : slot + 3] = 0
-
-
-@kernel
-def _publish(slots, control):
-    for slot in slots:
-        publish(control, slot, 3)
+            force = [share * led[n, of_force(kin) + i] if i < d else 0.0 for i in range(3)]
+            for i in range(3):
+                j, k = (i + 1) % 3, (i + 2) % 3
+                add_to(totals, first + i, force[i])
+                add_to(totals, turning + i, x[j] * force[k] - x[k] * force[j])
 
 
 @touch.on(RigidBodies)
 def _touch_rigid_bodies(contact, s):
     led = field(s.nodes.fields, RigidSums)
     _lead(s.kin, s.nodes, led, s.spans, kick(s), s.control.clock[0].kept)
-    _clear(contact.slots, s.control.totals)
-    _sum_forces_of_blocks(s, led)
-    _publish(contact.slots, s.control)
+    for slot in contact.slots:
+        s.control.totals[slot : slot + 3] = 0
+    for block in s.blocks:
+        if isinstance(block.laws, Rigid):
+            _sum_forces(
+                s.basis, s.kin, s.grids, block.points.x[s.control.clock[0].now], block.points, led,
+                contact.force, contact.torque, s.control.totals,
+            )  # fmt: skip
+    for slot in contact.slots:
+        publish(s.control, slot, 3)
 
 
 @touch_velocity.on(RigidBodies)

@@ -5,12 +5,13 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.compiler.compile import shared
+from karamelo_py.compiler.fields import pick_items, put_items
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import kernel, noinline
-from karamelo_py.compiler.rows import pick_items, put_items
 from karamelo_py.compiler.threads import by_team, shared_out
 from karamelo_py.compiler.tuples import record
-from karamelo_py.kernels.arrays import Number, Tag, Tiling
+from karamelo_py.kernels.arrays import Number
+from karamelo_py.kernels.sweep import by_threads
 from karamelo_py.kernels.visit import place_at
 from karamelo_py.points.basis import extent
 from karamelo_py.points.grid import Grid, cells_along, in_cells
@@ -71,7 +72,10 @@ def _seen(grid, sight, g, direction, at):
 
 @noinline
 def _find_tiles(kin, grids, tiles, x, of, ends, tile, k):
-    """The tiles of the k-th part of the points, and how many of these each tile has."""
+    """Find the tile of each point of the k-th part at `x` (w, n), on the grids `of` (n,).
+
+    `tile` (n,) takes them, `ends` (parts, T) how many of these points each tile has.
+    """
     grids, tiles = at_hand(grids), at_hand(tiles)
     parts = ends.shape[0]
     for t in range(ends.shape[1]):
@@ -170,7 +174,7 @@ def _order_in_tiles(kin, grids, sight, tiles, x, of, ids, found, k):
 
 @noinline
 def _find_rows(kin, grids, sight, x, tiling, parts, k):
-    """`Tiling.rows` of the k-th part of the tiles, in space."""
+    """Find `Tiling.rows` of the k-th part of the tiles in space; their points are at `x` (w, n)."""
     grids, sight, tiling = at_hand(grids), at_hand(sight), at_hand(tiling)
     rows, box = tiling.rows, tiling.box
     count = tiling.count[0]
@@ -213,12 +217,12 @@ def _put_rows(rows, first, last, room, parts, k):
             put_items(rows[r, 0], np.int64(0), room, r - first, begin, end)
 
 
-_find_all_tiles = shared_out(_find_tiles, "kin, grids, tiles, x, of, ends, tile")
-_order_parts = shared_out(_order_part, "found")
-_order_in_all_tiles = shared_out(_order_in_tiles, "kin, grids, sight, tiles, x, of, ids, found")
-_find_all_rows = shared_out(_find_rows, "kin, grids, sight, x, tiling, parts")
-_pick_all_rows = shared_out(_pick_rows, "rows, first, last, order, room, parts")
-_put_all_rows = shared_out(_put_rows, "rows, first, last, room, parts")
+find_tiles = by_threads(_find_tiles)
+find_rows = by_threads(_find_rows)
+_order_parts = shared_out(_order_part)
+_order_in_all_tiles = shared_out(_order_in_tiles)
+_pick_all_rows = shared_out(_pick_rows)
+_put_all_rows = shared_out(_put_rows)
 
 
 @noinline
@@ -237,7 +241,7 @@ def _permute(mode, rows, order, room, parts):
 
 def _sort(mode, kin, grids, sight, tiles, x, of, ids, found, rows):
     parts = found.ends.shape[0]
-    _find_all_tiles(mode, parts, kin, grids, tiles, x, of, found.ends, found.tile)
+    find_tiles(mode, parts, kin, grids, tiles, x, of, found.ends, found.tile)
     _begin_tiles(found)
     _order_parts(mode, parts, found)
     _order_in_all_tiles(mode, parts, kin, grids, sight, tiles, x, of, ids, found)
@@ -245,22 +249,11 @@ def _sort(mode, kin, grids, sight, tiles, x, of, ids, found, rows):
     return 0
 
 
-_sort_by_team = by_team(_sort, "kin, grids, sight, tiles, x, of, ids, found, rows")
+_sort_by_team = by_team(_sort)
 
 
 @kernel
-def sort_points(
-    mode: Tag,
-    kin: Tag,
-    grids: Grid,
-    sight: Neighbourhood,
-    tiles: TileGrid,
-    x: np.ndarray,
-    of: np.ndarray,
-    ids: np.ndarray,
-    found: SortedOrder,
-    rows: tuple,
-) -> None:
+def sort_points(mode, kin, grids, sight, tiles, x, of, ids, found, rows):
     """Sort points at places `x` (w, n) by tile, and within by the first node that they see.
 
     They are on the grids `of` (n,) and have the numbers `ids` (n,). Of all that they carry, these
@@ -271,39 +264,7 @@ def sort_points(
 
 
 @kernel
-def find_tiles(
-    mode: Tag,
-    kin: Tag,
-    grids: Grid,
-    tiles: TileGrid,
-    x: np.ndarray,
-    of: np.ndarray,
-    ends: np.ndarray,
-    tile: np.ndarray,
-) -> None:
-    """Find the tile of each point at `x` (w, n), on the grids `of` (n,).
-
-    `tile` (n,) takes them; `ends` (parts, T) is scratch.
-    """
-    _find_all_tiles(mode, ends.shape[0], kin, grids, tiles, x, of, ends, tile)
-
-
-@kernel
-def find_rows(
-    mode: Tag,
-    kin: Tag,
-    grids: Grid,
-    sight: Neighbourhood,
-    x: np.ndarray,
-    tiling: Tiling,
-    parts: int,
-) -> None:
-    """Find the range of each row of a tile's box that its sorted points at `x` (w, n) may reach."""
-    _find_all_rows(mode, parts, kin, grids, sight, x, tiling, parts)
-
-
-@kernel
-def widest(kin: Tag, basis: Tag, grids: Grid, x: np.ndarray, of: np.ndarray) -> float:
+def widest(kin, basis, grids, x, of):
     """Return the largest distance of a corner of a domain from its point, in cells."""
     grids = at_hand(grids)
     far = 0.0

@@ -3,35 +3,238 @@
 All at once go sums along the arms of a stencil, what is affine, and the corners of domains.
 """
 
-from karamelo_py.compiler.compile import (
-    all_lanes,
-    point_function,
-    prefetch_records,
-    shared,
-)
-from karamelo_py.compiler.lanes import EightLanes, FourLanes
-from karamelo_py.kernels.affine import (
-    affine_parts,
-    gathered_at_once_all,
-    gathered_by_arms,
-    give_affine,
-)
-from karamelo_py.kernels.arrays import Tag
-from karamelo_py.kernels.corners import (
-    all_by_corners,
-    gather_corners,
-    in_block,
-    scatter_corners,
-    shows_corners,
-)
-from karamelo_py.kernels.g2p import empty_all, gathered_all
+from karamelo_py.compiler.compile import all_lanes, point_function, prefetch_records, real, shared
+from karamelo_py.compiler.fields import field
+from karamelo_py.compiler.lanes.records import accumulate_affine
+from karamelo_py.kernels import g2p, p2g
+from karamelo_py.kernels.arrays import MASS, Tag, of_force
+from karamelo_py.kernels.g2p import Move, empty_all, gathered_all, update_at
 from karamelo_py.kernels.lanes import OneByOne
+from karamelo_py.kernels.loss import EnergyLoss
 from karamelo_py.kernels.p2g import scattered_all
-from karamelo_py.kernels.visit import Work, all_records_of
-from karamelo_py.points.basis import entry, support
-from karamelo_py.points.basis.cpdi.block import block_of, is_one_block, is_whole, of_one
-from karamelo_py.points.basis.cpdi.corners import CornerStencil
-from karamelo_py.points.basis.product import Stencil, evenly, sees_same_nodes, with_one_node
+from karamelo_py.kernels.visit import NodalStress, Work, all_records_of, for_tags
+from karamelo_py.points import transfers
+from karamelo_py.points.basis import carried, entry, product, reach, support
+from karamelo_py.points.basis.cpdi.block import InBlock, block_of, is_one_block, is_whole, of_one
+from karamelo_py.points.basis.cpdi.corners import AtCorners, CornerStencil
+from karamelo_py.points.basis.product import Stencil, inverse_spread, spacing
+from karamelo_py.points.kinematics import dimension, from_columns, zero_vector
+
+# --- what is affine around a point: mass, momentum, force of MLS ------------------------------
+#
+# In lanes such a quantity is brought into the order of the nodes' records once a point, not once a
+# node: half of the work of a scatter, in space two thirds.
+
+
+@point_function(otherwise=True)
+def affine_part(quantity, w, stencil, load):
+    """(array, first component, value at the first node, growths from node to node) of a quantity.
+
+    One growth for each direction, or none where all nodes see the same. () for what is not affine.
+    """
+    return ()
+
+
+@shared
+def _affine(w, stencil, value, growths):
+    """Value at the first node, and growth a node, of `value` at the point and growths a length."""
+    arm = reach(w.basis, w.kin, w.grid, stencil, 0)
+    for growth, way in zip(growths, arm, strict=True):
+        value = value + way * growth
+    step = w.grid.h * spacing(w.basis)
+    return value, tuple([step * growth for growth in growths])
+
+
+@shared
+def _momentum(w, stencil, mass, v, moment):
+    """The momentum at the first node, and its growth; () where nobody knows."""
+    momentum = mass * v
+    if not len(moment):
+        return () if transfers.nodal_momentum.defined(type(w.transfer)) else (momentum, ())
+    c = transfers.affine_velocity(w.transfer, moment, inverse_spread(w.basis, w.grid))
+    if not len(c):
+        return ()
+    return _affine(w, stencil, momentum, (mass * c).columns())
+
+
+@affine_part.on(p2g.MassMomentum)
+def _affine_part_mass_momentum(quantity, w, stencil, load):
+    mass, v, moment, _, _ = load
+    given = _momentum(w, stencil, mass, v, moment)
+    others = EnergyLoss, p2g.RigidSums, p2g.Centre, p2g.Normal, p2g.SquaredMass
+    if not len(given) or any(field(w.nodes.fields, kind) is not None for kind in others):
+        return ()
+    momentum, growths = given
+    return w.nodes.sums, MASS, (mass, *momentum), tuple([(mass - mass, *g) for g in growths])
+
+
+@affine_part.on(p2g.MomentumAgain)
+def _affine_part_momentum_again(quantity, w, stencil, load):
+    given = _momentum(w, stencil, *load)
+    return (w.nodes.velocity, 0, *given) if len(given) else ()
+
+
+@affine_part.on(p2g.InternalForce)
+def _affine_part_internal_force(quantity, w, stencil, load):
+    inverse_d = inverse_spread(w.basis, w.grid)
+    if not (len(inverse_d) and transfers.forces_by_arms(w.transfer, w.kin)):
+        return ()
+    if field(w.nodes.fields, NodalStress) is not None:
+        return ()
+    stress, outer, _ = load
+    own = outer if len(outer) else zero_vector(w.kin, stress[0])
+    growths = [inverse_d[0] * column for column in stress.columns()]
+    return w.nodes.sums, of_force(w.kin), *_affine(w, stencil, own, tuple(growths))
+
+
+@shared
+def _beside(a, b):
+    """`b` behind `a` and zeros, from the fifth component on."""
+    return (*a, *((a[0] - a[0],) * (4 - len(a))), *b)
+
+
+@shared
+def joined(lanes, kin, parts):
+    """Momentum and force as one part, where both grow and a register takes both."""
+    if isinstance(lanes, OneByOne) or len(parts) != 2 or of_force(kin) != 4:
+        return parts
+    array, first, a, to_a = parts[0]
+    _, _, b, to_b = parts[1]
+    of_sums = len(a) == 1 + dimension(kin) and len(b) == dimension(kin)
+    if not (of_sums and len(to_a) and len(to_b)):
+        return parts
+    growths = [_beside(x, y) for x, y in zip(to_a, to_b, strict=True)]
+    return ((array, first, _beside(a, b), tuple(growths)),)
+
+
+@shared
+def give_affine(lanes, w, stencil, parts):
+    """Give the nodes of a stencil what is affine."""
+    seen = [entry(w.basis, w.kin, w.grid, stencil, k)[:2] for k in range(support(w.basis, w.kin))]
+    nodes, weights = tuple([node for node, _ in seen]), tuple([weight for _, weight in seen])
+    for array, first, value, growths in joined(lanes, w.kin, parts):
+        value, growths = (*value,), tuple([(*growth,) for growth in growths])
+        accumulate_affine(array, nodes, first, weights, value, growths)
+
+
+@shared
+def gathered_by_arms(w):
+    """(a,), where what a point keeps is a sum_I N_I v*_I (X_I - x)^T away from walls; else ()."""
+    return transfers.by_arms(w.transfer, inverse_spread(w.basis, w.grid))
+
+
+@point_function(otherwise=True)
+def gathered_at_once(task: Tag, w: Work, stencil: tuple, total: tuple) -> tuple:
+    """Return the total of a gather over all nodes of a stencil; () where that goes node by node."""
+    return ()
+
+
+@gathered_at_once.on(Move)
+def _gathered_at_once_move(task, w, stencil, total):
+    factor = gathered_by_arms(w)
+    if not len(factor):
+        return ()
+    nodes = [entry(w.basis, w.kin, w.grid, stencil, k)[0] for k in range(support(w.basis, w.kin))]
+    found = [update_at(w.kin, w.nodes, i, total[0]) for i in nodes]
+    # sum N v (X - x)^T from sum N v and sum N v k, X being k nodes from the first: of rows, then of
+    # planes, as the weights are products.
+    sums = tuple([(v,) for v, _ in found])
+    changes = tuple([dv for _, dv in found])
+    for line in reversed(stencil.lines):
+        rows = range(0, len(sums), len(line.weights))
+        sums = tuple([_with_moment(line.weights, sums[k:]) for k in rows])
+        changes = tuple([_tails(line.weights, changes[k:])[-1] for k in rows])
+    v, *moments = sums[0]
+    arm = reach(w.basis, w.kin, w.grid, stencil, 0)
+    step = w.grid.h * spacing(w.basis)
+    pairs = zip(moments, arm, strict=True)
+    moment = from_columns([step * m + way * v for m, way in pairs])
+    return v, total[1] + changes[0], real(factor[0], step) * moment
+
+
+@shared
+def _tails(weights, vectors):
+    """Sums of weights times vectors: of the last one, of the last two, ... of all."""
+    last = len(weights) - 1
+    sums = (weights[last] * vectors[last],)
+    for k in range(last - 1, -1, -1):
+        sums = (*sums, sums[-1] + weights[k] * vectors[k])
+    return sums
+
+
+@shared
+def _with_moment(weights, row):
+    """Of the sums of the nodes of a row: the sum of the first, and k times that; all the others."""
+    first, *others = zip(*row[: len(weights)], strict=True)
+    *tails, total = _tails(weights, first)
+    return total, sum(tails[1:], tails[0]), *[_tails(weights, other)[-1] for other in others]
+
+
+gathered_at_once_all = for_tags(gathered_at_once, "w, stencil, totals", each="totals")
+affine_parts = for_tags(affine_part, "w, stencil, loads", each="loads")
+
+
+# --- corners of domains, each in the place of a node ------------------------------------------
+#
+# The functions of CPDI are sums over corners, N_I = sum_c w_c N_I^lin(x_c). What takes the weight
+# or the gradient of a node once, as a factor, is therefore done with the few corners: a corner
+# shows what the nodes around it have, and shares out among them what it is given.
+
+
+@shared
+def all_by_corners(parts, w):
+    """Tell whether all tasks or quantities take the weight or gradient of a node as a factor.
+
+    Those that do say so by `not_at_corners`: with what in the visit they do not. Moments are of the
+    velocities and places of nodes.
+    """
+    asked = transfers.add_moment, transfers.nodal_momentum, transfers.gradient_weight
+    there = {
+        "moments": any(function.defined(type(w.transfer)) for function in asked),
+        "loss": field(w.nodes.fields, EnergyLoss) is not None,
+        "anything": True,
+    }
+    unless = [getattr(type(part), "not_at_corners", ("anything",)) for part in parts]
+    return not any(there[name] for names in unless for name in names)
+
+
+@shared
+def _seeing(basis, w):
+    """The work with something in the place of the basis."""
+    items = zip(w._fields, w, strict=True)
+    return type(w)(*[basis if name == "basis" else item for name, item in items])
+
+
+@shared
+def in_block(w):
+    """The work of points that see blocks of nodes."""
+    return _seeing(InBlock(w.basis), w)
+
+
+@shared
+def shows_corners(tasks, w):
+    """Return True if the visit needs the velocities of the corners themselves."""
+    return carried(w.basis, w.kin) > 0 and any(isinstance(task, g2p.Move) for task in tasks)
+
+
+@shared
+def gather_corners(tasks, w, stencil, totals):
+    """The totals of the tasks over all corners."""
+    at = _seeing(AtCorners(w.basis), w)
+    for c in range(support(at.basis, w.kin)):
+        totals = g2p.gathered_all(tasks, at, stencil, c, totals)
+    return totals
+
+
+@shared
+def scatter_corners(quantities, w, stencil, loads):
+    """Give all corners their parts."""
+    at = _seeing(AtCorners(w.basis), w)
+    for c in range(support(at.basis, w.kin)):
+        p2g.scattered_all(quantities, at, stencil, c, loads)
+
+
+# --- all nodes --------------------------------------------------------------------------------
 
 
 @shared
@@ -50,52 +253,39 @@ def _scatter(quantities, w, stencil, loads):
 @shared
 def _even(w, stencil, asked):
     """Return True if D^-1 is the same for all points in lanes, or nothing depends on it."""
-    return all_lanes(evenly(w.basis, w.grid, stencil)) if asked else True
+    return all_lanes(product.evenly(w.basis, w.grid, stencil)) if asked else True
 
 
-@point_function(tags=2, otherwise=True)
-def gather_nodes(lanes: Tag, stencil: tuple, tasks: tuple, w: Work, totals: tuple) -> tuple:
+@point_function(otherwise=True)
+def gather_nodes(stencil: tuple, lanes: Tag, tasks: tuple, w: Work, totals: tuple) -> tuple:
     """Add the parts of all nodes of the stencil to the totals of the tasks."""
     return _gather(tasks, w, stencil, totals)
 
 
-@gather_nodes.on(OneByOne, Stencil)
-def _gather_nodes_one_by_one_stencil(lanes, stencil, tasks, w, totals):
+@gather_nodes.on(Stencil)
+def _gather_nodes_stencil(stencil, lanes, tasks, w, totals):
     if not _even(w, stencil, len(gathered_by_arms(w))):
         return _gather(tasks, w, stencil, totals)
-    return _gather_parts(tasks, w, stencil, totals)
-
-
-@gather_nodes.on(FourLanes, Stencil)
-@gather_nodes.on(EightLanes, Stencil)
-def _gather_nodes_lanes_stencil(lanes, stencil, tasks, w, totals):
-    if not _even(w, stencil, len(gathered_by_arms(w))):
-        return _gather(tasks, w, stencil, totals)
+    if isinstance(lanes, OneByOne):
+        return _gather_parts(tasks, w, stencil, totals)
     # Sorted points mostly see the same nodes: their records are loaded once for all lanes.
-    if sees_same_nodes(stencil):
-        return _gather_parts(tasks, w, with_one_node(stencil), totals)
+    if product.sees_same_nodes(stencil):
+        return _gather_parts(tasks, w, product.with_one_node(stencil), totals)
     _ask_ahead(tasks, w, stencil)
     return _gather_parts(tasks, w, stencil, totals)
 
 
-@gather_nodes.on(OneByOne, CornerStencil)
-def _gather_nodes_one_by_one_corner_stencil(lanes, stencil, tasks, w, totals):
-    if all_by_corners(tasks, w):
-        return gather_corners(tasks, w, stencil, totals)
-    return _gather(tasks, w, stencil, totals)
-
-
-@gather_nodes.on(FourLanes, CornerStencil)
-@gather_nodes.on(EightLanes, CornerStencil)
-def _gather_nodes_lanes_corner_stencil(lanes, stencil, tasks, w, totals):
+@gather_nodes.on(CornerStencil)
+def _gather_nodes_corner_stencil(stencil, lanes, tasks, w, totals):
     by_corners = all_by_corners(tasks, w)
-    if by_corners and shows_corners(tasks, w):
+    if by_corners and (isinstance(lanes, OneByOne) or shows_corners(tasks, w)):
         return gather_corners(tasks, w, stencil, totals)
-    block = block_of(w.kin, w.grid, stencil)
-    if is_one_block(block):
-        return _gather(tasks, in_block(w), of_one(block), totals)
-    if by_corners:
-        return gather_corners(tasks, w, stencil, totals)
+    if not isinstance(lanes, OneByOne):
+        block = block_of(w.kin, w.grid, stencil)
+        if is_one_block(block):
+            return _gather(tasks, in_block(w), of_one(block), totals)
+        if by_corners:
+            return gather_corners(tasks, w, stencil, totals)
     return _gather(tasks, w, stencil, totals)
 
 
@@ -117,42 +307,38 @@ def _gather_parts(tasks, w, stencil, totals):
     return tuple([own[rest.index(k)] if k in rest else total for k, total in enumerate(found)])
 
 
-@point_function(tags=2, otherwise=True)
-def scatter_nodes(lanes: Tag, stencil: tuple, quantities: tuple, w: Work, loads: tuple) -> None:
+@point_function(otherwise=True)
+def scatter_nodes(stencil: tuple, lanes: Tag, quantities: tuple, w: Work, loads: tuple) -> None:
     """Scatter the loads of the quantities to all nodes of the stencil."""
     _scatter(quantities, w, stencil, loads)
 
 
-@scatter_nodes.on(FourLanes, Stencil)
-@scatter_nodes.on(EightLanes, Stencil)
-def _scatter_nodes_lanes_stencil(lanes, stencil, quantities, w, loads):
+@scatter_nodes.on(Stencil)
+def _scatter_nodes_stencil(stencil, lanes, quantities, w, loads):
+    if isinstance(lanes, OneByOne):
+        _scatter(quantities, w, stencil, loads)
+        return
     parts = affine_parts(quantities, w, stencil, loads)
     if not _even(w, stencil, any(len(part) and len(part[-1]) for part in parts)):
         _scatter(quantities, w, stencil, loads)
-    elif sees_same_nodes(stencil):
-        _scatter_parts(lanes, quantities, w, with_one_node(stencil), loads, parts)
+    elif product.sees_same_nodes(stencil):
+        _scatter_parts(lanes, quantities, w, product.with_one_node(stencil), loads, parts)
     else:
         _ask_ahead(quantities, w, stencil)
         _scatter_parts(lanes, quantities, w, stencil, loads, parts)
 
 
-@scatter_nodes.on(OneByOne, CornerStencil)
-def _scatter_nodes_one_by_one_corner_stencil(lanes, stencil, quantities, w, loads):
+@scatter_nodes.on(CornerStencil)
+def _scatter_nodes_corner_stencil(stencil, lanes, quantities, w, loads):
+    if not isinstance(lanes, OneByOne):
+        block = block_of(w.kin, w.grid, stencil)
+        if is_one_block(block):
+            _scatter_block(lanes, quantities, w, of_one(block), loads)
+            return
+        if is_whole(block):
+            _scatter_block(lanes, quantities, w, block, loads)
+            return
     if all_by_corners(quantities, w):
-        scatter_corners(quantities, w, stencil, loads)
-    else:
-        _scatter(quantities, w, stencil, loads)
-
-
-@scatter_nodes.on(FourLanes, CornerStencil)
-@scatter_nodes.on(EightLanes, CornerStencil)
-def _scatter_nodes_lanes_corner_stencil(lanes, stencil, quantities, w, loads):
-    block = block_of(w.kin, w.grid, stencil)
-    if is_one_block(block):
-        _scatter_block(lanes, quantities, w, of_one(block), loads)
-    elif is_whole(block):
-        _scatter_block(lanes, quantities, w, block, loads)
-    elif all_by_corners(quantities, w):
         scatter_corners(quantities, w, stencil, loads)
     else:
         _scatter(quantities, w, stencil, loads)
@@ -178,4 +364,4 @@ def _scatter_parts(lanes, quantities, w, stencil, loads, parts):
 @shared
 def gathered_by(lanes: Tag, tasks: tuple, w: Work, stencil: tuple, x: tuple) -> tuple:
     """Gather the totals of the tasks over the nodes of a stencil."""
-    return gather_nodes(lanes, stencil, tasks, w, empty_all(tasks, w, x))
+    return gather_nodes(stencil, lanes, tasks, w, empty_all(tasks, w, x))

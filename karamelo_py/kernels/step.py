@@ -8,7 +8,7 @@ import functools
 from math import sqrt
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import by_type, over_blocks, real, shared
+from karamelo_py.compiler.compile import by_type, real, shared
 from karamelo_py.compiler.fields import load, load_vector
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import kernel
@@ -16,12 +16,19 @@ from karamelo_py.compiler.threads import by_team
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels import table
 from karamelo_py.kernels.arrays import DT, TIME, NoHooks, Setup, Tag
-from karamelo_py.kernels.clock import common_velocity, finish, kick, last_step_size, step_size
-from karamelo_py.kernels.g2p import STRAINS, TrialStrain, TrialStrainOfLastStep
+from karamelo_py.kernels.clock import (
+    all_well,
+    check_moves,
+    common_velocity,
+    finish,
+    kick,
+    last_step_size,
+    step_size,
+)
+from karamelo_py.kernels.g2p import Strain, TrialStrain, TrialStrainOfLastStep
 from karamelo_py.kernels.hook_loop import at_nodes, at_points
-from karamelo_py.kernels.reports import all_well, check_moves
-from karamelo_py.kernels.rows import average_volumes
 from karamelo_py.kernels.sweep import sweep, sweep_nodes
+from karamelo_py.kernels.table import average_volumes
 from karamelo_py.kernels.visit import deformation_of
 from karamelo_py.kernels.watch import look, look_at_heat
 from karamelo_py.points.frames import inverse_stretch_squared
@@ -70,9 +77,9 @@ def _visit(row, s, mode, more):
     """A visit of the points, and what comes before it."""
     whole = last_step_size(s) if row.of_last_step else step_size(s)
     dt = whole if row.share == 1 else real(row.share, whole) * whole
-    if row.gathers and any(isinstance(task, STRAINS) for task in row.visit.tasks):
+    if row.gathers and any(isinstance(task, Strain) for task in row.visit.tasks):
         trial = TrialStrainOfLastStep() if row.of_last_step else TrialStrain()
-        average_volumes(s.averaging, s, mode, dt, trial)
+        average_volumes(s, mode, dt, trial)
     scatters = more if row.only_if_more else row.scatters
     sweep(s, mode, row.visit, dt, row.gathers, scatters, row.moves)
     return all_well(s)
@@ -168,7 +175,7 @@ def _led(mode, scheme, visits, s, hooks, count):
 
 
 shared(run_steps)
-_by_team = by_team(_led, "scheme, visits, s, hooks, count")
+_by_team = by_team(_led)
 
 
 @kernel
@@ -196,13 +203,9 @@ def _fastest(frame, kin, points, laws, control):
     clock.rate = max(clock.rate, rate)
 
 
-@over_blocks
-def measure_blocks(block, s):
-    _fastest(s.frame, s.kin, block.points, block.laws, s.control)
-
-
 @shared
 def measure(s: Setup) -> None:
     """The rate of the present state, for the first dt."""
     s.control.clock[0].rate = 0.0
-    measure_blocks(s)
+    for block in s.blocks:
+        _fastest(s.frame, s.kin, block.points, block.laws, s.control)

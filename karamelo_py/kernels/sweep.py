@@ -4,7 +4,7 @@ A sweep over the points goes from a scene to a point in five steps:
 
 - `sweep` clears the nodes, goes over the points, and sums at the nodes what they gave;
 - `sweep_blocks` goes over the blocks, one for each law, in the order that other processes need;
-- `sweep_points` goes over one block, in the way of its mode: one thread, several, measured;
+- `sweep_points` goes over one block, in the way of its mode: by threads, or measured;
 - `visit_share` goes over the tiles of one share of a block: the work of one thread;
 - `visit_tile` gathers, updates and scatters the points of one tile.
 
@@ -16,7 +16,7 @@ sums are made in one order, whatever the number of threads.
 import inspect
 from collections.abc import Callable
 from math import inf
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -34,7 +34,7 @@ from karamelo_py.compiler.fields import load, load_vector, store
 from karamelo_py.compiler.held import at_hand, hold
 from karamelo_py.compiler.lanes import room_for
 from karamelo_py.compiler.loops import kernel, noinline
-from karamelo_py.compiler.threads import Serial, Threaded, shared_out
+from karamelo_py.compiler.threads import shared_out
 from karamelo_py.compiler.tuples import flat, nested_as, record
 from karamelo_py.kernels.arrays import (
     Block,
@@ -50,26 +50,18 @@ from karamelo_py.kernels.clock import common_velocity
 from karamelo_py.kernels.g2p import empty_all, settled_all
 from karamelo_py.kernels.lanes import (
     lanes_of_update,
-    lanes_of_visit,
+    lanes_with,
     one_loop_each,
-    points_at_once,
     points_from,
     zero_of,
 )
 from karamelo_py.kernels.nodes import at_node
-from karamelo_py.kernels.p2g import load_all
+from karamelo_py.kernels.p2g import adds, load_all, sum_share
 from karamelo_py.kernels.stencils import gathered_by, scatter_nodes
-from karamelo_py.kernels.sums import adds, sum_share
 from karamelo_py.kernels.totals import take_over
-from karamelo_py.kernels.visit import (
-    Work,
-    ask_ahead,
-    ask_ahead_of_stretch,
-    place_at,
-    present_stencil,
-)
+from karamelo_py.kernels.visit import Work, ask_ahead, place_at
 from karamelo_py.points.basis import locate
-from karamelo_py.points.frames import Total, Updated, follows
+from karamelo_py.points.frames import follows
 from karamelo_py.points.grid import Grid, inside, renumbered
 from karamelo_py.points.kinematics import zero_vector
 
@@ -100,6 +92,10 @@ class Context(NamedTuple):
     now: int
     room: Number  # cells that points may still go before their tile's box does not hold them
     common: tuple  # (d,) velocity that speeds are measured from
+    then: int  # which of the two arrays of places takes the new ones
+    gathers: bool  # whether the tasks of the visit are done
+    scatters: bool  # whether its quantities are scattered
+    dt: Number
 
 
 class OldWeights(NamedTuple):
@@ -119,55 +115,31 @@ def work_of(s: Context, grid: Grid, nodes: Nodes, block: Block, places: Places) 
     )  # fmt: skip
 
 
-@point_function()
+@shared
 def recompute_stencil(weights: Tag, w: Work, stencil: tuple, p: Index) -> tuple:
-    """Return the stencil of the scatter from that of the gather."""
+    """Return the stencil of the scatter from that of the gather; of reference places it stays."""
+    if isinstance(weights, OldWeights) or not follows(w.frame):
+        return stencil
+    return locate(w.basis, w.kin, w.grid, place_at(w.basis, w.kin, w.places.y, p))
 
 
-@recompute_stencil.on(OldWeights)
-def _recompute_stencil_old_weights(weights, w, stencil, p):
-    return stencil
-
-
-@recompute_stencil.on(PresentWeights)
-def _recompute_stencil_present_weights(weights, w, stencil, p):
-    return present_stencil(w.frame, w, stencil, p)
-
-
-@point_function()
+@shared
 def stays_in_box(weights: Tag, room: Number, moved: Number) -> bool:
     """Return True while points give to nodes of their tile's box.
 
     Points that left it are sorted before the next step, and give then what they would give now.
     """
+    return isinstance(weights, OldWeights) or all_lanes(moved <= room)
 
 
-@stays_in_box.on(OldWeights)
-def _stays_in_box_old_weights(weights, room, moved):
-    return True
-
-
-@stays_in_box.on(PresentWeights)
-def _stays_in_box_present_weights(weights, room, moved):
-    return all_lanes(moved <= room)
-
-
-@point_function()
+@shared
 def places_of(frame: Tag, points: Points, now: int, then: int) -> Places:
     """Return the places of the weights of a sweep, and of the points before and after it.
 
     `now` and `then` are rows of `Points.x`.
     """
-
-
-@places_of.on(Updated)
-def _places_of_updated(frame, points, now, then):
-    return Places(points.x[now], points.x[now], points.x[then])
-
-
-@places_of.on(Total)
-def _places_of_total(frame, points, now, then):
-    return Places(points.home, points.x[now], points.x[then])
+    weighed: Any = points.x[now] if follows(frame) else points.home
+    return Places(weighed, points.x[now], points.x[then])
 
 
 # --- tiles of points ---------------------------------------------------------------------------
@@ -192,36 +164,27 @@ def scatter_point(
     """Scatter the quantities of a point, or of points in lanes, to the nodes of `out`."""
     stencil = recompute_stencil(visit.weights, w, stencil, p)
     loads = load_all(visit.quantities, w, p, dt)
-    scatter_nodes(lanes, stencil, visit.quantities, out, loads)
+    scatter_nodes(stencil, lanes, visit.quantities, out, loads)
 
 
 @noinline
-def visit_tile(
-    visit: Visit,
-    s: Context,
-    block: Block,
-    then: int,
-    gathers: bool,
-    scatters: bool,
-    dt: Number,
-    t: int,
-) -> None:
+def visit_tile(visit: Visit, s: Context, block: Block, t: int) -> None:
     """Visit the points of the t-th occupied tile of a block in the context `s`.
 
-    With `gathers` the tasks of the visit are done, with `scatters` its quantities scattered: one
-    loop serves a scheme's fused and its single stages. `then` says which of the two arrays of
-    places takes the new ones. Points are gathered, updated and scattered one after another (in
-    lanes: a few at once), or in stretches (see `one_loop_each`).
+    One loop serves a scheme's fused and its single stages. Points are gathered, updated and
+    scattered one after another (in lanes: a few at once), or in stretches (see `one_loop_each`).
     """
     s, block = at_hand(s), at_hand(block)
     points, tiling = block.points, block.tiling
+    gathers, scatters, dt = s.gathers, s.scatters, s.dt
     grid = record(s.grids, tiling.grid[t])
-    places = places_of(s.frame, points, s.now, then)
+    places = places_of(s.frame, points, s.now, s.then)
     w = hold(work_of(s, grid, s.nodes, block, places))
     box = tiling.buffer
     numbered = renumbered(grid, box[t, 2], box[t, 3], box[t, 4])
     out = work_of(s, numbered, s.buffers, block, places)
-    lanes = lanes_of_visit(visit, s, block)
+    parts = (*visit.tasks, *visit.quantities, s.basis, s.transfer, s.averaging)
+    lanes = lanes_with(parts, block.laws, points.mass)
     wide = lanes_of_update(lanes, visit)
     apart = one_loop_each(lanes, visit)
     stretch = STRETCH if apart else WHOLE
@@ -235,16 +198,16 @@ def visit_tile(
         first = begin + k * stretch
         last = min(first + stretch, end)
         if apart and gathers:
-            for q in range(first, last, points_at_once(lanes)):
+            for q in range(first, last, lanes.width):
                 p = points_from(lanes, q, last)
-                if (q - first) % points_at_once(wide) == 0:
-                    ask_ahead_of_stretch(w, p, dt)
+                if (q - first) % wide.width == 0:
+                    ask_ahead(w, p, dt, apart)
                 totals = gathered_by(lanes, visit.tasks, w, stencil_of(w, p), position_of(w, p))
                 store(room, points_from(lanes, q - first, last - first), flat(totals))
-        for q in range(first, last, points_at_once(wide)):
+        for q in range(first, last, wide.width):
             p = points_from(wide, q, last)
             if not apart:
-                ask_ahead(w, p, dt)
+                ask_ahead(w, p, dt, apart)
             stencil = () if apart else stencil_of(w, p)
             moved = zero_of(wide, dt)
             rate = fastest
@@ -268,7 +231,7 @@ def visit_tile(
         # From the first point on that has gone wrong, or does not fit, a tile gives nothing more:
         # the run ends, or points are sorted and give all anew.
         if apart and scatters and wrong == 0 and stays_in_box(visit.weights, s.room, furthest):
-            for q in range(first, last, points_at_once(lanes)):
+            for q in range(first, last, lanes.width):
                 p = points_from(lanes, q, last)
                 scatter_point(visit, lanes, w, out, stencil_of(w, p), p, dt)
     tiling.report[t, 0] = largest(furthest)
@@ -277,21 +240,11 @@ def visit_tile(
 
 
 @noinline
-def visit_share(
-    visit: Visit,
-    s: Context,
-    block: Block,
-    then: int,
-    gathers: bool,
-    scatters: bool,
-    dt: Number,
-    first: int,
-    k: int,
-) -> None:
+def visit_share(visit: Visit, s: Context, block: Block, first: int, k: int) -> None:
     """Visit the points of the tiles of the k-th share behind the `first`, one thread's work."""
     share, order = block.tiling.share, block.tiling.order
     for t in range(share[first + k], share[first + k + 1]):
-        visit_tile(visit, s, block, then, gathers, scatters, dt, order[t])
+        visit_tile(visit, s, block, order[t])
 
 
 @noinline
@@ -312,7 +265,7 @@ def by_threads(share: Callable) -> Callable:
     The threads of `mode` divide these numbers among them.
     """
     names = ["mode", "count", *inspect.signature(share).parameters][:-1]
-    loop = shared_out(share, ", ".join(names[2:]))
+    loop = shared_out(share)
 
     def all_shares(*arguments):
         loop(*arguments)
@@ -328,29 +281,8 @@ _sum_shares = by_threads(sum_share)
 _visit_nodes = by_threads(visit_nodes)
 
 
-@point_function()
-def sweep_points(
-    mode: Tag,
-    visit: Visit,
-    s: Setup,
-    block: Block,
-    then: int,
-    gathers: bool,
-    scatters: bool,
-    dt: Number,
-) -> None:
-    """Sweep over the points of one block of the setup `s`."""
-
-
-@sweep_points.on(Serial)
-@sweep_points.on(Threaded)
-def _sweep_points_threaded(mode, visit, s, block, then, gathers, scatters, dt):
-    count = block.tiling.count[1]
-    visit_shares(mode, count, visit, context_of(s, dt), block, then, gathers, scatters, dt, 0)
-
-
 @shared
-def context_of(s: Setup, dt: Number) -> Context:
+def context_of(s: Setup, dt: Number, gathers: bool, scatters: bool, moves: bool) -> Context:
     """Return the context of a sweep that begins now."""
     clock = s.control.clock[0]
     # A little more, so that points are sorted next whenever one did not fit (see run.tiles).
@@ -358,31 +290,31 @@ def context_of(s: Setup, dt: Number) -> Context:
     return Context(
         s.frame, s.kin, s.basis, s.transfer, s.averaging, s.grids, s.nodes, s.buffers.nodes,
         clock.now, real(room, dt), common_velocity(s.kin, clock, dt),
+        1 - clock.now if moves else clock.now, gathers, scatters, dt,
     )  # fmt: skip
 
 
-@point_function()
+# What a sweep consists of, in the way of its mode: by one thread or several, if not otherwise.
+
+
+@point_function(otherwise=True)
+def sweep_points(mode: Tag, visit: Visit, s: Context, block: Block) -> None:
+    """Sweep over the points of one block."""
+    visit_shares(mode, block.tiling.count[1], visit, s, block, 0)
+
+
+@point_function(otherwise=True)
 def sum_buffers(mode: Tag, quantities: tuple, s: Setup, due: bool) -> None:
     """Sum at the nodes what the points gave of the quantities, if that is due."""
-
-
-@sum_buffers.on(Serial)
-@sum_buffers.on(Threaded)
-def _sum_buffers_threaded(mode, quantities, s, due):
     count = s.buffers.count[0] if due else 0
     _sum_shares(mode, count, quantities, s.kin, s.nodes, s.buffers)
 
 
-@point_function()
+@point_function(otherwise=True)
 def sweep_nodes(
     mode: Tag, task: Tag, kin: Tag, nodes: Nodes, ranges: np.ndarray, dt: Number
 ) -> None:
     """Do `task` at every node in use; `ranges` as in `Setup`."""
-
-
-@sweep_nodes.on(Serial)
-@sweep_nodes.on(Threaded)
-def _sweep_nodes_threaded(mode, task, kin, nodes, ranges, dt):
     _visit_nodes(mode, ranges[0, 0], task, kin, nodes, ranges, dt)
 
 
@@ -390,19 +322,10 @@ def _sweep_nodes_threaded(mode, task, kin, nodes, ranges, dt):
 
 
 @point_function(otherwise=True)
-def sweep_blocks(
-    ranks: Tag,
-    s: Setup,
-    mode: Tag,
-    visit: Visit,
-    then: int,
-    gathers: bool,
-    scatters: bool,
-    dt: Number,
-) -> None:
+def sweep_blocks(ranks: Tag, s: Setup, mode: Tag, visit: Visit, context: Context) -> None:
     """Sweep over the points of all blocks; begin to pass on what they give to other processes."""
     for block in s.blocks:
-        sweep_points(mode, visit, s, block, then, gathers, scatters, dt)
+        sweep_points(mode, visit, context, block)
 
 
 @shared
@@ -412,15 +335,14 @@ def sweep(
     """Visit all points and sum at the nodes what they gave.
 
     With `moves` new places go to the other array. How the points fared is in the reports of the
-    tiles (`reports.read_reports`).
+    tiles (`clock.read_reports`).
     """
-    now = s.control.clock[0].now
     # Where points give to the nodes themselves, these start from zero.
     direct = s.buffers.count[1]
     anew = tuple(quantity for quantity in visit.quantities if not adds(quantity))
     sum_given(mode, anew, s, scatters & (direct == 1))
-    then = 1 - now if moves else now
-    sweep_blocks(s.control.ranks, s, mode, visit, then, gathers, scatters, dt)
+    context = context_of(s, dt, gathers, scatters, moves)
+    sweep_blocks(s.control.ranks, s, mode, visit, context)
     sum_given(mode, visit.quantities, s, scatters & (direct == 0))
 
 

@@ -10,11 +10,22 @@ A scheme names its rows once, stage by stage, as its class attribute ``rows``. F
 Averaged volumes, XPIC, heat and contact are calls that do nothing in scenes without them.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
-from karamelo_py.kernels.g2p import Move, Strain, StrainInMove, StrainOfLastStep
-from karamelo_py.kernels.sweep import OldWeights, PresentWeights, Visit
+from karamelo_py.compiler.compile import point_function, real, shared
+from karamelo_py.compiler.fields import field
+from karamelo_py.compiler.loops import kernel
+from karamelo_py.compiler.tuples import clear_first
+from karamelo_py.kernels import arrays, g2p, nodes, p2g
+from karamelo_py.kernels.arrays import Number, Setup, Tag
+from karamelo_py.kernels.clock import step_size
+from karamelo_py.kernels.hook_loop import add_work
+from karamelo_py.kernels.loss import EnergyLoss, FrictionalHeat
+from karamelo_py.kernels.sweep import OldWeights, PresentWeights, Visit, sweep, sweep_nodes
+from karamelo_py.kernels.visit import FBar
+from karamelo_py.points.kinematics import Axisymmetric, dimension
+from karamelo_py.points.transfers.xpic import XPIC
 
 
 class AtPoints(NamedTuple):
@@ -83,19 +94,17 @@ def _tasks(gathers: list[Gather]) -> tuple:
     Strain behind a move knows what that gathered. By the velocity of the last step, points are
     strained where that has led them.
     """
-    moves = any(isinstance(g.task, Move) for g in gathers)
-
-    def known(g: Gather) -> NamedTuple:
-        if not isinstance(g.task, Strain) or not (moves or g.of_last_step):
-            return g.task
-        return StrainInMove() if moves else StrainOfLastStep()
-
-    return tuple(known(g) for g in gathers)
+    strain: type = g2p.Strain
+    if any(isinstance(g.task, g2p.Move) for g in gathers):
+        strain = g2p.StrainInMove
+    elif any(g.of_last_step for g in gathers):
+        strain = g2p.StrainOfLastStep
+    return tuple(strain() if type(g.task) is g2p.Strain else g.task for g in gathers)
 
 
-def _kinds(tags: tuple) -> tuple:
+def _kinds(tags: Any) -> Any:
     """Return the classes of tags: as tuples, tags without numbers are all equal."""
-    return tuple(type(tag) for tag in tags)
+    return tuple(_kinds(tag) if type(tag) is tuple else type(tag) for tag in tags)
 
 
 def fused(rows: Iterable[Any]) -> list[Any]:
@@ -106,30 +115,25 @@ def fused(rows: Iterable[Any]) -> list[Any]:
     out: list[Any] = []
     waiting: list[Gather] = []
 
-    def sweep(scatter: Scatter | None, more: bool = False) -> Sweep:
+    def sweep(scatter: Scatter | None, more: bool = False) -> None:
         found = scatter or Scatter((), OldWeights())
         visit = Visit(_tasks(waiting), found.quantities, found.weights)
         share, of_last_step = waiting[0][1:] if waiting else (1.0, False)
         # The new places are read by a scatter of the next step, whoever made them.
         moves = bool(waiting) or more
         scatters = scatter is not None
-        return Sweep(visit, share, of_last_step, bool(waiting), scatters, moves, more)
+        out.append(Sweep(visit, share, of_last_step, bool(waiting), scatters, moves, more))
+        waiting.clear()
 
     for row in kept:
-        if isinstance(row, Gather):
-            if waiting and waiting[0][1:] != row[1:]:
-                out.append(sweep(None))
-                waiting = []
-            waiting.append(row)
-        elif isinstance(row, Scatter):
-            out.append(sweep(row))
-            waiting = []
-        else:
-            if waiting:
-                out.append(sweep(None))
-                waiting = []
-            out.append(row)
-    out.append(sweep(next_sums, more=True))
+        if isinstance(row, Scatter):
+            sweep(row)
+            continue
+        goes_along = isinstance(row, Gather) and all(row[1:] == other[1:] for other in waiting)
+        if waiting and not goes_along:
+            sweep(None)
+        (waiting if isinstance(row, Gather) else out).append(row)
+    sweep(next_sums, more=True)
     return out
 
 
@@ -138,26 +142,18 @@ def staged(rows: Iterable[Any]) -> list[Any]:
     rows = list(rows)
     loops = [row.visit for row in fused(rows) if isinstance(row, Sweep)]
 
-    def loop_of(tasks: tuple, scatter: Scatter | None) -> Visit:
-        for visit in loops:
-            if scatter is None and _kinds(visit.tasks) == _kinds(tasks):
-                return visit
-            if scatter is not None and (*_kinds(visit.quantities), type(visit.weights)) == (
-                *_kinds(scatter.quantities),
-                type(scatter.weights),
-            ):
-                return visit
-        if scatter is None:
-            return Visit(tasks, (), OldWeights())
-        return Visit(tasks, scatter.quantities, scatter.weights)
+    def loop_of(own: Visit) -> Visit:
+        """The visit of the fused step with such tasks, or such quantities; else its own."""
+        part = slice(0, 1) if own.tasks else slice(1, 3)
+        return next((visit for visit in loops if _kinds(visit[part]) == _kinds(own[part])), own)
 
     out: list[Any] = []
     for row in rows:
         if isinstance(row, Gather):
-            out.append(Sweep(loop_of(_tasks([row]), None), *row[1:], True, False))
+            visit = loop_of(Visit(_tasks([row]), (), OldWeights()))
+            out.append(Sweep(visit, *row[1:], gathers=True, scatters=False))
         elif isinstance(row, Scatter):
-            visit = loop_of((), row)
-            out.append(Sweep(visit, gathers=False, moves=False))
+            out.append(Sweep(loop_of(Visit((), *row)), gathers=False, moves=False))
         else:
             out.append(row)
     return out
@@ -188,3 +184,194 @@ def says(row: Any, setup: Any) -> str | None:
     if isinstance(row, SceneTask):
         return row.function.says(setup)
     return None
+
+
+class Insulated(NamedTuple):
+    """No heat flows between points."""
+
+
+@point_function(otherwise=True)
+def conduct(heat: Tag, s: Setup, mode: Tag, hooks: Tag) -> None:
+    """Let heat flow between points for the length of a step; by default none does."""
+
+
+@point_function(otherwise=True)
+def touch(contact: Tag, s: Setup) -> None:
+    """Let solids with velocity fields of their own act on each other; by default there are none."""
+
+
+@point_function(otherwise=True)
+def touch_velocity(contact: Tag, s: Setup, steps: int) -> None:
+    """See that the velocity that deforms the points agrees with contact, where it is not v*.
+
+    `steps` is 1 when v* of this step is known, and 0 before: what touched in the last step counts.
+    """
+
+
+@kernel
+def _clear_radial(kin, nodes, grids):
+    for g in range(grids.first.size):
+        if abs(grids.x0[g]) > grids.slack[g] * grids.h[g]:
+            continue
+        for n in range(grids.first[g], grids.first[g] + grids.step_x[g]):
+            if nodes.sums[n, arrays.MASS] > 0:
+                nodes.sums[n, arrays.of_momentum(kin)] = 0
+                nodes.sums[n, arrays.of_force(kin)] = 0
+                nodes.update[n, 0] = 0
+                nodes.update[n, arrays.of_change(kin)] = 0
+                nodes.velocity[n, 0] = 0
+                clear_first(field(nodes.fields, p2g.Normal), n)
+
+
+@shared
+def hold_axis(s: Setup) -> None:
+    """Let no node on an axis of symmetry leave it, where there is one."""
+    # v_r = 0 at r = 0: N / r of a node there grows without bound where a point comes near. And a
+    # body that touches another on the axis has a normal along it.
+    if isinstance(s.kin, Axisymmetric):
+        _clear_radial(s.kin, s.nodes, s.grids)
+
+
+@shared
+def sum_series(s: Setup, mode: Tag) -> None:
+    """Put the new velocity of XPIC in the place of the change of velocity; others need nothing."""
+    if not isinstance(s.transfer, XPIC):
+        return
+    # (I - (I - S S+)^m) v_p = S sum_k (I - S+ S)^k S+ v, the sum from 0 to m - 1
+    dt = step_size(s)
+    sweep_nodes(mode, nodes.StartSeries(), s.kin, s.nodes, s.ranges, dt)
+    for k in range(s.transfer.order - 1):
+        visit = Visit((g2p.SeriesTerm(k),), (p2g.SeriesBack(),), OldWeights())
+        sweep(s, mode, visit, dt, True, True, False)
+        sweep_nodes(mode, nodes.ExtendSeries(), s.kin, s.nodes, s.ranges, dt)
+    hold_axis(s)
+
+
+@shared
+def average_volumes(s: Setup, mode: Tag, dt: Number, trial: Tag) -> None:
+    """Average the change of volume of the strain to come at the nodes, with F-bar.
+
+    `trial` is the task that finds it.
+    """
+    if isinstance(s.averaging, FBar):
+        visit = Visit((trial,), (p2g.Volumes(),), OldWeights())
+        sweep(s, mode, visit, dt, True, True, False)
+        sweep_nodes(mode, nodes.TakeMean(), s.kin, s.nodes, s.ranges, dt)
+
+
+@shared
+def average_stress(s: Setup, mode: Tag) -> None:
+    """Put the averaged mean stress in the place of the points' own, with F-bar."""
+    if isinstance(s.averaging, FBar):
+        dt = step_size(s)
+        sweep_nodes(mode, nodes.TakeMeanStress(), s.kin, s.nodes, s.ranges, dt)
+        visit = Visit((g2p.SetMeanStress(),), (p2g.AveragedForce(),), OldWeights())
+        sweep(s, mode, visit, dt, True, True, False)
+
+
+@shared
+def sum_loss(s: Setup, mode: Tag) -> None:
+    """At the nodes, what they do not keep of kinetic energy, where it becomes heat."""
+    if field(s.nodes.fields, FrictionalHeat) is not None:
+        sweep_nodes(mode, nodes.ClearFrictionalHeat(), s.kin, s.nodes, s.ranges, step_size(s))
+    if field(s.nodes.fields, EnergyLoss) is not None:
+        sweep_nodes(mode, nodes.KeepLoss(), s.kin, s.nodes, s.ranges, step_size(s))
+
+
+@shared
+def light_node(s):
+    """Nodal mass below which USL limits the gradient: d (c dt / h)^2 of a point that the node sees.
+
+    Less than one: a share below m / m_p would be less than what comes back to the node through the
+    points' velocities, and the strain of the node would run ahead of its stress.
+    """
+    clock = s.control.clock[0]
+    courant = clock.rate * s.control.values[arrays.DT] / clock.spacing
+    masses = min(dimension(s.kin) * courant * courant, 1.0)
+    return nodes.UpdateToVelocity(real(masses, s.nodes.sums[0, arrays.MASS]))
+
+
+light_node.goes_through = nodes.UpdateToVelocity.goes_through  # type: ignore[attr-defined]
+
+
+def _call(
+    function: Any, says: str | None = None, where: Callable[[Any], bool] = lambda s: True
+) -> SceneTask:
+    """A row that calls a function; `says` tells what it does in scenes where it does anything."""
+    function.says = lambda s: says if where(s) else None
+    return SceneTask(function)
+
+
+HEAT = _call(
+    lambda s, mode, hooks: conduct(s.heat, s, mode, hooks),
+    "heat to the nodes, its flow, temperature of the points",
+    lambda s: conduct.defined(type(s.heat)),
+)
+LOSS = _call(
+    lambda s, mode, hooks: sum_loss(s, mode),
+    "kinetic energy that the nodes do not keep, as heat to the points",
+    lambda s: field(s.nodes.fields, EnergyLoss) is not None,
+)
+AVERAGED = _call(
+    lambda s, mode, hooks: average_stress(s, mode),
+    "force of the averaged mean stress in one visit of the points",
+    lambda s: isinstance(s.averaging, FBar),
+)
+CONTACT = _call(
+    lambda s, mode, hooks: touch(s.contact, s),
+    "contact of v*",
+    lambda s: touch.defined(type(s.contact)),
+)
+WORK_OF_LOADS = _call(lambda s, mode, hooks: add_work(hooks, s))
+CONTACT_BEFORE = _call(lambda s, mode, hooks: touch_velocity(s.contact, s, 0))
+CONTACT_AFTER = _call(lambda s, mode, hooks: touch_velocity(s.contact, s, 1))
+AXIS = _call(
+    lambda s, mode, hooks: hold_axis(s),
+    "v_r = 0 on the axis",
+    lambda s: isinstance(s.kin, Axisymmetric),
+)
+SERIES = _call(
+    lambda s, mode, hooks: sum_series(s, mode),
+    "series of XPIC",
+    lambda s: isinstance(s.transfer, XPIC),
+)
+
+BEGIN = AtPoints(arrays.INITIAL_INTEGRATE, 0)
+END = AtPoints(arrays.FINAL_INTEGRATE, 1)
+SUMS = Scatter((p2g.MassMomentum(), p2g.InternalForce()))
+MASS_AND_MOMENTUM = Scatter((p2g.MassMomentum(),))
+# For schemes that strain first: the nodal velocity before the forces.
+VELOCITY_BEFORE = (
+    MASS_AND_MOMENTUM,
+    AXIS,
+    NodeTask(nodes.SumsToVelocity()),
+    AtNodes(arrays.POST_UPDATE_GRID_STATE, arrays.ON_VELOCITY),
+    CONTACT_BEFORE,
+)
+FORCE = Scatter((p2g.InternalForce(),), OldWeights())
+# v* = v + dt f / m, with what the fixes add and prescribe; and heat flows.
+ACCELERATE = (
+    LOSS,
+    AVERAGED,
+    HEAT,
+    AtNodes(arrays.POST_PARTICLES_TO_GRID, arrays.ON_SUMS),
+    AXIS,
+    NodeTask(nodes.NodalUpdate()),
+    AtNodes(arrays.POST_UPDATE_GRID_STATE, arrays.ON_UPDATE),
+    CONTACT,
+    WORK_OF_LOADS,
+)
+MOVE = (
+    Gather(g2p.Move()),
+    AtPoints(arrays.POST_GRID_TO_POINT, 1),
+    AtPoints(arrays.POST_ADVANCE_PARTICLES, 1),
+    Check(),
+)
+# The velocity of the moved points, at the nodes once more.
+MOMENTUM_AGAIN = (
+    Scatter((p2g.MomentumAgain(),), OldWeights()),
+    NodeTask(nodes.MomentumToVelocity()),
+    AXIS,
+    AtNodes(arrays.POST_VELOCITIES_TO_GRID, arrays.ON_VELOCITY),
+    CONTACT_AFTER,
+)

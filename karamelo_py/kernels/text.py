@@ -19,8 +19,8 @@ from numba import config, types
 
 from karamelo_py.compiler import code
 from karamelo_py.compiler.compile import fma, index, shared
-from karamelo_py.compiler.intrinsics import intrinsic
 from karamelo_py.compiler.loops import kernel
+from karamelo_py.compiler.values import intrinsic
 
 ROWS = 1024  # written at a time
 # The longest: -1.23456789e-308 and -4611686018427387903, a blank, and what is overwritten.
@@ -220,12 +220,9 @@ def _without_zeros(word):
 def _put_eight(text, at, word):
     """Write the bytes of an integer, wherever they begin."""
 
-    def codegen(builder, signature, arguments):
-        array = code.ArrayParts(builder, text, arguments[0])
-        place = builder.bitcast(
-            builder.gep(array.data, [arguments[1]]), ir.IntType(64).as_pointer()
-        )
-        builder.store(arguments[2], place, align=1)
-        return code.nothing()
+    def codegen(builder, array, at, number):
+        data = code.ArrayParts(builder, text, array).data
+        place = builder.bitcast(builder.gep(data, [at]), ir.IntType(64).as_pointer())
+        builder.store(number, place, align=1)
 
     return types.void(text, types.int64, types.int64), codegen

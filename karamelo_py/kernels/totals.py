@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.atomics import add_among
 from karamelo_py.compiler.compile import point_function, shared
 from karamelo_py.compiler.loops import kernel, noinline
+from karamelo_py.compiler.threads import add_among
 
 LIMBS = 68
 LOST = LIMBS - 1  # counts terms that are no numbers
@@ -195,11 +195,5 @@ def take_over(ranks, due):
 def publish(control, slot, count):
     """The published values from `slot` on become those of their totals."""
     collect(control.ranks, control, slot, count)
-    take_answer(control.values, control.answer, slot, count)
-
-
-@kernel
-def take_answer(values, answer, slot, count):
-    """The values from `slot` on become the answers."""
     for k in range(count):
-        values[slot + k] = answer[k]
+        control.values[slot + k] = control.answer[k]

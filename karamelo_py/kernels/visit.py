@@ -1,4 +1,4 @@
-"""The arrays and tags of a visit to a point, and loops over its tags.
+"""The arrays and tags of a visit to a point, loops over its tags, and F-bar.
 
 A visit gathers from the nodes of the point's stencil and settles the point (grid to points,
 :mod:`karamelo_py.kernels.g2p`), then scatters to the nodes (points to grid,
@@ -11,12 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import index, point_function, prefetch, real, shared
-from karamelo_py.compiler.fields import field, load, load_vector
-from karamelo_py.compiler.tuples import count_in, record
+from karamelo_py.compiler.compile import fma, index, point_function, prefetch, real, shared
+from karamelo_py.compiler.fields import StepField, SummedField, field, load, load_vector, pair
+from karamelo_py.compiler.tuples import count_in, record, row
 from karamelo_py.kernels.arrays import Index, Nodes, Number, Places, Points, Tag
-from karamelo_py.points.basis import blank, locate
-from karamelo_py.points.frames import DeformationGradient, Total
+from karamelo_py.points.basis import blank, entry
+from karamelo_py.points.frames import DeformationGradient, follows, scaled_increment
 from karamelo_py.points.grid import Grid
 from karamelo_py.points.kinematics import zero
 from karamelo_py.points.laws import deformation, initial_state
@@ -52,52 +52,38 @@ def law_of(w: Work, p: Index) -> Tag:
 
 
 @shared
-def state_of(w: Work, law: Tag, p: Index, like: Number) -> tuple:
-    """Load the state (s,) of the law at point `p`."""
-    return load(w.points.state, p, initial_state(law, w.kin, like))
+def law_and_state(w: Work, p: Index, like: Number) -> tuple:
+    """Load the law of point `p` and its state (s,)."""
+    law = law_of(w, p)
+    return law, load(w.points.state, p, initial_state(law, w.kin, like))
 
 
 @shared
-def stored_or_own(f: tuple, law: Tag, kin: Tag, state: tuple) -> tuple:
-    """Return the deformation gradient `f` if it is stored, else that of the law's state."""
-    return f if len(f) else deformation(law, kin, state)
+def deformed_state(w: Work, p: Index, like: Number) -> tuple:
+    """Load the law of point `p`, its state, and F as `deformation_of`."""
+    law, state = law_and_state(w, p, like)
+    return law, state, deformation_of(w.frame, w.kin, law, state, w.points, p)
 
 
 @shared
-def ask_ahead(w: Work, p: Index, like: Number) -> None:
-    """Ask the memory for the data of the next points, where they keep moments of velocity.
+def ask_ahead(w: Work, p: Index, like: Number, apart: bool) -> None:
+    """Ask the memory for the data of the next points, in space.
 
-    These are visited once a step, with all they have: in space that is more arrays side by side
-    than a processor sees the pattern of.
+    Those that keep moments of velocity are visited once a step, with all they have: that is more
+    arrays side by side than a processor sees the pattern of. So is what the update of a stretch of
+    points needs (`apart`), while it gathers.
     """
-    moment = zero_moment(w.transfer, w.kin, like)
-    if w.kin.dimension == 3 and len(moment):
-        _ask_for_motion(w, p)
-        _ask(field(w.points.fields, Moment), len(moment), p)
-        _ask(w.points.state, count_in(initial_state(law_of(w, p), w.kin, like)), p)
-
-
-@shared
-def ask_ahead_of_stretch(w: Work, p: Index, like: Number) -> None:
-    """Ask the memory for the data of the update of a stretch of points, while it gathers."""
-    if w.kin.dimension == 3:
-        _ask_for_motion(w, p)
-        _ask(w.points.state, count_in(initial_state(law_of(w, p), w.kin, like)), p)
-        f = field(w.points.fields, DeformationGradient)
-        if f is not None:
-            _ask(f, w.kin.tensor_size, p)
-
-
-@shared
-def _ask_for_motion(w, p):
-    _ask(w.places.x, w.kin.dimension, p)
-    _ask(w.points.v, w.kin.dimension, p)
-
-
-@shared
-def _ask(array, rows, p):
-    for k in range(rows):
-        prefetch(array, (k, p))
+    d, fields = w.kin.dimension, w.points.fields
+    moment = len(zero_moment(w.transfer, w.kin, like))
+    if d == 3 and (apart or moment):
+        state = count_in(initial_state(law_of(w, p), w.kin, like))
+        more = (field(fields, Moment), moment)
+        if apart:
+            more = (field(fields, DeformationGradient), w.kin.tensor_size)
+        for array, rows in ((w.places.x, d), (w.points.v, d), more, (w.points.state, state)):
+            if array is not None:
+                for k in range(rows):
+                    prefetch(array, (k, p))
 
 
 @point_function(otherwise=True)
@@ -109,27 +95,13 @@ def records_of(tag: Tag, nodes: Nodes) -> np.ndarray | None:
     return None
 
 
-@point_function(otherwise=True)
+@shared
 def deformation_of(frame: Tag, kin: Tag, law: Tag, state: tuple, points: Points, p: Index) -> tuple:
     """Return the deformation gradient F of a point where the frame needs it, else ()."""
-    return ()
-
-
-@deformation_of.on(Total)
-def _deformation_of_total(frame, kin, law, state, points, p):
+    if follows(frame):
+        return ()
     f = load(field(points.fields, DeformationGradient), p, zero(kin, points.mass[p]))
-    return stored_or_own(f, law, kin, state)
-
-
-@point_function(otherwise=True)
-def present_stencil(frame: Tag, w: Work, stencil: tuple, p: Index) -> tuple:
-    """Return the stencil of the place after the move; in the total frame it never changes."""
-    return locate(w.basis, w.kin, w.grid, place_at(w.basis, w.kin, w.places.y, p))
-
-
-@present_stencil.on(Total)
-def _present_stencil_total(frame, w, stencil, p):
-    return stencil
+    return f if len(f) else deformation(law, kin, state)
 
 
 # --- loops over tags, written out -------------------------------------------------------------
@@ -153,21 +125,81 @@ def for_tags(function: Callable, names: str, each: str | None = None) -> Callabl
     return loop
 
 
-def in_turn(function: Callable) -> Callable:
-    """Make ``f(tags, w, stencil, p, dt, totals, fastest)`` of settling functions, in turn.
+all_records_of = for_tags(records_of, "nodes")
 
-    Distances add up, and the rate goes from one to the next (see `g2p.settled`).
+
+# --- F-bar: averages over the surroundings, where a scene asks ---------------------------------
+
+
+class VolumeRatio(StepField):
+    """Ratio of volumes of the trial increment of a point."""
+
+    start = 1.0
+
+
+class NodalMean(SummedField):
+    """Sum of weight times value, and of weights, at a node; then the mean in place of the first.
+
+    Of ratios of volumes, weighted with volumes (F-bar); of temperatures, weighted with conductance.
     """
 
-    @shared
-    def loop(tags, w, stencil, p, dt, totals, fastest):
-        moved = real(0, fastest)
-        for k, tag in enumerate(tags):
-            further, fastest = function(tag, w, stencil, p, dt, totals[k], totals, fastest)
-            moved += further
-        return moved, fastest
-
-    return loop
+    shape = pair
 
 
-all_records_of = for_tags(records_of, "nodes")
+class AveragedStress(StepField):
+    """Mean stress of a point and its surroundings."""
+
+
+class NodalStress(SummedField):
+    """Sum of weight, volume and mean stress, and of weight and volume; then the mean."""
+
+    shape = NodalMean.shape
+
+
+class PointByPoint(NamedTuple):
+    """Every point has its own change of volume."""
+
+    in_lanes = True
+
+
+class FBar(NamedTuple):
+    """Changes of volume are averaged over the surroundings, against volumetric locking.
+
+    With d_p the rate of volume of a point and V_p its volume, the average is
+    sum_i N_ip sum_q N_iq V_q d_q / sum_q N_iq V_q. Weighted with volumes it is its own adjoint: the
+    mean stress averaged alike makes the forces whose power is that of the averaged strain.
+    """
+
+    in_lanes = True
+    point_fields = (VolumeRatio, AveragedStress)
+    node_fields = (NodalMean, NodalStress)
+
+
+@shared
+def no_ratio(w, like):
+    """Return the start of the gather of the averaged volume ratio; () where none is averaged."""
+    return (real(0, like),) if isinstance(w.averaging, FBar) else ()
+
+
+@shared
+def gathered_ratio(w, stencil, k, total):
+    """`total` with the ratio of volumes at the k-th node, where it is averaged."""
+    if not len(total):
+        return total
+    i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
+    (mean,) = row(field(w.nodes.fields, NodalMean), i, 0, total)
+    return (fma(weight, mean, total[0]),)
+
+
+@shared
+def averaged(w, p, dl, ratio):
+    """`dl` with the change of volume that the surroundings have on average, where there is one."""
+    if not len(ratio):
+        return dl
+    # The ratio of volumes of the increment is replaced by its average over the points nearby,
+    # weighted with their volumes (after Coombs et al. 2018, "Overcoming volumetric locking in
+    # material point methods", eq. 23; there over the points of a cell). In the total frame, `dl`
+    # is dt Fdot, and F + dl is scaled.
+    _, _, f = deformed_state(w, p, ratio[0])
+    own = field(w.points.fields, VolumeRatio)[0, p]
+    return scaled_increment(w.frame, w.kin, dl, f, ratio[0] / own)

@@ -5,7 +5,7 @@ to the middles of steps and stresses to their ends, more or less by the scheme: 
 steps in a row give those of one time, to second order. Sums go through the points in the order of
 their tiles, the same on any number of threads.
 
-Growth (`karamelo_py.kernels.growth`) is measured by the energy that bodies have besides their
+Growth (`karamelo_py.kernels.watch`) is measured by the energy that bodies have besides their
 drift, the motion of their centres of mass: large as that may be, from the start or by loads, it
 cannot hide what vibrates.
 """
@@ -17,7 +17,6 @@ from karamelo_py.compiler.compile import (
     all_lanes,
     index,
     of_present,
-    over_blocks,
     real,
     shared,
 )
@@ -25,12 +24,10 @@ from karamelo_py.compiler.fields import load, load_vector
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import kernel, noinline
 from karamelo_py.compiler.threads import shared_out
-from karamelo_py.compiler.tuples import record
+from karamelo_py.compiler.tuples import put_at, record
 from karamelo_py.kernels import totals
-from karamelo_py.kernels.arrays import TIMESTEP, known_to_laws
-from karamelo_py.kernels.growth import growth
-from karamelo_py.kernels.lanes import lanes_of_law, points_at_once, points_from
-from karamelo_py.kernels.searching import first_from
+from karamelo_py.kernels.arrays import TIMESTEP, first_from, known_to_laws
+from karamelo_py.kernels.lanes import lanes_with, points_from
 from karamelo_py.points.kinematics import dimension, free_from
 from karamelo_py.points.laws import (
     dissipated_energy,
@@ -45,41 +42,17 @@ LOOK = 10  # steps between two looks
 FEW = 3  # looks that are compared where no window is whole: the present and the two before
 LOOKS = 10  # looks that are averaged, in a window of 100 steps
 GROWTH = 0.01  # of the largest energy so far, in a window: more is told
+WITHIN = 0.1  # of the unit: more growth than that since the start is told, and is not kept
 DRIFTING = 1e-3  # of the energy of bodies that drift: what they vibrate by and matters is more
 BOUND = 10.0  # times the energy that there was and that loads have brought: more stops the run
 ROUND_OFF = 1e-14  # of m c^2: energies below are noise
 COARSE = 1000.0  # round-off errors: a strain of so many is noise, too
-LAST = 2**62  # no id of a point is so large
 ENERGIES, OF_SOLID = 3, 5  # columns of the reports of tiles
 HEAT_NOISE = 1e-4  # of a temperature: what does not count where all are alike
 OVERSHOOT = 0.1  # of the range of temperatures that sources allow: more stops the run
 # Steps so many times the stable one of conduction are borne: what nodes do not show of the points'
 # temperatures is levelled (measured with two points a cell: 4 and 5.8 with and without convection).
 BORNE = 4.0
-
-
-@shared
-def _squared(v):
-    return sum([real(x, 0.0) * real(x, 0.0) for x in v])
-
-
-@shared
-def _nothing(kin):
-    """No mass and no momentum."""
-    return (0.0,) * (1 + kin.dimension)
-
-
-@shared
-def _carried(total, mass, v):
-    """Mass and momentum with those of more points."""
-    more = (mass, *[mass * real(x, 0.0) for x in v])
-    return tuple([added(part, x) for part, x in zip(total, more, strict=True)])
-
-
-@shared
-def _note(report, t, total):
-    for k, part in enumerate(total):
-        report[t, OF_SOLID + 1 + k] = part
 
 
 @shared
@@ -92,34 +65,32 @@ def _solid_of(firsts, number):
 def _look_at_share(kin, points, laws, tiling, firsts, k):
     """Energies, mass and momentum of the points of each tile of the k-th share, for its report."""
     points, laws, tiling = at_hand(points), at_hand(laws), at_hand(tiling)
-    lanes = lanes_of_law(laws, points.mass)
+    lanes = lanes_with((), laws, points.mass)
     for place in range(tiling.share[k], tiling.share[k + 1]):
         t = tiling.order[place]
         start, end = tiling.range[t, 0], tiling.range[t, 1]
         solid = _solid_of(firsts, points.id[start])
-        begin, behind = firsts[solid], _behind(firsts, solid)
+        begin, behind = firsts[solid], firsts[solid + 1]
         kinetic = stored = 0.0
-        total = _nothing(kin)
-        for q in range(start, end, points_at_once(lanes)):
+        total = (0.0,) * (1 + kin.dimension)
+        for q in range(start, end, lanes.width):
             p = points_from(lanes, q, end)
             law = record(laws, index(points.material[p]))
             own = of_present(p, points.mass[p])
             state = load(points.state, p, initial_state(law, kin, own))
-            v = load_vector(kin, points.v, p)
             mass = real(own, 0.0)
-            kinetic = added(kinetic, 0.5 * mass * _squared(v))
+            v = [real(x, 0.0) for x in load_vector(kin, points.v, p)]
+            kinetic = added(kinetic, 0.5 * mass * sum([x * x for x in v]))
             energy = energy_density(law, kin, state) + dissipated_energy(law, kin, state)
             stored = added(stored, mass * real(specific_volume(law), 0.0) * real(energy, 0.0))
-            total = _carried(total, mass, v)
+            more = zip(total, (mass, *[mass * x for x in v]), strict=True)
+            total = tuple([added(part, x) for part, x in more])
             if not all_lanes((points.id[p] >= begin) & (points.id[p] < behind)):
                 solid = -1
-        tiling.report[t, ENERGIES] = kinetic
-        tiling.report[t, ENERGIES + 1] = stored
-        tiling.report[t, OF_SOLID] = solid
-        _note(tiling.report, t, total)
+        put_at(tiling.report, t, ENERGIES, (kinetic, stored, solid, *total))
 
 
-_look_at_shares = shared_out(_look_at_share, "kin, points, laws, tiling, firsts")
+_look_at_shares = shared_out(_look_at_share)
 
 
 @kernel
@@ -130,33 +101,18 @@ def _sum_energies(mode, kin, points, laws, tiling, control):
         totals.add_to(control.totals, totals.STORED, tiling.report[t, ENERGIES + 1])
 
 
-@over_blocks
-def _sum_blocks(block, s, mode):
-    points = known_to_laws(block.points)
-    _sum_energies(mode, s.kin, points, block.laws, block.tiling, s.control)
-
-
-@kernel
-def _clear(control):
-    control.totals[totals.KINETIC] = 0
-    control.totals[totals.STORED] = 0
-
-
-@kernel
-def _take_sums(control):
-    clock, answer = control.clock[0], control.answer
-    clock.kinetic = answer[totals.KINETIC]
-    clock.stored = answer[totals.STORED] + clock.born_with
-    clock.work = answer[totals.WORK]
-
-
 @shared
 def sum_energies(s, mode):
     """Energies of all points, kinetic and stored plus dissipated, and the work into the clock."""
-    _clear(s.control)
-    _sum_blocks(s, mode)
+    s.control.totals[: totals.WORK] = 0
+    for block in s.blocks:
+        points = known_to_laws(block.points)
+        _sum_energies(mode, s.kin, points, block.laws, block.tiling, s.control)
     totals.collect(s.control.ranks, s.control, totals.KINETIC, 3)
-    _take_sums(s.control)
+    clock, answer = s.control.clock[0], s.control.answer
+    clock.kinetic = answer[totals.KINETIC]
+    clock.stored = answer[totals.STORED] + clock.born_with
+    clock.work = answer[totals.WORK]
 
 
 @kernel
@@ -174,18 +130,12 @@ def _add_momenta(d, ids, masses, v, tiling, control):
                 if not begin <= ids[p] < end:
                     _add_momentum(control, solid, d)
                     solid = _solid_of(firsts, ids[p])
-                    begin, end = firsts[solid], _behind(firsts, solid)
+                    begin, end = firsts[solid], firsts[solid + 1]
                 mass = float(masses[p])
                 sums[0] += mass
                 for k in range(d):
                     sums[1 + k] += mass * float(v[k, p])
         _add_momentum(control, solid, d)
-
-
-@shared
-def _behind(firsts, solid):
-    """The id behind those of the points of a solid."""
-    return firsts[solid + 1] if solid + 1 < firsts.size else LAST
 
 
 @noinline
@@ -196,36 +146,23 @@ def _add_momentum(control, solid, d):
         control.answer[k] = 0
 
 
-@over_blocks
-def _add_blocks(block, s):
-    points = block.points
-    _add_momenta(dimension(s.kin), points.id, points.mass, points.v, block.tiling, s.control)
-
-
-@kernel
-def _clear_momenta(control):
-    control.totals[control.values.size :] = 0
-
-
-@kernel
-def _take_drift(kin, control):
-    d, energy = dimension(kin), 0.0
-    for k in range(control.firsts.size):
-        mass = control.answer[k * (1 + d)]
-        for i in range(free_from(kin), d):
-            momentum = control.answer[k * (1 + d) + 1 + i]
-            energy += 0.5 * momentum * momentum / mass if mass > 0 else 0.0
-    control.clock[0].of_drift = energy
-
-
 @shared
 def _sum_drift(s):
     """Kinetic energy of the centres of mass of the solids, into the clock; after `sum_energies`."""
-    _clear_momenta(s.control)
-    _add_blocks(s)
-    own = s.control.values.size
-    totals.collect(s.control.ranks, s.control, own, s.control.totals.shape[0] - own)
-    _take_drift(s.kin, s.control)
+    control, d = s.control, dimension(s.kin)
+    own = control.values.size
+    control.totals[own:] = 0
+    for block in s.blocks:
+        points = block.points
+        _add_momenta(d, points.id, points.mass, points.v, block.tiling, control)
+    totals.collect(control.ranks, control, own, control.totals.shape[0] - own)
+    energy = 0.0
+    for k in range(control.firsts.size - 1):
+        mass = control.answer[k * (1 + d)]
+        for i in range(free_from(s.kin), d):
+            momentum = control.answer[k * (1 + d) + 1 + i]
+            energy += 0.5 * momentum * momentum / mass if mass > 0 else 0.0
+    control.clock[0].of_drift = energy
 
 
 @shared
@@ -236,6 +173,16 @@ def _sum_before(s, mode, step):
     clock.stored_before = clock.stored
     clock.moving_before = clock.kinetic - clock.work
     clock.stored_at = step
+
+
+def growth(first, later, unit):
+    """Share of the unit by which a later mean exceeds the first."""
+    return (later - first) / unit
+
+
+def keeps(first, later, unit, within=WITHIN):
+    """Compare growth with a share of the unit; NaN is not kept."""
+    return later - first <= within * unit
 
 
 @shared
@@ -309,17 +256,13 @@ def _range_of_heat(kin, points, laws, control):
             clock.own_heat = max(clock.own_heat, float(work) / float(capacity))
 
 
-@over_blocks
-def _range_blocks(block, s):
-    _range_of_heat(s.kin, known_to_laws(block.points), block.laws, s.control)
-
-
 @shared
 def measure_heat(s):
     """Lowest and highest temperature of all points, into the clock."""
     clock = s.control.clock[0]
     clock.T_low, clock.T_high, clock.own_heat = inf, -inf, 0.0
-    _range_blocks(s)
+    for block in s.blocks:
+        _range_of_heat(s.kin, known_to_laws(block.points), block.laws, s.control)
 
 
 @shared

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from copy import copy
 from typing import Any
 
 from karamelo_py.language.scene import Scene
 from karamelo_py.script.errors import Place, ScriptError, meant
-from karamelo_py.script.evaluation import evaluate
 from karamelo_py.script.expressions import Expression, Value
 from karamelo_py.script.parser import parse_expression
 from karamelo_py.script.syntax import Raw
@@ -24,12 +24,7 @@ _KEYWORD = re.compile(r"([^\W\d]\w*)\s*=(?!=)")
 class Argument:
     """One argument of a call as the script has it, not evaluated.
 
-    Attributes
-    ----------
-    text : str
-        What is written, without blanks around it.
-    place : Place
-        Where it stands.
+    Its `text` is what is written, without blanks around it, and `place` where that stands.
     """
 
     def __init__(self, raw: Raw, interpreter: Any):
@@ -77,26 +72,18 @@ class Argument:
         return None if known else self.text
 
     def words(self, known: Sequence[str] = ()) -> str:
-        """Find the text it stands for where only a word will do, arithmetic or not.
-
-        Raises
-        ------
-        ScriptError
-            If it cannot be meant as a word.
-        """
+        """Find the text it stands for where only a word will do, arithmetic or not."""
         if self.text in known:
             return self.text
         quoted = _QUOTED.fullmatch(self.text)
         if quoted:
             return quoted[1]
-        if '"' in self.text:
-            value = self.value(None)
-            if isinstance(value, str):
-                return value
+        text = '"' in self.text
+        value = self.value(None) if text else self._interpreter.variables.get(self.text)
+        if isinstance(value, str):
+            return value
+        if text:
             raise ScriptError(f"{self.text} is not a text", place=self.place)
-        variable = self._interpreter.variables.get(self.text)
-        if isinstance(variable, str):
-            return variable
         if re.search(r"\s", self.text):
             first, second = self.text.split()[:2]
             raise ScriptError(
@@ -107,13 +94,7 @@ class Argument:
         return self.text
 
     def value(self, hub: Scene | None) -> Value:
-        """Find the number, text or formula it stands for.
-
-        Raises
-        ------
-        ScriptError
-            With the place of what is wrong inside the argument.
-        """
+        """Find the number, text or formula it stands for."""
         if self.is_null:
             raise ScriptError(
                 "NULL cannot be used here", place=self.place, expected="a number or a formula"
@@ -121,20 +102,33 @@ class Argument:
         return self._interpreter.evaluate(parse_expression(self._raw), self._raw)
 
     def value_with(self, seeds: Sequence[str]) -> Value:
-        """Find the value where the names `seeds` are those that a formula depends on.
-
-        Raises
-        ------
-        ScriptError
-            With the place of what is wrong inside the argument.
-        """
-        return evaluate(parse_expression(self._raw), self._raw, _Seeds(self._interpreter, seeds))
+        """Find the value where the names `seeds` are those that a formula depends on."""
+        own = self._interpreter
+        script = copy(own)
+        script.variables = own.variables | {name: Expression.seed(name) for name in seeds}
+        try:
+            return script.evaluate(parse_expression(self._raw), self._raw)
+        except ScriptError as error:
+            if unknown := re.fullmatch(r"unknown name '(\w+)'", error.message):
+                numbers = self.numbers()
+                others = ", ".join(numbers) or "none so far"
+                known = f"{', '.join(seeds)}, or a number that the script has set ({others})"
+                hint = meant(unknown[1], [*seeds, *numbers]) or f"set it first: {unknown[1]} = ..."
+                error.expected, error.hint = known, hint
+            raise
 
     def behind(self, count: int) -> Argument:
         """Cut off the first `count` characters."""
-        return Argument(
-            Raw(self._raw.source, self._raw.start + count, self._raw.end), self._interpreter
-        )
+        return self._from(self._raw.start + count)
+
+    def _from(self, start: int, end: int | None = None) -> Argument:
+        end = self._raw.end if end is None else end
+        return Argument(Raw(self._raw.source, start, end), self._interpreter)
+
+    def numbers(self) -> list[str]:
+        """List the variables that are numbers."""
+        variables = self._interpreter.variables.items()
+        return [name for name, value in variables if isinstance(value, float)]
 
     def knows(self, name: str) -> bool:
         """Tell if a name means something where the argument stands."""
@@ -142,49 +136,15 @@ class Argument:
 
     def part(self, text: str) -> Argument:
         """Find the last place of `text` in it, as an argument of its own."""
-        source = self._raw.source
-        start = source.text.rindex(text, self._raw.start, self._raw.end)
-        return Argument(Raw(source, start, start + len(text)), self._interpreter)
+        start = self._raw.source.text.rindex(text, self._raw.start, self._raw.end)
+        return self._from(start, start + len(text))
 
     def keyword(self) -> tuple[str, Argument] | None:
         """Name and value if it is written ``name = value``."""
         match = _KEYWORD.match(self.text)
         if not match:
             return None
-        start = self._raw.source.text.index("=", self._raw.start) + 1
-        return match[1], Argument(Raw(self._raw.source, start, self._raw.end), self._interpreter)
-
-
-class _Seeds:
-    """A scope in which some names are seeds of formulas."""
-
-    def __init__(self, outer: Any, seeds: Sequence[str]):
-        self.outer = outer
-        self.seeds = seeds
-
-    def name(self, name: str, node: Any, raw: Raw) -> Value:
-        """Find the value of a name; the error of an unknown one lists those that are known here."""
-        if name in self.seeds:
-            return Expression.seed(name)
-        try:
-            return self.outer.name(name, node, raw)
-        except ScriptError as error:
-            if error.message.startswith("unknown name"):
-                variables = self.outer.variables.items()
-                numbers = [n for n, value in variables if isinstance(value, float)]
-                others = ", ".join(numbers) or "none so far"
-                own = ", ".join(self.seeds)
-                error.expected = f"{own}, or a number that the script has set ({others})"
-                error.hint = meant(name, [*self.seeds, *numbers]) or f"set it first: {name} = ..."
-            raise
-
-    def command(self, node: Any, raw: Raw) -> Value:
-        """Find the value of a call that is not a function."""
-        return self.outer.command(node, raw)
-
-    def hides(self, name: str) -> bool:
-        """Tell if the script uses the name of a function for something else."""
-        return self.outer.hides(name)
+        return match[1], self._from(self._raw.source.text.index("=", self._raw.start) + 1)
 
 
 def with_gap(arguments: Sequence[Argument]) -> Argument | None:
@@ -193,13 +153,7 @@ def with_gap(arguments: Sequence[Argument]) -> Argument | None:
 
 
 def look_up(catalogue: Any, argument: Argument):
-    """Find the part of the scene that `argument` names.
-
-    Raises
-    ------
-    ScriptError
-        When it is not a name, or an unknown one.
-    """
+    """Find the part of the scene that `argument` names."""
     word = argument.word()
     if word is None:
         article = "an" if catalogue.kind[0] in "aeiou" else "a"
@@ -209,6 +163,5 @@ def look_up(catalogue: Any, argument: Argument):
     try:
         return catalogue[word]
     except ScriptError as error:
-        if error.place is None:
-            error.place = argument.place
+        error.place = error.place or argument.place
         raise

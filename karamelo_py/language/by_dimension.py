@@ -10,9 +10,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from karamelo_py.language.arguments import with_gap
-from karamelo_py.language.own_words import words_of
 from karamelo_py.language.scene import Scene
+from karamelo_py.language.unknown import words_of
 from karamelo_py.script.errors import ScriptError, meant, plural
+from karamelo_py.script.expressions import Expression
 
 # Karamelo's own stand-in for infinity; scripts that write it mean INF.
 _HUGE = 1e20
@@ -21,16 +22,10 @@ _HUGE = 1e20
 class Forms:
     """The forms of one argument list, by dimension.
 
-    Parameters
-    ----------
-    pattern
-        How a call is written, with ``{names}`` and perhaps ``{dimension}`` in it.
-    names
-        The names of the arguments for each dimension; dimensions left out have no form.
-    words
-        Arguments that are one of a few words, by name.
-    open_ends
-        What INF and EDGE mean for an argument, by name (-inf for a lower end, inf for an upper).
+    `pattern` is how a call is written, with ``{names}`` and perhaps ``{dimension}`` in it; `names`
+    are those of the arguments for each dimension, where it has a form. Some arguments are one of a
+    few `words`; INF and EDGE mean the `open_ends` of others (-inf for a lower end, inf for an
+    upper).
     """
 
     def __init__(
@@ -52,19 +47,11 @@ class Forms:
         return self.pattern.format(dimension=dimension, names=names)
 
     def read(self, hub: Scene, arguments: Sequence[Any], dimension: int) -> dict[str, float | str]:
-        """Read the values of `arguments` by name, for `dimension`.
-
-        Raises
-        ------
-        ScriptError
-            For a dimension without a form, a wrong count, or a value of the wrong kind.
-        """
+        """Read the values of `arguments` by name, for `dimension`."""
         if dimension not in self.names:
-            known = sorted(self.names)
-            raise ScriptError(
-                f"there is no form for {dimension}D",
-                expected=f"a domain with {' or '.join(str(d) for d in known)} dimensions",
-            )
+            known = " or ".join(map(str, sorted(self.names)))
+            expected = f"a domain with {known} dimensions"
+            raise ScriptError(f"there is no form for {dimension}D", expected=expected)
         names = self.names[dimension]
         if len(arguments) != len(names):
             self._refuse_count(arguments, dimension)
@@ -77,11 +64,10 @@ class Forms:
         names = self.names[dimension]
         got = len(arguments)
         missing = names[got:]
-        message = (
-            f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing in {dimension}D"
-            if missing
-            else f"{plural(got - len(names), 'argument')} too many in {dimension}D"
-        )
+        are = "is" if len(missing) == 1 else "are"
+        message = f"{', '.join(missing)} {are} missing in {dimension}D"
+        if not missing:
+            message = f"{plural(got - len(names), 'argument')} too many in {dimension}D"
         gap = with_gap(arguments)
         fitting = [d for d, names in self.names.items() if len(names) == got and d != dimension]
         hint = self._own_line(arguments, dimension) if got else None
@@ -138,37 +124,26 @@ def number(hub: Scene, argument: Any, name: str, expected: str | None = None) ->
     """Find the finite, constant number that `argument` stands for.
 
     A number that is not known before a run has been made is NaN in a rehearsal, and passes.
-
-    Raises
-    ------
-    ScriptError
-        For a text, a formula, NaN or infinity.
     """
     value = argument.value(hub)
-    if isinstance(value, str):
-        raise ScriptError(
-            f"{name} must be a number, not the text '{value}'",
-            place=argument.place,
-            expected=expected,
+    kind, hint = "number", None
+    if isinstance(value, Expression):
+        kind, what, hint = (
+            "constant number",
+            "a formula",
+            f"value({argument.text}) is its present value",
         )
-    if not isinstance(value, (int, float)):
-        raise ScriptError(
-            f"{name} must be a constant number, not a formula",
-            place=argument.place,
-            expected=expected,
-            hint=f"value({argument.text}) is its present value",
-        )
-    return finite(hub, float(value), name, argument)
+    elif isinstance(value, str):
+        what = f"the text '{value}'"
+    else:
+        return finite(hub, float(value), name, argument)
+    raise ScriptError(
+        f"{name} must be a {kind}, not {what}", place=argument.place, expected=expected, hint=hint
+    )
 
 
 def finite(hub: Scene, value: float, name: str, argument: Any | None = None) -> float:
-    """Return `value`, unless it is NaN or infinite (NaN passes in a rehearsal).
-
-    Raises
-    ------
-    ScriptError
-        Naming the argument.
-    """
+    """Return `value`, refused where it is NaN or infinite (NaN passes in a rehearsal)."""
     if math.isfinite(value) or (math.isnan(value) and hub.rehearsing):
         return value
     raise ScriptError(

@@ -21,18 +21,10 @@ KNOWN = (ScriptError, Quit, OSError, OverflowError, MemoryError, RecursionError)
 
 @contextmanager
 def as_script_error(name: str, where: str, code: Any, place: Place | None) -> Iterator[None]:
-    """Turn an exception of a style into an error of the script.
+    """Turn an exception of a style (``fix drag``) into an error of the script at `place`.
 
-    Parameters
-    ----------
-    name
-        Family and style: ``fix drag``.
-    where
-        The part of it that is at work, such as the name of a hook.
-    code
-        The class or function, whose file is looked for in the traceback.
-    place
-        The place in the script that asks for it.
+    `where` is the part of it that is at work, such as the name of a hook; the file of `code`, a
+    class or function, is looked for in the traceback.
     """
     try:
         yield

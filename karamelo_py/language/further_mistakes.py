@@ -12,9 +12,8 @@ from typing import Any
 
 from karamelo_py.language import registry
 from karamelo_py.language.unknown import unknown_call
-from karamelo_py.script.errors import Quit, ScriptError, nearest, plural
+from karamelo_py.script.errors import Quit, ScriptError, instead, nearest, plural
 from karamelo_py.script.functions import FUNCTIONS
-from karamelo_py.script.other_programs import instead
 from karamelo_py.script.syntax import Assignment, CommandCall, Statement
 
 MOST = 9
@@ -78,12 +77,8 @@ class Dependents:
 def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
     """Find mistakes in the statements behind the one that failed, in their order.
 
-    Parameters
-    ----------
-    interpreter
-        Behind the statement that failed. Its hub is tried on, and of no use thereafter.
-    first
-        What was wrong with that statement.
+    The interpreter is behind that statement, of which `first` says what was wrong. Its hub is tried
+    on, and of no use thereafter.
     """
     found = first.others
     seen = {first.message, *(error.message for error in found)}

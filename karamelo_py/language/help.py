@@ -12,16 +12,8 @@ from karamelo_py.language import signature
 class Help:
     """The help about a command or style.
 
-    Attributes
-    ----------
-    syntax
-        How it is called.
-    summary, text
-        First line and the rest of the docstring's head.
-    parameters
-        With kinds, defaults and descriptions.
-    sections
-        The other sections of the docstring: Example, Notes, See Also.
+    Beside the `syntax`: the first line and the rest of the docstring, parameters with their kinds,
+    and further sections by title, such as Example, Notes, See Also.
     """
 
     name: str
@@ -52,14 +44,8 @@ def describe(target: Callable, name: str) -> Help:
     sections.pop("Parameters", None)
     shown = signature.documented(target)
     described = [replace(p, description=descriptions.get(p.name, "")) for p in shown]
-    return Help(
-        name,
-        signature.syntax(target, name),
-        " ".join(summary.split()),
-        text.strip(),
-        described,
-        sections,
-    )
+    line, first = signature.syntax(target, name), " ".join(summary.split())
+    return Help(name, line, first, text.strip(), described, sections)
 
 
 def sections_of(doc: str) -> tuple[str, dict[str, str]]:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 from karamelo_py.language import registry, signature
 from karamelo_py.language.further_mistakes import errors_of_text, further_errors
@@ -24,18 +24,7 @@ from karamelo_py.script import evaluation, syntax
 from karamelo_py.script.errors import Pause, Place, Quit, ScriptError
 from karamelo_py.script.expressions import SEEDS, Expression, Value
 from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, WORDS
-from karamelo_py.script.parser import parse, parse_expression
-from karamelo_py.script.reading import read_script
-
-
-@runtime_checkable
-class Rehearsed(Protocol):
-    """A hub on whose copies the rest of a script can be tried."""
-
-    rehearsed: bool
-
-    def rehearsal(self) -> Any:
-        """Such a copy."""
+from karamelo_py.script.parser import parse, parse_expression, read_script
 
 
 @dataclass
@@ -48,65 +37,32 @@ class _Frame:
 
 
 class Interpreter:
-    """Runs a script on a hub.
-
-    Parameters
-    ----------
-    hub
-        What the commands act on; its ``interpreter`` and ``place`` are set.
-    presets
-        Variables from the command line, as text. The script's own assignment of such a name is
-        passed over.
-
-    Attributes
-    ----------
-    variables : dict
-        Numbers, texts and formulas by name.
-    files : list of Path
-        Scripts that were read.
-    record
-        What was done so far, for files to go on from.
-    replay
-        What is gone through once more, until the script is where an earlier run of it left off.
-    presets
-        Variables from the command line.
-    """
+    """Runs a script on a hub, whose ``interpreter`` and ``place`` it sets."""
 
     def __init__(self, hub: Any, presets: Mapping[str, str] | None = None):
         self.hub = hub
         self.variables: dict[str, Value] = {}
         hub.interpreter = self
-        self.files: list[Path] = []
+        self.files: list[Path] = []  # that were read
         self.frames: list[_Frame] = []
         self.statement: syntax.Statement | None = None  # the last that was begun
-        self.record = Record()
+        self.record = Record()  # of what was done so far, for files to go on from
+        # Until the script is where an earlier run of it left off.
         self.replay: Replay | None = None
+        # Variables from the command line, in the place of those that the script assigns.
         self.presets = Presets(self, presets or {})
 
     # -- running ----------------------------------------------------------------------------------
 
     def run_file(self, path: str | Path) -> None:
-        """Run a script from a file.
-
-        Raises
-        ------
-        ScriptError
-            For a file that cannot be read, and for the first mistake in it.
-        """
+        """Run a script from a file."""
         path = Path(path)
         self.files.append(path)
-        self._run(self._parsed(read_script(path), str(path)), path)
+        self._run(read_script(path), str(path), path)
 
     def run_text(self, text: str, name: str = "<text>") -> None:
         """Run a script that is in memory."""
-        self._run(self._parsed(text, name), None)
-
-    def _parsed(self, text: str, name: str) -> list[syntax.Statement]:
-        try:
-            return parse(text, name)
-        except ScriptError as error:
-            error.others = errors_of_text(self, error)
-            raise
+        self._run(text, name)
 
     @property
     def waits(self) -> bool:
@@ -146,18 +102,12 @@ class Interpreter:
     def rehearse(self, hub: Any) -> None:
         """Run all that comes after the statement in progress on another hub.
 
-        The variables there are copies. So mistakes late in a script are found before a long run.
-
-        Raises
-        ------
-        ScriptError
-            For the first mistake, with those behind it that do not follow from it.
+        The variables there are copies. So mistakes late in a script are found before a long run:
+        the first, with those behind it that do not follow from it.
         """
         other = self._copy(hub)
         try:
-            while other.frames:
-                other._go_on(other.frames[-1])
-                other.frames.pop()
+            other._finish()
         except Quit:
             return
         except ScriptError as error:
@@ -176,16 +126,19 @@ class Interpreter:
     @property
     def folder(self) -> Path:
         """Folder of the script in progress."""
-        for frame in reversed(self.frames):
-            if frame.path is not None:
-                return frame.path.parent
-        return self._working_folder
+        paths = (frame.path.parent for frame in reversed(self.frames) if frame.path)
+        return next(paths, self._working_folder)
 
     @property
     def _working_folder(self) -> Path:
         return getattr(self.hub, "folder", None) or Path.cwd()
 
-    def _run(self, statements: list[syntax.Statement], path: Path | None) -> None:
+    def _run(self, text: str, name: str, path: Path | None = None) -> None:
+        try:
+            statements = parse(text, name)
+        except ScriptError as error:
+            error.others = errors_of_text(self, error)
+            raise
         self.frames.append(_Frame(statements, path))
         try:
             self.presets.refuse_unused(statements)
@@ -197,27 +150,28 @@ class Interpreter:
     def go_on(self) -> None:
         """Carry out what is left of all scripts in progress, such as one that waits (`Pause`)."""
         try:
-            while self.frames:
-                self._go_on(self.frames[-1])
-                self.frames.pop()
-            if self.replay is not None:
-                raise self.replay.other_script("this one ends before")
+            self._finish()
         except Pause:
             raise
         except Quit:
             self.frames.clear()
             self.hub.answered = True
-            if self.replay is not None:
-                raise self.replay.other_script("this one ends before") from None
         except ScriptError as error:
             # Once a run has begun, the rest of the script has been tried.
-            if isinstance(self.hub, Rehearsed) and not self.hub.rehearsed:
+            if not getattr(self.hub, "rehearsed", True):
                 error.others = further_errors(self._copy(self.hub.rehearsal()), error)
             self.frames.clear()
             raise
         except BaseException:
             self.frames.clear()
             raise
+        if self.replay is not None:
+            raise self.replay.other_script("this one ends before")
+
+    def _finish(self) -> None:
+        while self.frames:
+            self._go_on(self.frames[-1])
+            self.frames.pop()
 
     def _go_on(self, frame: _Frame) -> None:
         while frame.next < len(frame.statements):
@@ -260,22 +214,18 @@ class Interpreter:
             error.complete = True
             raise
         except RecursionError:
-            raise ScriptError(
-                "this is nested too deeply", place=statement.place, hint="use more names"
-            ) from None
+            message, hint = "this is nested too deeply", "use more names"
+            raise ScriptError(message, place=statement.place, hint=hint) from None
 
     def _execute_recorded(self, statement: syntax.Statement) -> None:
-        if isinstance(statement, syntax.CommandCall) and registry.knows("command", statement.name):
-            command = registry.find("command", statement.name)
-            if getattr(command, "may_differ", False):
-                self._execute(statement)
-                return
-        text = spelled(statement)
+        name = statement.name if isinstance(statement, syntax.CommandCall) else ""
+        known = registry.knows("command", name)
+        if known and getattr(registry.find("command", name), "may_differ", False):
+            return self._execute(statement)
+        text, replay = spelled(statement), self.replay
         self.record.statements.append(text)
-        replay = self.replay
         if replay is None:
-            self._execute(statement)
-            return
+            return self._execute(statement)
         replay.next(text, statement.place)
         last = replay.at_end
         self._execute(statement)
@@ -289,28 +239,24 @@ class Interpreter:
 
     def _execute(self, statement: syntax.Statement) -> None:
         if isinstance(statement, syntax.Assignment):
-            self._assign(statement)
-        elif isinstance(statement, syntax.CommandCall):
-            self._call(statement)
-        else:
-            assert isinstance(statement, syntax.Evaluation)
-            node = statement.node
-            if isinstance(node, syntax.Name) and node.name == "quit":
-                raise Quit
-            if isinstance(node, syntax.Name) and not self.means_something(node.name):
-                raise unknown_statement(self, node.name)
-            if (
-                isinstance(node, syntax.BinaryOperation)
-                and node.operator == "=="
-                and isinstance(node.left, syntax.Name)
-            ):
-                right = statement.raw.code[node.right.start : node.right.end]
-                raise ScriptError(
-                    "this compares and does nothing with the result",
-                    place=statement.place,
-                    hint=f"an assignment has one =: {node.left.name} = {right}",
-                )
-            self.evaluate(node, statement.raw)
+            return self._assign(statement)
+        if isinstance(statement, syntax.CommandCall):
+            return self._call(statement)
+        assert isinstance(statement, syntax.Evaluation)
+        node = statement.node
+        if isinstance(node, syntax.Name) and node.name == "quit":
+            raise Quit
+        if isinstance(node, syntax.Name) and not self.means_something(node.name):
+            raise unknown_statement(self, node.name)
+        compares = isinstance(node, syntax.BinaryOperation) and node.operator == "=="
+        if compares and isinstance(node.left, syntax.Name):
+            right = statement.raw.code[node.right.start : node.right.end]
+            raise ScriptError(
+                "this compares and does nothing with the result",
+                place=statement.place,
+                hint=f"an assignment has one =: {node.left.name} = {right}",
+            )
+        self.evaluate(node, statement.raw)
 
     # -- assignments ------------------------------------------------------------------------------
 
@@ -318,52 +264,37 @@ class Interpreter:
         name = statement.name
         check_name(name)
         if name in self.presets:
-            self.presets.stand_for(statement)
-            return
-        if name not in self.variables and (name in FUNCTIONS or registry.knows("command", name)):
-            kind = "function" if name in FUNCTIONS else "command"
-            self._warn(
-                f"'{name}' is a {kind}, too; from here on it means the variable that is assigned "
-                f"here, and the {kind} cannot be called"
-            )
-        if name in self.hub.values and name not in self.variables:
-            self._warn(
-                f"'{name}' is a value of a fix or a compute; "
-                "from here on it means the variable that is assigned here",
-                hint="choose another name",
-            )
-        self.variables[name] = self._right_hand_side(statement.node, statement.right)
-        self.presets.follow(statement)
-
-    def _right_hand_side(self, node: syntax.Node, raw: syntax.Raw) -> Value:
+            return self.presets.stand_for(statement)
+        if name not in self.variables and hasattr(self.hub, "warn"):
+            means = "from here on it means the variable that is assigned here"
+            if name in FUNCTIONS or registry.knows("command", name):
+                kind = "function" if name in FUNCTIONS else "command"
+                message = f"'{name}' is a {kind}, too; {means}, and the {kind} cannot be called"
+                self.hub.warn(message, hint=None)
+            if name in self.hub.values:
+                message = f"'{name}' is a value of a fix or a compute; {means}"
+                self.hub.warn(message, hint="choose another name")
         try:
-            return self.evaluate(node, raw)
+            self.variables[name] = self.evaluate(statement.node, statement.right)
         except ScriptError as error:
-            word = raw.code.strip()
+            word = statement.right.code.strip()
             if error.message.startswith("unknown name") and re.fullmatch(r"\w+([-/.]\w+)+", word):
                 error.hint = f'a text stands in quotes: "{word}"'
             raise
-
-    def _warn(self, message: str, hint: str | None = None) -> None:
-        warn = getattr(self.hub, "warn", None)
-        if warn is not None:
-            warn(message, hint=hint)
+        self.presets.follow(statement)
 
     # -- calls ------------------------------------------------------------------------------------
 
     def _call(self, statement: syntax.CommandCall) -> None:
-        name = statement.name
-        if self.hides(name):
+        name, raw = statement.name, statement.raw
+        if self.hides(name) or not (name in FUNCTIONS or registry.knows("command", name)):
             raise unknown_call(self, name, statement.place, statement=True)
         if registry.knows("command", name):
             arguments = [signature.Argument(raw, self) for raw in statement.arguments]
             signature.call(registry.find("command", name), self.hub, arguments, name)
-        elif name in FUNCTIONS:
-            # A function alone on a line does nothing, but its mistakes count.
-            raw = statement.raw
-            self.evaluate(parse_expression(raw), raw)
         else:
-            raise unknown_call(self, name, statement.place, statement=True)
+            # A function alone on a line does nothing, but its mistakes count.
+            self.evaluate(parse_expression(raw), raw)
 
     # -- expressions ------------------------------------------------------------------------------
 
@@ -418,11 +349,11 @@ class Interpreter:
         except ScriptError as error:
             error.place = error.place or place
             raise
-        if isinstance(value, (bool, int, float)):
+        if isinstance(value, (int, float)):
             return float(value)
-        if isinstance(value, (str, Expression)):
-            return value
-        raise no_value(name, place)
+        if not isinstance(value, (str, Expression)):
+            raise no_value(name, place)
+        return value
 
 
 def _same(a: Path, b: Path) -> bool:

@@ -5,7 +5,7 @@ import math
 import os
 import re
 import sys
-from collections.abc import Callable, Container
+from collections.abc import Callable, Container, Hashable
 from dataclasses import dataclass
 from pathlib import Path
 from types import NoneType, UnionType
@@ -59,15 +59,10 @@ def In(lo: float, hi: float, open: bool | Literal["lo", "hi", "both"] = False) -
 
 
 class InputFile:
-    """For signatures: a file to read, looked for in the current folder, then beside the script.
-
-    Attributes
-    ----------
-    endings
-        Of files that can be read as what is asked for, in small letters; None: of any.
-    """
+    """For signatures: a file to read, looked for in the current folder, then beside the script."""
 
     script_kind = "the name of a file"
+    # Of files that can be read as what is asked for, in small letters; None: of any.
     endings: Container[str] | None = None
 
     @classmethod
@@ -80,17 +75,14 @@ class InputFile:
             if path.is_file():
                 return path
         here = folders[-1] / name
-        siblings = here.parent.iterdir() if here.parent.is_dir() else ()
-        files = [p for p in siblings if p.is_file()]
+        files = [p for p in here.parent.glob("*") if p.is_file()]
         if cls.endings is not None:
             files = [p for p in files if p.suffix.lower() in cls.endings]
         what = "is a folder, not a file" if here.is_dir() else "does not exist"
-        raise ScriptError(
-            f"the file {name} {what}",
-            place=argument.place,
-            expected="a file in the current folder or beside the script",
-            hint=meant(here.name, [p.name for p in files]),
-        )
+        expected = "a file in the current folder or beside the script"
+        hint = meant(here.name, [p.name for p in files])
+        message = f"the file {name} {what}"
+        raise ScriptError(message, place=argument.place, expected=expected, hint=hint)
 
 
 class TableFile(InputFile):
@@ -109,22 +101,20 @@ class OutputFile:
         """Read the path of the file."""
         name = _file_name(argument)
         path = getattr(hub, "folder", Path()) / name
+        encoding = sys.getfilesystemencoding()
         try:
             os.fsencode(name)
         except UnicodeEncodeError:
             raise ScriptError(
-                f"{name} cannot be the name of a file here, where names of files are in "
-                f"{sys.getfilesystemencoding()}",
+                f"{name} cannot be the name of a file here, where names of files are in {encoding}",
                 place=argument.place,
                 hint="the environment variable PYTHONUTF8=1, or another name",
             ) from None
         if not path.parent.is_dir():
-            parent = Path(name).parent
+            folder, expected = Path(name).parent, "a file in a folder that exists"
+            message = f"the folder {folder} does not exist"
             raise ScriptError(
-                f"the folder {parent} does not exist",
-                place=argument.place,
-                expected="a file in a folder that exists",
-                hint=f"mkdir {parent}",
+                message, place=argument.place, expected=expected, hint=f"mkdir {folder}"
             )
         if path.is_dir() or name.endswith(("/", "\\")):
             raise ScriptError(
@@ -159,8 +149,7 @@ class Unfit(Exception):
 class Kind:
     """The kind of an argument: its words, and the way to make a value of it.
 
-    `words` are the only ones that fit, where there are such; `family` is that of styles that it
-    names.
+    `words` are the only ones that fit, where there are such; `family` is that of styles it names.
     """
 
     text: str
@@ -187,10 +176,8 @@ def _to_number(hub: Any, argument: Argument) -> float:
         _suggest_numbers(argument, error)
         raise
     if isinstance(value, Expression):
-        raise Unfit(
-            f"a formula of {', '.join(sorted(value.names))}",
-            hint=f"value({argument.text}) is its present value",
-        )
+        names = ", ".join(sorted(value.names))
+        raise Unfit(f"a formula of {names}", hint=f"value({argument.text}) is its present value")
     if isinstance(value, str):
         number = value.strip()
         hint = f"numbers stand without quotes: {number}" if NUMBER.fullmatch(number) else None
@@ -206,9 +193,8 @@ def _suggest_numbers(argument: Argument, error: ScriptError) -> None:
     close = re.fullmatch(r"did you mean '(\w+)'\?", error.hint or "")
     if not (name and close) or close[1] in CONSTANTS or "value" in argument.text:
         return
-    variables = argument._interpreter.variables
-    if not isinstance(variables.get(close[1]), float):
-        numbers = [n for n, value in variables.items() if isinstance(value, float)]
+    numbers = argument.numbers()
+    if close[1] not in numbers:
         known = ", ".join(numbers) or "none so far"
         error.expected = f"a number, or a variable that is one ({known})"
         error.hint = meant(name[1], numbers) or f"set it first: {name[1]} = ..."
@@ -272,21 +258,22 @@ def _of_words(words: tuple[str, ...]) -> Callable[[Any, Argument], str]:
 
 
 def _no_word_of(words: tuple[str, ...], word: str, argument: Argument) -> Unfit:
-    value = argument._interpreter.variables.get(word)
-    got = f"'{word}'"
+    value, got = argument._interpreter.variables.get(word), f"'{word}'"
+    literal = bool(NUMBER.fullmatch(word))
     if isinstance(value, float):
         got += f", which is {number_text(value)}"
-    elif NUMBER.fullmatch(word):
+    elif literal:
         value = float(word)
     hint = meant(word, words)
     if words == TRUTH and value in (0, 1):
         truth = TRUTH[not value]
-        hint = f"write {truth}" if NUMBER.fullmatch(word) else f'write {word} = "{truth}"'
+        hint = f"write {truth}" if literal else f'write {word} = "{truth}"'
     return Unfit(got, hint=hint)
 
 
 TRUTH = ("true", "false")
 
+_RAW = Kind("anything", lambda hub, argument: argument)
 _SIMPLE = {
     float: Kind("a number", _to_number),
     int: Kind("a whole number", _to_integer),
@@ -297,20 +284,13 @@ _SIMPLE = {
         words=TRUTH,
     ),
     Expression: Kind("a number or a formula", _to_expression),
-    Argument: Kind("anything", lambda hub, argument: argument),
-    Any: Kind("anything", lambda hub, argument: argument),
-    inspect.Parameter.empty: Kind("anything", lambda hub, argument: argument),
+    Argument: _RAW,
+    **dict.fromkeys((Any, inspect.Parameter.empty), Kind("anything", _RAW.convert)),
 }
 
 
 def kind_of(annotation: Any) -> Kind:
-    """Find the kind that an annotation asks for.
-
-    Raises
-    ------
-    TypeError
-        If the annotation is none of those that are understood.
-    """
+    """Find the kind that an annotation asks for; a TypeError where there is none."""
     if annotation in (None, NoneType):
         return Kind(NULL, lambda hub, argument: None, nullable=True)
     if get_origin(annotation) is Annotated:
@@ -322,26 +302,18 @@ def kind_of(annotation: Any) -> Kind:
         return Kind(text, _of_words(words), words)
     if get_origin(annotation) in (Union, UnionType):
         return _union([kind_of(member) for member in get_args(annotation)])
-    try:
+    if isinstance(annotation, Hashable) and annotation in _SIMPLE:
         return _SIMPLE[annotation]
-    except (KeyError, TypeError):
-        pass
     if hasattr(annotation, "from_script"):
-        family = getattr(annotation, "family", None)
-        return Kind(_class_kind(annotation), annotation.from_script, family=family)
+        words = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", getattr(annotation, "__name__", "")).lower()
+        text = getattr(annotation, "script_kind", f"the ID of a {words}")
+        return Kind(text, annotation.from_script, family=getattr(annotation, "family", None))
     raise TypeError(f"a signature cannot have the annotation {annotation!r}")
 
 
 def is_raw(kind: Kind) -> bool:
     """Tell if arguments of this kind are left to the callee as they are."""
-    return kind is _SIMPLE[Argument]
-
-
-def _class_kind(cls: type) -> str:
-    if hasattr(cls, "script_kind"):
-        return cls.script_kind
-    words = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", cls.__name__).lower()
-    return f"the ID of a {words}"
+    return kind is _RAW
 
 
 def _constrained(kind: Kind, constraints: list[Constraint]) -> Kind:

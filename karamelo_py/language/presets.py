@@ -10,21 +10,14 @@ from karamelo_py.language.replay import spelled
 from karamelo_py.language.unknown import check_name, listed
 from karamelo_py.script.errors import ScriptError, meant
 from karamelo_py.script.expressions import Value
-from karamelo_py.script.parser import parse, parse_text
-from karamelo_py.script.reading import read_script
+from karamelo_py.script.parser import parse, parse_text, read_script
 from karamelo_py.script.syntax import Assignment, CommandCall, Statement
 
 _WORD = r"[^\W\d]\w*"
 
 
 class Presets(dict[str, str]):
-    """Text by name, as it was given; the script's own assignment of such a name is passed over.
-
-    Raises
-    ------
-    ScriptError
-        For a name that no variable can have.
-    """
+    """Text by name, as it was given; the script's own assignment of such a name is passed over."""
 
     def __init__(self, script: Any, given: Mapping[str, str]):
         super().__init__(given)
@@ -36,12 +29,11 @@ class Presets(dict[str, str]):
         # Which of them a variable is made of, by its name.
         itself = {name: {name: None} for name in given}
         self._made_of: dict[str, dict[str, None]] = dict(given._made_of) if again else itself
+        expected = "letters, digits and _, as in -var h 0.05"
         for name in given:
             if not name.isidentifier():
-                raise ScriptError(
-                    f"-var: '{name}' is not the name of a variable",
-                    expected="letters, digits and _, as in -var h 0.05",
-                )
+                message = f"-var: '{name}' is not the name of a variable"
+                raise ScriptError(message, expected=expected)
             try:
                 check_name(name)
             except ScriptError as error:
@@ -63,13 +55,7 @@ class Presets(dict[str, str]):
                 variables[name] = present
 
     def stand_for(self, statement: Assignment) -> None:
-        """Take the place of what a script assigns.
-
-        Raises
-        ------
-        ScriptError
-            For what is no expression, in the place of a number.
-        """
+        """Take the place of what a script assigns; no text takes that of a number."""
         name, variables = statement.name, self._script.variables
         # What was a word at first may have become an expression of variables.
         if isinstance(variables.get(name), str):
@@ -103,18 +89,15 @@ class Presets(dict[str, str]):
         for name, own in self._texts.items():
             if re.search(rf"\b{name}\b", spelled(statement)):
                 self.blamed.add(name)
-                error.hint = (
-                    f"-var {name} {self[name]} is a text, and the script has a number there, as in "
-                    f"-var {name} {own}"
-                )
+                text = f"-var {name} {self[name]} is a text"
+                error.hint = f"{text}, and the script has a number there, as in -var {name} {own}"
 
     def refuse_unused(self, statements: list[Statement]) -> None:
         """Refuse a variable of the command line that nothing reads or assigns."""
         words = set(re.findall(_WORD, " ".join(self.values())))
         assigned: dict[str, None] = {}
-        if not self or not self._collect(statements, self._script.folder, words, assigned, []):
-            return
-        for name in self:
+        told = self and self._collect(statements, self._script.folder, words, assigned, [])
+        for name in self if told else ():
             if name not in words:
                 raise ScriptError(
                     f"-var {name}: the script has no variable '{name}'",

@@ -15,8 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from karamelo_py import __version__
-from karamelo_py.script.errors import FAILURES, ScriptError, meant
-from karamelo_py.script.other_programs import instead
+from karamelo_py.script.errors import FAILURES, ScriptError, instead, meant
 
 PREFIX = "karamelo_py."
 BUILT_IN = Path(__file__).parents[1] / "styles.toml"
@@ -46,9 +45,8 @@ def _families() -> dict[str, dict[str, list[EntryPoint]]]:
 
 
 def _origin(entry: EntryPoint) -> str:
-    dist = entry.dist
-    if dist is not None:
-        return f"{dist.name} {dist.version}"
+    if entry.dist is not None:
+        return f"{entry.dist.name} {entry.dist.version}"
     built_in = entry.value.startswith(PREFIX)
     return f"karamelo-py {__version__}" if built_in else "an unknown package"
 
@@ -94,9 +92,8 @@ def find(family: str, name: str) -> Any:
     if key not in _loaded:
         entries = _entries(family, name)
         if len(entries) > 1:
-            packages = " and ".join(_origin(entry) for entry in entries)
             raise ScriptError(
-                f"{family} '{name}' is offered by two packages: {packages}",
+                f"{family} '{name}' is offered by two packages: {origin(family, name)}",
                 expected="one package for each style",
                 hint="uninstall one of them (pip uninstall ...)",
             )
@@ -106,22 +103,16 @@ def find(family: str, name: str) -> Any:
         except ScriptError:
             raise
         except FAILURES as error:
+            package, what = _origin(entry), f"{type(error).__name__}: {error}"
             raise ScriptError(
-                f"{family} '{name}' of {_origin(entry)} cannot be loaded: "
-                f"{type(error).__name__}: {error}",
-                hint=f"reinstall or repair {_origin(entry).split()[0]}; it names {entry.value}",
+                f"{family} '{name}' of {package} cannot be loaded: {what}",
+                hint=f"reinstall or repair {package.split()[0]}; it names {entry.value}",
             ) from error
     return _loaded[key]
 
 
 def called(family: str, ID: str, name: str) -> Any:
-    """Find the same for a statement that has an ID in front of it.
-
-    Raises
-    ------
-    ScriptError
-        See `find`; also where the style stands in the place of the ID.
-    """
+    """Find the same for a statement that has an ID in front of it, and not the style."""
     if not knows(family, name) and knows(family, ID):
         raise ScriptError(
             f"'{ID}' is a style, and the ID comes first",

@@ -1,7 +1,7 @@
 """A script gone through once more, up to the place where an earlier run of it left off."""
 
 import re
-from collections.abc import Sequence
+from dataclasses import dataclass, field
 from math import nan
 
 from karamelo_py.script.errors import Place, ScriptError
@@ -15,24 +15,16 @@ def spelled(statement: Statement) -> str:
     return _BLANKS.sub(lambda m: m[0] if m[0][0] == '"' else "", statement.raw.code)
 
 
+@dataclass
 class Record:
-    """The statements that a script has done so far.
+    """The statements that a script has done so far, in the order in which they were begun.
 
-    Commands that only say how a run goes on or what it writes (``may_differ``) are not in it.
-
-    Attributes
-    ----------
-    statements
-        The statements, in the order in which they were begun.
-    values
-        By the number of a statement: what its calls of value(...) gave.
+    Commands that only say how a run goes on or what it writes (``may_differ``) are not in it. By
+    the number of a statement it has the `values` that its calls of value(...) gave.
     """
 
-    def __init__(
-        self, statements: Sequence[str] = (), values: dict[int, list[float]] | None = None
-    ):
-        self.statements = list(statements)
-        self.values = dict(values or {})
+    statements: list[str] = field(default_factory=list)
+    values: dict[int, list[float]] = field(default_factory=dict)
 
     def note(self, value: float) -> None:
         """Note that a call of value(...) in the last statement gave `value`."""
@@ -42,14 +34,8 @@ class Record:
 class Replay:
     """Compares a script that is gone through once more with the record of the first time.
 
-    Parameters
-    ----------
-    record
-        What was done up to the state that is gone on from.
-    within
-        Whether its last statement was in progress then, a run.
-    file
-        Where the record comes from, for messages.
+    The record is of what was done up to the state that is gone on from, its last statement perhaps
+    `within`, in progress then: a run. Messages name the `file` that it comes from.
     """
 
     def __init__(self, record: Record, within: bool, file: str):
@@ -65,13 +51,7 @@ class Replay:
         return self.number == len(self.record.statements) - 1
 
     def next(self, text: str, place: Place | None) -> None:
-        """Go on to the next statement, which is `text`.
-
-        Raises
-        ------
-        ScriptError
-            If it was another one the first time.
-        """
+        """Go on to the next statement, `text`; refuse another one than the first time."""
         self.number += 1
         self._values = list(self.record.values.get(self.number, ()))
         before = self.record.statements[self.number]
@@ -88,9 +68,11 @@ class Replay:
         if not (assigns and name.isidentifier() and before.startswith(f"{name}=") and self.within):
             return None
         longer = re.sub(rf"\b{name}\b", lambda _: value, run)
-        if longer == run:
-            return None
-        return f"leave {before} as it was here, and write {longer} in the place of {run}"
+        return (
+            None
+            if longer == run
+            else f"leave {before} as it was here, and write {longer} in the place of {run}"
+        )
 
     def value(self) -> float:
         """Look up the number that the next value(...) of the present statement gave."""

@@ -37,9 +37,8 @@ from karamelo_py.language.kinds import (
     is_raw,
     kind_of,
 )
-from karamelo_py.language.own_words import longer
-from karamelo_py.script.errors import Place, ScriptError, meant, nearest
-from karamelo_py.script.other_programs import table
+from karamelo_py.language.unknown import longer
+from karamelo_py.script.errors import Place, ScriptError, meant, nearest, table
 
 __all__ = [
     "Argument", "AtLeast", "Constraint", "In", "InputFile", "NonNegative", "OutputFile", "Positive",
@@ -75,10 +74,7 @@ class Parameter:
 def parameters(target: Callable) -> list[Parameter]:
     """List the parameters of a command or style, without the hub; of a record, its fields.
 
-    Raises
-    ------
-    TypeError
-        If the signature cannot be understood (a fault of whoever wrote it).
+    A TypeError says that the signature cannot be understood, a fault of whoever wrote it.
     """
     record = is_record(target)
     try:
@@ -87,7 +83,7 @@ def parameters(target: Callable) -> list[Parameter]:
             empty, defaults = inspect.Parameter.empty, target._field_defaults
             return [_parameter(n, hints[n], defaults.get(n, empty)) for n in target._fields]
         function = target.given if record else target
-        found = list(inspect.signature(function, eval_str=True).parameters.values())
+        found = [*inspect.signature(function, eval_str=True).parameters.values()]
     except TypeError:
         raise
     except Exception as error:
@@ -117,23 +113,10 @@ def _parameter(name: str, annotation: Any, default: Any, kind: Any = None) -> Pa
 
 
 def call(target: Callable, hub: Any, arguments: Sequence[Argument], name: str) -> Any:
-    """Call a command or make a style with a script's arguments.
+    """Call a command or make a style with the hub and a script's arguments.
 
-    Parameters
-    ----------
-    target
-        Function or class.
-    hub
-        Its first argument.
-    arguments
-        What the script gives.
-    name
-        What the user calls it: ``run`` or ``fix body_force``.
-
-    Raises
-    ------
-    ScriptError
-        For a wrong count or kind, and whatever the target raises; with a place in the script.
+    The user calls it by `name`: ``run``, or ``fix body_force``. Whatever is wrong, with the count
+    or kind of arguments or in the target itself, is a ScriptError with a place in the script.
     """
     try:
         expected = parameters(target)
@@ -178,12 +161,13 @@ def call(target: Callable, hub: Any, arguments: Sequence[Argument], name: str) -
 
 def make(target: Callable, hub: Any, name: str, *values: Any, **named: Any) -> Any:
     """Call a command or make a style with values; a fault of its author is told as such."""
+    place = getattr(hub, "place", None)
     if not inspect.isclass(target):
         if target.__module__.startswith(registry.PREFIX):
             return target(hub, *values, **named)
-        with as_script_error(name, "it", target, getattr(hub, "place", None)):
+        with as_script_error(name, "it", target, place):
             return target(hub, *values, **named)
-    with as_script_error(name, "__init__", target, getattr(hub, "place", None)):
+    with as_script_error(name, "__init__", target, place):
         if not is_record(target):
             return target(hub, *values, **named)
         made = getattr(target, "given", target)(*values, **named)
@@ -201,7 +185,7 @@ def _bind(
     by_name = {p.name: p for p in expected if p.keyword}
     slots = [p for p in expected if not p.keyword]
     variadic = next((p for p in slots if p.variadic), None)
-    given = []
+    given: list[Argument] = []
     # Raw arguments are passed on to a style, which knows the names.
     passed_on = variadic is not None and is_raw(variadic.kind)
     for argument in arguments:
@@ -218,33 +202,28 @@ def _bind(
     needed = sum(1 for p in slots if not p.optional and not p.variadic)
     missing = [p.name for p in by_name.values() if not p.optional and p.name not in bound]
     if len(given) < needed or missing or (variadic is None and len(given) > len(slots)):
+        few, gap, hint = len(given) < needed, with_gap(given), None
         surplus = given[len(slots)] if len(given) > len(slots) and not variadic else None
-        gap = with_gap(given)
-        hint = (
-            longer(name, given) or table()["otherwise"].get(name) if len(given) < needed else None
-        )
+        if few:
+            hint = longer(name, given) or table()["otherwise"].get(name)
         if surplus is not None:
             values = {word: f"{p.name}={word}" for p in by_name.values() for word in p.kind.words}
             word = surplus.text if surplus.text in values else nearest(surplus.text, values)
             hint = values.get(word or "", hint) or table()["surplus"].get(name)
         if gap:
             hint = f"is a comma missing in '{gap.text}'?"
-        left_out = _left_out(slots[:needed], given) if len(given) < needed and not gap else []
+        left_out = _left_out(slots[:needed], given) if few and not gap else []
         if left_out:
             surplus, filled = _filled(slots[:needed], given, left_out)
             hint = hint or (filled and f"{name}({filled})")
         missing = [f"{m}=..." for m in missing]
         missing = _named(left_out or slots[len(given) : needed], slots) or missing
-        raise ScriptError(
-            f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing"
-            if missing
-            else "one argument too many"
-            if len(given) == len(slots) + 1
-            else f"{len(given) - len(slots)} arguments too many",
-            place=gap.place if gap else surplus.place if surplus else None,
-            expected=syntax(target, name),
-            hint=hint,
-        )
+        more = len(given) - len(slots)
+        message = f"{'one argument' if more == 1 else f'{more} arguments'} too many"
+        if missing:
+            message = f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing"
+        place = gap.place if gap else surplus.place if surplus else None
+        raise ScriptError(message, place=place, expected=syntax(target, name), hint=hint)
     for k, argument in enumerate(given):
         parameter = slots[k] if k < len(slots) and not slots[k].variadic else variadic
         bound.setdefault(parameter.name, []).append(argument)
@@ -282,10 +261,9 @@ def _filled(
 def _unknown_keyword(
     word: str, argument: Argument, expected: list[Parameter], by_name: dict
 ) -> ScriptError:
+    hint = meant(word, by_name) or f"leave out '{word} ='; == compares"
     if any(p.name == word for p in expected):
-        hint: str | None = f"arguments are given by position: leave out '{word} ='"
-    else:
-        hint = meant(word, by_name) or f"leave out '{word} ='; == compares"
+        hint = f"arguments are given by position: leave out '{word} ='"
     known = ", ".join(f"{name}=..." for name in by_name)
     return ScriptError(
         f"there is no argument to be given as '{word} = ...'",
@@ -296,13 +274,7 @@ def _unknown_keyword(
 
 
 def convert(hub: Any, parameter: Parameter, argument: Argument, number: int | None = None) -> Any:
-    """Convert an argument, the one of this number, to the value of a parameter.
-
-    Raises
-    ------
-    ScriptError
-        With its place if it is of another kind.
-    """
+    """Convert an argument, the one of this number, to the value of a parameter."""
     if argument.is_null and not parameter.kind.nullable and not is_raw(parameter.kind):
         raise _misfit(parameter, argument, number, Unfit(NULL))
     try:
@@ -335,9 +307,8 @@ def _swapped(
     for other in single:
         (there,) = bound[other.name]
         if other != wrong and not fits(other, there) and fits(wrong, there) and fits(other, given):
-            return f"swap {given.text} and {there.text}: {wrong.name} {there.text}, " + (
-                f"{other.name} {given.text}"
-            )
+            right = f"{wrong.name} {there.text}, {other.name} {given.text}"
+            return f"swap {given.text} and {there.text}: {right}"
     return None
 
 

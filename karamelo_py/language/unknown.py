@@ -1,17 +1,15 @@
 """Names that nothing answers to, or that cannot be given: what may have been meant."""
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from karamelo_py.language import registry
-from karamelo_py.language.own_words import in_own_words
-from karamelo_py.script.errors import ScriptError, meant, nearest
+from karamelo_py.script.errors import ScriptError, instead, meant, nearest, of_karamelo, table
 from karamelo_py.script.evaluation import usage
-from karamelo_py.script.expression_mistakes import BLOCKS, NO_BLOCKS
 from karamelo_py.script.expressions import SEEDS
 from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, RESERVED, WORDS
-from karamelo_py.script.other_programs import instead, of_karamelo, table
+from karamelo_py.script.mistakes import BLOCKS, NO_BLOCKS
 from karamelo_py.script.syntax import Assignment, CommandCall, Statement
 
 MEANINGS = {
@@ -39,21 +37,18 @@ def unknown_call(script: Any, name: str, place: Any, statement: bool) -> ScriptE
     what = "command" if statement else "function"
     other = in_own_words(script, name) or instead("command", name) if statement else None
     if script.knows(name) and not other:
-        return ScriptError(
+        message, expected = (
             f"'{name}' is not a {what} but a variable",
-            place=place,
-            expected="an operator between the name and the parenthesis",
-            hint=f"{name}*(...)",
+            "an operator between the name and the parenthesis",
         )
-    if name in BLOCKS:
-        other = NO_BLOCKS
-    known = commands if statement else [*FUNCTIONS, *commands]
+        return ScriptError(message, place=place, expected=expected, hint=f"{name}*(...)")
     shown = commands if statement else sorted(FUNCTIONS)
+    known = commands if statement else [*FUNCTIONS, *commands]
     return ScriptError(
         f"unknown {what} '{name}'",
         place=place,
-        expected="one of " + ", ".join(shown),
-        hint=other or meant(name, known),
+        expected=f"one of {', '.join(shown)}",
+        hint=NO_BLOCKS if name in BLOCKS else other or meant(name, known),
     )
 
 
@@ -69,17 +64,16 @@ def no_value(name: str, place: Any) -> ScriptError:
 
 def unknown_name(script: Any, name: str, place: Any) -> ScriptError:
     """Make the error for a name in an expression."""
-    what, kind = "", "command" if registry.knows("command", name) else "function"
+    kind = "command" if registry.knows("command", name) else "function"
     if name in WORDS:
-        what = f"{name} is not a number"
         expected = (
             "a number or a formula; NULL, INF and EDGE are words that stand alone, "
             "where a command knows them"
         )
-    elif kind == "command" or name in FUNCTIONS:
-        what = f"'{name}' is a {kind} and needs parentheses"
+        return ScriptError(f"{name} is not a number", place=place, expected=expected)
+    if kind == "command" or name in FUNCTIONS:
         expected = f"{name}(...)" if kind == "command" else usage(name)
-    if what:
+        what = f"'{name}' is a {kind} and needs parentheses"
         return ScriptError(what, place=place, expected=expected)
     if other := _not_published(script, name, place) or defined_later(script, name, place):
         return other
@@ -114,7 +108,7 @@ def _meant_by(script: Any, name: str, known: list[str]) -> str:
     if name.upper() in WORDS:
         return f"write {name.upper()}"
     by_style = {
-        item.style: f"{ID}_{item.published[0]}" if item.published[0] else ID
+        item.style: "_".join(filter(None, (ID, item.published[0])))
         for _, ID, item in _publishing(script)
         if item.published
     }
@@ -229,3 +223,63 @@ def check_name(name: str) -> None:
 def listed(names: Iterable[str]) -> str:
     text = ", ".join(names) or "none so far"
     return text if len(text) < 200 else text[:200].rsplit(",", 1)[0] + ", ..."
+
+
+# ---- older forms of Karamelo, in the words of the script at hand ---------------------------------
+
+# Words that stood in the place of the style region in 2020, and what fills the same.
+SHAPES = dict.fromkeys(("block", "box", "rectangle"), "block") | {
+    "cylinder": "cylinder",
+    "sphere": "sphere",
+}
+FLIPS = ("FLIP", "AFLIP", "ASFLIP")
+
+
+def words_of(statement: Any) -> list[str]:
+    """List the arguments of a call, as they are written."""
+    arguments = statement.arguments if isinstance(statement, CommandCall) else ()
+    return [" ".join(argument.code.split()) for argument in arguments]
+
+
+def in_own_words(script: Any, name: str) -> str | None:
+    """Write the line for a command of Karamelo that a script calls and that is not one here."""
+    calls = [s for frame in script.frames for s in frame.statements if isinstance(s, CommandCall)]
+    own = next((call for call in calls if call.name == "method"), None)
+    asked = [c for c in (script.statement, *calls) if isinstance(c, CommandCall) and c.name == name]
+    before, rest = words_of(own), words_of(asked[0] if asked else None)
+    where = f"in the place of line {own.place.line}" if own else "before the first solid"
+    if name == "method_modify" and rest:
+        if registry.knows("method", rest[0]):
+            before, rest = [rest[0], *before[1:]], rest[1:] or before[1:] or ["FLIP"]
+        elif not registry.knows("transfer", rest[0]):  # a share alone
+            rest = [*(before[1:3] if len(before) > 2 else ("FLIP", "linear")), *rest]
+        if len(rest) == 1 or not registry.knows("basis", rest[1]):
+            rest.insert(1, before[2] if len(before) > 2 else "linear")
+        if len(rest) == 2 and rest[0] in FLIPS:
+            rest.append(before[3] if len(before) > 3 else "0.99")
+        return f"method({', '.join([*(before[:1] or ['tlmpm']), *rest])}), {where}"
+    if name == "partition_domain" and len(before) > 2:
+        line = ", ".join([*before[:2], "linear", *before[3:]])
+        return f"method({line}), {where}: with linear weights no point acts across a line of nodes"
+    return None
+
+
+def filled(statement: Any) -> str | None:
+    """Write a region and a solid for ``solid(ID, block, xlo, ..., ppc, material, h)``."""
+    ID, shape, *numbers = words_of(statement)
+    if len(numbers) < 6 or shape not in SHAPES:
+        return None
+    inside, points = ", ".join(numbers[:-3]), ", ".join(numbers[-3:])
+    return f"region(box, {SHAPES[shape]}, {inside}), and solid({ID}, region, box, {points})"
+
+
+def longer(name: str, given: Sequence[Any]) -> str | None:
+    """Write the line of a law (`name`: ``eos shock``) that was `given` fewer arguments."""
+    forms = table()["shorter"].get(name)
+    if forms is None or not given:
+        return None
+    family, style = name.split()
+    says, line = forms.get(str(len(given)), forms["else"])
+    ID = words_of(given[0].statement)[:1] or ["ID"]
+    words = line.format(*(argument.text for argument in given))
+    return f"{says}{family}({ID[0]}, {style}, {words})"

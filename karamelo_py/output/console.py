@@ -24,16 +24,9 @@ LINES = 0.05
 
 
 class Console:
-    """The one place that writes to standard output and standard error.
+    """The one place that writes to standard output and standard error, or to `out` and `err`.
 
-    Parameters
-    ----------
-    out, err
-        Streams; standard output and standard error by default, looked up at each use.
-    terminal
-        Whether `out` is a terminal; found out by default.
-    quiet
-        Write warnings only.
+    Whether `out` is a `terminal` is found out by default. A `quiet` one writes warnings only.
     """
 
     def __init__(
@@ -119,15 +112,7 @@ class Console:
         stages: Sequence[tuple[str, float]] = (),
         title: str = "Run finished",
     ) -> None:
-        """Write the table at the end of a run: facts, then where the time went.
-
-        Parameters
-        ----------
-        facts
-            Name and value, in order.
-        stages
-            Name and seconds of each part of the run.
-        """
+        """Write the table at the end of a run: facts, then the parts of it and their seconds."""
         total = sum(seconds for _, seconds in stages) or 1.0
         parts = {
             f"  {name}": f"{f'{seconds:.3g} s':>8}  {f'{100 * seconds / total:.0f} %':>8}"
@@ -160,12 +145,7 @@ class Console:
     def progress(self, step: int, time_: float, fraction: float | None = None) -> None:
         """Show how far the run is: cheap enough to call at every step.
 
-        Parameters
-        ----------
-        step, time_
-            Where it is.
-        fraction
-            Share of the run done, or None where nobody knows (run_until, run_while).
+        The `fraction` done is None where nobody knows (run_until, run_while).
         """
         now = time.perf_counter()
         pause = REDRAW if self._progress is not None else REPORT

@@ -1,6 +1,7 @@
 """Fields of points and nodes for output, in the order of their ids."""
 
-from collections.abc import Callable, Iterator, Sequence
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,45 +11,25 @@ from karamelo_py.kernels.arrays import MASS, known_to_laws
 from karamelo_py.kernels.export import export
 from karamelo_py.kernels.laws import elastic_law
 from karamelo_py.language.scene import Scene
-from karamelo_py.output.node_columns import ABSENT_AT_NODES, BROUGHT, NODE_NAMES, NodeFields
-from karamelo_py.output.point_table import AXES, COMPONENTS, PointTable, Rows
+from karamelo_py.output import node_columns, point_table
+from karamelo_py.output.node_columns import BROUGHT, NodeFields
+from karamelo_py.output.point_table import PointTable, Rows, absent, declared_columns
 from karamelo_py.points.boundary import Bounces
 from karamelo_py.points.laws import can, dissipated_energy, energy_density
 from karamelo_py.points.laws.eos import initial_energy, taken_heat
 from karamelo_py.points.laws.plastic_rate import has_rate
+from karamelo_py.script.errors import ScriptError, unknown
 
 PIECE = 1 << 17  # points that are looked at together
-PARTICLE_NAMES = (
-    ["id", "type"]
-    + list(AXES)
-    + [axis + "0" for axis in AXES]
-    + ["v" + axis for axis in AXES]
-    + ["s" + c for c in COMPONENTS]
-    + ["e" + c for c in COMPONENTS]
-    + ["seq", "volume", "mass", "damage", "damage_init", "bx", "by", "bz", "ep", "epdot"]
-    + ["T", "ienergy", "gamma"]
-)
-
-# Columns of Karamelo that are zero here: nothing keeps them apart, or only some materials do.
-ABSENT_AT_POINTS = (
-    "damage", "damage_init", "bx", "by", "bz", "ep", "epdot", "T", "gamma",
-)  # fmt: skip
 
 
 class Fields(PointTable):
-    """The points and nodes of the running scene: columns of all points, sums over them, names.
-
-    N counts all points there have ever been. `members` leaves deleted ones out.
-    """
+    """The points and nodes of the running scene: columns of all points, sums over them, names."""
 
     def __init__(self, hub: Scene):
         self.hub = hub
         self._key: Any = None
         self._cache: dict[str, Any] = {}
-
-    @property
-    def _simulation(self) -> Any:
-        return self.hub.simulation
 
     @property
     def _rows(self) -> Rows:
@@ -60,22 +41,9 @@ class Fields(PointTable):
             self._cache.clear()
         return simulation.rows()
 
-    @property
-    def count(self) -> int:
-        """Number of points."""
-        return self._simulation.count
-
-    @property
-    def present(self) -> np.ndarray:
-        """(N,) False for points that were deleted."""
-        return self._simulation.present
-
     def pieces(self, *, to_first: bool = False) -> Iterator[PointTable]:
-        """The points, so many at a time, in the order of their ids.
-
-        With `to_first`, of several processes the first alone gets them.
-        """
-        return self._simulation.pieces(to_first=to_first)
+        """The points, so many at a time, by id; with `to_first` the first process gets them all."""
+        return self.hub.simulation.pieces(to_first=to_first)
 
     @property
     def node_count(self) -> int:
@@ -83,49 +51,45 @@ class Fields(PointTable):
         return sum(lattice.node_count for lattice in self.hub.lattices)
 
     def members(self, group: Any) -> np.ndarray:
-        """Ids (0-based) of a particle group."""
-        return self._simulation.members(group)
+        """Ids (0-based) of a particle group, without deleted points."""
+        return self.hub.simulation.members(group)
 
     def kinetic_energy(self, group: Any) -> float:
         """sum m v^2 / 2 of a particle group."""
-        return self._simulation.total("kinetic", group)
+        return self.hub.simulation.total("kinetic", group)
 
     def strain_energy(self, group: Any) -> float:
         """Stored energy of a particle group."""
-        return self._simulation.total("stored", group)
+        return self.hub.simulation.total("stored", group)
 
     def dissipated_energy(self, group: Any) -> float:
         """Dissipated energy of a particle group."""
-        return self._simulation.total("dissipated", group)
+        return self.hub.simulation.total("dissipated", group)
 
     def added_up(self, part: Any, name: str = "terms", *arguments: Any) -> np.ndarray:
         """Sums (k,) over the points of a part's group, rounded once: of processes and of one alike.
 
-        Parameters
-        ----------
-        part
-            A compute or fix, as it stands in the scene.
-        name
-            Of its method that is called with fields of some of the points after others, and the
-            `arguments`, and returns terms (k, n).
+        The method `name` of the part, a compute or fix as it stands in the scene, is called with
+        fields of some of the points after others, and `arguments`, and returns terms (k, n).
         """
-        return self._simulation.added_up(part, name, *arguments)
+        return self.hub.simulation.added_up(part, name, *arguments)
 
     def each(self, part: Any, name: str, *arguments: Any) -> list:
         """List what a method of a part says of fields of some points of its group after others.
 
-        Which points are together, and in what order they come, depends on processes and steps.
+        Which points are together, and their order, depends on processes and steps.
         """
-        return self._simulation.each(part, name, *arguments)
+        return self.hub.simulation.each(part, name, *arguments)
 
     def particle_names(self) -> list[str]:
         """Names that `particle` knows."""
-        own = [*sorted(self.columns_of_laws()), *self.declared_columns()]
-        return list(dict.fromkeys([*PARTICLE_NAMES, *own]))
+        own = [*sorted(self.columns_of_laws()), *declared_columns(self.hub, "point_fields")]
+        return list(dict.fromkeys([*point_table.COLUMNS, *own]))
 
     def node_names(self) -> list[str]:
         """Names that `node` knows."""
-        return list(NODE_NAMES)
+        own = declared_columns(self.hub, "node_fields")
+        return list(dict.fromkeys([*node_columns.COLUMNS, *own]))
 
     def rate_is_asked_for(self) -> bool:
         """Tell whether a dump or a compute has the column ``epdot``, which points keep for it."""
@@ -134,35 +98,32 @@ class Fields(PointTable):
 
     def absent_at_points(self) -> list[str]:
         """Names that `particle` knows, but that are 0 because no material has them."""
-        present = self.columns_of_laws() | set(self.declared_columns())
+        present = self.columns_of_laws() | {*declared_columns(self.hub, "point_fields")}
         if any(has_rate(material.law) for material in self.hub.materials.values()):
             present.add("epdot")
-        return [name for name in ABSENT_AT_POINTS if name not in present]
+        return absent(point_table.COLUMNS, present)
 
     def absent_at_nodes(self) -> list[str]:
         """Names that `node` knows, but that are 0 in this scene."""
-        present = {"T"} if self.hub.update.thermal else set()
-        return [name for name in ABSENT_AT_NODES if name not in present]
+        present = {*declared_columns(self.hub, "node_fields"), *["T"] * self.hub.update.thermal}
+        return absent(node_columns.COLUMNS, present)
 
     def node_pieces(self, names: Sequence[str], *, to_first: bool = False) -> Iterator[NodeFields]:
-        """Fields of all nodes, of which `names` are asked for, so many nodes at a time.
-
-        With `to_first`, of several processes the first alone gets them.
-        """
+        """Fields of all nodes, of which `names` are asked for, so many at a time, see `pieces`."""
         brought = [name for name in names if name in BROUGHT]
-        for rows in self._simulation.node_pieces(brought, to_first=to_first):
+        for rows in self.hub.simulation.node_pieces(brought, to_first=to_first):
             yield NodeFields(self.hub, rows)
 
     def mass_at_nodes(self, group: Any) -> np.ndarray:
         """(4,) the mass of the nodes of a group, and this times x, y and z; rounded once."""
-        self._simulation.show_on_nodes()
-        return self._simulation.mass_at_nodes(group.id)
+        self.hub.simulation.show_on_nodes()
+        return self.hub.simulation.mass_at_nodes(group.id)
 
     @property
     def occupied_nodes(self) -> tuple[int, int]:
         """The number of nodes with mass, and the last of them."""
-        self._simulation.show_on_nodes()
-        return self._simulation.occupied_nodes()
+        self.hub.simulation.show_on_nodes()
+        return self.hub.simulation.occupied_nodes()
 
     def node(self, name: str) -> np.ndarray:
         """A field of all nodes, (n,); nodes without mass are at rest."""
@@ -215,3 +176,41 @@ SUMMED = {
     "born with": _born_with,
     "bounces": _bounces,
 }
+
+# ---- columns that are asked for by name, and may be none ----------------------------------------
+
+# Columns, and other words for what they are together.
+_QUANTITIES = {
+    "s11 s22 s33 s12 s13 s23 seq": ("stress", "sigma", "sig", "p", "pressure"),
+    "seq": ("mises", "vonmises", "von_mises", "svm"),
+    "e11 e22 e33 e12 e13 e23": ("strain", "eps", "epsilon"),
+    "x y z": ("pos", "position", "positions", "coord", "coordinates"),
+    "vx vy vz": ("vel", "velocity", "v"),
+    "fx fy fz": ("force", "forces", "f"),
+    "x y z x0 y0 z0": ("u", "disp", "displacement"),
+    "T": ("temp", "temperature"),
+}
+
+
+def check_columns(columns: Sequence[str], known: Sequence[str], *, first: int) -> None:
+    """Refuse names that are not `known`; `first` is the place of the first among the arguments."""
+    for index, name in enumerate(columns):
+        if name not in known:
+            raise unknown_column(f"unknown column '{name}'", name, known, argument=first + index)
+
+
+def unknown_column(message: str, name: str, known: Iterable[str], **where: Any) -> ScriptError:
+    """Make the error for a column that is none of the `known`; `where` it stands."""
+    known = list(known)
+    error = unknown(message, name, known, **where)
+    quantity = next((q for q, words in _QUANTITIES.items() if name.lower() in words), "")
+    if there := [column for column in quantity.split() if column in known]:
+        error.hint = f"did you mean {', '.join(there)}?"
+    component = re.fullmatch(r"(s|sigma|stress|e|eps|strain)_?([xyz123])([xyz123])", name.lower())
+    if component is not None:
+        i, j = sorted("xyz".find(axis) + 1 or int(axis) for axis in component.groups()[1:])
+        tensor = "e" if component[1] in ("e", "eps", "strain") else "s"
+        error.hint = f"did you mean '{tensor}{i}{j}'?"
+    if name[:2] in ("v_", "c_"):  # as in LAMMPS
+        error.hint = f"log_modify(custom, step, time, {name[2:]}) writes one number"
+    return error

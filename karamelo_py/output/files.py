@@ -1,8 +1,10 @@
-"""Files that are whole or not there at all."""
+"""Files that are whole or not there at all; pictures and movies among them."""
 
 import os
+import shutil
+import subprocess
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from io import BytesIO
@@ -34,13 +36,7 @@ def folder_of_discarded() -> Path | None:
 
 @contextmanager
 def whole(path: Path) -> Iterator[BinaryIO]:
-    """Open `path` for writing; the file appears under its name only when all of it is written.
-
-    Raises
-    ------
-    ScriptError
-        If the file cannot be written, with the system's reason.
-    """
+    """Open `path` for writing; the file appears under its name only when all of it is written."""
     if folder_of_discarded() is not None:
         yield BytesIO()
         return
@@ -66,11 +62,6 @@ def continued(path: Path, start: int, tail: bytes) -> Iterator[BinaryIO]:
     """Open `path` to go on at byte `start` (0: a new file).
 
     If that breaks off, the file ends there again, with `tail`.
-
-    Raises
-    ------
-    ScriptError
-        If the file cannot be written, with the system's reason.
     """
     with reported(path), path.open("r+b" if start else "wb") as file:
         try:
@@ -86,13 +77,7 @@ def continued(path: Path, start: int, tail: bytes) -> Iterator[BinaryIO]:
 
 
 def picture_format(path: Path) -> str:
-    """Read the format that the name of a picture asks for.
-
-    Raises
-    ------
-    ScriptError
-        If it is none of png, pdf, svg.
-    """
+    """Read the format that the name of a picture asks for: png, pdf or svg."""
     ending = path.suffix.lower().lstrip(".")
     if ending not in FORMATS:
         raise ScriptError(
@@ -124,9 +109,81 @@ def unwarned() -> Iterator[None]:
 
 
 @contextmanager
-def reported(path: Path) -> Iterator[None]:
+def reported(path: Path, what: str = "") -> Iterator[None]:
     """Turn what the system says against writing `path` into a ScriptError."""
     try:
         yield
     except OSError as error:
-        raise ScriptError(f"cannot write {path}: {error.strerror or error}") from error
+        raise ScriptError(f"cannot write {what}{path}: {error.strerror or error}") from error
+
+
+def movie_format(path: Path) -> str:
+    """Read the format that the name of a movie asks for: gif, or mp4 where it can be made."""
+    ending = path.suffix.lower().lstrip(".")
+    if ending not in ("gif", "mp4") or "*" in path.name:
+        raise ScriptError(
+            f"'{path.name}' is no name for a movie",
+            argument="file",
+            expected="a file name without * that ends in .gif or .mp4",
+        )
+    if ending == "mp4" and shutil.which("ffmpeg") is None:
+        raise ScriptError(
+            "an .mp4 is made by the program ffmpeg, which is not installed",
+            argument="file",
+            expected=".gif, or ffmpeg",
+            hint=path.stem + ".gif",
+        )
+    return ending
+
+
+class Frames:
+    """Pictures that become a movie of `fps` in a second. They are kept as PNG, which are small."""
+
+    remembers = ("_frames",)
+
+    def __init__(self, fps: float):
+        self.fps = fps
+        self._frames: list[bytes] = []
+        self._saved = 0
+
+    def add(self, draw: Callable[[BinaryIO], None]) -> None:
+        """Take a picture that `draw` writes as PNG."""
+        file = BytesIO()
+        draw(file)
+        self._frames.append(file.getvalue())
+
+    def save(self, path: Path) -> None:
+        """Write the movie, if there is a frame that it does not have yet."""
+        if len(self._frames) == self._saved:
+            return
+        with whole(path) as file:
+            if path.suffix.lower() == ".gif":
+                self._save_gif(file)
+            else:
+                self._save_mp4(path, file)
+        self._saved = len(self._frames)
+
+    def _save_gif(self, file: BinaryIO) -> None:
+        from PIL import Image
+
+        first, *others = (Image.open(BytesIO(frame)) for frame in self._frames)
+        first.save(
+            file,
+            format="GIF",
+            save_all=True,
+            append_images=others,
+            # Hundredths of a second is what a GIF knows, and viewers slow down what is below two.
+            duration=max(20, 10 * round(100 / self.fps)),
+            loop=0,
+        )
+
+    def _save_mp4(self, path: Path, file: BinaryIO) -> None:
+        command = ["ffmpeg", "-y", "-loglevel", "error", "-f", "image2pipe", "-c:v", "png"]
+        command += ["-framerate", f"{self.fps:g}", "-i", "-"]
+        # Players want even sizes and colours at half the resolution.
+        command += ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"]
+        command += ["-f", "mp4", file.name]
+        done = subprocess.run(command, input=b"".join(self._frames), capture_output=True)
+        if done.returncode != 0:
+            last = (done.stderr.decode(errors="replace").strip().splitlines() or ["?"])[-1]
+            raise ScriptError(f"ffmpeg could not make {path}: {last}")

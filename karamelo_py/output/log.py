@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TextIO
 
 from karamelo_py.language.scene import Scene
+from karamelo_py.output.files import reported
 from karamelo_py.output.quantity import LIMIT, Quantity
 from karamelo_py.output.rhythm import ByTime, Rhythmic
 from karamelo_py.script.errors import ScriptError
@@ -59,10 +60,8 @@ class Log(Rhythmic):
         if not self.columns:
             self.columns = [Quantity(self.hub, name) for name in ("step", "dt", "time")]
         headings = [column.heading for column in self.columns]
-        self._widths = [
-            max(len(heading), STEP_WIDTH if heading == "Step" else NUMBER_WIDTH)
-            for heading in headings
-        ]
+        least = {"Step": STEP_WIDTH}
+        self._widths = [max(len(name), least.get(name, NUMBER_WIDTH)) for name in headings]
         header = _row(headings, self._widths)
         if self._file is None and self._end:
             self._go_on()
@@ -78,17 +77,13 @@ class Log(Rhythmic):
 
     def write(self) -> None:
         """Write one line: the quantities now."""
-        cells = []
         numbers = [column.read() for column in self.columns]
         if self.rows is not None:
             self.rows.append(([column.heading for column in self.columns], numbers))
-        for number in numbers:
-            if isinstance(number, int | str):
-                cells.append(str(number))
-            else:
-                # A blank keeps the place of the minus sign; the first column starts at the margin
-                # for pandas' sake.
-                cells.append(f"{number: .10g}" if cells else f"{number:.10g}")
+        # A blank keeps the place of the minus sign; the first column starts at the margin for
+        # pandas' sake.
+        cells = [str(x) if isinstance(x, int | str) else f"{x: .10g}" for x in numbers]
+        cells[0] = cells[0].lstrip()
         self._put(cells)
         self.hub.console.log_line(_row(cells, self._widths))
 
@@ -128,22 +123,17 @@ class Log(Rhythmic):
                 hint="-log FILE or -out FOLDER sends the log elsewhere; -log "
                 f"{self.file} overwrites it",
             )
-        try:
+        with reported(path, "the log file "):
             # Line buffering: each line is in the file at once, also when the run is killed.
             self._file = path.open("a", buffering=1, encoding="utf-8", newline="\n")
             weakref.finalize(self, self._file.close)
-            _claim(self._file)
+            if not _claimed(self._file):
+                raise ScriptError(
+                    f"another run is writing to {path}",
+                    expected="a folder of its own for each run",
+                    hint="-out FOLDER sends all files there",
+                )
             self._file.truncate(end)
-        except BlockingIOError as error:
-            raise ScriptError(
-                f"another run is writing to {path}",
-                expected="a folder of its own for each run",
-                hint="-out FOLDER sends all files there",
-            ) from error
-        except OSError as error:
-            raise ScriptError(
-                f"cannot write the log file {path}: {error.strerror or error}"
-            ) from error
 
     def _put(self, cells: list[str]) -> None:
         if not self.hub.output.writes:
@@ -153,13 +143,9 @@ class Log(Rhythmic):
             line = ",".join(f'"{c}"' if "," in c else c.strip() for c in cells)
         else:
             line = _row(cells, self._widths)
-        try:
+        with reported(self.path, "the log file "):
             self._file.write(line + "\n")
             self._end = os.fstat(self._file.fileno()).st_size
-        except OSError as error:
-            raise ScriptError(
-                f"cannot write the log file {self.path}: {error.strerror or error}"
-            ) from error
 
 
 def _is_log(path: Path) -> bool:
@@ -184,21 +170,20 @@ def _is_log(path: Path) -> bool:
     )
 
 
-def _claim(file: TextIO) -> None:
-    """Keep other programs from writing to `file` (BlockingIOError where one does).
+def _claimed(file: TextIO) -> bool:
+    """Keep other programs from writing to `file`; False where one does.
 
     The claim ends with the program, however it ends. Windows has none that lets others read.
     """
     try:
         import fcntl
-    except ImportError:
-        return
-    try:
+
         fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
-        if error.errno in (errno.EACCES, errno.EAGAIN):
-            raise BlockingIOError from error
-        # File systems without locks are none of our business.
+    except ImportError:
+        return True
+    except OSError as error:  # of file systems without locks others are none of our business
+        return error.errno not in (errno.EACCES, errno.EAGAIN)
+    return True
 
 
 def _row(cells: list[str], widths: list[int]) -> str:

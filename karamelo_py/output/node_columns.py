@@ -1,6 +1,6 @@
 """Fields of nodes for output, in the order of their numbers."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from math import frexp
 from typing import Any, NamedTuple
@@ -13,40 +13,19 @@ from karamelo_py.kernels.export import EXPORTED, JACOBIAN, export_state, export_
 from karamelo_py.kernels.hooks import CompiledHook
 from karamelo_py.kernels.p2g import Force
 from karamelo_py.language.scene import Scene
-from karamelo_py.output.point_table import volumes_before
+from karamelo_py.output.point_table import AXES, declared_columns, volumes_before
 from karamelo_py.points.laws import can, constrained_velocity
-
-AXES = "xyz"
-NODE_NAMES = (
-    ["id", "type"]
-    + list(AXES)
-    + ["v" + axis for axis in AXES]
-    + ["v" + axis + "_update" for axis in AXES]
-    + ["f" + axis for axis in AXES]
-    + ["mass", "vol", "mask", "rigid", "T", "bx", "by", "bz", "ntypex", "ntypey", "ntypez"]
-)
-ABSENT_AT_NODES = ("T",)
 
 
 class NodeRows(NamedTuple):
-    """The nodes with numbers from `first` to before `end`: their rows in the arrays of nodes.
-
-    Attributes
-    ----------
-    arrays
-        By name, as in a file to go on from.
-    brought
-        Sums over the points that were asked for (`BROUGHT`).
-    loaded
-        Number of nodes with mass that each fix acts on, by ID.
-    """
+    """The nodes with numbers from `first` to before `end`: their rows in the arrays of nodes."""
 
     first: int
     end: int
     kin: Any
-    arrays: dict[str, np.ndarray]
-    brought: dict[str, np.ndarray]
-    loaded: dict[str, int]
+    arrays: dict[str, np.ndarray]  # by name, as in a file to go on from
+    brought: dict[str, np.ndarray]  # sums over the points that were asked for (`BROUGHT`)
+    loaded: dict[str, int]  # number of nodes with mass that each fix acts on, by ID
 
 
 class NodeFields:
@@ -58,46 +37,36 @@ class NodeFields:
 
     def node(self, name: str) -> np.ndarray:
         """Return a field of the nodes, (n,)."""
-        arrays = self.rows.arrays
-        if name == "mass":
-            return arrays["nodes/sums"][:, MASS].astype(float)
-        if name in AXES:
-            return self.positions()[:, AXES.index(name)]
         if name == "T" and self.hub.update.thermal:
-            mass = arrays["heat/sums"][:, MASS]
-            return np.where(mass > 0, arrays["heat/velocity"][:, 0], 0.0)
-        if name in COLUMNS:
-            return COLUMNS[name](self)
-        if name in ABSENT_AT_NODES or (axis := AXES.index(name[1])) >= self.hub.domain.dimension:
-            return np.zeros(len(self.ids))
-        field = {
-            "v": arrays["nodes/velocity"][:, axis],
-            "u": arrays["nodes/update"][:, axis],
-            "f": arrays["nodes/sums"][:, of_force(self.rows.kin) + axis],
-        }["u" if name.endswith("_update") else name[0]]
-        return np.where(self.node("mass") > 0, field, 0.0)
+            mass = self.rows.arrays["heat/sums"][:, MASS]
+            return np.where(mass > 0, self.rows.arrays["heat/velocity"][:, 0], 0.0)
+        if (show := COLUMNS.get(name)) is not None:
+            return show(self)
+        if name in (shown := declared_columns(self.hub, "node_fields")):
+            kind, k = shown[name]
+            array = self.rows.arrays.get(f"nodes/{fields.name_of(kind)}")
+            if array is not None and k < kind.shape(self.rows.kin):
+                return array[:, k].astype(float)
+        return np.zeros(len(self.ids))
 
     def positions(self) -> np.ndarray:
         """Return where they are, (n, 3)."""
-        found = np.empty((len(self.ids), 3))
-        for lattice, own in self.lattices():
-            found[own] = lattice.positions(self.ids[own])
-        return found
-
-    def lattices(self) -> list[tuple[Any, slice]]:
-        """List the grids that they belong to, and which of them do."""
-        ends = ((one, one.first + one.node_count) for one in self.hub.lattices)
-        return [
-            (one, slice(*np.searchsorted(self.ids, (one.first, end)).tolist()))
-            for one, end in ends
-            if one.first < self.rows.end and end > self.rows.first
-        ]
+        return places_of(self.hub, self.ids)
 
 
-def kind_of_grid(nodes: NodeFields) -> np.ndarray:
-    """Return the number of the grid, from 1."""
-    begins = [lattice.first for lattice in nodes.hub.lattices]
-    return np.searchsorted(begins, nodes.ids, side="right")
+def by_lattice(hub: Scene, nodes: np.ndarray) -> Iterator[tuple[Any, slice]]:
+    """Yield the grids of a scene, and which of some nodes, of ascending numbers, are of each."""
+    for lattice in hub.lattices:
+        ends = lattice.first, lattice.first + lattice.node_count
+        yield lattice, slice(*np.searchsorted(nodes, ends))
+
+
+def places_of(hub: Scene, nodes: np.ndarray) -> np.ndarray:
+    """(n, 3) positions of nodes, of ascending numbers."""
+    found = np.empty((len(nodes), 3))
+    for lattice, own in by_lattice(hub, nodes):
+        found[own] = lattice.positions(nodes[own])
+    return found
 
 
 def mask(nodes: NodeFields) -> np.ndarray:
@@ -124,7 +93,9 @@ def kind_of_node(axis: int, nodes: NodeFields) -> np.ndarray:
     basis = nodes.hub.update.method.basis
     splines = type(basis).__name__ in ("QuadraticSpline", "CubicSpline")
     found = np.zeros(len(nodes.ids))
-    for lattice, own in nodes.lattices() if axis < nodes.hub.domain.dimension else ():
+    if axis >= nodes.hub.domain.dimension:
+        return found
+    for lattice, own in by_lattice(nodes.hub, nodes.ids):
         i, last = lattice.places(nodes.ids[own])[:, axis], lattice.shape[axis] - 1
         if splines:
             found[own] = np.minimum(2, i) - np.minimum(2, last - i)
@@ -156,14 +127,39 @@ def load(axis: int, nodes: NodeFields) -> np.ndarray:
     return out
 
 
-COLUMNS: dict[str, Callable[[NodeFields], np.ndarray]] = {
+def of_vector(name: str, first: Callable, axis: int, nodes: NodeFields) -> np.ndarray:
+    """Return a component of a vector, which begins at ``first(kin)`` in an array of nodes."""
+    if axis >= nodes.hub.domain.dimension:
+        return np.zeros(len(nodes.ids))
+    component = nodes.rows.arrays[name][:, first(nodes.rows.kin) + axis]
+    return np.where(nodes.node("mass") > 0, component, 0.0)
+
+
+def vector(name: str, array: str, first: Callable = lambda kin: 0) -> dict[str, Callable]:
+    """Return the columns of a vector, with the direction in the place of ``*``."""
+    return {
+        name.replace("*", axis): partial(of_vector, f"nodes/{array}", first, k)
+        for k, axis in enumerate(AXES)
+    }
+
+
+# Columns of every scene; those with None only some scenes have, in others they are 0.
+COLUMNS: dict[str, Callable[[NodeFields], np.ndarray] | None] = {
     "id": lambda nodes: nodes.ids,
-    "type": kind_of_grid,
+    "type": lambda nodes: np.searchsorted(
+        [grid.first for grid in nodes.hub.lattices], nodes.ids, side="right"
+    ),
+    **{axis: lambda nodes, k=k: nodes.positions()[:, k] for k, axis in enumerate(AXES)},
+    **vector("v*", "velocity"),
+    **vector("v*_update", "update"),
+    **vector("f*", "sums", of_force),
+    "mass": lambda nodes: nodes.rows.arrays["nodes/sums"][:, MASS].astype(float),
     "vol": lambda nodes: nodes.rows.brought["vol"],
-    "rigid": lambda nodes: (nodes.rows.brought["rigid"] > 0) * 1.0,
     "mask": mask,
-    **{f"ntype{axis}": partial(kind_of_node, k) for k, axis in enumerate(AXES)},
+    "rigid": lambda nodes: (nodes.rows.brought["rigid"] > 0) * 1.0,
+    "T": None,
     **{f"b{axis}": partial(load, k) for k, axis in enumerate(AXES)},
+    **{f"ntype{axis}": partial(kind_of_node, k) for k, axis in enumerate(AXES)},
 }
 
 # --- what points bring to nodes where it is asked for ---------------------------------------------
@@ -179,11 +175,6 @@ def _volume(simulation: Any, block: Any) -> np.ndarray:
     return volumes_before(simulation.hub, points.id) * rows[:, JACOBIAN]
 
 
-def _rigid(simulation: Any, block: Any) -> np.ndarray | None:
-    """1 where a rigid solid takes part, else 0."""
-    return np.ones(len(block.points.id)) if can(block.laws, constrained_velocity) else None
-
-
 def _force(axis: int, simulation: Any, block: Any) -> np.ndarray | None:
     force = fields.field(block.points.fields, Force)
     return None if force is None or axis >= len(force) else force[axis]
@@ -192,7 +183,9 @@ def _force(axis: int, simulation: Any, block: Any) -> np.ndarray | None:
 # What `of(simulation, block)` says of each point of a block, if anything.
 BROUGHT: dict[str, Callable[[Any, Any], np.ndarray | None]] = {
     "vol": _volume,
-    "rigid": _rigid,
+    "rigid": lambda simulation, block: (  # 1 where a rigid solid takes part
+        np.ones(len(block.points.id)) if can(block.laws, constrained_velocity) else None
+    ),
     **{f"b{axis}": partial(_force, k) for k, axis in enumerate(AXES)},
 }
 

@@ -5,6 +5,7 @@ Axes, labels and the bar of colours are a background that is drawn once and then
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import product
 from typing import Any, BinaryIO, NamedTuple
 
@@ -38,40 +39,18 @@ LIT = 8  # points, from which on they have a surface
 
 
 class Options(NamedTuple):
-    """Options of a picture.
+    """Options of a picture."""
 
-    Attributes
-    ----------
-    column
-        The column that colours the points, or is drawn over x in 1D.
-    label
-        Text beside the colours (or, in 1D, at the ordinate).
-    solids
-        Names of the solids that colour the points, if a column does not.
-    limits
-        Ends of the colours; None for ends that grow with what has been seen.
-    symmetric
-        True for limits that grow about 0.
-    cmap
-        A colour map of Matplotlib.
-    azimuth, elevation
-        Angles of view in 3D, in degrees.
-    axes
-        False for none.
-    lengths
-        Text behind the names of the axes: the unit.
-    """
-
-    column: str
-    label: str
-    solids: tuple[str, ...] = ()
-    limits: tuple[float | None, float | None] = (None, None)
-    symmetric: bool = False
+    column: str  # that colours the points, or is drawn over x in 1D
+    label: str  # text beside the colours (or, in 1D, at the ordinate)
+    solids: tuple[str, ...] = ()  # names of those that colour the points, if a column does not
+    limits: tuple[float | None, float | None] = (None, None)  # None: grow with what has been seen
+    symmetric: bool = False  # limits grow about 0
     cmap: str = "viridis"
-    azimuth: float = -60.0
+    azimuth: float = -60.0  # angles of view in 3D, in degrees
     elevation: float = 30.0
     axes: bool = True
-    lengths: str = ""
+    lengths: str = ""  # text behind the names of the axes: the unit
 
 
 class DrawnPoints(Artist):
@@ -125,21 +104,11 @@ class Picture:
             self.axes.set_axis_off()
         self._add_legend()
 
-    def _prepare(self) -> Any:
-        """Set up axes; return the artist that shows the points."""
-        raise NotImplementedError
-
-    def _rows(self, ids: np.ndarray, x: np.ndarray, values: np.ndarray, side: float) -> np.ndarray:
-        """List what shows of points at x (n, 3), in the order in which they are drawn."""
-        raise NotImplementedError
-
-    def place(self, rows: np.ndarray) -> None:
-        """Hand what shows of some points to the artist."""
-        raise NotImplementedError
-
-    def _apply_limits(self, lo: float, hi: float) -> None:
-        """Take new limits of the field."""
-        raise NotImplementedError
+    _prepare: Callable[[], Any]  # sets up axes and returns the artist that shows the points
+    # Lists what shows of points at x (n, 3), in the order in which they are drawn.
+    _rows: Callable[[np.ndarray, np.ndarray, np.ndarray, float], np.ndarray]
+    place: Callable[[np.ndarray], None]  # hands what shows of some points to the artist
+    _apply_limits: Callable[[float, float], None]  # takes new limits of the field
 
     def _apply_beyond(self, below: bool, above: bool) -> None:
         """Mark the ends of the colours beyond which there are values."""

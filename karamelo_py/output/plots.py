@@ -1,18 +1,15 @@
-"""Plots of logged quantities against each other, drawn with Matplotlib when a run ends."""
+"""Plots of logged quantities, drawn with Matplotlib when a run ends, and the look of all plots."""
 
-from collections.abc import Iterator
+from math import floor, log10
 from pathlib import Path
 from typing import Any
 
 from karamelo_py.language.scene import Scene
-from karamelo_py.output.files import FORMATS, savefig
-from karamelo_py.output.plot_style import blank_figure, tidy
+from karamelo_py.output.files import savefig
 from karamelo_py.output.quantity import Quantity
 from karamelo_py.output.rhythm import Rhythmic
 from karamelo_py.output.units import labelled
 from karamelo_py.script.errors import Place
-
-__all__ = ["FORMATS", "Plots", "PlottedCurve"]
 
 
 class PlottedCurve(Rhythmic):
@@ -41,45 +38,32 @@ class PlottedCurve(Rhythmic):
         self.points.append((float(self.x.read()), float(self.y.read())))
 
 
-class Plots:
-    """The curves of a scene and the file they are drawn to.
+class Plots(dict[str, PlottedCurve]):
+    """The curves of a scene by their IDs, and the file they are drawn to.
 
     Curves over the same quantity share one pair of axes; each further quantity gets axes of its
     own below. Without a file the curves are collected only.
     """
 
     def __init__(self, hub: Scene):
+        super().__init__()
         self.hub = hub
         self.file: Path | None = None
         self.place: Place | None = None  # of save_plot
-        self._curves: dict[str, PlottedCurve] = {}
-
-    def __iter__(self) -> Iterator[PlottedCurve]:
-        return iter(self._curves.values())
-
-    def __contains__(self, item: object) -> bool:
-        return any(curve is item for curve in self)
-
-    def __len__(self) -> int:
-        return len(self._curves)
 
     def add(self, ID: str, curve: PlottedCurve) -> None:
         """File a curve under `ID`, which must be new."""
         curve.id = ID
-        self._curves[ID] = curve
-
-    def ids(self) -> list[str]:
-        """List IDs of the curves."""
-        return list(self._curves)
+        self[ID] = curve
 
     def finish(self) -> None:
         """Draw every curve that has points to the file; without file or points do nothing."""
-        if self.file is None or not any(curve.points for curve in self):
-            return
         by_x: dict[str, list[PlottedCurve]] = {}
-        for curve in self:
+        for curve in self.values():
             if curve.points:
                 by_x.setdefault(curve.x.name, []).append(curve)
+        if self.file is None or not by_x:
+            return
         figure = blank_figure(6.4, 3.8 * len(by_x))
         all_axes = figure.subplots(len(by_x), 1, squeeze=False)[:, 0]
         for axes, (x_name, curves) in zip(all_axes, by_x.items(), strict=True):
@@ -90,14 +74,8 @@ class Plots:
                 # Colours go on from one side to the other.
                 lines += self._draw(axes, side, chosen, first=len(lines)) if chosen else []
             # Above the curves, where it hides none.
-            axes.legend(
-                handles=lines,
-                loc="lower left",
-                bbox_to_anchor=(0, 1),
-                ncols=4,
-                frameon=False,
-                fontsize="small",
-            )
+            above = {"loc": "lower left", "bbox_to_anchor": (0, 1), "ncols": 4}
+            axes.legend(handles=lines, **above, frameon=False, fontsize="small")
         savefig(figure, self.hub.folder / self.file)
 
     def _draw(self, axes: Any, side: str, curves: list[PlottedCurve], first: int) -> list:
@@ -122,3 +100,53 @@ class Plots:
         units = self.hub.output.units
         parts = {**self.hub.fixes, **self.hub.computes}
         return labelled(name, units.of_value(name, parts)) if units else name
+
+
+# ---- the look that all plots share --------------------------------------------------------------
+
+
+def blank_figure(width: float, height: float) -> Any:
+    """Make an empty figure of Matplotlib, in inches, that needs no display."""
+    # Matplotlib takes a third of a second to import: only scenes with plots pay it.
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), dpi=150, layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def tick_text(a: float, _: Any = None) -> str:
+    """Write a number at an axis: 0.02, 500, 3·10^-7."""
+    if a == 0 or 1e-3 <= abs(a) < 1e5:
+        return f"{a:g}"
+    exponent = floor(log10(abs(a)) + 1e-9)
+    lead = a / 10**exponent
+    tens = f"10^{{{exponent}}}"
+    return f"${tens}$" if abs(lead - 1) < 1e-9 else rf"${lead:g}\cdot{tens}$"
+
+
+def real_ticks(axis: Any) -> None:
+    """Real numbers at the ticks of a linear axis, no power of ten and no sum beside it."""
+    from matplotlib.ticker import MaxNLocator, ScalarFormatter
+
+    class WholeNumbers(ScalarFormatter):
+        def __call__(self, x: float, pos: int | None = None) -> str:
+            largest = abs(self.axis.get_view_interval()).max()
+            if largest == 0 or 1e-3 <= largest < 1e5:
+                return super().__call__(x, pos)
+            return tick_text(float(f"{x / largest:.12f}") * largest)
+
+    if type(axis.get_major_formatter()) is ScalarFormatter:
+        whole = WholeNumbers(useOffset=False)
+        whole.set_scientific(False)
+        axis.set_major_formatter(whole)
+        axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10]))  # few digits
+
+
+def tidy(axes: Any) -> None:
+    """Draw a light grid, no frame on the far sides, and real numbers at the ticks."""
+    real_ticks(axes.xaxis)
+    real_ticks(axes.yaxis)
+    axes.grid(True, color="0.9", linewidth=0.7)
+    axes.spines[["top", "right"]].set_visible(False)

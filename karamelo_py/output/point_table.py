@@ -8,7 +8,6 @@ import numpy as np
 
 from karamelo_py.compiler import fields
 from karamelo_py.kernels.arrays import MASS, Block, Points, Setup, known_to_laws, some_of
-from karamelo_py.kernels.averaging import FBar
 from karamelo_py.kernels.export import (
     ENERGY,
     EXPORTED,
@@ -26,6 +25,14 @@ from karamelo_py.points.transfers import Moment
 
 AXES = "xyz"
 COMPONENTS = ("11", "22", "33", "12", "13", "23")
+# Columns, the vectors that they belong to, and directions.
+VECTORS = {
+    f"{before}{axis}{after}": (vector, k)
+    for before, after, vector in (
+        ("", "", "position"), ("", "0", "reference_position"), ("v", "", "velocity")
+    )
+    for k, axis in enumerate(AXES)
+}  # fmt: skip
 
 
 class Part(NamedTuple):
@@ -66,6 +73,9 @@ class Rows(NamedTuple):
         """Gather (n, ...) a field, which `of` takes from `Points`; zero for deleted points."""
         own = [(part.places, part.taken(of(part.block.points))) for part in self.parts]
         found = np.zeros((*own[0][1].shape[:-1], len(self.ids)), own[0][1].dtype)
+        return self._filled(found, own)
+
+    def _filled(self, found: np.ndarray, own: list[tuple]) -> np.ndarray:
         for places, array in self.of_all(own):
             found[..., places] = array
         return found.T
@@ -85,9 +95,7 @@ class Rows(NamedTuple):
             return None
         found = fields.at_points(kind, self.s.kin, len(self.ids), float).array
         own = [(part.places, part.taken(array)) for part, array in arrays if array is not None]
-        for places, array in self.of_all(own):
-            found[:, places] = array
-        return found.T
+        return self._filled(found, own)
 
     def computed(self, of: Callable[[Block], Callable | None], *columns: int) -> np.ndarray:
         """Compute (n, *columns) numbers of each point by a kernel.
@@ -102,11 +110,8 @@ class Rows(NamedTuple):
             if len(points.id) and (fill := of(part.block.laws)):
                 rows = np.zeros((len(points.id), *columns))
                 fill(s.kin, s.nodes.sums[0, MASS], points, part.block.laws, rows)
-                own.append((part.places, rows))
-        found = np.zeros((len(self.ids), *columns))
-        for places, rows in self.of_all(own):
-            found[places] = rows
-        return found
+                own.append((part.places, rows.T))
+        return self._filled(np.zeros((*columns, len(self.ids))), own)
 
 
 class PointTable:
@@ -114,13 +119,6 @@ class PointTable:
 
     Deleted points (boundary delete) have zeros in the arrays of all points and of a piece;
     `particle` leaves them out.
-
-    Attributes
-    ----------
-    ids : ndarray (n,)
-        Their numbers, from 0.
-    present : ndarray (n,)
-        False for points that were deleted.
     """
 
     def __init__(self, hub: Scene, rows: Rows):
@@ -129,7 +127,7 @@ class PointTable:
         self._cache: dict[str, Any] = {}
 
     def _cached(self, name: str, make: Callable[[Rows], Any]) -> Any:
-        rows = self._rows
+        rows = self._rows  # where the scene has gone on this forgets what was made
         if name not in self._cache:
             self._cache[name] = make(rows)
         return self._cache[name]
@@ -200,21 +198,6 @@ class PointTable:
         laws = [material.law for material in self.hub.materials.values()]
         return {name for law in laws for name in columns_of(law)}
 
-    def declared_columns(self) -> dict[str, tuple[type, int]]:
-        """Map columns to the declared field of the points that shows each, and the component."""
-        update = self.hub.update
-        basis = getattr(update.method, "basis", None)
-        owners = [*self.hub.fixes.values(), update.method, update.transfer, basis, update.scheme]
-        owners += [getattr(update.method, "frame", None)]
-        owners += [Conducting] if update.thermal else []
-        owners += [ReflectingGrid] if update.boundary == "reflect" else []
-        owners += [FBar] if update.anti_locking else []
-        found: dict[str, tuple[type, int]] = {}
-        for kind in fields.declared(owners, "point_fields"):
-            for k, column in enumerate(fields.columns_of(kind)):
-                found.setdefault(column, (kind, k))
-        return found
-
     def particle(self, name: str) -> np.ndarray:
         """Return a column (n,) of the points that there are.
 
@@ -224,31 +207,12 @@ class PointTable:
         return values if present.all() else values[present]
 
     def _particle(self, name: str) -> np.ndarray:
-        if name == "id":
-            return self.ids + 1
-        if name == "type":
-            return self.solid + 1
-        if name in AXES:
-            return _column(self.position, AXES.index(name))
-        if name[:1] in AXES and name[1:] == "0":
-            return _column(self.reference_position, AXES.index(name[0]))
-        if name in ("vx", "vy", "vz"):
-            return _column(self.velocity, AXES.index(name[1]))
-        if name == "mass":
-            return self.mass.astype(float)
-        if name == "volume":
-            return self.reference_volume * self._exported[:, JACOBIAN]
-        if name == "ienergy":
-            return self._exported[:, ENERGY].copy()
+        if (show := COLUMNS.get(name)) is not None:
+            return show(self)
         if name in self.columns_of_laws() or name == "epdot":
             shown = partial(_column_of_laws, name)
             return self._cached(name, lambda rows: rows.computed(shown)).copy()
-        if name == "seq":
-            return _von_mises(self._exported[:, :STRAIN])
-        if name[:1] in "se" and name[1:] in COMPONENTS:
-            first = 0 if name[0] == "s" else STRAIN
-            return self._exported[:, first + COMPONENTS.index(name[1:])].copy()
-        if name in (shown := self.declared_columns()):
+        if name in (shown := declared_columns(self.hub, "point_fields")):
             kind, k = shown[name]
             if (array := self._rows.declared(kind)) is not None:
                 return _column(array, k)
@@ -260,6 +224,33 @@ class PointTable:
         return self._cached(
             "exported", lambda rows: rows.computed(lambda laws: export_state, EXPORTED)
         )
+
+
+def owners_of_fields(hub: Scene, contact: Any = None) -> list:
+    """List the parts of a scene that may declare fields of points and nodes."""
+    update, method = hub.update, hub.update.method
+    heat = Conducting if update.thermal else None
+    grids = ReflectingGrid if update.boundary == "reflect" else None
+    of_method = [None] * 4
+    if method is not None:
+        of_method = [method.frame, method.averaging(hub), method.basis, method]
+    frame, averaging, *others = of_method
+    owners = [frame, update.transfer, averaging, contact, heat, grids]
+    return [*owners, *hub.fixes.values(), update.scheme, *others]
+
+
+def declared_columns(hub: Scene, attribute: str) -> dict[str, tuple[type, int]]:
+    """Map columns to the field, declared in `attribute`, that shows each, and the component."""
+    found: dict[str, tuple[type, int]] = {}
+    for kind in fields.declared(owners_of_fields(hub), attribute):
+        for k, column in enumerate(fields.columns_of(kind)):
+            found.setdefault(column, (kind, k))
+    return found
+
+
+def absent(columns: dict[str, Callable | None], present: set[str] = frozenset()) -> list[str]:
+    """List the columns that only some scenes have, without those that are `present`."""
+    return [name for name, show in columns.items() if show is None and name not in present]
 
 
 def _place(s: Setup, points: Points) -> np.ndarray:
@@ -276,28 +267,23 @@ def _velocity_moment(s: Setup, points: Points) -> np.ndarray:
 
 def places_before(hub: Scene, ids: np.ndarray) -> np.ndarray:
     """Return (n, d) positions of points before the first step, without those of others."""
-    found = np.empty((len(ids), hub.domain.dimension))
-    for solid, rows, own in _of_solids(hub, ids):
-        found[rows] = solid.x0_of(own)
-    return found
+    return _before(hub, ids, lambda solid, own: solid.x0_of(own), hub.domain.dimension)
 
 
 def volumes_before(hub: Scene, ids: np.ndarray) -> np.ndarray:
     """Return (n,) volumes of points before the first step."""
-    found = np.empty(len(ids))
-    for solid, rows, own in _of_solids(hub, ids):
-        found[rows] = solid.volume0[own]
-    return found
+    return _before(hub, ids, lambda solid, own: solid.volume0[own])
 
 
-def _of_solids(hub: Scene, ids: np.ndarray) -> Iterator[tuple[Any, np.ndarray, np.ndarray]]:
-    """Yield solids with some of these points: rows of these, and their numbers there."""
-    order = np.argsort(ids)
+def _before(hub: Scene, ids: np.ndarray, of: Callable, *columns: int) -> np.ndarray:
+    """Gather what ``of(solid, numbers)`` returns of its points with these numbers."""
+    found, order = np.empty((len(ids), *columns)), np.argsort(ids)
     for solid in hub.solids.values():
         ends = solid.first_id, solid.first_id + solid.count
         rows = order[slice(*np.searchsorted(ids, ends, sorter=order))]
         if len(rows):
-            yield solid, rows, ids[rows] - solid.first_id
+            found[rows] = of(solid, ids[rows] - solid.first_id)
+    return found
 
 
 def _column_of_laws(name: str, laws: Any) -> Callable | None:
@@ -316,3 +302,28 @@ def _von_mises(s: np.ndarray) -> np.ndarray:
     xx, yy, zz, xy, xz, yz = s.T
     normal = (xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2
     return np.sqrt(0.5 * normal + 3 * (xy**2 + xz**2 + yz**2))
+
+
+def _of_vector(attribute: str, axis: int, table: PointTable) -> np.ndarray:
+    return _column(getattr(table, attribute), axis)
+
+
+def _exported(k: int, table: PointTable) -> np.ndarray:
+    return table._exported[:, k].copy()
+
+
+# Columns of every scene. Those with None only some materials or fields have; in other scenes they
+# are 0, as in Karamelo.
+COLUMNS: dict[str, Callable[[PointTable], np.ndarray] | None] = {
+    "id": lambda table: table.ids + 1,
+    "type": lambda table: table.solid + 1,
+    **{name: partial(_of_vector, *where) for name, where in VECTORS.items()},
+    **{f"s{name}": partial(_exported, k) for k, name in enumerate(COMPONENTS)},
+    **{f"e{name}": partial(_exported, STRAIN + k) for k, name in enumerate(COMPONENTS)},
+    "seq": lambda table: _von_mises(table._exported[:, :STRAIN]),
+    "volume": lambda table: table.reference_volume * table._exported[:, JACOBIAN],
+    "mass": lambda table: table.mass.astype(float),
+    **dict.fromkeys(("damage", "damage_init", "bx", "by", "bz", "ep", "epdot", "T")),
+    "ienergy": partial(_exported, ENERGY),
+    "gamma": None,
+}

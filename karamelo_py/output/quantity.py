@@ -7,9 +7,8 @@ from typing import Any
 
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
-from karamelo_py.script.errors import ScriptError, meant
+from karamelo_py.script.errors import ScriptError, meant, table
 from karamelo_py.script.expressions import POINT_SEEDS
-from karamelo_py.script.other_programs import table
 
 KEYWORDS = {"step": "Step", "dt": "dt", "time": "Time"}
 LIMIT = "limit"  # the log shows the name of what limits the step
@@ -20,33 +19,19 @@ class Quantity:
     """A named number of the running scene.
 
     It is one of the words ``step``, ``dt``, ``time``; a variable of the script; a value published
-    by a fix or a compute (``Ek``, ``v_x``); or a formula written on the spot (``Ek + Es``).
-
-    Parameters
-    ----------
-    hub
-        The hub of the scene.
-    name
-        What the script says.
-    formula
-        The formula to evaluate when `name` is a formula written on the spot.
-    words
-        Whether it may be the word ``limit``, whose content is a word.
-
-    Raises
-    ------
-    ScriptError
-        If nothing of that name exists, or it is not a single number.
+    by a fix or a compute (``Ek``, ``v_x``); or a `formula` written on the spot (``Ek + Es``).
     """
 
     script_kind = "a quantity"
 
-    def __init__(self, hub: Scene, name: str, formula: Any = None, words: bool = False):
+    words = False  # it may be ``limit``, whose content is a word
+
+    def __init__(self, hub: Scene, name: str, formula: Any = None):
         self.hub = hub
         self.name = name
         self.formula = formula
         self._told = False  # whether the user knows of a NaN
-        self.is_word = words and name == LIMIT and name not in self.names(hub)
+        self.is_word = self.words and name == LIMIT and name not in self.names(hub)
         if self.is_word:
             return
         if formula is None and name not in self.names(hub):
@@ -56,8 +41,6 @@ class Quantity:
                 hint=meant(name, self.names(hub)),
             )
         source = self._source()
-        if isinstance(source, str):
-            raise ScriptError(f"'{name}' is text, not a number")
         per_point = PER_POINT & getattr(source, "names", frozenset())
         if per_point:
             raise ScriptError(
@@ -66,12 +49,12 @@ class Quantity:
             )
 
     @classmethod
-    def from_script(cls, hub: Scene, argument: Argument, words: bool = False) -> Quantity:
+    def from_script(cls, hub: Scene, argument: Argument) -> Quantity:
         """Read the quantity that a script's argument means; errors mark the argument."""
         text = argument.text.strip().strip('"')
         try:
-            if text in cls.names(hub) or (words and text == LIMIT):
-                return cls(hub, text, words=words)
+            if text in cls.names(hub) or (cls.words and text == LIMIT):
+                return cls(hub, text)
             return cls(hub, text, argument.value(hub))
         except ScriptError as error:
             if error.place is None:
@@ -79,9 +62,8 @@ class Quantity:
             if error.message == f"unknown name '{text}'":
                 error.expected = "one of " + ", ".join(dict.fromkeys(cls.names(hub)))
                 if not (error.hint or "").startswith("did you mean"):
-                    error.hint = (
-                        table()["energies"].get(text) or meant(text, KEYWORDS) or error.hint
-                    )
+                    energy = table()["energies"].get(text)
+                    error.hint = energy or meant(text, KEYWORDS) or error.hint
                 if text in hub.fields.particle_names():
                     error.hint = (
                         f"{text} differs from point to point: dump(...) writes it, and "
@@ -115,8 +97,6 @@ class Quantity:
 
     def _number(self) -> float | int:
         source = self._source()
-        if isinstance(source, str):
-            raise ScriptError(f"'{self.name}' is text, not a number")
         if hasattr(source, "evaluate"):
             return float(source.evaluate(self.hub.values))
         return source
@@ -126,23 +106,24 @@ class Quantity:
 
         Looked up each time, as the script may set a variable anew between two runs.
         """
-        if self.formula is not None:
-            return self.formula
-        if self.name in KEYWORDS:
-            return getattr(self.hub.update, self.name)
         variables = _variables(self.hub)
-        if self.name in variables:
-            return variables[self.name]
-        return float(self.hub.values.get(self.name))
+        if self.formula is not None:
+            source = self.formula
+        elif self.name in KEYWORDS:
+            return getattr(self.hub.update, self.name)
+        elif self.name in variables:
+            source = variables[self.name]
+        else:
+            return float(self.hub.values.get(self.name))
+        if isinstance(source, str):
+            raise ScriptError(f"'{self.name}' is text, not a number")
+        return source
 
 
 class Logged(Quantity):
-    """For signatures: a quantity, or the word ``limit``."""
+    """A quantity, or the word ``limit``."""
 
-    @classmethod
-    def from_script(cls, hub: Scene, argument: Argument) -> Quantity:
-        """See `Quantity.from_script`."""
-        return Quantity.from_script(hub, argument, words=True)
+    words = True
 
 
 def _variables(hub: Scene) -> dict[str, Any]:

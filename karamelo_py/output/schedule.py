@@ -4,27 +4,17 @@ import os
 import re
 from contextlib import nullcontext
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from karamelo_py.language.faults import as_script_error
 from karamelo_py.language.scene import Scene
 from karamelo_py.output.log import Log
 from karamelo_py.output.plots import Plots
-from karamelo_py.output.rhythm import ByTime, is_due, next_step
+from karamelo_py.output.rhythm import ByTime, Rhythmic, is_due, next_step
 from karamelo_py.output.units import Units
 from karamelo_py.script.errors import ScriptError
 
 RESTART = "restart"
-
-
-class Periodic(Protocol):
-    """Something written again and again; `last_step` is the step it last wrote."""
-
-    every: int | ByTime
-    last_step: int | None
-
-    def write(self) -> None:
-        """Write the state now."""
 
 
 class Output:
@@ -33,9 +23,6 @@ class Output:
     Each of them is due at the first and the last state of every run and at the multiples of its
     `every`, counted in absolute steps or time, so that a further run goes on in the same rhythm.
     No state is written twice to the same file. In a rehearsal nothing is written.
-
-    A run calls ``begin``, then again and again ``next_step`` and ``write``, then ``end``;
-    ``abort`` stands in for ``end`` when the run breaks off.
     """
 
     def __init__(self, hub: Scene):
@@ -46,7 +33,7 @@ class Output:
         # False where a program keeps the log and no file is asked for.
         self.writes = True
         # Written after all others, which then have nothing to write of the same state.
-        self.last: list[Periodic] = []
+        self.last: list[Rhythmic] = []
         # Who writes to a file.
         self.files: dict[Path, str] = {}
 
@@ -56,13 +43,7 @@ class Output:
         return self.writes or not self.hub.settings.comm.leads
 
     def check_file(self, file: Path) -> None:
-        """Refuse to write to `file` if that is the log or a script, or cannot be done.
-
-        Raises
-        ------
-        ScriptError
-            With the argument ``file``.
-        """
+        """Refuse to write to `file` if that is the log or a script, or cannot be done."""
         path = self.hub.folder / file
         scripts = getattr(self.hub.interpreter, "files", ())
         if _may_be(path, self.log.path):
@@ -78,13 +59,7 @@ class Output:
         raise ScriptError(what, argument="file", expected="the name of another file")
 
     def claim(self, file: Path, writer: str) -> None:
-        """Keep `file` for one writer, such as a dump; only restart files may be written again.
-
-        Raises
-        ------
-        ScriptError
-            With the argument ``file`` if it is another one's.
-        """
+        """Keep `file` for one writer, such as a dump; only restart files may be written again."""
         other = self.files.get(file)
         if other is not None and not other == writer == RESTART:
             raise ScriptError(
@@ -98,7 +73,7 @@ class Output:
         """Write the headers and the first state of a run; not that of one gone on `within`."""
         if self.hub.rehearsing:
             return
-        if self.plots.file is not None and not len(self.plots):
+        if self.plots.file is not None and not self.plots:
             self.hub.warn(
                 f"{self.plots.file} will not be drawn: there is nothing to plot",
                 place=self.plots.place,
@@ -126,17 +101,11 @@ class Output:
             for i in self._items()
             if i.last_step != step and (last or is_due(i.every, step, time))
         ]
-        if any(item is self.log or item in self.plots for item in due):
+        if any(item is self.log or item in self.plots.values() for item in due):
             # Computes and energy fixes only work when somebody looks.
             self.hub.refresh_values()
         for item in due:
-            try:
-                self._do(item, "write")
-            except ScriptError as error:
-                raise _located(error, item) from error.__cause__
-            except OSError as error:
-                what = f"cannot write {error.filename or 'a file'}: {error.strerror or error}"
-                raise _located(ScriptError(what), item) from error
+            self._do(item, "write")
             item.last_step = step
             if isinstance(item.every, ByTime):
                 item.every.passed = item.every.now(time)
@@ -155,20 +124,19 @@ class Output:
         if last:
             self.write(last=True)
         for item in self._to_finish():
-            self._finish(item)
+            self._do(item, "finish")
 
     def abort(self) -> None:
         """Draw the plots, complete dumps and close the log of a run that breaks off.
 
-        No further state is written: a caller that holds a sound one calls ``write(last=True)``
-        before. What prevents them is told as a warning, as another error is on its way.
+        No further state is written. What prevents them is told as a warning.
         """
         if self.hub.rehearsing:
             return
         try:
             for item in self._to_finish():
                 try:
-                    self._finish(item)
+                    self._do(item, "finish")
                 except ScriptError as error:
                     self.hub.console.warn(error.render())
         finally:
@@ -177,31 +145,29 @@ class Output:
     def _to_finish(self) -> list:
         return [self.plots, *self.hub.dumps.values()] if self.writes else []
 
-    def _finish(self, item: Any) -> None:
-        try:
-            self._do(item, "finish")
-        except ScriptError as error:
-            raise _located(error, item) from error.__cause__
-
     def _do(self, item: Any, what: str) -> None:
-        """Write or finish; exceptions of a dump say where they come from."""
+        """Write or finish; errors have the place of the command that asked for it."""
         style = getattr(item, "style", "")
         if not self.hub.settings.comm.leads:
             what = "take_part" if hasattr(item, "take_part") else what
         place = getattr(item, "place", None)
         naming = as_script_error(f"dump {style}", what, type(item), place)
-        with naming if style else nullcontext():
-            getattr(item, what)()
+        try:
+            with naming if style else nullcontext():
+                getattr(item, what)()
+        except ScriptError as error:
+            raise _located(error, place) from error.__cause__
+        except OSError as error:
+            said = f"cannot write {error.filename or 'a file'}: {error.strerror or error}"
+            raise _located(ScriptError(said), place) from error
 
-    def _items(self) -> list[Periodic]:
+    def _items(self) -> list[Rhythmic]:
         if not self.takes_part:
-            return [self.log, *self.plots]
-        return [self.log, *self.hub.dumps.values(), *self.plots, *self.last]
+            return [self.log, *self.plots.values()]
+        return [self.log, *self.hub.dumps.values(), *self.plots.values(), *self.last]
 
 
-def _located(error: ScriptError, item: Any) -> ScriptError:
-    """Make the error of an output, with the place of the command that asked for it."""
-    place = getattr(item, "place", None)
+def _located(error: ScriptError, place: Any) -> ScriptError:
     if error.place is None and place is not None:
         error.place = place
         error.complete = True

@@ -13,33 +13,17 @@ from karamelo_py.script.errors import ScriptError
 
 
 class Snapshot(NamedTuple):
-    """The points at one moment.
-
-    Attributes
-    ----------
-    step, time
-        When; NaN where the file does not say.
-    columns
-        (n,) arrays by name, with x, y and z among them.
-    lo, hi
-        (3,) corners of the domain, or around the points where the file does not say.
-    """
+    """The points at one moment."""
 
     step: int
-    time: float
-    columns: dict[str, np.ndarray]
-    lo: np.ndarray
+    time: float  # NaN where the file does not say
+    columns: dict[str, np.ndarray]  # (n,) by name, with x, y and z among them
+    lo: np.ndarray  # (3,) corners of the domain, or around the points where the file does not say
     hi: np.ndarray
 
 
 def read(path: Path) -> Iterator[Snapshot]:
-    """Read the snapshots in a file, in their order.
-
-    Raises
-    ------
-    ScriptError
-        If the file cannot be read, or is no dump.
-    """
+    """Read the snapshots in a file, in their order; an error where it is no dump."""
     readers = {".h5": _hdf5, ".hdf5": _hdf5, ".vtu": _vtu, ".pvd": _pvd}
     reader = readers.get(path.suffix, _lammps)
     try:

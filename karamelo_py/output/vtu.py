@@ -64,14 +64,9 @@ class Column:
 
 
 class Vtu:
-    """A file of points with columns, and of cells between them.
+    """A file of points with columns of these `names`, and of cells between them.
 
-    Parameters
-    ----------
-    names
-        Of the columns.
-    folder
-        Where there is room for as much as the file takes.
+    In the `folder` there is room for as much as the file takes.
     """
 
     def __init__(self, names: Iterable[str], folder: Path):

@@ -12,13 +12,12 @@ from karamelo_py.compiler import fields
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.threads import Serial, Threaded, new_team
 from karamelo_py.kernels.arrays import DT, TIME, TIMESTEP, some_of
-from karamelo_py.kernels.clock import step_size
-from karamelo_py.kernels.conduction import show_heat
+from karamelo_py.kernels.clock import all_well, step_size
+from karamelo_py.kernels.heat import show_heat
 from karamelo_py.kernels.nodes import SumsToVelocity
 from karamelo_py.kernels.p2g import Force
-from karamelo_py.kernels.reports import all_well
-from karamelo_py.kernels.rows import SUMS
 from karamelo_py.kernels.sweep import Visit, sweep, sweep_nodes
+from karamelo_py.kernels.table import SUMS
 from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.plastic_rate import without_rate
 from karamelo_py.run.access.nodes_by_number import ByNumber
@@ -121,7 +120,7 @@ class SceneArrays(ById, ByNumber):
     def state(self) -> State:
         """All that a new lowering takes over."""
         if self.subdomain is not None:
-            self.subdomain.share_contact()
+            self.subdomain.share_memory()
         laws = {}
         for block in self.setup.blocks:
             state = block.points.state
@@ -130,6 +129,7 @@ class SceneArrays(ById, ByNumber):
                 rows[:, ids] = own
             laws[without_rate(law_kind(block.laws))] = rows
         kept = [kind for kind in self.point_fields if fields.is_kept(kind)]
+        nodes = self.setup.nodes.fields
         return State(
             self.count,
             self.present,
@@ -137,6 +137,8 @@ class SceneArrays(ById, ByNumber):
             self.by_id(lambda points: points.v),
             laws,
             {kind: self.declared(kind).T for kind in kept},
+            self.setup.grids,
+            {type(one): one.array for one in nodes if fields.is_kept(type(one))},
             self.setup.contact,
             float(self.control.clock[0].last_dt),
             float(self.control.clock[0].path),
@@ -238,6 +240,8 @@ class SceneArrays(ById, ByNumber):
 
         The copies of the snapshot `before`, which is lost, are used again where they fit.
         """
+        if self.subdomain is not None:
+            self.subdomain.share_kept()
         found = checkpoint.copied(self, before or {})
         return found if self.subdomain is None else found | {"owner": self.tiles.owner}
 
@@ -252,6 +256,7 @@ class SceneArrays(ById, ByNumber):
         """Yield what a file to go on from holds, array by array."""
         if self.subdomain is None:
             return checkpoint.stored(self)
+        self.subdomain.share_kept()
         return part_state.stored(self)
 
     def stored_snapshot(self, snapshot: dict[str, np.ndarray]) -> Iterator[checkpoint.Stored]:

@@ -7,7 +7,7 @@ corners and the middle; where it is not plane, the box is taken in halves, up to
 
 import itertools
 import math
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,45 +27,18 @@ SLOPE = 1e-3  # over the largest: one that is less is none (sums would lose thei
 
 
 class Pieces(NamedTuple):
-    """Clipped boxes: the parts in a region of boxes through which its surface passes.
+    """Clipped boxes: the parts in a region of boxes through which its surface passes."""
 
-    Attributes
-    ----------
-    number : ndarray (n,)
-        Numbers of the boxes, in order.
-    middle : ndarray (n, d)
-        Middles of what is left of them.
-    share : ndarray (n,)
-        How much that is, of a whole box.
-    rough : ndarray (m,)
-        Where the surface is not plane in parts too small to be halved again: how much they are, of
-        each box that has some.
-    """
-
-    number: np.ndarray
-    middle: np.ndarray
-    share: np.ndarray
+    number: np.ndarray  # (n,) of the boxes, in order
+    middle: np.ndarray  # (n, d) of what is left of them
+    share: np.ndarray  # (n,) how much that is, of a whole box
+    # (m,) of each box where the surface is not plane in parts too small to be halved again: these.
     rough: np.ndarray
-
-    @classmethod
-    def all_of(cls, pieces: list["Pieces"]) -> "Pieces":
-        """Several as one."""
-        return cls(*map(np.concatenate, zip(*pieces, strict=True)))
 
     def missed(self, size: float) -> float:
         """Return the least thickness whose mass is known; 0 where nothing is as thin."""
         mostly = self.rough.sum() > MOSTLY * self.share.sum()
         return size / 2**HALVED if mostly or self.rough.max(initial=0) > ROUGH else 0.0
-
-
-class CellBoxes(Protocol):
-    """Boxes in rows, numbered."""
-
-    def beside(self, number: np.ndarray, step: np.ndarray) -> np.ndarray:
-        """Numbers (n,) of those so many boxes (n, d) further along each axis; -1 for none."""
-
-    def middles(self, number: np.ndarray) -> np.ndarray:
-        """Their middles, (n, d)."""
 
 
 def clip(region: Region, x: np.ndarray, size: float, first: int) -> tuple[np.ndarray, Pieces]:
@@ -98,9 +71,10 @@ def clip(region: Region, x: np.ndarray, size: float, first: int) -> tuple[np.nda
     return kept, Pieces(first + edge[left], middle[left], share[left], rough)
 
 
-def join(region: Region, boxes: CellBoxes, pieces: Pieces) -> Pieces:
+def join(region: Region, boxes: Any, pieces: Pieces) -> Pieces:
     """Give what is little to the nearest piece that is not, if one is in a box beside it.
 
+    `boxes` are `Filled`, of which each place is the middle of a box.
     What has been given away has the share 0; whole boxes that took something are added.
     """
     small = np.flatnonzero(pieces.share < LEAST)

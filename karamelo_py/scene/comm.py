@@ -11,32 +11,24 @@ class SerialComm:
     """One process that has the whole scene, with the methods of several.
 
     All processes carry out the same statements of Python, and call these methods together.
-
-    Attributes
-    ----------
-    rank, size
-        The number of this process, from 0, and how many there are.
-    beside
-        How many of them have the same cores as this one, itself among them.
-    on_machine
-        How many of them share the memory of its machine.
-    waited
-        Seconds in which this process waited for others, or for what they sent, in steps.
-    failed_within
-        Whether this process has failed in the midst of what all do together.
-    at_end
-        Whether all processes have come to the same end of a run that does not go on.
     """
 
     rank, size = 0, 1
-    beside = on_machine = 1
-    waited = 0.0
-    failed_within = at_end = False
+    beside = 1  # so many have the same cores as this one, itself among them
+    on_machine = 1  # so many share the memory of its machine
+    waited = 0.0  # seconds, for others or for what they sent, in steps
+    failed_within = False  # in the midst of what all do together
+    at_end = False  # all have come to the same end of a run that does not go on
 
     @property
     def leads(self) -> bool:
         """Tell whether this is the first process, which writes."""
         return self.rank == 0
+
+    @property
+    def share_here(self) -> float:
+        """Part of the scene that is on this machine."""
+        return self.on_machine / self.size
 
     @contextmanager
     def joint(self) -> Iterator[None]:
@@ -56,15 +48,7 @@ class SerialComm:
         self.at_end = True
 
     def agree(self, word: int, patience: float = np.inf) -> np.ndarray | None:
-        """Gather a word of each process (size,), or None if one has not come in time.
-
-        Parameters
-        ----------
-        word
-            Of this process.
-        patience
-            Seconds that it waits for the others.
-        """
+        """Gather a word of each (size,), or None if one has not come in `patience` seconds."""
         return np.array([word])
 
     def bcast(self, thing: Any = None) -> Any:

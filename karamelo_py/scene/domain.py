@@ -4,12 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from karamelo_py.language.own_words import words_of
 from karamelo_py.language.scene import Scene
-from karamelo_py.scene.lattice import CHUNK, RELATIVE_TOLERANCE, Lattice
+from karamelo_py.language.unknown import words_of
+from karamelo_py.scene.lattice import RELATIVE_TOLERANCE, Lattice
 from karamelo_py.script.errors import Place, ScriptError
-
-__all__ = ["CHUNK", "Domain", "require_domain", "require_grid"]
 
 
 class Domain:
@@ -18,55 +16,25 @@ class Domain:
     The grid covers the whole box; when a side is not a multiple of `h` it reaches over the upper
     corner by less than one cell.
 
-    Parameters
-    ----------
-    dimension
-        1, 2 or 3.
-    lo, hi
-        Corners, one number per dimension.
-    h
-        Cell size; None leaves the grid to the first solid (the older language).
-
-    Attributes
-    ----------
-    lo, hi : ndarray (3,)
-        Corners; 0 in unused directions.
-    shape : tuple of 3 int
-        Nodes per direction, 1 in unused directions.
-    cells : tuple of 3 int
-        Cells per direction, 1 in unused directions.
-    axisymmetric : bool
-        Whether x is a radius and y the axis.
-    place : Place or None
-        Where a script makes it.
+    Corners `lo` and `hi` (3,) are 0 in unused directions. Without a cell size `h` the grid is left
+    to the first solid (the older language).
     """
 
-    axisymmetric = False
+    axisymmetric = False  # x is a radius and y the axis
     place: Place | None = None
 
     def __init__(self, dimension: int, lo: Sequence[float], hi: Sequence[float], h: float | None):
         self.dimension = dimension
-        self.lo = np.zeros(3)
-        self.hi = np.zeros(3)
-        self.lo[:dimension] = lo
-        self.hi[:dimension] = hi
+        self.lo, self.hi = np.zeros((2, 3))
+        self.lo[:dimension], self.hi[:dimension] = lo, hi
         self.h: float | None = None
-        self.shape: tuple[int, int, int] = (1, 1, 1)
-        self.cells: tuple[int, int, int] = (1, 1, 1)
         if h is not None:
             self.set_cell_size(h)
 
     def set_cell_size(self, h: float) -> None:
-        """Lay the grid.
-
-        Raises
-        ------
-        ScriptError
-            When there would be more nodes than can be counted.
-        """
-        lattice = Lattice(self.dimension, self.lo, self.hi, h)
-        self.h = lattice.h
-        self.cells, self.shape = lattice.cells, lattice.shape
+        """Lay the grid; an error where there would be more nodes than can be counted."""
+        self.lattice = Lattice(self.dimension, self.lo, self.hi, h)
+        self.h = self.lattice.h
 
     @property
     def tolerance(self) -> float:
@@ -76,11 +44,10 @@ class Domain:
 
     def contains(self, x: np.ndarray) -> np.ndarray:
         """Test which positions `x` (n, >= dimension) lie in the closed box: (n,) bool."""
-        tolerance = self.tolerance
         inside = np.ones(len(x), dtype=bool)
         for axis in range(self.dimension):
-            inside &= x[:, axis] >= self.lo[axis] - tolerance
-            inside &= x[:, axis] <= self.hi[axis] + tolerance
+            inside &= x[:, axis] >= self.lo[axis] - self.tolerance
+            inside &= x[:, axis] <= self.hi[axis] + self.tolerance
         return inside
 
 
@@ -103,16 +70,9 @@ def _around(hub: Scene, dimension: int) -> str | None:
 
 
 def require_domain(hub: Scene) -> Domain:
-    """The domain of the scene.
-
-    Raises
-    ------
-    ScriptError
-        When there is none yet.
-    """
+    """Return the domain of the scene; an error where there is none yet."""
     if hub.domain is None:
-        announced = getattr(hub, "announced_dimension", None)
-        if announced:
+        if announced := getattr(hub, "announced_dimension", None):
             ends = [f"{axis}{end}" for axis in "xyz"[:announced] for end in ("min", "max")]
             raise ScriptError(
                 f"the domain has no size yet: dimension({announced}) only says how many "
@@ -130,13 +90,7 @@ def require_domain(hub: Scene) -> Domain:
 
 
 def require_grid(hub: Scene) -> Domain:
-    """The domain of the scene with its grid.
-
-    Raises
-    ------
-    ScriptError
-        When there is no domain, or no cell size yet.
-    """
+    """Return the domain of the scene; an error where it has no grid yet."""
     domain = require_domain(hub)
     if domain.h is None:
         raise ScriptError(

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
-from karamelo_py.scene.domain import CHUNK, require_grid
-from karamelo_py.scene.lattice import Lattice
+from karamelo_py.scene.domain import require_grid
+from karamelo_py.scene.lattice import CHUNK, Lattice
 from karamelo_py.scene.region import Region, look_up
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import Place, ScriptError
@@ -19,12 +19,12 @@ NOTHING_THERE = "what acts on this group does nothing there"
 
 
 class Group:
-    """Base of point groups and node groups.
+    """Base of point groups and node groups. That of `all` also takes in what is made later.
 
-    Attributes
-    ----------
-    all : bool
-        Whether this is the group of everything, which also takes in what is made later.
+    Both have ``total()``, the number of points or nodes that there are; ``chosen()``, the members
+    of others than the group of all; and ``add(region, solids)``, which adds what lies in a region
+    and belongs to some solids (None: to any), and returns how many were found. Of a region that is
+    not known yet nothing is found.
     """
 
     kind = ""
@@ -43,28 +43,11 @@ class Group:
     @property
     def members(self) -> np.ndarray:
         """Numbers (from 0) of the members, ascending: (n,) int64."""
-        if self.all:
-            return np.arange(self.total(), dtype=np.int64)
-        return self.chosen()
+        return np.arange(self.total(), dtype=np.int64) if self.all else self.chosen()
 
-    def total(self) -> int:
-        """Number of points or nodes that there are."""
-        raise NotImplementedError
-
-    def chosen(self) -> np.ndarray:
-        """Members of a group that is not the group of everything."""
-        raise NotImplementedError
-
-    def find(self, region: Region, solids: Sequence[Solid] | None) -> np.ndarray:
-        """Numbers, ascending, of what lies in `region` and belongs to `solids`: (n,) int64.
-
-        Without `solids`, to any. Of a region that is not known yet nothing is found.
-        """
-        raise NotImplementedError
-
-    def add(self, region: Region, solids: Sequence[Solid] | None) -> int:
-        """Add what lies in `region`, see `find`; returns how many were found."""
-        raise NotImplementedError
+    total: Callable[[], int]
+    chosen: Callable[[], np.ndarray]
+    add: Callable[[Region, Sequence[Solid] | None], int]
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> Group:
@@ -100,17 +83,14 @@ class ParticleGroup(Group):
     def __len__(self) -> int:
         return sum(map(len, self.pieces()))
 
-    @property
-    def ids(self) -> np.ndarray:
-        """Point numbers (id - 1), ascending: (n,) int64."""
-        return self.members
+    ids = Group.members  # id - 1 of the points
 
     def total(self) -> int:
         """Number of points of all solids."""
         return sum(solid.count for solid in self.hub.solids.values())
 
     def chosen(self) -> np.ndarray:
-        """See `Group.chosen`."""
+        """Members of a group that is not that of all."""
         return np.concatenate([np.empty(0, np.int64), *self.pieces()])
 
     def pieces(self) -> Iterator[np.ndarray]:
@@ -140,7 +120,7 @@ class ParticleGroup(Group):
         return found
 
     def add(self, region: Region, solids: Sequence[Solid] | None) -> int:
-        """See `Group.add`."""
+        """Add what lies in a region, see `Group`."""
         return self._take(self._found(region, solids))
 
     def _take(self, pieces: Iterable[np.ndarray]) -> int:
@@ -155,10 +135,6 @@ class ParticleGroup(Group):
                 count += len(ids)
         self._bits = bits
         return count
-
-    def find(self, region: Region, solids: Sequence[Solid] | None) -> np.ndarray:
-        """Points of `solids` whose reference position lies in `region`."""
-        return np.concatenate([np.empty(0, np.int64), *self._found(region, solids)])
 
     def _found(self, region: Region, solids: Sequence[Solid] | None) -> Iterator[np.ndarray]:
         if region.unknown:
@@ -177,38 +153,23 @@ def _numbers_of(solid: Solid) -> Iterator[np.ndarray]:
         yield np.arange(first, min(first + CHUNK, end))
 
 
-def united(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """The numbers in one or the other of two ascending arrays, each once, ascending."""
-    if not len(a) or not len(b):
-        return a if len(a) else b  # millions would be sorted for nothing
-    return np.union1d(a, b)
-
-
 class NodeGroup(Group):
     """A set of nodes, by their positions. Methods decide whether solids share them.
 
     The group is what was said of it, not a list of numbers: solids and methods that come later may
     bring grids of their own, and what lies in the region there belongs to it, too.
-
-    Attributes
-    ----------
-    awaits_solids : bool
-        Whether solids that are made later may bring the first members.
     """
 
     kind = "nodes"
     script_kind = "a group of nodes, or all"
-    awaits_solids = False
+    awaits_solids = False  # those that are made later may bring the first members
 
     def __init__(self, hub: Scene, *, everything: bool = False):
         super().__init__(hub, everything=everything)
         self._parts: tuple[tuple[Region, Sequence[Solid] | None], ...] = ()
         self._found: tuple[list[Lattice], np.ndarray] | None = None
 
-    @property
-    def nodes(self) -> np.ndarray:
-        """Node numbers, ascending: (n,) int64."""
-        return self.members
+    nodes = Group.members
 
     def total(self) -> int:
         """Number of nodes of all grids."""
@@ -216,22 +177,22 @@ class NodeGroup(Group):
         return sum(lattice.node_count for lattice in self.hub.lattices)
 
     def chosen(self) -> np.ndarray:
-        """See `Group.chosen`; looked for again where there are other grids than before."""
+        """Members of a group that is not that of all; looked for anew where grids are others."""
         lattices = self.hub.lattices
         if self._found is None or self._found[0] is not lattices:
-            members = np.empty(0, dtype=np.int64)
-            for part in self._parts:
-                members = united(members, self.find(*part))
-            self._found = lattices, members
+            found = [numbers for part in self._parts if len(numbers := self._find(*part))]
+            # Each is ascending: millions would be sorted for nothing.
+            members = [np.unique(np.concatenate(found))] if len(found) > 1 else found
+            self._found = lattices, (members or [np.empty(0, np.int64)])[0]
         return self._found[1]
 
     def add(self, region: Region, solids: Sequence[Solid] | None) -> int:
-        """See `Group.add`."""
+        """Add what lies in a region, see `Group`."""
         self._parts = (*self._parts, (region, solids))
         self._found = None
-        return len(self.find(region, solids))
+        return len(self._find(region, solids))
 
-    def find(self, region: Region, solids: Sequence[Solid] | None) -> np.ndarray:
+    def _find(self, region: Region, solids: Sequence[Solid] | None) -> np.ndarray:
         """Nodes in `region`; where solids have nodes of their own, those of `solids`."""
         if region.unknown:
             return np.empty(0, dtype=np.int64)

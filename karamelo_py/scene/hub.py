@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from karamelo_py.language import registry
 from karamelo_py.language.faults import as_script_error
@@ -15,7 +15,7 @@ from karamelo_py.output.schedule import Output
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.lattice import Lattice
 from karamelo_py.scene.plugins import attributed
-from karamelo_py.scene.update import Update
+from karamelo_py.schemes.musl import MUSL
 from karamelo_py.script.errors import Place, ScriptError, meant, render_message
 from karamelo_py.script.values import Values
 
@@ -32,8 +32,7 @@ class Catalogue(dict):
         """File `item` under `ID`; a second use of an ID is an error unless `replace`."""
         if not replace:
             self.refuse(ID)
-        item.id = ID
-        item.place = self.hub.place
+        item.id, item.place = ID, self.hub.place
         self[ID] = item
         return item
 
@@ -55,7 +54,8 @@ class Catalogue(dict):
         below = line_below(self.hub.interpreter, self.kind, ID)
         hint = meant(ID, [*always, *self])
         if self.kind == "group" and other in ("region", "solid"):
-            hint = _group_of(other, ID)
+            who = f"{ID}, all" if other == "region" else f"regionID, solid, {ID}"
+            hint = f"group({ID}, particles, region, {who}) makes a group of a {other}"
         if below is not None:
             hint = f"{self.kind} '{ID}' stands further down: move line {below} up"
         raise ScriptError(
@@ -84,12 +84,6 @@ class Parts(dict):
 PARTS = ("eos", "strength", "damage", "temperature")
 
 
-def _group_of(kind: str, ID: str) -> str:
-    """Word the hint that makes a group of a region or a solid."""
-    who = f"{ID}, all" if kind == "region" else f"regionID, solid, {ID}"
-    return f"group({ID}, particles, region, {who}) makes a group of a {kind}"
-
-
 class Settings:
     """Settings of the command line or the script: threads, precision, processes."""
 
@@ -103,68 +97,99 @@ class Settings:
         self.trusts = False  # .geo files, which may run programs
 
 
-class Hub:
-    """The scene, how it goes forward, and what it writes.
+class Update:
+    """Choices of method, scheme, set_dt and dt_factor, and the clock."""
 
-    Attributes
-    ----------
-    domain
-        The domain, or None before ``dimension``.
-    regions, load_paths, elements, solids, groups, fixes, computes, dumps
-        Catalogues of what the script has named.
-    materials
-        The same: materials.
-    parts
-        The catalogues of the parts that some materials are made of, by their kind.
-    values
-        Numbers that fixes and computes publish, and time, timestep, dt.
-    place
-        Place of the statement in progress.
-    functions
-        Functions in Python that a program has given, by name.
-    pausing
-        Whether a script stops in front of its runs: a program lets time go on.
-    running
-        The run in progress, or None.
-    runs
-        The published values at the end of each run so far.
-    begun
-        Whether a run has begun, in fact or in the rehearsal of what follows it.
-    later
-        What the runs ask for that a rehearsal came to (`run.large_steps.Step`).
-    restart
-        What the script goes on from, until it is where that was written.
-    open_ended
-        Whether a program may go on behind the script.
-    in_runs
-        What acts, is written or drawn in some run, as far as a rehearsal came to them.
-    rehearsing
-        True while the rest of a script is tried before the first step: nothing runs or is written.
-    answered
-        Whether the script has printed or written something by itself, or said where it ends.
-    checking
-        True under ``karamelo-py check``: the first run only reports.
-    """
+    remembers = ("warned_of_bounces", "warned_of")
+
+    def __init__(self, values: Values):
+        self.values = values
+        self.method: Any = None
+        self.transfer: Any = None  # a NamedTuple: PIC, FLIP, APIC ...
+        self.scheme: Any = MUSL()
+        self.scheme_place: Place | None = None  # in the script, as of the others below
+        self.thermal = False  # heat flows between points
+        self.anti_locking = False  # changes of volume are averaged against volumetric locking
+        self.fixed_dt: float | None = None  # of set_dt; None: the step follows the fastest point
+        self.dt_factor: float | None = None  # share of the stable step; None: the program chooses
+        self.dt_place: Place | None = None
+        self.boundary = "error"  # or delete or reflect, for points that reach the edge
+        self.boundary_place: Place | None = None
+        self.warned_of_bounces = False  # the user knows that points were reflected
+        self.warned_of: list[str] = []  # names of failures that the user knows of
+        self.moving: tuple[list[Any], float] = ([], 0.0)  # fixes of the last run, and since when
+
+    def first_time(self, name: str) -> bool:
+        """Note that the user is warned of something; False where that was so before."""
+        first = name not in self.warned_of
+        self.warned_of += [name] * first
+        return first
+
+    @property
+    def words(self) -> str:
+        """Method, transfer, basis and scheme, as a script calls them."""
+        words = [
+            registry.name_of("method", type(self.method)),
+            _with_numbers(registry.name_of("transfer", type(self.transfer)), self.transfer),
+            _with_numbers(self.method.basis_name, self.method.basis),
+            _with_numbers(registry.name_of("scheme", type(self.scheme)), self.scheme),
+        ]
+        return " ".join([*words, *(["thermo-mechanical"] if self.thermal else [])])
+
+    @property
+    def step(self) -> int:
+        """Number of steps taken."""
+        return int(self.values.get("timestep"))
+
+    @property
+    def time(self) -> float:
+        """Present time."""
+        return self.values.get("time")
+
+    @property
+    def dt(self) -> float:
+        """The next step."""
+        return self.values.get("dt")
+
+    def transfer_tag(self, real: type) -> Any:
+        """The transfer with its numbers in the precision of the run."""
+        numbers = (real(x) if isinstance(x, float) else x for x in self.transfer)
+        return type(self.transfer)(*numbers)
+
+
+def _with_numbers(name: str, tag: NamedTuple) -> str:
+    """``FLIP (alpha 0.99)``."""
+    numbers = ", ".join(
+        f"{key} {value:g}" if isinstance(value, (int, float)) else f"{key} {value}"
+        for key, value in tag._asdict().items()
+    )
+    return name + (f" ({numbers})" if numbers else "")
+
+
+class Hub:
+    """The scene, how it goes forward, and what it writes."""
 
     def __init__(self, console: Console | None = None):
         self.console = console or Console()
         self.settings = Settings()
         self.folder = Path.cwd()
-        self.place: Place | None = None
+        self.place: Place | None = None  # of the statement in progress
+        # While the rest of a script is tried before the first step nothing runs or is written.
         self.rehearsing = False
         self.rehearsed = False
-        self.begun = False
-        self.answered = False
-        self.checking = False
-        self.pausing = False
-        self.open_ended = False
+        self.begun = False  # a run, in fact or in the rehearsal of what follows it
+        self.answered = False  # the script has printed or written something, or said where it ends
+        self.checking = False  # under ``karamelo-py check``: the first run only reports
+        self.pausing = False  # a script stops in front of its runs: a program lets time go on
+        self.open_ended = False  # a program may go on behind the script
+        # What acts, is written or drawn in some run, as far as a rehearsal came to them.
         self.in_runs: list[Any] = []
         self.interpreter: Any = None
-        self.restart: Any = None
+        self.restart: Any = None  # what the script goes on from, until it is there
         self.domain: Any = None
         self.announced_dimension: int | None = None
         self.regions = Catalogue("region", self)
-        self.parts = Parts(self)
+        self.parts = Parts(self)  # that some materials are made of
         self.materials = Catalogue("material", self)
         self.load_paths = Catalogue("load path", self)
         self.elements = Catalogue("element", self)
@@ -173,14 +198,14 @@ class Hub:
         self.fixes = Catalogue("fix", self)
         self.computes = Catalogue("compute", self)
         self.dumps = Catalogue("dump", self)
-        self.values = Values()
+        self.values = Values()  # that fixes and computes publish, and time, timestep, dt
         self.update = Update(self.values)
         self.output = Output(self)
         self.fields = Fields(self)
-        self.functions: dict[str, Any] = {}
-        self.running: Any = None
-        self.runs: list[dict[str, float]] = []
-        self.later: list[Any] = []
+        self.functions: dict[str, Any] = {}  # in Python, that a program has given
+        self.running: Any = None  # the run in progress
+        self.runs: list[dict[str, float]] = []  # published values at the end of each so far
+        self.later: list[Any] = []  # `run.advice.large_steps`, of runs that a rehearsal came to
         self._simulation: Any = None
         self._lattices: tuple[tuple, list[Lattice]] | None = None
 
@@ -213,11 +238,7 @@ class Hub:
         domain, method = self.domain, self.update.method
         key = (domain, domain.h, method, *self.solids.values())
         if self._lattices is None or self._lattices[0] != key:
-            if method is None:
-                lattices = [Lattice(domain.dimension, domain.lo, domain.hi, domain.h)]
-            else:
-                lattices = method.lattices(self)
-            self._lattices = key, lattices
+            self._lattices = key, method.lattices(self) if method else [domain.lattice]
         return self._lattices[1]
 
     def forget_simulation(self) -> None:
@@ -258,7 +279,7 @@ class Hub:
 
     def lasting(self) -> list[Any]:
         """List the parts that act in runs: fixes, dumps and curves."""
-        return [*self.fixes.values(), *self.dumps.values(), *self.output.plots]
+        return [*self.fixes.values(), *self.dumps.values(), *self.output.plots.values()]
 
     def _tell_of_late(self, rehearsed: Hub) -> None:
         """Warn of what the script has only behind its last run."""
@@ -291,8 +312,7 @@ class Hub:
         other.output = Output(other)
         other.output.files = dict(self.output.files)
         other.output.log.file = self.output.log.file
-        for curve in self.output.plots:
-            other.output.plots.add(curve.id, curve)
+        other.output.plots.update(self.output.plots)
         other.output.plots.file = self.output.plots.file
         other.fields = Fields(other)
         return other

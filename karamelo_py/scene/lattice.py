@@ -23,30 +23,10 @@ class Lattice:
     When a side of the box is not a multiple of `h`, it reaches over the upper corner by less than
     one cell.
 
-    Parameters
-    ----------
-    dimension
-        1, 2 or 3.
-    lo, hi
-        Corners of the box; only the first `dimension` numbers count.
-    h
-        Cell size.
-    nodes_per_cell
-        1, or 2 with nodes in the middle of cells too.
-    least_nodes
-        Nodes per direction that there are at least; those beyond the box stay without mass.
-    first
-        Number of the first node.
-
-    Attributes
-    ----------
-    cells, shape : tuple of 3 int
-        Cells and nodes per direction, 1 in unused directions.
-
-    Raises
-    ------
-    ScriptError
-        When there would be more nodes than can be counted.
+    Cells have the size `h`, and `nodes_per_cell` 1, or 2 with nodes in their middle, too. Nodes are
+    numbered from `first` on. There are at least `least_nodes` per direction, of which those beyond
+    the box stay without mass. `cells` and `shape` (3,) count cells and nodes, 1 in unused
+    directions. More nodes than can be counted are an error.
     """
 
     def __init__(
@@ -57,19 +37,17 @@ class Lattice:
         h: float,
         nodes_per_cell: int = 1,
         least_nodes: int = 2,
-        first: int = 0,
     ):
         self.dimension = dimension
         self.lo, self.hi = np.zeros((2, 3))
-        self.lo[:dimension] = lo[:dimension]
-        self.hi[:dimension] = hi[:dimension]
+        self.lo[:dimension], self.hi[:dimension] = lo[:dimension], hi[:dimension]
         self.h = float(h)
         self.nodes_per_cell = nodes_per_cell
-        self.first = first
+        self.first = 0  # number of the first node, see `numbered`
         lengths = (self.hi - self.lo)[:dimension]
         cells = [max(1, math.ceil(length / h - RELATIVE_TOLERANCE)) for length in lengths]
         nodes = [max(n * nodes_per_cell + 1, least_nodes) for n in cells]
-        if first + math.prod(nodes) > MAX_NODES:
+        if math.prod(nodes) > MAX_NODES:
             raise ScriptError(
                 f"cell size {h:g} gives a grid of {math.prod(nodes):.3g} nodes",
                 argument="h",
@@ -104,42 +82,31 @@ class Lattice:
 
         `lo` and `hi` (3,) may be infinite. Nodes come in the order of their numbers.
         """
-        first, last = [], []
-        for axis in range(self.dimension):
-            top = self.shape[axis] - 1
-            below = (lo[axis] - self.lo[axis]) / self.spacing - 1e-6
-            above = (hi[axis] - self.lo[axis]) / self.spacing + 1e-6
-            first.append(math.ceil(min(max(below, 0), top + 1)))
-            last.append(math.floor(min(max(above, -1), top)))
+        used = slice(self.dimension)
+        corner, shape = self.lo[used], self.shape[used]
+        below = (lo[used] - corner) / self.spacing - 1e-6
+        above = (hi[used] - corner) / self.spacing + 1e-6
+        first = np.ceil(np.clip(below, 0, shape)).astype(int).tolist()
+        last = np.floor(np.clip(above, -1, np.array(shape) - 1)).astype(int).tolist()
         if any(a > b for a, b in zip(first, last, strict=True)):
             return
-        _, *trailing = self.shape[: self.dimension]
         for index in boxes(first, last, 1):
-            number = index[:, 0].copy()
-            for axis, count in enumerate(trailing, start=1):
-                number *= count
-                number += index[:, axis]
-            yield number + self.first, self.lo[: self.dimension] + index * self.spacing
+            number = np.ravel_multi_index(tuple(index.T), shape)
+            yield number + self.first, corner + index * self.spacing
 
     def numbers(self, real: type) -> Grid:
         """The lattice as kernels read it, in the precision `real`."""
         size = (self.hi - self.lo) / self.h
         reach = float(np.abs([self.lo, self.hi]).max()) / self.h
         _, ny, nz = self.shape
+        slack = max(RELATIVE_TOLERANCE, 8 * np.finfo(real).eps * reach)
+        lengths = *self.lo, self.h, 1 / self.h, self.spacing
         return Grid(
-            *(real(x) for x in self.lo),
-            h=real(self.h),
-            inv_h=real(1 / self.h),
-            spacing=real(self.spacing),
-            nx=int(self.cells[0]),
-            ny=int(self.cells[1]),
-            nz=int(self.cells[2]),
-            lx=real(size[0]),
-            ly=real(size[1]),
-            lz=real(size[2]),
-            slack=real(max(RELATIVE_TOLERANCE, 8 * np.finfo(real).eps * reach)),
-            step_x=int(ny * nz),
-            step_y=int(nz),
+            *map(real, lengths),
+            *self.cells,
+            *map(real, (*size, slack)),
+            step_x=ny * nz,
+            step_y=nz,
             first=self.first,
         )
 
@@ -184,9 +151,4 @@ def chunks(first: Sequence[int], last: Sequence[int], weight: int) -> list[tuple
 def positions(first: Sequence[int], last: Sequence[int], start: int, end: int) -> np.ndarray:
     """Those with the numbers from `start` to before `end`."""
     counts = [b - a + 1 for a, b in zip(first, last, strict=True)]
-    number = np.arange(start, end, dtype=np.int64)
-    index = np.empty((len(number), len(counts)), dtype=np.int64)
-    for axis in range(len(counts) - 1, -1, -1):
-        number, index[:, axis] = np.divmod(number, counts[axis])
-        index[:, axis] += first[axis]
-    return index
+    return np.stack(np.unravel_index(np.arange(start, end), counts), axis=1) + first

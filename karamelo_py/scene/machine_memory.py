@@ -1,6 +1,7 @@
 """Memory of this machine, and of a job on it."""
 
 import warnings
+from contextlib import suppress
 from math import inf
 from pathlib import Path
 from typing import NamedTuple
@@ -41,14 +42,8 @@ def machine_memory(processes: int = 1, root: Path = Path("/")) -> MachineMemory 
     """Count what can be had at most: free, or held by caches and swap; None where no one tells.
 
     The machine's, or less where the processes of a container or of a batch job have a limit
-    (cgroup, of either version), or each of its own (ulimit -v).
-
-    Parameters
-    ----------
-    processes
-        How many share the scene on this machine: so many limits of a process are there.
-    root
-        For tests.
+    (cgroup, of either version), or each of the `processes` that share the scene here its own
+    (ulimit -v). `root` is for tests.
     """
     import psutil
 
@@ -93,29 +88,16 @@ def _of_groups(root: Path, swap: MachineMemory) -> list[MachineMemory]:
 
 def _lines(path: Path) -> list[str]:
     """Read the lines of a file; none where there is no file."""
-    try:
+    with suppress(OSError):
         return path.read_text(encoding="utf-8").splitlines()
-    except OSError:
-        return []
+    return []
 
 
 def _number(path: Path) -> float | None:
     """Read the number in a file; None where there is no file, or no limit."""
-    try:
+    with suppress(OSError, ValueError):
         return float(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
-
-
-def on_machine(hub: Scene) -> int:
-    """Count the processes that share the scene on this machine."""
-    return hub.settings.comm.on_machine
-
-
-def share_of_machine(hub: Scene) -> float:
-    """Tell which part of a scene is on this machine, where several share it."""
-    comm = hub.settings.comm
-    return comm.on_machine / comm.size
+    return None
 
 
 def most_points(hub: Scene, already: int, dimension: int) -> float:
@@ -123,7 +105,7 @@ def most_points(hub: Scene, already: int, dimension: int) -> float:
 
     Two places, a velocity and a mass in single precision, and three numbers that are whole.
     """
-    of_one = 4 * (3 * dimension + 1) + 16
-    found = machine_memory(on_machine(hub))
+    of_one, comm = 4 * (3 * dimension + 1) + 16, hub.settings.comm
+    found = machine_memory(comm.on_machine)
     whole = inf if found is None else found.whole
-    return max(whole / share_of_machine(hub) / of_one - already, 0.0)
+    return max(whole / comm.share_here / of_one - already, 0.0)

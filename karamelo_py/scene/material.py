@@ -10,24 +10,9 @@ from karamelo_py.language.scene import Scene
 
 
 class MaterialPart:
-    """A part of a law, or a whole one, under a name.
+    """A part of a law, or a whole one, under a name: of a `kind`, such as ``eos``, and a `style`.
 
-    Parameters
-    ----------
-    kind
-        What it is: the family of its style, such as ``eos``.
-    style
-        The style that made it.
-    made
-        What that returned: the law, or laws by their kinds where it brings others with it.
-
-    Attributes
-    ----------
-    law
-        The NamedTuple of numbers; its class selects the point functions
-        (:mod:`karamelo_py.points.laws`).
-    laws
-        The same and what comes with it, by kind.
+    `made` is what the style returned: the law, or `laws` by kind where it brings others with it.
     """
 
     id: str = ""
@@ -40,7 +25,7 @@ class MaterialPart:
 
     @property
     def law(self) -> NamedTuple:
-        """The law itself."""
+        """The NamedTuple of numbers, whose class selects point functions (`points.laws`)."""
         return self.laws[self.kind]
 
 

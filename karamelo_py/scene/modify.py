@@ -1,25 +1,8 @@
 """Fixes and computes: what acts on a run and what measures it (LAMMPS's and Karamelo's Modify).
 
-A fix overrides the hooks it needs, by the names of Karamelo:
-
-=============================  =================================================================
-``initial_integrate``          before anything else in the step; gets :class:`PointsView`
-``post_particles_to_grid``     mass, momentum and force are on the nodes; :class:`NodesView`
-``post_update_grid_state``     v* is known; :class:`NodesView`
-``post_grid_to_point``         the points have their new velocity and place; :class:`PointsView`
-``post_advance_particles``     the same moment, after all ``post_grid_to_point``
-``post_velocities_to_grid``    the velocity that will deform the points; :class:`NodesView`
-``post_heat_to_grid``          the temperature of the nodes is known; :class:`NodesView` of heat
-``supply_heat``                points may get heat; :class:`PointsView` with ``heat_supply``
-``post_update_grid_heat``      the temperature after the step is known; :class:`NodesView` of heat
-``final_integrate``            the end of the step; :class:`PointsView`
-=============================  =================================================================
-
-The last three are those of thermo-mechanical methods. In a view of heat, ``velocity`` is the
-temperature, (n, 1), ``mass`` the heat capacity and ``force`` the heat flow.
-
-A hook is either a method, called with a view of the group (Python comes back at that stage of each
-step), or the result of :func:`node_hook` or :func:`point_hook`, which is compiled into the loop.
+A fix overrides the hooks it needs, by the names of Karamelo: the page on plug-ins lists them. Each
+is either a method, called with a view of the group (Python comes back at that stage of each step),
+or the result of :func:`node_hook` or :func:`point_hook`, which is compiled into the loop.
 """
 
 from collections.abc import Callable
@@ -40,68 +23,36 @@ __all__ = ["Compute", "Fix", "NodesView", "PointsView", "heat_hook", "node_hook"
 
 
 class Fix:
-    """Base of all fixes: acts on its `group` during a run.
+    """Base of all fixes: acts on its `group` during a run. Attributes say what else it is."""
 
-    Attributes
-    ----------
-    group
-        The node or particle group it acts on.
-    formulas
-        One formula (or None) for each component, for compiled hooks.
-    published
-        Suffixes of the values it sets: "x" for ``ID_x`` and the like, "" for ``ID``; "x", "y", "z",
-        "s" and "" when a style does not say.
-    first_step_only
-        Whether it acts in the first step after its definition and is idle thereafter.
-    point_by_point
-        Whether its hooks in Python look at each point or node on its own, and move none. Then they
-        see, in any order, the points that are at hand: those of one of several processes, and
-        before the first step some after others. For sums over all there is ``total``.
-    for_method
-        Whether it has no hooks because the method reads it.
-    prescribes_velocity
-        Whether it prescribes velocities of the nodes of its group in ``post_update_grid_state``,
-        in the directions in which it has a formula: contact does not move them.
-    wall_friction
-        Formula of the coefficient of friction along the wall that a fix makes which prescribes
-        velocities, in the directions in which it has no formula; None for walls without.
-    point_fields
-        The fields of points that it declares (:mod:`karamelo_py.compiler.fields`); `Force` if it
-        sets forces on points in ``initial_integrate``.
-    leads_points
-        Whether it leads points against their forces, by work that no sum at nodes knows.
-    accelerates
-        Whether its formulas are forces per mass, as of weight.
-    conserves
-        Whether its hooks in Python bring no energy: what they do to points and nodes stores it,
-        passes it on or takes it away. Otherwise the energy of the scene is not watched.
-    acts_last
-        Whether it acts after all others at each moment, wherever the script has it.
-    friction
-        Coefficient of friction between its two `solids`, for methods with contact on the grid; None
-        for fixes that say nothing about that.
-    solids
-        The solids it acts between, of fixes that have no group.
-    id
-        Its ID in the script.
-    """
-
-    group: Any = None
-    formulas: tuple = ()
+    group: Any = None  # of nodes or points
+    formulas: tuple = ()  # one, or None, for each component, of compiled hooks
+    # Suffixes of the values it sets: "x" for ``ID_x`` and the like, "" for ``ID``.
     published: tuple[str, ...] = SUFFIXES
-    first_step_only = False
+    first_step_only = False  # acts in the first step after its definition and is idle thereafter
+    # Its hooks in Python look at each point or node on its own, and move none. Then they see, in
+    # any order, the points that are at hand: those of one of several processes, and before the
+    # first step some after others. For sums over all there is ``total``.
     point_by_point = False
-    for_method = False
+    for_method = False  # has no hooks because the method reads it
+    # Prescribes velocities of the nodes of its group in ``post_update_grid_state``, in the
+    # directions in which it has a formula: contact does not move them.
     prescribes_velocity = False
+    # Formula of the coefficient of friction along the wall that it makes by such velocities, in the
+    # directions in which it has no formula; None for walls without.
     wall_friction: Any = None
+    # Fields that it declares (`compiler.fields`): `Force` if it sets forces on points in
+    # ``initial_integrate``.
     point_fields: tuple[type, ...] = ()
     node_fields: tuple[type, ...] = ()
-    leads_points = False
-    accelerates = False
-    acts_last = False
+    leads_points = False  # against their forces, by work that no sum at nodes knows
+    accelerates = False  # its formulas are forces per mass, as of weight
+    acts_last = False  # after all others at each moment, wherever the script has it
+    # Its hooks in Python bring no energy: what they do to points and nodes stores it, passes it on
+    # or takes it away. Otherwise the energy of the scene is not watched.
     conserves = False
-    friction: float | None = None
-    solids: tuple = ()
+    friction: float | None = None  # between its two `solids`, for methods with contact on the grid
+    solids: tuple = ()  # that it acts between, without a group
     id: str = ""
     style: str = ""
     place: Place | None = None

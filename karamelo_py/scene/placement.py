@@ -21,37 +21,17 @@ _MAX_COUNTED = 20_000_000
 
 
 class Placement(NamedTuple):
-    """Points and their initial domains. What is the same for all may be given once.
+    """Points and their initial domains. What is the same for all may be given once."""
 
-    Attributes
-    ----------
-    x0 : ndarray (n, d), or Filled
-        Positions.
-    volume : float or ndarray (n,)
-        Volumes; per unit thickness in 2D, per unit area in 1D, without the radius.
-    half_size : ndarray (d,) or (n, d)
-        Half edge lengths of the initial domains.
-    lo, hi : ndarray (d,)
-        The box of the solid.
-    outside : float
-        How many more points would lie outside the domain, inf for an unknown number.
-    shape : str
-        ``box``, or the cell type that meshio uses.
-    corners : ndarray (n, c, d) or None
-        Corners of the initial domains that are no boxes.
-    missed : float
-        Parts of the region thinner than that may be missing, see `Pieces.missed`.
-    """
-
-    x0: Any  # np.ndarray or Filled
-    volume: float | np.ndarray
-    half_size: np.ndarray
-    lo: np.ndarray
+    x0: Any  # (n, d) positions, an array or Filled
+    volume: float | np.ndarray  # (n,), per unit thickness in 2D, area in 1D, without the radius
+    half_size: np.ndarray  # (n, d) half edge lengths of the initial domains
+    lo: np.ndarray  # (d,) corners of the box of the solid
     hi: np.ndarray
-    outside: float = 0
-    shape: str = "box"
-    corners: np.ndarray | None = None
-    missed: float = 0
+    outside: float = 0  # so many points more would lie outside the domain, inf where not known
+    shape: str = "box"  # or the cell type that meshio uses: line, triangle, quad, tetra, hexahedron
+    corners: np.ndarray | None = None  # (n, c, d) of initial domains that are no boxes
+    missed: float = 0  # parts of the region thinner than that may be missing, see `Pieces.missed`
 
 
 class Filled:
@@ -76,11 +56,8 @@ class Filled:
         self._number = np.empty((self._ppc,) * len(corner), np.int64)
         self._number[tuple(self._subs.T)] = np.arange(len(places))
 
-    def candidates(self, k: int) -> np.ndarray:
-        """All places (m, d) in the k-th chunk of cells."""
-        return self._in_cells(*self.chunks[k])
-
-    def _in_cells(self, begin: int, end: int) -> np.ndarray:
+    def candidates(self, begin: int, end: int) -> np.ndarray:
+        """All places (m, d) in the cells with numbers from `begin` to before `end`."""
         index = positions(*self._cells, begin, end)
         centre = self._corner + (index + 0.5) * self._h
         return (centre[:, None, :] + self._places).reshape(-1, len(self._corner))
@@ -96,9 +73,8 @@ class Filled:
 
         Places stand at equal distances. They are numbered through all cells.
         """
-        cell, place = np.divmod(number, len(self._places))
-        index = np.array(np.unravel_index(cell, self._counts)).T * self._ppc + self._subs[place]
-        index += step
+        cell, place = self._cell_and_place(number)
+        index = cell * self._ppc + self._subs[place] + step
         counts = np.array(self._counts)
         none = ((index < 0) | (index >= counts * self._ppc)).any(axis=1)
         cell, place = np.divmod(np.where(none[:, None], 0, index), self._ppc)
@@ -107,9 +83,12 @@ class Filled:
 
     def middles(self, number: np.ndarray) -> np.ndarray:
         """Return the positions of places with these numbers, (n, d)."""
+        cell, place = self._cell_and_place(number)
+        return self._corner + (cell + self._cells[0] + 0.5) * self._h + self._places[place]
+
+    def _cell_and_place(self, number: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         cell, place = np.divmod(number, len(self._places))
-        index = np.array(np.unravel_index(cell, self._counts)).T + np.array(self._cells[0])
-        return self._corner + (index + 0.5) * self._h + self._places[place]
+        return np.array(np.unravel_index(cell, self._counts)).T, place
 
     def move(self, rows: np.ndarray, x: np.ndarray) -> None:
         """Put points with the numbers `rows`, in order, to other places (n, d)."""
@@ -141,23 +120,8 @@ class Filled:
         else:
             found = np.flatnonzero(np.unpackbits(bits))[low:high]
         begin, end = int(found[0]) // m, int(found[-1]) // m + 1
-        x = self._in_cells(start + begin, start + end)
+        x = self.candidates(start + begin, start + end)
         return x[low - begin * m : high - begin * m] if bits is None else x[found - begin * m]
-
-
-class CellPattern(NamedTuple):
-    """The points of one cell of size 1.
-
-    Attributes
-    ----------
-    places : ndarray (m, d)
-        Measured from the centre of the cell.
-    sizes : ndarray (m, d) or (d,)
-        Edge lengths of the domains of the points, whose product is the volume.
-    """
-
-    places: np.ndarray
-    sizes: np.ndarray
 
 
 def lattice_of(region: Region, domain: Domain, h: float, *, own: bool) -> Lattice:
@@ -177,14 +141,9 @@ def lattice_of(region: Region, domain: Domain, h: float, *, own: bool) -> Lattic
 def offsets(ppc: int, rule: str | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Places of `ppc` points along a cell of size 1, from its centre, and their lengths: (ppc,).
 
-    Parameters
-    ----------
-    ppc
-        Number of points.
-    rule
-        ``regular``, ``cut``: equally spaced. ``gauss``: the points and weights of Gauss and
-        Legendre. None: as Karamelo does, equally spaced, but for 3, which stand at the Gauss points
-        in the digits that Karamelo writes, with equal lengths.
+    By the rules ``regular`` and ``cut`` they are equally spaced; those of ``gauss`` are the points
+    and weights of Gauss and Legendre. Without a rule they are as in Karamelo: equally spaced, but 3
+    stand at the Gauss points in the digits that Karamelo writes, with equal lengths.
     """
     if rule == "gauss":
         places, weights = np.polynomial.legendre.leggauss(ppc)
@@ -195,13 +154,15 @@ def offsets(ppc: int, rule: str | None = None) -> tuple[np.ndarray, np.ndarray]:
     return (np.arange(ppc) + 0.5) / ppc - 0.5, lengths
 
 
-def cell_pattern(ppc: int, dimension: int, rule: str | None = None) -> CellPattern:
-    """The `ppc`^dimension points of a cell, see `offsets`.
+def cell_pattern(
+    ppc: int, dimension: int, rule: str | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """The `ppc`^dimension points of a cell of size 1, see `offsets`: places and sizes, (m, d).
 
-    In Karamelo's order: x before y; in 3D the lowest z first.
+    In Karamelo's order: x before y; in 3D the lowest z first. Sizes that are the same are (d,).
     """
     places, lengths = (_in_order(along, dimension) for along in offsets(ppc, rule))
-    return CellPattern(places, lengths if rule == "gauss" else lengths[0])
+    return places, lengths if rule == "gauss" else lengths[0]
 
 
 def _in_order(along: np.ndarray, dimension: int) -> np.ndarray:
@@ -221,13 +182,9 @@ def fill(
     """The points of `lattice` that fill `region` within the domain.
 
     Cells are counted from the lower corner of the lattice, x outermost, then y, then z. Only cells
-    that the box around the region reaches are looked at, a bounded number at a time.
-
-    Raises
-    ------
-    ScriptError
-        When there would be more points than can be numbered, or than memory has `room` for, which
-        is asked where there may be many.
+    that the box around the region reaches are looked at, a bounded number at a time. More points
+    than can be numbered, or than memory has `room` for (asked where there may be many), are an
+    error.
     """
     dimension, h = domain.dimension, lattice.h
     used = slice(0, dimension)
@@ -263,16 +220,15 @@ def fill(
     if not counted:
         first, last = inner_first, inner_last
 
-    pattern = cell_pattern(ppc, dimension, rule)
-    even = pattern.sizes.ndim == 1
-    places = pattern.places * h
+    places, sizes = (of_unit * h for of_unit in cell_pattern(ppc, dimension, rule))
+    even = sizes.ndim == 1
     x0 = Filled([int(i) for i in first], [int(i) for i in last], corner, h, places)
     numbers: list[np.ndarray] = []  # which point of the pattern each one is
     left: list[tuple[np.ndarray, Pieces]] = []
     outside = 0.0
     most = room() if inner > FEW else math.inf
-    for k, (begin, _) in enumerate(x0.chunks):
-        x = x0.candidates(k)
+    for begin, end in x0.chunks:
+        x = x0.candidates(begin, end)
         if rule == "cut":
             left.append(clip(region, x, h / ppc, begin * len(places)))
         if rule == "cut" and not counted:
@@ -300,7 +256,7 @@ def fill(
         return _cut_off(placed, region, h / ppc, left)
     if even:
         return placed
-    sizes = pattern.sizes[np.concatenate(numbers)] * h if numbers else np.empty((0, dimension))
+    sizes = sizes[np.concatenate(numbers)] if numbers else np.empty((0, dimension))
     return placed._replace(volume=sizes.prod(axis=1), half_size=sizes / 2)
 
 
@@ -309,7 +265,8 @@ def _cut_off(
 ) -> Placement:
     """With what is left at the edge of the region in place of whole boxes, see `cut`."""
     x0, d = placed.x0, region.dimension
-    pieces = join(region, x0, Pieces.all_of([piece for _, piece in left]))
+    pieces = Pieces(*map(np.concatenate, zip(*(piece for _, piece in left), strict=True)))
+    pieces = join(region, x0, pieces)
     begin, rows = 0, []
     for kept, _ in left:
         some = slice(*np.searchsorted(pieces.number, [begin, begin + len(kept)]))

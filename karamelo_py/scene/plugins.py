@@ -17,7 +17,8 @@ from karamelo_py.kernels import table
 from karamelo_py.kernels.hooks import ACTS_ON, STAGES, CompiledHook
 from karamelo_py.language import faults, registry
 from karamelo_py.language.scene import Scene
-from karamelo_py.output.fields import ABSENT_AT_POINTS, PARTICLE_NAMES
+from karamelo_py.output import node_columns, point_table
+from karamelo_py.output.point_table import declared_columns
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import KINEMATICS
 from karamelo_py.points.transfers import updated_velocity
@@ -34,6 +35,7 @@ ROWS = (
     table.AtPoints, table.AtNodes, table.Gather, table.Scatter, table.NodeTask, table.SceneTask,
     table.Check,
 )  # fmt: skip
+COLUMNS = {"point_fields": point_table.COLUMNS, "node_fields": node_columns.COLUMNS}
 HOOKS_BEGIN = ("initial_", "post_", "final_", "supply_")
 ALIKE = 0.85  # so much of a name has to be that of a hook
 
@@ -161,12 +163,10 @@ def check_fields(hub: Scene, name: str, owner: Any, place: Any) -> None:
                 what = _wrong_field(kind) or _wrong_size(kind, hub.domain)
             if what:
                 raise faults.fault(name, f"{field}{what}", place)
-    for kind in getattr(owner, "point_fields", ()):
-        for column in columns_of(kind):
-            if shows := _shows(hub, column, kind):
-                raise faults.fault(
-                    name, f"{kind.__name__}: the column '{column}' is {shows}", place
-                )
+            for column in columns_of(kind):
+                if shows := _shows(hub, column, kind, attribute):
+                    what = f"{kind.__name__}: the column '{column}' is {shows}"
+                    raise faults.fault(name, what, place)
 
 
 def check_columns(hub: Scene, name: str, law: Any) -> None:
@@ -201,14 +201,14 @@ def _wrong_size(kind: type, domain: Any) -> str:
     return ""
 
 
-def _shows(hub: Scene, column: str, kind: type | None) -> str:
+def _shows(hub: Scene, column: str, kind: type | None, where: str = "point_fields") -> str:
     """Say what a column shows already, if that is not this field (None: a law)."""
-    if column in PARTICLE_NAMES and column not in ABSENT_AT_POINTS:
+    if COLUMNS[where].get(column) is not None:
         return "one of every scene"
-    if kind is not None and column in hub.fields.columns_of_laws():
+    if kind is not None and where == "point_fields" and column in hub.fields.columns_of_laws():
         return "one of a material"
-    other = hub.fields.declared_columns().get(column, (kind, 0))[0]
-    return "" if other is kind else f"one of the field {other.__name__}"
+    other = declared_columns(hub, where).get(column, (kind, 0))[0]
+    return "" if other in (None, kind) else f"one of the field {other.__name__}"
 
 
 def _shown(kind: Any) -> str:

@@ -20,28 +20,12 @@ HALVINGS = 12  # of the way on which a surface is looked for
 class Region:
     """Base of the region styles: override `contains`.
 
-    Parameters
-    ----------
-    hub
-        The scene. Its domain must exist.
-    lo, hi
-        Corners of a box around the shape, one number per dimension; infinite where it is open.
-    exterior
-        Whether the region is what lies outside the shape.
-    parts
-        The regions it is made of, if any.
-
-    Attributes
-    ----------
-    unknown : bool
-        Whether its place depends on results that a rehearsal does not have (NaN).
-    axis : tuple or None
-        Direction (0, 1, 2) and centre of the axis that a region in space is round about at the
-        same `radius` all along; None of others.
-    box_lo, box_hi : ndarray (3,)
-        Box around the region, infinite where it is open; 0 in unused directions.
+    `lo` and `hi` are corners of a box around the shape, one number per dimension, infinite where it
+    is open. An `exterior` region is what lies outside; `parts` are regions that it is made of.
     """
 
+    # Direction (0, 1, 2) and centre of the axis that a region in space is round about at the same
+    # `radius` all along.
     axis: tuple | None = None
     id: str = ""
     place: Place | None = None
@@ -58,18 +42,14 @@ class Region:
         self.hub = hub
         self.domain = require_domain(hub)
         self.exterior = exterior
-        dimension = self.domain.dimension
+        self.dimension = dimension = self.domain.dimension
         self.parts = tuple(parts)
+        # Its place depends on results that a rehearsal does not have.
         self.unknown: bool = bool(np.isnan([*lo, *hi]).any()) or any(p.unknown for p in self.parts)
-        self.box_lo = np.zeros(3)
-        self.box_hi = np.zeros(3)
+        # A box around it, infinite where it is open; 0 in unused directions.
+        self.box_lo, self.box_hi = np.zeros((2, 3))
         self.box_lo[:dimension] = -np.inf if exterior else lo
         self.box_hi[:dimension] = np.inf if exterior else hi
-
-    @property
-    def dimension(self) -> int:
-        """Dimension of the domain."""
-        return self.domain.dimension
 
     @property
     def tolerance(self) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -12,7 +12,8 @@ from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
 from karamelo_py.points.laws import can, law_kind, specific_volume
 from karamelo_py.points.laws.temperatures import initial_heat
-from karamelo_py.scene.domain import CHUNK, Domain, require_domain
+from karamelo_py.scene.domain import Domain, require_domain
+from karamelo_py.scene.lattice import CHUNK
 from karamelo_py.scene.material import Material
 from karamelo_py.scene.placement import MAX_POINTS, Placement
 from karamelo_py.scene.region import look_up
@@ -24,48 +25,14 @@ _SAMPLE = 5000
 class Solid:
     """Base of the styles of solid: a body of points. A style calls `put` with its points.
 
-    Parameters
-    ----------
-    hub
-        The scene. Its domain must exist.
-    material
-        What the points are made of.
-    h
-        Cell size. With a grid shared by all solids it must be that of the domain; a method with
-        the attribute ``own_grids`` lays a grid of its own for each solid.
-    T0
-        Initial temperature; None for that of the material.
-    glued_to
-        The solid with which this one shares a velocity field, in methods that have several.
-
-    Attributes
-    ----------
-    index : int
-        0 for the first solid made, and so on.
-    first_id : int
-        Number (from 0) of its first point; point ids are these numbers plus 1.
-    places : ndarray (n, d), or Filled
-        Reference positions; of a slice of points they are made where they are not kept.
-    volume0 : ndarray (n,)
-        Initial volumes: per unit thickness in 2D, per unit area in 1D, per radian where the domain
-        is axisymmetric. Read only, as is all that follows.
-    mass : ndarray (n,)
-        Masses, per the same unit.
-    half_size : ndarray (n, d)
-        Half edge lengths of the initial domain of each point along the axes.
-    corners : ndarray (n, c, d) or None
-        Corners of the initial domains in the order of the nodes of an element, for solids from a
-        mesh; None where the domains are boxes.
-    shape : str
-        ``box``, or as meshio says: ``line``, ``triangle``, ``quad``, ``tetra``, ``hexahedron``.
-    lo, hi : ndarray (d,)
-        Box of the solid.
+    Where all solids share a grid the cell size `h` is that of the domain; a method with the
+    attribute ``own_grids`` lays a grid for each. Without an initial temperature `T0` the material
+    says it. With the solid that it is `glued_to` it shares a velocity field in methods of several.
     """
 
     id: str = ""
     place: Place | None = None
-    # The argument that says where the points are, for messages.
-    source = "region"
+    source = "region"  # the argument that says where the points are, for messages
 
     def __init__(
         self,
@@ -90,10 +57,11 @@ class Solid:
             )
         self._compare_temperatures(hub)
         self.index = len(hub.solids)
+        # From 0; ids of points are such numbers plus 1.
         self.first_id = sum(other.count for other in hub.solids.values())
 
     def _compare_temperatures(self, hub: Scene) -> None:
-        """Tell of a temperature that the material does not have, or that nobody gives."""
+        """Tell of a temperature that the material cannot have, or that nobody gives."""
         # Scripts of Karamelo give T0 in mechanical runs, too.
         if hub.update.thermal and self.T0 and not can(self.material.law, initial_heat):
             hub.warn(
@@ -101,8 +69,19 @@ class Solid:
                 hint="material(ID, linear, rho, E, nu, cp, kappa), or temperature(...) with "
                 "eos-strength",
             )
-        if can(self.material.law, initial_heat) and self.T0 is not None:
-            self._judge_temperature(hub, self.T0)
+        T0 = self.T0 if can(self.material.law, initial_heat) else None
+        Tm = min((getattr(part, "Tm", math.inf) for part in self.material.law), default=math.inf)
+        if T0 is not None and T0 < 0:
+            hub.warn(
+                f"T0 = {T0:g} is below absolute zero, unless it is counted from another point",
+                hint="temperatures in kelvin throughout: T0, Tr, Tm",
+            )
+        elif T0 is not None and Tm <= T0:
+            hub.warn(
+                f"T0 = {T0:g} is not below the melting temperature {Tm:g}: "
+                "the solid has no strength from the start",
+                hint="all temperatures counted from the same point",
+            )
         kinds = law_kind(self.material.law)
         if self.T0 is None and any("initial_temperature" in kind._fields for kind in kinds):
             hub.warn(
@@ -110,29 +89,8 @@ class Solid:
                 hint="give T0 behind the cell size",
             )
 
-    def _judge_temperature(self, hub: Scene, T0: float) -> None:
-        """Tell of a temperature at which the material does not exist."""
-        Tm = min((getattr(part, "Tm", math.inf) for part in self.material.law), default=math.inf)
-        if T0 < 0:
-            hub.warn(
-                f"T0 = {T0:g} is below absolute zero, unless it is counted from another point",
-                hint="temperatures in kelvin throughout: T0, Tr, Tm",
-            )
-        elif Tm <= T0:
-            hub.warn(
-                f"T0 = {T0:g} is not below the melting temperature {Tm:g}: "
-                "the solid has no strength from the start",
-                hint="all temperatures counted from the same point",
-            )
-
     def put(self, hub: Scene, placement: Placement, *, may_be_empty: bool = False) -> None:
-        """Give the solid its points, in place of those that it has.
-
-        Raises
-        ------
-        ScriptError
-            For none, for too many, or for points left of the axis of symmetry.
-        """
+        """Give the solid its points; none, too many, or some left of the axis are an error."""
         count, d = len(placement.x0), self.domain.dimension
         if not count and not may_be_empty:
             raise ScriptError(
@@ -146,9 +104,16 @@ class Solid:
         volume = np.asarray(placement.volume, float)
         if self.domain.axisymmetric:
             radius = placement.x0[:][:, 0]
-            self._check_radii(radius)
+            if count and radius.min() <= 0:  # a point on the axis itself would have no mass
+                raise ScriptError(
+                    f"points at x = {radius.min():g}: in an axisymmetric domain x is the radius, "
+                    "and points lie at x > 0",
+                    argument=self.source,
+                    expected=f"a {self.described().split()[0]} at x >= 0",
+                )
             volume = volume * radius
-        # Equal volumes are stored once, however many points there are.
+        # As in `Placement`, but volumes are per radian where the domain is axisymmetric. Equal ones
+        # are stored once, however many points there are. All is to be read only.
         self.places = placement.x0
         self.volume0 = np.broadcast_to(volume, (count,))
         self.mass = np.broadcast_to(volume / float(specific_volume(self.material.law)), (count,))
@@ -156,23 +121,16 @@ class Solid:
         self.shape, self.corners = placement.shape, placement.corners
         self.lo, self.hi = placement.lo, placement.hi
         if placement.outside:
+            uncounted = math.isinf(placement.outside)
+            points = "points" if uncounted else plural(placement.outside, "point")
             hub.warn(
-                f"{_counted(placement.outside)} of {self.described()} outside the domain "
-                "left out of the solid",
+                f"{points} of {self.described()} outside the domain left out of the solid",
                 hint=f"make the domain larger or the {self.described().split()[0]} smaller",
             )
 
-    def described(self) -> str:
-        """Describe the source of the points in words, such as ``region 'disk'``."""
-        raise NotImplementedError
-
-    def why_empty(self) -> str:
-        """Why there are no points, though none lies outside the domain."""
-        raise NotImplementedError
-
-    def wanted(self) -> str:
-        """Describe a source that would give points."""
-        raise NotImplementedError
+    described: Callable[[], str]  # the source of the points in words, such as ``region 'disk'``
+    why_empty: Callable[[], str]  # why there are no points, though none lies outside the domain
+    wanted: Callable[[], str]  # a source that would give points
 
     @property
     def count(self) -> int:
@@ -203,16 +161,6 @@ class Solid:
         """The solid that `argument` names."""
         return look_up(hub.solids, argument)
 
-    def _check_radii(self, radius: np.ndarray) -> None:
-        # A point on the axis itself would have no mass.
-        if len(radius) and radius.min() <= 0:
-            raise ScriptError(
-                f"points at x = {radius.min():g}: in an axisymmetric domain x is the radius, "
-                "and points lie at x > 0",
-                argument=self.source,
-                expected=f"a {self.described().split()[0]} at x >= 0",
-            )
-
 
 def solid_with(hub: Scene, number: int) -> Solid:
     """The solid that a point belongs to."""
@@ -226,8 +174,7 @@ def named(hub: Scene, number: int) -> str:
 
 def own_grids(hub: Scene) -> bool:
     """Return True if the method lays a grid of its own for each solid."""
-    method = hub.update.method
-    return method is not None and method.own_grids
+    return getattr(hub.update.method, "own_grids", False)
 
 
 def _cell_size(hub: Scene, domain: Domain, h: float) -> float:
@@ -262,8 +209,8 @@ def coinciding(a: Solid, b: Solid) -> bool:
     """Return True if points of `a` coincide with points of `b`; of many, a sample is tested."""
     if not a.count or not b.count:
         return False
-    (low, high), (other_low, other_high) = _box(a), _box(b)
-    lo, hi = np.maximum(low, other_low), np.minimum(high, other_high)
+    lows, highs = zip(_box(a), _box(b), strict=True)
+    lo, hi = np.maximum(*lows), np.minimum(*highs)
     if (lo > hi).any():
         return False
     of_a = np.concatenate([_within(x, lo, hi) for _, x in a.pieces()])
@@ -282,13 +229,7 @@ def _within(x: np.ndarray, lo: np.ndarray, hi: np.ndarray) -> np.ndarray:
 
 
 def _keys(x: np.ndarray, h: float) -> np.ndarray:
-    """A number (n,) for each position, equal for positions that differ by rounding only."""
+    """Number positions (n,), those alike that differ by rounding only."""
     places = np.rint(x * (1e4 / h)).astype(np.int64)
     # Primes keep places apart; the product may overflow, which only mixes the bits.
     return places @ np.array([1, 1_000_003, 998_244_353_001], np.int64)[: x.shape[1]]
-
-
-def _counted(outside: float) -> str:
-    if math.isinf(outside):
-        return "points"
-    return plural(outside, "point")

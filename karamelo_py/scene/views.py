@@ -4,6 +4,8 @@ A view hands out arrays with a row for each node or point of the group. What a h
 by assignment or in place, is written back when it returns; what cannot be changed is read-only.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
@@ -17,21 +19,138 @@ from karamelo_py.kernels.heat import Supply, Temperature
 from karamelo_py.kernels.hook_loop import corners_that_move
 from karamelo_py.kernels.laws import elastic_law
 from karamelo_py.kernels.p2g import Force
-from karamelo_py.output.point_table import Part, PointTable, Rows
+from karamelo_py.output.point_table import VECTORS, Part, PointTable, Rows
 from karamelo_py.points.laws import can, with_stress
 from karamelo_py.points.transfers import Moment
-from karamelo_py.scene.view import Shown, View
+from karamelo_py.script.errors import NoItem, nearest
+
+
+class Shown:
+    """A field of a view: how it is read and, unless it is read-only, written."""
+
+    def __init__(self, read: Callable):
+        self.read = read
+        self.write: Callable | None = None
+        self.__doc__ = read.__doc__
+
+    def writer(self, write: Callable) -> Callable:
+        """Decorate the function that writes the field."""
+        self.write = write
+        return write
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    def __get__(self, view: View | None, owner: type) -> Any:
+        if view is None:
+            return self
+        if self.name not in view._handed_out:
+            array = np.array(self.read(view))
+            array.flags.writeable = self.write is not None
+            view._handed_out[self.name] = array, array.copy() if self.write else array
+        return view._handed_out[self.name][0]
+
+    def __set__(self, view: View, value: Any) -> None:
+        if self.write is None:
+            raise AttributeError(f"{self.name} is read-only")
+        now = self.__get__(view, type(view))
+        value = np.asarray(value)
+        if value.ndim and value.shape != now.shape:
+            raise ValueError(f"{self.name} has the shape {now.shape}, not {value.shape}")
+        now[...] = value
+
+
+# Columns of dumps, and the arrays that hold them.
+_VECTORS = VECTORS | {f"{of}{axis}": ("force", k) for of in "fb" for k, axis in enumerate("xyz")}
+
+
+class View:
+    """A view whose fields are the only attributes, and take only what fits."""
+
+    _fields: tuple[str, ...] = ()
+
+    def __init__(self) -> None:
+        # By names of attributes, and classes of declared fields: arrays, and what was in them.
+        self._handed_out: dict[str | type, tuple[np.ndarray, np.ndarray]] = {}
+
+    def _take_times(self, control: Any) -> None:
+        self.dt = float(control.values[arrays.DT])
+        self.kick = float(control.clock[0].kick)
+        self.time = float(control.values[arrays.TIME])
+
+    def write_back(self) -> None:
+        """Write what a hook has changed; called when it returns."""
+        for key, (now, before) in self._handed_out.items():
+            if now is before or np.array_equal(now, before, equal_nan=True):
+                continue
+            if isinstance(key, str):
+                getattr(type(self), key).write(self, now)
+            else:
+                self._put(key, now)
+
+    _get: Callable[[type], np.ndarray]  # (n, components) of a declared field
+    _put: Callable[[type, np.ndarray], None]
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        known = name in self._fields or name.startswith("_")
+        if not known and not isinstance(getattr(type(self), name, None), Shown):
+            raise self._unknown(name)
+        object.__setattr__(self, name, value)
+
+    def __getattr__(self, name: str) -> Any:
+        raise self._unknown(name)
+
+    def __getitem__(self, kind: type) -> np.ndarray:
+        """(n, components) of a field that a part declares."""
+        if not isinstance(kind, type):
+            raise self._no_column(kind)
+        if kind not in self._handed_out:
+            array = np.array(self._get(kind))
+            self._handed_out[kind] = array, array.copy()
+        return self._handed_out[kind][0]
+
+    def __setitem__(self, kind: type, value: Any) -> None:
+        self[kind][...] = value
+
+    def _no_column(self, name: Any) -> KeyError:
+        """The error for a column in brackets, which says the attribute."""
+        kind = type(self).__name__
+        attribute, *k = _VECTORS.get(str(name), (str(name),))
+        if isinstance(getattr(type(self), attribute, None), Shown):
+            place = f"[:, {k[0]}]" if k else ""
+            return NoItem(f"{kind} has no ['{name}']: write .{attribute}{place}")
+        names = ", ".join(n for n in dir(type(self)) if isinstance(getattr(type(self), n), Shown))
+        return NoItem(f"{kind} has no ['{name}']; its attributes are {names}")
+
+    def _unknown(self, name: str) -> AttributeError:
+        names = [*self._fields, *(n for n in dir(type(self)) if not n.startswith("_"))]
+        close = nearest(name, names)
+        return AttributeError(
+            f"{type(self).__name__} has no {name}; "
+            + (f"did you mean {close}?" if close else f"it has {', '.join(sorted(names))}")
+        )
+
+
+NO_HEAT = "no heat flows: the method has to be thermo-mechanical"
+
+
+def _declared(kind: type, of: str, missing: str = "") -> Callable:
+    """Return what finds the array of a declared field in those of points or nodes."""
+
+    def find(found: Any) -> np.ndarray:
+        array = field(found.fields, kind)
+        if array is None:
+            what = f"{of}s have no {name_of(kind)}: name it in the {of}_fields of the fix"
+            raise ValueError(missing or what)
+        return array
+
+    return find
 
 
 class NodesView(View):
-    """The nodes of a group that carry mass, at one stage of a step::
+    """The nodes `index` (n,) of a group that carry mass, at one stage of a step.
 
-        nodes.force += nodes.mass[:, None] * self.gravity
-
-    Attributes
-    ----------
-    index : (n,) int
-        Node numbers.
+    A hook writes ``nodes.force += nodes.mass[:, None] * self.gravity``.
     """
 
     _fields = ("dt", "kick", "time", "index")
@@ -60,9 +179,18 @@ class NodesView(View):
         own = slice(None) if self._foreign is None else self._foreign[self.index] == 0
         return self._simulation.summed(terms[own])
 
-    def _part(self, array: np.ndarray, first: int) -> tuple:
-        """Return where in an array of the nodes a vector of those of the view lies."""
-        return self.index, slice(first, first + self._d)
+    def _vector(self, name: str, first: int = 0) -> np.ndarray:
+        """Return (n, d) components from `first` on of an array of the nodes."""
+        return getattr(self._nodes, name)[self.index, first : first + self._d]
+
+    def _put_vector(self, value: np.ndarray, name: str, first: int = 0) -> None:
+        getattr(self._nodes, name)[self.index, first : first + self._d] = value
+
+    def _get(self, kind: type) -> np.ndarray:
+        return _declared(kind, "node")(self._nodes)[self.index, : kind.shape(self._kin)]
+
+    def _put(self, kind: type, value: np.ndarray) -> None:
+        _declared(kind, "node")(self._nodes)[self.index, : kind.shape(self._kin)] = value
 
     @Shown
     def position(self) -> np.ndarray:
@@ -83,57 +211,47 @@ class NodesView(View):
     @Shown
     def force(self) -> np.ndarray:
         """(n, d) internal plus external force; set it in ``post_particles_to_grid``."""
-        return self._nodes.sums[self._at_force()]
+        return self._vector("sums", arrays.of_force(self._kin))
 
     @force.writer
     def _write_force(self, value: np.ndarray) -> None:
-        self._nodes.sums[self._at_force()] = value
-
-    def _at_force(self) -> tuple:
-        return self._part(self._nodes.sums, arrays.of_force(self._kin))
+        self._put_vector(value, "sums", arrays.of_force(self._kin))
 
     @Shown
     def velocity(self) -> np.ndarray:
         """(n, d) velocity: v before the momentum update, or the one that deforms the points."""
-        nodes = self._nodes
         if self._on_velocity:
-            return nodes.velocity[self._part(nodes.velocity, 0)]
+            return self._vector("velocity")
         if self._stage == arrays.POST_PARTICLES_TO_GRID:
-            momentum = nodes.sums[self._part(nodes.sums, arrays.of_momentum(self._kin))]
-            return momentum / nodes.sums[self.index, arrays.MASS][:, None]
-        change = nodes.update[self._part(nodes.update, arrays.of_change(self._kin))]
-        return nodes.update[self._part(nodes.update, 0)] - change
+            momentum = self._vector("sums", arrays.of_momentum(self._kin))
+            return momentum / self._nodes.sums[self.index, arrays.MASS][:, None]
+        return self._vector("update") - self._vector("update", arrays.of_change(self._kin))
 
     @velocity.writer
     def _write_velocity(self, value: np.ndarray) -> None:
-        nodes = self._nodes
         if self._on_velocity:
-            nodes.velocity[self._part(nodes.velocity, 0)] = value
+            self._put_vector(value, "velocity")
         elif self._stage in (arrays.POST_UPDATE_GRID_STATE, arrays.POST_UPDATE_GRID_HEAT):
-            star = nodes.update[self._part(nodes.update, 0)]
-            nodes.update[self._part(nodes.update, arrays.of_change(self._kin))] = star - value
+            change = self._vector("update") - value
+            self._put_vector(change, "update", arrays.of_change(self._kin))
         else:
-            mass = nodes.sums[self.index, arrays.MASS][:, None]
-            nodes.sums[self._part(nodes.sums, arrays.of_momentum(self._kin))] = mass * value
+            mass = self._nodes.sums[self.index, arrays.MASS][:, None]
+            self._put_vector(mass * value, "sums", arrays.of_momentum(self._kin))
 
     @Shown
     def velocity_update(self) -> np.ndarray:
         """(n, d) v*, the velocity after the momentum update (``post_update_grid_state``)."""
-        if self._on_velocity:
-            return self._nodes.velocity[self._part(self._nodes.velocity, 0)]
-        return self._nodes.update[self._part(self._nodes.update, 0)]
+        return self._vector("velocity" if self._on_velocity else "update")
 
     @velocity_update.writer
     def _write_velocity_update(self, value: np.ndarray) -> None:
-        nodes = self._nodes
         if self._on_velocity:
-            nodes.velocity[self._part(nodes.velocity, 0)] = value
+            self._put_vector(value, "velocity")
             return
-        star = self._part(nodes.update, 0)
-        change = self._part(nodes.update, arrays.of_change(self._kin))
-        old = nodes.update[star] - nodes.update[change]
-        nodes.update[star] = value
-        nodes.update[change] = nodes.update[star] - old
+        change = arrays.of_change(self._kin)
+        old = self._vector("update") - self._vector("update", change)
+        self._put_vector(value, "update")
+        self._put_vector(self._vector("update") - old, "update", change)
 
 
 class PointsView(View):
@@ -150,7 +268,6 @@ class PointsView(View):
         self.ids = ids
         self.moved = False
         self._found: Rows | None = None
-        self._declared: dict[type, tuple[np.ndarray, np.ndarray]] = {}
 
     def total(self, terms: Any) -> np.ndarray:
         """The sum of terms (n,) or (n, k) over all points of the group, rounded once.
@@ -177,36 +294,11 @@ class PointsView(View):
             self._found = Rows(s, parts, self.ids, np.ones(len(self.ids), np.bool_))
         return self._found
 
-    def __getitem__(self, kind: type) -> np.ndarray:
-        """(n, components) of a field that a fix declares in its ``point_fields``."""
-        if isinstance(kind, str):
-            raise self._no_column(kind)
-        if kind not in self._declared:
-            array = np.array(self._rows.take(self._of(kind)))
-            self._declared[kind] = array, array.copy()
-        return self._declared[kind][0]
+    def _get(self, kind: type) -> np.ndarray:
+        return self._rows.take(_declared(kind, "point"))
 
-    def __setitem__(self, kind: type, value: np.ndarray) -> None:
-        self[kind][...] = value
-
-    def write_back(self) -> None:
-        """Write what a hook has changed; called when it returns."""
-        super().write_back()
-        for kind, (array, before) in self._declared.items():
-            if not np.array_equal(array, before, equal_nan=True):
-                self._rows.put(self._of(kind), array)
-
-    @staticmethod
-    def _of(kind: type) -> Callable:
-        def of(points: Any) -> np.ndarray:
-            array = field(points.fields, kind)
-            if array is None:
-                raise ValueError(
-                    f"points have no {name_of(kind)}: name it in the point_fields of the fix"
-                )
-            return array
-
-        return of
+    def _put(self, kind: type, value: np.ndarray) -> None:
+        self._rows.put(_declared(kind, "point"), value)
 
     def _places(self, points: Any) -> np.ndarray:
         now = self._simulation.now
@@ -244,14 +336,9 @@ class PointsView(View):
     def set_velocity_gradient(self, component: int, gradient: Callable) -> None:
         """Let points whose transfer keeps it (APIC, TPIC ...) know how their velocity changes.
 
-        Parameters
-        ----------
-        component
-            The component of velocity whose gradient this is.
-        gradient
-            ``gradient(moves, step)`` -> (n, d), its derivatives by the coordinates that the grid
-            has (positions, or reference positions where `moves` is False); `step` is a length that
-            is small beside a cell. It is not called where no point keeps such a thing.
+        ``gradient(moves, step)`` -> (n, d) are the derivatives of the `component` by the
+        coordinates that the grid has (positions, or reference positions where `moves` is False);
+        `step` is a length that is small beside a cell. It is called where a point keeps them.
         """
         simulation, slopes = self._simulation, None
         s, d = simulation.setup, simulation.kin.dimension
@@ -284,35 +371,25 @@ class PointsView(View):
 
         Only for fixes with ``point_fields = (Force,)``. It is zero before the first of them.
         """
-        return self._rows.take(self._of(Force))
+        return self._get(Force)
 
     @force.writer
     def _write_force(self, value: np.ndarray) -> None:
-        self._rows.put(self._of(Force), value)
+        self._put(Force, value)
 
     @Shown
     def temperature(self) -> np.ndarray:
         """(n,) temperatures, where heat flows; read only."""
-        return self._rows.take(self._heat(Temperature))[:, 0]
+        return self._rows.take(_declared(Temperature, "point", NO_HEAT))[:, 0]
 
     @Shown
     def heat_supply(self) -> np.ndarray:
         """(n,) heat per time that fixes bring; add to it in ``supply_heat``."""
-        return self._rows.take(self._heat(Supply))[:, 0]
+        return self._rows.take(_declared(Supply, "point", NO_HEAT))[:, 0]
 
     @heat_supply.writer
     def _write_heat_supply(self, value: np.ndarray) -> None:
-        self._rows.put(self._heat(Supply), value[:, None])
-
-    @staticmethod
-    def _heat(kind: type) -> Callable:
-        def of(points: Any) -> np.ndarray:
-            array = field(points.fields, kind)
-            if array is None:
-                raise ValueError("no heat flows: the method has to be thermo-mechanical")
-            return array
-
-        return of
+        self._rows.put(_declared(Supply, "point", NO_HEAT), value[:, None])
 
     def set_stress(self, given: dict[str, np.ndarray]) -> None:
         """Set components of the Cauchy stress: ``{"11": (n,) values, ...}`` of rate-form laws."""

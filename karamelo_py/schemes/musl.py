@@ -2,15 +2,8 @@
 
 from typing import NamedTuple
 
-from karamelo_py.kernels.arrays import (
-    FINAL_INTEGRATE,
-    INITIAL_INTEGRATE,
-    ON_VELOCITY,
-    POST_VELOCITIES_TO_GRID,
-)
+from karamelo_py.kernels import table
 from karamelo_py.kernels.g2p import Strain
-from karamelo_py.kernels.rows import ACCELERATE, CONTACT_AFTER, MOMENTUM_AGAIN, MOVE, SERIES, SUMS
-from karamelo_py.kernels.table import AtNodes, AtPoints, Gather
 
 
 class MUSL(NamedTuple):
@@ -30,14 +23,12 @@ class MUSL(NamedTuple):
     # with smooth gradients, with those that jump, and with nodes within the cells (docs/energy.md).
     keeping = ((0.9, 0.9), (0.4, 0.2), (0.2, 0.2))
     rows = (
-        AtPoints(INITIAL_INTEGRATE, 0),
-        SUMS,
-        *ACCELERATE,
-        SERIES,
-        *MOVE,
-        *MOMENTUM_AGAIN,
-        AtNodes(POST_VELOCITIES_TO_GRID, ON_VELOCITY),
-        CONTACT_AFTER,
-        Gather(Strain()),
-        AtPoints(FINAL_INTEGRATE, 1),
+        table.BEGIN,
+        table.SUMS,
+        *table.ACCELERATE,
+        table.SERIES,
+        *table.MOVE,
+        *table.MOMENTUM_AGAIN,
+        table.Gather(Strain()),
+        table.END,
     )

@@ -11,8 +11,7 @@ from karamelo_py.kernels.arrays import (
     POST_UPDATE_GRID_STATE,
 )
 from karamelo_py.kernels.g2p import Strain
-from karamelo_py.kernels.rows import AXIS, MOVE, SUMS, WORK_OF_LOADS
-from karamelo_py.kernels.table import AtNodes, AtPoints, Gather
+from karamelo_py.kernels.table import AXIS, MOVE, SUMS, WORK_OF_LOADS, AtNodes, AtPoints, Gather
 from karamelo_py.language.signature import NonNegative, Positive
 
 # What acts on the nodes in a step, by present stress; who holds them; and how points follow.

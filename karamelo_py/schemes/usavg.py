@@ -2,25 +2,8 @@
 
 from typing import NamedTuple
 
-from karamelo_py.kernels.arrays import (
-    FINAL_INTEGRATE,
-    INITIAL_INTEGRATE,
-    ON_VELOCITY,
-    POST_UPDATE_GRID_STATE,
-    POST_VELOCITIES_TO_GRID,
-)
+from karamelo_py.kernels import table
 from karamelo_py.kernels.g2p import SecondStrain, Strain
-from karamelo_py.kernels.rows import (
-    ACCELERATE,
-    CONTACT_AFTER,
-    CONTACT_BEFORE,
-    FORCE,
-    MOMENTUM_AGAIN,
-    MOVE,
-    SERIES,
-    VELOCITY_BEFORE,
-)
-from karamelo_py.kernels.table import AtNodes, AtPoints, Gather
 
 
 class USAVG(NamedTuple):
@@ -39,18 +22,14 @@ class USAVG(NamedTuple):
     bears_drift = True
     strained_before = 0.5
     rows = (
-        AtPoints(INITIAL_INTEGRATE, 0),
-        *VELOCITY_BEFORE,
-        AtNodes(POST_UPDATE_GRID_STATE, ON_VELOCITY),
-        CONTACT_BEFORE,
-        Gather(Strain(), 0.5, of_last_step=True),
-        FORCE,
-        *ACCELERATE,
-        SERIES,
-        *MOVE,
-        *MOMENTUM_AGAIN,
-        AtNodes(POST_VELOCITIES_TO_GRID, ON_VELOCITY),
-        CONTACT_AFTER,
-        Gather(SecondStrain(), 0.5),
-        AtPoints(FINAL_INTEGRATE, 1),
+        table.BEGIN,
+        *table.VELOCITY_BEFORE,
+        table.Gather(Strain(), 0.5, of_last_step=True),
+        table.FORCE,
+        *table.ACCELERATE,
+        table.SERIES,
+        *table.MOVE,
+        *table.MOMENTUM_AGAIN,
+        table.Gather(SecondStrain(), 0.5),
+        table.END,
     )

@@ -2,22 +2,8 @@
 
 from typing import NamedTuple
 
-from karamelo_py.kernels.arrays import (
-    FINAL_INTEGRATE,
-    INITIAL_INTEGRATE,
-    ON_VELOCITY,
-    POST_UPDATE_GRID_STATE,
-)
+from karamelo_py.kernels import table
 from karamelo_py.kernels.g2p import Strain
-from karamelo_py.kernels.rows import (
-    ACCELERATE,
-    CONTACT_BEFORE,
-    FORCE,
-    MOVE,
-    SERIES,
-    VELOCITY_BEFORE,
-)
-from karamelo_py.kernels.table import AtNodes, AtPoints, Gather
 
 
 class USF(NamedTuple):
@@ -38,14 +24,12 @@ class USF(NamedTuple):
     keeping = ((0.9, 0.6), (0.4, 0.2), (0.2, 0.2))  # as in musl
     strained_before = 1.0
     rows = (
-        AtPoints(INITIAL_INTEGRATE, 0),
-        *VELOCITY_BEFORE,
-        AtNodes(POST_UPDATE_GRID_STATE, ON_VELOCITY),
-        CONTACT_BEFORE,
-        Gather(Strain(), of_last_step=True),
-        FORCE,
-        *ACCELERATE,
-        SERIES,
-        *MOVE,
-        AtPoints(FINAL_INTEGRATE, 1),
+        table.BEGIN,
+        *table.VELOCITY_BEFORE,
+        table.Gather(Strain(), of_last_step=True),
+        table.FORCE,
+        *table.ACCELERATE,
+        table.SERIES,
+        *table.MOVE,
+        table.END,
     )

@@ -3,12 +3,11 @@
 from typing import NamedTuple
 
 from karamelo_py.compiler.compile import real, shared
-from karamelo_py.kernels.arrays import FINAL_INTEGRATE, INITIAL_INTEGRATE, MASS
+from karamelo_py.kernels import arrays, table
 from karamelo_py.kernels.g2p import Strain
 from karamelo_py.kernels.nodes import UpdateToVelocity
 from karamelo_py.kernels.p2g import SquaredMass
-from karamelo_py.kernels.rows import ACCELERATE, MOVE, SERIES, SUMS, light_node
-from karamelo_py.kernels.table import AtPoints, Gather, NodeTask
+from karamelo_py.kernels.table import NodeTask, light_node
 from karamelo_py.language.rules import known_failure
 from karamelo_py.points.transfers import gradient_weight
 
@@ -35,14 +34,14 @@ class USL(NamedTuple):
     damps = True  # what vibrates, with two points a cell and direction
     node_fields = (SquaredMass,)
     rows = (
-        AtPoints(INITIAL_INTEGRATE, 0),
-        SUMS,
-        *ACCELERATE,
+        table.BEGIN,
+        table.SUMS,
+        *table.ACCELERATE,
         NodeTask(light_node),
-        SERIES,
-        *MOVE,
-        Gather(Strain()),
-        AtPoints(FINAL_INTEGRATE, 1),
+        table.SERIES,
+        *table.MOVE,
+        table.Gather(Strain()),
+        table.END,
     )
 
 
@@ -66,7 +65,7 @@ known_failure(
 @shared
 def any_node(s):
     """The nodal mass below which this form limits the gradient: none."""
-    return UpdateToVelocity(real(0, s.nodes.sums[0, MASS]))
+    return UpdateToVelocity(real(0, s.nodes.sums[0, arrays.MASS]))
 
 
 any_node.goes_through = UpdateToVelocity.goes_through  # type: ignore[attr-defined]
@@ -84,4 +83,6 @@ class USLUnlimited(NamedTuple):
     """
 
     courant = USL.courant
-    rows = tuple(NodeTask(any_node) if row == NodeTask(light_node) else row for row in USL.rows)
+    rows = tuple(
+        table.NodeTask(any_node) if row == NodeTask(light_node) else row for row in USL.rows
+    )

@@ -1,9 +1,18 @@
-"""Errors of a script, with their place in the text and a remedy."""
+"""Errors of a script, with their place in the text and a remedy.
+
+Remedies are names that are alike, and what says the same here as a word of another program.
+"""
+
+from __future__ import annotations
 
 import difflib
 import re
+import tomllib
 import unicodedata
 from collections.abc import Iterable
+from dataclasses import KW_ONLY, dataclass, field
+from functools import cache
+from pathlib import Path
 from typing import Any, NamedTuple
 
 _WIDEST_LINE = 160
@@ -38,6 +47,7 @@ class Pause(Exception):
     """The script waits in front of a run."""
 
 
+@dataclass(eq=False, repr=False)
 class ScriptError(Exception):
     """Something in a script (or on the command line) that the user has to change.
 
@@ -56,31 +66,22 @@ class ScriptError(Exception):
         What to write instead.
     """
 
-    def __init__(
-        self,
-        message: str,
-        *,
-        place: Place | None = None,
-        argument: str | int | None = None,
-        expected: str | None = None,
-        hint: str | None = None,
-    ):
-        super().__init__(message)
-        self.message = message
-        self.place = place
-        self.argument = argument
-        self.expected = expected
-        self.hint = hint
-        # Command or style that complains, put in front of the message.
-        self.command: str | None = None
-        # Where scripts include the one that it is in, the nearest first.
-        self.included: list[Place] = []
-        # Further mistakes of the script, which do not follow from this one.
-        self.others: list[ScriptError] = []
-        # Where the text of a script is wrong: the statements in which it is not.
-        self.statements: list = []
-        # Whether the statement it belongs to is known: nothing outside of it may add to it.
-        self.complete = False
+    message: str
+    _: KW_ONLY
+    place: Place | None = None
+    argument: str | int | None = None
+    expected: str | None = None
+    hint: str | None = None
+    # Command or style that complains, put in front of the message.
+    command: str | None = None
+    # Where scripts include the one that it is in, the nearest first.
+    included: list[Place] = field(default_factory=list)
+    # Further mistakes of the script, which do not follow from this one.
+    others: list[ScriptError] = field(default_factory=list)
+    # Where the text of a script is wrong: the statements in which it is not.
+    statements: list = field(default_factory=list)
+    # Whether the statement it belongs to is known: nothing outside of it may add to it.
+    complete: bool = False
 
     def __str__(self) -> str:
         return self.message
@@ -107,12 +108,9 @@ def render_message(
     hint: str | None = None,
 ) -> str:
     """Lay out an error or a warning (`kind`) as it is shown to the user."""
-    lines = []
-    if place is None:
-        lines.append(f"{kind}: {message}")
-    else:
-        lines.append(f"{place.file}:{place.line}:{place.column}: {kind}: {message}")
-        lines += _marked(place)
+    lines = [f"{kind}: {message}"]
+    if place is not None:
+        lines = [f"{place.file}:{place.line}:{place.column}: {lines[0]}", *_marked(place)]
     if expected:
         lines.append(f"expected: {expected}")
     if hint:
@@ -186,14 +184,31 @@ def nearest(name: str, names: Iterable[str]) -> str | None:
             return candidate
     # Of short names a longer one says something else: Ek_s is not Es.
     like = names if len(name) > 3 else [n for n in names if len(n) - len(name) < 2]
-    close = difflib.get_close_matches(name, like, n=1, cutoff=0.6)
-    if close:
-        return close[0]
     by_lower = {candidate.lower(): candidate for candidate in like}
-    close = difflib.get_close_matches(lowered, by_lower, n=1, cutoff=0.6)
-    if close:
-        return by_lower[close[0]]
+    for word, among in (name, {n: n for n in like}), (lowered, by_lower):
+        if close := difflib.get_close_matches(word, among, n=1, cutoff=0.6):
+            return among[close[0]]
     # A part of the name: cubic of cubic-spline.
     by_lower = {candidate.lower(): candidate for candidate in names}
     parts = (c for c in by_lower if len(lowered) > 2 and lowered in re.split("[-_/ ]", c))
     return by_lower.get(next(parts, ""))
+
+
+# ---- words of other programs, above all of LAMMPS -----------------------------------------------
+
+
+@cache
+def table() -> dict[str, Any]:
+    """Read the table other_programs.toml; nothing needs it before something is wrong."""
+    path = Path(__file__).with_name("other_programs.toml")
+    return tomllib.loads(path.read_text(encoding="utf-8"))
+
+
+def of_karamelo(name: str) -> bool:
+    """Tell if a name is that of a command of Karamelo, which no variable there can have."""
+    return name in table()["karamelo"].split()
+
+
+def instead(family: str, name: str) -> str | None:
+    """Find what to write here for a command or style of another program; None for other words."""
+    return table()["instead"].get(family, {}).get(name)

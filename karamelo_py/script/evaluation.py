@@ -1,37 +1,31 @@
 """From the trees of expressions to what they stand for: numbers, texts and formulas."""
 
 import math
-from functools import partial
+from functools import partial, reduce
 from typing import Any, Protocol
 
 from karamelo_py.script import syntax
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.errors import ScriptError, plural
 from karamelo_py.script.expressions import Expression, Value
 from karamelo_py.script.functions import FUNCTIONS, TAIL, compute
 from karamelo_py.script.terms import REWRITTEN, applied
 
 
 class NameScope(Protocol):
-    """The scope that gives names and calls of commands their meaning: the interpreter."""
+    """The scope that gives names and calls of commands their meaning: the interpreter.
 
-    def name(self, name: str, node: syntax.Name, raw: syntax.Raw) -> Value:
-        """Find the value of a name."""
+    It `hides` the function of a name that the script uses for something else.
+    """
 
-    def command(self, node: syntax.FunctionCall, raw: syntax.Raw) -> Value:
-        """Find the value of a call that is not a function."""
+    def name(self, name: str, node: syntax.Name, raw: syntax.Raw) -> Value: ...
 
-    def hides(self, name: str) -> bool:
-        """Tell if the script uses the name of a function for something else."""
+    def command(self, node: syntax.FunctionCall, raw: syntax.Raw) -> Value: ...
+
+    def hides(self, name: str) -> bool: ...
 
 
 def evaluate(node: syntax.Node, raw: syntax.Raw, scope: NameScope) -> Value:
-    """Evaluate the tree of `raw`: to a number, a text or a formula.
-
-    Raises
-    ------
-    ScriptError
-        With the place of the operand to blame.
-    """
+    """Evaluate the tree of `raw`: to a number, a text or a formula."""
     if isinstance(node, (syntax.NumberLiteral, syntax.TextLiteral)):
         return node.value
     if isinstance(node, syntax.Name):
@@ -72,9 +66,7 @@ def _texts(node: syntax.BinaryOperation, left: Value, right: Value, raw: syntax.
             return left + right
         if node.operator in ("==", "!="):
             return float((left == right) == (node.operator == "=="))
-        guilty, text = node.left, left
-    else:
-        guilty, text = (node.left, left) if isinstance(left, str) else (node.right, right)
+    guilty, text = (node.left, left) if isinstance(left, str) else (node.right, right)
     raise ScriptError(
         f"'{text}' is text, and '{node.operator}' needs numbers",
         place=mark(raw, guilty),
@@ -85,11 +77,8 @@ def _texts(node: syntax.BinaryOperation, left: Value, right: Value, raw: syntax.
 def _numeric(node: syntax.Node, raw: syntax.Raw, scope: NameScope, user: str) -> float | Expression:
     value = evaluate(node, raw, scope)
     if isinstance(value, str):
-        raise ScriptError(
-            f"'{value}' is text, and {user} needs a number",
-            place=mark(raw, node),
-            expected="a number",
-        )
+        message = f"'{value}' is text, and {user} needs a number"
+        raise ScriptError(message, place=mark(raw, node), expected="a number")
     return value
 
 
@@ -97,18 +86,10 @@ def _function(node: syntax.FunctionCall, raw: syntax.Raw, scope: NameScope) -> V
     signature = FUNCTIONS[node.name]
     count = len(node.operands)
     if not signature.least <= count <= signature.most:
-        wanted = (
-            f"at least {signature.least} operands"
-            if signature.most > signature.least
-            else "1 operand"
-            if signature.least == 1
-            else f"{signature.least} operands"
-        )
-        raise ScriptError(
-            f"{node.name} takes {wanted}, not {count}",
-            place=mark(raw, node),
-            expected=usage(node.name),
-        )
+        wanted = "at least " * (signature.most > signature.least)
+        wanted += plural(signature.least, "operand")
+        message = f"{node.name} takes {wanted}, not {count}"
+        raise ScriptError(message, place=mark(raw, node), expected=usage(node.name))
     if node.name == "if":
         condition = _numeric(node.operands[0], raw, scope, "if")
         if isinstance(condition, float):
@@ -118,10 +99,7 @@ def _function(node: syntax.FunctionCall, raw: syntax.Raw, scope: NameScope) -> V
     values = tuple(_numeric(operand, raw, scope, node.name) for operand in node.operands)
     if node.name in ("min", "max"):
         # Pairwise: the evaluator knows them for two operands.
-        result = values[0]
-        for value in values[1:]:
-            result = _apply(node.name, node, (result, value), raw)
-        return result
+        return reduce(lambda a, b: _apply(node.name, node, (a, b), raw), values)
     return _apply(node.name, node, values, raw)
 
 
@@ -146,6 +124,19 @@ def _apply(operation: str, node: syntax.Node, values: tuple, raw: syntax.Raw) ->
         raise _impossible(operation, node, values, raw, error) from None
 
 
+_DOMAINS = {
+    "sqrt": "a number of at least 0",
+    "atanh": "a number between -1 and 1, both excluded",
+    "acosh": "a number of at least 1",
+    "inv_norm": f"a number from {TAIL:g} to 1 - {TAIL:g}",
+    "log1p": "a number above -1",
+    **dict.fromkeys(("log", "log2", "log10"), "a number above 0"),
+    **dict.fromkeys(("asin", "acos"), "a number between -1 and 1"),
+    **dict.fromkeys(("^", "pow"), "a whole exponent for a negative base"),
+    **dict.fromkeys(("gamma", "lgamma", "tgamma"), "any number but 0, -1, -2, ..."),
+}
+
+
 def _impossible(
     operation: str, node: syntax.Node, values: tuple, raw: syntax.Raw, error: Exception
 ) -> ScriptError:
@@ -154,38 +145,17 @@ def _impossible(
     shown = ", ".join(f"{value:g}" for value in values)
     if isinstance(error, ZeroDivisionError) or (operation in ("^", "pow") and values[0] == 0):
         guilty = operands[0] if operation in ("^", "pow") else operands[-1]
-        code = raw.code[guilty.start : guilty.end]
-        return ScriptError(
-            "division by zero"
-            + ("" if isinstance(guilty, syntax.NumberLiteral) else f": {code} is 0"),
-            place=mark(raw, guilty),
-            expected="a number other than 0",
-        )
+        literal = isinstance(guilty, syntax.NumberLiteral)
+        what = "" if literal else f": {raw.code[guilty.start : guilty.end]} is 0"
+        message, expected = f"division by zero{what}", "a number other than 0"
+        return ScriptError(message, place=mark(raw, guilty), expected=expected)
     if isinstance(error, OverflowError):
-        return ScriptError(
-            f"the result of {_spelled(operation, shown)} is too large",
-            place=mark(raw, node),
-            expected="at most 1.8e308",
-        )
-    domains = {
-        "sqrt": "a number of at least 0",
-        "asin": "a number between -1 and 1",
-        "acos": "a number between -1 and 1",
-        "atanh": "a number between -1 and 1, both excluded",
-        "acosh": "a number of at least 1",
-        "inv_norm": f"a number from {TAIL:g} to 1 - {TAIL:g}",
-        "log1p": "a number above -1",
-        "^": "a whole exponent for a negative base",
-        "pow": "a whole exponent for a negative base",
-        "gamma": "any number but 0, -1, -2, ...",
-        "lgamma": "any number but 0, -1, -2, ...",
-        "tgamma": "any number but 0, -1, -2, ...",
-    }
-    positive = operation in ("log", "log2", "log10")
+        message = f"the result of {_spelled(operation, shown)} is too large"
+        return ScriptError(message, place=mark(raw, node), expected="at most 1.8e308")
     return ScriptError(
         f"{_spelled(operation, shown)} is not a real number",
         place=mark(raw, operands[0] if len(operands) == 1 else node),
-        expected="a number above 0" if positive else domains.get(operation, "a finite result"),
+        expected=_DOMAINS.get(operation, "a finite result"),
     )
 
 

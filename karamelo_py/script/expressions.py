@@ -14,14 +14,15 @@ import numpy as np
 from karamelo_py.compiler import formula
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.functions import compute_quietly
-from karamelo_py.script.programs import in_order, program
 from karamelo_py.script.terms import (
     Term,
     alike,
     applied,
     constant,
+    in_order,
     is_short,
     number_text,
+    program,
     text_of,
 )
 from karamelo_py.script.values import Values
@@ -37,21 +38,15 @@ CHUNK = 1 << 18  # points at which a formula is evaluated together
 class Expression:
     """A number, or a formula of positions, time and published values; used alike in signatures.
 
-    Parameters
-    ----------
-    value
-        A number, or another expression.
-
-    Attributes
-    ----------
-    names : frozenset of str
-        The seeds it needs: some of x y z x0 y0 z0, time timestep dt, published names.
+    Its `names` are the seeds it needs: some of x y z x0 y0 z0, time timestep dt, published names.
     """
 
     __slots__ = ("_term",)
 
     def __init__(self, value: float | Term | Expression):
-        self._term = value if isinstance(value, Term) else _term(value)
+        if not isinstance(value, Term):
+            value = value._term if isinstance(value, Expression) else constant(value)
+        self._term = value
 
     @classmethod
     def seed(cls, name: str) -> Expression:
@@ -103,13 +98,7 @@ class Expression:
         return alike(self._term, other._term)
 
     def evaluate(self, values: Values) -> float:
-        """Compute the number it has now.
-
-        Raises
-        ------
-        ScriptError
-            If it needs a position.
-        """
+        """Compute the number it has now; a formula of positions has none."""
         needed = self.names.intersection(POINT_SEEDS)
         if needed:
             raise ScriptError(
@@ -135,18 +124,9 @@ class Expression:
     def evaluate_points(
         self, values: Values, x: np.ndarray, x0: np.ndarray | None = None
     ) -> np.ndarray:
-        """Compute the numbers it has at positions `x`, whose reference positions are `x0`.
+        """Compute the (n,) numbers it has at positions `x`, whose reference positions are `x0`.
 
-        Parameters
-        ----------
-        values
-            Published values.
-        x, x0 : ndarray (n, 1 to 3)
-            Missing directions count as 0; `x0` defaults to `x`.
-
-        Returns
-        -------
-        ndarray (n,) float64
+        Positions are (n, 1 to 3); missing directions count as 0, and `x0` defaults to `x`.
         """
         if not self.names.intersection(POINT_SEEDS):
             return np.full(len(x), self.evaluate(values))
@@ -175,10 +155,6 @@ def shown(value: Value) -> str:
     return number_text(value)
 
 
-def _term(value: float | Expression) -> Term:
-    return value._term if isinstance(value, Expression) else constant(value)
-
-
 def _evaluate(root: Term, values: Values) -> float:
     found: dict[int, float] = {}
     for term in in_order(root):
@@ -201,5 +177,5 @@ def _published(name: str, values: Values) -> str:
 def _three_columns(x: np.ndarray) -> np.ndarray:
     x = np.asarray(x, dtype=np.float64)
     if x.shape[1] < 3:
-        x = np.concatenate([x, np.zeros((len(x), 3 - x.shape[1]))], axis=1)
+        x = np.pad(x, ((0, 0), (0, 3 - x.shape[1])))
     return np.ascontiguousarray(x)

@@ -10,7 +10,7 @@ from typing import Any
 
 from karamelo_py.compiler import cache
 from karamelo_py.script import syntax
-from karamelo_py.script.mistakes import Mistake
+from karamelo_py.script.syntax import Mistake
 
 # Trees are walked by recursion; this keeps well below Python's limit.
 MAX_DEPTH = 150
@@ -53,9 +53,8 @@ def literal(word: str, start: int) -> float:
     """Read a number, which stands at `start`."""
     value = float(word)
     if math.isinf(value):
-        raise Mistake(
-            f"the number {word} is too large", start, start + len(word), expected="below 1.8e308"
-        )
+        message = f"the number {word} is too large"
+        raise Mistake(message, start, start + len(word), "below 1.8e308")
     return value
 
 
@@ -68,7 +67,12 @@ def _around(parts: list) -> tuple[int, int]:
     return span(parts[0])[0], span(parts[-1])[1]
 
 
-def _deeper(start: int, end: int, *below: syntax.Node) -> int:
+def _spelled(sign: str) -> str:
+    return SPELLINGS.get(str(sign), str(sign))
+
+
+def _above(start: int, end: int, *below: syntax.Node) -> tuple[int, int, int]:
+    """Find start, end and depth of a node."""
     depth = 1 + max((node.depth for node in below), default=0)
     if depth > MAX_DEPTH:
         raise Mistake(
@@ -78,7 +82,7 @@ def _deeper(start: int, end: int, *below: syntax.Node) -> int:
             expected=f"at most {MAX_DEPTH} levels",
             hint="give parts of it names: a = ..., b = ..., then a + b",
         )
-    return depth
+    return start, end, depth
 
 
 class _TreeBuilder:
@@ -125,27 +129,21 @@ class _TreeBuilder:
 
     def unary(self, parts: list) -> syntax.Node:
         sign, operand = parts
-        operator = SPELLINGS.get(str(sign), str(sign))
-        start, end = sign.start_pos, operand.end
-        return syntax.UnaryOperation(start, end, _deeper(start, end, operand), operator, operand)
+        around = _above(sign.start_pos, operand.end, operand)
+        return syntax.UnaryOperation(*around, _spelled(sign), operand)
 
     def binary(self, parts: list) -> syntax.Node:
         left, sign, right = parts
-        operator = SPELLINGS.get(str(sign), str(sign))
-        start, end = left.start, right.end
-        return syntax.BinaryOperation(
-            start, end, _deeper(start, end, left, right), operator, left, right
-        )
+        around = _above(left.start, right.end, left, right)
+        return syntax.BinaryOperation(*around, _spelled(sign), left, right)
 
     def operands(self, parts: list) -> list:
         return parts[::2]
 
     def function(self, parts: list) -> syntax.Node:
         operands = tuple(parts[2]) if len(parts) == 4 else ()
-        start, end = parts[0].start_pos, parts[-1].end_pos
-        return syntax.FunctionCall(
-            start, end, _deeper(start, end, *operands), str(parts[0]), operands
-        )
+        around = _above(parts[0].start_pos, parts[-1].end_pos, *operands)
+        return syntax.FunctionCall(*around, str(parts[0]), operands)
 
     def parenthesis(self, parts: list) -> syntax.Node:
         # The same tree, but marked and quoted with its parentheses.

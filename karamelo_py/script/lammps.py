@@ -4,9 +4,9 @@ import math
 import re
 
 from karamelo_py.script import grammar, syntax
+from karamelo_py.script.errors import instead, of_karamelo, table
 from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, WORDS
-from karamelo_py.script.mistakes import Mistake
-from karamelo_py.script.other_programs import instead, of_karamelo, table
+from karamelo_py.script.syntax import Mistake
 
 _UNSIGNED = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?[0-2]?\d?\d)?"
 _ZERO = r"[+-]?(?=[.0]*0)[.0]+(?:[eE][+-]?\d+)?"

@@ -1,34 +1,15 @@
-"""Syntax errors in a user's words: characters, quotes and parentheses."""
+"""Syntax errors in a user's words: characters, quotes and parentheses, then expressions.
+
+Of expressions Lark's parser, fed token by token, tells where it stopped, what it had read and what
+was open then; what the user did follows from these.
+"""
 
 import re
+from typing import Any, NamedTuple
 
-from karamelo_py.script.errors import ScriptError
-from karamelo_py.script.syntax import Source
-
-
-class Mistake(Exception):
-    """A syntax error at offsets of a text whose place in a file is not known here."""
-
-    def __init__(
-        self,
-        message: str,
-        start: int,
-        end: int,
-        expected: str | None = None,
-        hint: str | None = None,
-    ):
-        super().__init__(message)
-        self.message = message
-        self.start = start
-        self.end = end
-        self.expected = expected
-        self.hint = hint
-
-    def error(self, source: Source, offset: int = 0) -> ScriptError:
-        """Make it an error with a place."""
-        place = source.place(offset + self.start, offset + self.end)
-        return ScriptError(self.message, place=place, expected=self.expected, hint=self.hint)
-
+from karamelo_py.script.errors import instead, table
+from karamelo_py.script.lammps import line_of, with_name
+from karamelo_py.script.syntax import Mistake
 
 CLOSES_NOTHING = (
     "this ) closes nothing", "as many ( as )", "remove it, or add the ( that belongs to it"
@@ -36,20 +17,12 @@ CLOSES_NOTHING = (
 _PUNCTUATION = re.compile(
     r'"[^"\n]*"|#[^\n]*|(?<!&)&(?=[ \t]*(?:#.*)?(?:\n|\Z))|["()“”„‟«»‘’`\x00-\x08\x0e-\x1f\x7f]'
 )
-
-
 # A comment of C in the line that ends there.
 _SLASHES = re.compile(r"(?:^|[ \t)])//[^\n]*\Z", re.MULTILINE)
 
 
 def check_characters(text: str) -> None:
-    """Refuse characters that no part of a script may contain outside quotes and comments.
-
-    Raises
-    ------
-    Mistake
-        At the first of them.
-    """
+    """Refuse characters that no part of a script may contain outside quotes and comments."""
     if text.isascii() and text.isprintable():
         return
     for match in _PUNCTUATION.finditer(text):
@@ -57,25 +30,16 @@ def check_characters(text: str) -> None:
         if len(word) > 1 or word in '"#()':
             continue
         if word == "&":
-            raise Mistake(
-                "no & stands at the end of a line",
-                *match.span(),
-                expected="a statement in one line, or a call over several",
-                hint="leave it out; a call may run over several lines inside its parentheses",
-            )
-        if ord(word) < 32 or word == "\x7f":
-            raise Mistake(
-                f"a control character (code {ord(word)}) stands here",
-                *match.span(),
-                expected="a text file",
-                hint="delete it; is this really a script?",
-            )
-        raise Mistake(
-            f"typographic quote {word}",
-            *match.span(),
-            expected='the plain quote "',
-            hint="such quotes come from word processors and web pages; type them anew",
-        )
+            message = "no & stands at the end of a line"
+            expected = "a statement in one line, or a call over several"
+            hint = "leave it out; a call may run over several lines inside its parentheses"
+        elif ord(word) < 32 or word == "\x7f":
+            message = f"a control character (code {ord(word)}) stands here"
+            expected, hint = "a text file", "delete it; is this really a script?"
+        else:
+            message, expected = f"typographic quote {word}", 'the plain quote "'
+            hint = "such quotes come from word processors and web pages; type them anew"
+        raise Mistake(message, *match.span(), expected, hint)
 
 
 def in_script(text: str) -> Mistake:
@@ -87,10 +51,10 @@ def in_script(text: str) -> Mistake:
             return open_quote(text, start)
         if word == "(":
             opened.append(start)
+        elif word == ")" and not opened:
+            message, *advice = CLOSES_NOTHING
+            return Mistake(message, start, start + 1, *advice)
         elif word == ")":
-            if not opened:
-                message, *advice = CLOSES_NOTHING
-                return Mistake(message, start, start + 1, *advice)
             opened.pop()
     if opened:
         return open_parenthesis(text, opened[0])
@@ -100,13 +64,9 @@ def in_script(text: str) -> Mistake:
 def open_quote(text: str, start: int) -> Mistake:
     """Make the mistake of a quote that begins at `start` and has no end."""
     end = text.find("\n", start)
-    return Mistake(
-        "this quote is not closed",
-        start,
-        len(text) if end < 0 else end,
-        expected='a second " in the same line',
-        hint="comments begin with #" if _SLASHES.search(text, 0, start) else 'add the missing "',
-    )
+    hint = "comments begin with #" if _SLASHES.search(text, 0, start) else 'add the missing "'
+    end = len(text) if end < 0 else end
+    return Mistake("this quote is not closed", start, end, 'a second " in the same line', hint)
 
 
 def open_parenthesis(text: str, start: int) -> Mistake:
@@ -114,10 +74,267 @@ def open_parenthesis(text: str, start: int) -> Mistake:
     before = re.search(r"[^\W\d]\w*[ \t]*$", text[:start])
     begin = before.start() if before else start
     what = f"the call of {before[0].rstrip()}" if before else "this parenthesis"
-    return Mistake(
-        f"{what} is not closed: a ) is missing",
-        begin,
-        start + 1,
-        expected="as many ) as (",
-        hint="add the missing )",
+    message = f"{what} is not closed: a ) is missing"
+    return Mistake(message, begin, start + 1, "as many ) as (", "add the missing )")
+
+
+# ---- expressions ---------------------------------------------------------------------------------
+
+_REMEDIES = {
+    ";": "one statement per line, without ;",
+    "&": "write && or and",
+    "|": "write || or or",
+    **dict.fromkeys("[]{}", "use parentheses ( )"),
+    "'": 'text stands in double quotes: "..."',
+    "$": "a variable is written by its name alone, without $",
+    "@": "a name consists of letters, digits and _",
+    "\\": "a call may run over several lines inside its parentheses; no \\ is needed",
+    ":": "assign with name = expression",
+    "?": "write if(condition, a, b)",
+    "~": "negate a condition with !",
+    "−": "this is a typographic minus; type -",
+    **dict.fromkeys("–—", "this is a dash; type -"),
+    **dict.fromkeys("×·", "multiply with *"),
+    "÷": "divide with /",
+    "²": "write ^2",
+    "³": "write ^3",
+    ".": "a number has a digit next to its point; a file name or other word stands in quotes here",
+}
+
+_VALUE = "a number, a name or a parenthesis"
+
+
+_OPERATORS = ("OR", "AND", "NOT", "COMPARISON", "SIGN", "TIMES", "POWER")
+_STARTS = ("NUMBER", "NAME", "STRING", "LPAR")
+_ENDS = ("NUMBER", "NAME", "STRING", "RPAR")
+
+
+class _Stop(NamedTuple):
+    """The place at which the parser stopped: tokens before and there, and what it held.
+
+    `here` is a character that begins no token, a token, or None at the end.
+    """
+
+    code: str
+    before: list
+    here: Any
+    start: int
+    stack: list
+
+    @property
+    def end(self) -> int:
+        return self.start + len(self.here)
+
+    @property
+    def last(self) -> Any:
+        """The token before, or None."""
+        return self.before[-1] if self.before else None
+
+    @property
+    def kind(self) -> str:
+        """The type of the token here."""
+        return getattr(self.here, "type", "")
+
+    @property
+    def opened(self) -> list[int]:
+        """List the places of open parentheses."""
+        return [t.start_pos for t in self.stack if getattr(t, "type", "") == "LPAR"]
+
+    @property
+    def after_call(self) -> bool:
+        """Tell if all before is one call."""
+        types = [getattr(part, "type", "") for part in self.stack]
+        call = types[:2] == ["NAME", "LPAR"] and types[-1] == "RPAR"
+        return call and types.count("LPAR") == 1
+
+    def mistake(self, message: str, expected: str = _VALUE, hint: str | None = None) -> Mistake:
+        """Make a mistake that marks what stands here."""
+        return Mistake(message, self.start, self.end, expected, hint)
+
+
+def _stop(parser: Any, code: str) -> _Stop:
+    """Feed `code` to Lark's `parser` up to where it can go no further."""
+    from lark.exceptions import UnexpectedCharacters, UnexpectedToken
+
+    interactive = parser.parse_interactive(code)
+    state, before = interactive.parser_state, []
+    here, start = None, len(code)
+    try:
+        for token in interactive.lexer_thread.lex(state):
+            interactive.feed_token(token)
+            before.append(token)
+    except UnexpectedCharacters as error:
+        start = error.pos_in_stream
+        here = code[start]
+    except UnexpectedToken as error:
+        here, start = error.token, error.token.start_pos
+    return _Stop(code, before, here, start, list(state.value_stack))
+
+
+def in_expression(parser: Any, code: str) -> Mistake:
+    """Find the mistake in `code`, which Lark's `parser` refuses."""
+    at = _stop(parser, code)
+    if at.here is None:
+        return _at_end(at)
+    if at.here == "=":
+        return _equals(at)
+    if at.here == '"':
+        return open_quote(code, at.start)
+    if not at.kind:
+        return at.mistake(
+            f"'{at.here}' means nothing in an expression",
+            "numbers, names, operators and parentheses",
+            _REMEDIES.get(at.here),
+        )
+    if at.here == ",":
+        return _comma(at)
+    if at.here == ")":
+        return _closing(at)
+    before = at.last
+    if before and before.type in _ENDS and at.kind in _STARTS:
+        return _side_by_side(at)
+    if at.kind not in _OPERATORS:
+        return at.mistake(f"'{at.here}' cannot stand here")
+    for start in (at.start - 1, at.start):
+        if code[max(start, 0) : start + 2] in ("//", "/*"):
+            message = f"'{code[start : start + 2]}' begins no comment"
+            return Mistake(message, start, start + 2, _VALUE, "comments begin with #")
+    hint = "put it in parentheses" if at.kind == "NOT" else None
+    if before and before.type in _OPERATORS:
+        return at.mistake(f"operator '{at.here}' follows operator '{before}'", hint=hint)
+    if before and before.type in _ENDS:
+        return at.mistake(f"'{at.here}' cannot stand between two values", hint=hint)
+    return at.mistake(f"operator '{at.here}' has nothing on its left", hint=hint)
+
+
+def _at_end(at: _Stop) -> Mistake:
+    before = at.last
+    if before is None:
+        return Mistake("there is nothing here", 0, len(at.code), expected="an expression")
+    place = before.start_pos, before.end_pos
+    if before.type in _OPERATORS:
+        message = f"the expression ends after '{before}'"
+        return Mistake(message, *place, expected=f"{_VALUE} after '{before}'")
+    if at.opened:
+        return open_parenthesis(at.code, at.opened[0])
+    return Mistake("the expression ends too early", *place, expected=_VALUE)
+
+
+def _equals(at: _Stop) -> Mistake:
+    tokens, before = at.before, at.last
+    expected = "name = expression, once in a line; == compares"
+    if before is None:
+        return at.mistake("'=' has no name on its left", expected)
+    first, rest = tokens[0], at.code[at.end :].strip()
+    if len(tokens) == 2 and before.type in _OPERATORS and first.type == "NAME":
+        hint = f"{first} = {first} {before} {rest}"
+        message = f"'{before}=' is not known here"
+        return Mistake(message, before.start_pos, at.end, expected, hint)
+    if first.type == "NAME" and len(tokens) > 1 and tokens[1] == "(" and before == ")":
+        hint = f"a formula needs no arguments: {first} = {rest}"
+        place = first.start_pos, before.end_pos
+        return Mistake("only a name can stand left of '='", *place, expected, hint)
+    hint = "compare with ==" if at.opened else None
+    if all(token.type in ("NAME", "NUMBER", *_OPERATORS) for token in tokens):
+        hint = "a name begins with a letter and has letters, digits and _ only"
+    return at.mistake("'=' cannot stand here", expected, hint)
+
+
+def _comma(at: _Stop) -> Mistake:
+    before = at.last
+    if before is None or before in ("(", ",") or before.type in _OPERATORS:
+        return at.mistake("something is missing before this comma")
+    digits = re.match(r"\s*([\d.]+)", at.code[at.end :]) if before.type == "NUMBER" else None
+    return at.mistake(
+        "a comma separates the arguments of a call; there is no call here",
+        "an operator or the end of the expression",
+        f"write decimals with a point: {before}.{digits[1]}" if digits else None,
     )
+
+
+def _closing(at: _Stop) -> Mistake:
+    if not at.opened:
+        return at.mistake(*CLOSES_NOTHING)
+    if at.last == "(":
+        message = "there is nothing in these parentheses"
+        return Mistake(message, at.last.start_pos, at.end, expected=_VALUE)
+    return at.mistake(f"something is missing after '{at.last}'")
+
+
+def _side_by_side(at: _Stop) -> Mistake:
+    code, before, here = at.code, at.last, at.here
+    start, end = before.start_pos, at.end
+    touching = before.type == "NUMBER" and before.end_pos == at.start
+    if touching and at.kind == "NUMBER":
+        number = re.match(r"[\d.]+([eE][+-]?[\d.]+)?", code[start:])
+        end = start + number.end()
+        expected = "a number has one point at most"
+        if "." in (number[1] or ""):
+            expected = "a whole number as the exponent; x^y is any power"
+        return Mistake(f"'{code[start:end]}' is not a number", start, end, expected)
+    if touching and at.kind == "NAME":
+        if re.fullmatch(r"[eEdD]\d*", here):
+            good = re.fullmatch(r"[dD](\d+)", here)
+            end += len(here) == 1 and code[end : end + 1] in ("+", "-")
+            hint = f"{before}e{good[1]}" if good else None
+            message = f"'{code[start:end]}' is not a number"
+            return Mistake(message, start, end, "an exponent as in 1e-5", hint)
+        message = f"an operator is missing between '{before}' and '{here}'"
+        hint = f"{before}*{here}; a name cannot start with a digit"
+        return Mistake(message, start, end, "an operator, such as *", hint)
+    if len(at.before) == 1 and before.type == "NAME":
+        words = [word.strip(",") for word in code[at.start :].strip().rstrip(",").split()]
+        hint = _block_or_call(before, words)
+        if re.match(r"\s*=(?!=)", code[at.end :]):
+            hint = f"a name has no blanks: {before}_{here} = ..."
+        if here.lower() in ("and", "or", "not"):
+            hint = f"write {here.lower()}"
+        return at.mistake(
+            f"'{here}' follows '{before}' without an operator",
+            "name = expression, or command(arguments)",
+            hint,
+        )
+    hint = None
+    if at.after_call and at.kind == "NAME":
+        hint = "multiply with *; two statements stand on two lines"
+        hint = NO_BLOCKS if at.before[0] in BLOCKS else hint
+    elif before.type == "NUMBER" and at.kind == "NAME" and not code[end:].strip():
+        hint = "numbers stand without units"
+    return at.mistake(
+        f"an operator is missing between '{_short(before)}' and '{_short(here)}'",
+        "an operator, such as *, or a comma between arguments",
+        hint,
+    )
+
+
+BLOCKS = (
+    "for", "while", "if", "else", "elif", "def", "do", "import", "loop", "label", "next", "jump",
+)  # fmt: skip
+NO_BLOCKS = "there are no loops and blocks; if(condition, a, b) chooses a value"
+
+
+def _block_or_call(name: str, words: list[str]) -> str:
+    """Write the line to stand instead of ``name word word``."""
+    if name in BLOCKS:
+        return NO_BLOCKS
+    if own := line_of(name, words):
+        return own
+    if other := table()["otherwise"].get(name) or instead("command", name):
+        return other
+    if name in ("fix", "compute") and len(words) > 2:
+        other = instead(name, words[2]) or ""
+        style = other.removeprefix("the style ")
+        if other and (style == other or " " in style):
+            return other
+        if words[1] == "all" or other:  # LAMMPS has the group in front of the style
+            words[1:3] = style or words[2], words[1]
+    if name == "group" and words[1:2] == ["region"] and len(words) == 3:  # as in LAMMPS
+        words = [words[0], "particles", *words[1:], "all"]
+    words = with_name(name, words)
+    if all(re.fullmatch(r"[\w.*/+-]+|\"[^\"]*\"", word) for word in words):
+        return f"arguments go in parentheses: {name}({', '.join(words)})"
+    return f"arguments go in parentheses: {name}(...)"
+
+
+def _short(text: str) -> str:
+    return text if len(text) < 30 else text[:27] + "..."

@@ -1,26 +1,66 @@
-"""From text to statements and trees of expressions."""
+"""From a file to text, and from text to statements and trees of expressions."""
 
+import difflib
 import re
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
-from karamelo_py.script import expression_mistakes, grammar, mistakes, syntax
+from karamelo_py.script import grammar, mistakes, syntax
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.script.mistakes import Mistake
+from karamelo_py.script.syntax import Mistake
 
 _SINGLE_QUOTED = re.compile(r"'([^'\"\n]*)'?")
+_LARGEST_SCRIPT = 100_000_000
+# What programs write beside scripts.
+_WRITTEN = (
+    *(".png", ".pdf", ".svg", ".gif", ".mp4", ".gz", ".bin", ".h5", ".vtu", ".pvd", ".csv", ".txt"),
+    *(".LAMMPS", ".log", ".part"),
+)
+
+
+def scripts_in(folder: Path) -> list[str]:
+    """List names of the files in a folder that may be scripts."""
+    files = folder.iterdir() if folder.is_dir() else ()
+    return sorted(file.name for file in files if file.suffix not in _WRITTEN and file.is_file())
+
+
+def read_script(path: Path) -> str:
+    """Read the text of a script file."""
+    try:
+        if path.is_dir():
+            raise ScriptError(f"{path} is a folder", expected="the name of a script")
+        if path.stat().st_size > _LARGEST_SCRIPT:
+            raise ScriptError(f"{path} is too large for a script", expected="at most 100 MB")
+        data = path.read_bytes()
+    except FileNotFoundError:
+        parent = path.parent
+        close = difflib.get_close_matches(path.name, scripts_in(parent), n=1, cutoff=0.7)
+        where = "" if parent.is_dir() else f": the folder {parent} does not exist"
+        raise ScriptError(
+            f"there is no file {path}{where}",
+            expected="the name of a script",
+            hint=f"did you mean {parent / close[0]}?" if close else None,
+        ) from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise ScriptError(f"{path} cannot be read: {reason}") from None
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return data.decode("utf-16", errors="replace")
+    if b"\0" in data:
+        raise ScriptError(f"{path} is not a text file", expected="a script")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        # Old editors write comments in Latin-1, where every byte is a character.
+        return data.decode("latin-1")
 
 
 def parse(text: str, file: str = "<text>") -> list[syntax.Statement]:
     """Read the statements of a script.
 
-    Arguments of calls stay as they are written; everything else is checked.
-
-    Raises
-    ------
-    ScriptError
-        At the first syntax error, with its place; those of other statements are its `others`, and
-        statements without any its `statements`.
+    Arguments of calls stay as they are written; everything else is checked. Syntax errors of other
+    statements are `others` of the first, and statements without any its `statements`.
     """
     # A byte order mark and the line ends of other systems mean nothing.
     text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
@@ -47,13 +87,7 @@ def parse(text: str, file: str = "<text>") -> list[syntax.Statement]:
 
 
 def parse_expression(raw: syntax.Raw) -> syntax.Node:
-    """Read the tree of an expression.
-
-    Raises
-    ------
-    ScriptError
-        At a syntax error, with its place.
-    """
+    """Read the tree of an expression."""
     try:
         return _tree(raw.code)
     except Mistake as mistake:
@@ -71,18 +105,17 @@ def _tree(code: str) -> syntax.Node:
     """Read the tree of `code`; its offsets count from the start of `code`."""
     word = code.strip()
     # Most arguments and many right-hand sides are one name or one whole number.
+    start = code.index(word)
     if word.isascii() and word.isidentifier() and word not in grammar.SPELLINGS:
-        start = code.index(word)
         return syntax.Name(start, start + len(word), 1, word)
     if word.isascii() and word.isdigit():
-        start = code.index(word)
         return syntax.NumberLiteral(start, start + len(word), 1, grammar.literal(word, start))
     if not word:
         raise Mistake("there is nothing here", 0, len(code), expected="an expression")
     try:
         return grammar.parser_of("expression").parse(code)
     except grammar.refused():
-        raise expression_mistakes.in_expression(grammar.parser_of("expression"), code) from None
+        raise mistakes.in_expression(grammar.parser_of("expression"), code) from None
 
 
 def _statement(
@@ -91,21 +124,20 @@ def _statement(
     """Read the statement that lies at `start` to `end`."""
     place = source.place(start, start + max(len(name), 1))
     whole = syntax.Raw(source, start, end)
-    if kind == "assignment":
-        begin, stop = parts
-        right = syntax.Raw(source, begin, max(stop, begin))
-        if not right.code.strip():
-            raise ScriptError(
-                f"nothing is assigned to '{name}'",
-                place=source.place(start, end),
-                expected="a number, a text in quotes or an expression after the =",
-                hint=f"{name} = 1",
-            )
-        return syntax.Assignment(place, whole, name, right, parse_expression(right))
     if kind == "call":
         return syntax.CommandCall(place, whole, name, tuple(_arguments(source, name, parts)))
-    node = parse_expression(whole)
-    return syntax.Evaluation(source.place(start, end), whole, node)
+    if kind == "evaluation":
+        return syntax.Evaluation(whole.place, whole, parse_expression(whole))
+    begin, stop = parts
+    right = syntax.Raw(source, begin, max(stop, begin))
+    if not right.code.strip():
+        raise ScriptError(
+            f"nothing is assigned to '{name}'",
+            place=whole.place,
+            expected="a number, a text in quotes or an expression after the =",
+            hint=f"{name} = 1",
+        )
+    return syntax.Assignment(place, whole, name, right, parse_expression(right))
 
 
 def _arguments(source: syntax.Source, name: str, parts: list) -> list[syntax.Raw]:
@@ -113,25 +145,23 @@ def _arguments(source: syntax.Source, name: str, parts: list) -> list[syntax.Raw
     if parts == [None]:
         return []
     raws = []
-    for k, part in enumerate(parts):
-        if k % 2:
-            continue
+    for k, part in enumerate(parts[::2]):
         if part is None:
-            comma = parts[k + 1] if k + 1 < len(parts) else parts[k - 1]
-            where = "before" if k + 1 < len(parts) else "after"
+            after = 2 * k + 1 == len(parts)
+            comma = parts[2 * k - 1 if after else 2 * k + 1]
             raise ScriptError(
-                f"{name}: argument {k // 2 + 1} is missing",
+                f"{name}: argument {k + 1} is missing",
                 place=source.place(*grammar.span(comma)),
-                expected=f"something {where} this comma",
+                expected=f"something {'after' if after else 'before'} this comma",
                 hint="leave the comma out, or write NULL where a component is not to be set",
             )
         if single := _SINGLE_QUOTED.match(source.text, part[0]):
+            bare = ", or the word without quotes" if single[1].isidentifier() else ""
             raise ScriptError(
                 f"{single[0]} stands in single quotes",
                 place=source.place(*single.span()),
                 expected="texts stand in double quotes",
-                hint=f'write "{single[1]}"'
-                + (", or the word without quotes" if single[1].isidentifier() else ""),
+                hint=f'write "{single[1]}"{bare}',
             )
         raws.append(syntax.Raw(source, *part))
     return raws

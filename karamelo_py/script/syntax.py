@@ -5,7 +5,7 @@ from bisect import bisect_right
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from karamelo_py.script.errors import Place
+from karamelo_py.script.errors import Place, ScriptError
 
 # Quoted text is matched first so that a # in it starts no comment.
 _COMMENT_OR_BREAK = re.compile(r'"[^"\n]*"|#[^\n]*|\n')
@@ -40,6 +40,22 @@ class Source:
                 lambda m: m[0] if m[0][0] == '"' else " " * len(m[0]), text
             )
         return text
+
+
+@dataclass(eq=False)
+class Mistake(Exception):
+    """A syntax error at offsets of a text whose place in a file is not known here."""
+
+    message: str
+    start: int
+    end: int
+    expected: str | None = None
+    hint: str | None = None
+
+    def error(self, source: Source, offset: int = 0) -> ScriptError:
+        """Make it an error with a place."""
+        place = source.place(offset + self.start, offset + self.end)
+        return ScriptError(self.message, place=place, expected=self.expected, hint=self.hint)
 
 
 # ---- expressions; start and end are offsets into the text of the expression ---------------------

@@ -21,8 +21,8 @@ class Values:
     def __init__(self) -> None:
         self.array = np.zeros(CAPACITY)
         self._slots: dict[str, int] = {}
-        self._first: dict[str, int] = {}
-        self._others: dict[str, list[str]] = {}
+        self._of: dict[str, dict[str, int]] = {}  # slots of the names of an ID
+        self._first: dict[str, int] = {}  # slot of ID_x, whether it has a name or not
         self._used = 0
         for name in ("time", "timestep", "dt"):
             self.publish(name)
@@ -44,28 +44,21 @@ class Values:
         """
         if ID not in self._first:
             self._first[ID] = self._reserve(len(SUFFIXES))
-        for k, suffix in enumerate(SUFFIXES):
+        ordered = [s for s in SUFFIXES if s in suffixes]
+        ordered += [s for s in suffixes if s not in SUFFIXES]
+        slots = {}
+        for suffix in ordered:
             name = f"{ID}_{suffix}" if suffix else ID
-            if suffix in suffixes:
-                self._slots[name] = self._first[ID] + k
-                self.publish(name)
-            elif self._slots.get(name) == self._first[ID] + k:
+            if suffix in SUFFIXES:
+                self._slots[name] = self._first[ID] + SUFFIXES.index(suffix)
+            slots[name] = self.publish(name)
+        for name, slot in self._of.get(ID, {}).items():
+            if name not in slots and self._slots.get(name) == slot:
                 del self._slots[name]
-        others = [f"{ID}_{suffix}" for suffix in suffixes if suffix not in SUFFIXES]
-        for name in set(self._others.get(ID, ())) - set(others):
-            del self._slots[name]
-        for name in others:
-            self.publish(name)
-        self._others[ID] = others
+        self._of[ID] = slots
 
     def slot(self, name: str) -> int:
-        """Find the place of `name` in the array.
-
-        Raises
-        ------
-        KeyError
-            If nothing of that name is published.
-        """
+        """Find the place of `name` in the array (KeyError if it is not published)."""
         return self._slots[name]
 
     def names(self) -> list[str]:
@@ -77,11 +70,11 @@ class Values:
 
     def get(self, name: str) -> float:
         """Read the present value of `name` (KeyError if it is not published)."""
-        return float(self.array[self._slots[name]])
+        return float(self.array[self.slot(name)])
 
     def set(self, name: str, value: float) -> None:
         """Change the value of `name` (KeyError if it is not published)."""
-        self.array[self._slots[name]] = value
+        self.array[self.slot(name)] = value
 
     def _reserve(self, count: int) -> int:
         first = self._used

@@ -1,40 +1,57 @@
-"""One of several workloads measured by a process of its own: karamelo-py bench.
+"""Workloads measured by processes of their own: karamelo-py bench of several, and with --ranks.
 
-What workloads before it leave in memory has no part in its speed then. This module is the program
-of that process, too: ``python -m karamelo_py.app.bench.apart``, which takes a `Measurement` from
-its input and gives what it finds to its output, in JSON. It ends with the process that has started
-it.
+What workloads before it leave in memory has no part in the speed of one then. This module is the
+program of such a process, too: ``python -m karamelo_py.app.bench.apart``. It takes a `Measurement`
+in JSON from its input, gives what it finds to its output, and ends with the process that has
+started it. One of several takes it as its argument, and the first writes what they find to a file.
 """
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
+from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from karamelo_py.app.bench import measure
-from karamelo_py.app.bench.measure import Measured
-from karamelo_py.app.bench.workloads import WORKLOADS
-from karamelo_py.app.cli import outcome_of
-from karamelo_py.app.together import Outcome
+from karamelo_py.app.bench.measure import WORKLOADS, Measured
+from karamelo_py.app.launch import Outcome, keep_to_oneself, launch, outcome_of, together
+from karamelo_py.run.mpi.comm import MpiComm
 from karamelo_py.script.errors import ScriptError
 
 _SIGNALS = {one.value: one.name for one in signal.Signals}
-COMMAND = (sys.executable, "-m", "karamelo_py.app.bench.apart")
+MODULE = "karamelo_py.app.bench.apart"
+COMMAND = (sys.executable, "-m", MODULE)
+# With --ranks, unless workloads are named: those whose scaling has an aim.
+USUAL = ("disks-320", "block-3d-mls", "bar-3d-ul", "dam-break")
+HEADING = (
+    f"  {'processes x threads':<22}{'points':>9} {'million/s':>10} {'times one':>10} "
+    f"{'exchange':>9} {'imbalance':>10}"
+)
 
 
 class Measurement(NamedTuple):
-    """Arguments of one measurement; `triad` is the bandwidth of the memory (bytes/s)."""
+    """Arguments of one measurement."""
 
     workload: str
     threads: int
     presets: dict[str, str]
     seconds: float
-    triad: float
-    debug: bool
+    triad: float = 0.0  # bandwidth of the memory (bytes/s)
+    debug: bool = False
+    ranks: int = 1
+    file: str = ""  # for what several processes find
+
+
+# ---- one process --------------------------------------------------------------------------------
 
 
 def measured(part: Measurement) -> Measured:
@@ -45,13 +62,7 @@ def measured(part: Measurement) -> Measured:
 
 
 def measured_apart(part: Measurement) -> Measured | Outcome:
-    """Measure a workload in a process of its own; how that has ended where it went wrong.
-
-    Raises
-    ------
-    ScriptError
-        If somebody ended it.
-    """
+    """Measure a workload in a process of its own; how that has ended where it went wrong."""
     # A session of its own: Ctrl-C comes to this process alone.
     process = subprocess.Popen(
         COMMAND, bufsize=0, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
@@ -74,8 +85,101 @@ def measured_apart(part: Measurement) -> Measured | Outcome:
     return Measured(**found["measured"]) if "measured" in found else Outcome(**found)
 
 
-def main() -> None:
-    """Measure what the input says, and give what is found to the output."""
+# ---- several processes --------------------------------------------------------------------------
+
+
+class Scaled(NamedTuple):
+    """Measured speed with some processes of some threads each."""
+
+    ranks: int
+    threads: int
+    weak: bool  # of a scene so many times as large
+    points: int
+    best: float  # particle-steps per second of the fastest repetition
+    exchange: float  # share of its time that the process which waits least waits for others
+    imbalance: float  # share that the others wait longer than that one, their mean
+
+
+def scaled(part: Measurement, ranks: Sequence[int], available: int) -> Iterator[Scaled]:
+    """Measure a workload with one process, then with several, or as many threads; then grown."""
+    counts = sorted({1, *ranks})
+    for n in counts:
+        yield measured_with_ranks(part._replace(ranks=n))
+        if n > 1 and n * part.threads <= available:
+            yield measured_with_ranks(part._replace(threads=n * part.threads))
+    for n in counts[1:]:
+        larger = part.presets | grown(WORKLOADS[part.workload].script, part.presets, n)
+        yield measured_with_ranks(part._replace(ranks=n, presets=larger), weak=True)
+
+
+def grown(script: str, presets: Mapping[str, str], times: int) -> dict[str, str]:
+    """Find the variable for the size of a scene with so many times the points."""
+    d = int(re.search(r"dimension\((\d)", script)[1])
+    name, value = re.search(r"^(N|coarser) = (\S+)$", script, re.M).groups()
+    value = float(presets.get(name, value))
+    if name == "N":
+        return {name: str(round(value * times ** (1 / d)))}
+    return {name: repr(value / times ** (1 / d))}
+
+
+def measured_with_ranks(part: Measurement, *, weak: bool = False) -> Scaled:
+    """Measure a workload with so many processes, which are started as those of a run."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "found.json"
+        words = [json.dumps(part._replace(file=str(file)))]
+        if part.ranks > 1:
+            status = launch(part.ranks, words, module=MODULE)
+        else:
+            status = subprocess.run([*COMMAND, *words], check=False).returncode
+        if status or not file.exists():
+            why = f"ended by signal {abs(status) % 128}" if not 0 <= status < 128 else "see above"
+            raise ScriptError(
+                f"{part.workload} could not be measured with {part.ranks} x {part.threads}: {why}"
+            )
+        found = json.loads(file.read_text(encoding="utf-8"))
+    return Scaled(part.ranks, part.threads, weak, **found)
+
+
+def _measure_share(part: Measurement, comm: MpiComm | None = None) -> int:
+    """Measure as one of the processes; the first writes what is found."""
+    workload = WORKLOADS[part.workload]
+    simulation = measure.build(workload, part.threads, part.presets, comm)
+    simulation.compile()
+    count, found = measure.repeated(simulation, part.seconds, workload.lead)
+    taken, waits = min(found, key=lambda one: one[0])
+    if simulation.comm.leads:
+        least = float(np.min(waits))
+        file = {
+            "points": simulation.count,
+            "best": simulation.count * count / taken,
+            "exchange": least / taken,
+            "imbalance": (float(np.mean(waits)) - least) / taken,
+        }
+        Path(part.file).write_text(json.dumps(file), encoding="utf-8")
+    return 0
+
+
+def line(row: Scaled, one: Scaled) -> str:
+    """Write a line of the table: speeds, and their ratios to that of one process."""
+    who = f"{row.ranks} x {row.threads}" + (" (larger)" if row.weak else "")
+    shares = f"{'-':>9} {'-':>10}"
+    if row.ranks > 1:
+        shares = f"{100 * row.exchange:>7.1f} % {100 * row.imbalance:>8.1f} %"
+    speed = f"{row.best / 1e6:>10.2f} {row.best / one.best:>10.2f}"
+    return f"  {who:<22}{row.points:>9} {speed} {shares}"
+
+
+# ---- the program of these processes -------------------------------------------------------------
+
+
+def main() -> int:
+    """Measure what the argument or the input says."""
+    if len(sys.argv) > 1:
+        part = Measurement(*json.loads(sys.argv[1]))
+        keep_to_oneself()
+        if part.ranks > 1:
+            return together(part.ranks, lambda comm: _measure_share(part, comm))
+        return _measure_share(part)
     answers, sys.stdout = sys.stdout, sys.stderr
     part = Measurement(*json.loads(sys.stdin.readline()))
     threading.Thread(target=_end_with_the_other, daemon=True).start()
@@ -90,6 +194,7 @@ def main() -> None:
 
     outcome = outcome_of(act, debugging=part.debug)
     print(json.dumps(found or outcome._asdict()), file=answers, flush=True)
+    return 0
 
 
 def _end_with_the_other() -> None:
@@ -99,4 +204,4 @@ def _end_with_the_other() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -4,36 +4,41 @@ Speeds are of the fastest of several repetitions; they are meant for comparison 
 this command, since machines are shared and their clocks change.
 """
 
+import json
 import re
+import subprocess
 import sys
-from argparse import ArgumentTypeError, Namespace
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from collections.abc import Mapping
+from math import inf
 from pathlib import Path
 from typing import Any
 
-from karamelo_py.app.bench import apart, measure, record, scaling
-from karamelo_py.app.bench.workloads import WORKLOADS
+import karamelo_py
+from karamelo_py.app.bench import apart, measure
+from karamelo_py.app.bench.measure import WORKLOADS
+from karamelo_py.app.launch import Outcome
 from karamelo_py.app.options import above_zero, add_variables, threads_option
-from karamelo_py.app.studies.options import out_file
-from karamelo_py.app.together import Outcome
+from karamelo_py.app.plot import read_text
+from karamelo_py.app.studies.records import surroundings
+from karamelo_py.app.studies.variables import out_file
+from karamelo_py.output.files import write_whole
 from karamelo_py.script.errors import ScriptError, unknown
 
 ELSEWHERE = "published, one core of another machine, a small AMD EPYC"
-
-
-def add_parser(subparsers: Any) -> None:
-    """Say what the subcommand takes, and what it can measure."""
-    width = max(map(len, WORKLOADS))
-    parser = subparsers.add_parser(
-        "bench",
-        description=f"""\
+KIND = "karamelo-py bench"
+WIDTH = max(map(len, WORKLOADS))
+DESCRIPTION = f"""\
 Measure the speed of this machine on known scenes, all or those that are named: particle-steps per
 second of the fastest of five repetitions, bytes per particle, the time of each stage of a step, and
 what limits it: memory, arithmetic, nodes or overhead. Each of several has a process of its own.
 
 workloads:
-{chr(10).join(f"  {name:<{width}}  {w.title}" for name, w in WORKLOADS.items())}""",
-    )
-    parser.set_defaults(act=measure_all)
+{chr(10).join(f"  {name:<{WIDTH}}  {w.title}" for name, w in WORKLOADS.items())}"""
+
+
+def add_options(parser: ArgumentParser) -> None:
+    """Add what the subcommand takes."""
     parser.add_argument("workloads", nargs="*", metavar="WORKLOAD")
     add_variables(parser, "set a variable of the scenes, such as N, their fineness")
     parser.add_argument(
@@ -43,7 +48,7 @@ workloads:
     parser.add_argument(
         "--ranks", type=_counts, metavar="N,M,...",
         help="measure with so many processes instead, and with as many threads: on the scene as it "
-        f"is, and on one as many times as large (default workloads: {', '.join(scaling.USUAL)})",
+        f"is, and on one as many times as large (default workloads: {', '.join(apart.USUAL)})",
     )  # fmt: skip
     parser.add_argument(
         "--seconds", type=above_zero, default=2.0, metavar="S",
@@ -56,12 +61,12 @@ workloads:
     parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
 
 
-def measure_all(options: Namespace) -> int:
-    """The subcommand."""
+def run(options: Namespace) -> int:
+    """Measure what the command line asks for; returns the exit status."""
     for name in options.workloads:
         if name not in WORKLOADS:
             raise unknown(f"unknown workload '{name}'", name, WORKLOADS)
-    chosen = options.workloads or (scaling.USUAL if options.ranks else list(WORKLOADS))
+    chosen = options.workloads or (apart.USUAL if options.ranks else list(WORKLOADS))
     known = {name: set(re.findall(r"\w+", WORKLOADS[name].script)) for name in chosen}
     for variable, _ in options.var:
         if not any(variable in words for words in known.values()):
@@ -69,7 +74,7 @@ def measure_all(options: Namespace) -> int:
                 f"-var {variable}: no scene has a variable '{variable}'", expected="N or coarser"
             )
     out = out_file(options.o, ".json") if options.o else None
-    earlier = record.read(options.against) if options.against else None
+    earlier = read(options.against) if options.against else None
     from numba import config
 
     from karamelo_py.compiler.threads import set_threads
@@ -79,34 +84,28 @@ def measure_all(options: Namespace) -> int:
     set_threads(threads)
     triad = measure.bandwidth(threads)
     print(f"threads {threads}, triad bandwidth {triad / 1e9:.1f} GB/s (256 MiB arrays)")
-    found = record.head(threads, triad, options.seconds)
+    about = {"commit": commit(), "threads": threads, "triad": triad, "seconds": options.seconds}
+    found: dict[str, Any] = {"kind": KIND, **surroundings(), **about, "workloads": {}}
     for name in chosen:
-        workload = WORKLOADS[name]
         presets = {n: value for n, value in options.var if n in known[name]}
+        part = apart.Measurement(name, threads, presets, options.seconds, triad, options.debug)
         if options.ranks:
-            rows = []
-            print(f"\n{name}: {workload.title}\n{scaling.HEADING}")
-            for row in scaling.scaled(
-                name, options.ranks, threads, presets, options.seconds, available
-            ):
-                rows.append(row)
-                print(scaling.line(row, rows[0]), flush=True)
-            found["workloads"][name] = record.scaled(rows, workload.title, presets)
+            one = _scaling(part, options.ranks, available)
         else:
             act = apart.measured_apart if len(chosen) > 1 else apart.measured
-            one = act(
-                apart.Measurement(name, threads, presets, options.seconds, triad, options.debug)
-            )
-            if isinstance(one, Outcome):
+            measured = act(part)
+            if isinstance(measured, Outcome):
                 sys.stdout.flush()
-                print(one.text, file=sys.stderr, flush=True)
-                return one.status
-            _print(name, one, published=not presets)
-            found["workloads"][name] = record.entry(one, workload.title, presets)
+                print(measured.text, file=sys.stderr, flush=True)
+                return measured.status
+            _print(name, measured, published=not presets)
+            one = measured.record()
+        title = WORKLOADS[name].title
+        found["workloads"][name] = {"title": title, "variables": presets, **one}
         if out:
-            record.write(out, found)
+            write_whole(out, json.dumps(found, indent=1) + "\n")
     if earlier:
-        print("\n" + "\n".join(record.comparison(found, earlier)))
+        print("\n" + "\n".join(comparison(found, earlier)))
     if out:
         print(f"\nwritten: {out}")
     return 0
@@ -117,6 +116,17 @@ def _counts(text: str) -> list[int]:
     if not all(word.isdigit() and int(word) for word in words):
         raise ArgumentTypeError(f"'{text}' is no list of numbers of processes, such as 1,2,4")
     return [int(word) for word in words]
+
+
+def _scaling(part: apart.Measurement, ranks: list[int], available: int) -> dict[str, Any]:
+    """Measure and print how a workload scales; its record, in which the speed of one is first."""
+    rows: list[apart.Scaled] = []
+    print(f"\n{part.workload}: {WORKLOADS[part.workload].title}\n{apart.HEADING}")
+    for row in apart.scaled(part, ranks, available):
+        rows.append(row)
+        print(apart.line(row, rows[0]), flush=True)
+    first, *_ = scaling = [row._asdict() for row in rows]
+    return {"points": first["points"], "best": first["best"], "scaling": scaling}
 
 
 def _print(name: str, one: measure.Measured, *, published: bool) -> None:
@@ -134,8 +144,77 @@ def _print(name: str, one: measure.Measured, *, published: bool) -> None:
     for stage, per in stages.items():
         print(f"    {stage:<38} {1e9 * per / one.points:8.2f} ns")
     print(f"    {'together, in one compiled loop':<38} {1e9 / best:8.2f} ns")
-    if not one.told_apart:
-        print(f"  {'limited by':<34} {one.limit:>8} (sweeps are too short to be timed one by one)")
-        return
-    shares = f"nodes {100 * one.nodes:.0f} % of the sweeps, {100 * one.rest:.0f} % beside them"
+    shares = "sweeps are too short to be timed one by one"
+    if one.told_apart:
+        shares = f"nodes {100 * one.nodes:.0f} % of the sweeps, {100 * one.rest:.0f} % beside them"
     print(f"  {'limited by':<34} {one.limit:>8} ({shares})")
+
+
+# ---- files of what was measured -----------------------------------------------------------------
+
+
+def commit() -> str | None:
+    """Find the commit of the program where it runs from its repository."""
+    folder = Path(karamelo_py.__file__).parent
+
+    def git(*words: str) -> str:
+        return subprocess.run(
+            ["git", "-C", str(folder), *words], capture_output=True, text=True, check=True,
+            timeout=10,
+        ).stdout.strip()  # fmt: skip
+
+    try:
+        git("ls-files", "--error-unmatch", "__init__.py")  # not a folder in another repository
+        return git("describe", "--always", "--dirty", "--abbrev=40", "--exclude=*")
+    except (OSError, subprocess.SubprocessError):
+        return None
+
+
+def read(path: Path) -> dict[str, Any]:
+    """Read a bench that was written before."""
+    expected = "a file that karamelo-py bench -o has written"
+    text = read_text(path, expected)
+    try:
+        found = json.loads(text)
+        speeds = [one["best"] for one in found["workloads"].values()]
+        good = found["kind"] == KIND and all(0 < best < inf for best in speeds)
+    except (ValueError, LookupError, TypeError, AttributeError):
+        good = False
+    if not good:
+        raise ScriptError(f"{path} is not the output of a bench", expected=expected)
+    return found
+
+
+def comparison(now: Mapping[str, Any], then: Mapping[str, Any]) -> list[str]:
+    """Compare a bench with an earlier one: ratios of speeds, then what differs around, by line."""
+    lines = [f"{'workload':<24} {'then':>10} {'now':>10} {'ratio':>7}   (best, million/s)"]
+    ours, theirs = now["workloads"], then["workloads"]
+    for name in dict.fromkeys((*ours, *theirs)):
+        one, other = ours.get(name), theirs.get(name)
+        before, after = (f"{each['best'] / 1e6:.2f}" if each else "-" for each in (other, one))
+        ratio, said = "-", "new" if other is None else "not measured now"
+        if one and other:
+            # Of what differs here, ratios say something about the surroundings, too.
+            about = ("points", "precision", "variables")
+            said = ", ".join(f"other {key}" for key in about if one.get(key) != other.get(key))
+            ratio = "-" if said else f"{one['best'] / other['best']:.2f}"
+        lines.append(f"{name:<24} {before:>10} {after:>10} {ratio:>7}   {said}")
+    return [line.rstrip() for line in [*lines, *_differences(now, then)]]
+
+
+def _differences(now: Mapping[str, Any], then: Mapping[str, Any]) -> list[str]:
+    """List other differences between two benches, a line each: machine, threads, versions."""
+
+    def about(found: Mapping[str, Any]) -> dict[str, Any]:
+        keys = ("processor", "cores", "system", "commit", "threads")
+        versions = found.get("versions") or {}
+        return {key: found.get(key) for key in keys} | {
+            f"version of {name}": version for name, version in versions.items()
+        }
+
+    ours, theirs = about(now), about(then)
+    return [
+        f"another {word}: {theirs.get(word) or 'unknown'} then, {ours.get(word) or 'unknown'} now"
+        for word in ours | theirs
+        if ours.get(word) != theirs.get(word)
+    ]

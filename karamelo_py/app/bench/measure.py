@@ -2,33 +2,69 @@
 
 import statistics
 import time
-from collections.abc import Callable, Iterator, Mapping
+import tomllib
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from math import inf
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numba import config
 
-from karamelo_py.app.bench.workloads import MOST_STEPS, Workload
+from karamelo_py.app.launch import share
 from karamelo_py.compiler.compile import index, shared
 from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.threads import Serial, Threaded, shared_out
 from karamelo_py.kernels.clock import finish
+from karamelo_py.kernels.p2g import columns_of
 from karamelo_py.kernels.step import DONE, Fused, begin, step
-from karamelo_py.kernels.sums import columns_of
 from karamelo_py.kernels.sweep import sum_buffers, sweep_nodes, sweep_points
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.run.lower.sizes import node_fields, nodes_in_use, point_fields
+from karamelo_py.run.mpi.comm import MpiComm
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
-ARRAYS = 3 * 256 * 2**20  # bytes
+MOST_STEPS = 2500  # in the scenes nothing leaves the domain before
+ARRAYS = 3 * 256 * 2**20  # bytes, far more than caches hold
 REPETITIONS = 5
 ALONE = 0.5  # the share of a step from which on something is said to limit it
 APART = 1.5  # times a step in one compiled loop, up to which its sweeps one by one are believed
+
+
+class Workload(NamedTuple):
+    """A scene to be timed."""
+
+    title: str
+    script: str
+    # Steps before the measuring begins.
+    lead: int = 3
+    # Published million particle-steps a second of Karamelo (C++) on one core of a small AMD EPYC.
+    karamelo: float | None = None
+
+
+def _read_workloads() -> dict[str, Workload]:
+    path = Path(__file__).with_name("workloads.toml")
+    found = tomllib.loads(path.read_text(encoding="utf-8"))
+    texts = found["scenes"]
+
+    def workload(
+        title: str, scenes: Sequence[str], variables: Mapping[str, str | int],
+        method: str = "ulmpm, FLIP, linear, 1", scheme: str = "musl", precision: str = "double",
+        **rest,
+    ) -> Workload:  # fmt: skip
+        lines = [f"precision({precision})", f"method({method})", f"scheme({scheme})"]
+        for name, value in variables.items():
+            lines.append(f'{name} = "{value}"' if isinstance(value, str) else f"{name} = {value}")
+        return Workload(title, "\n".join([*lines, *(texts[name] for name in scenes)]), **rest)
+
+    return {name: workload(**each) for name, each in found["workloads"].items()}
+
+
+WORKLOADS = _read_workloads()
 
 
 class Timed(NamedTuple):
@@ -43,47 +79,26 @@ class Timed(NamedTuple):
 
 
 class Measured(NamedTuple):
-    """Measured speed of a workload.
-
-    Attributes
-    ----------
-    points
-        How many.
-    speeds
-        Particle-steps per second of each repetition.
-    bytes_per_particle, bytes_per_step
-        Those that a point holds, and those that move in a particle-step if no cache keeps them.
-    roofline
-        The share of the memory's bandwidth that these take at the best speed.
-    roofline_in_place
-        The same, of the bandwidth of arrays as large as the scene, which caches may keep.
-    of_points, of_nodes
-        Seconds per step in sweeps over points and over nodes, without the way there.
-    waits
-        Seconds per step of these in which threads begin and wait for each other.
-    precision
-        ``double`` or ``single``.
-    """
+    """Measured speed of a workload."""
 
     points: int
-    speeds: list[float]
+    speeds: list[float]  # particle-steps per second of each repetition
     bytes_per_particle: int
-    bytes_per_step: float
-    roofline: float
-    roofline_in_place: float
+    bytes_per_step: float  # that move in a particle-step if no cache keeps them
+    roofline: float  # share of the memory's bandwidth that these take at the best speed
+    roofline_in_place: float  # the same, of arrays as large as the scene, which caches may keep
+    # Seconds per step in sweeps over points and over nodes, without the way there.
     of_points: dict[str, float]
     of_nodes: dict[str, float]
-    waits: float
+    waits: float  # seconds per step of these in which threads begin and wait for each other
     precision: str
 
     @property
     def best(self) -> float:
-        """Particle-steps per second of the fastest repetition."""
         return max(self.speeds)
 
     @property
     def median(self) -> float:
-        """Their median."""
         return statistics.median(self.speeds)
 
     @property
@@ -126,28 +141,43 @@ class Measured(NamedTuple):
             return "nodes"
         return "memory" if self.roofline_in_place >= ALONE else "arithmetic"
 
+    def record(self) -> dict[str, Any]:
+        """Write what is kept in a file; speeds in particle-steps/s, times in seconds."""
+        return {
+            "points": self.points,
+            "precision": self.precision,
+            "best": self.best,
+            "median": self.median,
+            "speeds": self.speeds,
+            "bytes_per_particle": self.bytes_per_particle,
+            "bytes_per_particle_step": self.bytes_per_step,
+            "roofline": self.roofline,
+            "roofline_in_place": self.roofline_in_place,
+            "limited_by": self.limit,
+            "share_of_nodes": self.nodes,
+            "share_of_rest": self.rest,
+            "sweeps_of_points": self.of_points,
+            "sweeps_of_nodes": self.of_nodes,
+        }
+
 
 def _name(*tags: Any) -> str:
     return " + ".join(type(tag).__name__ for tag in tags)
 
 
 @sweep_points.on(Timed)
-def _sweep_points_timed(mode, visit, s, block, then, gathers, scatters, dt):
+def _sweep_points_timed(mode, visit, s, block, *others):
     nothing = block._replace(tiling=block.tiling._replace(count=np.zeros(3, np.int64)))
-    name = _name(*visit.tasks, *visit.quantities)
-    with _noted(mode.of_points, name):
-        sweep_points(mode.mode, visit, s, block, then, gathers, scatters, dt)
-    with _noted(mode.of_points, name):
-        sweep_points(mode.mode, visit, s, nothing, then, gathers, scatters, dt)
+    for swept in (block, nothing):
+        with _noted(mode.of_points, _name(*visit.tasks, *visit.quantities)):
+            sweep_points(mode.mode, visit, s, swept, *others)
 
 
 @sweep_nodes.on(Timed)
 def _sweep_nodes_timed(mode, task, kin, nodes, ranges, dt):
-    nothing = np.zeros_like(ranges)
-    with _noted(mode.of_nodes, _name(task)):
-        sweep_nodes(mode.mode, task, kin, nodes, ranges, dt)
-    with _noted(mode.of_nodes, _name(task)):
-        sweep_nodes(mode.mode, task, kin, nodes, nothing, dt)
+    for swept in (ranges, np.zeros_like(ranges)):
+        with _noted(mode.of_nodes, _name(task)):
+            sweep_nodes(mode.mode, task, kin, nodes, swept, dt)
 
 
 @sum_buffers.on(Timed)
@@ -165,27 +195,23 @@ def _noted(seconds: dict[str, list[float]], name: str) -> Iterator[None]:
 
 
 def build(
-    workload: Workload, threads: int | None, presets: Mapping[str, str] | None = None
+    workload: Workload, threads: int | None, presets: Mapping[str, str], comm: MpiComm | None = None
 ) -> Simulation:
-    """The simulation of a workload, ready to step; `presets` set variables of its script."""
+    """Build the simulation of a workload, ready to step; `presets` set variables of its script."""
     hub = Hub(Console(quiet=True))
     hub.settings.threads = threads
+    if comm is not None:
+        share(hub, comm)
     hub.interpreter = Interpreter(hub, presets=presets)
     hub.interpreter.run_text(workload.script, "bench")
-    simulation = hub.simulation
-    simulation.begin(inf)
-    return simulation
+    hub.simulation.begin(inf)
+    return hub.simulation
 
 
-def measured(
-    simulation: Simulation,
-    seconds: float,
-    triad: float,
-    lead: int = 3,
-    repetitions: int = REPETITIONS,
-) -> Measured:
+def measured(simulation: Simulation, seconds: float, triad: float, lead: int) -> Measured:
     """Measure a scene for about so many seconds; `triad` is the bandwidth of the memory."""
-    rates = speeds(simulation, seconds, lead, repetitions)
+    count, found = repeated(simulation, seconds, lead)
+    rates = [simulation.count * count / taken for taken, _ in found]
     per_step, held, regions = traffic(simulation)
     return Measured(
         simulation.count,
@@ -200,31 +226,33 @@ def measured(
     )
 
 
-def speeds(
-    simulation: Simulation, seconds: float, lead: int = 3, repetitions: int = REPETITIONS
-) -> list[float]:
-    """Particle-steps per second of each repetition.
+def repeated(
+    simulation: Simulation, seconds: float, lead: int
+) -> tuple[int, list[tuple[float, np.ndarray]]]:
+    """Step a scene again and again from the state after `lead` steps, for `seconds` in all.
 
-    Every repetition starts from the same state, that after `lead` steps.
+    Returns
+    -------
+    count, found
+        Steps of a repetition; the seconds that each took, and those that each process waited.
     """
     timed_steps(simulation, lead)
     start = simulation.snapshot()
-    count = step_count(timed_steps(simulation, 5) / 5, seconds, repetitions)
-    rates = []
-    for _ in range(repetitions):
+    count = int(seconds / REPETITIONS / (timed_steps(simulation, 5) / 5))
+    count = simulation.comm.bcast(min(max(5, count), MOST_STEPS))
+    found = []
+    for _ in range(REPETITIONS):
         simulation.restore(start)
-        rates.append(simulation.count * count / timed_steps(simulation, count))
+        before, begun = simulation.waits(), time.perf_counter()
+        timed_steps(simulation, count)
+        after = simulation.waits()  # all have finished then
+        found.append((time.perf_counter() - begun, after - before))
     simulation.restore(start)
-    return rates
-
-
-def step_count(per_step: float, seconds: float, repetitions: int = REPETITIONS) -> int:
-    """Steps of a repetition, where one takes so long and all together about `seconds`."""
-    return min(max(5, int(seconds / repetitions / per_step)), MOST_STEPS)
+    return count, found
 
 
 def timed_steps(simulation: Simulation, count: int) -> float:
-    """Seconds that `count` steps take."""
+    """Take `count` steps; returns the seconds."""
     begun = time.perf_counter()
     if simulation.advance(count) != DONE:
         raise ScriptError("a workload went wrong")
@@ -232,7 +260,7 @@ def timed_steps(simulation: Simulation, count: int) -> float:
 
 
 def stages(simulation: Simulation, seconds: float) -> tuple[dict[str, float], dict[str, float]]:
-    """Seconds per step in each sweep of a fused step over points and over nodes.
+    """Time each sweep of a fused step over points and over nodes, in seconds per step.
 
     They are called one by one, some in each step more than once; sums of medians.
     """
@@ -302,13 +330,11 @@ def _sum_buffers_recorder(mode, quantities, s, due):
 
 
 def traffic(simulation: Simulation) -> tuple[float, float, int]:
-    """Bytes per particle-step that have to move if nothing stays in a cache; what else follows.
+    """Count bytes per particle-step that have to move if nothing stays in a cache.
 
-    The others are the bytes that the scene holds, and how often in a step threads begin.
-
-    Fields of the points count once for each sweep that reads and once for each that writes them;
-    of node fields, those that loops over nodes go through; of the tiles' buffers, what is given to
-    them and summed.
+    Also the bytes that the scene holds, and how often in a step threads begin. Fields of the points
+    count once for each sweep that reads and once for each that writes them; of node fields, those
+    that loops over nodes go through; of the tiles' buffers, what is given to them and summed.
     """
     s, scheme = simulation.setup, simulation.hub.update.scheme
     recorder = _Recorder([], [], [], [])
@@ -332,7 +358,7 @@ def _triad_part(a, b, c, factor, parts, k):
         a[index(i)] = b[index(i)] + factor * c[index(i)]
 
 
-_triad_parts = shared_out(shared(_triad_part), "a, b, c, factor, parts")
+_triad_parts = shared_out(shared(_triad_part))
 
 
 @kernel
@@ -351,10 +377,7 @@ def _fastest(calls: int, act: Callable, *arguments: Any) -> float:
 
 
 def bandwidth(threads: int, size: float = ARRAYS) -> float:
-    """Bytes per second of a[i] = b[i] + factor c[i] over three arrays of `size` bytes together.
-
-    By default they are far larger than the caches.
-    """
+    """Measure bytes/s of a[i] = b[i] + factor c[i] over three arrays of `size` bytes together."""
     n = max(1000, int(size / 24))
     a, b, c = np.zeros(n), np.ones(n), np.ones(n)
     mode = Serial() if threads == 1 else Threaded()
@@ -363,5 +386,5 @@ def bandwidth(threads: int, size: float = ARRAYS) -> float:
 
 
 def start_of_threads() -> float:
-    """Seconds that it takes threads to begin and to wait for each other, for next to no work."""
+    """Measure the seconds in which threads begin and wait for each other, with no work."""
     return _fastest(200, _triad, Threaded(), *np.ones((3, 64)), 0.5, config.NUMBA_NUM_THREADS, 1)

@@ -2,28 +2,20 @@
 
 import re
 import subprocess
-import sys
-from collections.abc import Iterator, Mapping
+from argparse import ArgumentParser
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from karamelo_py.app.options import above_zero, positive
-from karamelo_py.app.studies import records
-from karamelo_py.app.studies.case import environment
+from karamelo_py.app.studies import records, variables
+from karamelo_py.app.studies.case import PROGRAM, environment, options_of, worded
 from karamelo_py.app.studies.curves import column, order, usable
-from karamelo_py.app.studies.forecast import Forecast, forecast
-from karamelo_py.app.studies.options import (
-    add_combinations,
-    add_family,
-    family,
-    new_parser,
-    out_file,
-    zipped,
-)  # fmt: skip
 from karamelo_py.app.studies.study import Study, plain_table, shown, terminal
-from karamelo_py.app.studies.variables import cases, logged
 from karamelo_py.script.errors import ScriptError, plural
 from karamelo_py.script.terms import number_of
 
@@ -39,6 +31,72 @@ one at a time, since their times count, unless another cost is named. With -run 
 and it is told whether it met the target."""
 
 
+@dataclass(frozen=True)
+class Forecast:
+    """Forecast of a run that has not been made: its error, between which bounds, and its cost."""
+
+    error: float
+    low: float
+    high: float
+    cost: float
+
+
+def forecast(
+    x: float, xs: Sequence[float], rows: Sequence[Mapping[str, Any]], accuracy: str, cost: str
+) -> Forecast | None:
+    """Expect a run at `x` from the runs at `xs`, coarse ones first.
+
+    The error goes on with the order between the last two. Its bounds are those of the least and the
+    largest order so far, at least a third of the expected order away; an order that has fallen may
+    fall by as much again. The time is steps times (a + b points), fitted to the runs; any other
+    cost goes on as between the last two. None where fewer than two runs have an error, or the last
+    one got worse.
+    """
+    xs = np.asarray(xs, float)
+    error = column(rows, accuracy)
+    good = np.isfinite(error) & (error > 0)
+    if good.sum() < 2 or not good[-1]:
+        return None
+    xs, error = xs[good], error[good]
+    rows = [row for row, is_good in zip(rows, good, strict=True) if is_good]
+    local = np.diff(np.log(error)) / np.diff(np.log(xs))
+    # Signs such that finer means a larger way.
+    way = abs(np.log(x / xs[-1]))
+    fall = local * np.sign(np.diff(np.log(xs)))
+    if fall[-1] >= 0:
+        return None
+    expected = -fall[-1]
+    rates = [-f for f in fall if f < 0]
+    # An order that falls may go on falling.
+    drop = max(-fall[-2] - expected, 0.0) if len(fall) > 1 else 0.0
+    slow = max(min(*rates, 2 / 3 * expected, expected - drop), 0.0)
+    fast = max(*rates, 4 / 3 * expected)
+    at = [float(error[-1] * np.exp(-rate * way)) for rate in (expected, fast, slow)]
+    return Forecast(*at, _cost(x, xs, rows, cost))
+
+
+def _cost(x: float, xs: np.ndarray, rows: Sequence[Mapping[str, Any]], cost: str) -> float:
+    values = column(rows, cost)
+    if cost == "seconds" and all(usable(a) for a in values):
+        steps, points = (np.array(column(rows, name), float) for name in ("steps", "points"))
+        # Relative errors count alike; neither part of the time can be negative.
+        matrix = np.stack([steps, steps * points], axis=1) / values[:, None]
+        parts = np.linalg.lstsq(matrix, np.ones(len(values)), rcond=None)[0]
+        if (parts < 0).any():
+            best = int(np.argmax(parts))
+            parts = np.zeros(2)
+            parts[best] = 1 / np.mean(matrix[:, best])
+        more = [_power(x, xs, of) for of in (steps, points)]
+        return float(more[0] * (parts[0] + parts[1] * more[1]))
+    return _power(x, xs, values)
+
+
+def _power(x: float, xs: np.ndarray, values: np.ndarray) -> float:
+    """A power law through the last two values."""
+    exponent = order(xs[-2:], values[-2:]).exponent
+    return float(values[-1] * (x / xs[-1]) ** (exponent if np.isfinite(exponent) else 0.0))
+
+
 @dataclass
 class ChoiceRuns:
     """A choice of words and what is known of its runs, coarse ones first."""
@@ -49,12 +107,12 @@ class ChoiceRuns:
     @property
     def label(self) -> str:
         """The choice in words."""
-        return ", ".join(f"{n} = {v}" for n, v in self.values.items()) or "the script"
+        return worded(self.values) or "the script"
 
 
 @dataclass
 class Candidate:
-    """A variant that may meet the target."""
+    """A variant that may meet the target; without a forecast it was run."""
 
     choice: ChoiceRuns
     step: int
@@ -66,18 +124,8 @@ class Candidate:
 class Adviser:
     """Looks for the cheapest variant whose error is at most `target`.
 
-    Parameters
-    ----------
-    study
-        Runs the variants.
-    along
-        The variable that makes a scene finer, and its values, coarse ones first.
-    choices
-        The other variables.
-    accuracy, cost
-        Columns of the table.
-    target
-        The error that is allowed.
+    `along` is the variable that makes a scene finer, with its values, coarse ones first; `accuracy`
+    and `cost` are columns of the table.
     """
 
     def __init__(
@@ -103,67 +151,67 @@ class Adviser:
                     self.go_on(choice)
 
     def _met(self, choice: ChoiceRuns) -> int | None:
-        """The first of its runs that meets the target."""
+        """Find the first of its runs that meets the target."""
         errors = column(choice.rows, self.accuracy)
         return next((k for k, e in enumerate(errors) if e <= self.target), None)
 
-    def candidates(self, choice: ChoiceRuns, hope: bool = False) -> Iterator[Candidate]:
-        """The cheapest variant of a choice that meets the target, known or expected.
+    def candidate(self, choice: ChoiceRuns, hope: bool = False) -> Candidate | None:
+        """Find the cheapest variant of a choice that meets the target, known or expected.
 
         With `hope` by the lower bound of the error.
         """
         k = self._met(choice)
         if k is not None:
-            row = choice.rows[k]
-            cost = column([row], self.cost)[0]
-            yield Candidate(choice, k, cost, column([row], self.accuracy)[0])
-            return
+            cost, error = (column(choice.rows, name)[k] for name in (self.cost, self.accuracy))
+            return Candidate(choice, k, cost, error)
         known = self.xs[: len(choice.rows)]
-        for step in range(len(choice.rows), len(self.xs)):
+        for step in range(len(known), len(self.xs)):
             found = forecast(self.xs[step], known, choice.rows, self.accuracy, self.cost)
             if found is None:
-                return
+                break
             if (found.low if hope else found.error) <= self.target:
-                yield Candidate(choice, step, found.cost, found.error, found)
-                return
+                return Candidate(choice, step, found.cost, found.error, found)
+        return None
+
+    def candidates(self, hope: bool = False) -> list[Candidate]:
+        """Find those of all choices, the cheapest first."""
+        found = filter(None, (self.candidate(choice, hope) for choice in self.choices))
+        return sorted(found, key=lambda c: c.cost)
 
     def best(self) -> Candidate | None:
-        """The cheapest candidate, after running what lies in between as far as it pays.
+        """Find the cheapest candidate, after running what lies in between as far as it pays.
 
         A choice that could become the cheapest is followed until its candidate is the next finer
         variant, so that its order is known where it matters.
         """
         while True:
-            found = [c for choice in self.choices for c in self.candidates(choice)]
-            best = min(found, key=lambda c: c.cost, default=None)
+            best = next(iter(self.candidates()), None)
             limit = best.cost if best else inf
             doubtful = [
-                c for choice in self.choices for c in self.candidates(choice, hope=True)
+                c for c in self.candidates(hope=True)
                 if c.forecast and c.step > len(c.choice.rows) and c.cost <= limit
             ]  # fmt: skip
             if not doubtful:
                 return best
-            self.go_on(min(doubtful, key=lambda c: c.cost).choice)
+            self.go_on(doubtful[0].choice)
 
     def hopeful(self) -> Candidate | None:
-        """The cheapest variant that may meet the target though none is expected to."""
-        found = [c for choice in self.choices for c in self.candidates(choice, hope=True)]
-        return min((c for c in found if c.forecast), key=lambda c: c.cost, default=None)
+        """Find the cheapest variant that may meet the target though none is expected to."""
+        return next((c for c in self.candidates(hope=True) if c.forecast), None)
+
+    def label(self, choice: ChoiceRuns, step: int) -> str:
+        """Write a variant in words."""
+        return f"{choice.label}, {self.name} = {self.values[step]}"
 
 
-def add_parser(subparsers: Any) -> None:
-    """The subcommand for the command line."""
-    parser = new_parser(
-        subparsers, "advise", "find the cheapest variant that is accurate enough", DESCRIPTION, run
-    )
-    add_family(parser)
-    add_combinations(parser)
+def add_options(parser: ArgumentParser) -> None:
+    """Add what the subcommand takes."""
+    variables.add_family(parser)
+    variables.add_combinations(parser)
     parser.add_argument(
-        "-accuracy",
-        required=True,
-        metavar="COLUMN",
+        "-accuracy", required=True, metavar="COLUMN",
         help="log column: err, max:err, or a formula: off=abs(max:u/3.28 - 1)",
-    )
+    )  # fmt: skip
     parser.add_argument("-target", required=True, type=above_zero, help="the error that is allowed")
     parser.add_argument("-cost", default="seconds", help="what counts as cost (seconds)")
     parser.add_argument("-along", metavar="NAME", help="the variable that makes the scene finer")
@@ -174,10 +222,10 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: Any) -> int:
     """Do what the command line says; returns the exit status."""
-    out = out_file(options.o, ".csv")
+    out = variables.out_file(options.o, ".csv")
     timed = options.cost in ("seconds", "wall_s", "particle_steps_per_s")
-    values, launch, jobs = family(options, timed=timed)
-    items = records.recorded(options.accuracy, logged(options.script), options.script, values)
+    values, script, launch, jobs = variables.family(options, timed=timed)
+    items = records.recorded(options.accuracy, script, values)
     if len(items) != 1:
         raise ScriptError(f"-accuracy {options.accuracy}", expected="one column")
     if options.cost not in records.COLUMNS:
@@ -185,27 +233,21 @@ def run(options: Any) -> int:
     numeric = [name for name in values if all(number_of(v) is not None for v in values[name])]
     name = options.along or max(numeric, key=lambda n: len(values[n]), default=None)
     if name not in numeric or len(values[name]) < 3:
-        raise ScriptError(
-            "no variable makes the scene finer" if name not in numeric
-            else f"-var {name} has {plural(len(values[name]), 'value')}",
-            expected="a number with at least 3 values, such as -var N=10,20,40,80",
-        )  # fmt: skip
+        wrong = "no variable makes the scene finer"
+        if name in numeric:
+            wrong = f"-var {name} has {plural(len(values[name]), 'value')}"
+        expected = "a number with at least 3 values, such as -var N=10,20,40,80"
+        raise ScriptError(wrong, expected=expected)
     others = {n: v for n, v in values.items() if n != name}
-    together = zipped(options)
+    together = variables.zipped(options)
     if any(name in group for group in together):
         raise ScriptError(f"-zip: {name} makes the scene finer", expected="choices in step")
-    combined = cases(others, together, options.where) if others else [{}]
+    combined = variables.cases(others, together, options.where) if others else [{}]
     choices = [ChoiceRuns(case) for case in combined]
-    study = Study(
-        launch, out.with_suffix(""), items, jobs, again=options.again, strict=True,
-        most=len(choices) * len(values[name]),
-    )  # fmt: skip
+    most = len(choices) * len(values[name])
+    study = Study(launch, out, items, jobs, again=options.again, strict=True, most=most)
     study.names = list(values)
-    records.describe(
-        out, script=str(options.script), variables=values, record=[items[0].text], timed=timed,
-        repeat=1, threads=launch.threads, jobs=jobs,
-    )  # fmt: skip
-    study.on_row = lambda: records.write(out, list(study.rows.values()))
+    study.describe(variables=values, record=[items[0].text], timed=timed, repeat=1)
     ordered = coarse_first(options.script, name, values[name], choices[0].values)
     adviser = Adviser(study, (name, ordered), choices, items[0].word, options.cost, options.target)
     adviser.pilot(options.pilot)
@@ -221,16 +263,15 @@ def run(options: Any) -> int:
 def coarse_first(
     script: Path, name: str, values: list[str], others: Mapping[str, str]
 ) -> list[str]:
-    """Values in the order of the work they make, by what `karamelo-py check` says of the ends."""
+    """Put values in the order of the work they make: `karamelo-py check` tells that of the ends."""
     ordered = sorted(values, key=float)
     work = []
     for value in (ordered[0], ordered[-1]):
-        command = [sys.executable, "-m", "karamelo_py.app.cli", "check", str(script), "--threads"]
-        command += ["1", "-var", name, value]
-        command += [w for n, v in others.items() for w in ("-var", n, v)]
+        command = [*PROGRAM, "check", str(script), "--threads", "1"]
         said = subprocess.run(
-            command, capture_output=True, text=True, encoding="utf-8", env=environment()
-        ).stdout
+            [*command, *options_of({name: value, **others})],
+            capture_output=True, text=True, encoding="utf-8", env=environment(),
+        ).stdout  # fmt: skip
         points = re.search(r"^points +(\d+)", said, re.M)
         dt = re.search(r"^first dt +([-+.\deE]+)", said, re.M)
         work.append(float(points[1]) / float(dt[1]) if points and dt else None)
@@ -245,19 +286,17 @@ def tell(adviser: Adviser) -> None:
     table = plain_table(["choice"], headings)
     for choice in adviser.choices:
         errors = column(choice.rows, adviser.accuracy)
-        last = choice.rows[-1]
-        found = next(adviser.candidates(choice), None)
-        if not usable(errors[-1]):
-            shown_order = f"{last['status']}: {last['reason']}"[:60]
-        else:
-            shown_order = str(order(adviser.xs[: len(errors)], errors))
-        where = "–" if found is None else adviser.values[found.step]
-        cost = "–" if found is None else shown(float(found.cost))
-        if found is not None and found.forecast:
-            cost = f"about {cost}"
-        error = shown(float(errors[-1])) if usable(errors[-1]) else "–"
-        fine = adviser.values[len(choice.rows) - 1]
-        table.add_row(choice.label, str(len(choice.rows)), fine, error, shown_order, where, cost)
+        last, count = choice.rows[-1], len(choice.rows)
+        found = adviser.candidate(choice)
+        where = cost = error = "–"
+        if found is not None:
+            where = adviser.values[found.step]
+            cost = "about " * bool(found.forecast) + shown(float(found.cost))
+        fit = f"{last['status']}: {last['reason']}"[:60]
+        if usable(errors[-1]):
+            error, fit = shown(float(errors[-1])), str(order(adviser.xs[:count], errors))
+        fine = adviser.values[count - 1]
+        table.add_row(choice.label, str(count), fine, error, fit, where, cost)
     terminal().print(table)
 
 
@@ -278,33 +317,30 @@ def sureness(adviser: Adviser, best: Candidate) -> str:
     if best.forecast is None:
         return f"sure: it was run ({said})"
     low, high = best.forecast.low, best.forecast.high
-    word = "almost sure" if high <= adviser.target else "likely"
-    fraction = adviser.target / best.error
-    if high > adviser.target and fraction < 1.1:
-        word = "uncertain"
+    word = "almost sure"
+    if high > adviser.target:
+        word = "uncertain" if adviser.target / best.error < 1.1 else "likely"
     return f"{word}: expected {said}; by its orders the error lies between {low:.3g} and {high:.3g}"
 
 
 def _nothing(adviser: Adviser) -> int:
-    """No variant meets the target: say what comes nearest."""
+    """Say that no variant meets the target, and what comes nearest."""
     print(f"\nno variant is expected to reach {adviser.accuracy} <= {adviser.target:g}")
     found = [
-        (column([row], adviser.accuracy)[0], choice, row)
-        for choice in adviser.choices for row in choice.rows
+        (error, adviser.label(choice, k))
+        for choice in adviser.choices
+        for k, error in enumerate(column(choice.rows, adviser.accuracy)) if usable(error)
     ]  # fmt: skip
-    found = [item for item in found if usable(item[0])]
     if found:
-        error, choice, row = min(found, key=lambda item: item[0])
-        print(
-            f"nearest: {choice.label}, {adviser.name} = {row[adviser.name]} with {error:.3g}; "
-            f"finer values of {adviser.name} or other choices may do"
-        )
+        error, label = min(found, key=lambda item: item[0])
+        others = f"finer values of {adviser.name} or other choices may do"
+        print(f"nearest: {label} with {error:.3g}; {others}")
     hope = adviser.hopeful()
     if hope is not None:
         print(
-            f"{hope.choice.label}, {adviser.name} = {adviser.values[hope.step]} may do, at about "
-            f"{adviser.cost} {hope.cost:.3g}: expected {hope.error:.3g}, at best "
-            f"{hope.forecast.low:.3g}; with -run it is tried"
+            f"{adviser.label(hope.choice, hope.step)} may do, at about {adviser.cost} "
+            f"{hope.cost:.3g}: expected {hope.error:.3g}, at best {hope.forecast.low:.3g}; "
+            "with -run it is tried"
         )
     return 1
 
@@ -321,7 +357,7 @@ def carry_out(adviser: Adviser, best: Candidate | None, script: Path) -> int:
         row = best.choice.rows[-1]
         error = column([row], adviser.accuracy)[0]
         word = "met" if error <= adviser.target else "missed" if advised else "not yet met"
-        said = f"{best.choice.label}, {adviser.name} = {row[adviser.name]}"
+        said = adviser.label(best.choice, len(best.choice.rows) - 1)
         print(f"\nrun: {said}: {adviser.accuracy} {error:.4g}, the target is {word}")
         if row["reason"]:
             print(f"{row['status']}: {row['reason']}")
@@ -331,10 +367,9 @@ def carry_out(adviser: Adviser, best: Candidate | None, script: Path) -> int:
         best = best or adviser.hopeful()
     if best is None:
         return _nothing(adviser)
-    row = best.choice.rows[best.step]
     print(
-        f"\nthe target is met: {best.choice.label}, {adviser.name} = {row[adviser.name]} with "
-        f"{adviser.accuracy} {best.error:.4g} at {adviser.cost} {best.cost:.4g}; "
-        f"its files are in {row['folder']}"
+        f"\nthe target is met: {adviser.label(best.choice, best.step)} with {adviser.accuracy} "
+        f"{best.error:.4g} at {adviser.cost} {best.cost:.4g}; its files are in "
+        f"{best.choice.rows[best.step]['folder']}"
     )
     return 0

@@ -7,17 +7,18 @@ import re
 import shlex
 import shutil
 import subprocess
-import sys
 import time
 import tomllib
+from argparse import ArgumentParser
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import karamelo_py
+from karamelo_py.app.plot import read_text
 from karamelo_py.app.studies import records
-from karamelo_py.app.studies.case import environment
-from karamelo_py.app.studies.options import new_parser
+from karamelo_py.app.studies.case import PROGRAM, environment
+from karamelo_py.app.studies.variables import names
 from karamelo_py.output.console import duration
 from karamelo_py.output.files import write_whole
 from karamelo_py.script.errors import ScriptError, meant, plural
@@ -54,43 +55,24 @@ _RUN = re.compile(r"\d+/\d+  |note: |drawn: ")
 
 @dataclass
 class Entry:
-    """A picture or a table, and the commands that make it.
+    """A picture or a table, and the commands that make it."""
 
-    Attributes
-    ----------
-    name
-        Its folder; a part before a slash is what ``-only`` can name as well.
-    text
-        What it shows.
-    commands
-        Command lines of karamelo-py, without that word.
-    whole, small
-        Values of the words in braces.
-    interpreted
-        Whether its scenes are so small that to interpret them takes less time than to compile.
-    page
-        Whether it has a part of the page.
-    ends_early
-        Whether it shows runs that do not end well.
-    """
-
-    name: str
-    text: str = ""
-    commands: list[str] = field(default_factory=list)
+    name: str  # its folder; a part before a slash is what -only can name as well
+    text: str = ""  # what it shows
+    commands: list[str] = field(default_factory=list)  # of karamelo-py, without that word
+    # Values of the words in braces.
     whole: dict[str, str] = field(default_factory=dict)
     small: dict[str, str] = field(default_factory=dict)
-    interpreted: bool = False
-    page: bool = True
-    ends_early: bool = False
+    interpreted: bool = False  # its scenes are so small that this takes less time than to compile
+    page: bool = True  # has a part of the page
+    ends_early: bool = False  # shows runs that do not end well
+
+    @property
+    def group(self) -> str:
+        return self.name.partition("/")[0]
 
     def lines(self, inputs: str, *, small: bool) -> list[str]:
-        """The commands with their values.
-
-        Raises
-        ------
-        ScriptError
-            For a word in braces that has no value.
-        """
+        """Fill values into the commands."""
         words = {"inputs": inputs, **self.whole, **(self.small if small else {})}
         try:
             return [command.format(**words) for command in self.commands]
@@ -102,17 +84,9 @@ class Entry:
 
 
 def read(path: Path) -> tuple[list[Entry], Path]:
-    """The entries of an atlas, and its folder of scripts.
-
-    Raises
-    ------
-    ScriptError
-        If it cannot be read, or an entry is not one.
-    """
+    """Read the entries of an atlas, and its folder of scripts."""
     try:
-        found = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ScriptError(f"cannot read {path}: {error.strerror or error}") from None
+        found = tomllib.loads(read_text(path))
     except tomllib.TOMLDecodeError as error:
         raise ScriptError(f"{path} is not TOML: {error}") from None
     entries = []
@@ -129,9 +103,8 @@ def read(path: Path) -> tuple[list[Entry], Path]:
     return entries, (path.parent / found.get("inputs", "inputs")).resolve()
 
 
-def add_parser(subparsers: Any) -> None:
-    """The subcommand for the command line."""
-    parser = new_parser(subparsers, "atlas", "make pictures of a page again", DESCRIPTION, run)
+def add_options(parser: ArgumentParser) -> None:
+    """Add what the subcommand takes."""
     parser.add_argument("atlas", type=Path, help="the list of entries, such as docs/atlas.toml")
     parser.add_argument("-only", default="", metavar="NAMES", help="entries or groups, with commas")
     parser.add_argument("-small", action="store_true", help="at the smaller values of the entries")
@@ -149,20 +122,17 @@ def add_parser(subparsers: Any) -> None:
 def run(options: Any) -> int:
     """Do what the command line says; returns the exit status."""
     entries, inputs = read(options.atlas)
-    asked = [name.strip() for name in options.only.split(",") if name.strip()]
-    groups = {entry.name.partition("/")[0] for entry in entries}
+    asked = names(options.only)
+    groups = {entry.group for entry in entries}
+    known = [*groups, *(entry.name for entry in entries)]
     for name in asked:
-        if name not in groups and name not in {entry.name for entry in entries}:
-            known = [*groups, *(entry.name for entry in entries)]
+        if name not in known:
             raise ScriptError(
                 f"-only {name}: no such entry",
                 expected="one of " + ", ".join(sorted(groups)) + " (-list shows all)",
                 hint=meant(name, known),
             )
-    chosen = [
-        entry for entry in entries
-        if not asked or entry.name in asked or entry.name.partition("/")[0] in asked
-    ]  # fmt: skip
+    chosen = [e for e in entries if not asked or e.name in asked or e.group in asked]
     if options.list:
         for entry in chosen:
             first, *_ = re.split(r"(?<=[.:])\s", " ".join(entry.text.split()))
@@ -181,7 +151,8 @@ def run(options: Any) -> int:
         elif bad:
             state += f", {len(bad)} of {plural(count, 'run')} ended early"
             if not entry.ends_early:
-                failed[entry.name] = f" ({_few(bad)})"
+                more = f" and {len(bad) - 3} more" if len(bad) > 3 else ""
+                failed[entry.name] = f" ({', '.join(bad[:3])}{more})"
         print(f"{said} {state} ({duration(time.perf_counter() - begun)})", flush=True)
     if options.page and not options.small:
         write_page(options.page, entries, folder, inputs)
@@ -192,15 +163,10 @@ def run(options: Any) -> int:
 
 
 def ended(place: Path) -> tuple[list[str], int]:
-    """Runs in the tables of an entry that did not end well, and how many there are in all."""
+    """List runs in the tables of an entry that did not end well, and count all."""
     tables = [records.read(path) for path in sorted(place.glob("*.csv"))]
     runs = [row for table in tables for row in table if "status" in row and "folder" in row]
-    bad = [row["folder"] for row in runs if row["status"] != "done"]
-    return [Path(folder).name for folder in bad], len(runs)
-
-
-def _few(names: list[str]) -> str:
-    return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
+    return [Path(row["folder"]).name for row in runs if row["status"] != "done"], len(runs)
 
 
 def make(entry: Entry, place: Path, inputs: Path, *, small: bool, again: bool) -> str:
@@ -220,7 +186,7 @@ def make(entry: Entry, place: Path, inputs: Path, *, small: bool, again: bool) -
     told = []
     for line in lines:
         done = subprocess.run(
-            [sys.executable, "-m", "karamelo_py.app.cli", *shlex.split(line)],
+            [*PROGRAM, *shlex.split(line)],
             cwd=place, env={**environment(), **more}, stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE, text=True, encoding="utf-8", check=False,
         )  # fmt: skip
@@ -244,10 +210,7 @@ def key_of(lines: list[str]) -> str:
 
 
 def write_page(page: Path, entries: list[Entry], folder: Path, inputs: Path) -> None:
-    """Write a page of the entries that are done, with their pictures, commands and tables.
-
-    What it says of others stays.
-    """
+    """Write a page of the entries that are done; what it says of others stays."""
     before = page.read_text(encoding="utf-8") if page.exists() else ""
     kept = {
         part.partition("\n")[0]: part.rstrip() for part in re.split("^##+ ", before, flags=re.M)
@@ -264,10 +227,9 @@ def write_page(page: Path, entries: list[Entry], folder: Path, inputs: Path) -> 
         part = part or kept.get(entry.name)
         if not part or not entry.page:
             continue
-        head = entry.name.partition("/")[0]
-        if head != group:
-            parts.append(f"## {head.replace('_', ' ').capitalize()}")
-            group = head
+        if entry.group != group:
+            group = entry.group
+            parts.append(f"## {group.replace('_', ' ').capitalize()}")
         parts.append(f"### {part}")
     page.write_text("\n\n".join(parts) + "\n", encoding="utf-8")
     print(f"written: {page}; pictures are in {shown}")
@@ -283,19 +245,15 @@ def part_of_page(entry: Entry, place: Path, shown: Path, inputs: Path) -> str:
         shutil.copyfile(path, target)
         parts.append(f"![{title}](_static/atlas/{entry.name}/{path.name})")
     said = (place / SAID).read_text(encoding="utf-8").replace(str(inputs), "inputs")
-    return "\n\n".join([*parts, f"```text\n{abridged(said)}\n```", made_with(place / KEPT)])
-
-
-def made_with(record: Path) -> str:
-    """Tell when an entry was made, with which version, and where."""
-    made = json.loads(record.read_text(encoding="utf-8"))
+    made = json.loads((place / KEPT).read_text(encoding="utf-8"))
     version = made.get("versions", {}).get("karamelo-py", karamelo_py.__version__)
-    said = [f"karamelo-py {version}", made.get("processor"), made.get("date", "")[:10]]
-    return "*" + ", ".join(filter(None, said)) + "*"
+    with_what = [f"karamelo-py {version}", made.get("processor"), made.get("date", "")[:10]]
+    made_with = "*" + ", ".join(filter(None, with_what)) + "*"
+    return "\n\n".join([*parts, f"```text\n{abridged(said)}\n```", made_with])
 
 
 def abridged(said: str) -> str:
-    """All commands, and what the last one found: orders, edges, the table of a machine.
+    """Keep all commands, and what the last one found: orders, edges, the table of a machine.
 
     Runs one by one, and the way to them, are in the tables of the folder of work.
     """

@@ -1,6 +1,5 @@
 """One run of a study: a process of its own in a folder of its own, and what is read from it."""
 
-import contextlib
 import hashlib
 import json
 import os
@@ -21,6 +20,8 @@ from karamelo_py.output.files import write_whole
 from karamelo_py.script.errors import ScriptError
 
 KEPT = "case.json"
+WAIT4 = hasattr(os, "wait4")
+PROGRAM = [sys.executable, "-m", "karamelo_py.app.cli"]
 # Facts are indented by 2, the parts of the time by 4.
 _FACT = re.compile(r"^( {2}| {4})(\S.*?) {2,}(\S.*)$")
 _ERROR = re.compile(r"(?:^|: )error: (.*)")
@@ -33,68 +34,65 @@ _TOO_MUCH = re.compile(r"memory|times the stable one")
 class CaseOutcome:
     """Outcome of a case.
 
-    Attributes
-    ----------
-    status
-        ``done``, ``failed`` (the run ended with an error), ``refused`` (by a mistake of the script,
-        before any step), ``too long`` or ``killed``.
-    reason
-        Why, of what did not end well; the message of the program.
-    facts
-        Numbers of the run: seconds, points, steps and so on, see `COLUMNS`.
-    folder
-        Where its files are.
+    Its status is ``done``, ``failed`` (the run ended with an error), ``refused`` (by a mistake of
+    the script, before any step), ``too long`` or ``killed``.
     """
 
     status: str
-    reason: str = ""
-    facts: dict[str, float] = field(default_factory=dict)
+    reason: str = ""  # of what did not end well: the message of the program
+    facts: dict[str, float] = field(default_factory=dict)  # numbers of the run, see `COLUMNS`
     folder: Path = Path()
 
     @property
     def complaint(self) -> str:
         """All that the program said of what went wrong."""
-        return (self.folder / "err.txt").read_text(encoding="utf-8", errors="replace")
+        return said_in(self.folder / "err.txt")
 
 
-# What is measured of every run beside the log, with its meaning.
+# What is measured of every run beside the log, with titles of axes.
 COLUMNS = {
-    "seconds": "seconds in the stepping loop, without compilation and output",
-    "cpu_seconds": "seconds of processors in the stepping loop, of all threads",
-    "seconds_spread": "largest less smallest of the repetitions",
-    "particle_steps_per_s": "steps times points over seconds",
+    "seconds": "time of the stepping loop (s)",  # without compilation and output
+    "cpu_seconds": "processor time of the stepping loop (s)",  # of all threads
+    "seconds_spread": "seconds_spread",  # largest less smallest of the repetitions
+    "particle_steps_per_s": "particle-steps per second",
     "particle_steps": "steps times points",
-    "steps": "steps of all runs of the script",
-    "points": "points at the beginning",
-    "dt": "the first step",
-    "stable_dt": "the largest stable step at the beginning",
-    "own_dt": "the first step of the program's own choice, where the script chose another",
-    "bytes_per_particle": "bytes of all fields of a point, the mean over points",
-    "peak_memory_mib": "largest resident memory of the process, MiB",
-    "wall_s": "seconds of the whole process",
+    "steps": "steps",  # of all runs of the script
+    "points": "points",  # at the beginning
+    "dt": "first step (time of the script)",
+    "stable_dt": "stable_dt",  # the largest stable step at the beginning
+    "own_dt": "own_dt",  # the first of the program's own choice, where the script chose another
+    "bytes_per_particle": "bytes per particle",  # of all fields, the mean over points
+    "peak_memory_mib": "peak memory (MiB)",
+    "wall_s": "time of the process (s)",
 }
+
+
+def worded(case: Mapping[str, Any]) -> str:
+    """Write the values of a case in words."""
+    return ", ".join(f"{name} = {value}" for name, value in case.items())
+
+
+def said_in(file: Path) -> str:
+    """Read what a run has said; nothing where that is gone."""
+    try:
+        return file.read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return ""
 
 
 class Refused(ScriptError):
     """A variant that the program refuses by a mistake of its script, told in the program's words.
 
-    Parameters
-    ----------
-    case
-        Values of its variables.
-    outcome
-        What became of it.
+    The values of its variables follow the whole message.
     """
 
     def __init__(self, case: Mapping[str, str], outcome: CaseOutcome):
         super().__init__(outcome.reason)
         lines = outcome.complaint.rstrip().splitlines()
         first = next((k for k, line in enumerate(lines) if _ERROR.search(line)), 0)
-        said = ", ".join(f"{name} = {value}" for name, value in case.items())
-        self._whole = "\n".join([*lines[first:], f"this is the script with {said}"])
+        self._whole = "\n".join([*lines[first:], f"this is the script with {worded(case)}"])
 
     def render(self) -> str:
-        """The whole message, and the values of the variables."""
         return self._whole
 
 
@@ -104,28 +102,14 @@ class Stop(Exception):
 
 @dataclass
 class Launch:
-    """Run the cases of a study.
-
-    Attributes
-    ----------
-    script
-        The script.
-    threads
-        Threads of each run, None for the program's own choice.
-    repeat
-        How often each is run; the time is the median.
-    limit
-        Seconds after which a run is given up, or None.
-    stop
-        Set when the study is to end.
-    """
+    """Run the cases of a study."""
 
     script: Path
-    threads: int | None = 1
-    repeat: int = 1
-    limit: float | None = None
-    texts: tuple[str, ...] = ()
-    stop: threading.Event = field(default_factory=threading.Event)
+    threads: int = 1  # of each run
+    repeat: int = 1  # runs of each case; the time is their median
+    limit: float | None = None  # seconds after which a run is given up
+    texts: tuple[str, ...] = ()  # of the script and those that it includes
+    stop: threading.Event = field(default_factory=threading.Event)  # set when the study is to end
 
     def key(self, case: Mapping[str, str]) -> str:
         """Hash what a result belongs to: it is used again only for the very same."""
@@ -168,21 +152,14 @@ class Launch:
                 facts["seconds_spread"] = max(seconds) - min(seconds)
         if "particle_steps" in facts and facts["seconds"] > 0:
             facts["particle_steps_per_s"] = facts["particle_steps"] / facts["seconds"]
-        record = {
-            "key": self.key(case),
-            "variables": dict(case),
-            "status": outcome.status,
-            "reason": outcome.reason,
-            "facts": outcome.facts,
-        }
+        kept = {"status": outcome.status, "reason": outcome.reason, "facts": facts}
+        record = {"key": self.key(case), "variables": dict(case), **kept}
         write_whole(folder / KEPT, json.dumps(record, indent=1))
         return outcome
 
     def _once(self, case: Mapping[str, str], folder: Path) -> CaseOutcome:
-        command = [sys.executable, "-m", "karamelo_py.app.cli", str(self.script.resolve())]
-        for name, value in case.items():
-            command += ["-var", name, value]
-        command += ["--threads", str(self.threads or "auto")]
+        command = [*PROGRAM, str(self.script.resolve()), *options_of(case)]
+        command += ["--threads", str(self.threads)]
         (folder / "log.mpm").unlink(missing_ok=True)
         begun = time.perf_counter()
         with (
@@ -194,8 +171,7 @@ class Launch:
                 env=environment(), start_new_session=os.name == "posix",
             )  # fmt: skip
             memory, overdue = self._wait(process, begun)
-        said = (folder / "out.txt").read_text(encoding="utf-8", errors="replace")
-        facts = read_facts(said)
+        facts = read_facts(said_in(folder / "out.txt"))
         facts["wall_s"] = time.perf_counter() - begun
         if memory:
             facts["peak_memory_mib"] = memory
@@ -204,33 +180,29 @@ class Launch:
         if process.returncode < 0:
             reason = f"ended by signal {-process.returncode}"
             return CaseOutcome("killed", reason, facts, folder)
+        outcome = CaseOutcome("done", "", facts, folder)
         if process.returncode:
-            outcome = CaseOutcome("failed", "", facts, folder)
-            outcome.reason = reason_in(outcome.complaint)
+            outcome.status, outcome.reason = "failed", reason_in(outcome.complaint)
             others = _NOT_ITS_OWN, _TOO_MUCH
             if "points" not in facts and not any(each.search(outcome.reason) for each in others):
                 outcome.status = "refused"
-            return outcome
-        return CaseOutcome("done", "", facts, folder)
+        return outcome
 
     def _wait(self, process: subprocess.Popen, begun: float) -> tuple[float | None, bool]:
-        """Wait for the end; the peak memory in MiB, where known, and whether it was late."""
+        """Wait for the end; tells the peak memory in MiB, where known, and whether it was late."""
         pause, memory = 0.005, None
         while process.returncode is None:
             if self.stop.is_set() or (self.limit and time.perf_counter() - begun > self.limit):
-                if hasattr(os, "wait4"):
+                if WAIT4:
                     os.kill(process.pid, signal.SIGKILL)  # Popen.kill might reap it before wait4.
                 else:
                     process.kill()
-            if hasattr(os, "wait4"):
-                number, status, usage = os.wait4(process.pid, os.WNOHANG)
-                if number:
-                    process.returncode = os.waitstatus_to_exitcode(status)
-                    # Linux counts kibibytes, macOS bytes.
-                    memory = usage.ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10)
-            else:
-                with contextlib.suppress(subprocess.TimeoutExpired):
-                    process.wait(0)
+            if not WAIT4:
+                process.poll()
+            elif (ended := os.wait4(process.pid, os.WNOHANG))[0]:
+                process.returncode = os.waitstatus_to_exitcode(ended[1])
+                # Linux counts kibibytes, macOS bytes.
+                memory = ended[2].ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10)
             if process.returncode is None:
                 time.sleep(pause)
                 pause = min(1.5 * pause, 0.1)
@@ -240,27 +212,28 @@ class Launch:
         return memory, late and process.returncode != 0
 
 
+def options_of(case: Mapping[str, str]) -> list[str]:
+    """Write the options of a command line that set the variables of a case."""
+    return [word for name, value in case.items() for word in ("-var", name, value)]
+
+
 def environment() -> dict[str, str]:
-    """The environment of a run: it runs this very program, wherever it starts."""
+    """Give the environment of a run: it runs this very program, wherever it starts."""
     paths = [str(Path(karamelo_py.__file__).parent.parent), os.environ.get("PYTHONPATH")]
     return {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, paths))}
 
 
 def read_facts(said: str) -> dict[str, float]:
-    """The numbers in what the program says at the beginning and the end of each run."""
+    """Read the numbers in what the program says at the beginning and the end of each run."""
     facts: dict[str, float] = {}
     seconds = cpu = steps = 0.0
-    for line in said.splitlines():
-        match = _FACT.match(line)
-        if not match:
-            continue
-        part, name, text = len(match[1]) == 4, match[2], match[3]
-        value = _leading_number(text)
+    for match in filter(None, map(_FACT.match, said.splitlines())):
+        name, value = match[2], _leading_number(match[3])
         if value is None:
             continue
         if name in ("points", "nodes", "dt", "stable dt", "own dt", "bytes per particle"):
             facts.setdefault(name.replace(" ", "_"), value)
-        elif name == "steps" and part:
+        elif name == "steps" and len(match[1]) == 4:
             seconds += value
         elif name == "steps":
             steps += value
@@ -284,17 +257,15 @@ def _leading_number(text: str) -> float | None:
 
 
 def reason_in(complaint: str) -> str:
-    """The message of an error, without its place and its remedy."""
-    for line in complaint.splitlines():
-        match = _ERROR.search(line)
-        if match:
-            return match[1].strip()
+    """Find the message of an error, without its place and its remedy."""
     lines = [line for line in complaint.splitlines() if line.strip()]
+    if match := next(filter(None, map(_ERROR.search, lines)), None):
+        return match[1].strip()
     return lines[-1].strip() if lines else "ended without a message"
 
 
 def folder_name(case: Mapping[str, Any]) -> str:
-    """A folder for a case, named after its values."""
+    """Name a folder for a case after its values."""
     said = ",".join(f"{name}={value}" for name, value in case.items())
     plain = re.sub(r"[^\w.,=+-]", "_", said)
     if plain == said and len(plain) < 100:

@@ -1,16 +1,23 @@
 """karamelo-py chart: what accuracy costs, how errors fall, where two variables lead."""
 
-from collections.abc import Sequence
+import base64
+import html
+import importlib.util
+import io
+import json
+from argparse import ArgumentParser
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from string import Template
 from typing import Any
 
 import numpy as np
 
-from karamelo_py.app.studies import histories, keeping, look, page, pictures, records, versus
-from karamelo_py.app.studies.curves import Family, missing, order
-from karamelo_py.app.studies.options import add_axes, along, new_parser, out_file, split
+from karamelo_py.app.studies import keeping, look, pictures, records
+from karamelo_py.app.studies.case import options_of, worded
+from karamelo_py.app.studies.curves import Family, Table, column, order, require
 from karamelo_py.app.studies.study import plain_table, shown, terminal
-from karamelo_py.app.studies.variables import holds
+from karamelo_py.app.studies.variables import add_axes, along, holds, names, out_file, split
 from karamelo_py.script.errors import ScriptError
 
 DESCRIPTION = """\
@@ -27,9 +34,8 @@ Pareto front (runs that none beats in both). Prints the same as a table, with fi
 SUFFIXES = (".png", ".svg", ".pdf", ".html")
 
 
-def add_parser(subparsers: Any) -> None:
-    """The subcommand for the command line."""
-    parser = new_parser(subparsers, "chart", "draw a table of runs", DESCRIPTION, run)
+def add_options(parser: ArgumentParser) -> None:
+    """Add what the subcommand takes."""
     parser.add_argument(
         "tables", type=Path, nargs="+", metavar="table",
         help="what karamelo-py sweep has written; several with -versus",
@@ -37,9 +43,7 @@ def add_parser(subparsers: Any) -> None:
     wanted = parser.add_mutually_exclusive_group(required=True)
     wanted.add_argument("-accuracy", metavar="COLUMN", help="the error")
     wanted.add_argument(
-        "-curve",
-        metavar="COLUMN",
-        help="a log column, a curve for each run, over -x (Time)",
+        "-curve", metavar="COLUMN", help="a log column, a curve for each run, over -x (Time)"
     )
     wanted.add_argument(
         "-keeps", metavar="COLUMN",
@@ -74,59 +78,45 @@ def run(options: Any) -> int:
         return side_by_side(options)
     if len(options.tables) > 1:
         raise ScriptError(f"{len(options.tables)} tables", expected="one, or several with -versus")
-    options.table = options.tables[0]
-    rows, variables, made = read(options.table, options.where)
-    by = [name.strip() for name in options.by.split(",") if name.strip()]
+    table = read(options.tables[0], options.where)
+    by = names(options.by)
     if options.keeps:
-        return keeps(options, rows, by or variables, variables, made)
+        return keeps(options, table, by or table.variables)
     if options.curve:
-        return curves(options, rows, by or variables, made)
-    said = made.get("record", ())
-    family = Family(rows, variables, options.accuracy, options.cost, by, options.x, said)
-    if len(family.without) == len(rows):
+        return curves(options, table, by or table.variables)
+    family = Family(table, options.accuracy, options.cost, by, options.x)
+    if len(family.without) == len(table.rows):
         raise ScriptError(f"no run has a value of '{options.accuracy}' above 0")
     out = out_file(options.o, *SUFFIXES) if options.o else None
     if out is not None and out.suffix.lower() == ".html":
-        page.require_plotly()
-    title = options.title if options.title is not None else Path(made.get("script", "")).name
-    axes = [name.strip() for name in (options.heat or "").split(",") if name.strip()]
-    for name in axes:
-        if name not in variables:
-            raise missing("-heat", name, variables)
+        require_plotly()
+    title = table.script if options.title is None else options.title
+    axes = names(options.heat or "")
+    require("-heat", axes, table.variables)
     if options.heat and len(axes) != 2:
         raise ScriptError(f"-heat {options.heat}", expected="two variables: -heat N,ppc")
-    if not options.x and not axes and not any(line.shown(line.cost).any() for line in family.lines):
+    if not options.x and not axes and not any(line.shown.any() for line in family.lines):
         raise ScriptError(f"no run has a value of '{options.cost}' above 0")
     first = family.along if options.x else look.label(family.cost)
     words = along(options, *(axes or (first, family.error_label)))
-    tell(family, made, costs=costs)
+    tell(family, costs=costs)
     if out is None:
         return 0
     if out.suffix.lower() == ".html":
         if axes:
             raise ScriptError("-heat is a picture", expected="-o heat.png, .svg or .pdf")
-        page.write(
-            family, rows, out, convergence=bool(options.x), title=title or "runs", made=made,
-            words=words,
-        )  # fmt: skip
+        write_page(family, out, words, title or "runs")
     elif axes:
-        pictures.heat(family, rows, *axes, out, title, words=words)
+        pictures.heat(family, *axes, out, words, title)
     else:
-        pictures.lines(family, out, convergence=bool(options.x), title=title, words=words)
+        pictures.lines(family, out, words, title)
     print(f"drawn: {out}")
     return 0
 
 
-def read(path: Path, where: Sequence[str]) -> tuple[list, list[str], dict]:
-    """The rows of a table that fulfil the conditions, its variables, and how it was made.
-
-    Raises
-    ------
-    ScriptError
-        If it does not say which columns are variables, or no row is left.
-    """
-    rows = records.read(path)
-    made = {"table": path.name, **records.beside(path)}
+def read(path: Path, where: Sequence[str]) -> Table:
+    """Read a table, of its rows those that fulfil the conditions."""
+    rows, made = records.read(path), records.beside(path)
     if "folder" not in rows[0] and "variables" not in made:
         raise ScriptError(
             f"{path} does not say which columns are variables",
@@ -138,7 +128,7 @@ def read(path: Path, where: Sequence[str]) -> tuple[list, list[str], dict]:
         rows = [r for r in rows if holds(condition, {n: r[n] for n in variables}, words)]
     if not rows:
         raise ScriptError("no row fulfils -where " + " and ".join(where))
-    return rows, variables, made
+    return Table(rows, variables, path, made)
 
 
 def side_by_side(options: Any) -> int:
@@ -148,67 +138,59 @@ def side_by_side(options: Any) -> int:
     out = out_file(options.o, *SUFFIXES[:-1]) if options.o else None
     found, known = [], []
     for path in options.tables:
-        rows, variables, made = read(path, options.where)
-        some, values = versus.pairs(
-            rows, made, variables, options.versus, options.accuracy, options.cost
-        )
+        table = read(path, options.where)
+        some, values = pictures.pairs(table, options.versus, options.accuracy, options.cost)
         if known and values != known:
-            raise ScriptError(f"{path}: {options.versus} is {', '.join(values)}",
-                              expected=", ".join(known) + ", as in the first table")  # fmt: skip
+            expected = ", ".join(known) + ", as in the first table"
+            raise ScriptError(f"{path}: {options.versus} is {', '.join(values)}", expected=expected)
         known = values
         found += some
-    versus.tell(found, known, options.accuracy, options.cost)
+    pictures.tell_pairs(found, known, options.accuracy, options.cost)
     if out is not None:
         cost = look.label(options.cost).removesuffix(" (s)")
         words = along(
             options, look.label(options.accuracy), f"{cost},\n{known[1]} over {known[0]} (1)"
         )
-        versus.draw(found, known, out, words, options.accuracy, options.title or "")
+        pictures.draw_pairs(found, known, out, words, options.accuracy, options.title or "")
         print(f"drawn: {out}")
     return 0
 
 
-def curves(options: Any, rows: list, by: list[str], made: dict) -> int:
+def curves(options: Any, table: Table, by: list[str]) -> int:
     """Draw a column of the logs, a curve for each run."""
     out = out_file(options.o or Path("curves.png"), *SUFFIXES[:-1])
-    differing = [name for name in by if len({row[name] for row in rows}) > 1]
+    differing = [name for name in by if len({row[name] for row in table.rows}) > 1]
     over = options.x or "Time"
-    names = [name for name in split(options.names) if name]
+    called = [name for name in split(options.names) if name]
 
-    def read(column: str) -> list[histories.History]:
-        return histories.histories(
-            rows, differing, options.table.parent, options.log, over, column, names
-        )
+    def read(column: str) -> list[pictures.History]:
+        return pictures.histories(table, differing, options.log, over, column, called)
 
     exact = None
     if options.exact:
         whole = max(read(options.exact), key=lambda each: len(each.x))
         exact = whole._replace(label=options.exact)
-    title = options.title if options.title is not None else Path(made.get("script", "")).name
+    title = table.script if options.title is None else options.title
     found = read(options.curve)
-    x, y = along(options, over, options.curve)
-    histories.draw(found, out, x=x, y=y, title=title, exact=exact)
+    words = along(options, over, options.curve)
+    pictures.draw_histories(found, out, words, title, exact)
     for each in found:
         print(f"{each.label}: {options.curve} {shown(float(each.y[-1]))} at the end")
     print(f"drawn: {out}")
     return 0
 
 
-def keeps(options: Any, rows: list, by: list[str], variables: list[str], made: dict) -> int:
+def keeps(options: Any, table: Table, by: list[str]) -> int:
     """Show whether a log column stays what it was, and which runs fail without a known cause."""
     out = out_file(options.o, ".md") if options.o else None
-    for name in by:
-        if name not in variables:
-            raise missing("-by", name, variables)
-    over, folder = options.x or "Time", options.table.parent
-    what = over, options.keeps, keeping.WITHIN, made.get("computes", ())
-    kept = [keeping.look_at(row, folder, *what) for row in rows]
-    found = keeping.table(rows, kept, by, variables)
-    text = keeping.markdown(found)
+    require("-by", by, table.variables)
+    what = options.x or "Time", options.keeps, keeping.WITHIN, table.made.get("computes", ())
+    kept = [keeping.look_at(row, table.path.parent, *what) for row in table.rows]
+    text, silent = keeping.verdicts(table, kept, by)
     print(text)
     for word in dict.fromkeys(one.word for one in kept):
         print(f"{word}: {sum(one.word == word for one in kept)} of {len(kept)}")
-    for line in found.silent:
+    for line in silent:
         print(f"nothing says why: {line}")
     if out:
         out.write_text(text, encoding="utf-8")
@@ -216,41 +198,166 @@ def keeps(options: Any, rows: list, by: list[str], variables: list[str], made: d
     return 0
 
 
-def tell(family: Family, made: dict, *, costs: bool = True) -> None:
+def tell(family: Family, *, costs: bool) -> None:
     """Print the runs, by cost with the Pareto front marked, and the order of each line."""
     front = {id(row) for row in family.front()} if costs else set()
-    named = family.along, family.cost if costs else None, family.accuracy
-    table = plain_table(family.by, list(filter(None, named)))
+    named = {"x": family.along, "cost": family.cost if costs else None, "error": family.accuracy}
+    columns = {column: name for column, name in named.items() if name}
+    table = plain_table(family.by, list(columns.values()))
     table.add_column("Pareto" if costs else "", no_wrap=True)
-    members = [
-        (cost, x, error, line, row)
-        for line in family.lines
-        for cost, x, error, row in zip(line.cost, line.x, line.error, line.rows, strict=True)
-    ]
+    members = [(line, k) for line in family.lines for k in range(len(line.rows))]
     if costs:
-        members.sort(key=lambda m: (np.isnan(m[0]), m[0]))
-    for cost, x, error, line, row in members:
-        numbers = [shown(float(x))] if family.along else []
-        measured = (cost, error) if costs else (error,)
-        numbers += [shown(float(a)) for a in measured]
+        members.sort(key=lambda m: (np.isnan(m[0].cost[m[1]]), m[0].cost[m[1]]))
+    for line, k in members:
+        row = line.rows[k]
         end = "front" if id(row) in front else ""
-        if np.isnan(error):
+        if np.isnan(line.error[k]):
             end = (row.get("status", "") + ": " + row.get("reason", ""))[:70]
+        numbers = (shown(float(getattr(line, column)[k])) for column in columns)
         table.add_row(*line.choice.values(), *numbers, end)
     console = terminal()
     console.print(table)
-    pairs = {f"{family.accuracy} by {family.cost}": ("cost", "error")} if costs else {}
-    if family.along:
-        pairs[f"{family.accuracy} by {family.along}"] = ("x", "error")
-    if family.along and costs:
-        pairs[f"{family.cost} by {family.along}"] = ("x", "cost")
+    pairs = {
+        f"{columns[y]} by {columns[x]}": (x, y)
+        for x, y in (("cost", "error"), ("x", "error"), ("x", "cost")) if {x, y} <= {*columns}
+    }  # fmt: skip
     orders = plain_table([""], list(pairs), "\norders, of all and between neighbours")
     for line in family.lines:
         fits = (order(getattr(line, x), getattr(line, y)) for x, y in pairs.values())
         orders.add_row(line.label, *map(str, fits))
     console.print(orders)
-    if costs and family.cost == "seconds" and made.get("timed") is False:
+    if costs and family.cost == "seconds" and family.table.made.get("timed") is False:
         print(
             "note: these runs went side by side, their times disturb each other; "
             "sweep -time measures"
         )
+
+
+# ---- one page (HTML) that needs no server: a point shows its run --------------------------------
+
+_WIDEST = 480  # pixels of a picture in the page
+_MOST = 60  # pictures in a page
+
+
+def require_plotly() -> None:
+    """See that Plotly is there, which takes long to import."""
+    if importlib.util.find_spec("plotly") is None:
+        raise ScriptError(
+            "a page needs the package plotly", hint='pip install "karamelo-py[studies]"'
+        )
+
+
+def write_page(family: Family, path: Path, words: tuple[str, str], title: str) -> None:
+    """Write the page with Plotly; `words` stand along the axes."""
+    from plotly import graph_objects
+    from plotly import io as plotly_io
+
+    rows = family.table.rows
+    number_of = {id(row): k for k, row in enumerate(rows)}
+    figure = graph_objects.Figure()
+    front = family.front()
+    if not family.convergence:
+        cost, error = column(front, family.cost), column(front, family.accuracy)
+        figure.add_scatter(
+            x=cost, y=error, mode="lines+markers", name="Pareto front", hoverinfo="skip",
+            line={"shape": "hv", "width": 8, "color": "#cccccc"},
+            marker={"size": 18, "color": "#cccccc"},
+        )  # fmt: skip
+    styles = look.styles([line.choice for line in family.lines])
+    for line, (colour, marker, dash) in zip(family.lines, styles, strict=True):
+        shown = np.flatnonzero(line.shown)
+        figure.add_scatter(
+            x=line.across[shown], y=line.error[shown], mode="lines+markers", name=line.label,
+            customdata=[number_of[id(line.rows[k])] for k in shown],
+            text=[_said(line.rows[k], family) for k in shown],
+            hovertemplate="%{text}<br>%{y:.4g} at %{x:.4g}<extra></extra>",
+            line={"color": colour, "dash": look.PLOTLY_DASHES[dash], "width": 2},
+            marker={"symbol": look.PLOTLY_MARKERS[marker], "size": 10},
+        )  # fmt: skip
+    usual = {
+        "type": "log", "showgrid": True, "gridcolor": "#e6e6e6", "exponentformat": "power",
+        "linecolor": "#444", "ticks": "outside",
+    }  # fmt: skip
+    figure.update_layout(
+        template="plotly_white", margin={"l": 70, "r": 20, "t": 20, "b": 60}, hovermode="closest",
+        xaxis={**usual, "title": words[0]},
+        yaxis={**usual, "title": words[1]},
+        legend={"orientation": "h", "y": -0.15},
+    )  # fmt: skip
+    for axis, numbers in (("xaxis", "across"), ("yaxis", "error")):
+        drawn = np.concatenate([getattr(line, numbers)[line.shown] for line in family.lines])
+        ticks = look.log_ticks(*(drawn.min(), drawn.max()) if len(drawn) else (1.0, 10.0))
+        if 2 <= len(ticks) <= 14:
+            figure.layout[axis].tickvals = ticks
+            figure.layout[axis].ticktext = [f"{tick:g}" for tick in ticks]
+    runs = [_about(row, family, family.table.path.parent, k) for k, row in enumerate(rows)]
+    text = json.dumps(runs).replace("</", "<\\/")
+    first = number_of[id(front[-1])] if front else 0
+    chart = plotly_io.to_html(
+        figure, include_plotlyjs=True, full_html=False, div_id="chart",
+        default_height="100%", config={"displaylogo": False, "responsive": True},
+    )  # fmt: skip
+    made = family.table.made
+    versions = ", ".join(f"{n} {v}" for n, v in made.get("versions", {}).items())
+    threads = f"{made['threads']} threads" if "threads" in made else None
+    about = filter(None, [made.get("processor"), threads, versions, made.get("date")])
+    template = Template(Path(__file__).with_name("page.html").read_text(encoding="utf-8"))
+    page = template.substitute(
+        title=html.escape(title), chart=chart, failures=_failures(family, number_of),
+        footer=html.escape("; ".join(about)), runs=text, first=first,
+    )  # fmt: skip
+    try:
+        path.write_text(page, encoding="utf-8")
+    except OSError as error:
+        raise ScriptError(f"cannot write {path}: {error.strerror or error}") from None
+
+
+def _values(row: Mapping[str, str], family: Family) -> dict[str, str]:
+    return {name: row[name] for name in family.table.variables}
+
+
+def _said(row: Mapping[str, str], family: Family) -> str:
+    return html.escape(worded(_values(row, family)))
+
+
+def _about(row: Mapping[str, str], family: Family, folder: Path, k: int) -> dict[str, Any]:
+    script = family.table.made.get("script", "SCRIPT")
+    values = _values(row, family)
+    skipped = {*values, "status", "reason", "folder"}
+    return {
+        "title": worded(values),
+        "command": f"karamelo-py {script} {' '.join(options_of(values))}",
+        "status": row.get("status", ""),
+        "reason": row.get("reason", ""),
+        "numbers": [[n, v] for n, v in row.items() if n not in skipped and v],
+        "picture": _picture(folder / row["folder"]) if k < _MOST and row.get("folder") else None,
+    }
+
+
+def _picture(folder: Path) -> str | None:
+    """Read the newest picture of a run, small enough for a page, as a data URL."""
+    pictures = sorted(folder.glob("*.png"), key=lambda p: p.stat().st_mtime)
+    if not pictures:
+        return None
+    from PIL import Image
+
+    try:
+        with Image.open(pictures[-1]) as image:
+            small = image.convert("RGB")
+            small.thumbnail((_WIDEST, _WIDEST))
+            out = io.BytesIO()
+            small.save(out, "PNG", optimize=True)
+    except OSError:
+        return None
+    return "data:image/png;base64," + base64.b64encode(out.getvalue()).decode()
+
+
+def _failures(family: Family, number_of: Mapping[int, int]) -> str:
+    if not family.without:
+        return ""
+    items = ""
+    for row in family.without:
+        why = html.escape(row.get("reason") or row.get("status", ""))
+        link = f'<a href="#" data-run="{number_of[id(row)]}">{_said(row, family)}</a>'
+        items += f"<li>{link}: {why}</li>"
+    return f"<h2>Without a value</h2><ul>{items}</ul>"

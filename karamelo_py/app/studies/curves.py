@@ -1,9 +1,10 @@
 """A table of runs as lines of ever finer runs, their orders, and the Pareto front."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from math import inf, isfinite
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,20 +16,11 @@ from karamelo_py.script.terms import number_of
 NONE = "mechanical"  # what a script says where a method has no such word
 
 
-@dataclass
-class Order:
-    """The exponent of a power law y = c x^exponent, fitted to logarithms by least squares.
+class Order(NamedTuple):
+    """The exponent of a power law y = c x^exponent, fitted to logarithms by least squares."""
 
-    Attributes
-    ----------
-    exponent
-        Of the fit; NaN with fewer than two points.
-    lowest, highest
-        Exponents between neighbouring points.
-    """
-
-    exponent: float
-    lowest: float
+    exponent: float  # NaN with fewer than two points
+    lowest: float  # exponents between neighbouring points
     highest: float
 
     def __str__(self) -> str:
@@ -40,7 +32,7 @@ class Order:
 
 
 def order(x: Sequence[float], y: Sequence[float]) -> Order:
-    """The order of y in x; points that have no logarithm are left out."""
+    """Fit the order of y in x; points that have no logarithm are left out."""
     pairs = sorted((a, b) for a, b in zip(x, y, strict=True) if usable(a) and usable(b))
     logs = np.log(np.array(pairs).reshape(-1, 2))
     if len(np.unique(logs[:, 0])) < 2:
@@ -56,36 +48,54 @@ def usable(a: float | None) -> bool:
     return a is not None and 0 < a < inf
 
 
+class Table(NamedTuple):
+    """A table of runs, the variables among its columns, and how it was made."""
+
+    rows: list[Mapping[str, str]]
+    variables: list[str]
+    path: Path = Path()
+    made: Mapping[str, Any] = {}
+
+    @property
+    def script(self) -> str:
+        """The name of the script."""
+        return Path(self.made.get("script", "")).name
+
+
 @dataclass
 class GroupedRuns:
-    """Runs that differ in one variable only.
+    """Runs that differ in one variable only, in its order."""
 
-    Attributes
-    ----------
-    choice
-        Values of the other variables that differ between lines.
-    rows
-        Rows of the table, in the order of that variable.
-    x, cost, error
-        Numbers of each, NaN where there is none.
-    """
-
-    choice: dict[str, str]
-    rows: list[Mapping[str, str]] = field(default_factory=list)
-    x: np.ndarray = field(default_factory=lambda: np.empty(0))
-    cost: np.ndarray = field(default_factory=lambda: np.empty(0))
-    error: np.ndarray = field(default_factory=lambda: np.empty(0))
+    choice: dict[str, str]  # values of the other variables that differ between lines
+    rows: list[Mapping[str, str]]
+    # Numbers of each, NaN where there is none.
+    x: np.ndarray
+    cost: np.ndarray
+    error: np.ndarray
+    across: np.ndarray  # one of the first two: what errors are drawn over
 
     @property
     def label(self) -> str:
-        """The choice in words; what says nothing alone says what it is the value of."""
-        choice = {n: v for n, v in self.choice.items() if v != NONE} or self.choice
-        parts = [v if _tells(v) else f"{n} = {v}" for n, v in choice.items()]
-        return ", ".join(parts) or "all"
+        """Write the choice in words."""
+        return label(self.choice)
 
-    def shown(self, along: np.ndarray) -> np.ndarray:
-        """Choose the members that have a place in a diagram of errors over `along`."""
-        return np.isfinite(self.error) & (self.error > 0) & np.isfinite(along) & (along > 0)
+    @property
+    def shown(self) -> np.ndarray:
+        """Choose the members that have a place in a diagram of errors."""
+        good = np.isfinite(self.error) & (self.error > 0)
+        return good & np.isfinite(self.across) & (self.across > 0)
+
+
+def label(choice: Mapping[str, str]) -> str:
+    """Write a choice in words; what says nothing alone says what it is the value of."""
+    choice = {n: v for n, v in choice.items() if v != NONE} or choice
+    parts = [v if _tells(v) else f"{n} = {v}" for n, v in choice.items()]
+    return ", ".join(parts) or "all"
+
+
+def told(choice: Mapping[str, str]) -> list[str]:
+    """Write values of variables: words alone, numbers with what they are the value of."""
+    return [v if number_of(v) is None else f"{name} = {v}" for name, v in choice.items()]
 
 
 def _tells(value: str) -> bool:
@@ -95,44 +105,22 @@ def _tells(value: str) -> bool:
 class Family:
     """A table of runs as lines.
 
-    Parameters
-    ----------
-    rows
-        Rows of the table.
-    variables
-        Names of its variables.
-    accuracy, cost
-        Columns to compare.
-    by
-        Variables whose values tell the lines apart; others that differ are added.
-    along
-        The variable that differs along a line; by default the number with the most values.
-    recorded
-        What the sweep was asked to record: a column that is a formula is shown as such.
-
-    Raises
-    ------
-    ScriptError
-        For columns that the table does not have.
+    `accuracy` and `cost` are the columns to compare. Variables `by` tell the lines apart; others
+    that differ are added. `along` differs along a line: by default the number with the most values.
+    What the sweep has recorded is shown as a formula where it is one.
     """
 
     def __init__(
-        self,
-        rows: Sequence[Mapping[str, str]],
-        variables: Sequence[str],
-        accuracy: str,
-        cost: str,
-        by: Sequence[str] = (),
+        self, table: Table, accuracy: str, cost: str, by: Sequence[str] = (),
         along: str | None = None,
-        recorded: Sequence[str] = (),
-    ):
-        self.formulas = dict(word.split("=", 1) for word in recorded if "=" in word)
-        for option, name in (("-accuracy", accuracy), ("-cost", cost)):
-            require(rows, option, name)
-        for option, names in (("-by", by), ("-x", [along] if along else [])):
-            for name in names:
-                if name not in variables:
-                    raise missing(option, name, variables)
+    ):  # fmt: skip
+        self.table, self.accuracy, self.cost = table, accuracy, cost
+        rows, variables = table.rows, table.variables
+        require("-accuracy", [accuracy], rows[0])
+        require("-cost", [cost], rows[0])
+        require("-by", by, variables)
+        require("-x", [along] if along else [], variables)
+        self.convergence = bool(along)  # errors over that variable, not over cost
         values = {name: list(dict.fromkeys(row[name] for row in rows)) for name in variables}
         differing = [name for name in variables if len(values[name]) > 1]
         numbers = [
@@ -141,31 +129,32 @@ class Family:
         ]  # fmt: skip
         self.along = along or max(numbers, key=lambda name: len(values[name]), default=None)
         self.by = [*by, *(n for n in differing if n not in by and n != self.along)]
-        self.accuracy, self.cost, self.variables = accuracy, cost, list(variables)
-        self.lines = self._lines(rows)
+        groups: dict[tuple[str, ...], list[Mapping[str, str]]] = {}
+        for row in rows:
+            groups.setdefault(tuple(row[name] for name in self.by), []).append(row)
+        self.lines = [
+            self._line(dict(zip(self.by, key, strict=True)), members)
+            for key, members in groups.items()
+        ]
         self.without = [row for row in rows if not usable(value(row, accuracy))]
 
-    def _lines(self, rows: Sequence[Mapping[str, str]]) -> list[GroupedRuns]:
-        found: dict[tuple[str, ...], GroupedRuns] = {}
-        for row in rows:
-            key = tuple(row[name] for name in self.by)
-            line = found.setdefault(key, GroupedRuns(dict(zip(self.by, key, strict=True))))
-            line.rows.append(row)
-        for line in found.values():
-            if self.along:
-                line.rows.sort(key=lambda row: number_of(row[self.along]))
-            line.x = column(line.rows, self.along) if self.along else np.zeros(len(line.rows))
-            line.cost, line.error = column(line.rows, self.cost), column(line.rows, self.accuracy)
-        return list(found.values())
+    def _line(self, choice: dict[str, str], rows: list[Mapping[str, str]]) -> GroupedRuns:
+        x = np.zeros(len(rows))
+        if self.along:
+            rows.sort(key=lambda row: number_of(row[self.along]))
+            x = column(rows, self.along)
+        cost, error = column(rows, self.cost), column(rows, self.accuracy)
+        return GroupedRuns(choice, rows, x, cost, error, x if self.convergence else cost)
 
     @property
     def error_label(self) -> str:
         """Name the error for an axis."""
-        formula = self.formulas.get(self.accuracy)
+        words = (word.partition("=") for word in self.table.made.get("record", ()))
+        formula = {name: formula for name, _, formula in words}.get(self.accuracy)
         return f"{self.accuracy} = {formula}" if formula else look.label(self.accuracy)
 
     def front(self) -> list[Mapping[str, str]]:
-        """The Pareto front: runs that none beats in both cost and error, cheapest first."""
+        """Find the Pareto front: runs that none beats in both cost and error, cheapest first."""
         members = [
             (c, e, k, row)
             for line in self.lines
@@ -181,17 +170,18 @@ class Family:
 
 
 def column(rows: Sequence[Mapping[str, Any]], name: str) -> np.ndarray:
-    """The numbers of a column, NaN where there is none."""
+    """Read the numbers of a column, NaN where there is none."""
     found = [value(row, name) for row in rows]
     return np.array([np.nan if a is None else a for a in found], float)
 
 
-def require(rows: Sequence[Mapping[str, str]], option: str, name: str) -> None:
-    """See that a table has a column."""
-    if name not in rows[0]:
-        raise missing(option, name, list(rows[0]))
+def require(option: str, names: Iterable[str], known: Iterable[str]) -> None:
+    """See that a table has columns, or variables."""
+    for name in names:
+        if name not in known:
+            raise missing(option, name, list(known))
 
 
 def missing(option: str, name: str, known: Sequence[str], place: str = "the table") -> ScriptError:
-    """The error for a column or a variable that a table does not have."""
+    """Make the error for a column or a variable that a table does not have."""
     return unknown(f"{option}: {place} has no '{name}'", name, known)

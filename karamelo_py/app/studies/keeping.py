@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.app.logs import read_log
-from karamelo_py.app.studies import stretches
-from karamelo_py.app.studies.curves import missing
-from karamelo_py.kernels.growth import WITHIN
+from karamelo_py.app.plot import read_log
+from karamelo_py.app.studies.case import said_in, worded
+from karamelo_py.app.studies.curves import Table, missing
+from karamelo_py.kernels.watch import WITHIN, growth
 
 SHARE = 0.2  # of the run: means over its first and its last part are compared
 WRONG = ("gains", "breaks")
@@ -25,25 +25,15 @@ _POINT = re.compile(r"point \d+ of solid '[^']*'")
 class Kept(NamedTuple):
     """Verdict on the column in a run.
 
-    Attributes
-    ----------
-    word
-        ``keeps``, ``damps``, ``gains``, ``breaks`` (the run was stopped on its way), ``refused``
-        (it made no step), or ``unknown`` (given up or killed). What is a part of the energy
-        ``falls`` or ``grows``: whether the whole is lost or gained it does not tell.
-    number
-        Mean of the last part of the run over that of the first; of a run that breaks, when.
-    said
-        Warnings of the run, and the error that ended it; what is known to be the cause where the
-        program named that.
-    warned
-        Whether it warned, or the error that ended it names a known cause.
+    Its word is ``keeps``, ``damps``, ``gains``, ``breaks`` (the run was stopped on its way),
+    ``refused`` (it made no step), or ``unknown`` (given up or killed). What is a part of the energy
+    ``falls`` or ``grows``: whether the whole is lost or gained it does not tell.
     """
 
     word: str
-    number: float
-    said: tuple[str, ...]
-    warned: bool
+    number: float  # mean of the last part over that of the first; of a run that breaks, when
+    said: tuple[str, ...]  # warnings, and the error that ended it: known causes where it named them
+    warned: bool  # or the error that ended it names a known cause
 
     @property
     def silent(self) -> bool:
@@ -51,10 +41,19 @@ class Kept(NamedTuple):
         return self.word in WRONG and not self.warned
 
 
+def grown(first: float, later: float) -> float:
+    """Growth from one mean to a later one, as a share of the first; NaN from nothing."""
+    return growth(first, later, first) if first else np.nan
+
+
 def judge(x: np.ndarray, y: np.ndarray, within: float = WITHIN) -> tuple[str, float]:
-    """The word for a column `y` over `x`, and its mean over the last part over that at first."""
-    first, last = stretches.ends(x, y, SHARE)
-    share = stretches.grown(first, last)
+    """Find the word for a column `y` over `x`, and its mean over the last part over that at first.
+
+    The parts are shares of the way along `x`.
+    """
+    span = SHARE * (x[-1] - x[0])
+    first, last = float(y[x <= x[0] + span].mean()), float(y[x >= x[-1] - span].mean())
+    share = grown(first, last)
     ratio = last / first if first else np.nan
     if not share <= within:  # nor for NaN
         return "gains", ratio
@@ -65,18 +64,9 @@ def look_at(
     row: Mapping[str, str], folder: Path, over: str, column: str, within: float,
     parts: Container[str] = (),
 ) -> Kept:  # fmt: skip
-    """Judge a column in a run; a value of one of the computes `parts` is no whole.
-
-    Raises
-    ------
-    ScriptError
-        For a column that its log does not have.
-    """
+    """Judge a column in a run; a value of one of the computes `parts` is no whole."""
     place = folder / row["folder"]
-    try:
-        lines = (place / "err.txt").read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError:
-        lines = []
+    lines = said_in(place / "err.txt").splitlines()
     said = [match[1] for line in lines if (match := _SAID.search(line))]
     causes = [_general(text) for text in said]
     warned = any(_WARNED.search(line) for line in lines)
@@ -105,37 +95,26 @@ def _general(text: str) -> str:
     return _POINT.sub("a point", _OWN.sub("", text))
 
 
-class Verdicts(NamedTuple):
-    """Cells of runs: rows and columns are the values of variables."""
+def verdicts(table: Table, kept: Sequence[Kept], by: Sequence[str]) -> tuple[str, list[str]]:
+    """Write runs as Markdown: a row for each value of the variables `by`, columns for the others.
 
-    headings: list[str]
-    rows: list[list[str]]
-    notes: list[str]
-    silent: list[str]
-
-
-def table(rows: Sequence[Mapping[str, str]], kept: Sequence[Kept], by: Sequence[str],
-          variables: Sequence[str]) -> Verdicts:  # fmt: skip
-    """Arrange runs: a row for each value of the variables `by`, a column for each of the others.
-
-    Variables that go in step with those of the rows are left out.
+    What runs said stands below, by the numbers in brackets. Variables that go in step with those of
+    the rows are left out. Also names the runs that go wrong silently.
     """
+    rows = table.rows
     keys = [tuple(row[name] for name in by) for row in rows]
 
-    def follows(name: str) -> bool:
-        return len({(key, row[name]) for key, row in zip(keys, rows, strict=True)}) == len(
-            set(keys)
-        )
+    def differs(name: str) -> bool:
+        pairs = {(key, row[name]) for key, row in zip(keys, rows, strict=True)}
+        return len(pairs) > len(set(keys))
 
-    across = [name for name in variables if name not in by and not follows(name)]
+    across = [name for name in table.variables if name not in by and differs(name)]
     columns = list(dict.fromkeys(tuple(row[name] for name in across) for row in rows))
     notes: list[str] = []
     cells: dict[tuple, str] = {}
     silent = []
     for key, row, one in zip(keys, rows, kept, strict=True):
-        for text in one.said:
-            if text not in notes:
-                notes.append(text)
+        notes += [text for text in one.said if text not in notes]
         marks = ", ".join(str(notes.index(text) + 1) for text in one.said)
         number = f" {one.number:.3g}" if np.isfinite(one.number) else ""
         if one.word == "breaks":
@@ -144,19 +123,13 @@ def table(rows: Sequence[Mapping[str, str]], kept: Sequence[Kept], by: Sequence[
         place = tuple(row[name] for name in across)
         cells[key, place] = one.word + number + marks + (" (silent)" if one.silent else "")
         if one.silent:
-            silent.append(", ".join(f"{name} = {row[name]}" for name in (*by, *across)))
-    headings = [", ".join(f"{n} = {v}" for n, v in zip(across, c, strict=True)) for c in columns]
-    return Verdicts(
+            silent.append(worded({name: row[name] for name in (*by, *across)}))
+    headings = [worded(dict(zip(across, values, strict=True))) for values in columns]
+    lines = [
         [*by, *(heading or "all" for heading in headings)],
-        [[*key, *(cells.get((key, c), "") for c in columns)] for key in dict.fromkeys(keys)],
-        notes,
-        silent,
-    )
-
-
-def markdown(found: Verdicts) -> str:
-    """The table as Markdown, and below what runs said, by the numbers in brackets."""
-    lines = [found.headings, ["---"] * len(found.headings), *found.rows]
+        ["---"] * (len(by) + len(headings)),
+        *([*key, *(cells.get((key, c), "") for c in columns)] for key in dict.fromkeys(keys)),
+    ]
     text = "\n".join("| " + " | ".join(line) + " |" for line in lines)
-    notes = "\n".join(f"{k}. {note}" for k, note in enumerate(found.notes, 1))
-    return f"{text}\n\n{notes}".rstrip() + "\n"
+    said = "\n".join(f"{k}. {note}" for k, note in enumerate(notes, 1))
+    return f"{text}\n\n{said}".rstrip() + "\n", silent

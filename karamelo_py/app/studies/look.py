@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.output.plot_style import tick_text
+from karamelo_py.app.studies.case import COLUMNS
+from karamelo_py.output.plots import tick_text
 from karamelo_py.script.terms import number_of
 
 # After Okabe & Ito, for eyes that see colours differently; each has a marker of its own, so that a
@@ -18,13 +19,8 @@ PALETTE = (
 )  # fmt: skip
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">")
 DASHES = (
-    "-",
-    (0, (5, 2)),
-    (0, (1, 1.5)),
-    (0, (5, 1.5, 1, 1.5)),
-    (0, (9, 3)),
-    (0, (3, 1, 1, 1, 1, 1)),
-)
+    "-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (9, 3)), (0, (3, 1, 1, 1, 1, 1)),
+)  # fmt: skip
 PLOTLY_DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")
 PLOTLY_MARKERS = (
     "circle", "square", "triangle-up", "diamond", "triangle-down", "cross", "x",
@@ -37,22 +33,10 @@ FAMILIES = (
     ("ulmpm", "tlmpm", "ulcpdi", "tlcpdi", "ulmpm/contacts"),
     ("musl", "usl", "usf", "usavg"),
 )
-LABELS = {
-    "seconds": "time of the stepping loop (s)",
-    "cpu_seconds": "processor time of the stepping loop (s)",
-    "particle_steps": "steps times points",
-    "wall_s": "time of the process (s)",
-    "peak_memory_mib": "peak memory (MiB)",
-    "bytes_per_particle": "bytes per particle",
-    "particle_steps_per_s": "particle-steps per second",
-    "points": "points",
-    "steps": "steps",
-    "dt": "first step (time of the script)",
-}
 
 
 def place(word: str, others: Sequence[str] = ()) -> int:
-    """The number of a word's colour and marker: fixed for methods, else in the order of values."""
+    """Number the colour and marker of a word: fixed for methods, else in the order of values."""
     for family in FAMILIES:
         if word in family:
             return family.index(word) % len(PALETTE)
@@ -97,8 +81,8 @@ def _in_order(value: str, values: Sequence[str]) -> str:
 
 
 def label(name: str) -> str:
-    """The title of an axis."""
-    return LABELS.get(name, name)
+    """Give the title of an axis."""
+    return COLUMNS.get(name, name)
 
 
 def log_ticks(low: float, high: float) -> list[float]:
@@ -110,15 +94,10 @@ def log_ticks(low: float, high: float) -> list[float]:
     decades = log10(high / low)
     every = 1 if decades < 9 else ceil(decades / 8)
     exponents = range(floor(log10(low)) - 1, ceil(log10(high)) + 1)
-    finest = [k / 20 for k in range(20, 200)]
     for leads in (
-        (1,),
-        (1, 2, 5),
-        (1, 1.5, 2, 3, 4, 5, 6, 8),
-        [k / 2 for k in range(2, 20)],
-        [k / 5 for k in range(5, 50)],
-        finest,
-    ):
+        (1,), (1, 2, 5), (1, 1.5, 2, 3, 4, 5, 6, 8), [k / 2 for k in range(2, 20)],
+        [k / 5 for k in range(5, 50)], [k / 20 for k in range(20, 200)],
+    ):  # fmt: skip
         ticks = [lead * 10.0**k for k in exponents if k % every == 0 for lead in leads]
         ticks = [tick for tick in ticks if low * (1 - 1e-9) <= tick <= high * (1 + 1e-9)]
         if len(ticks) >= 3:
@@ -159,31 +138,18 @@ def apart(wanted: Sequence[float], gap: float, low: float, high: float) -> np.nd
     Between `low` and `high` as long as there is room.
     """
     rank = np.argsort(wanted, kind="stable")
-    places = np.asarray(wanted, float)[rank]
-    gap = min(gap, (high - low) / max(len(places) - 1, 1))
-    for k in range(1, len(places)):
-        places[k] = max(places[k], places[k - 1] + gap)
-    limit = high
-    for k in range(len(places) - 1, -1, -1):
-        places[k] = min(places[k], limit)
-        limit = places[k] - gap
-    limit = low
-    for k in range(len(places)):
-        places[k] = max(places[k], limit)
-        limit = places[k] + gap
+    count = max(len(rank) - 1, 1)
+    steps = min(gap, (high - low) / count) * np.arange(len(rank))
+    # Less what lies between them at least, places only have to rise.
+    places = np.maximum.accumulate(np.asarray(wanted, float)[rank] - steps)
+    places = np.maximum(np.minimum(places, high - steps[-1]), low)
     found = np.empty(len(places))
-    found[rank] = places
+    found[rank] = places + steps
     return found
 
 
 def direct_labels(axes: Any, ends: Sequence[tuple[float, float, str, str]]) -> None:
-    """Names of lines in a column beside the axes, each joined to the end of its line.
-
-    Parameters
-    ----------
-    ends
-        x and y of the end of each line, its name and its colour.
-    """
+    """Write names of lines beside the axes, by x and y of their ends, names and colours."""
     if not ends:
         return
     to_axes = axes.transData + axes.transAxes.inverted()

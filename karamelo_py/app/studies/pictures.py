@@ -1,34 +1,34 @@
-"""Charts of studies as pictures (PNG, SVG, PDF), drawn with Matplotlib."""
+"""Charts of studies as pictures (PNG, SVG, PDF), by Matplotlib; `words` stand along their axes."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from karamelo_py.app.plot import read_log
 from karamelo_py.app.studies import look
-from karamelo_py.app.studies.curves import Family, column, usable
+from karamelo_py.app.studies.curves import Family, Table, column, label, require, told, usable
+from karamelo_py.app.studies.records import value
+from karamelo_py.app.studies.study import plain_table, shown, terminal
 from karamelo_py.output.files import savefig
-from karamelo_py.output.plot_style import blank_figure, tick_text, tidy
-from karamelo_py.script.errors import plural
+from karamelo_py.output.plots import blank_figure, tick_text, tidy
+from karamelo_py.script.errors import ScriptError, plural, unknown
 from karamelo_py.script.terms import number_of
 
+DECADES = 1e4  # curves that reach over more are drawn on a logarithmic axis
 
-def lines(
-    family: Family, path: Path, *, convergence: bool, words: tuple[str, str], title: str = ""
-) -> None:
-    """Errors over costs with the Pareto front, or over the variable along lines.
 
-    `words` stand along the axes.
-    """
+def lines(family: Family, path: Path, words: tuple[str, str], title: str = "") -> None:
+    """Draw errors over costs with the Pareto front, or over the variable along lines."""
     figure = blank_figure(8.4, 5.2)
     axes = figure.subplots()
+    convergence = family.convergence
     styles = look.styles([line.choice for line in family.lines])
-    across = [line.x if convergence else line.cost for line in family.lines]
-    drawn = [line.shown(x) for line, x in zip(family.lines, across, strict=True)]
-    xs = np.concatenate([x[k] for x, k in zip(across, drawn, strict=True)])
-    ys = np.concatenate([line.error[k] for line, k in zip(family.lines, drawn, strict=True)])
-    failed = [x[~k & (x > 0)] for x, k in zip(across, drawn, strict=True)] if convergence else []
+    xs = np.concatenate([line.across[line.shown] for line in family.lines])
+    ys = np.concatenate([line.error[line.shown] for line in family.lines])
+    failed = [line.across[~line.shown & (line.across > 0) & convergence] for line in family.lines]
     look.log_axis(
         axes.xaxis, *_ends(np.concatenate([xs, *failed])), list(xs) if convergence else None
     )
@@ -36,10 +36,9 @@ def lines(
     if not convergence:
         _front(axes, family)
     ends = []
-    for line, x, k, style in zip(family.lines, across, drawn, styles, strict=True):
-        colour, marker, dash = style
-        way = np.argsort(line.x[k], kind="stable")
-        px, py = x[k][way], line.error[k][way]
+    for line, (colour, marker, dash) in zip(family.lines, styles, strict=True):
+        way = np.argsort(line.x[line.shown], kind="stable")
+        px, py = line.across[line.shown][way], line.error[line.shown][way]
         if len(px):
             axes.plot(
                 px, py, color=colour, marker=look.MARKERS[marker], linestyle=look.DASHES[dash],
@@ -47,17 +46,17 @@ def lines(
             )  # fmt: skip
             last = int(np.argmax(px))
             ends.append((px[last], py[last], line.label, colour))
-    _gone(axes, [(x, style[0]) for style, gone in zip(styles, failed, strict=False) for x in gone])
+    _gone(axes, [(x, style[0]) for style, gone in zip(styles, failed, strict=True) for x in gone])
     look.direct_labels(axes, ends)
     axes.set(xlabel=words[0], ylabel=words[1])
     axes.set_title(title, loc="left", fontsize=10)
     tidy(axes)
-    _footnote(figure, family, convergence, not convergence and family.front())
+    _footnote(figure, family)
     savefig(figure, path)
 
 
 def _gone(axes: Any, marks: Sequence[tuple[float, str]]) -> None:
-    """A cross at the top for each run without a value; those at one place stand side by side."""
+    """Draw a cross at the top for each run without a value, side by side at one place."""
     for at in {x for x, _ in marks}:
         colours = [colour for x, colour in marks if x == at]
         for k, colour in enumerate(colours):
@@ -80,29 +79,25 @@ def _front(axes: Any, family: Family) -> None:
     axes.plot(cost, error, "o", color="0.8", markersize=13, zorder=1)
 
 
-def _footnote(figure: Any, family: Family, convergence: bool, front: Any) -> None:
+def _footnote(figure: Any, family: Family) -> None:
     said = []
-    if front:
+    if not family.convergence and family.front():
         said.append("grey band: Pareto front, no run is both cheaper and more accurate")
-    if convergence and family.without:
-        said.append("× at the top: no value (failed)")
-    elif family.without:
-        said.append(f"not shown: {plural(len(family.without), 'run')} without a value")
+    if family.without:
+        missing = f"not shown: {plural(len(family.without), 'run')} without a value"
+        said.append("× at the top: no value (failed)" if family.convergence else missing)
     if said:
         figure.supxlabel("; ".join(said), fontsize=8, color="0.35", x=0.02, ha="left")
 
 
 def heat(
-    family: Family, rows: Sequence[Any], x: str, y: str, path: Path, title: str = "", *,
-    words: tuple[str, str],
-) -> None:  # fmt: skip
-    """A column of the table over two variables, as coloured cells with their numbers.
-
-    `words` stand along the axes.
-    """
+    family: Family, x: str, y: str, path: Path, words: tuple[str, str], title: str = ""
+) -> None:
+    """Draw a column of the table over two variables, as coloured cells with their numbers."""
     from matplotlib import colormaps
     from matplotlib.colors import LogNorm
 
+    rows = family.table.rows
     others = [n for n in [*family.by, family.along] if n and n not in (x, y)]
     panels: dict[tuple, list] = {}
     for row in rows:
@@ -138,10 +133,7 @@ def heat(
         axes.set_xticks(np.arange(len(across)) + 0.5, across)
         axes.set_yticks(np.arange(len(up)) + 0.5, up)
         axes.set_facecolor("0.93")
-        said = [
-            v if number_of(v) is None else f"{n} = {v}" for n, v in zip(others, key, strict=True)
-        ]
-        axes.set_title(", ".join(said), fontsize=9)
+        axes.set_title(", ".join(told(dict(zip(others, key, strict=True)))), fontsize=9)
     for axes in all_axes[len(panels) :]:
         axes.set_visible(False)
     figure.supxlabel(words[0], fontsize=10)
@@ -157,3 +149,194 @@ def heat(
 def _sorted(rows: Sequence[Any], name: str) -> list[str]:
     found = list(dict.fromkeys(row[name] for row in rows))
     return sorted(found, key=number_of) if all(number_of(v) is not None for v in found) else found
+
+
+# ---- columns of logs, a curve for each run -------------------------------------------------------
+
+
+class History(NamedTuple):
+    """One column over another, of one run."""
+
+    x: np.ndarray
+    y: np.ndarray
+    label: str  # what the run was chosen to be
+    stopped: bool = False  # before its end
+
+
+def histories(
+    table: Table, by: Sequence[str], log: str, over: str, curve: str, names: Sequence[str] = ()
+) -> list[History]:
+    """Read the curves of all runs whose logs there are: one column `over` another.
+
+    Runs are called by their values of the variables `by`, or by `names` in the order of the table.
+    """
+    found = []
+    for k, row in enumerate(table.rows):
+        columns = read_log(table.path.parent / row["folder"], log)
+        if not columns:
+            continue
+        for name in (over, curve):
+            if name not in columns:
+                raise unknown(f"{log} has no column '{name}'", name, columns)
+        called = names[k] if k < len(names) else label({name: row[name] for name in by})
+        stopped = row.get("status", "done") != "done"
+        kept = forward(columns["Time"], stopped) if "Time" in columns else slice(None)
+        found.append(History(columns[over][kept], columns[curve][kept], called, stopped))
+    if not found:
+        raise ScriptError(f"no run has left a {log}", expected="the folders of the sweep")
+    return found
+
+
+def forward(time: np.ndarray, stopped: bool) -> np.ndarray:
+    """Choose the rows (n,) of a log that belong to one way forward.
+
+    A run that was stopped ends with its last good state, which came before; one that went back and
+    on with smaller steps has rows of what it gave up.
+    """
+    if stopped:
+        return np.arange(len(time)) <= np.argmax(time)
+    after = np.append(np.minimum.accumulate(time[::-1])[::-1][1:], np.inf)
+    return time < after
+
+
+def draw_histories(
+    found: Sequence[History], path: Path, words: Sequence[str], title: str, exact: History | None
+) -> None:
+    """Draw curves with their names beside them; a cross where a run was stopped."""
+    figure = blank_figure(7.2, 4.0)
+    axes = figure.subplots()
+    ys = np.concatenate([each.y for each in found])
+    positive = ys[np.isfinite(ys) & (ys > 0)]
+    logarithmic = not (ys < 0).any() and len(positive) and positive.max() > DECADES * positive.min()
+    if logarithmic:
+        # What is zero but for round-off stays below the axis.
+        top = float(positive.max())
+        low = max(float(positive.min()), 1e-16 * top)
+        look.log_axis(axes.yaxis, low, top)
+    ends = []
+    if exact is not None:
+        axes.plot(exact.x, exact.y, color="0.6", linewidth=4, zorder=1)
+        ends.append((exact.x[-1], exact.y[-1], exact.label, "0.4"))
+    for k, each in enumerate(found):
+        colour = look.PALETTE[(k + 2) % len(look.PALETTE) if len(found) > 1 else 1]
+        axes.plot(
+            each.x, each.y, color=colour, linestyle=look.DASHES[k % len(look.DASHES)],
+            linewidth=1.6, zorder=3,
+        )  # fmt: skip
+        name = each.label
+        if each.stopped:
+            axes.plot(each.x[-1], each.y[-1], "X", color=colour, markersize=9, zorder=4)
+            name += " (stopped)"
+        last = each.y[-1] if not logarithmic else max(each.y[-1], low)
+        ends.append((each.x[-1], last, name, colour))
+    axes.set(xlabel=words[0], ylabel=words[1])
+    axes.set_title(title, loc="left", fontsize=10)
+    tidy(axes)
+    figure.canvas.draw()  # limits are known from here on
+    look.direct_labels(axes, ends)
+    savefig(figure, path)
+
+
+# ---- two values of a variable side by side, scene by scene ---------------------------------------
+
+
+@dataclass
+class Pair:
+    """The runs of a scene for two values of one variable, with numbers of both, or NaN."""
+
+    label: str  # the scene, and what else was chosen
+    error: tuple[float, float]
+    cost: tuple[float, float]
+    bytes: tuple[float, float]
+
+    @property
+    def cost_ratio(self) -> float:
+        """The cost of the second over that of the first."""
+        return self.cost[1] / self.cost[0]
+
+
+def pairs(table: Table, name: str, accuracy: str, cost: str) -> tuple[list[Pair], list[str]]:
+    """Find the pairs of a table, and the two values in their order."""
+    rows, variables = table.rows, table.variables
+    require("-accuracy", [accuracy], rows[0])
+    require("-cost", [cost], rows[0])
+    require("-versus", [name], variables)
+    values = list(dict.fromkeys(row[name] for row in rows))
+    if len(values) != 2:
+        raise ScriptError(
+            f"-versus {name}: {table.path.name} has {plural(len(values), 'value')} of it",
+            expected="two",
+        )
+    others = [n for n in variables if n != name]
+    cases: dict[tuple[str, ...], dict[str, Mapping[str, str]]] = {}
+    for row in rows:
+        cases.setdefault(tuple(row[n] for n in others), {})[row[name]] = row
+    differing = [n for k, n in enumerate(others) if len({case[k] for case in cases}) > 1]
+    scene = table.script or table.path.name
+    found = []
+    for case, two in cases.items():
+        if len(two) < 2:
+            continue
+        said = dict(zip(others, case, strict=True))
+        parts = told({name: said[name] for name in differing})
+        numbers = [
+            tuple(_number(two[word], column) for word in values)
+            for column in (accuracy, cost, "bytes_per_particle")
+        ]
+        found.append(Pair(", ".join([scene, *parts]), *numbers))
+    return found, values
+
+
+def _number(row: Mapping[str, str], column: str) -> float:
+    found = value(row, column)
+    return found if usable(found) else np.nan
+
+
+def tell_pairs(found: Sequence[Pair], values: Sequence[str], accuracy: str, cost: str) -> None:
+    """Print the pairs as a table."""
+    ratio = f"{values[1]}/{values[0]}"
+    headings = [f"{what}, {word}" for what in (accuracy, cost) for word in values]
+    table = plain_table([""], [*headings, f"{cost}, {ratio}", f"bytes, {ratio}"])
+    for pair in found:
+        numbers = [*pair.error, *pair.cost, pair.cost_ratio, pair.bytes[1] / pair.bytes[0]]
+        table.add_row(pair.label, *(shown(float(f"{a:.3g}")) for a in numbers))
+    terminal().print(table)
+
+
+def draw_pairs(
+    found: Sequence[Pair], values: Sequence[str], path: Path, words: Sequence[str], accuracy: str,
+    title: str,
+) -> None:  # fmt: skip
+    """Draw errors of both values on the left, and the ratio of their costs on the right."""
+    figure = blank_figure(9.0, 1.1 + 0.3 * len(found))
+    left, right = figure.subplots(1, 2, sharey=True, width_ratios=(3, 2))
+    errors = np.array([pair.error for pair in found])
+    good = errors[np.isfinite(errors)]
+    if not len(good):
+        raise ScriptError(f"no run has a value of '{accuracy}' above 0")
+    look.log_axis(left.xaxis, float(good.min()), float(good.max()))
+    up = np.arange(len(found))[::-1]
+    for k, (word, filled) in enumerate(zip(values, (True, False), strict=True)):
+        colour = look.PALETTE[1 + k]
+        left.plot(
+            errors[:, k], up, look.MARKERS[k], color=colour, label=word, markersize=9 - 2 * k,
+            markerfacecolor=colour if filled else "white", markeredgewidth=1.6, zorder=3 + k,
+        )  # fmt: skip
+    ratios = np.array([pair.cost_ratio for pair in found])
+    right.barh(up, np.nan_to_num(ratios), height=0.55, color="0.7", zorder=2)
+    for at, a in zip(up, ratios, strict=True):
+        if np.isfinite(a):
+            right.text(0.04, at, f"{a:.2f}", va="center", fontsize=8, zorder=4)
+    right.axvline(1.0, color="0.3", linewidth=1, linestyle=look.DASHES[1], zorder=3)
+    right.set_xlim(0, 1.15 * max(1.0, float(np.nanmax(ratios, initial=1.0))))
+    left.set_yticks(up, [pair.label for pair in found])
+    left.set_ylim(-0.7, len(found) - 0.3)
+    left.set_xlabel(words[0])
+    right.set_xlabel(words[1])
+    left.set_title(title, loc="left", fontsize=10)
+    # Above the axes: within them it would hide points.
+    left.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False, fontsize=9)
+    for axes in (left, right):
+        tidy(axes)
+        axes.tick_params(axis="y", length=0)
+    savefig(figure, path)

@@ -8,16 +8,16 @@ import platform
 import re
 from collections.abc import Container, Iterable, Mapping, Sequence
 from datetime import datetime
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import karamelo_py
-from karamelo_py.app.logs import read_log
+from karamelo_py.app.plot import read_log, read_text
 from karamelo_py.app.studies.case import COLUMNS, CaseOutcome
-from karamelo_py.app.studies.variables import NamesOfCase
+from karamelo_py.app.studies.variables import NamesOfCase, ScriptFiles
 from karamelo_py.output.files import write_whole
 from karamelo_py.output.quantity import KEYWORDS
 from karamelo_py.script.errors import ScriptError, meant, nearest
@@ -44,18 +44,17 @@ class Reduction:
         self.reduction, self.column = reduction, KEYWORDS.get(column, column)
         self.level = None if level is None else number_of(level)
         known = [*REDUCTIONS, "when"]
-        if reduction not in known or not column or (reduction == "when") == (self.level is None):
-            close = nearest(reduction, known) if reduction not in known else None
-            raise ScriptError(
-                f"-record {word}: unknown word '{reduction}'"
-                if reduction not in known
-                else f"-record {word}: '{reduction}:{column}' is not complete",
-                expected=_WORDS,
-                hint=f"did you mean '{close}:{self.column}'?" if close else None,
-            )
+        if reduction not in known:
+            close = nearest(reduction, known)
+            hint = f"did you mean '{close}:{self.column}'?" if close else None
+            unknown = f"-record {word}: unknown word '{reduction}'"
+            raise ScriptError(unknown, expected=_WORDS, hint=hint)
+        if not column or (reduction == "when") == (self.level is None):
+            incomplete = f"-record {word}: '{reduction}:{column}' is not complete"
+            raise ScriptError(incomplete, expected=_WORDS)
 
     def of(self, log: Mapping[str, np.ndarray]) -> float | None:
-        """The number, if the log has it."""
+        """Take the number, if the log has it."""
         values = log.get(self.column)
         if values is None or not len(values):
             return None
@@ -70,7 +69,7 @@ class Reduction:
         return float(log["Time"][k - 1] + share * (log["Time"][k] - log["Time"][k - 1]))
 
     def missing(self, log: Mapping[str, np.ndarray]) -> str:
-        """Why there is no such number."""
+        """Tell why there is no such number."""
         if self.column not in log:
             return f"the log has no column '{self.column}'"
         return f"{self.column} does not reach {self.level:g}"
@@ -86,8 +85,7 @@ class Recorded:
     def __init__(self, word: str):
         name, equals, formula = (part.strip() for part in word.partition("="))
         self.text, self.raw = word, None
-        self.parts: dict[str, Reduction] = {}
-        self.names: list[str] = []
+        self.parts: dict[str, Reduction] = {}  # by their names in the formula
         if not equals:
             self.word = word
             reduction, colon, rest = word.partition(":")
@@ -104,22 +102,21 @@ class Recorded:
 
         formula = _PART.sub(named, formula)
         self.raw, self.node = parse_text(formula, f"-record {name}")
-        names = {*_NAME.findall(formula)}
-        self.names = sorted(names - {*self.parts, *CONSTANTS})
+        for name in sorted({*_NAME.findall(formula)} - {*self.parts, *CONSTANTS}):
+            self.parts[name] = Reduction("last", name, None, word)
 
-    @property
-    def columns(self) -> list[str]:
-        """The log columns that it names, each with what is taken of it."""
-        return [part.column for part in self.parts.values()]
+    def columns(self, variables: Container[str] = ()) -> list[str]:
+        """List the log columns that it names, but for `variables` of the study."""
+        return [part.column for name, part in self.parts.items() if name not in variables]
 
     def of(self, log: Mapping[str, np.ndarray], case: Mapping[str, Any]) -> float | None:
-        """The number, if the log has what it takes."""
-        found = {name: part.of(log) for name, part in self.parts.items()}
+        """Take the number, if the log has what it takes."""
+        found = {
+            name: number_of(case[name]) if name in case else part.of(log)
+            for name, part in self.parts.items()
+        }
         if self.raw is None:
             return found[""]
-        for name in self.names:
-            last = Reduction("last", name, None, self.text)
-            found[name] = number_of(case[name]) if name in case else last.of(log)
         if None in found.values():
             return None
         try:
@@ -129,34 +126,25 @@ class Recorded:
         return value if isinstance(value, float) else None
 
     def missing(self, log: Mapping[str, np.ndarray]) -> str:
-        """Why there is no number."""
-        plain = [Reduction("last", name, None, self.text) for name in self.names]
-        parts = [p for p in [*self.parts.values(), *plain] if p.of(log) is None]
-        return parts[0].missing(log) if parts else f"'{self.text}' has no value"
+        """Tell why there is no number."""
+        lacking = (part for part in self.parts.values() if part.of(log) is None)
+        part = next(lacking, None)
+        return part.missing(log) if part else f"'{self.text}' has no value"
 
 
 def recorded(
-    text: str,
-    headings: Sequence[str] | None,
-    script: Path,
-    variables: Container[str] = (),
-    option: str = "-record",
+    text: str, script: ScriptFiles, variables: Container[str] = (), option: str = "-record"
 ) -> list[Recorded]:
-    """Read the numbers that -record, or another option, asks for.
-
-    Raises
-    ------
-    ScriptError
-        For a column that the script does not log, as far as that is known beforehand.
-    """
+    """Read the numbers that -record, or another option, asks for."""
     found = [Recorded(word.strip()) for word in _apart(text) if word.strip()]
+    headings = script.logged()
     for item in found:
-        for column in [*item.columns, *(n for n in item.names if n not in variables)]:
+        for column in item.columns(variables):
             if headings is None or column in headings:
                 continue
             known = list(dict.fromkeys(headings))
             raise ScriptError(
-                f"{option} {item.text}: {script} does not log '{column}'",
+                f"{option} {item.text}: {script.path} does not log '{column}'",
                 expected="one of " + ", ".join(known),
                 hint=meant(column, known)
                 or f"log_modify(custom, step, dt, time, {column}) in the script",
@@ -165,7 +153,7 @@ def recorded(
 
 
 def _apart(text: str) -> list[str]:
-    """The words between commas that stand in no parentheses."""
+    """Part words at commas that stand in no parentheses."""
     words, depth = [""], 0
     for sign in text:
         depth += (sign == "(") - (sign == ")")
@@ -179,19 +167,18 @@ def _apart(text: str) -> list[str]:
 def row(
     case: Mapping[str, str], outcome: CaseOutcome, items: Iterable[Recorded], folder: Path
 ) -> dict[str, Any]:
-    """The row of a run; what is not known of it is left empty.
+    """Make the row of a run; what is not known of it is left empty.
 
     A run that did not end well has no recorded values: those of its last moments say nothing.
     """
     log = read_log(outcome.folder) if outcome.status == "done" else {}
-    found: dict[str, Any] = dict(case)
-    for item in items:
-        found[item.word] = item.of(log, case)
-    for name in COLUMNS:
-        found[name] = outcome.facts.get(name)
-    found["status"], found["reason"] = outcome.status, outcome.reason
-    found["folder"] = os.path.relpath(outcome.folder, folder).replace(os.sep, "/")
-    return found
+    place = os.path.relpath(outcome.folder, folder).replace(os.sep, "/")
+    return {
+        **case,
+        **{item.word: item.of(log, case) for item in items},
+        **{name: outcome.facts.get(name) for name in COLUMNS},
+        "status": outcome.status, "reason": outcome.reason, "folder": place,
+    }  # fmt: skip
 
 
 def write(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
@@ -200,65 +187,34 @@ def write(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
     writer.writeheader()
     for each in rows:
-        writer.writerow({name: _cell(value) for name, value in each.items()})
+        writer.writerow({n: f"{v:.10g}" if isinstance(v, float) else v for n, v in each.items()})
     write_whole(path, file.getvalue())
 
 
-def _cell(value: Any) -> str:
-    if value is None:
-        return ""
-    if isinstance(value, float):
-        return f"{value:.10g}"
-    return str(value)
-
-
 def read(path: Path) -> list[dict[str, str]]:
-    """The rows of a table.
-
-    Raises
-    ------
-    ScriptError
-        If there is no such file, or no table in it.
-    """
+    """Read the rows of a table."""
+    expected = "a table that karamelo-py sweep has written"
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            rows = list(csv.DictReader(file))
-    except OSError as error:
-        raise ScriptError(
-            f"cannot read {path}: {error.strerror or error}",
-            expected="a table that karamelo-py sweep has written",
-        ) from None
-    except (UnicodeDecodeError, csv.Error):
+        rows = list(csv.DictReader(io.StringIO(read_text(path, expected), newline="")))
+    except csv.Error:
         rows = []
     if not rows or any(None in each or None in each.values() for each in rows):
-        raise ScriptError(
-            f"{path} is not a table of runs", expected="a table that karamelo-py sweep has written"
-        )
+        raise ScriptError(f"{path} is not a table of runs", expected=expected)
     return rows
 
 
 def value(each: Mapping[str, Any], name: str) -> float | None:
-    """The number in a column, None where it is empty or no number."""
+    """Read the number in a column, None where it is empty or no number."""
     cell = each.get(name)
     if cell is None or isinstance(cell, float):
         return cell
     return number_of(str(cell))
 
 
-def describe(path: Path, **said: Any) -> None:
-    """Write beside a table what it was made with: processor, threads, versions, date."""
-    text = json.dumps({**said, **surroundings()}, indent=1) + "\n"
-    path.with_suffix(".json").write_text(text, encoding="utf-8")
-
-
 def surroundings() -> dict[str, Any]:
     """Date, machine and versions, for what is measured here and now."""
     versions = {"python": platform.python_version(), "karamelo-py": karamelo_py.__version__}
-    for name in ("numpy", "numba", "llvmlite"):
-        try:
-            versions[name] = version(name)
-        except PackageNotFoundError:
-            versions[name] = "not installed"
+    versions |= {name: version(name) for name in ("numpy", "numba", "llvmlite")}
     return {
         "date": datetime.now().astimezone().isoformat(timespec="seconds"),
         "processor": processor(),
@@ -269,7 +225,7 @@ def surroundings() -> dict[str, Any]:
 
 
 def beside(path: Path) -> dict[str, Any]:
-    """Read what `describe` wrote beside a table, or nothing."""
+    """Read what a study wrote beside its table, or nothing."""
     try:
         return json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -277,7 +233,7 @@ def beside(path: Path) -> dict[str, Any]:
 
 
 def processor() -> str:
-    """The name of the processor."""
+    """Find the name of the processor."""
     try:
         for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
             if line.lower().startswith("model name"):

@@ -2,31 +2,24 @@
 
 import re
 import textwrap
+from argparse import ArgumentParser
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from itertools import pairwise
-from math import isclose, isfinite, nan, prod
+from math import ceil, inf, isclose, isfinite, nan, prod
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from karamelo_py.app.logs import read_log
 from karamelo_py.app.options import above_zero, positive
-from karamelo_py.app.studies import records, stretches
-from karamelo_py.app.studies.frontier import Cell, explore, unseen
-from karamelo_py.app.studies.options import (
-    add_axes,
-    add_family,
-    along,
-    family,
-    new_parser,
-    out_file,
-)
+from karamelo_py.app.plot import read_log
+from karamelo_py.app.studies import records, variables
+from karamelo_py.app.studies.case import said_in
+from karamelo_py.app.studies.keeping import grown
 from karamelo_py.app.studies.study import Study
-from karamelo_py.app.studies.variables import logged
 from karamelo_py.output.files import savefig
-from karamelo_py.output.plot_style import blank_figure
+from karamelo_py.output.plots import blank_figure
 from karamelo_py.script.errors import ScriptError, nearest, plural
 from karamelo_py.script.terms import number_of
 
@@ -40,6 +33,8 @@ with one value is passed on.
   karamelo-py stability in.file -var dt_factor=0.1:2:20 -var xi=0:1:20 -o map.png
 
 The script logs an energy that should stay about the same, such as Ek + Es."""
+Cell = tuple[int, int]
+UNKNOWN = -1
 ENERGIES = ("Etot", "E_total", "Ek+Es", "Ek_s+Es_s", "Ek+Es+Ed", "Ek", "Ek_s")
 CLASSES = ("stable", "growing", "failed")
 FIRST = 0.1  # of the rows of a log: energies are means over so many
@@ -59,24 +54,23 @@ REASONS = {
 }
 
 
-def add_parser(subparsers: Any) -> None:
-    """The subcommand for the command line."""
-    parser = new_parser(subparsers, "stability", "map where a method is stable", DESCRIPTION, run)
-    add_family(parser)
+def add_options(parser: ArgumentParser) -> None:
+    """Add what the subcommand takes."""
+    variables.add_family(parser)
     parser.add_argument("-energy", metavar="COLUMN", help="log column that should not grow")
     parser.add_argument(
         "-bound", type=above_zero, default=2.0,
         help="growing: energy above this times that of the first tenth of the log, in the mean (2)",
     )  # fmt: skip
     parser.add_argument("-stride", type=positive, default=6, help="cells between first runs (6)")
-    add_axes(parser)
+    variables.add_axes(parser)
     parser.add_argument("-o", type=Path, default=Path("map.png"), help="the picture (map.png)")
 
 
 def run(options: Any) -> int:
     """Do what the command line says; returns the exit status."""
-    out = out_file(options.o, ".png", ".svg", ".pdf")
-    values, launch, jobs = family(options)
+    out = variables.out_file(options.o, ".png", ".svg", ".pdf")
+    values, script, launch, jobs = variables.family(options)
     axes = [name for name in values if len(values[name]) > 1]
     for name in axes:
         if any(number_of(value) is None for value in values[name]):
@@ -88,24 +82,21 @@ def run(options: Any) -> int:
         )
     for name in axes:
         values[name].sort(key=float)
-    energy = energy_column(options.energy, logged(options.script), options.script)
-    words = along(options, axes[0], axes[1] if len(axes) > 1 else "")
+    energy = energy_column(options.energy, script)
+    words = variables.along(options, axes[0], axes[1] if len(axes) > 1 else "")
     table = out.with_suffix(".csv")
     items = [records.Recorded(f"max:{energy}")]
-    cells = prod(len(values[name]) for name in axes)
+    most = prod(len(values[name]) for name in axes)
     study = Study(
-        launch, out.with_suffix(""), items, jobs, again=options.again, strict=True, most=cells
+        launch, table, items, jobs, again=options.again, strict=True, most=most, writes=False
     )
-    records.describe(
-        table, script=str(options.script), variables=values, energy=energy, bound=options.bound,
-        threads=launch.threads, jobs=jobs,
-    )  # fmt: skip
-    chart = Map(study, values, axes, energy, options.bound, out.parent)
+    study.describe(variables=values, energy=energy, bound=options.bound)
+    chart = Map(study, values, axes, energy, options.bound)
     known, inferred = explore(chart.shape, chart.classify, options.stride)
-    rows = chart.rows(known, inferred)
-    records.write(table, rows)
-    chart.draw(known, inferred, out, options.script.name, words)
-    chart.tell(known, inferred)
+    chart.classes = {**known, **inferred}
+    records.write(table, chart.rows())
+    chart.draw(out, options.script.name, words)
+    chart.tell()
     width = unseen(chart.shape, options.stride)
     if inferred and width:
         wide = plural(width, "cell")
@@ -114,37 +105,41 @@ def run(options: Any) -> int:
     return 0
 
 
-def energy_column(asked: str | None, headings: Sequence[str] | None, script: Path) -> str:
-    """The log column to watch.
-
-    Raises
-    ------
-    ScriptError
-        If the script does not log it, or logs no energy that is known by its name.
-    """
+def energy_column(asked: str | None, script: variables.ScriptFiles) -> str:
+    """Choose the log column to watch."""
     if asked is not None:
-        return records.recorded(asked, headings, script, option="-energy")[0].columns[0]
+        return records.recorded(asked, script, option="-energy")[0].columns()[0]
+    headings = script.logged()
     for name in ENERGIES:
         if headings is None or name in headings:
             return name
     close = nearest("Ek+Es", headings or [])
     raise ScriptError(
-        f"{script} logs no energy under a usual name",
+        f"{script.path} logs no energy under a usual name",
         expected="-energy COLUMN, or log_modify(custom, step, dt, time, Ek + Es) in the script",
         hint=f"-energy {close}" if close else None,
     )
 
 
 def growth(energy: np.ndarray) -> float:
-    """The largest mean of an energy over the mean of its first tenth; infinite for NaN."""
-    first, later = stretches.most(energy, FIRST)
+    """Find the largest mean of an energy over that of its first tenth; infinite for NaN.
+
+    Means are over a tenth of the rows. From rest the median stands for the beginning.
+    """
+    if not len(energy):
+        return 0.0
+    if not np.isfinite(energy).all():
+        return inf
+    rows = max(1, ceil(FIRST * len(energy)))
+    means = np.convolve(np.abs(energy), np.full(rows, 1 / rows), "valid")
+    first = float(means[0]) or float(np.median(np.abs(energy)))
     if first == 0:
-        return np.inf if later > 0 else 0.0
-    return 1 + stretches.grown(first, later)
+        return inf if means.max() > 0 else 0.0
+    return 1 + grown(first, float(means.max()))
 
 
 def in_short(row: Mapping[str, Any]) -> str:
-    """The reason of a failure in a few words."""
+    """Give the reason of a failure in a few words."""
     if row["status"] == "too long":
         return "too long"
     for pattern, words in REASONS.items():
@@ -156,157 +151,126 @@ def in_short(row: Mapping[str, Any]) -> str:
 
 def limited_by(folder: Path) -> str:
     """Read by name what limits the first step of a run; nothing where the script says the step."""
-    try:
-        said = (folder / "out.txt").read_text(encoding="utf-8", errors="replace")
-    except OSError:
-        return ""
-    match = re.search(r"^  limited by +(\w+);", said, re.M)
+    match = re.search(r"^  limited by +(\w+);", said_in(folder / "out.txt"), re.M)
     return match[1] if match and match[1] not in ("set_dt", "end") else ""
 
 
 class Map:
     """The plane of a stability map.
 
-    Parameters
-    ----------
-    study
-        Runs the cases.
-    values, axes
-        Values of all variables, and the names of the one or two that vary.
-    energy, bound
-        The log column to watch, and how much it may grow.
-    folder
-        What folders in the table are relative to.
+    Of all variables in `values` the one or two `axes` vary. The log column `energy` may grow by the
+    factor `bound`.
     """
 
     def __init__(
-        self, study: Study, values: dict[str, list[str]], axes: list[str], energy: str,
-        bound: float, folder: Path,
-    ):  # fmt: skip
+        self, study: Study, values: dict[str, list[str]], axes: list[str], energy: str, bound: float
+    ):
         self.study, self.values, self.axes = study, values, axes
-        self.energy, self.bound, self.folder = energy, bound, folder
-        self.shape = (len(values[axes[0]]), len(values[axes[1]]) if len(axes) > 1 else 1)
-        self.found: dict[Cell, dict[str, Any]] = {}
+        self.energy, self.bound = energy, bound
+        self.x, *more = ([float(v) for v in values[name]] for name in axes)
+        self.y = more[0] if more else [0.0]
+        self.shape = len(self.x), len(self.y)
+        self.found: dict[Cell, dict[str, Any]] = {}  # cells that were run
+        self.classes: dict[Cell, Any] = {}  # those of all cells
+
+    @property
+    def failures(self) -> list[tuple[str, int]]:
+        """Count why runs failed, the commonest first."""
+        failed = (row["why"] for row in self.found.values() if row["class"] == "failed")
+        return Counter(failed).most_common()
 
     def case(self, cell: Cell) -> dict[str, str]:
-        """The values of the variables of a cell."""
+        """Find the values of the variables of a cell."""
         at = dict(zip(self.axes, cell, strict=False))
         return {name: values[at.get(name, 0)] for name, values in self.values.items()}
 
     def classify(self, cells: Sequence[Cell]) -> list[str]:
-        """Run cells; the class of each."""
+        """Run cells, and tell the class of each."""
         rows = self.study.run([self.case(cell) for cell in cells])
-        classes = []
         for cell, row in zip(cells, rows, strict=True):
-            log = read_log(self.folder / row["folder"])
-            if row["status"] == "done" and self.energy not in log:
+            place = self.study.out.parent / row["folder"]
+            log = read_log(place)
+            done = row["status"] == "done"
+            if done and self.energy not in log:
                 raise ScriptError(
                     f"the log has no column '{self.energy}'", expected=", ".join(log) or "a log"
                 )
             factor = growth(log.get(self.energy, np.empty(0)))
-            kind = "failed" if row["status"] != "done" else "stable"
-            if kind == "stable" and factor > self.bound:
-                kind = "growing"
-            reason = in_short(row) if kind == "failed" else ""
-            if kind == "growing":
-                reason = f"{self.energy} grows {factor:.3g} times"
-            name = limited_by(self.folder / row["folder"])
-            found = {**row, "class": kind, "why": reason, "growth": factor, "limit": name}
-            self.found[cell] = found
-            classes.append(kind)
-        return classes
+            kind, why = "stable", ""
+            if not done:
+                kind, why = "failed", in_short(row)
+            elif factor > self.bound:
+                kind, why = "growing", f"{self.energy} grows {factor:.3g} times"
+            found = {"class": kind, "why": why, "growth": factor, "limit": limited_by(place)}
+            self.found[cell] = {**row, **found}
+        return [self.found[cell]["class"] for cell in cells]
 
-    def rows(self, known: Mapping[Cell, Any], inferred: Mapping[Cell, Any]) -> list[dict]:
-        """The table: every cell, whether it was run, and what it showed."""
+    def rows(self) -> list[dict]:
+        """Make the table: every cell, whether it was run, and what it showed."""
         rows = []
-        for cell in sorted({**known, **inferred}):
+        for cell, kind in sorted(self.classes.items()):
             row = self.found.get(cell, {})
-            rows.append(
-                {
-                    **self.case(cell),
-                    "class": known.get(cell) or inferred.get(cell),
-                    "run": "yes" if cell in known else "no",
-                    "reason": row.get("why", ""),
-                    "growth": row.get("growth"),
-                    "dt": row.get("dt"),
-                    "stable_dt": row.get("stable_dt"),
-                    "own_dt": row.get("own_dt"),
-                    "limit": row.get("limit", ""),
-                    "message": row.get("reason", ""),
-                    "folder": row.get("folder", ""),
-                }
-            )
+            found = {"class": kind, "run": "yes" if row else "no", "reason": row.get("why")}
+            found |= {name: row.get(name) for name in ("growth", "dt", "stable_dt", "own_dt")}
+            found |= {"limit": row.get("limit"), "message": row.get("reason")}
+            rows.append({**self.case(cell), **found, "folder": row.get("folder")})
         return rows
 
     def where(self, step: str, j: int) -> float | None:
-        """The first variable where the first step is the one of this column, in row j."""
-        x = [float(v) for v in self.values[self.axes[0]]]
+        """Find the first variable where the first step is that of this column, in row j."""
         points = []
         for (i, other), row in sorted(self.found.items()):
             dt, same = row.get("dt"), row.get(step)
             if other == j and dt and same and isfinite(dt / same):
-                points.append((x[i], dt / same))
+                points.append((self.x[i], dt / same))
         for (xa, a), (xb, b) in pairwise(points):
             if (a - 1) * (b - 1) <= 0 and a != b:
                 return xa + (1 - a) / (b - a) * (xb - xa)
         return None
 
-    def margins(self, classes: Mapping[Cell, Any]) -> list[float]:
-        """The largest stable step over the program's stable step, in each row that has an edge."""
+    def margins(self) -> list[float]:
+        """Divide the largest stable step by the program's, in each row that has an edge."""
         found = []
         for j in range(self.shape[1]):
-            column = [classes[i, j] for i in range(self.shape[0])]
+            column = [self.classes[i, j] for i in range(self.shape[0])]
             edge = next((i for i, kind in enumerate(column) if kind != "stable"), None)
             row = self.found.get((edge - 1, j)) if edge else None
             if row and row.get("dt") and row.get("stable_dt"):
                 found.append(row["dt"] / row["stable_dt"])
         return found
 
-    def tell(self, known: Mapping[Cell, Any], inferred: Mapping[Cell, Any]) -> None:
+    def tell(self) -> None:
         """Print how many cells are of each class and why runs failed."""
-        classes = {**inferred, **known}
-        count = Counter(classes.values())
-        print(f"{len(known)} of {len(classes)} cells were run (the others lie between like ones)")
+        count, run = Counter(self.classes.values()), len(self.found)
+        print(f"{run} of {len(self.classes)} cells were run (the others lie between like ones)")
         for kind in CLASSES:
             if count[kind]:
                 print(f"  {kind:<8} {plural(count[kind], 'cell')}")
-        why = Counter(row["why"] for row in self.found.values() if row["class"] == "failed")
-        for reason, times in why.most_common():
+        for reason, times in self.failures:
             print(f"    {reason}: {plural(times, 'run')}")
-        margins = self.margins(classes)
+        margins = self.margins()
         if margins:
             low, high = min(margins), max(margins)
             ends = f"{low:.3g}" if high - low < 1e-3 else f"{low:.3g} to {high:.3g}"
             print(f"the largest stable first step is {ends} times the program's stable step")
 
-    def draw(
-        self,
-        known: Mapping[Cell, Any],
-        inferred: Mapping[Cell, Any],
-        path: Path,
-        title: str,
-        words: tuple[str, str],
-    ) -> None:
+    def draw(self, path: Path, title: str, words: tuple[str, str]) -> None:
         """Draw the map, with `words` along its axes."""
         from matplotlib.colors import ListedColormap
         from matplotlib.lines import Line2D
         from matplotlib.patches import Patch
 
-        classes = {**inferred, **known}
-        x = [float(v) for v in self.values[self.axes[0]]]
-        two = len(self.axes) > 1
-        y = [float(v) for v in self.values[self.axes[1]]] if two else [0.0]
-        grid = np.array(
-            [[CLASSES.index(classes[i, j]) for i in range(len(x))] for j in range(len(y))]
-        )
+        x, y, two = self.x, self.y, len(self.axes) > 1
+        grid = np.zeros(self.shape)
+        for cell, kind in self.classes.items():
+            grid[cell] = CLASSES.index(kind)
         figure = blank_figure(9.0, 5.6 if two else 2.8)
         axes = figure.subplots()
         axes.pcolormesh(
-            edges(x), edges(y), grid, cmap=ListedColormap([COLOURS[k] for k in CLASSES]),
+            edges(x), edges(y), grid.T, cmap=ListedColormap([COLOURS[k] for k in CLASSES]),
             vmin=-0.5, vmax=2.5,
         )  # fmt: skip
-        reasons = Counter(row["why"] for row in self.found.values() if row["class"] == "failed")
-        number_of = {reason: str(k) for k, (reason, _) in enumerate(reasons.most_common(), 1)}
+        number_of = {reason: str(k) for k, (reason, _) in enumerate(self.failures, 1)}
         for (i, j), row in self.found.items():
             if row["class"] == "failed":
                 axes.text(x[i], y[j], number_of[row["why"]], ha="center", va="center",
@@ -315,7 +279,7 @@ class Map:
                 axes.plot(x[i], y[j], "k.", markersize=4)
         handles = [
             Patch(facecolor=COLOURS[k], edgecolor="0.4", label=k)
-            for k in CLASSES if k in classes.values()
+            for k in CLASSES if k in self.classes.values()
         ]  # fmt: skip
         handles += [
             Patch(facecolor="none", edgecolor="none", label=f"{k}  {reason}")
@@ -354,9 +318,119 @@ class Map:
 
 
 def edges(centres: Sequence[float]) -> np.ndarray:
-    """Edges of cells around centres."""
+    """Find the edges of cells around centres."""
     at = np.asarray(centres, float)
     if len(at) == 1:
         return np.array([at[0] - 0.5, at[0] + 0.5])
     middle = (at[:-1] + at[1:]) / 2
     return np.concatenate([[2 * at[0] - middle[0]], middle, [2 * at[-1] - middle[-1]]])
+
+
+# ---- where a plane of cells changes, with few runs -----------------------------------------------
+
+
+def explore(
+    shape: tuple[int, int],
+    classify: Callable[[Sequence[Cell]], Sequence[Hashable]],
+    stride: int = 6,
+) -> tuple[dict[Cell, Hashable], dict[Cell, Hashable]]:
+    """Find the class of every cell of a plane, most of them by inference.
+
+    First lines and columns about `stride` cells apart are crossed. What lies in a row or a column
+    between two cells of one class is taken to be like them, the nearest ones first; between unlike
+    ones the middle is asked for, in the longest gaps first. Where an edge goes along a row, one in
+    three of its cells is asked for, so that no bow of it is cut off. So edges are found to the
+    cell; an island that lies wholly between the cells that were asked for is missed.
+
+    `classify` gives the classes of cells; it is asked for several at once, none of which tells
+    another. Returns the classes of those cells, and of the others.
+    """
+    classes: list[Hashable] = []  # those of the numbers in the planes
+    known = np.full(shape, UNKNOWN)
+    cells = [(i, j) for i in _cuts(shape[0], stride) for j in _cuts(shape[1], stride)]
+    while cells:
+        for cell, kind in zip(cells, classify(cells), strict=True):
+            if kind not in classes:
+                classes.append(kind)
+            known[cell] = classes.index(kind)
+        found = _filled(known, stride)
+        cells = _apart([*_halves(found)] or [*_unproved(known, found)])
+    asked = {cell: classes[k] for cell, k in np.ndenumerate(known) if k != UNKNOWN}
+    return asked, {cell: classes[k] for cell, k in np.ndenumerate(found) if cell not in asked}
+
+
+def unseen(shape: tuple[int, int], stride: int) -> int:
+    """Count the cells across islands and strips that no run needs to meet."""
+    return max((b - a - 1 for n in shape for a, b in pairwise(_cuts(n, stride))), default=0)
+
+
+def _cuts(count: int, stride: int) -> list[int]:
+    pieces = max(1, ceil((count - 1) / stride))
+    return sorted({round(k * (count - 1) / pieces) for k in range(pieces + 1)})
+
+
+def _gaps(line: np.ndarray) -> Iterator[tuple[int, int]]:
+    """Neighbours in a line between which nothing is known."""
+    return ((a, b) for a, b in pairwise(np.flatnonzero(line != UNKNOWN)) if b - a > 1)
+
+
+def _filled(known: np.ndarray, stride: int) -> np.ndarray:
+    """Fill in what lies between like cells; where row and column disagree, nothing."""
+    found, reach = known.copy(), 2
+    while reach <= stride:
+        rows, columns = _between(found, reach), _between(found.T, reach).T
+        agreed = np.where((rows == columns) | (columns == UNKNOWN), rows, columns)
+        agreed[(rows != columns) & (np.minimum(rows, columns) != UNKNOWN)] = UNKNOWN
+        new = (found == UNKNOWN) & (agreed != UNKNOWN)
+        found[new] = agreed[new]
+        reach = 2 if new.any() else reach + 1
+    return found
+
+
+def _between(plane: np.ndarray, reach: int) -> np.ndarray:
+    """Fill each row between like cells at most `reach` apart."""
+    said = np.full(plane.shape, UNKNOWN)
+    for line, out in zip(plane, said, strict=True):
+        for a, b in _gaps(line):
+            if b - a <= reach and line[a] == line[b]:
+                out[a + 1 : b] = line[a]
+    return said
+
+
+def _halves(found: np.ndarray) -> Iterator[tuple[int, Cell]]:
+    """The middles of gaps in rows and columns, each with the length of its gap."""
+    for i, line in enumerate(found):
+        yield from ((b - a, (i, (a + b) // 2)) for a, b in _gaps(line))
+    for j, line in enumerate(found.T):
+        yield from ((b - a, ((a + b) // 2, j)) for a, b in _gaps(line))
+
+
+def _unproved(known: np.ndarray, found: np.ndarray) -> Iterator[tuple[int, Cell]]:
+    """The middles of stretches along an edge in which no cell is known, with their lengths."""
+    for i, k in np.ndindex(found.shape[0] - 1, 2):
+        for stretch in _stretches(known[i + k], found[i], found[i + 1], k):
+            yield len(stretch), (i + k, stretch[len(stretch) // 2])
+    for j, k in np.ndindex(found.shape[1] - 1, 2):
+        for stretch in _stretches(known[:, j + k], found[:, j], found[:, j + 1], k):
+            yield len(stretch), (stretch[len(stretch) // 2], j + k)
+
+
+def _stretches(known: np.ndarray, near: np.ndarray, far: np.ndarray, which: int) -> list[list[int]]:
+    """Find stretches longer than 1 where two lines differ and nothing is known of one of them."""
+    line = (near, far)[which]
+    stretches: list[list[int]] = [[]]
+    for i in np.flatnonzero((near != far) & (known == UNKNOWN)):
+        last = stretches[-1]
+        if last and (i > last[-1] + 1 or line[i] != line[last[-1]]):
+            stretches.append([])
+        stretches[-1].append(int(i))
+    return [stretch for stretch in stretches if len(stretch) > 1]
+
+
+def _apart(wanted: list[tuple[int, Cell]]) -> list[Cell]:
+    """Cells of the longest gaps, those left out that lie within half the gap of another."""
+    chosen: list[tuple[int, Cell]] = []
+    for size, (i, j) in sorted(wanted, key=lambda one: (-one[0], one[1])):
+        if all(max(abs(i - k), abs(j - m)) > longer // 2 for longer, (k, m) in chosen):
+            chosen.append((size, (i, j)))
+    return [cell for _, cell in chosen]

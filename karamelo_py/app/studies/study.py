@@ -1,100 +1,84 @@
-"""Runs the cases of a study: some at once, those that are known not again, all of them shown."""
+"""Cases of a study, some run at once, known ones not again; karamelo-py sweep, all in a table."""
 
 from __future__ import annotations
 
+import json
 import os
 import sys
 import time
+from argparse import ArgumentParser
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from karamelo_py.app.logs import read_log
+from karamelo_py.app.options import positive
+from karamelo_py.app.plot import read_log
+from karamelo_py.app.studies import variables
 from karamelo_py.app.studies.case import CaseOutcome, Launch, Refused, folder_name
-from karamelo_py.app.studies.records import Recorded, row
+from karamelo_py.app.studies.records import Recorded, recorded, row, surroundings, write
 from karamelo_py.output.console import duration
+from karamelo_py.script.errors import ScriptError, plural
 from karamelo_py.script.terms import number_of
 
+DESCRIPTION = """\
+Runs a script with every combination of values of its variables, and writes one table (CSV).
+
+  karamelo-py sweep in.file -var N=10,20,40 -var basis=linear,quadratic-spline -record err,max:Etot
+
+Each run has a folder of its own, named after its values, in a folder named after the table. A run
+that fails is recorded with its reason and stops nothing; where none is done, the exit status is 1.
+An interrupted sweep goes on where it stopped when the same command is given again. Processor,
+threads and versions are written beside the table (sweep.json)."""
 _FACTS = ("seconds", "points", "steps")
 _STATUS = 24  # characters at least, for what became of a run
 
 
+@dataclass
 class Study:
-    """A family of runs of one script.
+    """A family of runs of one script."""
 
-    Parameters
-    ----------
-    launch
-        How a case is run.
-    folder
-        Where the folders of the runs are.
-    items
-        What is recorded of their logs.
-    jobs
-        How many run at once.
-    again
-        Whether to run also what has been run before.
-    title
-        Heads the table on the terminal.
-    strict
-        Whether a variant that is refused ends the study.
-    most
-        How many cases there can be, of a study that asks for them by and by; 0: `run` gets all.
+    launch: Launch
+    out: Path  # the table or picture: runs have their folders in one of that name
+    items: Sequence[Recorded]  # what is recorded of the logs
+    jobs: int  # runs at once
+    again: bool = False  # run also what has been run before
+    title: str = ""  # heads the table on the terminal
+    strict: bool = False  # a variant that is refused ends the study
+    most: int = 0  # cases of a study that asks for them by and by; 0: `run` gets all
+    writes: bool = True  # the table, after each run
+    names: list[str] = field(default_factory=list)  # the variables
+    # Of finished runs, by the values of the case.
+    rows: dict[tuple[str, ...], dict[str, Any]] = field(default_factory=dict)
+    ran: int = 0  # not taken from an earlier study
+    begun: float = field(default_factory=time.perf_counter)
 
-    Attributes
-    ----------
-    rows
-        The rows of finished runs, by the values of the case.
-    names
-        The variables.
-    ran
-        How many were run, not taken from an earlier study.
-    """
+    def __post_init__(self) -> None:
+        self.folder = self.out.with_suffix("")
 
-    def __init__(
-        self,
-        launch: Launch,
-        folder: Path,
-        items: Sequence[Recorded],
-        jobs: int,
-        *,
-        again: bool = False,
-        title: str = "",
-        strict: bool = False,
-        most: int = 0,
-    ):
-        self.launch = launch
-        self.folder = folder
-        self.items = items
-        self.jobs = max(1, jobs)
-        self.again = again
-        self.title = title
-        self.strict = strict
-        self.most = most
-        self.rows: dict[tuple[str, ...], dict[str, Any]] = {}
-        self.names: list[str] = []
-        self.ran = 0
-        self.begun = time.perf_counter()
-        self.on_row: Callable[[], None] = lambda: None
+    def describe(self, **said: Any) -> None:
+        """Write beside the table what it is made with."""
+        how = {"threads": self.launch.threads, "jobs": self.jobs, **surroundings()}
+        text = json.dumps({"script": str(self.launch.script), **said, **how}, indent=1) + "\n"
+        self.out.with_suffix(".json").write_text(text, encoding="utf-8")
+
+    def write(self) -> None:
+        """Write the table of what is known."""
+        if self.writes and self.rows:
+            write(self.out, list(self.rows.values()))
 
     def run(self, cases: Sequence[Mapping[str, str]]) -> list[dict[str, Any]]:
-        """The rows of these cases, in order; runs what is not known yet.
+        """Give the rows of these cases, in order; runs what is not known yet.
 
-        Raises
-        ------
-        Refused
-            For a variant that is refused, in a strict study.
-        KeyboardInterrupt
-            When the user interrupts; the runs in progress are taken down, finished ones are kept.
+        When the user interrupts, runs in progress are taken down, and finished ones are kept.
         """
         self.names = list(cases[0])
         waiting = []
         for case in cases:
-            key = tuple(case.values())
-            if key in self.rows:
+            if tuple(case.values()) in self.rows:
                 continue
             place = self.folder / folder_name(case)
             known = None if self.again else self.launch.kept(case, place)
@@ -102,27 +86,31 @@ class Study:
                 self._put(case, known)
             else:
                 waiting.append((case, place))
-        if len(self.rows):
-            self.on_row()
+        self.write()
         if waiting:
-            with _Display(self, cases, len(waiting)) as display:
+            with _Display(self, len(waiting)) as display:
                 self._run(waiting, display)
         return [self.rows[tuple(case.values())] for case in cases]
 
-    def _run(self, waiting: list[tuple[Mapping[str, str], Path]], display: _Display) -> None:
+    def _run(self, queue: list[tuple[Mapping[str, str], Path]], display: _Display) -> None:
         pool = ThreadPoolExecutor(self.jobs)
         running: dict[Future, Mapping[str, str]] = {}
         started: set[tuple] = set()
         compiled = {kind_of(dict(zip(self.names, key, strict=True))) for key in self.rows}
+
+        def ready() -> Any:
+            """Choose a case to run; the first of a kind goes ahead: only it has to compile."""
+            kinds = (((case, place), kind_of(case)) for case, place in queue)
+            return next((i for i, kind in kinds if kind in compiled or kind not in started), None)
+
         try:
-            queue = list(waiting)
             while queue or running:
-                while len(running) < self.jobs and (ready := self._ready(queue, started, compiled)):
-                    case, place = ready
-                    queue.remove(ready)
+                while len(running) < self.jobs and (item := ready()):
+                    queue.remove(item)
+                    case, place = item
                     started.add(kind_of(case))
                     running[pool.submit(self.launch.run, case, place)] = case
-                    display.begin(case)
+                    display.started[tuple(case.values())] = time.perf_counter()
                 done, _ = wait(running, timeout=0.25, return_when=FIRST_COMPLETED)
                 for future in done:
                     case = running.pop(future)
@@ -130,21 +118,13 @@ class Study:
                     compiled.add(kind_of(case))
                     self._put(case, future.result())
                     display.finish(case, self.rows[tuple(case.values())])
-                    self.on_row()
+                    self.write()
                 display.tick([case for case, _ in queue], list(running.values()))
         except BaseException:
             self.launch.stop.set()
             raise
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
-
-    @staticmethod
-    def _ready(queue: list, started: set, compiled: set) -> Any:
-        """The next case to run; the first of a kind goes ahead, so that only it has to compile."""
-        for item in queue:
-            if kind_of(item[0]) in compiled or kind_of(item[0]) not in started:
-                return item
-        return None
 
     def _put(self, case: Mapping[str, str], outcome: CaseOutcome) -> None:
         if self.strict and outcome.status == "refused":
@@ -159,10 +139,8 @@ class Study:
 class _Display:
     """The table of a study on the terminal while it runs; plain lines where nobody looks."""
 
-    def __init__(self, study: Study, cases: Sequence[Mapping[str, str]], count: int):
-        self.study = study
-        self.names = study.names
-        self.count = count
+    def __init__(self, study: Study, count: int):
+        self.study, self.count = study, count
         self.finished = 0
         self.started: dict[tuple[str, ...], float] = {}
         self.live: Any = None
@@ -179,18 +157,14 @@ class _Display:
         if self.live is not None:
             self.live.stop()
 
-    def begin(self, case: Mapping[str, str]) -> None:
-        self.started[tuple(case.values())] = time.perf_counter()
-
     def finish(self, case: Mapping[str, str], found: Mapping[str, Any]) -> None:
         self.finished += 1
         if self.live is None:
             said = " ".join(f"{name}={value}" for name, value in case.items())
             numbers = [f"{i.word} {shown(found[i.word])}" for i in self.study.items]
-            end = found["status"] + (f": {found['reason']}" if found["reason"] else "")
-            line = ", ".join([said, *numbers, f"{shown(found['seconds'])} s", end])
             done, of = self.progress
             number = f"run {done} of at most {of}:" if self.study.most else f"{done}/{of} "
+            line = ", ".join([said, *numbers, f"{shown(found['seconds'])} s", ended(found)])
             print(f"{number} {line}", flush=True)
 
     def tick(self, queue: Sequence[Mapping], running: Sequence[Mapping]) -> None:
@@ -203,24 +177,19 @@ class _Display:
 
         rows = list(self.study.rows.values())
         room = max(4, self.live.console.height - 8 - len(running))
-        waiting = [
-            (case, f"running, {duration(time.perf_counter() - self.started[tuple(case.values())])}")
-            for case in running
-        ]
+        waiting = [(case, f"running, {duration(self.since(case))}") for case in running]
         table = results_table(
-            rows[-room:], self.names, self.study.items, self.study.title,
+            rows[-room:], self.study.names, self.study.items, self.study.title,
             self.live.console.width, waiting,
         )  # fmt: skip
         # Nobody knows how many more a study by and by asks for.
         left = None if self.study.most else self.left(queue, running)
-        line = Table.grid(padding=(0, 1))
         done, of = self.progress
         said = f"{done} of {'at most ' if self.study.most else ''}{of} runs"
         said += f", {duration(time.perf_counter() - self.study.begun)}"
-        line.add_row(
-            ProgressBar(total=of, completed=done, width=30),
-            Text(said + (f", about {duration(left)} left" if left is not None else "")),
-        )
+        said += f", about {duration(left)} left" if left is not None else ""
+        line = Table.grid(padding=(0, 1))
+        line.add_row(ProgressBar(total=of, completed=done, width=30), Text(said))
         self.live.update(Group(table, line))
 
     @property
@@ -229,18 +198,19 @@ class _Display:
         most = self.study.most
         return (self.study.ran, most) if most else (self.finished, self.count)
 
+    def since(self, case: Mapping) -> float:
+        """Tell for how many seconds a case has been running."""
+        return time.perf_counter() - self.started[tuple(case.values())]
+
     def left(self, queue: Sequence[Mapping], running: Sequence[Mapping]) -> float | None:
-        """Seconds that remain, from the times of finished runs and how they grow with variables."""
+        """Guess the seconds that remain, by the times of finished runs and their variables."""
         done = [found for found in self.study.rows.values() if found.get("wall_s")]
         if not self.finished or not done:
             return None
-        predict = guessed_time(
-            [{n: f[n] for n in self.names} for f in done], [f["wall_s"] for f in done]
-        )
-        now = time.perf_counter()
+        cases = [{name: found[name] for name in self.study.names} for found in done]
+        predict = guessed_time(cases, [found["wall_s"] for found in done])
         rest = sum(predict(case) for case in queue)
-        for case in running:
-            rest += max(predict(case) - (now - self.started[tuple(case.values())]), 0.0)
+        rest += sum(max(predict(case) - self.since(case), 0.0) for case in running)
         return rest / min(self.study.jobs, max(len(queue) + len(running), 1))
 
 
@@ -252,37 +222,39 @@ def kind_of(case: Mapping[str, str]) -> tuple[str, ...]:
 def guessed_time(
     cases: Sequence[Mapping[str, str]], times: Sequence[float]
 ) -> Callable[[Mapping[str, str]], float]:
-    """A guess of the time of a case: a product of powers of its numbers and factors of its words.
+    """Fit the time of a case: a product of powers of its numbers and factors of its words.
 
-    Fitted by least squares of logarithms, with a pull towards "changes nothing" where little is
-    known.
+    By least squares of logarithms, with a pull towards "changes nothing" where little is known.
     """
-    # A variable may have numbers and words, of which 0 is one.
-    terms = list(dict.fromkeys(_term(n, v) for case in cases for n, v in case.items()))
 
-    def features(case: Mapping[str, str]) -> list[float]:
-        have = {_term(n, v): v for n, v in case.items()}
-        return [
-            0.0 if t not in have else np.log(number_of(have[t])) if t[1] is None else 1.0
-            for t in terms
-        ]
+    def features(case: Mapping[str, str]) -> dict[Any, float]:
+        """Note logarithms of numbers by their names, and 1 for each word; 0 is a word, too."""
+        found: dict[Any, float] = {}
+        for name, word in case.items():
+            number = number_of(word)
+            if number is not None and number > 0:
+                found[name] = np.log(number)
+            else:
+                found[name, word] = 1.0
+        return found
 
-    matrix = np.array([features(case) for case in cases], float).reshape(len(cases), -1)
+    terms = list(dict.fromkeys(term for case in cases for term in features(case)))
+
+    def line(case: Mapping[str, str]) -> list[float]:
+        have = features(case)
+        return [have.get(term, 0.0) for term in terms]
+
+    matrix = np.array([line(case) for case in cases], float).reshape(len(cases), -1)
     logs = np.log(times)
     centre, mean = matrix.mean(axis=0), logs.mean()
     shifted = matrix - centre
     normal = shifted.T @ shifted + 0.05 * np.eye(matrix.shape[1])
     slopes = np.linalg.solve(normal, shifted.T @ (logs - mean))
-    return lambda case: float(np.exp(mean + (np.array(features(case)) - centre) @ slopes))
-
-
-def _term(name: str, value: str) -> tuple[str, Any]:
-    as_number = number_of(value)
-    return (name, None) if as_number is not None and as_number > 0 else (name, value)
+    return lambda case: float(np.exp(mean + (np.array(line(case)) - centre) @ slopes))
 
 
 def shown(value: Any) -> str:
-    """A number or a word as a table shows it; NaN is none."""
+    """Write a number or a word as a table shows it; NaN is none."""
     if value is None or value == "" or value != value:
         return "–"
     if isinstance(value, float):
@@ -290,8 +262,13 @@ def shown(value: Any) -> str:
     return str(value)
 
 
+def ended(found: Mapping[str, Any]) -> str:
+    """Write what became of a run."""
+    return found["status"] + (f": {found['reason']}" if found["reason"] else "")
+
+
 def plain_table(words: Sequence[str], numbers: Sequence[str], title: str | None = None) -> Any:
-    """A table for a terminal, empty, with columns of words and of numbers."""
+    """Make an empty table for a terminal, with columns of words and of numbers."""
     from rich.table import Table
 
     table = Table(box=None, pad_edge=False, title=title, title_justify="left")
@@ -310,7 +287,7 @@ def results_table(
     width: int,
     running: Sequence[tuple[Mapping[str, str], str]] = (),
 ) -> Any:
-    """A table of runs for a terminal of `width` characters, and below them those that run.
+    """Make a table of runs for a terminal of `width` characters, and below them those that run.
 
     No value is cut off: where there is little room some facts are left out, and the last column
     takes more lines.
@@ -334,7 +311,7 @@ def results_table(
         table.add_column(name, justify="right", min_width=widths[name])
     table.add_column("status", overflow="fold", min_width=6)
     for k, each in enumerate(rows):
-        end = each["status"] + (f": {each['reason']}" if each["reason"] else "")
+        end = ended(each)
         style = {"done": "green", "failed": "red", "refused": "red"}.get(each["status"], "yellow")
         cells = [Text(values[name][k]) for name in (*names, *columns)]
         table.add_row(*cells, Text(end if len(end) < 60 else end[:59] + "…", style=style))
@@ -343,13 +320,80 @@ def results_table(
     return table
 
 
-def default_jobs() -> int:
-    """As many as there are cores."""
-    return max(1, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1)
-
-
 def terminal() -> Any:
     """Open the place of tables; a file or a pipe is wide enough for whole rows."""
     from rich.console import Console
 
     return Console() if sys.stdout.isatty() else Console(width=200)
+
+
+# ---- karamelo-py sweep --------------------------------------------------------------------------
+
+
+def add_options(parser: ArgumentParser) -> None:
+    """Add what the subcommand takes."""
+    variables.add_family(parser)
+    variables.add_combinations(parser)
+    parser.add_argument(
+        "-record", default="", metavar="COLUMNS",
+        help="log columns: err (the last value), max:err, min:err, mean:err, first:err, the time "
+        "when:err:0.1; formulas of them: off=abs(max:u/3.28 - 1); with commas",
+    )  # fmt: skip
+    parser.add_argument(
+        "-time", action="store_true",
+        help="measure time: one run at a time, each repeated; seconds are the median",
+    )  # fmt: skip
+    parser.add_argument("-repeat", type=positive, default=3, help="repetitions of -time (3)")
+    parser.add_argument("-o", type=Path, default=Path("sweep.csv"), help="the table (sweep.csv)")
+
+
+def run(options: Any) -> int:
+    """Do what the command line says; returns the exit status."""
+    out = variables.out_file(options.o, ".csv")
+    repeat = options.repeat if options.time else 1
+    values, script, launch, jobs = variables.family(options, timed=options.time, repeat=repeat)
+    combinations = variables.cases(values, variables.zipped(options), options.where)
+    items = recorded(options.record, script, values)
+    study = Study(launch, out, items, jobs, again=options.again, title=str(options.script))
+    if study.folder.exists() and not study.folder.is_dir():
+        expected = "a free name for the folder of the runs"
+        raise ScriptError(f"{study.folder} is a file", expected=expected)
+    record, computes = [item.text for item in items], script.computes()
+    study.describe(
+        variables=values, record=record, computes=computes, timed=options.time, repeat=repeat
+    )
+    try:
+        rows = study.run(combinations)
+    except KeyboardInterrupt:
+        print(
+            f"{len(study.rows)} of {len(combinations)} runs are in {out}; "
+            "the same command goes on with the others",
+            file=sys.stderr,
+        )
+        raise
+    write(out, rows)
+    tell(rows, values, items, study, out)
+    if not any(row["status"] == "done" for row in rows):
+        raise ScriptError(
+            f"no run is done: {rows[0]['reason']}",
+            hint=f"{out.parent / rows[0]['folder'] / 'err.txt'} has all that it said",
+        )
+    return 0
+
+
+def tell(rows: list, values: dict, items: list, study: Study, out: Path) -> None:
+    """Show the whole table and what became of the runs."""
+    console = terminal()
+    console.print(results_table(rows, list(values), items, study.title, console.width))
+    done = sum(row["status"] == "done" for row in rows)
+    left, old = len(rows) - done, len(rows) - study.ran
+    said = f"{done} of {plural(len(rows), 'run')} {'is' if done == 1 else 'are'} done"
+    said += f", {left} {'is' if left == 1 else 'are'} not (see reason)" if left else ""
+    said += f"; {old} were known" if old > 0 else ""
+    print(f"{said}; the table is {out}")
+    refused = [row["reason"] for row in rows if row["status"] == "refused"]
+    if refused and done:
+        print(
+            f"{len(refused)} of them {'was' if len(refused) == 1 else 'were'} refused before any "
+            "step, by a mistake of the script: " + "; ".join([*dict.fromkeys(refused)][:3])
+        )

@@ -1,16 +1,21 @@
-"""Variables of a study: their values, which go together, and whether a script reads them."""
+"""Variables of a study, their values and whether its script reads them; options of studies."""
 
+import csv
+import os
 import re
 from collections.abc import Container, Iterable, Mapping, Sequence
 from itertools import product
+from math import prod
 from pathlib import Path
 from typing import Any
 
+from karamelo_py.app.options import VARIABLE, above_zero, positive
+from karamelo_py.app.studies.case import Launch
 from karamelo_py.output.quantity import KEYWORDS
-from karamelo_py.script.errors import ScriptError, meant, plural
+from karamelo_py.script.errors import ScriptError, meant, nearest, plural
 from karamelo_py.script.evaluation import evaluate
 from karamelo_py.script.functions import CONSTANTS
-from karamelo_py.script.parser import parse, parse_text
+from karamelo_py.script.parser import parse, parse_text, scripts_in
 from karamelo_py.script.syntax import Assignment, CommandCall
 from karamelo_py.script.terms import number_of
 
@@ -20,14 +25,9 @@ _MOST = 100_000
 
 
 def choices(words: Iterable[str], in_step: Container[str] = ()) -> dict[str, list[str]]:
-    """The values of each variable: ``N=10,20``, ``xi=0:1:5`` (5 of them), ``basis=linear``.
+    """Read the values of each variable: ``N=10,20``, ``xi=0:1:5`` (5 of them), ``basis=linear``.
 
     Variables that go `in_step` with others may have a value twice.
-
-    Raises
-    ------
-    ScriptError
-        For a word that is not of this form, or a variable that is given twice.
     """
     found: dict[str, list[str]] = {}
     for word in words:
@@ -63,29 +63,17 @@ def _spread(name: str, value: str) -> list[str]:
 def cases(
     values: dict[str, list[str]], zipped: Sequence[Sequence[str]] = (), where: Sequence[str] = ()
 ) -> list[dict[str, str]]:
-    """Every combination of values, the first variable changing slowest.
+    """Combine the values of all variables, the first one changing slowest.
 
-    Parameters
-    ----------
-    values
-        Values of each variable.
-    zipped
-        Names of variables that go in step: first with first, second with second.
-    where
-        Conditions in the language of scripts; a combination must fulfil all of them.
-
-    Raises
-    ------
-    ScriptError
-        For lists in step that differ in length, for a condition that is wrong, and where nothing is
-        left.
+    Variables `zipped` go in step: first with first, second with second. A combination must fulfil
+    all conditions `where`, which are in the language of scripts.
     """
     axes: list[list[dict[str, str]]] = []
+    for group in zipped:
+        if unknown := [name for name in group if name not in values]:
+            raise ScriptError(f"-zip: there is no -var {unknown[0]}", expected=", ".join(values))
     for name in values:
         together = next((group for group in zipped if name in group), [name])
-        unknown = [other for other in together if other not in values]
-        if unknown:
-            raise ScriptError(f"-zip: there is no -var {unknown[0]}", expected=", ".join(values))
         if name != next(other for other in values if other in together):
             continue
         lengths = {other: len(values[other]) for other in together}
@@ -98,13 +86,7 @@ def cases(
         if len(set(rows)) < len(rows):
             raise ScriptError("-zip " + ",".join(together) + ": the same combination twice")
         axes.append([dict(zip(together, row, strict=True)) for row in rows])
-    for group in zipped:
-        unknown = [name for name in group if name not in values]
-        if unknown:
-            raise ScriptError(f"-zip: there is no -var {unknown[0]}", expected=", ".join(values))
-    total = 1
-    for axis in axes:
-        total *= len(axis)
+    total = prod(map(len, axes))
     if total > _MOST:
         raise ScriptError(f"these are {total} combinations", expected=f"at most {_MOST}")
     words = {value for column in values.values() for value in column}
@@ -120,17 +102,7 @@ def cases(
 
 
 class NamesOfCase:
-    """The names in a formula of an option: numbers and texts, and words that stand for themselves.
-
-    Parameters
-    ----------
-    option
-        Whose formula it is, for messages.
-    known
-        Values of the names.
-    words
-        Words that may stand in the formula without quotes.
-    """
+    """The names in a formula of an option: those of `known` values, and words without quotes."""
 
     def __init__(self, option: str, known: Mapping[str, Any], words: Iterable[str] = ()):
         self.option, self.known, self.words = option, {**CONSTANTS, **known}, words
@@ -166,75 +138,178 @@ def holds(condition: str, case: Mapping[str, str], words: Iterable[str] = ()) ->
     return value != 0
 
 
-def check_script(path: Path, names: Iterable[str]) -> None:
-    """See that a script reads each of these variables.
+class ScriptFiles:
+    """A script of a study and those that it includes, by their statements."""
 
-    Raises
-    ------
-    ScriptError
-        For a script with a syntax error, and for a variable that it never reads.
-    """
-    read: set[str] = set()
-    assigned: set[str] = set()
-    if not _collect(path, read, assigned, set()):
-        return
-    for name in names:
-        if name not in read:
-            what = "sets it and never reads it" if name in assigned else "has no such variable"
-            raise ScriptError(
-                f"-var {name}: {path} {what}",
-                expected="one of " + ", ".join(sorted(assigned & read)),
-                hint=meant(name, sorted((assigned & read) - {name})),
-            )
+    def __init__(self, path: Path):
+        self.path = path
+        self.statements: dict[Path, list[Any]] = {}
+        self.all_known = True  # else it includes what is not known beforehand
+        self._read(path)
 
+    def _read(self, path: Path) -> None:
+        if path in self.statements:
+            return
+        text = path.read_text(encoding="utf-8", errors="replace")
+        self.statements[path] = list(parse(text, str(path)))
+        for call in self.calls("include", path):
+            other = path.parent / ", ".join(raw.code for raw in call.arguments).strip().strip('"')
+            if other.is_file():
+                self._read(other)
+            else:
+                self.all_known = False
 
-def texts(path: Path) -> list[str]:
-    """The text of a script and of those that it includes."""
-    seen: set[Path] = set()
-    _collect(path, set(), set(), seen)
-    return [each.read_text(encoding="utf-8", errors="replace") for each in sorted(seen)]
+    def calls(self, name: str, path: Path) -> list[CommandCall]:
+        """Find the calls of a command in a file."""
+        found = self.statements[path]
+        return [each for each in found if isinstance(each, CommandCall) and each.name == name]
 
+    def texts(self) -> tuple[str, ...]:
+        """Read the text of all files."""
+        files = sorted(self.statements)
+        return tuple(path.read_text(encoding="utf-8", errors="replace") for path in files)
 
-def logged(path: Path) -> list[str] | None:
-    """The headings of the log columns that a script names; None if it is not known beforehand."""
-    headings = ["Step", "dt", "Time"]
-    for statement in parse(path.read_text(encoding="utf-8", errors="replace"), str(path)):
-        if isinstance(statement, CommandCall) and statement.name == "include":
+    def check(self, names: Iterable[str]) -> None:
+        """See that it reads each of these variables."""
+        read: set[str] = set()
+        assigned: set[str] = set()
+        for statement in (each for found in self.statements.values() for each in found):
+            codes = [statement.raw.code]
+            if isinstance(statement, Assignment):
+                assigned.add(statement.name)
+                codes = [statement.right.code]
+            elif isinstance(statement, CommandCall):
+                codes = [raw.code for raw in statement.arguments]
+            code = re.sub(r"#[^\n]*", "", ", ".join(codes))
+            read.update(_NAME.findall(re.sub(r'"[^"]*"', "", code)))
+        for name in names:
+            if name not in read and self.all_known:
+                what = "sets it and never reads it" if name in assigned else "has no such variable"
+                raise ScriptError(
+                    f"-var {name}: {self.path} {what}",
+                    expected="one of " + ", ".join(sorted(assigned & read)),
+                    hint=meant(name, sorted((assigned & read) - {name})),
+                )
+
+    def logged(self) -> list[str] | None:
+        """List headings of the log columns that it names; None if that is not known beforehand."""
+        if self.calls("include", self.path):
             return None
-        if isinstance(statement, CommandCall) and statement.name == "log_modify":
-            words = ["".join(raw.code.split()).strip('"') for raw in statement.arguments[1:]]
+        headings = ["Step", "dt", "Time"]
+        for call in self.calls("log_modify", self.path):
+            words = ["".join(raw.code.split()).strip('"') for raw in call.arguments[1:]]
             headings += [KEYWORDS.get(word, word) for word in words]
-    return headings
+        return headings
+
+    def computes(self) -> list[str]:
+        """List the IDs of its computes, as far as known."""
+        calls = [call for path in sorted(self.statements) for call in self.calls("compute", path)]
+        return [call.arguments[0].code.strip() for call in calls if call.arguments]
 
 
-def computes(path: Path) -> list[str]:
-    """The IDs of the computes of a script and of those that it includes, as far as known."""
-    return [
-        statement.arguments[0].code.strip()
-        for text in texts(path)
-        for statement in parse(text, str(path))
-        if isinstance(statement, CommandCall)
-        and statement.name == "compute"
-        and statement.arguments
-    ]
+# ---- options ------------------------------------------------------------------------------------
 
 
-def _collect(path: Path, read: set[str], assigned: set[str], seen: set[Path]) -> bool:
-    """Gather the names of a script and what it includes; False if not all of it is known."""
-    if path in seen:
-        return True
-    seen.add(path)
-    known = True
-    for statement in parse(path.read_text(encoding="utf-8", errors="replace"), str(path)):
-        code = statement.raw.code
-        if isinstance(statement, Assignment):
-            assigned.add(statement.name)
-            code = statement.right.code
-        elif isinstance(statement, CommandCall):
-            code = ", ".join(raw.code for raw in statement.arguments)
-            if statement.name == "include":
-                other = path.parent / code.strip().strip('"')
-                known = other.is_file() and _collect(other, read, assigned, seen) and known
-        code = re.sub(r'"[^"]*"', "", re.sub(r"#[^\n]*", "", code))
-        read.update(_NAME.findall(code))
-    return known
+def add_family(parser: Any) -> None:
+    """Add options of a family of runs."""
+    parser.add_argument("script", type=Path, help="the script")
+    parser.add_argument(
+        *VARIABLE, action="append", default=[], metavar="NAME=VALUES",
+        help=f"values of a variable of the script: {VALUES}; again for each variable",
+    )  # fmt: skip
+    parser.add_argument(
+        "-jobs", type=positive, help="runs at once (default: as many as there are cores)"
+    )
+    parser.add_argument(
+        "--threads", type=positive, default=None, help="threads of each run (default: 1)"
+    )
+    parser.add_argument(
+        "-limit", type=above_zero, metavar="SECONDS", help="give up a run that takes longer"
+    )
+    parser.add_argument(
+        "-again", action="store_true", help="run also what is known from an earlier study"
+    )
+    parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
+
+
+def add_axes(parser: Any) -> None:
+    """Add the option of words along the axes of a picture."""
+    parser.add_argument(
+        "-axes",
+        metavar="X,Y",
+        help="what to write along them, such as 'time (s),F (N)'; an empty one stays as it is, "
+        "one with commas stands in double quotes",
+    )
+
+
+def along(options: Any, x: str, y: str) -> tuple[str, str]:
+    """Choose the words along the axes: as the options say, else `x` and `y`."""
+    words = split(options.axes or ",")
+    if len(words) != 2:
+        raise ScriptError(f"-axes {options.axes}", expected="two, such as -axes 'time (s),F (N)'")
+    return words[0] or x, words[1] or y
+
+
+def split(text: str) -> list[str]:
+    """Part words at commas; one in double quotes may have commas of its own."""
+    return [word.strip() for word in next(csv.reader([text], skipinitialspace=True), [])]
+
+
+def names(text: str) -> list[str]:
+    """Part names at commas."""
+    return [name.strip() for name in text.split(",") if name.strip()]
+
+
+def add_combinations(parser: Any) -> None:
+    """Add options of which values go together."""
+    parser.add_argument(
+        "-zip", action="append", default=[], metavar="A,B",
+        help="variables that go in step: the first values together, then the second, ...",
+    )  # fmt: skip
+    parser.add_argument(
+        "-where", action="append", default=[], metavar="CONDITION",
+        help="keep the combinations that fulfil it: 'N < 40 || basis == linear'",
+    )  # fmt: skip
+
+
+def zipped(options: Any) -> list[list[str]]:
+    """Read which variables go in step."""
+    groups = getattr(options, "zip", [])  # not every study of a family has it
+    return [[name.strip() for name in group.split(",")] for group in groups]
+
+
+def family(
+    options: Any, *, timed: bool = False, repeat: int = 1
+) -> tuple[dict, ScriptFiles, Launch, int]:
+    """Read values of the variables, the script, how to run, and how many at once."""
+    path = options.script
+    if not path.is_file():
+        close = nearest(path.name, scripts_in(path.parent))
+        raise ScriptError(
+            f"there is no file {path}",
+            expected="the name of a script",
+            hint=f"did you mean {path.parent / close}?" if close else None,
+        )
+    in_step = {name for group in zipped(options) for name in group}
+    values = choices(options.var, in_step)
+    if not values:
+        raise ScriptError("nothing varies", expected=f"-var {VALUES}")
+    script, threads = ScriptFiles(path), options.threads or 1
+    script.check(values)
+    launch = Launch(path, threads, repeat, options.limit, script.texts())
+    if timed and (options.jobs or 1) > 1:
+        raise ScriptError("-time runs one at a time", expected="-time without -jobs")
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
+    jobs = 1 if timed else options.jobs or max(1, cores // threads)
+    return values, script, launch, jobs
+
+
+def out_file(path: Path, *suffixes: str) -> Path:
+    """See that a file can be written, with one of these endings."""
+    if suffixes and path.suffix.lower() not in suffixes:
+        raise ScriptError(f"-o {path}: unknown kind of file", expected=", ".join(suffixes))
+    if not path.parent.is_dir():
+        raise ScriptError(f"the folder {path.parent} does not exist", hint=f"mkdir {path.parent}")
+    if path.is_dir():
+        raise ScriptError(f"{path} is a folder", expected="the name of a file")
+    return path

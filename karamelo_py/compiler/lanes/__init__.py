@@ -14,7 +14,8 @@ the first point, and nothing is stored or given to nodes for them.
 Only compiled kernels know lanes; interpreted ones take the points one by one.
 """
 
-from karamelo_py.compiler.lanes import apart, records  # noqa: F401
+from karamelo_py.compiler.code import Lanes
+from karamelo_py.compiler.lanes import records  # noqa: F401
 from karamelo_py.compiler.lanes.arrays import (
     EightLanes,
     FourLanes,
@@ -23,6 +24,5 @@ from karamelo_py.compiler.lanes.arrays import (
     room_for,
     spread,
 )
-from karamelo_py.compiler.lanes.registers import Lanes
 
 __all__ = ["EightLanes", "FourLanes", "Lanes", "group", "lanes_for", "room_for", "spread"]

@@ -8,6 +8,7 @@ from llvmlite import ir
 from numba import types
 
 from karamelo_py.compiler import code
+from karamelo_py.compiler.code import I32, I64, Lanes, lane, pack, shuffle, splat
 from karamelo_py.compiler.compile import (
     beside,
     by_type,
@@ -19,20 +20,8 @@ from karamelo_py.compiler.compile import (
     prefetch,
     real,
 )
-from karamelo_py.compiler.intrinsics import intrinsic
-from karamelo_py.compiler.lanes.numbers import select
-from karamelo_py.compiler.lanes.registers import (
-    I32,
-    I64,
-    Lanes,
-    constant,
-    lane,
-    pack,
-    shape,
-    shuffle,
-    splat,
-    vector_of,
-)
+from karamelo_py.compiler.lanes.numbers import all_same, select
+from karamelo_py.compiler.values import intrinsic
 
 AHEAD = 256  # bytes by which arrays of points are asked of the memory ahead of their use
 
@@ -58,7 +47,7 @@ class Beside(types.Type):
 
     def register_type(self) -> ir.Type:
         """LLVM's type: the nodes, and the steps."""
-        return ir.LiteralStructType([vector_of(self.nodes), I64])
+        return ir.LiteralStructType([code.register_type(self.nodes), I64])
 
 
 class FourLanes(NamedTuple):
@@ -83,8 +72,8 @@ def group(tag, first, count):
     """The `count` points from `first` on, as many as the tag says at most."""
     made = LaneGroup(tag.instance_class.width)
 
-    def codegen(builder, sig, arguments):
-        return code.make_struct(builder, made.register_type(), arguments[1:])
+    def codegen(builder, _, *numbers):
+        return code.make_struct(builder, made.register_type(), numbers)
 
     return made(tag, types.int64, types.int64), codegen
 
@@ -93,18 +82,7 @@ def group(tag, first, count):
 def spread(tag, value):
     """The same number in all lanes, as many as the tag says."""
     lanes = Lanes(value, tag.instance_class.width)
-
-    def codegen(builder, sig, arguments):
-        return splat(builder, arguments[1], lanes)
-
-    return lanes(tag, value), codegen
-
-
-def _masked(builder: Any, p: Any, width: int) -> Any:
-    """Make the mask of the lanes of a group that have a point."""
-    count = splat(builder, builder.extract_value(p, 1), Lanes(types.int64, width))
-    numbers = constant(list(range(width)), ir.IntType(64))
-    return builder.icmp_signed("<", numbers, count)
+    return lanes(tag, value), lambda builder, _, number: splat(builder, number, lanes)
 
 
 @intrinsic
@@ -118,7 +96,7 @@ def room_for(points, numbers):
     array = types.Array(numbers[0], 2, "C")
     shape = len(numbers), points.literal_value
 
-    def codegen(builder, sig, arguments):
+    def codegen(builder, *_):
         number = code.memory_type(array.dtype)
         memory = code.room(builder, ir.ArrayType(number, shape[0] * shape[1]))
         memory.align = 64  # bytes that caches get at once
@@ -130,15 +108,21 @@ def room_for(points, numbers):
     return array(points, numbers), codegen
 
 
+# --- points that lie one after another ----------------------------------------------------------
+
+
+def _masked(builder: Any, p: Any, width: int) -> Any:
+    """Make the mask of the lanes of a group that have a point."""
+    numbers = Lanes(types.int64, width)
+    count = splat(builder, builder.extract_value(p, 1), numbers)
+    all_of_them = ir.Constant(code.register_type(numbers), list(range(width)))
+    return builder.icmp_signed("<", all_of_them, count)
+
+
 @intrinsic
 def _present(p):
-    """Make the mask of the lanes that have a point."""
     mask = Lanes(types.boolean, p.width)
-
-    def codegen(builder, sig, arguments):
-        return _masked(builder, arguments[0], p.width)
-
-    return mask(p), codegen
+    return mask(p), lambda builder, given: _masked(builder, given, p.width)
 
 
 @implements(of_present, LaneGroup)
@@ -146,8 +130,135 @@ def _of_present(p, value):
     return select(_present(p), value, real(0, value))
 
 
+def _either(builder: Any, condition: Any, first: Callable, second: Callable) -> Any:
+    """The value of `first` where the condition holds, else that of `second`: one code is run."""
+    found = []
+    with builder.if_else(condition) as branches:
+        for branch, write in zip(branches, (first, second), strict=True):
+            with branch:
+                found.append((write(), builder.block))
+    if found[0][0] is None:
+        return None
+    chosen = builder.phi(found[0][0].type)
+    for value, block in found:
+        chosen.add_incoming(value, block)
+    return chosen
+
+
+def _all_or_masked(
+    builder: Any, pointer: Any, p: Any, lanes: Lanes, whole: Callable, partly: Callable
+) -> Any:
+    """Read or write all lanes if all have a point, as in nearly all groups, else some of them.
+
+    `partly` gets the name of LLVM's vectors, the address, the alignment and the mask.
+    """
+    size = lanes.scalar.bitwidth // 8
+    vector = code.register_type(lanes)
+    at = builder.bitcast(pointer, vector.as_pointer())
+    full = builder.icmp_signed("==", builder.extract_value(p, 1), I64(lanes.width))
+
+    def masked() -> Any:
+        name = f"{code.overloaded(vector)}.p0"
+        return partly(name, at, I32(size), _masked(builder, p, lanes.width))
+
+    return _either(builder, full, lambda: whole(at, size), masked)
+
+
+def _points_at(builder: Any, array: types.Array, value: Any, at: Any, place: Any) -> tuple:
+    """Address of an item whose last index is a group: that of its first point; and the group."""
+    kinds, values = _indices(builder, at, place)
+    first = builder.extract_value(values[-1], 0)
+    # Points lie one after another in each row, however far the rows are apart.
+    size = I64(array.dtype.bitwidth // 8)
+    indices = [*_as_places(builder, kinds[:-1], values[:-1]), first]
+    return code.item_pointer(builder, array, value, indices, size), values[-1]
+
+
+def _indices(builder: Any, at: Any, value: Any) -> tuple[list, list]:
+    """Types and values of the indices of an item, one or a tuple of them."""
+    if isinstance(at, types.BaseTuple):
+        return list(at), code.unpack(builder, value)
+    return [at], [value]
+
+
+def _as_places(builder: Any, kinds: list, values: list) -> list:
+    return [code.cast(builder, v, k, types.intp) for k, v in zip(kinds, values, strict=True)]
+
+
+@intrinsic
+def _load_points(array, at):
+    lanes = Lanes(array.dtype, lanes_of(at))
+    vector = code.register_type(lanes)
+
+    def codegen(builder, value, place):
+        pointer, p = _points_at(builder, array, value, at, place)
+
+        def partly(name, here, align, mask):
+            """Lanes without a point get the first's number."""
+            kinds = [here.type, I32, mask.type, vector]
+            load = code.external(builder, f"llvm.masked.load.{name}", vector, kinds)
+            loaded = builder.call(load, [here, align, mask, ir.Constant(vector, None)])
+            first = shuffle(builder, loaded, loaded, [0] * lanes.width)
+            return builder.select(mask, loaded, first)
+
+        def whole(here, size):
+            return builder.load(here, align=size)
+
+        return _all_or_masked(builder, pointer, p, lanes, whole, partly)
+
+    return lanes(array, at), codegen
+
+
+@intrinsic
+def _store_points(array, at, value):
+    lanes = Lanes(array.dtype, lanes_of(at))
+    typed = value if isinstance(value, Lanes) else lanes
+
+    def codegen(builder, table, place, number):
+        pointer, p = _points_at(builder, array, table, at, place)
+
+        def partly(name, here, align, mask):
+            kinds = [number.type, here.type, I32, mask.type]
+            store = code.external(builder, f"llvm.masked.store.{name}", ir.VoidType(), kinds)
+            builder.call(store, [number, here, align, mask])
+
+        def whole(here, size):
+            builder.store(number, here, align=size)
+
+        _all_or_masked(builder, pointer, p, lanes, whole, partly)
+
+    return types.void(array, at, typed), codegen
+
+
+def ask(builder: Any, pointer: Any, ahead: Any) -> None:
+    """Have the memory bring what lies so many bytes behind an address."""
+    at = builder.gep(builder.bitcast(pointer, code.NOTHING), [ahead])
+    kinds = [code.NOTHING, I32, I32, I32]
+    function = code.external(builder, "llvm.prefetch.p0", ir.VoidType(), kinds)
+    read, near, data = I32(0), I32(3), I32(1)
+    builder.call(function, [at, read, near, data])
+
+
+@implements(prefetch, LaneGroup)
+@intrinsic
+def _prefetch(array, at):
+    def codegen(builder, value, place):
+        pointer, _ = _points_at(builder, array, value, at, place)
+        ask(builder, pointer, I32(AHEAD))
+
+    return types.void(array, at), codegen
+
+
+# --- items at numbers in lanes ------------------------------------------------------------------
+
+
 def at_lane(builder, kind, array, of, at, k, *rest):
-    """Address of an item of an array; its first index is that of lane `k` of nodes `at`."""
+    """Address of an item of an array; its first index is that of lane `k` of nodes `at`.
+
+    Of a number that is not in lanes it is the same for all.
+    """
+    if not lanes_of(of):
+        return code.item_pointer(builder, kind, array, [at, *rest])
     steps = None
     if isinstance(of, Beside):
         of, at, steps = of.nodes, *(builder.extract_value(at, part) for part in (0, 1))
@@ -160,158 +271,17 @@ def at_lane(builder, kind, array, of, at, k, *rest):
     return code.byte_pointer(builder, found, builder.mul(steps, stride))
 
 
-def _load(builder, array, pointer, p, lanes):
-    """Load the numbers from `pointer` on, one a point; lanes without a point get the first's."""
-    vector = vector_of(lanes)
-    size = lanes.scalar.bitwidth // 8
-    at = builder.bitcast(pointer, vector.as_pointer())
-
-    def partly():
-        mask = _masked(builder, p, lanes.width)
-        function = code.external(
-            builder, f"llvm.masked.load.{shape(lanes)}.p0", vector,
-            [vector.as_pointer(), I32, mask.type, vector],
-        )  # fmt: skip
-        zero = ir.Constant(vector, None)
-        loaded = builder.call(function, [at, ir.Constant(I32, size), mask, zero])
-        return builder.select(mask, loaded, _first_everywhere(builder, loaded))
-
-    full = _is_full(builder, p, lanes)
-    return _either(builder, full, lambda: builder.load(at, align=size), partly)
-
-
-def _either(builder: Any, condition: Any, first: Callable, second: Callable) -> Any:
-    """The value of `first` where the condition holds, else that of `second`: one code is run."""
-    found = []
-    with builder.if_else(condition) as branches:
-        for branch, code in zip(branches, (first, second), strict=True):
-            with branch:
-                found.append((code(), builder.block))
-    chosen = builder.phi(found[0][0].type)
-    for value, block in found:
-        chosen.add_incoming(value, block)
-    return chosen
-
-
-def _first_everywhere(builder: Any, value: Any) -> Any:
-    """The number of the first lane in all lanes."""
-    return shuffle(builder, value, value, [0] * value.type.count)
-
-
-def all_same(builder: Any, lanes: Lanes, value: Any) -> Any:
-    """Check that all lanes have the same whole number."""
-    same = builder.icmp_signed("==", value, _first_everywhere(builder, value))
-    bits = builder.bitcast(same, ir.IntType(lanes.width))
-    return builder.icmp_signed("==", bits, ir.Constant(bits.type, -1))
-
-
-def _is_full(builder: Any, p: Any, lanes: Lanes) -> Any:
-    """Check that all lanes of a group have a point, as nearly all groups do."""
-    return builder.icmp_signed("==", builder.extract_value(p, 1), ir.Constant(I64, lanes.width))
-
-
-def _store(builder, pointer, p, lanes, value):
-    vector = vector_of(lanes)
-    size = lanes.scalar.bitwidth // 8
-    at = builder.bitcast(pointer, vector.as_pointer())
-    with builder.if_else(_is_full(builder, p, lanes)) as (then, otherwise):
-        with then:
-            builder.store(value, at, align=size)
-        with otherwise:
-            mask = _masked(builder, p, lanes.width)
-            function = code.external(
-                builder, f"llvm.masked.store.{shape(lanes)}.p0", ir.VoidType(),
-                [vector, vector.as_pointer(), I32, mask.type],
-            )  # fmt: skip
-            builder.call(function, [value, at, ir.Constant(I32, size), mask])
-
-
-def _indices(at: Any, builder: Any, value: Any) -> tuple[list, list]:
-    """Types and values of the indices of an item, one or a tuple of them."""
-    if isinstance(at, types.BaseTuple):
-        return list(at), code.unpack(builder, value)
-    return [at], [value]
-
-
-def _points_at(builder, array, at, arguments):
-    """Address of an item whose last index is a group: that of its first point; and the group."""
-    kinds, values = _indices(at, builder, arguments[1])
-    first = builder.extract_value(values[-1], 0)
-    rest = [
-        code.cast(builder, value, kind, types.intp)
-        for kind, value in zip(kinds[:-1], values[:-1], strict=True)
-    ]
-    # Points lie one after another in each row, however far the rows are apart.
-    size = ir.Constant(I64, array.dtype.bitwidth // 8)
-    found = code.item_pointer(builder, array, arguments[0], [*rest, first], size)
-    return found, values[-1]
-
-
-@intrinsic
-def _load_points(array, at):
-    lanes = Lanes(array.dtype, lanes_of(at))
-
-    def codegen(builder, sig, arguments):
-        pointer, p = _points_at(builder, array, at, arguments)
-        return _load(builder, array, pointer, p, lanes)
-
-    return lanes(array, at), codegen
-
-
-def ask(builder, pointer, ahead):
-    """Have the memory bring what lies so many bytes behind an address."""
-    byte = ir.IntType(8).as_pointer()
-    at = builder.gep(builder.bitcast(pointer, byte), [ahead])
-    function = code.external(builder, "llvm.prefetch.p0", ir.VoidType(), [byte, I32, I32, I32])
-    read, near, data = 0, 3, 1
-    builder.call(function, [at, *(ir.Constant(I32, k) for k in (read, near, data))])
-
-
-@intrinsic
-def _prefetch(array, at):
-    def codegen(builder, sig, arguments):
-        pointer, _ = _points_at(builder, array, at, arguments)
-        ask(builder, pointer, ir.Constant(I32, AHEAD))
-        return code.nothing()
-
-    return types.void(array, at), codegen
-
-
-implements(prefetch, LaneGroup)(_prefetch)
-
-
-@intrinsic
-def _store_points(array, at, value):
-    lanes = Lanes(array.dtype, lanes_of(at))
-    typed = value if isinstance(value, Lanes) else array.dtype
-
-    def codegen(builder, sig, arguments):
-        pointer, p = _points_at(builder, array, at, arguments)
-        number = arguments[2]
-        if not isinstance(value, Lanes):
-            number = splat(builder, number, lanes)
-        _store(builder, pointer, p, lanes, number)
-        return code.nothing()
-
-    return types.void(array, at, typed), codegen
-
-
 @intrinsic
 def _gather(array, at):
     """Items of an array at numbers in lanes, the first index."""
     lanes = Lanes(array.dtype, lanes_of(at))
 
-    def codegen(builder, sig, arguments):
-        kinds, values = _indices(at, builder, arguments[1])
-        rest = [
-            code.cast(builder, value, kind, types.intp)
-            for kind, value in zip(kinds[1:], values[1:], strict=True)
-        ]
+    def codegen(builder, value, place):
+        kinds, values = _indices(builder, at, place)
+        rest = _as_places(builder, kinds[1:], values[1:])
 
         def of(k):
-            return builder.load(
-                at_lane(builder, array, arguments[0], kinds[0], values[0], k, *rest)
-            )
+            return builder.load(at_lane(builder, array, value, kinds[0], values[0], k, *rest))
 
         def apart():
             return pack(builder, [of(k) for k in range(lanes.width)], lanes)
@@ -319,32 +289,28 @@ def _gather(array, at):
         if array.ndim > 1:
             return apart()
         # Of parameters: mostly all points of a group are of one material.
-        one = all_same(builder, kinds[0], values[0])
+        one = all_same(builder, values[0])
         return _either(builder, one, lambda: splat(builder, of(0), lanes), apart)
 
     return lanes(array, at), codegen
 
 
-def _last(at: Any) -> Any:
-    return tuple(at)[-1] if isinstance(at, types.BaseTuple) and len(at) else at
-
-
-def _head(at: Any) -> Any:
-    return next(iter(at)) if isinstance(at, types.BaseTuple) and len(at) else at
+def _index_at(at: Any, k: int) -> Any:
+    return tuple(at)[k] if isinstance(at, types.BaseTuple) and len(at) else at
 
 
 @by_type(operator.getitem)
 def _get(array, at):
-    if isinstance(array, types.Array) and isinstance(_last(at), LaneGroup):
+    if isinstance(array, types.Array) and isinstance(_index_at(at, -1), LaneGroup):
         return _load_points
-    if isinstance(array, types.Array) and isinstance(_head(at), Lanes | Beside):
+    if isinstance(array, types.Array) and isinstance(_index_at(at, 0), Lanes | Beside):
         return _gather
     return None
 
 
 @by_type(operator.setitem)
 def _set(array, at, value):
-    if isinstance(array, types.Array) and isinstance(_last(at), LaneGroup):
+    if isinstance(array, types.Array) and isinstance(_index_at(at, -1), LaneGroup):
         return _store_points
     return None
 
@@ -352,26 +318,21 @@ def _set(array, at, value):
 # --- numbers of nodes -----------------------------------------------------------------------------
 
 
+@implements(is_one, Lanes)
 @intrinsic
 def _is_one(nodes):
-    def codegen(builder, sig, arguments):
-        return all_same(builder, nodes, arguments[0])
-
-    return types.boolean(nodes), codegen
+    return types.boolean(nodes), all_same
 
 
-implements(is_one, Lanes)(_is_one)
-
-
+@implements(beside, Lanes)
 @intrinsic
 def _beside(first, steps):
     made = Beside(first)
 
-    def codegen(builder, sig, arguments):
-        return code.make_struct(builder, made.register_type(), arguments)
+    def codegen(builder, *given):
+        return code.make_struct(builder, made.register_type(), given)
 
     return made(first, types.intp), codegen
 
 
-implements(beside, Lanes)(_beside)
 implements(index, Beside)(lambda i: i)

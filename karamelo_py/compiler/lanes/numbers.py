@@ -1,4 +1,4 @@
-"""Lanes as a number type: arithmetic, comparisons, choices, conversions."""
+"""Lanes as a number type: choices, conversions, questions, and what is done lane after lane."""
 
 import math
 import operator
@@ -9,162 +9,41 @@ from llvmlite import ir
 from numba import types
 
 from karamelo_py.compiler import code
-from karamelo_py.compiler.arithmetic import ON_LANES, Operation
+from karamelo_py.compiler.arithmetic import common
+from karamelo_py.compiler.code import I64, Lanes, lane, scalar_of, splat
 from karamelo_py.compiler.compile import (
+    added,
     all_lanes,
     any_lane,
-    fma,
+    first_false_lane,
+    first_lane,
     implements,
     index,
+    lane_by_lane,
     lanes_of,
+    largest,
     real,
     round_off,
     where,
 )
-from karamelo_py.compiler.intrinsics import intrinsic
-from karamelo_py.compiler.lanes.registers import I32, Lanes, call_vector, splat, vector_of
-from karamelo_py.compiler.lowering import Lowering
+from karamelo_py.compiler.values import (
+    Untraceable,
+    Value,
+    builtin,
+    intrinsic,
+    mapped,
+    rebuilt,
+)
 
-# --- arithmetic -------------------------------------------------------------------------------
-
-
-def _wider(a: Any, b: Any) -> Lanes | None:
-    """Of two operands, at least one with lanes: the lanes of the result."""
-    if isinstance(a, Lanes) and isinstance(b, Lanes):
-        if a == b:
-            return a
-        if isinstance(a.scalar, types.Integer) and isinstance(b.scalar, types.Integer):
-            return a if a.scalar.bitwidth >= b.scalar.bitwidth else b
-        return None
-    lanes, other = (a, b) if isinstance(a, Lanes) else (b, a)
-    if not isinstance(lanes, Lanes) or not isinstance(other, types.Number | types.Boolean):
-        return None
-    # Numbers of cells beside a real number would be cut off: `real(i, x)` makes lanes of reals.
-    if not isinstance(lanes.scalar, types.Float) and isinstance(other, types.Float):
-        return None
-    return lanes
-
-
-def _spread_both(builder: Any, kinds: tuple, values: list, lanes: Lanes) -> list:
-    out = []
-    for kind, value in zip(kinds, values, strict=True):
-        if not isinstance(kind, Lanes):
-            value = splat(builder, value, lanes)
-        elif kind != lanes:
-            value = builder.sext(value, vector_of(lanes))
-        out.append(value)
-    return out
-
-
-def _operator(function: Any, result: Callable, made: Callable) -> None:
-    """Let an operator know lanes: `result` says of which kind, `made` makes them."""
-
-    def operation(*kinds: types.Type) -> Operation | None:
-        kinds = tuple(map(types.unliteral, kinds))
-        lanes = _wider(*kinds)
-        gives = None if lanes is None else result(lanes)
-        if gives is None:
-            return None
-        kinds = tuple(k if isinstance(k, Lanes) else lanes.scalar for k in kinds)
-        return Operation(
-            gives,
-            kinds,
-            lambda builder, v: made(builder, lanes, *_spread_both(builder, kinds, v, lanes)),
-        )
-
-    ON_LANES[function] = operation
-
-
-def _binary(operation: Any, of_floats: str | None, of_ints: str | None) -> None:
-    def name(lanes):
-        return of_floats if isinstance(lanes.scalar, types.Float) else of_ints
-
-    _operator(
-        operation,
-        lambda lanes: lanes if name(lanes) else None,
-        lambda builder, lanes, a, b: getattr(builder, name(lanes))(a, b),
-    )
-
-
-for _operation, _floats, _ints in (
-    (operator.add, "fadd", "add"), (operator.sub, "fsub", "sub"), (operator.mul, "fmul", "mul"),
-    (operator.truediv, "fdiv", None), (operator.and_, None, "and_"), (operator.or_, None, "or_"),
-):  # fmt: skip
-    _binary(_operation, _floats, _ints)
-
-
-def _comparison(operation: Any, sign: str) -> None:
-    def compared(builder, lanes, a, b):
-        if isinstance(lanes.scalar, types.Float):
-            compare = builder.fcmp_unordered if sign == "!=" else builder.fcmp_ordered
-            return compare(sign, a, b)
-        return builder.icmp_signed(sign, a, b)
-
-    _operator(operation, lambda lanes: Lanes(types.boolean, lanes.width), compared)
-
-
-for _operation, _sign in (
-    (operator.lt, "<"), (operator.le, "<="), (operator.gt, ">"), (operator.ge, ">="),
-    (operator.eq, "=="), (operator.ne, "!="),
-):  # fmt: skip
-    _comparison(_operation, _sign)
-
-
-def _unary(function: Any, made: Callable) -> None:
-    ON_LANES[function] = lambda lanes: Operation(
-        lanes, (lanes,), lambda builder, values: made(builder, lanes.scalar, values[0])
-    )
-
-
-def _negated(builder: Any, scalar: types.Type, value: Any) -> Any:
-    return builder.fneg(value) if isinstance(scalar, types.Float) else builder.neg(value)
-
-
-_unary(operator.neg, _negated)
-_unary(operator.not_, lambda builder, scalar, value: builder.not_(value))
-
-
-def _operands(*arguments: Any) -> tuple[Lanes, list]:
-    """The lanes among the arguments, and what the others are cast to."""
-    lanes = next(a for a in arguments if isinstance(a, Lanes))
-    return lanes, [a if isinstance(a, Lanes) else lanes.scalar for a in arguments]
-
-
-@intrinsic
-def _fma_lanes(a, b, c):
-    lanes, typed = _operands(a, b, c)
-    return lanes(*typed), call_vector("fma", lanes)
-
-
-@intrinsic
-def _sqrt_lanes(a):
-    return a(a), call_vector("sqrt", a)
-
-
-@intrinsic
-def _abs_lanes(a):
-    return a(a), call_vector("fabs", a)
-
-
-implements(fma, Lanes)(_fma_lanes)
-implements(math.sqrt, Lanes)(_sqrt_lanes)
-implements(abs, Lanes)(_abs_lanes)
+# --- choices ----------------------------------------------------------------------------------
 
 
 @intrinsic
 def select(condition, a, b):
-    lanes, typed = _operands(a, b) if isinstance(a, Lanes) or isinstance(b, Lanes) else (None, None)
-    if lanes is None:
-        lanes, typed = Lanes(a, condition.width), [a, a]
-
-    def codegen(builder, sig, arguments):
-        values = [
-            value if isinstance(kind, Lanes) else splat(builder, value, lanes)
-            for kind, value in zip(sig.args[1:], arguments[1:], strict=True)
-        ]
-        return builder.select(arguments[0], *values)
-
-    return lanes(condition, *typed), codegen
+    """Choose lane by lane."""
+    lanes = common(a, b)
+    lanes = lanes if isinstance(lanes, Lanes) else Lanes(a, condition.width)
+    return lanes(condition, lanes, lanes), lambda builder, *values: builder.select(*values)
 
 
 @implements(where, Lanes)
@@ -173,97 +52,58 @@ def _where(condition, a, b):
         return a if condition else b
     if not isinstance(a, tuple):
         return select(condition, a, b)
-    items = [where(condition, x, y) for x, y in zip(a, b, strict=True)]
-    return type(a)(*items) if hasattr(a, "_fields") else tuple(items)
+    return rebuilt(a, [where(condition, x, y) for x, y in zip(a, b, strict=True)])
 
 
-@implements(max, Lanes)
-def _max(*numbers):
-    best = numbers[0]
-    for one in numbers[1:]:
-        best = select(one > best, one, best)
-    return best
+def _all_bits(builder: Any, mask: Any, sign: str, wanted: int) -> Any:
+    bits = builder.bitcast(mask, ir.IntType(mask.type.count))
+    return builder.icmp_signed(sign, bits, ir.Constant(bits.type, wanted))
 
 
-@implements(min, Lanes)
-def _min(*numbers):
-    best = numbers[0]
-    for one in numbers[1:]:
-        best = select(one < best, one, best)
-    return best
+@implements(all_lanes, Lanes)
+@intrinsic
+def _all(mask):
+    return types.boolean(mask), lambda builder, given: _all_bits(builder, given, "==", -1)
 
 
-def _truth(function: Callable, sign: str, bits_of: int) -> None:
-    """Let a question about all lanes be one about the bits of a mask."""
-
-    @intrinsic
-    def asked(mask):
-        def codegen(builder, sig, arguments):
-            bits = builder.bitcast(arguments[0], ir.IntType(mask.width))
-            return builder.icmp_signed(sign, bits, ir.Constant(bits.type, bits_of))
-
-        return types.boolean(mask), codegen
-
-    implements(function, Lanes)(asked)
+@implements(any_lane, Lanes)
+@intrinsic
+def _any(mask):
+    return types.boolean(mask), lambda builder, given: _all_bits(builder, given, "!=", 0)
 
 
-_truth(all_lanes, "==", -1)
-_truth(any_lane, "!=", 0)
+def all_same(builder: Any, value: Any) -> Any:
+    """Check that all lanes have the same whole number."""
+    first = code.shuffle(builder, value, value, [0] * value.type.count)
+    return _all_bits(builder, builder.icmp_signed("==", value, first), "==", -1)
+
+
+@implements(bool, Lanes)
+@intrinsic
+def _branch(value):
+    raise Untraceable(
+        "several points are computed at once, which a branch cannot tell apart: take where, "
+        "all_lanes or any_lane, or name the point function in scalarised"
+    )
 
 
 # --- conversions ------------------------------------------------------------------------------
 
 
+@implements(int, Lanes)
 @intrinsic
 def _truncated(a):
     if not isinstance(a.scalar, types.Float):
         return None
     whole = Lanes(types.int32, a.width)  # every processor has that, and cells are no more
-
-    def codegen(builder, sig, arguments):
-        return builder.fptosi(arguments[0], vector_of(whole))
-
-    return whole(a), codegen
-
-
-implements(int, Lanes)(_truncated)
-
-
-@intrinsic
-def _converted(value, like):
-    scalar = like.scalar if isinstance(like, Lanes) else like
-    lanes = Lanes(scalar, value.width)
-
-    def codegen(builder, sig, arguments):
-        if isinstance(value.scalar, types.Integer):
-            narrow = arguments[0]
-            if value.scalar.bitwidth > 32:
-                narrow = builder.trunc(narrow, ir.VectorType(I32, value.width))
-            return builder.sitofp(narrow, vector_of(lanes))
-        if value.scalar.bitwidth == scalar.bitwidth:
-            return arguments[0]
-        convert = builder.fpext if scalar.bitwidth == 64 else builder.fptrunc
-        return convert(arguments[0], vector_of(lanes))
-
-    return lanes(value, like), codegen
-
-
-Lowering.converted = _converted
-Lowering.spread = staticmethod(splat)
-
-
-@intrinsic
-def _spread(value, like):
-    def codegen(builder, sig, arguments):
-        number = code.cast(builder, arguments[0], value, like.scalar)
-        return splat(builder, number, like)
-
-    return like(value, like), codegen
+    return whole(a), lambda builder, given: code.cast(builder, given, a, whole)
 
 
 @implements(real, Lanes)
+@intrinsic
 def _real(value, like):
-    return _converted(value, like) if lanes_of(value) else _spread(value, like)
+    made = Lanes(scalar_of(like), (value if isinstance(value, Lanes) else like).width)
+    return made(value, like), lambda builder, given, _: code.cast(builder, given, value, made)
 
 
 @implements(index, Lanes)
@@ -271,14 +111,142 @@ def _index(i):
     return i
 
 
+@implements(round_off, Lanes)
 @intrinsic
 def _round_off(like):
     error = 2.0**-23 if like.scalar == types.float32 else 2.0**-52
 
-    def codegen(builder, sig, arguments):
+    def codegen(builder, _):
         return splat(builder, code.constant(builder, like.scalar, error), like)
 
     return like(like), codegen
 
 
-implements(round_off, Lanes)(_round_off)
+# --- lane after lane --------------------------------------------------------------------------
+
+
+@implements(largest, Lanes)
+@intrinsic
+def _largest_lane(a):
+    def codegen(builder, given):
+        best = lane(builder, given, 0)
+        for k in range(1, a.width):
+            value = lane(builder, given, k)
+            best = builder.select(builder.fcmp_ordered(">", value, best), value, best)
+        return best
+
+    return a.scalar(a), codegen
+
+
+@implements(first_false_lane, Lanes)
+@intrinsic
+def _first_false(mask):
+    def codegen(builder, given):
+        found = I64(0)
+        for k in reversed(range(mask.width)):
+            found = builder.select(lane(builder, given, k), found, I64(k))
+        return found
+
+    return types.int64(mask), codegen
+
+
+@implements(first_lane, Lanes)
+@intrinsic
+def _first(a):
+    return a.scalar(a), lambda builder, given: lane(builder, given, 0)
+
+
+@implements(added, Lanes)
+@intrinsic
+def _added_lanes(total, a):
+    def codegen(builder, so_far, given):
+        for k in range(a.width):
+            so_far = builder.fadd(so_far, lane(builder, given, k))
+        return so_far
+
+    return total(total, a), codegen
+
+
+def _lanes_changed(thing: Any, change: Callable) -> Any:
+    """Give tuples, or a number, with something else for each number in lanes in them."""
+
+    def changed(item: Any) -> Any:
+        lanes = isinstance(item, Value) and isinstance(item._kind, Lanes)
+        return change(item) if lanes else item
+
+    return mapped(changed, thing)
+
+
+def _room(builder: Any, lanes: Lanes) -> Any:
+    """Give memory for lanes; truth takes bytes there."""
+    kind = ir.VectorType(code.memory_type(lanes.scalar), lanes.width)
+    return builder and code.room(builder, kind)
+
+
+def _in_memory(builder: Any, value: Value) -> Value:
+    """Store lanes, to be read one by one."""
+    room, bits = _room(builder, value._kind), value._value
+    if builder:
+        wanted = room.type.pointee
+        builder.store(bits if bits.type == wanted else builder.zext(bits, wanted), room)
+    return Value(value._kind, room)
+
+
+def _from_memory(builder: Any, stored: Value) -> Value:
+    bits, wanted = builder.load(stored._value), code.register_type(stored._kind)
+    return Value(stored._kind, bits if bits.type == wanted else builder.trunc(bits, wanted))
+
+
+def _place(builder: Any, stored: Value, k: Any) -> Any:
+    """Give where one lane in memory is."""
+    scalar = code.memory_type(stored._kind.scalar)
+    return builder.gep(builder.bitcast(stored._value, scalar.as_pointer()), [k])
+
+
+@builtin(lane_by_lane)
+def _lane_by_lane(lowering: Any, function: Callable, unrolled: bool, arguments: tuple) -> Any:
+    builder = lowering.builder
+    width = lanes_of(tuple(map(lowering.kind_of, arguments)))
+    stored = _lanes_changed(arguments, lambda value: _in_memory(builder, value))
+
+    def run(k: Any) -> Any:
+        def of_lane(value: Value) -> Value:
+            scalar = value._kind.scalar
+            place = builder and _place(builder, value, k)
+            return Value(scalar, builder and code.get(builder, scalar, place))
+
+        def to_lane(thing: Any) -> Value:
+            scalar = types.unliteral(lowering.kind_of(thing))
+            lanes = Lanes(scalar, width)
+            made = Value(lanes, _room(builder, lanes))
+            if builder:
+                number = lowering.lowered(thing, scalar)
+                code.put(builder, scalar, number, _place(builder, made, k))
+            return made
+
+        read, lowering.read = lowering.read, dict(lowering.read)
+        found = mapped(to_lane, function(*_lanes_changed(stored, of_lane)))
+        lowering.read = read
+        return found
+
+    if builder is None:
+        return run(None)
+    count = I64(width)
+    if not unrolled:
+        # The loop is to stay one, with one copy of the function: LLVM must not know its count.
+        count = builder.asm(ir.FunctionType(I64, [I64]), "", "=r,0", [count], False)
+    with code.counted(builder, count) as k:
+        found = run(k)
+    return _lanes_changed(found, lambda value: _from_memory(builder, value))
+
+
+def _each_lane(function: Callable) -> None:
+    """Let a function of numbers know lanes: it is called for one after another."""
+    implements(function, Lanes)(lambda *arguments: lane_by_lane(function, True, arguments))
+
+
+for _function in (
+    math.log, math.log1p, math.exp, math.expm1, math.pow, math.sin, math.cos, math.tan, math.atan2,
+    operator.pow, operator.floordiv, operator.mod,
+):  # fmt: skip
+    _each_lane(_function)

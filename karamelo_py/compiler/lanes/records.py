@@ -6,7 +6,8 @@ from typing import Any
 from llvmlite import ir
 from numba import types
 
-from karamelo_py.compiler import code, machine
+from karamelo_py.compiler import arithmetic, code, machine
+from karamelo_py.compiler.code import I32, I64, Lanes, lane, pack, shuffle, splat
 from karamelo_py.compiler.compile import (
     Weighted,
     accumulate,
@@ -16,20 +17,9 @@ from karamelo_py.compiler.compile import (
     prefetch_records,
     tag_class,
 )
-from karamelo_py.compiler.intrinsics import intrinsic
 from karamelo_py.compiler.lanes.arrays import Beside, ask, at_lane
-from karamelo_py.compiler.lanes.registers import (
-    I32,
-    I64,
-    Lanes,
-    element,
-    lane,
-    pack,
-    shuffle,
-    splat,
-    vector_of,
-)
 from karamelo_py.compiler.tuples import row
+from karamelo_py.compiler.values import intrinsic
 
 # Bytes of a record that a field is given to at once: a register. Of wider vectors LLVM makes two,
 # and where registers are narrow there are too few of them for that.
@@ -55,7 +45,7 @@ def _transposed(builder: Any, rows: list) -> list:
 
 def _record(builder: Any, kind: Any, pointer: Any, components: int) -> Any:
     """Address of so many components of a record, as a vector."""
-    vector = ir.VectorType(element(kind.dtype), components)
+    vector = ir.VectorType(code.register_type(kind.dtype), components)
     return builder.bitcast(pointer, vector.as_pointer())
 
 
@@ -82,24 +72,28 @@ def _lanes_from(builder: Any, rows: list, lanes: Lanes, count: int) -> list:
     return [shuffle(builder, *pair, list(range(8))) for pair in zip(*parts, strict=True)]
 
 
+def _gathered(builder: Any, lanes: Lanes, first: Any, like: Any, read: Callable) -> list:
+    """Components of records in lanes: ``read(lane, column, count)`` gives some of one point."""
+    found: list = []
+    for begin, count in _chunks(len(like)):
+        column = builder.add(first, I64(begin))
+        rows = [read(k, column, count) for k in range(lanes.width)]
+        found += _lanes_from(builder, rows, lanes, count)
+    return found[: len(like)]
+
+
 @intrinsic
 def _gather_row(array, nodes, first, like):
     """Components of the records of nodes, as many as `like` has."""
     lanes = Lanes(array.dtype, nodes.width)
     made = types.UniTuple(lanes, len(like))
 
-    def codegen(builder, sig, arguments):
-        found = []
-        for begin, count in _chunks(len(like)):
-            column = builder.add(arguments[2], ir.Constant(arguments[2].type, begin))
+    def codegen(builder, table, at, first, _):
+        def read(k, column, count):
+            pointer = at_lane(builder, array, table, nodes, at, k, column)
+            return builder.load(_record(builder, array, pointer, count), align=_size(array))
 
-            rows = []
-            for k in range(lanes.width):
-                given = builder, array, arguments[0], nodes, arguments[1], k, column
-                at = _record(builder, array, at_lane(*given), count)
-                rows.append(builder.load(at, align=array.dtype.bitwidth // 8))
-            found += _lanes_from(builder, rows, lanes, count)
-        return code.make_tuple(builder, made, found[: len(like)])
+        return code.make_tuple(builder, made, _gathered(builder, lanes, first, like, read))
 
     return made(array, nodes, types.int64, like), codegen
 
@@ -110,53 +104,43 @@ def _gather_weighted(array, nodes, first, weights, like):
     lanes = weights[0]
     made = types.UniTuple(lanes, len(like))
 
-    def codegen(builder, sig, arguments):
-        size = array.dtype.bitwidth // 8
-        spread = _kept_in_memory(builder, code.unpack(builder, arguments[3]))
-        at = code.unpack(builder, arguments[1])
-        found = []
-        for begin, count in _chunks(len(like)):
-            column = builder.add(arguments[2], ir.Constant(arguments[2].type, begin))
+    def codegen(builder, table, places, first, shares, _):
+        size = _size(array)
+        spread = _kept_in_memory(builder, code.unpack(builder, shares))
+        at = code.unpack(builder, places)
+
+        def read(j, column, count):
             record = Lanes(array.dtype, count)
-            rows = []
-            for j in range(lanes.width):
-                total = ir.Constant(vector_of(record), None)
-                for k, node in enumerate(at):
-                    given = builder, array, arguments[0], nodes[k], node, j, column
-                    pointer = _record(builder, array, at_lane(*given), count)
-                    weight = splat(builder, builder.load(spread(k, j), align=size), record)
-                    total = _fma(builder, weight, builder.load(pointer, align=size), total)
-                rows.append(total)
-            found += _lanes_from(builder, rows, lanes, count)
-        return code.make_tuple(builder, made, found[: len(like)])
+            total = ir.Constant(code.register_type(record), None)
+            for k, node in enumerate(at):
+                pointer = at_lane(builder, array, table, nodes[k], node, j, column)
+                pointer = _record(builder, array, pointer, count)
+                weight = splat(builder, builder.load(spread(k, j), align=size), record)
+                total = _fma(builder, [weight, builder.load(pointer, align=size), total])
+            return total
+
+        return code.make_tuple(builder, made, _gathered(builder, lanes, first, like, read))
 
     return made(array, nodes, types.int64, weights, like), codegen
 
 
+def _size(array: types.Array) -> int:
+    return array.dtype.bitwidth // 8
+
+
+_fma = arithmetic.of_library("llvm.fma")  # a b + c of vectors, with one rounding
+
+
+@implements(prefetch_records, Lanes, Beside)
 @intrinsic
 def _prefetch_records(array, nodes):
-    def codegen(builder, sig, arguments):
-        strides = code.ArrayParts(builder, array, arguments[0]).strides
-        stride = strides[0]
-        ahead = builder.mul(stride, ir.Constant(stride.type, AHEAD))
-        column = ir.Constant(I64, 0)
+    def codegen(builder, table, at):
+        stride = code.ArrayParts(builder, array, table).strides[0]
+        ahead = builder.mul(stride, I64(AHEAD))
         for k in range(nodes.width):
-            pointer = at_lane(builder, array, arguments[0], nodes, arguments[1], k, column)
-            ask(builder, pointer, ahead)
-        return code.nothing()
+            ask(builder, at_lane(builder, array, table, nodes, at, k, I64(0)), ahead)
 
     return types.void(array, nodes), codegen
-
-
-implements(prefetch_records, Lanes, Beside)(_prefetch_records)
-
-
-def _fma(builder: Any, a: Any, b: Any, c: Any) -> Any:
-    """a b + c of vectors, with one rounding."""
-    kind = a.type
-    name = f"llvm.fma.v{kind.count}{kind.element.intrinsic_name}"
-    function = code.external(builder, name, kind, [kind] * 3)
-    return builder.call(function, [a, b, c])
 
 
 @by_type(row)
@@ -171,42 +155,27 @@ def _row(array, i, first, like):
 @intrinsic
 def _scatter(array, nodes, first, values):
     """Add to components of the records of nodes, lane after lane; summed before to one node."""
-    width = max(lanes_of(value) for value in values)
-    lanes = Lanes(array.dtype, width)
+    lanes = Lanes(array.dtype, max(lanes_of(value) for value in values))
+    at_once = types.Tuple([v if isinstance(v, Lanes) else lanes for v in values])
 
-    def codegen(builder, sig, arguments):
-        size = array.dtype.bitwidth // 8
-        parts = code.unpack(builder, arguments[3])
-        parts = [
-            part if isinstance(kind, Lanes) else splat(builder, part, lanes)
-            for kind, part in zip(values, parts, strict=True)
-        ]
-        zero = ir.Constant(vector_of(lanes), None)
-        for begin, count in _chunks(len(parts)):
-            column = builder.add(arguments[2], ir.Constant(arguments[2].type, begin))
-            chosen = [*parts[begin : begin + count], *[zero] * 4][:count]
-            rows = []
-            for k in range(0, width, 4):
-                four = chosen
-                if width == 8:
-                    four = [shuffle(builder, v, v, list(range(k, k + 4))) for v in chosen]
-                rows += _records(builder, four)
+    def codegen(builder, table, at, first, numbers):
+        size, parts = _size(array), code.unpack(builder, numbers)
+        for begin in range(0, len(parts), 4):
+            some = parts[begin : begin + 4]
+            count = _chunks(len(some))[0][1]
+            column = builder.add(first, I64(begin))
+            rows = _records_of(builder, some, lanes, count)
             if not lanes_of(nodes):
                 while len(rows) > 1:
                     rows = [builder.fadd(*pair) for pair in zip(rows[::2], rows[1::2], strict=True)]
             for k, number in enumerate(rows):
-                given = builder, array, arguments[0]
-                if lanes_of(nodes):
-                    pointer = at_lane(*given, nodes, arguments[1], k, column)
-                else:
-                    pointer = code.item_pointer(*given, [arguments[1], column])
-                at = _record(builder, array, pointer, count)
-                total = builder.fadd(builder.load(at, align=size), number)
-                builder.store(total, at, align=size)
-        return code.nothing()
+                pointer = at_lane(builder, array, table, nodes, at, k, column)
+                here = _record(builder, array, pointer, count)
+                total = builder.fadd(builder.load(here, align=size), number)
+                builder.store(total, here, align=size)
 
-    at = nodes if lanes_of(nodes) else types.int64
-    return types.void(array, at, types.int64, values), codegen
+    place = nodes if lanes_of(nodes) else types.int64
+    return types.void(array, place, types.int64, at_once), codegen
 
 
 def move_record(array, i, other, j, first, like, keep):
@@ -219,31 +188,25 @@ def move_record(array, i, other, j, first, like, keep):
         other[j, k] = 0
 
 
+@implements(move_record)
 @intrinsic
 def _move_record(array, i, other, j, first, like, keep):
-    def codegen(builder, sig, arguments):
-        size = array.dtype.bitwidth // 8
-        to, of = (
-            _record(
-                builder,
-                kind,
-                code.item_pointer(builder, kind, arguments[k], [arguments[k + 1], arguments[4]]),
-                len(like),
-            )
-            for k, kind in ((0, array), (2, other))
-        )
-        there = builder.load(to, align=size)
-        zero = ir.Constant(there.type, None)
-        kept = builder.select(arguments[6], there, zero)
+    def codegen(builder, here, i, there, j, first, _, keep):
+        size = _size(array)
+
+        def place(kind, table, node):
+            pointer = code.item_pointer(builder, kind, table, [node, first])
+            return _record(builder, kind, pointer, len(like))
+
+        to, of = place(array, here, i), place(other, there, j)
+        before = builder.load(to, align=size)
+        zero = ir.Constant(before.type, None)
+        kept = builder.select(keep, before, zero)
         builder.store(builder.fadd(kept, builder.load(of, align=size)), to, align=size)
         builder.store(zero, of, align=size)
-        return code.nothing()
 
-    signature = types.void(array, types.int64, other, types.int64, types.int64, like, types.boolean)
-    return signature, codegen
-
-
-implements(move_record)(_move_record)
+    number = types.int64
+    return types.void(array, number, other, number, number, like, types.boolean), codegen
 
 
 def _records(builder: Any, parts: list) -> list:
@@ -281,6 +244,7 @@ def accumulate_affine(array, nodes, first, weights, value, slopes):
             array[node, first + c] += weight * number
 
 
+@implements(accumulate_affine)
 @intrinsic
 def _accumulate_affine(array, nodes, first, weights, value, slopes):
     """The records of the points, each with one vector; the weights are read one by one.
@@ -289,19 +253,18 @@ def _accumulate_affine(array, nodes, first, weights, value, slopes):
     """
     lanes = weights[0]
 
-    def codegen(builder, sig, arguments):
-        size = array.dtype.bitwidth // 8
-        spread = _kept_in_memory(builder, code.unpack(builder, arguments[3]))
-        values = code.unpack(builder, arguments[4])
-        growths = [code.unpack(builder, slope) for slope in code.unpack(builder, arguments[5])]
+    def codegen(builder, table, places, first, shares, numbers, growth):
+        size = _size(array)
+        spread = _kept_in_memory(builder, code.unpack(builder, shares))
+        values = code.unpack(builder, numbers)
+        growths = [code.unpack(builder, slope) for slope in code.unpack(builder, growth)]
         width = round(len(nodes) ** (1 / max(1, len(growths))))
         widest = min(_AT_ONCE // size, 8)
         for begin in range(0, len(values), widest):
             some = slice(begin, begin + widest)
             left = len(values[some])
             count = widest if left > 4 else _chunks(left)[0][1]
-            column = builder.add(arguments[2], ir.Constant(arguments[2].type, begin))
-            vector = ir.VectorType(element(array.dtype), count)
+            column = builder.add(first, I64(begin))
             one = Lanes(array.dtype, count)
             # By the place of the node in the first directions.
             at = {(): _records_of(builder, values[some], lanes, count)}
@@ -316,40 +279,32 @@ def _accumulate_affine(array, nodes, first, weights, value, slopes):
                         at[place] = [builder.fadd(*pair) for pair in pairs]
                 return at[place]
 
-            for k, node in enumerate(code.unpack(builder, arguments[1])):
+            for k, node in enumerate(code.unpack(builder, places)):
                 place = tuple(k // width**d % width for d in reversed(range(len(grow))))
                 total = pointer = None
                 for j, record in enumerate(field_at(*place)):
                     if total is None or lanes_of(nodes[k]):
-                        given = builder, array, arguments[0]
-                        if lanes_of(nodes[k]):
-                            pointer = at_lane(*given, nodes[k], node, j, column)
-                        else:
-                            pointer = code.item_pointer(*given, [node, column])
-                        pointer = builder.bitcast(pointer, vector.as_pointer())
+                        pointer = at_lane(builder, array, table, nodes[k], node, j, column)
+                        pointer = _record(builder, array, pointer, count)
                         total = builder.load(pointer, align=size)
                     weight = splat(builder, builder.load(spread(k, j), align=size), one)
-                    total = _fma(builder, weight, record, total)
+                    total = _fma(builder, [weight, record, total])
                     if lanes_of(nodes[k]):
                         builder.store(total, pointer, align=size)
                 if not lanes_of(nodes[k]):
                     builder.store(total, pointer, align=size)
-        return code.nothing()
 
-    made = types.void(array, nodes, types.int64, weights, value, slopes)
-    return made, codegen
-
-
-implements(accumulate_affine)(_accumulate_affine)
+    return types.void(array, nodes, types.int64, weights, value, slopes), codegen
 
 
 def _records_of(builder: Any, parts: list, lanes: Lanes, count: int) -> list:
     """A record of `count` components for each lane."""
-    zero = ir.Constant(vector_of(lanes), None)
-    parts = [*parts, *[zero] * 8][:count]
+    parts = [*parts, *[ir.Constant(code.register_type(lanes), None)] * 8][:count]
     rows = []
     for k in range(0, lanes.width, 4):
-        four = [shuffle(builder, v, v, list(range(k, k + 4))) for v in parts]
+        four = parts
+        if lanes.width == 8:
+            four = [shuffle(builder, v, v, list(range(k, k + 4))) for v in parts]
         low, high = _records(builder, four[:4]), four[4:]
         if high:
             pairs = zip(low, _records(builder, high), strict=True)
@@ -373,4 +328,4 @@ def _kept_in_memory(builder: Any, vectors: list) -> Callable:
     builder.asm(hidden, "", "r,~{memory}", [room], side_effect=True)
     scalars = builder.bitcast(room, vectors[0].type.element.as_pointer())
     width = vectors[0].type.count
-    return lambda k, j: builder.gep(scalars, [ir.Constant(I32, k * width + j)])
+    return lambda k, j: builder.gep(scalars, [I32(k * width + j)])

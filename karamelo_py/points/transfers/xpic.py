@@ -67,7 +67,7 @@ class XPIC(NamedTuple):
 
 @updated_velocity.on(XPIC)
 def _updated_velocity_xpic(transfer, v, v_pic, dv):
-    # kernels.rows.sum_series has put the sum of the series, with the change, in the place of dv.
+    # kernels.table.sum_series has put the sum of the series, with the change, in the place of dv.
     return dv
 
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from karamelo_py.kernels.arrays import MASS, Setup
 from karamelo_py.output.fields import PIECE
-from karamelo_py.output.node_columns import NodeRows, brought, loaded
-from karamelo_py.run.checkpoint.arrays import of_nodes
+from karamelo_py.output.node_columns import NodeRows, brought, loaded, places_of
+from karamelo_py.run.checkpoint.arrays import kept_at_nodes, of_nodes
 from karamelo_py.run.tiles.boxes import numbers
 
 
@@ -23,6 +23,9 @@ class ByNumber:
         """
         self.show_on_nodes()
         self.bring(names)
+        kept = kept_at_nodes(self.setup)
+        if self.subdomain is not None:
+            self.subdomain.share_kept()
         gather = self.comm.gather if to_first else self.comm.allgather
         for first, end in self.node_ranges():
             if self.comm.size == 1:
@@ -33,6 +36,7 @@ class ByNumber:
                 if parts is None:
                     continue
                 arrays, sums = self._joined(first, end, parts)
+                arrays |= {f"nodes/{name}": array[first:end] for name, array in kept}
             sums = {name: of.sum(axis=1) for name, of in sums.items()}
             yield NodeRows(first, end, self.kin, arrays, sums, self._loaded)
         self.bring(())
@@ -87,16 +91,7 @@ class ByNumber:
         )
         mass = self.setup.nodes.sums[nodes, MASS].astype(float)
         ones = np.ones(len(nodes))
-        return self.summed(mass[:, None] * np.column_stack([ones, self.places_of(nodes)]))
-
-    def places_of(self, nodes: np.ndarray) -> np.ndarray:
-        """(n, 3) positions of nodes, of ascending numbers."""
-        x = np.empty((len(nodes), 3))
-        for lattice in self.hub.lattices:
-            ends = lattice.first, lattice.first + lattice.node_count
-            rows = slice(*np.searchsorted(nodes, ends))
-            x[rows] = lattice.positions(nodes[rows])
-        return x
+        return self.summed(mass[:, None] * np.column_stack([ones, places_of(self.hub, nodes)]))
 
     def occupied_nodes(self) -> tuple[int, int]:
         """Count the nodes that have mass, and find the last of them."""

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.compiler.fields import as_rows_of_points, name_of
+from karamelo_py.compiler.fields import as_rows_of_points, is_kept, name_of
 from karamelo_py.kernels.arrays import Nodes, Points, Tiling, arrays_of
 from karamelo_py.kernels.totals import WORK, carry
 from karamelo_py.run.tiles.boxes import numbers, used
@@ -28,6 +28,8 @@ def changing(simulation: Any) -> Iterator[tuple[str, np.ndarray]]:
         yield name, array[:rows]
     yield "clock", s.control.clock
     yield "work", s.control.totals[WORK]
+    for name, array in kept_at_nodes(s):
+        yield f"kept/{name}", array
     for k, block in enumerate(s.blocks):
         now = s.control.clock[0].now  # known once the clock is put back
         for name, array in arrays_of(block.points):
@@ -214,6 +216,11 @@ def of_nodes(s: Any) -> Iterator[tuple[str, np.ndarray]]:
             yield f"{kind}/{name}", getattr(nodes, name)
         for one in nodes.fields:
             yield f"{kind}/{name_of(type(one))}", one.array
+
+
+def kept_at_nodes(s: Any) -> list[tuple[str, np.ndarray]]:
+    """List the fields of nodes that outlive a step, with their names."""
+    return [(name_of(type(one)), one.array) for one in s.nodes.fields if is_kept(type(one))]
 
 
 def take_tiling(tiling: Tiling, found: Mapping[str, np.ndarray], stem: str) -> Tiling:

@@ -60,7 +60,8 @@ def stored(simulation: Any, kept: dict[str, np.ndarray] | None = None) -> Iterat
         rows |= {f"tiling/{k}/{name}": getattr(tiling, name)[:n] for name, n in in_use(tiling)}
     if parts is not None:
         work = sum(part["work"] for part in parts)
-        yield from in_file(rows | {"clock": own["clock"], "work": work})
+        at_nodes = {name: array for name, array in own.items() if name.startswith("kept/")}
+        yield from in_file(rows | {"clock": own["clock"], "work": work} | at_nodes)
     for k, tiling in enumerate(tilings):
         yield from _points(simulation, k, tiling, own)
     if kept:
@@ -140,7 +141,7 @@ def _pieces(spans: np.ndarray) -> Iterator[tuple[slice, np.ndarray]]:
         begin += len(nodes)
 
 
-ALL_HAVE = ("clock", "work", "values")
+ALL_HAVE, EACH_HAS = ("clock", "work", "values"), ("touched/", "kept/")
 
 # --- and back -------------------------------------------------------------------------------------
 
@@ -153,7 +154,7 @@ def own_share(simulation: Any, state: Mapping) -> dict[str, np.ndarray]:
     before = tiles.owner
     tiles.share_out(work_of(tiles.loads(whole), simulation.subdomain.load.costs))
     owner, tiles.owner = tiles.owner, before
-    found = {n: state[n][()] for n in state if n in ALL_HAVE or n.startswith("touched/")}
+    found = {n: state[n][()] for n in state if n in ALL_HAVE or n.startswith(EACH_HAS)}
     if not comm.leads:
         found["work"] = np.zeros_like(found["work"])
     for k, tiling in enumerate(tilings):

@@ -89,7 +89,7 @@ def _all_parts(hub: Hub) -> Iterator[tuple[Key, Any]]:
         for ID, part in catalogue.items():
             kind = getattr(part, "style", "") or type(part).__name__
             yield (catalogue.kind, ID, kind), part
-    for curve in hub.output.plots:
+    for curve in hub.output.plots.values():
         yield ("curve", curve.id, ""), curve
     for item in hub.output.last:
         yield ("restart", str(item.file), ""), item

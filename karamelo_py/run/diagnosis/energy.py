@@ -4,9 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.kernels import growth
 from karamelo_py.kernels.hooks import HEAT_STAGES, CompiledHook
-from karamelo_py.kernels.watch import BORNE, FEW, unit_of
+from karamelo_py.kernels.watch import BORNE, FEW, WITHIN, growth, keeps, unit_of
 from karamelo_py.language import registry
 from karamelo_py.output.point_table import PointTable
 from karamelo_py.points.laws import can, constrained_velocity
@@ -130,7 +129,7 @@ def swelling(points: PointTable) -> np.ndarray:
 def has_grown(simulation: Any) -> bool:
     """Judge, by looks at it, that energy has come from nowhere."""
     clock = simulation.control.clock[0]
-    return bool(clock.watch_energy and (clock.windows >= TOLD or clock.grown > growth.WITHIN))
+    return bool(clock.watch_energy and (clock.windows >= TOLD or clock.grown > WITHIN))
 
 
 def words_of_growth(hub: Hub, simulation: Any) -> tuple[str, str] | None:
@@ -162,13 +161,13 @@ def grown_little(simulation: Any) -> bool:
         return True
     # The last look, too: noise that grows by half in a hundred steps is there in the state already.
     before = clock.first_mean if clock.looks >= FEW else clock.first_balance
-    return bool(growth.keeps(before, clock.balance, unit_of(clock)))
+    return bool(keeps(before, clock.balance, unit_of(clock)))
 
 
 def growth_since(simulation: Any, before: float) -> float:
     """Growth of the energy now since one that it had `before`; NaN where nobody watches it."""
     unit = max(abs(before), float(simulation.control.clock[0].energy_floor), 1e-300)
-    return growth.growth(before, simulation.energy(), unit)
+    return growth(before, simulation.energy(), unit)
 
 
 def change_of_energy(simulation: Any) -> dict[str, str]:
@@ -178,7 +177,7 @@ def change_of_energy(simulation: Any) -> dict[str, str]:
         return {}
     mean = (clock.balance + clock.last_balance + clock.last_but_one) / FEW
     # Not from `first_few`, which `forget_growth` changes.
-    share = 100 * growth.growth(clock.first_balance, mean, unit_of(clock))
+    share = 100 * growth(clock.first_balance, mean, unit_of(clock))
     words = "since the start (kinetic + stored + dissipated - work, at one time)"
     return {"energy": f"{share:+.2f} % {words}"}
 

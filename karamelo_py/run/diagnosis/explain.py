@@ -9,9 +9,8 @@ from typing import NamedTuple, NoReturn
 import numpy as np
 
 from karamelo_py.compiler.tuples import record
-from karamelo_py.kernels import growth
 from karamelo_py.kernels.step import ABOVE_LIMIT, DONE, GAINED, HEATED, SHRUNK, STOPPED
-from karamelo_py.kernels.watch import GROWTH, LOOK, unit_of
+from karamelo_py.kernels.watch import GROWTH, LOOK, WITHIN, unit_of
 from karamelo_py.output.point_table import PointTable
 from karamelo_py.points.basis import carried, extent
 from karamelo_py.run.advice.large_steps import step_was_told
@@ -144,7 +143,7 @@ def _keep_good(hub: Hub, simulation: Simulation, status: int, good: RollbackPoin
     if status not in (GAINED, HEATED) and step > simulation.step:
         before = simulation.energy()
         good.again(simulation.advance, step)
-        if path is None and energy.growth_since(simulation, before) > growth.WITHIN:
+        if path is None and energy.growth_since(simulation, before) > WITHIN:
             # The watch looks at means of a hundred steps, and has not seen it yet.
             grown = True
             _return_before_growth(simulation, good, step)
@@ -192,7 +191,7 @@ def only_leave(hub: Hub, simulation: Simulation, snapshot: dict) -> bool:
     before, steps = simulation.energy(), step - simulation.step
     if steps:
         simulation.advance(steps)
-    kept = energy.growth_since(simulation, before) <= growth.WITHIN
+    kept = energy.growth_since(simulation, before) <= WITHIN
     healthy = kept and not simulation.above_limit()
     simulation.advance(1)  # which goes wrong again, for others to look at
     return healthy

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from karamelo_py.output.files import savefig, whole
-from karamelo_py.output.plot_style import blank_figure, tidy
+from karamelo_py.output.plots import blank_figure, tidy
 from karamelo_py.points import laws as materials
 from karamelo_py.run.element.load_path import COMPONENTS
 from karamelo_py.run.element.point import Point

@@ -4,7 +4,7 @@ import importlib.util
 from collections.abc import Iterator
 
 from karamelo_py.compiler.fields import declared
-from karamelo_py.kernels.averaging import PointByPoint
+from karamelo_py.kernels.visit import PointByPoint
 from karamelo_py.language import registry
 from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.points.transfers import Moment

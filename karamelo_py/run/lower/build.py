@@ -24,12 +24,13 @@ from karamelo_py.kernels.arrays import (
     new_control,
     some_of,
 )
-from karamelo_py.kernels.averaging import NodalMean
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.laws import elastic_law, law_in, law_on, law_table
 from karamelo_py.kernels.loss import EnergyLoss, FrictionalHeat
-from karamelo_py.kernels.rows import Insulated
+from karamelo_py.kernels.table import Insulated
+from karamelo_py.kernels.visit import NodalMean
 from karamelo_py.language.scene import Scene
+from karamelo_py.output.point_table import owners_of_fields
 from karamelo_py.points.basis import carried, deformed
 from karamelo_py.points.boundary import ReflectingGrid
 from karamelo_py.points.kinematics import Line
@@ -72,6 +73,8 @@ class State(NamedTuple):
     v: np.ndarray
     laws: dict[tuple, np.ndarray]  # state for each kind of law
     fields: dict[type, np.ndarray]  # declared fields that are kept
+    grids: NamedTuple
+    node_fields: dict[type, np.ndarray]  # the same of the nodes of these grids, (nodes, components)
     contact: NamedTuple  # how solids touch, with what it remembers
     last_dt: float  # the step that the velocities belong to the middle of
     path: float  # how far points have gone
@@ -214,8 +217,7 @@ def lower(
     if hub.update.thermal:
         at_nodes = lower_nodes((NodalMean,), Line(), count, real)
         heat = Conducting(at_nodes, tiles.empty_buffers(at_nodes, len(hub.solids)))
-    owners = [method.frame, transfer, averaging, contact, heat, grids]
-    owners += [*hub.fixes.values(), hub.update.scheme, basis, method]
+    owners = owners_of_fields(hub, contact)
     kinds = [
         kind
         for kind in fields.declared(owners, "node_fields")
@@ -226,6 +228,8 @@ def lower(
     if warms_by_friction(hub):
         kinds.append(FrictionalHeat)
     at_nodes = lower_nodes(kinds, kin, count, real)
+    if previous is not None:
+        resume_nodes(at_nodes, grids, previous)
     setup = Setup(
         frame=method.frame,
         kin=kin,
@@ -287,6 +291,15 @@ def lower_nodes(kinds: Iterable[type], kin: NamedTuple, count: int, real: type) 
     )
 
 
+def resume_nodes(nodes: Nodes, grids: NamedTuple, previous: State) -> None:
+    """Take over kept fields of the nodes where they were there before, with the same numbers."""
+    same = zip(grids, previous.grids, strict=True)
+    if all(np.array_equal(now[: len(before)], before) for now, before in same):
+        for one in nodes.fields:
+            if (before := previous.node_fields.get(type(one))) is not None:
+                one.array[: len(before)] = before
+
+
 def part_of(solid: Solid, first: int, end: int) -> Solid:
     """A solid like this one, with its points whose ids are from `first` to before `end`."""
     begin, end = (min(max(i - solid.first_id, 0), solid.count) for i in (first, end))
@@ -319,14 +332,9 @@ def start(law, T0: float | None, kin, real: type) -> np.ndarray:
     return np.array(flat(state), real)
 
 
-def point_kinds(hub: Hub, real: type) -> tuple[type, ...]:
+def point_kinds(hub: Hub) -> tuple[type, ...]:
     """The declared fields of the points, as far as no array of nodes has to be made for that."""
-    method, thermal = hub.update.method, hub.update.thermal
-    owners = [method.frame, hub.update.transfer_tag(real), method.averaging(hub)]
-    owners += [Conducting] if thermal else []
-    owners += [ReflectingGrid] if hub.update.boundary == "reflect" else []
-    owners += [*hub.fixes.values(), hub.update.scheme, method.basis, method]
-    return fields.declared(owners, "point_fields")
+    return fields.declared(owners_of_fields(hub), "point_fields")
 
 
 def lower_block(

@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.compiler.addresses import address_of
 from karamelo_py.compiler.formula import BLOCK, EVALUATE, ROWS, STACK, evaluate_in_table
+from karamelo_py.compiler.loops import address_of
 from karamelo_py.compiler.threads import Serial
 from karamelo_py.kernels import arrays
 from karamelo_py.kernels.hooks import STAGES, CompiledHook

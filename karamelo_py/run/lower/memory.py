@@ -12,7 +12,7 @@ from karamelo_py.kernels.arrays import SUMS_WIDTH, UPDATE_WIDTH, VELOCITY_WIDTH,
 from karamelo_py.run.lower.build import PRECISIONS, check_scene, lower_points, part_of, point_kinds
 from karamelo_py.run.lower.sizes import point_fields
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.machine_memory import machine_memory, on_machine, share_of_machine
+from karamelo_py.scene.machine_memory import machine_memory
 from karamelo_py.scene.solid import Solid, own_grids
 from karamelo_py.script.errors import ScriptError, plural
 
@@ -35,20 +35,20 @@ def check_room(hub: Hub, *, copied: bool) -> None:
     ScriptError
         At the line of the largest solid.
     """
+    comm = hub.settings.comm
     count = sum(solid.count for solid in hub.solids.values())
-    if count <= FEW or (there := machine_memory(on_machine(hub))) is None:
+    if count <= FEW or (there := machine_memory(comm.on_machine)) is None:
         return
     check_scene(hub)
-    comm, share = hub.settings.comm, share_of_machine(hub)
-    need = share * least_bytes(hub, PRECISIONS[hub.settings.precision], copied)
+    need = comm.share_here * least_bytes(hub, PRECISIONS[hub.settings.precision], copied)
     if need > there.free:
         # Scenes of before, which point to themselves, stay until someone looks.
         gc.collect()
-        there = machine_memory(on_machine(hub)) or there
+        there = machine_memory(comm.on_machine) or there
     if need <= there.free:
         return
     place, beside = _largest(hub).place, ""
-    if share < 1:
+    if comm.share_here < 1:
         beside = f" for {comm.on_machine} of {comm.size} processes"
     message = (
         f"the scene has {plural(count, 'point')}, which take at least {in_words(need)} of memory"
@@ -75,7 +75,7 @@ def _ways(hub: Hub, need: float, there: float, copied: bool) -> str:
     # Bytes go with that power of the number of cells along a side; two digits, rounded up.
     larger = ceil(10 * (need / max(there, 1.0)) ** (1 / hub.domain.dimension)) / 10
     ways = [f"cells {max(larger, 1.1):g} times as large, or fewer points per cell"]
-    single = share_of_machine(hub) * least_bytes(hub, np.float32, copied)
+    single = hub.settings.comm.share_here * least_bytes(hub, np.float32, copied)
     if hub.settings.precision == "double" and single < there:
         ways.append(f"precision(single), which needs at least {in_words(single)}")
     ways.append("processes on several machines (mpiexec), which share the points out")
@@ -88,7 +88,7 @@ def least_bytes(hub: Hub, real: type, copied: bool) -> float:
     It is the least: boxes of tiles, groups and what the program itself takes come on top.
     """
     kin = hub.update.method.kinematics(hub)
-    kinds = point_kinds(hub, real)
+    kinds = point_kinds(hub)
     points, cells = 0, [0.0]
     for solid in hub.solids.values():
         if not solid.count:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.kernels.arrays import INITIAL_INTEGRATE, ON_VELOCITY, SUPPLY_HEAT, Setup
-from karamelo_py.kernels.conduction import at_heat_nodes, at_heated_points
+from karamelo_py.kernels.heat import at_heat_nodes, at_heated_points
 from karamelo_py.kernels.hook_loop import at_nodes, at_points
 from karamelo_py.kernels.hooks import STAGES, CompiledHook
 from karamelo_py.run.lower.hook_tables import lower_hooks
@@ -82,7 +82,8 @@ def _on_nodes(hooks: PythonHooks, s: Setup, stage: int, target: int) -> None:
 
 def _on_heat_nodes(hooks: PythonHooks, s: Setup, stage: int, target: int) -> None:
     # A temperature is to a capacity what a velocity is to a mass: the same view shows it.
-    _on_nodes(hooks, s._replace(nodes=s.heat.nodes), stage, target)
+    nodes = s.heat.nodes._replace(fields=s.nodes.fields)
+    _on_nodes(hooks, s._replace(nodes=nodes), stage, target)
 
 
 def _on_points(hooks: PythonHooks, s: Setup, stage: int, then: int) -> None:

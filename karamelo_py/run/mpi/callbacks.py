@@ -5,8 +5,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from karamelo_py.compiler.addresses import address_of_python
 from karamelo_py.compiler.formula import GLOBAL, UNIFORM
+from karamelo_py.compiler.loops import address_of_python
 from karamelo_py.kernels import ranks
 from karamelo_py.kernels.arrays import DT
 from karamelo_py.kernels.totals import WORK, rounded

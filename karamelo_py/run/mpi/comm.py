@@ -35,12 +35,14 @@ PAUSE = 0.005  # seconds between two looks whether the others have come
 
 
 @contextmanager
-def handled_signals(handler: Callable[[int, Any], None]) -> Iterator[None]:
+def handled_signals(
+    handler: Callable[[int, Any], None], numbers: Sequence[int] = ENDING
+) -> Iterator[None]:
     """Have signals that end programs call a handler, but for those that are ignored."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = {number: signal.getsignal(number) for number in ENDING}
+    before = {number: signal.getsignal(number) for number in numbers}
     # Whoever started the program may have it go on when the terminal is closed (nohup).
     heeded = [number for number, now in before.items() if now != signal.SIG_IGN]
     for number in heeded:

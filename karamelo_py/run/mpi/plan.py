@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.kernels.arrays import NoHooks, Setup, Tiling, arrays_of
+from karamelo_py.kernels.p2g import given
 from karamelo_py.kernels.step import Fused, Staged, step
-from karamelo_py.kernels.sums import given
 from karamelo_py.kernels.sweep import sum_buffers, sweep_nodes, sweep_points
 from karamelo_py.run.lower.sizes import memory_of
 from karamelo_py.run.mpi.partition import SharedTiles, occupied
@@ -53,7 +53,7 @@ class _Sums(NamedTuple):
 
 
 @sweep_points.on(_Sums)
-def _sweep_points_sums(mode, visit, s, block, then, gathers, scatters, dt):
+def _sweep_points_sums(mode, visit, s, block):
     return None
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from karamelo_py.kernels.arrays import TIMESTEP, Block, Setup
 from karamelo_py.kernels.ranks import Linked
-from karamelo_py.run.checkpoint.arrays import remembered_at, take_points, take_tiling
+from karamelo_py.run.checkpoint.arrays import kept_at_nodes, remembered_at, take_points, take_tiling
 from karamelo_py.run.mpi.callbacks import Callbacks, reads_totals
 from karamelo_py.run.mpi.load import Load
 from karamelo_py.run.mpi.pack import by_tile, join_tilings, share_of, stripped
@@ -41,7 +41,7 @@ class Subdomain:
 
     def migrate(self, s: Setup) -> Setup:
         """Hand over the points that have left the own tiles; they are to be sorted then."""
-        self.share_contact()
+        self.share_memory()
         self.account()
         return self.tiles.migrate(s, self.learn())
 
@@ -63,15 +63,30 @@ class Subdomain:
         """List what contact remembers of every node."""
         return remembered_at(self.simulation, np.array([[0, len(self.tiles.foreign)]]))
 
-    def share_contact(self) -> None:
-        """Tell all where contact acted in the last step: other nodes come to be in use."""
-        memory = self.contact_memory()
-        if not memory:
-            return
-        own, step = self.counted(), self.simulation.step
-        own = own[np.any([(np.abs(one[own]) == step).any(axis=1) for one in memory], axis=0)]
-        for nodes, *rows in self.comm.allgather((own, *(one[own] for one in memory))):
-            for one, found in zip(memory, rows, strict=True):
+    def memory(self) -> list[np.ndarray]:
+        """List what is remembered of every node: by contact, and in fields that outlive a step."""
+        kept = kept_at_nodes(self.simulation.setup)
+        return [*self.contact_memory(), *(array for _, array in kept)]
+
+    def share_memory(self) -> None:
+        """Tell all where contact acted in the last step, and kept fields of nodes.
+
+        Other nodes come to be in use.
+        """
+        own, step, contact = self.counted(), self.simulation.step, self.contact_memory()
+        self.share_kept()
+        if contact:
+            touched = [(np.abs(one[own]) == step).any(axis=1) for one in contact]
+            self._share(own[np.any(touched, axis=0)], contact)
+
+    def share_kept(self) -> None:
+        """Tell all the fields of the own nodes that outlive a step."""
+        if kept := kept_at_nodes(self.simulation.setup):
+            self._share(self.counted(), [array for _, array in kept])
+
+    def _share(self, own: np.ndarray, arrays: list[np.ndarray]) -> None:
+        for nodes, *rows in self.comm.allgather((own, *(one[own] for one in arrays))):
+            for one, found in zip(arrays, rows, strict=True):
                 one[nodes] = found
 
     def counted(self) -> np.ndarray:
@@ -118,7 +133,7 @@ class Subdomain:
         due = due and not (tiles.direct or sorted_next)
         if not due or not tiles.balance(work_of(tiles.loads(s.blocks), self.learn())):
             return
-        self.share_contact()
+        self.share_memory()
         own = [tiles.owner[occupied(block.tiling)[0]] for block in s.blocks]
         others = tiles.partners(np.bincount(np.concatenate(own), minlength=self.comm.size))
         given = {rank: share_of(s, tiles.owner == rank) for rank in others}

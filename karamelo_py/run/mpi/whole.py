@@ -124,7 +124,7 @@ class Whole:
             ],
             "nodes": own,
             "at nodes": [array[own] for _, array in of_nodes(s)],
-            "memory": [array[own] for array in subdomain.contact_memory()],
+            "memory": [array[own] for array in subdomain.memory()],
         }
 
     def _join(self, parts: list[dict[str, Any]]) -> None:
@@ -138,7 +138,7 @@ class Whole:
         nodes = numbers(whole.spans)
         for _, array in of_nodes(whole):
             array[nodes] = 0  # also those that no box reaches: nobody has them
-        memory = self.simulation.subdomain.contact_memory()
+        memory = self.simulation.subdomain.memory()
         for part in parts:
             for (_, array), rows in zip(of_nodes(whole), part["at nodes"], strict=True):
                 array[part["nodes"]] = rows
@@ -154,7 +154,7 @@ class Whole:
         if not moved:
             return nodes, [array[nodes] for _, array in of_nodes(self.setup)]
         tiles.share_out(work_of(tiles.loads(self.setup.blocks), subdomain.load.costs))
-        return tiles.owner, nodes, [one[nodes] for one in subdomain.contact_memory()]
+        return tiles.owner, nodes, [one[nodes] for one in subdomain.memory()]
 
     def _shares(self) -> list[dict[str, np.ndarray]] | None:
         """Pack what each process has of the whole."""
@@ -169,7 +169,7 @@ class Whole:
         simulation.tiles.owner = owner
         found = simulation.comm.scatter(self._shares())
         simulation.tiles.empty_nodes(simulation.setup)
-        for one, rows in zip(subdomain.contact_memory(), memory, strict=True):
+        for one, rows in zip(subdomain.memory(), memory, strict=True):
             one[nodes] = rows
         subdomain.put(found)
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from karamelo_py.compiler.fields import addresses_of_rows
 from karamelo_py.compiler.lanes import lanes_for
-from karamelo_py.compiler.rows import addresses_of_rows
 from karamelo_py.compiler.threads import Serial, Threaded
 from karamelo_py.kernels.arrays import (
     ADD,
@@ -221,7 +221,8 @@ class Tiles:
         """(n,) the tile of each point."""
         x, ends = self._where(s, points), np.empty((self.threads, self.count), np.int64)
         tile = np.empty(x.shape[1], np.int64)
-        find_tiles(self.mode, planar(s.kin), s.grids, self._cut, x, points.grid, ends, tile)
+        kin, of = planar(s.kin), points.grid
+        find_tiles(self.mode, len(ends), kin, s.grids, self._cut, x, of, ends, tile)
         return tile
 
     def _sort_block(self, s: Setup, block: Block) -> np.ndarray:
@@ -265,7 +266,7 @@ class Tiles:
         tiling.grid[:count] = grid
         tiling.box[:count] = np.concatenate(found.boxes[:, occupied], axis=1)
         if self._most_in_box:
-            find_rows(mode, s.kin, s.grids, sight, x, tiling, parts)
+            find_rows(mode, parts, s.kin, s.grids, sight, x, tiling, parts)
         return occupied
 
     def box_bytes(self, s: Setup) -> int:

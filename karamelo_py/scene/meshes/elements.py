@@ -19,31 +19,19 @@ _PLANE = 1e-9
 
 
 class Shape(NamedTuple):
-    """A shape of elements; nodes are in the order of meshio, which is that of VTK.
+    """A shape of elements; nodes are in the order of meshio, which is that of VTK."""
 
-    Attributes
-    ----------
-    name
-        Its cell type in meshio.
-    words
-        Its name, in plural.
-    dimension
-        Its dimension.
-    mirrored
-        The order of the nodes that turns a negative orientation into a positive one.
-    natural
-        Signs of the natural coordinates of the nodes of a quadrilateral or hexahedron, (c, d);
-        none for simplices, whose map is linear.
-    """
-
-    name: str
-    words: str
+    name: str  # the cell type in meshio
+    words: str  # in plural
     dimension: int
+    # The order of the nodes that turns a negative orientation into a positive one.
     mirrored: tuple[int, ...]
+    # (c, d) signs of the natural coordinates of nodes; none for simplices, whose map is linear.
     natural: tuple[tuple[int, ...], ...] = ()
 
 
 _SQUARE = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+_CUBE = tuple((*xy, z) for z in (-1, 1) for xy in _SQUARE)
 SHAPES = {
     shape.name: shape
     for shape in (
@@ -51,33 +39,17 @@ SHAPES = {
         Shape("triangle", "triangles with 3 nodes", 2, (0, 2, 1)),
         Shape("quad", "quadrilaterals with 4 nodes", 2, (0, 3, 2, 1), _SQUARE),
         Shape("tetra", "tetrahedra with 4 nodes", 3, (0, 2, 1, 3)),
-        Shape(
-            "hexahedron",
-            "hexahedra with 8 nodes",
-            3,
-            (0, 3, 2, 1, 4, 7, 6, 5),
-            tuple((*xy, z) for z in (-1, 1) for xy in _SQUARE),
-        ),
+        Shape("hexahedron", "hexahedra with 8 nodes", 3, (0, 3, 2, 1, 4, 7, 6, 5), _CUBE),
     )
 }
 
 
 class MeshElements(NamedTuple):
-    """MeshElements of one shape.
-
-    Attributes
-    ----------
-    shape : Shape
-        Their shape.
-    numbers : ndarray (n, c)
-        Numbers of their nodes.
-    corners : ndarray (n, c, d)
-        Positions of their nodes.
-    """
+    """Elements of one shape."""
 
     shape: Shape
-    numbers: np.ndarray
-    corners: np.ndarray
+    numbers: np.ndarray  # (n, c) of their nodes
+    corners: np.ndarray  # (n, c, d) positions of these
 
     def mirrored(self, which: np.ndarray) -> MeshElements:
         """With the orientation of `which` (n,) of them reversed."""
@@ -90,23 +62,10 @@ class MeshElements(NamedTuple):
 def elements_of(
     mesh: meshio.Mesh, dimension: int, group: str | int | None = None, *, lower: bool = False
 ) -> list[MeshElements]:
-    """The elements of `dimension` in a mesh, one item for each shape.
+    """The elements of `dimension` in a mesh or its physical `group`, one item for each shape.
 
-    Parameters
-    ----------
-    mesh
-        As read.
-    dimension
-        That of the domain. The mesh lies in the plane z = 0 in 2D, on the x axis in 1D.
-    group
-        Physical group to take them from; None takes all.
-    lower
-        Whether a group of lower dimension, such as a boundary, will do.
-
-    Raises
-    ------
-    ScriptError
-        When there are none, for elements of other types, and for a mesh out of the plane.
+    With `lower`, a group of lower dimension, such as a boundary, will do. None, elements of other
+    types, and a mesh out of the plane z = 0 in 2D, beside the x axis in 1D are errors.
     """
     cells = chosen_cells(mesh, group)
     of = f"group '{group}'" if group is not None else "the mesh"
@@ -167,12 +126,8 @@ def measured(elements: MeshElements) -> tuple[MeshElements, np.ndarray, np.ndarr
 
     Volume and centroid are those of the region that the map of the element covers, faces that are
     not plane included: integrals of det J and x det J by 2 Gauss points a direction, which is
-    exact, since both are polynomials of degree 3 at most in each natural coordinate.
-
-    Raises
-    ------
-    ScriptError
-        For an element that is flat or twisted.
+    exact, since both are polynomials of degree 3 at most in each natural coordinate. An element
+    that is flat or twisted is an error.
     """
     shape, corners = elements.shape, elements.corners
     # About the first node, so that a mesh far from the origin loses no digits.

@@ -1,16 +1,157 @@
-"""compute error: how far a field of points is from a formula."""
+"""Computes error and reference: how far values or fields are from formulas or curves."""
 
-from typing import Literal
+from __future__ import annotations
+
+import re
+from math import inf, isnan
+from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 
-from karamelo_py.output.point_table import PointTable
-from karamelo_py.scene.group import ParticleGroup
+from karamelo_py.language.scene import Scene
+from karamelo_py.language.signature import Argument, TableFile
+from karamelo_py.output.point_table import AXES, COMPONENTS, PointTable
+from karamelo_py.output.quantity import Quantity
+from karamelo_py.scene.domain import require_domain
+from karamelo_py.scene.group import ALL, ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Compute
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.errors import ScriptError, nearest, unknown
 from karamelo_py.script.expressions import Expression
-from karamelo_py.styles.computes.columns import Compared, Norm, PointField, column, refuse_absent
+from karamelo_py.script.terms import number_of
+
+VECTORS = {"displacement": "u", "velocity": "v"}
+TENSORS = {"stress": "s", "strain": "e"}
+DISPLACEMENTS = ("ux", "uy", "uz")
+
+
+def column(points: PointTable, name: str) -> np.ndarray:
+    """A column of points, (n,), displacements too."""
+    if name in DISPLACEMENTS:
+        return points.particle(name[1]) - points.particle(name[1] + "0")
+    return points.particle(name)
+
+
+class PointField:
+    """A field of points: its name in the script, and its columns, one for a scalar.
+
+    `weights` say how often a component counts in the square of the size: shear components twice.
+    """
+
+    script_kind = "a column of points, or displacement, velocity, stress or strain"
+
+    def __init__(self, name: str, columns: tuple[str, ...]):
+        self.name = name
+        self.columns = columns
+        shear = name in TENSORS
+        self.weights = [2.0 if shear and k >= 3 else 1.0 for k in range(len(columns))]
+
+    @classmethod
+    def from_script(cls, hub: Scene, argument: Argument) -> PointField:
+        known = [*hub.fields.particle_names(), *DISPLACEMENTS, *VECTORS, *TENSORS]
+        name = argument.words(known)
+        if name not in known:
+            raise unknown(f"unknown field '{name}'", name, known, place=argument.place)
+        if name in VECTORS:
+            d = require_domain(hub).dimension
+            return cls(name, tuple(VECTORS[name] + axis for axis in AXES[:d]))
+        if name in TENSORS:
+            return cls(name, tuple(TENSORS[name] + component for component in COMPONENTS))
+        return cls(name, (name,))
+
+
+class Norm:
+    """The size of a difference: L1, L2 or max, as it is or relative to the same norm of the exact.
+
+    Over a history the time since the last output weighs a difference, so that a history does not
+    depend on how often it is looked at.
+    """
+
+    remembers = ("_sums", "_duration", "_time", "history", "largest")
+
+    def __init__(self, words: tuple[str, ...] = ()):
+        kinds = [word for word in words if word in ("L1", "L2", "max")]
+        scales = [word for word in words if word in ("absolute", "relative")]
+        if len(kinds) > 1 or len(scales) > 1:
+            one, other = kinds[:2] if len(kinds) > 1 else scales[:2]
+            raise ScriptError(
+                f"both {one} and {other}",
+                expected="one norm (L1, L2, max) and one scale (absolute, relative)",
+            )
+        self.kind = kinds[0] if kinds else "L2"
+        self.relative = scales == ["relative"]
+        self._sums = np.zeros(2)
+        self._duration = 0.0
+        self._time: float | None = None
+        self.history = 0.0
+        self.largest = 0.0
+
+    def terms(self, sizes: np.ndarray, weight: np.ndarray) -> np.ndarray:
+        """Return the terms of a norm from the sizes (2, n) of differences and exact values."""
+        return np.vstack([weight * sizes ** (2 if self.kind == "L2" else 1), weight])
+
+    def moment(self, sums: np.ndarray, largest: list[np.ndarray]) -> np.ndarray:
+        """The norms (2,) of differences and exact values from sums, and the largest of some."""
+        if self.kind == "max":
+            return np.max([np.zeros(2), *largest], axis=0)
+        mean = sums[:2] / sums[2] if sums[2] else np.zeros(2)
+        return mean if self.kind == "L1" else np.sqrt(mean)
+
+    def follow(self, time: float, moment: np.ndarray) -> float:
+        """As `scaled`; `history` and `largest` take the moment in, once."""
+        now = self.scaled(*moment)
+        if self._time is not None and time <= self._time:
+            return now
+        if self.kind == "max":
+            self._sums = np.maximum(self._sums, moment)
+            self.history = self.scaled(*self._sums)
+        else:
+            power = 1 if self.kind == "L1" else 2
+            # The first state stands for itself until there is a second one.
+            span = time - self._time if self._time is not None else 0.0
+            self._duration += span
+            self._sums += span * moment**power
+            sums = self._sums / self._duration if self._duration else moment**power
+            self.history = self.scaled(*sums ** (1 / power))
+        self.largest = max(self.largest, now)
+        self._time = time
+        return now
+
+    def scaled(self, difference: float, exact: float) -> float:
+        """The norm as it is asked for, from that of differences and that of exact values."""
+        if not self.relative or difference == 0:
+            return float(difference)
+        return float(difference / exact) if exact else inf
+
+
+class Compared:
+    """Mixed into computes that compare points: says `sizes(points)`, and has a `norm`."""
+
+    def measured(self) -> tuple[np.ndarray, np.ndarray]:
+        """Norms (2,) of differences and exact values now, and other sums."""
+        sums = self.hub.fields.added_up(self)
+        largest = self.hub.fields.each(self, "largest") if self.norm.kind == "max" else []
+        return self.norm.moment(sums, largest), sums[3:]
+
+    def terms(self, points: PointTable) -> np.ndarray:
+        sizes, weight, *rest = self.sizes(points)
+        return np.vstack([self.norm.terms(sizes, weight), *rest])
+
+    def largest(self, points: PointTable) -> np.ndarray | None:
+        sizes = self.sizes(points)[0]
+        return sizes.max(axis=1) if sizes.size else None
+
+
+def refuse_absent(hub: Any, columns: tuple[str, ...]) -> None:
+    """A column that no material has cannot be wrong: comparing it is a mistake."""
+    absent = [name for name in columns if name in hub.fields.absent_at_points()]
+    if absent and hub.materials:
+        raise ScriptError(
+            f"'{absent[0]}' is 0 because no material of the scene has it",
+            argument="field",
+            expected="a column that the points have",
+        )
 
 
 class Error(Compared, Compute):
@@ -75,7 +216,6 @@ class Error(Compared, Compute):
         self.norm = Norm(words)
 
     def refresh(self) -> None:
-        """Measure and publish."""
         now = self.norm.follow(self.hub.update.time, self.measured()[0])
         self.publish("", now)
         self.publish("max", self.norm.largest)
@@ -89,3 +229,161 @@ class Error(Compared, Compute):
             exact = formula.evaluate_points(self.hub.values, x, x0)
             squares += weight * np.stack([column(points, name) - exact, exact]) ** 2
         return np.sqrt(squares), points.reference_volume
+
+
+def read_table(path: Path) -> dict[str, np.ndarray]:
+    """The columns of a file of numbers, by the names in its first row (or "1", "2", ...).
+
+    Numbers are separated by commas, semicolons or blanks; a line that begins with # is a comment.
+    """
+    rows = []
+    for number, line in enumerate(path.read_text(encoding="utf-8-sig").splitlines(), 1):
+        if line.strip() and not line.lstrip().startswith("#"):
+            cells = re.split(r"\s*[,;\t]\s*" if re.search("[,;\t]", line) else r"\s+", line.strip())
+            rows.append((number, [cell.strip('" ') for cell in cells]))
+    if not rows:
+        raise ScriptError(f"{path} has no rows", expected="columns of numbers", argument="file")
+    names = rows[0][1]
+    if any(number_of(cell) is not None for cell in names):
+        names = [str(k + 1) for k in range(len(names))]
+    else:
+        rows = rows[1:]
+    table = []
+    for number, cells in rows:
+        values = [number_of(cell) for cell in cells]
+        if len(values) != len(names) or None in values or any(map(isnan, values)):
+            raise ScriptError(
+                f"line {number} of {path}: {' '.join(cells)}",
+                expected=f"{len(names)} numbers: {', '.join(names)}",
+                argument="file",
+            )
+        table.append(values)
+    columns = np.array(table, float).reshape(-1, len(names)).T
+    return dict(zip(names, columns, strict=True))
+
+
+class GroupOrValue:
+    """For signatures: a group of points, or a number that changes in time."""
+
+    script_kind = "a group of points, or a value"
+
+    @staticmethod
+    def from_script(hub: Scene, argument: Argument) -> ParticleGroup | Quantity:
+        name = argument.text.strip().strip('"')
+        if name == ALL or name in hub.groups:
+            return ParticleGroup.from_script(hub, argument)
+        return Quantity.from_script(hub, argument)
+
+
+class Reference(Compared, Compute):
+    """Measure the difference between a value or a field of points and a curve in a file.
+
+    Parameters
+    ----------
+    subject
+        A value (``v_x``, a variable, a formula of values) is compared over time; the points of a
+        group, or ``all``, over a coordinate.
+    file
+        Columns of numbers, with commas, semicolons or blanks between them, and their names in the
+        first row (or named 1, 2, ... where there is no such row); lines that begin with # are
+        comments. The first column is the time or, for points, the coordinate, whose name it bears:
+        x, y, z, x0, y0, z0 or any other column of points.
+    column
+        The column of the file to compare with; for points also the column of the points, such as
+        s11 or vx.
+    norm
+        ``L1``, ``L2`` (without a word) or ``max``, and ``absolute`` (without a word) or
+        ``relative``, in any order.
+
+    Example
+    -------
+    compute(v, average_velocity, all)
+    compute(tip, reference, v_x, measured.csv, velocity, max, relative)
+    compute(profile, reference, all, exact.csv, s11)
+    log_modify(custom, step, time, tip, tip_curve, profile)
+
+    Notes
+    -----
+    The curve is linear between its rows. What lies beyond its ends is not compared.
+
+    Of a value, ID is the norm of its difference over the time so far, each output with the time
+    since the one before; ID_now is the difference now and ID_curve the curve now.
+    Of points, ID is the norm over the points now, each with its volume at first, ID_now is the
+    same, and ID_curve the mean of the curve at the points.
+
+    See Also
+    --------
+    error
+    """
+
+    syntax = "group|value, file, column[, L1|L2|max][, absolute|relative]"
+    published = ("", "now", "curve")
+    remembers = ("norm",)
+
+    def __init__(
+        self,
+        hub: Hub,
+        subject: GroupOrValue,
+        file: TableFile,
+        column: Argument,
+        *norm: Literal["L1", "L2", "max", "absolute", "relative"],
+    ):
+        self.points = isinstance(subject, ParticleGroup)
+        super().__init__(hub, subject if self.points else None)
+        self.subject = subject
+        columns = read_table(file)
+        name = column.text.strip('"')
+        if name not in columns:
+            raise unknown(f"{file} has no column '{name}'", name, columns, place=column.place)
+        self.along, self.column = next(iter(columns)), name
+        order = np.argsort(columns[self.along], kind="stable")
+        self.curve = columns[self.along][order], columns[name][order]
+        self.norm = Norm(norm)
+        if self.points:
+            self._check_columns(hub, file, column)
+
+    def _check_columns(self, hub: Hub, file: TableFile, column: Argument) -> None:
+        known = [*hub.fields.particle_names(), "ux", "uy", "uz"]
+        for name in (self.along, self.column):
+            if name not in known:
+                close = nearest(name, known)
+                raise ScriptError(
+                    f"points have no column '{name}'",
+                    place=column.place,
+                    expected=f"in {file} the coordinate first, then columns named as those of a "
+                    f"dump: {' '.join(known)}",
+                    hint=f"name it '{close}' in the file" if close else None,
+                )
+        refuse_absent(hub, (self.column,))
+
+    def refresh(self) -> None:
+        if self.points:
+            moment, (total, count) = self.measured()
+            now = self.norm.scaled(*moment)
+            self.publish("", now)
+            self.publish("now", now)
+            self.publish("curve", total / count if count else 0.0)
+            return
+        time = self.hub.update.time
+        within, exact = self._exact(np.array([time]))
+        if within.any():
+            difference = float(self.subject.read()) - exact[0]
+            sizes = np.abs([[difference], exact])
+            self.norm.follow(
+                time, self.norm.moment(self.norm.terms(sizes, np.ones(1))[:, 0], [sizes[:, 0]])
+            )
+            self.publish("", self.norm.history)
+            self.publish("now", difference)
+        self.publish("curve", exact[0] if within.any() else 0.0)
+
+    def sizes(self, points: PointTable) -> tuple[np.ndarray, ...]:
+        """Sizes (2, n) of differences and of the curve at points, weights; the curve, and one."""
+        within, exact = self._exact(column(points, self.along))
+        difference = column(points, self.column)[within] - exact
+        sizes = np.abs([difference, exact])
+        return sizes, points.reference_volume[within], exact, np.ones(len(exact))
+
+    def _exact(self, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return which places (n,) the curve covers, and its values there."""
+        within = (at >= self.curve[0][0]) & (at <= self.curve[0][-1])
+        return within, np.interp(at[within], *self.curve)

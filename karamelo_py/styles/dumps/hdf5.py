@@ -1,9 +1,8 @@
-"""dump hdf5: the material points in one binary file, as arrays over time and id."""
+"""dump hdf5 and grid/hdf5: one binary file, as arrays over time and id."""
 
 import os
 import re
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,7 +11,7 @@ import numpy as np
 from karamelo_py.output.fields import PIECE
 from karamelo_py.output.files import whole
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.styles.dumps.table import OfPoints, TableDump, TableRows
+from karamelo_py.styles.dumps.base import OfNodes, OfPoints, TableDump, TableRows
 
 # The least compression: with the bytes of like order together, more takes twice the time for a few
 # per cent.
@@ -43,7 +42,6 @@ class Hdf5Dump(TableDump):
     _snapshots = 0
 
     def write(self) -> None:
-        """Write one snapshot."""
         update = self.hub.update
         snapshot = SnapshotRows(update.time, update.step, self.extent()[1], self.tables())
         self._add(self.path(), self._snapshots, snapshot)
@@ -68,13 +66,18 @@ class Hdf5Dump(TableDump):
 
     def _go_on(self, path: Path, k: int, snapshot: SnapshotRows) -> None:
         """Write snapshot `k` into a file, after those before it."""
-        with _reported(path), _opened_to_append(path) as root:
-            try:
-                self._append(root, k, snapshot)
-            except BaseException:
-                for name in ("time", "step", *self.columns):
-                    root[name].resize(k, axis=0)
-                raise
+        try:
+            with _opened_to_append(path) as root:
+                try:
+                    self._append(root, k, snapshot)
+                except BaseException:
+                    for name in ("time", "step", *self.columns):
+                        root[name].resize(k, axis=0)
+                    raise
+        except (OSError, RuntimeError) as error:  # of HDF5: told in the words of the system
+            reason = re.search("error message = '([^']*)'", str(error))
+            what = reason[1] if reason else str(error).splitlines()[0]
+            raise ScriptError(f"cannot write {path}: {what}") from error
 
     def resumed(self) -> None:
         """Go on in the file of an earlier run, with the snapshots that it had then.
@@ -185,17 +188,6 @@ class Hdf5Dump(TableDump):
                     root[name][k, own] = row
 
 
-@contextmanager
-def _reported(path: Path) -> Iterator[None]:
-    """Turn what HDF5 says against writing `path` into a ScriptError, in the words of the system."""
-    try:
-        yield
-    except (OSError, RuntimeError) as error:
-        reason = re.search("error message = '([^']*)'", str(error))
-        what = reason[1] if reason else str(error).splitlines()[0]
-        raise ScriptError(f"cannot write {path}: {what}") from error
-
-
 def _opened_to_append(path: Path) -> Any:
     """Open the file such that what was written stays readable, whatever happens to the program.
 
@@ -237,4 +229,24 @@ class Hdf5(OfPoints, Hdf5Dump):
     See Also
     --------
     dump particle, dump grid/hdf5
+    """
+
+
+class GridHdf5(OfNodes, Hdf5Dump):
+    """Write the nodes of the background grids to one compressed binary file.
+
+    Everything else is as in dump hdf5.
+
+    Parameters
+    ----------
+    occupied
+        true: nodes without mass are NaN.
+
+    Example
+    -------
+    dump(d2, all, grid/hdf5, 100, nodes.h5, vx, vy, mass, occupied=true)
+
+    See Also
+    --------
+    dump grid, dump hdf5
     """

@@ -1,49 +1,39 @@
-"""The LAMMPS text format of dumps, which OVITO, ParaView (by readers) and most scripts open."""
-
-from __future__ import annotations
+"""dump particle, dump grid and their kin: the formats of LAMMPS, which OVITO opens."""
 
 import gzip
+import struct
 import zlib
-from collections.abc import Iterator, Sequence
-from pathlib import Path
-from typing import BinaryIO, Protocol
+from collections.abc import Iterator
+from functools import partial
+from typing import Any
+
+import numpy as np
 
 from karamelo_py.kernels.text import rows
 from karamelo_py.output.files import continued, whole
 from karamelo_py.scene.hub import Hub
-from karamelo_py.styles.dumps.table import TableDump
+from karamelo_py.styles.dumps.base import OfNodes, OfPoints, TableDump
 
 # A third of the time of level 6 for 4 % more bytes.
 COMPRESSION = 4
 PIECE = 1 << 20  # bytes
-
-
-class Encoder(Protocol):
-    """Turns text into the bytes of a file; the interface of ``zlib.compressobj``."""
-
-    def compress(self, data: bytes) -> bytes:
-        """Return bytes that can be written now."""
-
-    def flush(self) -> bytes:
-        """Return the last bytes of the file."""
-
-    def copy(self) -> Encoder:
-        """Make an independent encoder in the same state."""
+# Of the binary format (LAMMPS manual, dump, second revision).
+MAGIC = b"DUMPCUSTOM"
+ENDIAN, REVISION = 1, 2
+# How the sides of the box are: shrink-wrapped, with a least extent.
+SHRUNK, AT_LEAST = 2, 3
 
 
 class Plain:
-    """Leaves text as it is."""
+    """Leaves text as it is, with the interface of ``zlib.compressobj``."""
 
     def compress(self, data: bytes) -> bytes:
-        """Return the same bytes."""
         return data
 
     def flush(self) -> bytes:
-        """Nothing is left."""
         return b""
 
-    def copy(self) -> Plain:
-        """Itself, as it has no state."""
+    def copy(self) -> Any:
         return self
 
 
@@ -56,11 +46,10 @@ class LammpsDump(TableDump):
     to_first = True
     _end = 0
     _length = 0
-    _encoder: Encoder | None = None
-
-    def encoder(self) -> Encoder:
-        """Make the encoder of the text of a new file."""
-        return Plain()
+    _encoder: Any = None
+    # Makes the encoder of a new file, and opens the text of one.
+    encoder: Any = Plain
+    opened: Any = staticmethod(partial(open, mode="rb"))
 
     def write(self) -> None:
         """Write one snapshot: to a file of its own, or after those before it."""
@@ -92,7 +81,8 @@ class LammpsDump(TableDump):
             return
         path = self.path()
         if not path.is_file() or path.stat().st_size < self._end:
-            self.begin_anew()
+            self.warn_of_absence()
+            self._end = self._length = 0
             return
         # What an encoder has kept for the bytes to come is not in the file, but follows from it.
         self._encoder = self.encoder()
@@ -100,21 +90,36 @@ class LammpsDump(TableDump):
             for begin in range(0, self._length, PIECE):
                 self._encoder.compress(file.read(min(PIECE, self._length - begin)))
 
-    def begin_anew(self) -> None:
-        """Begin a new file: that of the earlier run is not there."""
-        self.warn_of_absence()
-        self._end = self._length = 0
-
-    @staticmethod
-    def opened(path: Path) -> BinaryIO:
-        """Open the text of a file."""
-        return path.open("rb")
-
     def _snapshot(self) -> Iterator[bytes]:
         """Write the text of the present state, piece by piece."""
-        yield header(self.hub, self.extent()[0], ["id", "type", *self.columns])
+        update, units = self.hub.update, self.hub.output.units
+        lines = [
+            *(["ITEM: UNITS", str(units)] if units else []),
+            "ITEM: TIMESTEP",
+            str(update.step),
+            "ITEM: TIME",
+            f"{update.time:.16g}",
+            "ITEM: NUMBER OF ATOMS",
+            str(self.extent()[0]),
+            "ITEM: BOX BOUNDS sm sm sm",
+            *(f"{lo:.10g} {hi:.10g}" for lo, hi in box(self.hub)),
+            "ITEM: ATOMS " + " ".join(["id", "type", *self.columns]),
+        ]
+        yield ("\n".join(lines) + "\n").encode("ascii")
         for ids, types, columns in self.tables():
             yield from rows([ids, types, *columns])
+
+
+def box(hub: Hub) -> list[tuple[float, float]]:
+    """Find the ends of the domain along the three axes.
+
+    OVITO takes a box of no thickness for degenerate; one cell about zero is right for a slice of
+    unit width.
+    """
+    domain = hub.domain
+    used = slice(domain.dimension)
+    thin = [(-0.5 * domain.h, 0.5 * domain.h)] * (3 - domain.dimension)
+    return [*zip(domain.lo[used].tolist(), domain.hi[used].tolist(), strict=True), *thin]
 
 
 class Gzipped:
@@ -127,38 +132,127 @@ class Gzipped:
         ``*`` all snapshots follow each other in one file.
     """
 
-    def encoder(self) -> Encoder:
+    def encoder(self) -> Any:
         """Make a gzip stream without name and date, so that the same run gives the same bytes."""
         return zlib.compressobj(COMPRESSION, zlib.DEFLATED, 16 + zlib.MAX_WBITS)
 
-    @staticmethod
-    def opened(path: Path) -> BinaryIO:
-        """Open the text of a file."""
-        return gzip.open(path)
+    opened = staticmethod(gzip.open)
 
 
-def header(hub: Hub, count: int, names: Sequence[str]) -> bytes:
-    """Write the lines above the rows of a snapshot."""
-    domain = hub.domain
-    bounds = []
-    for axis in range(3):
-        lo, hi = float(domain.lo[axis]), float(domain.hi[axis])
-        if axis >= domain.dimension:
-            # OVITO takes a box of no thickness for degenerate; one cell about zero is right for a
-            # slice of unit width.
-            lo, hi = -0.5 * domain.h, 0.5 * domain.h
-        bounds.append(f"{lo:.10g} {hi:.10g}")
-    units = hub.output.units
-    lines = [
-        *(["ITEM: UNITS", str(units)] if units else []),
-        "ITEM: TIMESTEP",
-        str(hub.update.step),
-        "ITEM: TIME",
-        f"{hub.update.time:.16g}",
-        "ITEM: NUMBER OF ATOMS",
-        str(count),
-        "ITEM: BOX BOUNDS sm sm sm",
-        *bounds,
-        "ITEM: ATOMS " + " ".join(names),
-    ]
-    return ("\n".join(lines) + "\n").encode("ascii")
+class BinaryRows:
+    """Mixed into a text dump: the same rows as numbers in double precision, little-endian.
+
+    Parameters
+    ----------
+    file
+        File name, best with the ending ``.bin``. The first ``*`` becomes the step number; without
+        ``*`` all snapshots follow each other in one file.
+    """
+
+    def _snapshot(self) -> Iterator[bytes]:
+        update = self.hub.update
+        count, names = self.extent()[0], ["id", "type", *self.columns]
+        line = " ".join(names).encode("ascii")
+        yield struct.pack("<q", -len(MAGIC)) + MAGIC + struct.pack("<ii", ENDIAN, REVISION)
+        yield struct.pack("<qqi", update.step, count, 0)  # 0: the box is not skewed
+        yield struct.pack("<6i6d", *[SHRUNK, AT_LEAST] * 3, *np.ravel(box(self.hub)))
+        yield struct.pack("<iibd", len(names), 0, 1, update.time)  # no units, but a time
+        yield struct.pack("<i", len(line)) + line
+        yield struct.pack("<ii", 1, count * len(names))  # all in one piece
+        for ids, types, columns in self.tables():
+            yield np.column_stack([ids, types, *columns]).astype("<f8", copy=False).tobytes()
+
+
+class Particle(OfPoints, LammpsDump):
+    """Write the material points in LAMMPS text format, which OVITO opens.
+
+    Each row begins with the point's number (``id``, the same through the whole run) and the number
+    of its solid (``type``, from 1). Positions are always written. The header carries the true step
+    and, as ``ITEM: TIME``, the time.
+
+    Example
+    -------
+    dump(d1, all, particle, 100, dump_p.*.LAMMPS, x, y, z, vx, vy, vz, s11, s22, s12)
+    """
+
+
+class GridDump(OfNodes, LammpsDump):
+    """Write the nodes of the background grids in LAMMPS text format, which OVITO opens.
+
+    Each row begins with the node's number (``id``, from 0, z fastest, then y, then x) and the
+    number of its grid (``type``, from 1). Positions are always written.
+
+    With ulmpm and ulcpdi there is one grid. tlmpm and tlcpdi have one for each solid, in the order
+    of the solids, which stays over the reference shape of its solid; ulmpm/contacts has the grid of
+    the domain once for each velocity field, so that several rows have the same position. The nodes
+    of all grids are written, those of the second after those of the first, with ids that go on.
+
+    Example
+    -------
+    dump(d2, all, grid, 100, dump_g.*.LAMMPS, x, y, z, vx, vy, mass)
+    """
+
+
+class ParticleGz(Gzipped, Particle):
+    """Write the material points in LAMMPS text format, gzipped.
+
+    A file has less than half the size, and OVITO
+    opens it as it is.
+
+    Everything else is as in dump particle.
+
+    Example
+    -------
+    dump(d1, all, particle/gz, 100, dump_p.*.LAMMPS.gz, x, y, z, vx, vy, vz, seq)
+
+    See Also
+    --------
+    dump particle
+    """
+
+
+class GridGz(Gzipped, GridDump):
+    """Write the nodes of the background grids in LAMMPS text format, gzipped.
+
+    Everything else is as in dump grid.
+
+    Example
+    -------
+    dump(d2, all, grid/gz, 100, dump_g.*.LAMMPS.gz, x, y, z, mass)
+
+    See Also
+    --------
+    dump grid
+    """
+
+
+class ParticleBin(BinaryRows, Particle):
+    """Write the material points in the binary format of LAMMPS, which OVITO opens.
+
+    Numbers keep all their digits, and files are written faster than text. Everything else is as in
+    dump particle.
+
+    Example
+    -------
+    dump(d1, all, particle/bin, 100, dump_particle.*.bin, x, y, z, vx, vy)
+
+    See Also
+    --------
+    dump particle, dump particle/gz
+    """
+
+
+class GridBin(BinaryRows, GridDump):
+    """Write the nodes of the background grid in the binary format of LAMMPS, which OVITO opens.
+
+    Numbers keep all their digits, and files are written faster than text. Everything else is as in
+    dump grid.
+
+    Example
+    -------
+    dump(d1, all, grid/bin, 100, dump_grid.*.bin, x, y, z, vx, vy)
+
+    See Also
+    --------
+    dump grid, dump grid/gz
+    """

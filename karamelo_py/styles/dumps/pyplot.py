@@ -1,16 +1,15 @@
-"""dump pyplot: pictures of the points, drawn with Matplotlib."""
+"""dump pyplot and movie: pictures of the points, drawn with Matplotlib."""
 
 import re
-from collections.abc import Iterator
+from functools import cached_property
 from typing import Annotated, Any, BinaryIO
 
 import numpy as np
 
 from karamelo_py.language.kinds import In
 from karamelo_py.language.signature import OutputFile, Positive
-from karamelo_py.output.columns import check_columns
-from karamelo_py.output.files import picture_format, savefig, unwarned, whole
-from karamelo_py.output.point_table import PointTable
+from karamelo_py.output.fields import check_columns
+from karamelo_py.output.files import Frames, movie_format, picture_format, savefig, unwarned, whole
 from karamelo_py.output.rhythm import Every
 from karamelo_py.output.snapshots import Snapshot
 from karamelo_py.output.units import labelled
@@ -71,6 +70,9 @@ class PyPlot(Dump):
     dump movie
     """
 
+    remembers = carries = ("seen",)
+    format_of = staticmethod(picture_format)
+
     def __init__(
         self,
         hub: Hub,
@@ -91,7 +93,7 @@ class PyPlot(Dump):
         if field is not None:
             check_columns([field], hub.fields.particle_names(), first=4)
         super().__init__(hub, every, file, *([] if field is None else [field]))
-        self.format = self.check_format()
+        self.format = self.format_of(self.file)
         self.size = (_inches("width", width), _inches("height", height))
         if field is not None:
             self.warn_of_absent([field], hub.fields.absent_at_points(), "points")
@@ -109,8 +111,6 @@ class PyPlot(Dump):
         self._picture: Any = None
         self._limits: tuple[float, float] | None = None
 
-    remembers = carries = ("seen",)
-
     @property
     def seen(self) -> tuple[Any, ...]:
         """Limits of the field so far, and what they are those of."""
@@ -125,12 +125,7 @@ class PyPlot(Dump):
             if self._picture is not None:
                 self._picture.begin_with(limits)
 
-    def check_format(self) -> str:
-        """Read the format that the file name asks for."""
-        return picture_format(self.file)
-
     def write(self) -> None:
-        """Draw the present state."""
         with unwarned():
             if self.format == "png":
                 with whole(self.path()) as file:
@@ -181,16 +176,13 @@ class PyPlot(Dump):
         """Take what a picture needs of all points, some of them after others."""
         label, domain, update = self._label(), self.hub.domain, self.hub.update
         names = dict.fromkeys(["id", "x", "y", "z", "volume", label])
-        pieces = [[piece.particle(name) for name in names] for piece in self._pieces()]
+        tables = self.hub.fields.pieces(to_first=True)
+        pieces = [[table.particle(name) for name in names] for table in tables]
         columns = dict(zip(names, map(np.concatenate, zip(*pieces, strict=True)), strict=True))
         return Snapshot(update.step, update.time, columns, domain.lo, domain.hi)
 
-    def _pieces(self) -> Iterator[PointTable]:
-        return self.hub.fields.pieces(to_first=True)
-
     def take_part(self) -> None:
-        """Give the first of several processes the own points."""
-        for _ in self._pieces():
+        for _ in self.hub.fields.pieces(to_first=True):
             pass
 
     def side(self, snapshot: Snapshot) -> float:
@@ -212,13 +204,7 @@ class PyPlot(Dump):
 def colours_of(
     column: str, limits: tuple[float | None, float | None], cmap: str | None
 ) -> tuple[bool, str]:
-    """Choose for a column if limits that grow lie about 0, and the colour map.
-
-    Raises
-    ------
-    ScriptError
-        If Matplotlib does not have the map that is asked for.
-    """
+    """Choose for a column if limits that grow lie about 0, and the colour map."""
     signed = SIGNED.fullmatch(column) is not None
     if cmap is not None:
         from matplotlib import colormaps
@@ -244,3 +230,44 @@ def _inches(argument: str, value: float) -> float:
             f"from {LEAST_PIXELS} to {MOST_PIXELS} pixels",
         )
     return inches
+
+
+FRAMES_PER_SECOND = 25
+
+
+class Movie(PyPlot):
+    """Draw a movie of the points, as dump pyplot draws pictures: 25 frames in a second.
+
+    The file is written at the end of each run, also of one that breaks off or is interrupted.
+
+    Parameters
+    ----------
+    every
+        Steps between two frames, or ``time(T)``. The first and the last state of a run are
+        always drawn.
+    file
+        File name ending in .gif or, where the program ffmpeg is installed, .mp4.
+    vmin, vmax
+        Ends of the colours. Without them the colours change when numbers outgrow them.
+
+    Example
+    -------
+    dump(d3, all, movie, 100, disks.gif, 500, 500, seq, vmin=0, vmax=2e5)
+
+    See Also
+    --------
+    dump pyplot
+    """
+
+    remembers = ("frames",)
+    format_of = staticmethod(movie_format)
+
+    @cached_property
+    def frames(self) -> Frames:
+        return Frames(FRAMES_PER_SECOND)
+
+    def write(self) -> None:
+        self.frames.add(self.draw)
+
+    def finish(self) -> None:
+        self.frames.save(self.path())

@@ -1,4 +1,4 @@
-"""dump vtk: the material points as a series of files for ParaView."""
+"""dump vtk and grid/vtk: points, or cells of the grids, as a series of files for ParaView."""
 
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
@@ -10,8 +10,9 @@ from karamelo_py.output.files import whole
 from karamelo_py.output.rhythm import Every
 from karamelo_py.output.vtu import Vtu
 from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.lattice import boxes
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.styles.dumps.table import POSITIONS, OfPoints, TableDump
+from karamelo_py.styles.dumps.base import POSITIONS, OfNodes, OfPoints, TableDump
 
 
 class VtkDump(TableDump):
@@ -26,13 +27,7 @@ class VtkDump(TableDump):
     remembers = ("_series",)
     to_first, counts_rows = True, False
 
-    def __init__(
-        self,
-        hub: Hub,
-        every: Every,
-        file: OutputFile,
-        *columns: str,
-    ):
+    def __init__(self, hub: Hub, every: Every, file: OutputFile, *columns: str):
         super().__init__(hub, every, file, *columns)
         if not self.one_file_per_step or self.file.suffix != ".vtu":
             stem = self.file.name.replace("*", "").partition(".")[0]
@@ -70,20 +65,16 @@ class VtkDump(TableDump):
             self.complete(vtu, kept)
             vtu.write(file)
         self._series.append((self.hub.update.time, path.name))
+        rows = [f'<DataSet timestep="{t:.16g}" file={quoteattr(n)}/>\n' for t, n in self._series]
+        head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n<Collection>\n'
         with whole(self.index) as file:
-            file.write(_collection(self._series))
+            file.write((head + "".join(rows) + "</Collection>\n</VTKFile>\n").encode())
 
     def connect(self, vtu: Vtu, ids: np.ndarray, kept: list[np.ndarray]) -> None:
         """Add what is drawn of the last points, or keep what is needed for it."""
 
     def complete(self, vtu: Vtu, kept: list[np.ndarray]) -> None:
         """Add what is drawn between all points."""
-
-
-def _collection(series: list[tuple[float, str]]) -> bytes:
-    rows = [f'<DataSet timestep="{t:.16g}" file={quoteattr(name)}/>\n' for t, name in series]
-    head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n<Collection>\n'
-    return (head + "".join(rows) + "</Collection>\n</VTKFile>\n").encode()
 
 
 class Vtk(OfPoints, VtkDump):
@@ -102,6 +93,51 @@ class Vtk(OfPoints, VtkDump):
     """
 
     def connect(self, vtu: Vtu, ids: np.ndarray, kept: list[np.ndarray]) -> None:
-        """See `VtkDump.connect`."""
         last = vtu.counts[0]
         vtu.add_cells("vertex", np.arange(last - len(ids), last)[:, None])
+
+
+KINDS = {1: "line", 2: "quad", 3: "hexahedron"}
+# Corners of a cell in the order of VTK.
+CORNERS = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))
+
+
+class GridVtk(OfNodes, VtkDump):
+    """Write the background grids, with numbers at their nodes, as a series of VTU files.
+
+    ParaView opens the file with the ending ``.pvd`` beside them, which lists all snapshots with
+    their times.
+
+    Parameters
+    ----------
+    occupied
+        true: leave out nodes without mass, and cells that have such a node.
+
+    Example
+    -------
+    dump(d2, all, grid/vtk, 100, grid.*.vtu, vx, vy, mass)
+
+    See Also
+    --------
+    dump grid, dump vtk
+    """
+
+    def connect(self, vtu: Vtu, ids: np.ndarray, kept: list[np.ndarray]) -> None:
+        """Keep the numbers of nodes that are written, where others are not."""
+        if self.occupied:
+            kept.append(ids)
+
+    def complete(self, vtu: Vtu, kept: list[np.ndarray]) -> None:
+        """Add lines, squares or cubes between the nodes that are written."""
+        there = np.concatenate(kept) if kept else np.empty(0, np.int64)
+        d = self.hub.domain.dimension
+        for lattice in self.hub.lattices:
+            last = [count - 2 for count in lattice.shape[:d]]
+            steps = np.append(np.cumprod(lattice.shape[:0:-1])[::-1], 1)[:d]
+            corners = np.array(CORNERS[: 2**d])[:, :d] @ steps
+            for index in boxes([0] * d, last, 2**d):
+                nodes = (lattice.first + index @ steps)[:, None] + corners
+                if self.occupied:
+                    rows = np.searchsorted(there[:-1], nodes)
+                    nodes = rows[(there[rows] == nodes).all(axis=1)] if len(there) else nodes[:0]
+                vtu.add_cells(KINDS[d], nodes)

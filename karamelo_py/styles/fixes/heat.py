@@ -1,10 +1,12 @@
-"""Base of fixes that act on heat."""
+"""Fixes of heat."""
 
 from typing import Any
 
+from karamelo_py.scene.group import NodeGroup, ParticleGroup
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.modify import Fix
+from karamelo_py.scene.modify import Fix, heat_hook, node_hook
 from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.expressions import Expression
 
 
 class HeatFix(Fix):
@@ -20,3 +22,166 @@ class HeatFix(Fix):
                 expected="method(..., thermo-mechanical)",
             )
         self.formulas = formulas
+
+
+def hold_node(capacity, T, T_star, flow, value, before, dt, share):
+    """T* is the value; the total is the heat per time that takes."""
+    return T, value, flow, capacity * (value - T_star) / dt
+
+
+def hold_mapped(capacity, T, T_star, flow, value, before, dt, share):
+    """The temperature whose gradient makes heat flow is the value."""
+    return value, value, flow, 0.0
+
+
+class TemperatureNodes(HeatFix):
+    """Prescribe the temperature of nodes: hot and cold walls.
+
+    Parameters
+    ----------
+    T
+        Temperature: a number or a formula of x0, y0, z0, time and published values.
+
+    Example
+    -------
+    fix(hot, temperature_nodes, left, 400)
+    fix(oven, temperature_nodes, all, 298 + 50*min(time/10, 1))
+
+    Notes
+    -----
+    Publishes the heat per time that the nodes need for it as ID_s. Where several such fixes hold a
+    node, the last of them decides and has the heat of that node.
+
+    See Also
+    --------
+    temperature_particles, heat_flux_particles, convection_particles, method
+    """
+
+    post_heat_to_grid = node_hook(hold_mapped, publishes=False)
+    post_update_grid_heat = node_hook(hold_node, holds=True)
+
+    def __init__(self, hub: Hub, group: NodeGroup, T: Expression):
+        super().__init__(hub, group, T)
+
+
+def hold_point(capacity, T, face, supply, value, other, dt):
+    """The point has the value, whatever flows to it."""
+    return 0.0, supply, value
+
+
+class TemperatureParticles(HeatFix):
+    """Prescribe the temperature of points: they heat what is around them.
+
+    Parameters
+    ----------
+    T
+        Temperature: a number or a formula of x, y, z, x0, y0, z0, time and published values.
+
+    Example
+    -------
+    fix(hot, temperature_particles, heater, 400)
+
+    Notes
+    -----
+    Publishes nothing.
+
+    See Also
+    --------
+    temperature_nodes, heat_flux_particles, convection_particles, method
+    """
+
+    published = ()
+    supply_heat = heat_hook(hold_point)
+
+    def __init__(self, hub: Hub, group: ParticleGroup, T: Expression):
+        super().__init__(hub, group, T)
+
+
+def heat(capacity, T, face, supply, value, other, dt):
+    """The flux goes through one face of the point."""
+    return 1.0, supply + face * value, T
+
+
+class HeatFluxParticles(HeatFix):
+    """Let heat flow into points at the surface of a body: lasers, flames, friction.
+
+    Parameters
+    ----------
+    group
+        Group of points: one layer of them along the surface.
+    q
+        Heat per area and time, negative where it leaves the body: a number or a formula of x, y, z,
+        x0, y0, z0, time and published values.
+
+    Example
+    -------
+    fix(laser, heat_flux_particles, top, 1e6*exp(-(x/0.01)^2))
+
+    Notes
+    -----
+    A point shows one face to what is around it, the side of a cube of its volume; in one dimension
+    that is the whole section. A point at an edge of the body, with two faces outside, needs a fix
+    for each; around an axis the face is at the radius of the point, somewhat inside the surface.
+    Publishes the heat per time (in two dimensions per thickness, per radian where axisymmetric) as
+    ID_s.
+
+    See Also
+    --------
+    convection_particles, temperature_nodes, temperature_particles, method
+    """
+
+    supply_heat = heat_hook(heat, publishes=True)
+
+    def __init__(self, hub: Hub, group: ParticleGroup, q: Expression):
+        super().__init__(hub, group, q)
+
+
+def exchange(capacity, T, face, supply, value, other, dt):
+    """Newton's law of cooling through one face of the point, at its temperature after the step.
+
+    With the temperature before it, a large coefficient would cool the point below the fluid.
+    """
+    if not capacity > 0:
+        return 1.0, supply, T
+    rate = face * value
+    return 1.0, supply + rate * (other - T) / (1 + rate * dt / capacity), T
+
+
+class ConvectionParticles(HeatFix):
+    """Cool or heat points at the surface of a body by a fluid around it: q = h (T_inf - T).
+
+    Parameters
+    ----------
+    group
+        Group of points: one layer of them along the surface.
+    h
+        Heat transfer coefficient, heat per area, time and kelvin: a number or a formula of x, y, z,
+        x0, y0, z0, time and published values.
+    T_inf
+        Temperature of the fluid; a number or a formula likewise.
+
+    Example
+    -------
+    fix(air, convection_particles, surface, 25, 293)
+
+    Notes
+    -----
+    The faces of points are those of heat_flux_particles. Publishes the heat per time that all
+    points get as ID_s.
+
+    See Also
+    --------
+    heat_flux_particles, temperature_nodes, temperature_particles, method
+    """
+
+    acts_last = True  # what others supply bounds the temperatures that the watch allows
+    supply_heat = heat_hook(exchange, publishes=True, holds=True)
+
+    def __init__(self, hub: Hub, group: ParticleGroup, h: Expression, T_inf: Expression):
+        super().__init__(hub, group, h, T_inf)
+        if h.is_constant and not h.constant >= 0:
+            raise ScriptError(
+                f"the heat transfer coefficient is {h.constant:g}",
+                argument="h",
+                expected="a number of at least 0; whether it heats or cools follows from T_inf",
+            )

@@ -1,12 +1,13 @@
-"""Fixes that change nothing and measure forces for the functions of groups in expressions."""
+"""Fixes that change nothing and measure."""
 
 import numpy as np
 
 from karamelo_py.output.point_table import PointTable
-from karamelo_py.scene.group import Group
+from karamelo_py.scene.group import Group, ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix, node_hook, point_hook
 from karamelo_py.script.expressions import Expression
+from karamelo_py.styles.fixes.formulas import per_direction
 
 
 def force_of_nodes(mass, v, v_star, force, value, before, dt, share):
@@ -19,59 +20,85 @@ def momentum_rate(mass, v, x_old, x, value, before, dt, kick):
     return v, x, mass * v / kick
 
 
+# What is measured of nodes or points, and when in a step.
+HOOKS = {
+    "internal_force": ("post_particles_to_grid", node_hook(force_of_nodes)),
+    "force": ("post_update_grid_state", node_hook(force_of_nodes)),
+    "momentum_before": ("initial_integrate", point_hook(momentum_rate, publishes=True)),
+    "momentum_after": ("final_integrate", point_hook(momentum_rate, publishes=True)),
+}
+# Before all other fixes, whenever they are defined.
+COME_FIRST = ("internal_force", "momentum_before")
+
+
 class Measuring(Fix):
-    """Base of fixes that only measure.
-
-    Attributes
-    ----------
-    comes_first
-        Whether it acts before all other fixes, whenever it is defined.
-    """
+    """Sum one of `HOOKS`, or the ``external_force`` that fixes put on points, over a group."""
 
     published = ("x", "y", "z")
-    comes_first = False
 
-    def __init__(self, hub: Hub, group: Group):
+    def __init__(self, hub: Hub, group: Group, name: str):
         super().__init__(hub, group)
-        self.formulas = (Expression(0.0),) * hub.domain.dimension
-
-
-class ForceBeforeFixes(Measuring):
-    """Force of nodes before other fixes add to it."""
-
-    comes_first = True
-    post_particles_to_grid = node_hook(force_of_nodes)
-
-
-class TotalForce(Measuring):
-    """Force of nodes with all that fixes have added."""
-
-    post_update_grid_state = node_hook(force_of_nodes)
-
-
-class MomentumBefore(Measuring):
-    """Momentum of points at the start of a step over the step."""
-
-    comes_first = True
-    initial_integrate = point_hook(momentum_rate, publishes=True)
-
-
-class MomentumAfter(Measuring):
-    """Momentum of points at the end of a step over the step."""
-
-    final_integrate = point_hook(momentum_rate, publishes=True)
-
-
-class PointForce(Fix):
-    """Force that fixes put on points."""
-
-    published = ("x", "y", "z")
-    comes_first = False
+        self.name = name
+        if name in HOOKS:
+            self.formulas = (Expression(0.0),) * hub.domain.dimension
+            setattr(self, *HOOKS[name])
 
     def refresh(self) -> None:
-        """Measure and publish."""
-        self.publish_components(self.hub.fields.added_up(self))
+        if self.name not in HOOKS:
+            self.publish_components(self.hub.fields.added_up(self))
 
     def terms(self, points: PointTable) -> list[np.ndarray]:
-        """Components of the forces on points."""
         return [points.particle("b" + axis) for axis in "xyz"]
+
+
+class CheckSolution(Fix):
+    """Compare the displacement of points with an exact solution, whenever the log is written.
+
+    Parameters
+    ----------
+    displacement
+        ux, uy, uz, as many as the domain has dimensions: formulas of x0, y0, z0 and time.
+
+    Example
+    -------
+    fix(error, check_solution, all, 0.01*sin(PI*x0)*sin(10*time), 0)
+
+    Notes
+    -----
+    Publishes ID_s = sqrt(sum V0 |u - u_exact|^2 / sum V0), the error now;
+    ID_x = sum dt sum V0 |u - u_exact|^2 and ID_y = sum dt sum V0 |u_exact|^2 over the outputs so
+    far; and ID_z = sqrt(ID_x / ID_y), the relative error of the whole history.
+    """
+
+    syntax = "group, ux[, uy[, uz]]"
+    published = ("x", "y", "z", "s")
+    remembers = ("_step",)
+
+    def __init__(self, hub: Hub, group: ParticleGroup, *displacement: Expression | None):
+        super().__init__(hub, group)
+        self.formulas = per_direction(hub, "u", displacement)
+        self._step: int | None = None
+
+    def refresh(self) -> None:
+        now, size, volume = self.hub.fields.added_up(self)
+        if not volume:
+            return
+        self.publish("s", np.sqrt(now / volume))
+        if self._step == self.hub.update.step:
+            return
+        self._step = self.hub.update.step
+        values, dt = self.hub.values, self.hub.update.dt
+        self.publish("x", values.get(f"{self.id}_x") + dt * now)
+        self.publish("y", values.get(f"{self.id}_y") + dt * size)
+        total = values.get(f"{self.id}_y")
+        self.publish("z", np.sqrt(values.get(f"{self.id}_x") / total) if total > 0 else 0.0)
+
+    def terms(self, points: PointTable) -> np.ndarray:
+        """Squares of the error and of the displacement at points times their volume, and this."""
+        x, x0 = points.position, points.reference_position
+        squares = np.zeros((2, points.count))
+        for k, formula in enumerate(self.formulas):
+            if formula is not None:
+                exact = formula.evaluate_points(self.hub.values, x, x0)
+                squares += np.stack([x[:, k] - x0[:, k] - exact, exact]) ** 2
+        return points.reference_volume * np.vstack([squares, np.ones(points.count)])

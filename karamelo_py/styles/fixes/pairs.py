@@ -1,21 +1,26 @@
-"""Base of fixes between two solids."""
+"""Fixes between two solids."""
 
 from functools import partial
-from typing import Any, NamedTuple
+from math import inf
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 
 from karamelo_py.compiler.fields import field
 from karamelo_py.kernels import pairs
 from karamelo_py.kernels.arrays import Block
+from karamelo_py.kernels.laws import elastic_law
 from karamelo_py.kernels.p2g import Force
 from karamelo_py.language.rules import gain
+from karamelo_py.language.signature import NonNegative
+from karamelo_py.points.pairs import Hertz, MinimizePenetration
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.solid import Solid
 from karamelo_py.scene.views import PointsView
 from karamelo_py.script.errors import ScriptError
+from karamelo_py.styles.fixes.formulas import judge_friction
 
 SENT = 350  # bytes that the process that looks for pairs needs of each point
 
@@ -33,9 +38,11 @@ def check_pair(solid1: Solid, solid2: Solid) -> None:
 class PairContact(Fix):
     """Base of the fixes by which the points of two solids push each other.
 
-    Of many processes the first looks for pairs among the points of all that may touch.
+    Of many processes the first looks for pairs among the points of all that may touch. The `law` is
+    the tag of :mod:`karamelo_py.points.pairs` that gives the force between two points.
     """
 
+    law: NamedTuple
     published = ("x", "y", "z")
     point_fields = (Force,)
     point_by_point = True
@@ -59,10 +66,6 @@ class PairContact(Fix):
         ranges = [(solid.first_id, solid.first_id + solid.count) for solid in self.solids]
         self._ranges = (*ranges[0], *ranges[1])
         self._reach = max(solid.h for solid in self.solids)
-
-    def law(self) -> NamedTuple:
-        """The tag of :mod:`karamelo_py.points.pairs` that gives the force between two points."""
-        raise NotImplementedError
 
     def initial_integrate(self, points: PointsView) -> None:
         """Find the pairs that touch and give the points their forces."""
@@ -124,7 +127,7 @@ class PairContact(Fix):
         _, mass, radius, *both = np.ascontiguousarray(of_all[order].T)
         x, v = (np.stack(part, axis=1) for part in (both[:d], both[d:]))
         bodies = pairs.TwoBodies(x, v, mass, radius, np.zeros((n, d)), n - int(second.sum()))
-        pairs.push_apart(self.law(), kin, bodies, pairs.cells_for(n), self._reach, dt, kick, total)
+        pairs.push_apart(self.law, kin, bodies, pairs.cells_for(n), self._reach, dt, kick, total)
         force = np.empty((n, d))
         force[order] = bodies.force
         ends = np.cumsum([len(one) for one in found])[:-1]
@@ -137,3 +140,159 @@ gain(
     cause="contact between points",
     cure="a smaller step, or method ulmpm/contacts",
 )
+
+
+class ContactMinimizePenetration(PairContact):
+    """Let two solids touch point by point, as stiffly as the step allows, with friction.
+
+    Parameters
+    ----------
+    solid1, solid2
+        IDs of the two solids.
+    mu
+        Coefficient of friction (Coulomb).
+
+    Example
+    -------
+    fix(touch, contact/minimize_penetration, ball, plate, 0.2)
+
+    Notes
+    -----
+    Points are balls with the radius R of half the side of a cube of their present volume (in the
+    plane a square, in axisymmetry one at the distance r from the axis). Two that are closer than
+    R1 + R2 get the forces that take them apart within one step, if both were free: m1 m2 / (m1 +
+    m2) p / dt^2 for the penetration p = R1 + R2 - |x2 - x1|. Friction is mu times that, along the
+    slip, and at most what stops the slip of two free points (de Vaucorbeil & Nguyen 2021,
+    "Modelling contacts with a total Lagrangian material point method").
+
+    A surface of balls is rough: sliding is braked by riding from ball to ball, too, with mu = 0 by
+    one to two tenths of the pressing force in a block of two points a cell and direction.
+
+    With many processes the first looks for pairs, among the points of all that may touch.
+    Publishes the force on solid1 as ID_x, ID_y, ID_z; that on solid2 is the opposite. Pairs are
+    found by cells: the cost grows with the number of points.
+
+    See Also
+    --------
+    contact/hertz, contact/friction, method tlmpm
+    """
+
+    def __init__(
+        self, hub: Hub, solid1: Solid, solid2: Solid, mu: Annotated[float, NonNegative] = 0.0
+    ):
+        super().__init__(hub, solid1, solid2)
+        self.law = MinimizePenetration(float(mu))
+        judge_friction(hub, mu)
+
+
+def plane_modulus(solid: Solid, argument: str) -> float:
+    """E / (1 - nu^2) of a solid's material: 4 G (lambda + G) / (lambda + 2 G)."""
+    law = elastic_law(solid.material.law)
+    G, lam = getattr(law, "G", None), getattr(law, "lam", None)
+    if G is None or lam is None or not G > 0:
+        raise ScriptError(
+            f"material '{solid.material.id}' of solid '{solid.id}' has no elastic moduli",
+            argument=argument,
+            expected="a solid of a material with Young's modulus and Poisson's ratio",
+        )
+    return 4 * G * (lam + G) / (lam + 2 * G)
+
+
+class ContactHertz(PairContact):
+    """Let two solids touch point by point, with the force of Hertz, without friction.
+
+    Parameters
+    ----------
+    solid1, solid2
+        IDs of the two solids; their materials have a Young's modulus and a Poisson's ratio.
+
+    Example
+    -------
+    fix(touch, contact/hertz, ball, plate)
+
+    Notes
+    -----
+    Points are balls with the radius R of half the side of a cube of their present volume (in the
+    plane a square). Two that are closer than R1 + R2, by p, push each other with 4/3 E* sqrt(R
+    p^3) in space and pi/4 E* sqrt(R p^3) otherwise, where R = R1 R2 / (R1 + R2) and 1/E* = (1 -
+    nu1^2)/E1 + (1 - nu2^2)/E2. The force is that of single points: bodies get closer than the sum
+    of the radii before it is large, and a fast one may pass through.
+
+    Publishes the force on solid1 as ID_x, ID_y, ID_z; that on solid2 is the opposite.
+    With many processes the first looks for pairs, among the points of all that may touch.
+
+    See Also
+    --------
+    contact/minimize_penetration, method tlmpm
+    """
+
+    def __init__(self, hub: Hub, solid1: Solid, solid2: Solid):
+        super().__init__(hub, solid1, solid2)
+        if hub.domain.axisymmetric:
+            raise ScriptError(
+                "the force of Hertz is one of balls, and axisymmetric points are rings",
+                expected="fix contact/minimize_penetration, or a scene in 3D",
+            )
+        moduli = (plane_modulus(solid1, "solid1"), plane_modulus(solid2, "solid2"))
+        self.law = Hertz(1 / sum(1 / modulus for modulus in moduli))
+
+
+class ContactFriction(Fix):
+    """Let two solids rub where they touch on the grid (method ulmpm/contacts).
+
+    Parameters
+    ----------
+    solid1, solid2
+        IDs of the two solids. Other pairs stay frictionless; a pair has one fix.
+    mu
+        Coefficient of friction (Coulomb): the force along the surface is at most mu times the
+        force across it. The words ``no-slip`` let the solids stick while they are pressed together.
+
+    Example
+    -------
+    fix(rub, contact/friction, block, base, 0.3)
+
+    Notes
+    -----
+    Publishes the contact force of solid2 on solid1 as ID_x, ID_y, ID_z.
+
+    The work of friction heats solids that have a temperature: half each, or all the one that has.
+    In methods with ``thermo-mechanical`` it is shared by the effusivities sqrt(kappa rho cp), as
+    between half-spaces.
+
+    See Also
+    --------
+    contact/minimize_penetration, method ulmpm/contacts
+    """
+
+    syntax = "solid1, solid2, mu|no-slip"
+    published = ("x", "y", "z")
+    for_method = True
+
+    def __init__(
+        self,
+        hub: Hub,
+        solid1: Solid,
+        solid2: Solid,
+        mu: Annotated[float, NonNegative] | Literal["no-slip"],
+    ):
+        super().__init__(hub)
+        check_pair(solid1, solid2)
+        method = hub.update.method
+        if not method.fields_per_solid:
+            raise ScriptError(
+                "contact/friction is for solids with velocity fields of their own",
+                expected="method(ulmpm/contacts, ...)",
+                hint="in ulmpm solids that meet on the grid stick together; "
+                "for tlmpm there is fix contact/minimize_penetration",
+            )
+        a, b = (method.lattice_of(hub, solid) for solid in (solid1, solid2))
+        if a == b:
+            raise ScriptError(
+                f"solids '{solid1.id}' and '{solid2.id}' are glued together: they never slide",
+                argument="solid2",
+            )
+        self.solids = (solid1, solid2)
+        self.friction = inf if mu == "no-slip" else float(mu)
+        if mu != "no-slip":
+            judge_friction(hub, self.friction)

@@ -6,7 +6,6 @@ import sys
 import zlib
 from collections.abc import Callable
 from importlib import import_module
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -28,15 +27,6 @@ DATA = (
 )
 
 
-def _is_of(module: Any, path: Path) -> bool:
-    return module is not None and getattr(module, "__file__", None) == str(path)
-
-
-def _not_a_file(module: str, function: str) -> str | None:
-    """The hint where the name of a file stands in the place of a function."""
-    return f"a function f of the file {module}.py is {module}.f" if function == "py" else None
-
-
 class PythonFunction:
     """For signatures: a function of a module, or one that a program has given the scene."""
 
@@ -44,11 +34,14 @@ class PythonFunction:
 
     @classmethod
     def from_script(cls, hub: Hub, argument: Argument) -> Callable:
-        """The function that `argument` names; modules beside the script come first."""
+        """Find the function that `argument` names; modules beside the script come first."""
         name = argument.words()
         if name in hub.functions:
             return hub.functions[name]
         module, _, function = name.rpartition(".")
+        no_file = (
+            f"a function f of the file {module}.py is {module}.f" if function == "py" else None
+        )
         if not module:
             raise ScriptError(
                 f"'{name}' names no module",
@@ -60,14 +53,15 @@ class PythonFunction:
         try:
             # Another script of this process may have had a module of this name beside it.
             beside = folder / f"{module}.py"
-            if beside.is_file() and not _is_of(sys.modules.get(module), beside):
+            known = getattr(sys.modules.get(module), "__file__", None)
+            if beside.is_file() and known != str(beside):
                 sys.modules.pop(module, None)
             found = import_module(module)
         except FAILURES as error:
             raise ScriptError(
                 f"the module {module} cannot be imported: {cause_of(error)}",
                 place=argument.place,
-                hint=_not_a_file(module, function),
+                hint=no_file,
             ) from error
         finally:
             sys.path.pop(0)
@@ -77,8 +71,7 @@ class PythonFunction:
             raise ScriptError(
                 f"the module {module} has no function '{function}'",
                 place=argument.place,
-                hint=_not_a_file(module, function)
-                or (f"did you mean '{module}.{close}'?" if close else None),
+                hint=no_file or (f"did you mean '{module}.{close}'?" if close else None),
             )
         return getattr(found, function)
 
@@ -146,13 +139,13 @@ class Python(Fix):
             moment = "post_update_grid_state" if on_nodes else "initial_integrate"
         if group.all and ACTS_ON[moment] == "nodes":
             group, on_nodes = NodeGroup(hub, everything=True), True
-        if (ACTS_ON[moment] == "nodes") != on_nodes:
+        fit = [m for m in MOMENTS if (ACTS_ON[m] == "nodes") == on_nodes]
+        if moment not in fit:
             raise ScriptError(
                 f"{moment} is a moment of {ACTS_ON[moment]}, and '{group.id}' is a group of "
                 f"{group.kind}",
                 argument="moment",
-                expected="one of "
-                + ", ".join(m for m in MOMENTS if (ACTS_ON[m] == "nodes") == on_nodes),
+                expected=f"one of {', '.join(fit)}",
             )
         _check_arguments(function)
         super().__init__(hub, group)
@@ -165,11 +158,12 @@ class Python(Fix):
     @property
     def state(self) -> dict[str, Any]:
         """Values that the function keeps and names."""
-        return self.keeper.state()
+        return {name: getattr(self.keeper.owner, name) for name in self.keeper.names}
 
     @state.setter
     def state(self, kept: dict[str, Any]) -> None:
-        self.keeper.restore(kept)
+        for name, value in kept.items():
+            setattr(self.keeper.owner, name, value)
 
     def filed(self) -> None:
         """Warn once of other values that the function has changed: files do not hold them."""
@@ -210,7 +204,6 @@ class Python(Fix):
             self.publish_components(numbers)
 
     def _agree(self, given: Any) -> None:
-        """See that all processes return the same."""
         own = None if given is None else np.asarray(given, float).tolist()
         first, *others = map(repr, self.hub.simulation.everyone("its end", own))
         other = next((one for one in others if one != first), None)
@@ -227,17 +220,7 @@ class Python(Fix):
 class Keeper:
     """Owner of the values that a function needs from step to step: its object, or its module.
 
-    Attributes
-    ----------
-    names
-        What ``remembers`` names there.
-    place
-        Where this word belongs.
-
-    Raises
-    ------
-    ScriptError
-        If it names what is not there.
+    `names` are those that ``remembers`` names there; `place` says where this word belongs.
     """
 
     def __init__(self, function: Callable):
@@ -258,15 +241,6 @@ class Keeper:
                     expected="a name that has its first value when the fix is made",
                 )
         self.seen = self._look()
-
-    def state(self) -> dict[str, Any]:
-        """The values of the names."""
-        return {name: getattr(self.owner, name) for name in self.names}
-
-    def restore(self, kept: dict[str, Any]) -> None:
-        """Give the names their values."""
-        for name, value in kept.items():
-            setattr(self.owner, name, value)
 
     def forgotten(self) -> list[str]:
         """Names of what has changed since the last look and is not remembered."""

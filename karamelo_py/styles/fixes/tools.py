@@ -1,98 +1,26 @@
-"""Base of fixes that put forces on points: tools, walls and tractions."""
+"""Fixes that put forces on points: walls and tractions, and the base of"""
 
 from collections.abc import Sequence
-from functools import cached_property
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from karamelo_py.kernels.laws import elastic_law
-from karamelo_py.kernels.p2g import Force
+from karamelo_py.language.signature import NonNegative
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.solid import Solid
 from karamelo_py.scene.views import PointsView
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
-from karamelo_py.styles.fixes.formulas import per_direction
+from karamelo_py.styles.fixes.forces import PointForces
+from karamelo_py.styles.fixes.formulas import judge_friction, per_direction, vector
 
 
-class Bodies:
-    """The points of a group as small cubes (in the plane squares), at one moment.
+class ToolFix(PointForces):
+    """Base of fixes that push points, which they take for small cubes (in the plane squares)."""
 
-    What a tool does not ask for is not looked for.
-
-    Attributes
-    ----------
-    x, x0, v : (n, d)
-        Positions now and before the first step, velocities.
-    mass, side, face, stiffness : (n,)
-        Masses, edges of the cubes, areas of one face (per radian around an axis), and shear moduli
-        less what damage has taken of them.
-    total
-        The sum of terms (n,) over all points of the group, those of all processes.
-    dt, kick
-        The step, and how long forces act in it.
-    """
-
-    def __init__(self, hub: Hub, points: PointsView):
-        self._hub, self._points = hub, points
-        self.dt, self.kick = points.dt, points.kick
-        self._d = hub.domain.dimension
-        self.total = points.total
-
-    @cached_property
-    def x(self) -> np.ndarray:
-        return self._points.position.astype(float)
-
-    @property
-    def x0(self) -> np.ndarray:
-        return self._points.reference_position
-
-    @cached_property
-    def v(self) -> np.ndarray:
-        return self._points.velocity.astype(float)
-
-    @cached_property
-    def mass(self) -> np.ndarray:
-        return self._points.mass.astype(float)
-
-    @cached_property
-    def _radius(self) -> np.ndarray:
-        return self.x[:, 0] if self._hub.domain.axisymmetric else np.ones(len(self.x))
-
-    @cached_property
-    def side(self) -> np.ndarray:
-        return (self._column("volume") / self._radius) ** (1 / self._d)
-
-    @property
-    def face(self) -> np.ndarray:
-        return self.side ** (self._d - 1) * self._radius
-
-    @cached_property
-    def stiffness(self) -> np.ndarray:
-        solid = self._column("type").astype(int) - 1
-        moduli = np.array([_shear_modulus(one) for one in self._hub.solids.values()])
-        return moduli[solid] * (1 - self._column("damage"))
-
-    def _column(self, name: str) -> np.ndarray:
-        return self._points.column(name)
-
-
-class PointForceFix(Fix):
-    """Base of fixes that put a force on each point of their group.
-
-    Attributes
-    ----------
-    needs_stiffness
-        Whether the force goes with the shear modulus of the point.
-    """
-
-    published: tuple[str, ...] = ("x", "y", "z")
-    point_fields = (Force,)
-    point_by_point = True
-    needs_stiffness = False
+    needs_stiffness = False  # whether the force goes with the shear modulus of the point
 
     def __init__(self, hub: Hub, group: ParticleGroup):
         super().__init__(hub, group)
@@ -105,60 +33,61 @@ class PointForceFix(Fix):
                 expected="a group of points of elastic materials",
             )
 
-    def push(self, bodies: Bodies) -> np.ndarray:
-        """The forces (n, d) on the points."""
-        raise NotImplementedError
-
-    def initial_integrate(self, points: PointsView) -> None:
-        """Give the points their forces and publish the sum."""
-        force = self.push(Bodies(self.hub, points))
-        points.force = points.force + force
-        self.publish_components(points.total(force))
-
     def now(self, formulas: Sequence[Expression]) -> np.ndarray:
         """The present numbers (d,) of formulas of time, one for each direction."""
         return np.array([formula.evaluate(self.hub.values) for formula in formulas])
 
 
-def place(hub: Hub, x: Expression, y: Expression, z: Expression, name: str = "") -> tuple:
-    """The formulas of a vector for the directions of the domain; further ones have to be 0."""
-    return per_direction(hub, name, (x, y, z))
+def side_of(hub: Hub, points: PointsView) -> np.ndarray:
+    """Edges (n,) of the cubes that points are taken for."""
+    return (points.column("volume") / _radius(hub, points)) ** (1 / hub.domain.dimension)
+
+
+def face_of(hub: Hub, points: PointsView, side: np.ndarray) -> np.ndarray:
+    """Areas (n,) of a face of the cubes with these sides, per radian around an axis."""
+    return side ** (hub.domain.dimension - 1) * _radius(hub, points)
+
+
+def stiffness_of(hub: Hub, points: PointsView) -> np.ndarray:
+    """Shear moduli (n,) less what damage has taken of them."""
+    solid = points.column("type").astype(int) - 1
+    moduli = np.array([_shear_modulus(one) for one in hub.solids.values()])
+    return moduli[solid] * (1 - points.column("damage"))
+
+
+def _radius(hub: Hub, points: PointsView) -> np.ndarray | float:
+    return points.position[:, 0].astype(float) if hub.domain.axisymmetric else 1.0
 
 
 def unit(vector: np.ndarray) -> np.ndarray:
-    """A vector (d,) of length 1.
-
-    Raises
-    ------
-    ScriptError
-        For one without a direction.
-    """
+    """A vector (d,) of length 1; one without a direction is refused."""
     length = np.linalg.norm(vector)
     if not (np.isfinite(length) and length > 0):
         raise ScriptError("the normal has no direction", expected="a vector that is not 0")
     return vector / length
 
 
-def apart(bodies: Bodies, penetration: np.ndarray, normal: np.ndarray) -> np.ndarray:
+def apart(points: PointsView, penetration: np.ndarray, normal: np.ndarray) -> np.ndarray:
     """Forces (n, d) that undo penetrations (n,) along `normal` within one step.
 
     m p / dt^2, for a point that nothing else holds (de Vaucorbeil & Nguyen 2021).
     """
-    push = bodies.mass * np.maximum(penetration, 0) / (bodies.dt * bodies.kick)
+    push = points.mass.astype(float) * np.maximum(penetration, 0) / (points.dt * points.kick)
     return push[:, None] * normal
 
 
 def rubbed(
-    bodies: Bodies, push: np.ndarray, normal: np.ndarray, velocity: np.ndarray, mu: float
+    points: PointsView, push: np.ndarray, normal: np.ndarray, velocity: np.ndarray, mu: float
 ) -> np.ndarray:
     """Forces (n, d) of friction by something that moves with `velocity` and pushes with `push`.
 
     mu times the pressing force, along the slip, and at most what stops it within the step.
     """
-    slip = velocity - bodies.v
+    slip = velocity - points.velocity.astype(float)
     slip = slip - (slip * normal).sum(axis=1, keepdims=True) * normal
     speed = np.linalg.norm(slip, axis=1)
-    rub = np.minimum(mu * np.linalg.norm(push, axis=1), bodies.mass * speed / bodies.kick)
+    stopping = points.mass.astype(float) * speed / points.kick
+    rub = np.minimum(mu * np.linalg.norm(push, axis=1), stopping)
     return slip * np.divide(rub, speed, out=np.zeros_like(speed), where=speed > 0)[:, None]
 
 
@@ -166,3 +95,157 @@ def _shear_modulus(solid: Solid) -> float:
     """The shear modulus of a solid, 0 where it has none."""
     law: Any = elastic_law(solid.material.law)
     return float(getattr(law, "G", None) or getattr(getattr(law, "strength", None), "G", None) or 0)
+
+
+class NeumannBcMech(PointForces):
+    """Load the surface of a body with a force per area.
+
+    Parameters
+    ----------
+    group
+        Group of points: one layer of them along the surface.
+    traction
+        tx, ty, tz, as many as the domain has dimensions: force per area, numbers or formulas of x,
+        y, z, x0, y0, z0, time and published values. NULL leaves a component alone.
+
+    Example
+    -------
+    fix(load, neumann_bc_mech, top, 0, -1e6*min(time/0.01, 1))
+
+    Notes
+    -----
+    A point shows one face to what is around it, the side of a cube of its present volume: V^(2/3)
+    in space, V^(1/2) in the plane, the whole section in one dimension; around an axis the face is
+    at the radius of the point, somewhat inside the surface. Points lie half a side inside of the
+    surface where the load acts in fact. Publishes the total force as ID_x, ID_y, ID_z.
+
+    See Also
+    --------
+    force_nodes, body_force, heat_flux_particles
+    """
+
+    syntax = "group, tx[, ty[, tz]]"
+
+    def __init__(self, hub: Hub, group: ParticleGroup, *traction: Expression | None):
+        super().__init__(hub, group)
+        self.traction = per_direction(hub, "t", traction)
+
+    def forces(self, points: PointsView) -> np.ndarray:
+        x = points.position.astype(float)
+        face = face_of(self.hub, points, side_of(self.hub, points))
+        return face[:, None] * vector(self.traction, self.hub, x, lambda: points.reference_position)
+
+
+class ImpenetrableSurface(ToolFix):
+    """Push points back that come behind a plane, with a force that grows with the depth.
+
+    Parameters
+    ----------
+    K
+        Stiffness of the wall in shear moduli of the point: a number or a formula of time.
+    xs, ys, zs
+        A point of the plane: numbers or formulas of time; z is 0 in the plane.
+    nx, ny, nz
+        Its normal, of any length, towards the side where points may be.
+
+    Example
+    -------
+    fix(wall, impenetrablesurface, all, 1, 0, 0.1, 0, 0, 1, 0)
+
+    Notes
+    -----
+    A point at the depth p = n.(xs - x) > 0 gets the force K G (1 - D) p V^(1/d) along the normal,
+    with the shear modulus G and the damage D of its material, its present volume V and the number
+    of dimensions d. Publishes the force on the points as ID_x, ID_y, ID_z.
+
+    See Also
+    --------
+    contact/minimize_penetration/plane, cuttingtool
+    """
+
+    needs_stiffness = True
+
+    def __init__(
+        self,
+        hub: Hub,
+        group: ParticleGroup,
+        K: Annotated[Expression, NonNegative],
+        xs: Expression,
+        ys: Expression,
+        zs: Expression,
+        nx: Expression,
+        ny: Expression,
+        nz: Expression,
+    ):
+        super().__init__(hub, group)
+        self.K = K
+        self.origin = per_direction(hub, "", (xs, ys, zs))
+        self.normal = per_direction(hub, "n", (nx, ny, nz))
+        if not hub.rehearsing:  # which does not know all numbers
+            unit(self.now(self.normal))
+
+    def forces(self, points: PointsView) -> np.ndarray:
+        (K,) = self.now((self.K,))
+        normal = unit(self.now(self.normal))
+        depth = np.maximum((self.now(self.origin) - points.position.astype(float)) @ normal, 0)
+        stiffness, side = stiffness_of(self.hub, points), side_of(self.hub, points)
+        return (K * stiffness * depth * side)[:, None] * normal
+
+
+class ContactMinimizePenetrationPlane(ToolFix):
+    """Let a solid touch a fixed plane, as stiffly as the step allows, with friction.
+
+    Parameters
+    ----------
+    solid
+        ID of the solid.
+    x, y, z
+        A point of the plane: numbers or formulas of time; z is 0 in the plane.
+    nx, ny, nz
+        Its normal, of any length, towards the side where the solid is.
+    mu
+        Coefficient of friction (Coulomb).
+
+    Example
+    -------
+    fix(floor, contact/minimize_penetration/plane, s1, 0, 0.1, 0, 0, 1, 0, 0.2)
+
+    Notes
+    -----
+    Points are balls with the radius rp of half the side of a cube of their present volume. Where
+    one reaches p = rp - n.(x - xq) into the plane it gets the force m p / dt^2, which takes a free
+    point out within one step. Friction is mu times that, against the slip, and at most what stops
+    it (de Vaucorbeil & Nguyen 2021). A plane that moves does so without dragging.
+
+    Publishes the force on the solid as ID_x, ID_y, ID_z.
+
+    See Also
+    --------
+    impenetrablesurface, contact/minimize_penetration, indent/minimize_penetration
+    """
+
+    def __init__(
+        self,
+        hub: Hub,
+        solid: Solid,
+        x: Expression,
+        y: Expression,
+        z: Expression,
+        nx: Expression,
+        ny: Expression,
+        nz: Expression,
+        mu: Annotated[float, NonNegative],
+    ):
+        super().__init__(hub, ParticleGroup.of(hub, solid))
+        self.mu = mu
+        judge_friction(hub, mu)
+        self.origin = per_direction(hub, "", (x, y, z))
+        self.normal = per_direction(hub, "n", (nx, ny, nz))
+        if not hub.rehearsing:  # which does not know all numbers
+            unit(self.now(self.normal))
+
+    def forces(self, points: PointsView) -> np.ndarray:
+        normal = unit(self.now(self.normal))[None, :]
+        height = (points.position.astype(float) - self.now(self.origin)) @ normal[0]
+        push = apart(points, side_of(self.hub, points) / 2 - height, normal)
+        return push + rubbed(points, push, normal, np.zeros(len(normal[0])), self.mu)

@@ -1,4 +1,4 @@
-"""fix velocity_nodes: a given velocity at nodes."""
+"""Fixes that give nodes velocities, and the force that holds them (compute reaction)."""
 
 from __future__ import annotations
 
@@ -10,11 +10,10 @@ import numpy as np
 from karamelo_py.language.signature import Argument
 from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.modify import Fix, node_hook
+from karamelo_py.scene.modify import Compute, Fix, NodesView, node_hook
 from karamelo_py.script.errors import ScriptError, plural
 from karamelo_py.script.expressions import Expression
-from karamelo_py.styles.fixes.formulas import AXES, per_direction
-from karamelo_py.styles.fixes.friction import judge_friction
+from karamelo_py.styles.fixes.formulas import AXES, judge_friction, per_direction, unlike
 
 
 def prescribe(mass, v, v_star, force, value, before, dt, share):
@@ -54,21 +53,20 @@ def prescribe_mapped_at_least(mass, v, v_star, force, value, before, dt, share):
     return allowed, allowed, force, 0.0
 
 
-class Velocity(Expression):
-    """For signatures: a number or a formula, behind the word leq or geq where it is a bound.
+BOUNDS = {
+    "leq": (prescribe_at_most, prescribe_mapped_at_most),
+    "geq": (prescribe_at_least, prescribe_mapped_at_least),
+}
 
-    Attributes
-    ----------
-    bound : str
-        ``leq``, ``geq``, or nothing.
-    """
+
+class Velocity(Expression):
+    """For signatures: a number or a formula, behind the word leq or geq where it is a `bound`."""
 
     script_kind = "a number or a formula"
     bound = ""
 
     @classmethod
     def from_script(cls, hub: Hub, argument: Argument) -> Velocity:
-        """The velocity or bound that a script's argument stands for."""
         first = re.match(r"(leq|geq)\w*", argument.text)
         if not first or argument.knows(first[0]):
             return super().from_script(hub, argument)
@@ -121,11 +119,7 @@ class VelocityNodes(Fix):
     post_velocities_to_grid = node_hook(prescribe_mapped, publishes=False)
 
     def __init__(
-        self,
-        hub: Hub,
-        group: NodeGroup,
-        *velocity: Velocity | None,
-        mu: Expression | None = None,
+        self, hub: Hub, group: NodeGroup, *velocity: Velocity | None, mu: Expression | None = None
     ):
         super().__init__(hub, group)
         self.formulas: tuple[Any, ...] = per_direction(hub, "v", velocity)
@@ -146,31 +140,20 @@ class VelocityNodes(Fix):
             )
         self.bound = self._one_bound()
         if self.bound:
-            most = self.bound == "leq"
             # Contact may move these nodes: they are held only as far as they come.
             self.prescribes_velocity = False
-            self.post_update_grid_state = node_hook(
-                prescribe_at_most if most else prescribe_at_least, uses_before=True, holds=True
-            )
-            self.post_velocities_to_grid = node_hook(
-                prescribe_mapped_at_most if most else prescribe_mapped_at_least, publishes=False
-            )
+            update, mapped = BOUNDS[self.bound]
+            self.post_update_grid_state = node_hook(update, uses_before=True, holds=True)
+            self.post_velocities_to_grid = node_hook(mapped, publishes=False)
 
     @property
     def nodes(self) -> np.ndarray:
-        """Numbers of the nodes that it acts on."""
         if None in self.formulas or self.bound:
             return self.group.nodes
         return self.hub.update.method.held_with(self.hub, self.group.nodes)
 
     def _one_bound(self) -> str:
-        """The bound that all components have.
-
-        Raises
-        ------
-        ScriptError
-            If they differ: a fix has one function for all components.
-        """
+        """The bound that all components have: a fix has one function for all of them."""
         bounds = [velocity.bound for velocity in self.formulas if velocity is not None]
         if len(set(bounds)) > 1:
             shown = [
@@ -193,17 +176,106 @@ class VelocityNodes(Fix):
         for other in self.hub.fixes.values():
             if other is self or not isinstance(other, VelocityNodes) or other.bound:
                 continue
-            axes = [
-                axis
-                for axis, mine, its in zip(AXES, self.formulas, other.formulas, strict=False)
-                if mine is not None and its is not None and not mine.is_like(its)
-            ]
+            axes = unlike(other, self)
             shared = np.intersect1d(self.group.members, other.group.members) if axes else ()
             if len(shared):
-                names = " and ".join(f"v{axis}" for axis in axes)
+                names = " and ".join(f"v{AXES[k]}" for k in axes)
                 count = plural(len(shared), "node")
                 self.hub.warn(
                     f"fix '{other.id}' (line {other.place.line}) gives {count} of this group "
                     f"another {names}: this fix decides there",
                     hint="groups that have no nodes in common, or NULL for one of the components",
                 )
+
+
+class InitialVelocityNodes(Fix):
+    """Give nodes a velocity in the first step after this line, and never again.
+
+    Parameters
+    ----------
+    velocity
+        vx, vy, vz, as many as the domain has dimensions: numbers or formulas of x0, y0, z0.
+        NULL leaves a component alone.
+
+    Example
+    -------
+    fix(kick, initial_velocity_nodes, all, 0.1*sin(x0), NULL)
+
+    See Also
+    --------
+    initial_velocity_particles
+    """
+
+    syntax = "group, vx[, vy[, vz]]"
+    published = ()
+    first_step_only = True
+    point_by_point = True
+
+    def __init__(self, hub: Hub, group: NodeGroup, *velocity: Expression | None):
+        super().__init__(hub, group)
+        self.formulas = per_direction(hub, "v", velocity)
+
+    def _impose(self, v: np.ndarray, nodes: NodesView) -> None:
+        x = nodes.position[:, : v.shape[1]]
+        for k, formula in enumerate(self.formulas):
+            if formula is not None:
+                v[:, k] = formula.evaluate_points(self.hub.values, x, x)
+
+    def post_update_grid_state(self, nodes: NodesView) -> None:
+        self._impose(nodes.velocity_update, nodes)
+
+    def post_velocities_to_grid(self, nodes: NodesView) -> None:
+        self._impose(nodes.velocity, nodes)
+
+
+class Reaction(Compute):
+    """Measure the force that holds nodes, published as ID_x, ID_y, ID_z.
+
+    Parameters
+    ----------
+    group
+        Group of nodes, or ``all``. Every fix velocity_nodes acts either on nodes of the group only,
+        or on none of them.
+
+    Example
+    -------
+    compute(R, reaction, all)
+    log_modify(custom, time, R_x, R_y)
+
+    Notes
+    -----
+    The sum of the reactions of the fixes velocity_nodes in the group: where two of them hold the
+    same nodes, the sum is the force of both, whatever they share. Before the first step it is 0.
+
+    See Also
+    --------
+    fix velocity_nodes, internal_force
+    """
+
+    published = ("x", "y", "z")
+
+    def __init__(self, hub: Hub, group: NodeGroup):
+        super().__init__(hub, group)
+
+    def refresh(self) -> None:
+        values = self.hub.values
+        total = np.zeros(3)
+        for fix in self.hub.fixes.values():
+            if isinstance(fix, VelocityNodes) and self._contains(fix):
+                total += [values.get(f"{fix.id}_{axis}") for axis in "xyz"]
+        self.publish_components(total)
+
+    def _contains(self, fix) -> bool:
+        """Return True if the nodes that a fix holds belong to the group."""
+        if self.group.all:
+            return True
+        inside = np.isin(fix.group.members, self.group.members)
+        if inside.any() and not inside.all():
+            raise ScriptError(
+                f"fix '{fix.id}' holds nodes of group '{self.group.id}' and others: "
+                "its reaction is that of both",
+                place=self.place,
+                expected="a group that has all nodes of a fix or none",
+                hint=f"two fixes, one for the nodes of {self.group.id}, in the place of '{fix.id}'",
+            )
+        return bool(inside.all()) and len(inside) > 0

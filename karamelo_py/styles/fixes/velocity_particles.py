@@ -1,11 +1,23 @@
-"""fix velocity_particles: a given velocity of points."""
+"""Fixes that give points velocities, and which of several decides: that is told beforehand."""
 
+from collections.abc import Iterator
+from functools import partial
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.language.rules import known_failure
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.modify import Fix, point_hook
-from karamelo_py.script.expressions import Expression
-from karamelo_py.styles.fixes import conflicts
-from karamelo_py.styles.fixes.formulas import per_direction
+from karamelo_py.scene.modify import Fix, PointsView, point_hook
+from karamelo_py.script.errors import plural
+from karamelo_py.script.expressions import FIRST, Expression
+from karamelo_py.styles.fixes.formulas import AXES, per_direction, unlike
+
+SAMPLE = 1000  # points at which formulas are compared, about
+ALIKE = 1e-6  # of a velocity, or of the speed of waves: less is no other velocity
+HELD = " how they move, that one how they deform"
 
 
 def start(mass, v, x_old, x, value, before, dt, kick):
@@ -18,7 +30,17 @@ def carry(mass, v, x_old, x, value, before, dt, kick):
     return value, x_old + dt * value, mass * (value - v) / kick
 
 
-class VelocityParticles(Fix):
+class VelocityOfPoints(Fix):
+    """Base of fixes that give points a velocity by a formula for each component."""
+
+    syntax = "group, vx[, vy[, vz]]"
+
+    def __init__(self, hub: Hub, group: ParticleGroup, *velocity: Expression | None):
+        super().__init__(hub, group)
+        self.formulas = per_direction(hub, "v", velocity)
+
+
+class VelocityParticles(VelocityOfPoints):
     """Prescribe the velocity of points: they move as told, and push what they meet on the grid.
 
     Parameters
@@ -42,16 +64,162 @@ class VelocityParticles(Fix):
     velocity_nodes, initial_velocity_particles
     """
 
-    syntax = "group, vx[, vy[, vz]]"
     published = ("x", "y", "z")
     leads_points = True
 
     initial_integrate = point_hook(start, uses_before=True)
     post_advance_particles = point_hook(carry, publishes=True)
 
-    def __init__(self, hub: Hub, group: ParticleGroup, *velocity: Expression | None):
-        super().__init__(hub, group)
-        self.formulas = per_direction(hub, "v", velocity)
+
+class InitialVelocityParticles(VelocityOfPoints):
+    """Give points a velocity before the first step after this line, and never again.
+
+    Parameters
+    ----------
+    velocity
+        vx, vy, vz: numbers or formulas of x, y, z, x0, y0, z0. NULL leaves a component alone; in
+        fewer dimensions the last ones may be left out, NULL or 0.
+
+    Example
+    -------
+    fix(v1, initial_velocity_particles, ball, 0.1, 0.1, NULL)
+    fix(mode, initial_velocity_particles, all, 0.1*sin(PI*x0/50))
+
+    Notes
+    -----
+    Points of transfers that keep a gradient or moment of velocity (APIC, TPIC and their kin) get
+    that of the formulas, too, so that the first step changes nothing in an affine motion.
+
+    See Also
+    --------
+    initial_velocity_nodes, velocity_particles
+    """
+
+    published = ()
+    first_step_only = True
+    point_by_point = True
+
+    def initial_integrate(self, points: PointsView) -> None:
+        v = points.velocity
+        x = x0 = points.position
+        if any(formula is not None and formula.names & FIRST for formula in self.formulas):
+            x0 = points.reference_position
+        for k, formula in enumerate(self.formulas):
+            if formula is not None:
+                v[:, k] = formula.evaluate_points(self.hub.values, x, x0)
+                points.set_velocity_gradient(k, partial(gradient, formula, self.hub, x, x0))
+        points.velocity = v
 
 
-conflicts.register(VelocityParticles)
+def gradient(
+    formula: Any, hub: Hub, x: np.ndarray, x0: np.ndarray, moves: bool, step: float
+) -> np.ndarray:
+    """Derivatives (n, d) of a formula by x (`moves`) or x0, by central differences over `step`.
+
+    Where a point is still at its reference position, x and x0 are the same coordinate.
+    """
+    out = np.zeros_like(x, float)
+    if formula.is_constant:
+        return out
+    # Positions in single precision are rounded.
+    unmoved = (np.abs(x - x0) <= 0.01 * step).all(axis=1)
+    for k in range(x.shape[1]):
+        shift = np.zeros_like(out)
+        shift[:, k] = step
+        here = shift if moves else shift * unmoved[:, None]
+        there = shift * unmoved[:, None] if moves else shift
+        ahead = formula.evaluate_points(hub.values, x + here, x0 + there)
+        behind = formula.evaluate_points(hub.values, x - here, x0 - there)
+        out[:, k] = (ahead - behind) / (2 * step)
+    return out
+
+
+def _conflicts(fix: Any, simulation: Any) -> Iterator[dict[str, Any]]:
+    """Find the fixes that give way to this one, with what to say of them."""
+    fixes = list(simulation.hub.fixes.values())
+    first = [one for one in simulation.beginning if isinstance(one, VelocityOfPoints)]
+    if not (fix.leads_points or fix in first):
+        return
+    led = [one for one in fixes[: fixes.index(fix)] if one.leads_points]
+    for other in led if fix.leads_points else ():
+        axes, shared = unlike(other, fix), _shared(simulation, other, fix)
+        if axes and len(shared):
+            yield _said(other, axes, shared)
+    # What begins with one velocity for all and has another for some is meant so.
+    for other in first[: first.index(fix)] if fix in first else first:
+        axes, shared = unlike(other, fix), _shared(simulation, other, fix)
+        if axes and 0 < len(shared) == len(simulation.members(other.group)):
+            axes = [k for k in axes if _differ(simulation, other, fix, k, shared)]
+            if axes:
+                yield _said(other, axes, shared)
+    for other in fixes if fix.leads_points else ():
+        axes = unlike(other, fix) if other.prescribes_velocity else []
+        caught = _within(simulation, other, fix) if axes else ()
+        # A tool that passes by a wall is none.
+        if 2 * len(caught) > len(simulation.members(fix.group)):
+            yield _said(other, axes, caught)
+
+
+def _said(other: Any, axes: list[int], ids: np.ndarray) -> dict[str, Any]:
+    """The words on a fix that gives way in these directions, for points with these ids."""
+    held = other.prescribes_velocity
+    return {
+        "other": other,
+        "points": "all nodes around " * held + plural(len(ids), "point"),
+        "axes": " and ".join(f"v{AXES[k]}" for k in axes),
+        "more": HELD * held,
+        "apart": "nodes that these points do not see"
+        if held
+        else "groups that have no points in common",
+    }
+
+
+def _shared(simulation: Any, other: Any, fix: Any) -> np.ndarray:
+    """Ids of the points that both act on."""
+    mine = np.zeros(simulation.count, np.bool_)
+    mine[simulation.members(fix.group)] = True
+    ids = simulation.members(other.group)
+    return ids[mine[ids]]
+
+
+def _differ(simulation: Any, other: Any, fix: Any, axis: int, ids: np.ndarray) -> bool:
+    """Tell whether two fixes give some of the points other velocities now."""
+    ids = ids[:: max(1, len(ids) // SAMPLE)]
+    x, x0 = simulation.x[ids], simulation.x0_of(ids)
+    values = simulation.hub.values
+    a, b = (one.formulas[axis].evaluate_points(values, x, x0) for one in (other, fix))
+    small = ALIKE * max(np.abs(a).max(), np.abs(b).max(), float(simulation.control.clock[0].rate))
+    return bool((np.abs(a - b) > small).any())
+
+
+def _within(simulation: Any, held: Any, driven: Any) -> np.ndarray:
+    """Ids of the driven points in cells all of whose corners are held."""
+    hub = simulation.hub
+    method, d = hub.update.method, hub.domain.dimension
+    still = np.zeros(held.group.total(), np.bool_)
+    still[held.nodes] = True
+    ids = simulation.members(driven.group)
+    x = simulation.x[ids] if method.frame.moves else simulation.x0_of(ids)
+    caught = np.zeros(len(ids), np.bool_)
+    for solid in hub.solids.values():
+        lattice = hub.lattices[method.lattice_of(hub, solid)]
+        own = np.flatnonzero(hub.fields.solid[ids] == solid.index)
+        per_cell = lattice.nodes_per_cell
+        cell = np.floor((x[own] - lattice.lo[:d]) / lattice.h).astype(np.int64)
+        cell = np.clip(cell, 0, np.array(lattice.cells[:d]) - 1) * per_cell
+        corners = [
+            lattice.first + np.ravel_multi_index(tuple((cell + corner).T), lattice.shape[:d])
+            for corner in product((0, per_cell), repeat=d)
+        ]
+        caught[own] = still[np.array(corners)].all(axis=0)
+    return ids[caught]
+
+
+known_failure(
+    VelocityOfPoints,
+    "velocities of '{other.id}' and '{part.id}'",
+    when=lambda fix, scene: list(_conflicts(fix, scene.simulation)),
+    reason="fix '{other.id}' (line {other.place.line}) gives {points} of this group another "
+    "{axes}: this fix decides{more}",
+    cure="{apart}, or NULL for one of the components",
+)

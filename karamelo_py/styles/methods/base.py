@@ -5,27 +5,29 @@ from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from karamelo_py.kernels.averaging import FBar, PointByPoint
+from karamelo_py.kernels.visit import FBar, PointByPoint
 from karamelo_py.language import registry
+from karamelo_py.points.basis.cpdi import Element
 from karamelo_py.points.frames import Updated
 from karamelo_py.points.kinematics import KINEMATICS, Axisymmetric
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.lattice import Lattice, numbered
+from karamelo_py.scene.lattice import Lattice
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import Place, ScriptError
-from karamelo_py.styles.methods.domains import initial_shape
 
-DIRECTIONS = ("x", "y", "z")
-
-
-def force_on(solid: Solid) -> str:
-    """Stem of the names under which the force on a solid is published."""
-    return f"ContactForce_{solid.id}"
+# Names under which the force on a solid and its torque are published.
+LOADS = ("ContactForce", "ContactTorque")
 
 
-def torque_on(solid: Solid) -> str:
-    """The same of the torque."""
-    return f"ContactTorque_{solid.id}"
+def publish_loads(hub: Hub, solid: Solid) -> None:
+    """Make room for the force on a solid, and its torque."""
+    for load in LOADS:
+        hub.values.publish_vector(f"{load}_{solid.id}", ("x", "y", "z"))
+
+
+def slots_of_loads(hub: Hub, solid: Solid) -> list[int]:
+    """Find where the force on a solid and its torque are published."""
+    return [hub.values.slot(f"{load}_{solid.id}_x") for load in LOADS]
 
 
 class NoContact(NamedTuple):
@@ -34,6 +36,11 @@ class NoContact(NamedTuple):
 
 class Method:
     """Base of the method styles.
+
+    Parameters
+    ----------
+    heat
+        Whether heat flows between points, too.
 
     Attributes
     ----------
@@ -62,13 +69,6 @@ class Method:
     fields_per_solid: ClassVar[bool] = False
 
     def __init__(self, hub: Hub, heat: Literal["mechanical", "thermo-mechanical"] = "mechanical"):
-        """Take the option that scripts may add.
-
-        Parameters
-        ----------
-        heat
-            Whether heat flows between points, too.
-        """
         self.thermal = heat == "thermo-mechanical"
 
     @property
@@ -107,7 +107,6 @@ class Method:
         return nodes
 
     def kinematics(self, hub: Hub) -> Any:
-        """The kinematics of the scene."""
         return Axisymmetric() if hub.domain.axisymmetric else KINEMATICS[hub.domain.dimension]()
 
     def averaging(self, hub: Hub) -> NamedTuple:
@@ -120,7 +119,21 @@ class Method:
 
     def shapes(self, kin: Any, solid: Solid) -> np.ndarray:
         """Return the shapes of the domains of a solid's points, (n, s), as the basis keeps them."""
-        return initial_shape(type(self.basis), solid)
+        basis, half = type(self.basis), solid.half_size
+        n, d = half.shape
+        unit = np.eye(d)
+        parts = [np.empty((n, 0))]
+        for part in getattr(basis, "shape", ()):
+            if part == "corners":
+                corners = _corners(basis.element, solid)
+                parts.append(corners.reshape(n, corners.shape[1] * d))
+            elif part == "half_edges":
+                parts.append((half[:, :, None] * unit).reshape(n, d * d))
+            elif part == "deformation":
+                parts.append(np.tile(unit.ravel(), (n, 1)))
+            else:
+                parts.append(getattr(solid, part))
+        return np.concatenate(parts, axis=1)
 
     def _lattice(
         self, dimension: int, lo: Sequence[float], hi: Sequence[float], h: float
@@ -142,30 +155,13 @@ class Method:
             )
 
 
-class OwnGrids(Method):
-    """A grid of its own for every solid."""
-
-    own_grids = True
-    remembers = ("warned",)
-    warned = False
-
-    def begin(self, hub: Hub, contact: NamedTuple) -> None:
-        """Tell once of solids that pass through all others."""
-        touching = {solid.id for fix in hub.fixes.values() for solid in fix.solids}
-        alone = [ID for ID in hub.solids if ID not in touching]
-        if len(hub.solids) > 1 and alone and not self.warned:
-            self.warned = True
-            hub.warn(
-                f"solids with grids of their own pass through each other: {', '.join(alone)}",
-                hint="fix(ID, contact/minimize_penetration, solid1, solid2, mu) for those that may "
-                "meet, or method ulmpm",
-            )
-
-    def lattices(self, hub: Hub) -> list[Lattice]:
-        """A grid over the box of each solid."""
-        d = hub.domain.dimension
-        return numbered([self._lattice(d, s.lo, s.hi, s.h) for s in hub.solids.values()])
-
-    def lattice_of(self, hub: Hub, solid: Solid) -> int:
-        """The grid of a solid has its number."""
-        return solid.index
+def _corners(element: Element, solid: Solid) -> np.ndarray:
+    """Corners (n, c, d) of the elements of a mesh, else of the boxes; no volume is negative."""
+    corners = solid.corners
+    if corners is None:
+        corners = solid.x0[:, None, :] + np.array(element.box) * solid.half_size[:, None, :]
+    corners = corners.astype(float)
+    edges = np.stack([corners[:, b] - corners[:, a] for a, b in element.edges], axis=1)
+    negative = np.linalg.det(edges) < 0
+    corners[negative] = corners[negative][:, element.mirrored]
+    return corners

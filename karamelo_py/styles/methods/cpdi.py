@@ -1,4 +1,4 @@
-"""Base of methods with convected domains: their variants, and what they refuse."""
+"""Methods with convected domains: ulcpdi and tlcpdi."""
 
 from typing import Any, ClassVar
 
@@ -14,6 +14,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.methods.base import Method
+from karamelo_py.styles.methods.ulmpm import TLMPM, ULMPM
 
 VARIANTS = {"R4": R4, "Q4": Q4, "T3": T3, "R8": R8, "H8": H8, "Tet4": Tet4}
 
@@ -35,13 +36,11 @@ class Convected(Method):
     variants: ClassVar[dict[str, type]] = VARIANTS
 
     def shapes(self, kin: Any, solid: Solid) -> np.ndarray:
-        """Return the shapes of the domains of a solid's points, (n, s), as the basis keeps them."""
         self._check_domain(kin.dimension)
         self._check_solid(solid)
         return super().shapes(kin, solid)
 
     def check(self, hub: Hub) -> None:
-        """Refuse what does not go together; called before every run."""
         super().check(hub)
         self._check_domain(hub.domain.dimension)
         for solid in hub.solids.values():
@@ -92,3 +91,45 @@ class Convected(Method):
             place=solid.place,
             hint=hint,
         )
+
+
+class ULCPDI(Convected, ULMPM):
+    """CPDI: every point has a domain that deforms with it, and sees the nodes around its corners.
+
+    All solids share one grid. A body does not break between points, however far it stretches, and
+    no force jumps when a point crosses a cell face (Sadeghirad et al. 2011, 2013).
+
+    ``R4`` and ``R8``
+        parallelograms and parallelepipeds that follow the deformation of their point: robust;
+    ``Q4`` and ``H8``
+        quadrilaterals and hexahedra whose corners move with the grid: no gaps nor overlaps;
+    ``T3`` and ``Tet4``
+        the triangles and tetrahedra of a mesh, whose corners move with the grid.
+
+    Parameters
+    ----------
+    variant
+        The shape of the domains.
+
+    Example
+    -------
+    method(ulcpdi, FLIP, linear, 1, R4)
+    method(ulcpdi, FLIP, linear, 1, mechanical, Q4)
+    """
+
+
+class TLCPDI(Convected, TLMPM):
+    """Total Lagrangian CPDI: the initial domain of every point on a grid of its solid's own.
+
+    Domains keep their initial shape, so that none tangles; weights never change. Solids do not see
+    each other on the grid. The variants are those of ulcpdi.
+
+    Parameters
+    ----------
+    variant
+        The shape of the domains.
+
+    Example
+    -------
+    method(tlcpdi, FLIP, linear, 1, Q4)
+    """

@@ -1,4 +1,4 @@
-"""method ulmpm: updated Lagrangian, one grid for the whole domain."""
+"""Methods ulmpm and tlmpm: one grid for the whole domain, or one for each solid."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -6,11 +6,12 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.kernels.rigid import RigidBodies
+from karamelo_py.points.frames import Total
 from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.lattice import Lattice
+from karamelo_py.scene.lattice import Lattice, numbered
 from karamelo_py.scene.solid import Solid
-from karamelo_py.styles.methods.base import DIRECTIONS, Method, force_on, torque_on
+from karamelo_py.styles.methods.base import Method, publish_loads, slots_of_loads
 
 
 class ULMPM(Method):
@@ -31,28 +32,55 @@ class ULMPM(Method):
     """
 
     def welcome(self, hub: Hub, solid: Solid) -> None:
-        """Publish the force on a rigid solid."""
         if can(solid.material.law, constrained_velocity):
-            hub.values.publish_vector(force_on(solid), DIRECTIONS)
-            hub.values.publish_vector(torque_on(solid), DIRECTIONS)
+            publish_loads(hub, solid)
 
     def contact_between(self, hub: Hub, lattices: Sequence[Lattice]) -> NamedTuple:
-        """Rigid solids lead what they meet."""
         solids = list(hub.solids.values())
         rigid = [can(solid.material.law, constrained_velocity) for solid in solids]
         if not any(rigid):
             return super().contact_between(hub, lattices)
+        slots = np.full((2, len(solids)), -1)
+        for k in np.flatnonzero(rigid):
+            slots[:, k] = slots_of_loads(hub, solids[k])
+        force, torque = np.repeat(slots, [solid.count for solid in solids], axis=1)
+        return RigidBodies(force=force, torque=torque, slots=slots[slots >= 0])
 
-        def slots(stem) -> list[int]:
-            return [
-                hub.values.slot(stem(solid) + "_x") if leads else -1
-                for solid, leads in zip(solids, rigid, strict=True)
-            ]
 
-        counts = [solid.count for solid in solids]
-        force, torque = slots(force_on), slots(torque_on)
-        return RigidBodies(
-            force=np.repeat(np.array(force, np.int64), counts),
-            torque=np.repeat(np.array(torque, np.int64), counts),
-            slots=np.array([slot for slot in force + torque if slot >= 0], np.int64),
-        )
+class TLMPM(Method):
+    """Total Lagrangian MPM: weights belong to reference positions, each solid has its own grid.
+
+    Weights never change: no point crosses a cell face, and a body breaks only where its law says
+    so. Solids do not see each other on the grid: contact is a matter of fixes (contact/hertz,
+    contact/minimize_penetration). For bodies that keep their topology (de Vaucorbeil, Nguyen &
+    Hutchinson 2020, "A Total-Lagrangian material point method for solid mechanics problems
+    involving large deformations").
+
+    Example
+    -------
+    method(tlmpm, FLIP, linear, 0.99)
+    """
+
+    frame = Total()
+    own_grids = True
+    remembers = ("warned",)
+    warned = False
+
+    def begin(self, hub: Hub, contact: NamedTuple) -> None:
+        """Tell once of solids that pass through all others."""
+        touching = {solid.id for fix in hub.fixes.values() for solid in fix.solids}
+        alone = [ID for ID in hub.solids if ID not in touching]
+        if len(hub.solids) > 1 and alone and not self.warned:
+            self.warned = True
+            hub.warn(
+                f"solids with grids of their own pass through each other: {', '.join(alone)}",
+                hint="fix(ID, contact/minimize_penetration, solid1, solid2, mu) for those that may "
+                "meet, or method ulmpm",
+            )
+
+    def lattices(self, hub: Hub) -> list[Lattice]:
+        d = hub.domain.dimension
+        return numbered([self._lattice(d, s.lo, s.hi, s.h) for s in hub.solids.values()])
+
+    def lattice_of(self, hub: Hub, solid: Solid) -> int:
+        return solid.index

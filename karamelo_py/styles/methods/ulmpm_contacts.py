@@ -20,7 +20,7 @@ from karamelo_py.scene.lattice import Lattice, numbered
 from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.styles.methods.base import DIRECTIONS, Method, force_on, torque_on
+from karamelo_py.styles.methods.base import Method, publish_loads, slots_of_loads
 
 
 def fields(hub: Hub) -> list[int]:
@@ -56,11 +56,6 @@ def _around(lattice: Lattice, cells: np.ndarray, steps: range) -> np.ndarray:
         shape = lattice.shape[: lattice.dimension]
         found.append(np.unique(np.ravel_multi_index(tuple(place), shape)))
     return lattice.first + np.unique(np.concatenate(found))
-
-
-def prescribing(hub: Hub) -> list[Fix]:
-    """Fixes that prescribe the velocity of nodes."""
-    return [fix for fix in hub.fixes.values() if fix.prescribes_velocity]
 
 
 class ULMPMContacts(Method):
@@ -113,22 +108,19 @@ class ULMPMContacts(Method):
     """
 
     fields_per_solid = True
+    _prescribed: np.ndarray | None = None
 
     def lattices(self, hub: Hub) -> list[Lattice]:
-        """The domain's grid once for each velocity field."""
         domain = hub.domain
         count = max(fields(hub), default=0) + 1
         box = domain.dimension, domain.lo, domain.hi, domain.h
         return numbered([self._lattice(*box) for _ in range(count)])
 
     def lattice_of(self, hub: Hub, solid: Solid) -> int:
-        """The field of a solid."""
         return fields(hub)[solid.index]
 
     def welcome(self, hub: Hub, solid: Solid) -> None:
-        """Publish the contact force."""
-        hub.values.publish_vector(force_on(solid), DIRECTIONS)
-        hub.values.publish_vector(torque_on(solid), DIRECTIONS)
+        publish_loads(hub, solid)
 
     def held_with(self, hub: Hub, nodes: np.ndarray) -> np.ndarray:
         """`nodes`, and what else the points of a body see whose cells have all corners among them.
@@ -155,21 +147,20 @@ class ULMPMContacts(Method):
         nodes = sum(lattice.node_count for lattice in lattices)
         h = hub.domain.h
         first: dict[int, Solid] = {}
-        copies: list[list[int]] = []
+        copies: list[tuple[int, int]] = []
         solids = hub.solids.values()
         for solid, field in zip(solids, fields(hub), strict=True):
             if first.setdefault(field, solid) is not solid:
-                for stem in (force_on, torque_on):
-                    of_both = (stem(first[field]), stem(solid))
-                    copies.append([hub.values.slot(name + "_x") for name in of_both])
+                both = (slots_of_loads(hub, one) for one in (first[field], solid))
+                copies += zip(*both, strict=True)
+        laws = [first[k].material.law for k in range(count)]
+        slots = np.array([slots_of_loads(hub, first[k]) for k in range(count)])
         return SeparateFields(
             stride=lattices[0].node_count,
             friction=np.zeros((count, count)),
-            warmth=heat_shares(
-                [first[k].material.law for k in range(count)], conducting=hub.update.thermal
-            ),
+            warmth=heat_shares(laws, conducting=hub.update.thermal),
             pair=np.full((count, count), -1, np.int64),
-            slot=np.array([hub.values.slot(f"{force_on(first[k])}_x") for k in range(count)]),
+            slot=slots[:, 0].copy(),
             copies=np.array(copies, np.int64).reshape(-1, 2),
             # Pages that nothing is written to cost no memory.
             touched=np.zeros((nodes, count), np.int32),
@@ -178,10 +169,8 @@ class ULMPMContacts(Method):
             meeting=np.zeros(count, np.int64),
             partners=np.zeros(count, np.int64),
             change=np.zeros((count, d)),
-            rigid=np.array(
-                [can(first[k].material.law, constrained_velocity) for k in range(count)]
-            ),
-            torque=np.array([hub.values.slot(f"{torque_on(first[k])}_x") for k in range(count)]),
+            rigid=np.array([can(law, constrained_velocity) for law in laws]),
+            torque=slots[:, 1].copy(),
             surface=np.array(
                 [surface_table(self.basis, first[k].half_size.mean() / h) for k in range(count)]
             ),
@@ -194,9 +183,19 @@ class ULMPMContacts(Method):
         for (a, b), fix in self._rubbing(hub):
             contact.friction[a, b] = contact.friction[b, a] = fix.friction
             contact.pair[a, b] = hub.values.slot(f"{fix.id}_x")
-        self._prescribe(hub, contact.prescribed)
-        slots = [hub.values.slot(f"{fix.id}_x") for fix in prescribing(hub)]
+        fixes = [fix for fix in hub.fixes.values() if fix.prescribes_velocity]
+        slots = [hub.values.slot(f"{fix.id}_x") for fix in fixes]
         contact.reactions[: 1 + len(slots)] = [len(slots), *slots]
+        # Pages that nothing is written to cost no memory.
+        prescribed: np.ndarray = contact.prescribed
+        if self._prescribed is prescribed:
+            prescribed[:] = 0
+        self._prescribed = prescribed if fixes else None
+        for fix, slot in zip(fixes, slots, strict=True):
+            nodes = slice(None) if fix.group.all else fix.nodes
+            for k, formula in enumerate(fix.formulas):
+                if formula is not None:
+                    prescribed[nodes, k] = 1 + slot
 
     def remembered(self, contact: NamedTuple, spans: np.ndarray) -> list[np.ndarray]:
         """Return views of the record of last contact: usf and usavg need it when a step starts."""
@@ -237,18 +236,3 @@ class ULMPMContacts(Method):
             if fix.friction is not None:
                 first, second = fix.solids
                 yield (of[first.index], of[second.index]), fix
-
-    def _prescribe(self, hub: Hub, prescribed: np.ndarray) -> None:
-        """Note the nodes whose velocity fixes prescribe, and where each reaction is published."""
-        fixes = prescribing(hub)
-        # Pages that nothing is written to cost no memory.
-        if self._prescribed is prescribed:
-            prescribed[:] = 0
-        self._prescribed = prescribed if fixes else None
-        for fix in fixes:
-            nodes = slice(None) if fix.group.all else fix.nodes
-            for k, formula in enumerate(fix.formulas):
-                if formula is not None:
-                    prescribed[nodes, k] = 1 + hub.values.slot(f"{fix.id}_x")
-
-    _prescribed: np.ndarray | None = None

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from karamelo_py.styles.dumps.table import OfPoints, TableDump
+from karamelo_py.styles.dumps.base import OfPoints, TableDump
 
 
 class Csv(OfPoints, TableDump):

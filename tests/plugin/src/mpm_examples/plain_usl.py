@@ -6,8 +6,7 @@ from karamelo_py.compiler.compile import real, shared
 from karamelo_py.kernels.arrays import FINAL_INTEGRATE, INITIAL_INTEGRATE, MASS
 from karamelo_py.kernels.g2p import Strain
 from karamelo_py.kernels.nodes import UpdateToVelocity
-from karamelo_py.kernels.rows import ACCELERATE, MOVE, SERIES, SUMS
-from karamelo_py.kernels.table import AtPoints, Gather, NodeTask
+from karamelo_py.kernels.table import ACCELERATE, MOVE, SERIES, SUMS, AtPoints, Gather, NodeTask
 
 
 @shared

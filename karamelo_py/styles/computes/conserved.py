@@ -1,0 +1,259 @@
+"""Computes of what is conserved: energies, momenta, and their drift."""
+
+import numpy as np
+
+from karamelo_py.output.point_table import PointTable
+from karamelo_py.scene.group import ParticleGroup
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.modify import Compute, Fix
+from karamelo_py.script.expressions import Expression
+
+
+class Energy(Compute):
+    """Base of computes of an energy that the fields of the scene know by the name `measured`."""
+
+    published: tuple[str, ...] = ("", "s")
+    measured = ""
+
+    def refresh(self) -> None:
+        energy = getattr(self.hub.fields, self.measured)(self.group)
+        for suffix in self.published:
+            self.publish(suffix, energy)
+
+
+class KineticEnergy(Energy):
+    """Measure the kinetic energy sum m v^2 / 2 of a group of points; published as ID.
+
+    Example
+    -------
+    compute(Ek, kinetic_energy, all)
+    log_modify(custom, step, time, Ek)
+
+    See Also
+    --------
+    strain_energy
+    """
+
+    measured = "kinetic_energy"
+
+
+class FixKineticEnergy(KineticEnergy, Fix):
+    """Measure the kinetic energy sum m v^2 / 2 of a group of points; published as ID_s and ID.
+
+    Example
+    -------
+    fix(Ek, kinetic_energy, all)
+    log_modify(custom, step, time, Ek_s)
+
+    See Also
+    --------
+    strain_energy, compute kinetic_energy
+    """
+
+
+class StrainEnergy(Energy):
+    """Measure the stored (elastic) energy of a group of points; published as ID.
+
+    Example
+    -------
+    compute(Es, strain_energy, all)
+    log_modify(custom, step, time, Es)
+
+    See Also
+    --------
+    kinetic_energy
+    """
+
+    measured = "strain_energy"
+
+
+class FixStrainEnergy(StrainEnergy, Fix):
+    """Measure the stored (elastic) energy of a group of points; published as ID_s and ID.
+
+    Example
+    -------
+    fix(Es, strain_energy, all)
+    log_modify(custom, step, time, Es_s)
+
+    See Also
+    --------
+    kinetic_energy, compute strain_energy
+    """
+
+
+class DissipatedEnergy(Energy):
+    """Measure the energy that a group of points has dissipated; published as ID.
+
+    Plastic and viscous work, and what damage sets free. It is 0 of materials that dissipate
+    nothing.
+
+    Example
+    -------
+    compute(Ed, dissipated_energy, all)
+    log_modify(custom, step, time, Ed)
+
+    See Also
+    --------
+    strain_energy, kinetic_energy
+    """
+
+    published = ("",)
+    measured = "dissipated_energy"
+
+
+class Drift:
+    """|value - first value|, relative to the largest scale there has been so far."""
+
+    remembers = ("_first", "_scale")
+
+    def __init__(self) -> None:
+        self._first: np.ndarray | None = None
+        self._scale = 0.0
+
+    def __call__(self, value: np.ndarray | float, scale: float) -> float:
+        """The drift now; `scale` is a size that the value could have, above 0."""
+        value = np.atleast_1d(np.asarray(value, float))
+        if self._first is None:
+            self._first = value
+        self._scale = max(self._scale, scale)
+        distance = float(np.linalg.norm(value - self._first))
+        return distance / self._scale if self._scale > 0 else distance
+
+
+class EnergyBalance(Compute):
+    """Measure kinetic + stored + dissipated energy less the work done, which should stay the same.
+
+    Parameters
+    ----------
+    work
+        Work that loads have done on the group since the start, as far as it is known: a formula of
+        time and published values; 0 without it.
+
+    Example
+    -------
+    compute(c, center_of_mass, all)
+    compute(E, energy_balance, all, -9.81*1000*(c_y - 0.5))
+    log_modify(custom, time, E, E_drift)
+
+    Notes
+    -----
+    Publishes ID, the sum; ID_total, the energies without the work; and ID_drift, the change of ID
+    since the first output, relative to the largest of kinetic, stored and dissipated energy and
+    work so far. Velocities lie half a step beside positions, so that a drift of the order of dt is
+    that of the way of counting (a third in a body of a few cells); the end of a run says by how
+    much the energies of one time have changed. The energy that affine transfers keep within points
+    is not in it.
+
+    See Also
+    --------
+    kinetic_energy, strain_energy, dissipated_energy, center_of_mass
+    """
+
+    published = ("", "total", "drift")
+    remembers = ("_drift",)
+
+    def __init__(self, hub: Hub, group: ParticleGroup, work: Expression | None = None):
+        super().__init__(hub, group)
+        self.work = work
+        self._drift = Drift()
+
+    def refresh(self) -> None:
+        fields = self.hub.fields
+        energies = fields.kinetic_energy, fields.strain_energy, fields.dissipated_energy
+        parts = [energy(self.group) for energy in energies]
+        work = self.work.evaluate(self.hub.values) if self.work is not None else 0.0
+        total = sum(parts)
+        self.publish("", total - work)
+        self.publish("total", total)
+        self.publish("drift", self._drift(total - work, max(abs(part) for part in (*parts, work))))
+
+
+class Momentum(Compute):
+    """Base of computes of a momentum: the `terms` of points are its components, and their size."""
+
+    published = ("x", "y", "z", "drift")
+    remembers = ("_drift",)
+
+    def __init__(self, hub: Hub, group: ParticleGroup):
+        super().__init__(hub, group)
+        self._drift = Drift()
+
+    def refresh(self) -> None:
+        *total, scale = self.hub.fields.added_up(self)
+        self.publish_components(np.array(total))
+        self.publish("drift", self._drift(np.array(total), scale))
+
+
+class LinearMomentum(Momentum):
+    """Measure the momentum sum m v of points, and how far it has drifted.
+
+    Example
+    -------
+    compute(p, linear_momentum, all)
+    log_modify(custom, time, p_x, p_drift)
+
+    Notes
+    -----
+    Publishes ID_x, ID_y, ID_z, and ID_drift, the length of the change since the first output
+    relative to the largest sum m |v| so far.
+
+    See Also
+    --------
+    angular_momentum, average_velocity
+    """
+
+    def terms(self, points: PointTable) -> np.ndarray:
+        """Momenta of points, and what they are without their direction."""
+        mass, v = points.mass.astype(float), points.velocity.astype(float)
+        return mass * np.vstack([v.T, np.linalg.norm(v, axis=1)])
+
+
+class AngularMomentum(Momentum):
+    """Measure sum m (x - c) x v of points about a centre c, and how far it has drifted.
+
+    Parameters
+    ----------
+    cx, cy, cz
+        The centre.
+
+    Example
+    -------
+    compute(L, angular_momentum, disk, 0.5, 0.5)
+    log_modify(custom, time, L_z)
+
+    Notes
+    -----
+    Publishes ID_x, ID_y, ID_z, and ID_drift, the length of the change since the first output
+    relative to the largest sum m |x - c| |v| so far.
+
+    With an affine transfer (APIC) points carry angular momentum in their moment of velocity too:
+    it is part of the sum, which the transfer then conserves.
+
+    See Also
+    --------
+    linear_momentum
+    """
+
+    def __init__(
+        self, hub: Hub, group: ParticleGroup, cx: float = 0.0, cy: float = 0.0, cz: float = 0.0
+    ):
+        super().__init__(hub, group)
+        self.centre = np.array([cx, cy, cz])
+
+    def terms(self, points: PointTable) -> np.ndarray:
+        """Angular momenta of points, and what they are without their direction."""
+        d = self.hub.domain.dimension
+        arm, v = np.zeros((2, points.count, 3))
+        arm[:, :d], v[:, :d] = points.position, points.velocity
+        arm -= self.centre
+        angular = np.cross(arm, v)
+        moment = points.velocity_moment
+        if moment is not None and d > 1:
+            # B_ij = sum N v_i (X - x)_j: the part of v x arm within a point's surroundings.
+            b = np.zeros((points.count, 3, 3))
+            b[:, :d, :d] = moment.reshape(-1, d, d)
+            angular += np.stack(
+                [b[:, 2, 1] - b[:, 1, 2], b[:, 0, 2] - b[:, 2, 0], b[:, 1, 0] - b[:, 0, 1]], axis=1
+            )
+        scale = np.linalg.norm(arm, axis=1) * np.linalg.norm(v, axis=1)
+        return points.mass * np.vstack([angular.T, scale])

@@ -1,0 +1,323 @@
+"""Computes of means, extremes and quantiles over points, and of a column at a place."""
+
+from collections.abc import Sequence
+from typing import Annotated
+
+import numpy as np
+
+from karamelo_py.language.signature import In, Positive
+from karamelo_py.output.fields import check_columns
+from karamelo_py.output.point_table import COMPONENTS, PointTable
+from karamelo_py.scene.group import AnyGroup, ParticleGroup
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.modify import Compute
+from karamelo_py.script.errors import ScriptError
+
+
+class Mean(Compute):
+    """Base of computes of means: the `terms` of points are weights, and these times quantities.
+
+    Without weight the mean is 0, as the sums of other computes.
+    """
+
+    empty = 0.0
+
+    def sums(self) -> Sequence[float]:
+        return self.hub.fields.added_up(self)
+
+    def refresh(self) -> None:
+        weight, *totals = self.sums()
+        for suffix, total in zip(self.published, totals, strict=False):
+            self.publish(suffix, total / weight if weight > 0 else self.empty)
+
+
+class AverageVelocity(Mean):
+    """Measure the plain mean of the velocities of points; published as ID_x, ID_y, ID_z.
+
+    Example
+    -------
+    compute(v, average_velocity, all)
+    log_modify(custom, time, v_x)
+    """
+
+    published = ("x", "y", "z")
+
+    def terms(self, points: PointTable) -> list[np.ndarray]:
+        return [np.ones(points.count), *points.velocity.T]
+
+
+class AverageStress(Mean):
+    """Measure the mean Cauchy stress, published as ID_11, ID_22, ID_33, ID_12, ID_13, ID_23.
+
+    Example
+    -------
+    compute(s, average_stress, all)
+    log_modify(custom, time, s_11, s_12)
+
+    Notes
+    -----
+    The mean is over the present volume: sum V sigma / sum V, which for a body at rest follows from
+    the forces on its surface alone. 0 for a group without points.
+
+    See Also
+    --------
+    strain_energy, average_velocity
+    """
+
+    published = COMPONENTS
+
+    def terms(self, points: PointTable) -> list[np.ndarray]:
+        volume = points.particle("volume")
+        return [volume, *(volume * points.particle("s" + c) for c in COMPONENTS)]
+
+
+class AverageTemperature(Mean):
+    """Measure the mean temperature of a group of points; published as ID.
+
+    All points count alike, and those of materials without a temperature as 0.
+
+    Example
+    -------
+    compute(warmth, average_temperature, all)
+    log_modify(custom, time, warmth)
+
+    See Also
+    --------
+    max_plastic_strain, temperature plastic_work
+    """
+
+    published = ("",)
+
+    def terms(self, points: PointTable) -> list[np.ndarray]:
+        return [np.ones(points.count), points.particle("T")]
+
+
+class MaxPlasticStrain(Compute):
+    """Measure the largest equivalent plastic strain and temperature of a group of points.
+
+    Published as ID_Epmax and ID_Tmax; 0 where nothing can yield, or has a temperature.
+
+    Example
+    -------
+    compute(worst, max_plastic_strain, all)
+    log_modify(custom, time, worst_Epmax)
+
+    See Also
+    --------
+    strength plastic
+    """
+
+    published = ("Epmax", "Tmax")
+
+    def refresh(self) -> None:
+        found = np.max(self.hub.fields.each(self, "largest"), axis=0)
+        for published, value in zip(self.published, found, strict=True):
+            self.publish(published, float(value))
+
+    def largest(self, points: PointTable) -> list[float]:
+        return [points.particle(name).max(initial=0) for name in ("ep", "T")]
+
+
+class CenterOfMass(Mean):
+    """Measure the centre of mass, published as ID_x, ID_y, ID_z.
+
+    Parameters
+    ----------
+    group
+        Group of points or of nodes, or ``all`` points. Nodes have the mass that the points bring.
+
+    Example
+    -------
+    compute(middle, center_of_mass, ball)
+    log_modify(custom, time, middle_x, middle_y)
+
+    Notes
+    -----
+    0 for a group without mass.
+
+    See Also
+    --------
+    xcm, max_position, average_velocity
+    """
+
+    published = ("x", "y", "z")
+
+    def __init__(self, hub: Hub, group: AnyGroup):
+        super().__init__(hub, group)
+
+    def sums(self) -> Sequence[float]:
+        on_points = isinstance(self.group, ParticleGroup)
+        return super().sums() if on_points else self.hub.fields.mass_at_nodes(self.group)
+
+    def terms(self, points: PointTable) -> list[np.ndarray]:
+        mass = points.mass.astype(float)
+        return [mass, *(mass * points.position.T)]
+
+
+class MaxPosition(Compute):
+    """Measure the largest coordinates among points, each on its own; published as ID_x, ID_y, ID_z.
+
+    Example
+    -------
+    compute(front, max_position, water)
+    log_modify(custom, time, front_x)
+    """
+
+    published = ("x", "y", "z")
+
+    def refresh(self) -> None:
+        found = self.hub.fields.each(self, "largest")
+        # Without points, 0, as the sums of other computes.
+        self.publish_components(np.max(found, axis=0) if found else np.zeros(3))
+
+    def largest(self, points: PointTable) -> np.ndarray | None:
+        return points.position.max(axis=0) if points.count else None
+
+
+BITS = 8  # of a coordinate that are looked at together
+SIGN = np.uint64(1 << 63)
+
+
+class PositionQuantile(Compute):
+    """Measure the coordinates below which a share of the mass lies, each on its own.
+
+    Published as ID_x, ID_y, ID_z. A front measured so does not jump after a few points that fly
+    ahead, as the largest position does.
+
+    Parameters
+    ----------
+    share
+        Share of the mass, from 0 (the lowest point) to 1 (the highest).
+
+    Example
+    -------
+    compute(front, position_quantile, all, 0.99)
+    log_modify(custom, time, front_x)
+
+    Notes
+    -----
+    The first coordinate at which the mass of the points up to there reaches the share.
+
+    See Also
+    --------
+    max_position, center_of_mass
+    """
+
+    published = ("x", "y", "z")
+
+    def __init__(self, hub: Hub, group: ParticleGroup, share: Annotated[float, In(0, 1)]):
+        super().__init__(hub, group)
+        self.share = share
+
+    def refresh(self) -> None:
+        d = self.hub.domain.dimension
+        # Of the bits of the coordinates, eight at a time: which come first is known so far.
+        first, below = [0] * d, np.zeros(d)
+        for shift in range(64 - BITS, -1, -BITS):
+            mass = self.hub.fields.added_up(self, "masses", shift, first).reshape(d, -1)
+            if shift == 64 - BITS:
+                # Shares such as 0.1 of ten equal points must not fail by rounding.
+                wanted = self.share * mass.sum(axis=1) * (1 - 1e-12)
+            for axis, of_bits in enumerate(mass):
+                there = np.flatnonzero(of_bits)
+                if not len(there):  # no points
+                    self.publish_components(np.zeros(d))
+                    return
+                up_to = below[axis] + np.cumsum(of_bits[there])
+                own = there[min(np.count_nonzero(up_to < wanted[axis]), len(there) - 1)]
+                below[axis] += of_bits[:own].sum()
+                first[axis] = first[axis] << BITS | int(own)
+        self.publish_components(_numbers(np.array(first, np.uint64)))
+
+    def masses(self, points: PointTable, shift: int, first: list[int]) -> tuple:
+        """Masses of points whose coordinates begin with these bits, by the next ones."""
+        found = []
+        for axis, begin in enumerate(first):
+            bits = _bits(points.position[:, axis].astype(float)) >> np.uint64(shift)
+            rows = np.flatnonzero(bits >> np.uint64(BITS) == begin)
+            own = (bits[rows] & np.uint64(2**BITS - 1)).astype(np.int64)
+            found.append((own + axis * 2**BITS, points.mass[rows].astype(float)))
+        rows, terms = (np.concatenate(same) for same in zip(*found, strict=True))
+        return len(first) * 2**BITS, rows, terms
+
+
+def _bits(numbers: np.ndarray) -> np.ndarray:
+    """Whole numbers in the order of floating-point ones."""
+    bits = (numbers + 0.0).view(np.uint64)  # no zero with a sign
+    return np.where(bits >> np.uint64(63) > 0, ~bits, bits | SIGN)
+
+
+def _numbers(bits: np.ndarray) -> np.ndarray:
+    """The numbers that have these bits."""
+    return np.where(bits >> np.uint64(63) > 0, bits ^ SIGN, ~bits).view(float)
+
+
+class Probe(Mean):
+    """Measure a column of the points: its mean, or its value at a point or a place.
+
+    Published as the plain ID, or with several columns as ID_column each. Without points in the
+    group, and of a point that is not there any more, NaN.
+
+    Parameters
+    ----------
+    column, columns
+        Columns of dump particle. Their mean over the group counts points by their volume.
+    point
+        The id of a point, as dumps show it: its own values instead of the mean.
+    x, y, z
+        A place: the values of the point of the group that is now nearest to it.
+
+    Example
+    -------
+    compute(p, probe, bar, s11)
+    compute(tip, probe, all, y, vy, point=128)
+    compute(gauge, probe, water, s22, x=0.5, y=0)
+    log_modify(custom, time, p, tip_vy, gauge)
+    """
+
+    empty = np.nan
+
+    def __init__(
+        self,
+        hub: Hub,
+        group: ParticleGroup,
+        column: str,
+        *columns: str,
+        point: Annotated[int, Positive] | None = None,
+        x: float | None = None,
+        y: float | None = None,
+        z: float | None = None,
+    ):
+        super().__init__(hub, group if point is None else ParticleGroup(hub, everything=True))
+        self.columns = (column, *columns)
+        check_columns(self.columns, hub.fields.particle_names(), first=1)
+        self.point = point
+        self.at = {axis: c for axis, c in zip("xyz", (x, y, z), strict=True) if c is not None}
+        if point is not None and self.at:
+            raise ScriptError("a probe is at a point or at a place, not both", argument="point")
+        self.published = ("",) if len(self.columns) == 1 else self.columns
+
+    def refresh(self) -> None:
+        if self.point is None and not self.at:
+            super().refresh()
+            return
+        found = self.hub.fields.each(self, "nearest")
+        values = min(found)[2:] if found else [self.empty] * len(self.columns)
+        for end, value in zip(self.published, values, strict=True):
+            self.publish(end, value)
+
+    def terms(self, points: PointTable) -> list[np.ndarray]:
+        volume = points.particle("volume")
+        return [volume, *(volume * points.particle(name) for name in self.columns)]
+
+    def nearest(self, points: PointTable) -> list[float] | None:
+        """Distance, id and columns of the point that is asked for, or of the nearest of these."""
+        ids = points.particle("id")
+        if self.point is not None:
+            distance = np.where(ids == self.point, 0.0, np.inf)
+        else:
+            distance = sum((points.particle(axis) - c) ** 2 for axis, c in self.at.items())
+        if not len(ids) or not np.isfinite(least := distance.min()):
+            return None
+        at = min(np.flatnonzero(distance == least), key=ids.__getitem__)
+        return [least, *(float(points.particle(name)[at]) for name in ("id", *self.columns))]

@@ -1,0 +1,272 @@
+"""Fixes of forces on nodes and points, and of the stress of points at first."""
+
+from typing import Annotated
+
+import numpy as np
+
+from karamelo_py.kernels.laws import elastic_law
+from karamelo_py.kernels.p2g import Force
+from karamelo_py.language.signature import In
+from karamelo_py.points.laws import can, with_stress
+from karamelo_py.scene.group import NodeGroup, ParticleGroup
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.modify import Fix, PointsView, node_hook
+from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.expressions import Expression
+from karamelo_py.styles.fixes.formulas import per_direction, vector
+
+
+def accelerate(mass, v, v_star, force, value, before, dt, share):
+    """The force grows by mass times the value; so does the total."""
+    return v, v_star, force + mass * value, mass * value
+
+
+class BodyForce(Fix):
+    """Accelerate nodes: gravity, centrifugal force, a manufactured solution's source.
+
+    Parameters
+    ----------
+    acceleration
+        bx, by, bz, as many as the domain has dimensions: force per mass, numbers or formulas of
+        x0, y0, z0, time and published values. NULL leaves a component alone.
+
+    Example
+    -------
+    fix(gravity, body_force, all, 0, -9.81)
+    fix(ramp, body_force, all, NULL, -9.81*min(time/2, 1))
+
+    Notes
+    -----
+    Publishes the total force as ID_x, ID_y, ID_z.
+
+    See Also
+    --------
+    force_nodes
+    """
+
+    syntax = "group, bx[, by[, bz]]"
+    published = ("x", "y", "z")
+    accelerates = True
+
+    post_particles_to_grid = node_hook(accelerate)
+
+    def __init__(self, hub: Hub, group: NodeGroup, *acceleration: Expression | None):
+        super().__init__(hub, group)
+        self.formulas = per_direction(hub, "b", acceleration)
+
+
+def share_out(mass, v, v_star, force, value, before, dt, share):
+    """Each member takes its share of the value."""
+    return v, v_star, force + value * share, value * share
+
+
+class ForceNodes(Fix):
+    """Apply a total force, split equally among the nodes of the group that carry mass.
+
+    Parameters
+    ----------
+    force
+        fx, fy, fz: numbers or formulas of time and published values. NULL leaves a component
+        alone; in fewer dimensions the last ones may be left out, NULL or 0.
+
+    Example
+    -------
+    fix(pull, force_nodes, tip, 0, -100*min(time, 1), NULL)
+
+    Notes
+    -----
+    Publishes the applied force as ID_x, ID_y, ID_z.
+
+    See Also
+    --------
+    body_force
+    """
+
+    syntax = "group, fx[, fy[, fz]]"
+    published = ("x", "y", "z")
+
+    post_particles_to_grid = node_hook(share_out, shares=True)
+
+    def __init__(self, hub: Hub, group: NodeGroup, *force: Expression | None):
+        super().__init__(hub, group)
+        self.formulas = per_direction(hub, "f", force)
+
+
+class PointForces(Fix):
+    """Base of fixes that put a force on each point of their group."""
+
+    published: tuple[str, ...] = ("x", "y", "z")
+    point_fields = (Force,)
+    point_by_point = True
+
+    def forces(self, points: PointsView) -> np.ndarray:
+        """The forces (n, d) on the points."""
+        raise NotImplementedError
+
+    def initial_integrate(self, points: PointsView) -> None:
+        """Give the points their forces, and publish the sum."""
+        force = self.forces(points)
+        points.force = points.force + force
+        self.publish_components(points.total(force))
+
+
+class ForceParticles(PointForces):
+    """Apply a total force to points, split by their masses.
+
+    Parameters
+    ----------
+    force
+        fx, fy, fz, as many as the domain has dimensions: numbers or formulas of x, y, z, x0, y0,
+        z0, time and published values. NULL leaves a component alone.
+
+    Example
+    -------
+    fix(pull, force_particles, tip, 0, -100*min(time, 1))
+
+    Notes
+    -----
+    A point of mass m gets m/M of the force, M the mass of the group: where the formula depends on
+    the place, of the force there. The load goes with the points wherever they move, as that of
+    fix force_nodes does not. In an axisymmetric scene forces belong to a radian. Publishes the sum
+    as ID_x, ID_y, ID_z.
+
+    See Also
+    --------
+    force_nodes, body_force, edge_traction, neumann_bc_mech
+    """
+
+    syntax = "group, fx[, fy[, fz]]"
+
+    def __init__(self, hub: Hub, group: ParticleGroup, *force: Expression | None):
+        super().__init__(hub, group)
+        self.force = per_direction(hub, "f", force)
+
+    def forces(self, points: PointsView) -> np.ndarray:
+        mass, x = points.mass.astype(float), points.position
+        share = mass / (points.total(mass) or 1.0)
+        return share[:, None] * vector(self.force, self.hub, x, lambda: points.reference_position)
+
+
+def brake(mass, v, v_star, force, value, before, dt, share):
+    """v* loses a share of what the force changed it by, against v; the total is the force of that.
+
+    Where the step turns the node around, or a wall has stopped it, there is nothing to brake.
+    """
+    against = 0.0
+    if v * v_star > 0:
+        change = min(abs(v_star - v), abs(force) * dt / mass)
+        against = min(value * change, abs(v_star))
+        if v > 0:
+            against = -against
+    return v, v_star + against, force, mass * against / dt
+
+
+class LocalDamping(Fix):
+    """Bring a scene to rest: each node is braked by a share of the force that is out of balance.
+
+    Parameters
+    ----------
+    alpha
+        The share, from 0 to 1; 0.8 is usual. A number or a formula of time: damping may end.
+
+    Example
+    -------
+    fix(weight, body_force, all, 0, -9.81)
+    fix(calm, local_damping, all, 0.8)
+
+    Notes
+    -----
+    f - alpha |f| sign(v), component by component, in the place of the force f of a node (Cundall
+    1987). Where forces balance there is no damping: the state of rest is that without it, whatever
+    the stiffness, and steady motion is not braked. A scene takes some ten periods of its slowest
+    vibration to come to rest with 0.8.
+
+    It acts after all other fixes, wherever it stands: nodes that are held, or move as told at a
+    constant speed, are not braked, and their reactions are those of the scene. Publishes the sum of
+    what it adds as ID_x, ID_y, ID_z.
+
+    In method ulmpm/contacts it acts before solids push each other, so that bodies in contact stick
+    like by friction, anywhere between 1 - alpha and 1 + alpha of the load: there alpha has to go
+    to 0, as 0.8*max(1 - time/T, 0) does.
+
+    See Also
+    --------
+    body_force, edge_traction, run_while
+    """
+
+    published = ("x", "y", "z")
+    acts_last = True
+
+    post_update_grid_state = node_hook(brake)
+
+    def __init__(self, hub: Hub, group: NodeGroup, alpha: Annotated[Expression, In(0, 1)] = 0.8):
+        super().__init__(hub, group)
+        self.formulas = (Expression(alpha),) * hub.domain.dimension
+
+    def defined(self) -> None:
+        """Warn where rest would not be that without damping."""
+        alpha = self.formulas[0]
+        lasts = alpha.is_constant and alpha.constant > 0
+        if lasts and self.hub.update.method.fields_per_solid:
+            self.hub.warn(
+                "bodies that touch come to rest anywhere near their balance while damping acts",
+                hint="an alpha that goes to 0: 0.8*max(1 - time/T, 0)",
+            )
+
+
+NAMES = ("11", "22", "33", "23", "13", "12")
+
+
+class InitialStress(Fix):
+    """Give points a Cauchy stress before the first step after this line, and never again.
+
+    Parameters
+    ----------
+    sxx, syy, szz, syz, sxz, sxy
+        Components: numbers or formulas of x, y, z, x0, y0, z0; tension is positive. NULL leaves a
+        component alone. Shear components that the dimension does not have must be NULL or 0.
+
+    Example
+    -------
+    fix(geostatic, initial_stress, soil, 0.4*2000*9.81*y0, 2000*9.81*y0, 0.4*2000*9.81*y0, 0, 0, 0)
+
+    Notes
+    -----
+    The stress of a hyperelastic material (neo-hookean) follows from its deformation and cannot be
+    set.
+    """
+
+    published = ()
+    first_step_only = True
+    point_by_point = True
+
+    def __init__(
+        self,
+        hub: Hub,
+        group: ParticleGroup,
+        sxx: Expression | None,
+        syy: Expression | None,
+        szz: Expression | None,
+        syz: Expression | None,
+        sxz: Expression | None,
+        sxy: Expression | None,
+    ):
+        super().__init__(hub, group)
+        self.formulas = (sxx, syy, szz, syz, sxz, sxy)
+        for solid in hub.solids.values():
+            if group.touches(solid) and not can(elastic_law(solid.material.law), with_stress):
+                raise ScriptError(
+                    f"the stress of solid '{solid.id}' follows from its deformation "
+                    "and cannot be set",
+                    argument="group",
+                    expected="points of a material in rate form, such as linear or eos-strength",
+                )
+
+    def initial_integrate(self, points: PointsView) -> None:
+        x, x0 = points.position, points.reference_position
+        given = {
+            name: formula.evaluate_points(self.hub.values, x, x0)
+            for name, formula in zip(NAMES, self.formulas, strict=True)
+            if formula is not None
+        }
+        points.set_stress(given)

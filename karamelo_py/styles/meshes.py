@@ -1,0 +1,237 @@
+"""Region styles mesh and stl, solid style mesh: what Gmsh and others make."""
+
+from functools import cached_property
+from typing import Annotated, Literal
+
+import numpy as np
+
+from karamelo_py.language.signature import Positive
+from karamelo_py.scene.domain import RELATIVE_TOLERANCE, require_domain
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.material import Material
+from karamelo_py.scene.meshes.elements import elements_of, measured
+from karamelo_py.scene.meshes.inside import Simplices, Skin, Surface, outer_faces, split
+from karamelo_py.scene.meshes.reading import MeshFile, read
+from karamelo_py.scene.placement import Placement
+from karamelo_py.scene.region import EXTERIOR, Region
+from karamelo_py.scene.solid import Solid
+from karamelo_py.script.errors import ScriptError
+from karamelo_py.styles.solids import Body
+
+
+class Enclosed(Region):
+    """Base of regions within a surface of `faces`."""
+
+    @cached_property
+    def skin(self) -> Skin:
+        return Skin(self.faces())
+
+    def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
+        distance = self.skin.distance(x[:, : self.dimension], reach)
+        return np.where(self.contains(x), distance, -distance)
+
+
+class MeshRegion(Enclosed):
+    """All that lies in an element of a mesh, or of one of its physical groups.
+
+    Parameters
+    ----------
+    file
+        Name of a mesh file in a format that meshio reads, such as Gmsh's .msh, or of a .geo file,
+        which Gmsh meshes.
+    group
+        Name or number of a physical group (a set of elements in other formats). Left out: the
+        whole mesh. A group of lower dimension, such as a boundary, holds the positions that lie
+        on it, which is useful for groups of nodes.
+    exterior
+        The word ``exterior`` makes the region all that is outside.
+
+    Example
+    -------
+    region(core, mesh, part.msh, inside)
+    region(body, mesh, part.msh)
+
+    Notes
+    -----
+    Elements are lines in 1D, triangles and quadrilaterals in 2D, tetrahedra and hexahedra in 3D,
+    of first order; their faces belong to them. Faces of hexahedra that are not plane count as two
+    triangles. In 2D the mesh lies in the plane z = 0.
+
+    See Also
+    --------
+    stl, solid mesh
+    """
+
+    def __init__(
+        self,
+        hub: Hub,
+        file: MeshFile,
+        group: str | int | None = None,
+        exterior: Literal["exterior"] | None = None,
+    ):
+        if group == EXTERIOR and exterior is None:
+            group, exterior = None, EXTERIOR
+        dimension = require_domain(hub).dimension
+        parts = elements_of(
+            read(file, dimension, hub.settings.trusts), dimension, group, lower=group is not None
+        )
+        corners = np.concatenate([split(elements) for elements in parts])
+        lo, hi = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+        super().__init__(hub, lo, hi, exterior=exterior == EXTERIOR)
+        # Meshes are written with fewer digits than numbers have.
+        tolerance = max(self.tolerance, RELATIVE_TOLERANCE * float((hi - lo).max()))
+        self.corners = corners
+        self.simplices = Simplices(corners, tolerance)
+
+    def contains(self, x: np.ndarray) -> np.ndarray:
+        return self.simplices.contain(np.asarray(x)[:, : self.dimension])
+
+    def faces(self) -> np.ndarray:
+        return outer_faces(self.corners)
+
+    def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
+        if self.simplices.flat:
+            return np.full(len(x), -reach)  # nothing lies in a surface or a line
+        return super().distance(x, reach)
+
+
+# Binary STL files, and most programs that write the others, have single precision.
+_SINGLE = float(np.finfo(np.float32).eps)
+
+
+class STL(Enclosed):
+    """All that a closed surface of triangles encloses, the surface included; in 3D.
+
+    Parameters
+    ----------
+    file
+        Name of a file with triangles: STL (text or binary), or any format that meshio reads. In
+        the lengths of the script: the file is not scaled.
+    exterior
+        The word ``exterior`` makes the region all that is outside of the surface.
+
+    Example
+    -------
+    region(part, stl, body.stl)
+
+    Notes
+    -----
+    The surface must be closed: every edge belongs to two triangles. A part inside of another one
+    is a cavity. A position is inside if a ray from it along z crosses the surface an odd number of
+    times; edges and vertices on the ray make no difference.
+
+    See Also
+    --------
+    mesh, difference
+    """
+
+    def __init__(self, hub: Hub, file: MeshFile, exterior: Literal["exterior"] | None = None):
+        if require_domain(hub).dimension != 3:
+            raise ScriptError(
+                "a surface encloses space in 3D only",
+                expected="dimension(3, ...)",
+                hint="in 2D, region(ID, mesh, file) takes a mesh of triangles or quadrilaterals",
+            )
+        mesh = read(file, 2, hub.settings.trusts)
+        triangles = mesh.get_cells_type("triangle")
+        if not len(triangles):
+            raise ScriptError(
+                f"{file.name} has no triangles", argument="file", expected="a surface of triangles"
+            )
+        points = np.asarray(mesh.points, float)
+        used = points[np.unique(triangles)]
+        lo, hi = used.min(axis=0), used.max(axis=0)
+        super().__init__(hub, lo, hi, exterior=exterior == EXTERIOR)
+        tolerance = max(self.tolerance, 2 * _SINGLE * float(np.abs(used).max()))
+        self.surface = Surface(points, triangles.astype(np.int64), tolerance)
+
+    def contains(self, x: np.ndarray) -> np.ndarray:
+        return self.surface.encloses(np.asarray(x)[:, :3])
+
+    def faces(self) -> np.ndarray:
+        return self.surface.corners
+
+
+class MeshSolid(Body):
+    """A body with one point in each element of a mesh.
+
+    The point stands at the centroid of its element and has its volume, which is exact for every
+    shape (times x where the domain is axisymmetric).
+
+    Parameters
+    ----------
+    file
+        Name of a mesh file in a format that meshio reads, such as Gmsh's .msh, or of a .geo file,
+        which Gmsh meshes. It is looked for in the current folder, then beside the script.
+    group
+        Name or number of a physical group, whose elements are taken. Left out: the whole mesh.
+
+    Example
+    -------
+    solid(s1, mesh, part.msh, steel, 0.1, 0)
+
+    Notes
+    -----
+    Elements are lines in 1D, triangles or quadrilaterals in 2D, tetrahedra or hexahedra in 3D, of
+    first order and of one shape; those of lower dimension are left out. In 2D the mesh lies in the
+    plane z = 0. Elements whose centroid lies outside the domain are left out, with a warning.
+
+    See Also
+    --------
+    region, region mesh, material
+    """
+
+    syntax = "file, material, h[, T0][, group=group][, GlueToSolid=solidID]"
+    source = "file"
+
+    def __init__(
+        self,
+        hub: Hub,
+        file: MeshFile,
+        material: Material,
+        h: Annotated[float, Positive],
+        T0: float | None = None,
+        *,
+        group: str | int | None = None,
+        GlueToSolid: Solid | None = None,
+    ):
+        domain = require_domain(hub)
+        super().__init__(hub, material, h, T0, GlueToSolid)
+        self.file = file
+        parts = elements_of(
+            read(file, domain.dimension, hub.settings.trusts), domain.dimension, group
+        )
+        if len(parts) > 1:
+            both = " and ".join(part.shape.words for part in parts)
+            raise ScriptError(
+                f"the mesh has {both}; the points of a solid have one shape",
+                argument="file",
+                expected="elements of one shape",
+                hint="a physical group for each shape, and a solid for each group: group=...",
+            )
+        elements, volume, centroid = measured(parts[0])
+        kept = domain.contains(centroid)
+        corners = elements.corners[kept]
+        reach = corners if len(corners) else elements.corners
+        self.put(
+            hub,
+            Placement(
+                x0=centroid[kept],
+                volume=volume[kept],
+                half_size=np.ptp(corners, axis=1) / 2,
+                lo=reach.min(axis=(0, 1)),
+                hi=reach.max(axis=(0, 1)),
+                outside=int(np.count_nonzero(~kept)),
+                shape=elements.shape.name,
+                corners=corners,
+            ),
+        )
+
+    def described(self) -> str:
+        return f"mesh '{self.file.name}'"
+
+    def why_empty(self) -> str:
+        return f"{self.described()} has no elements"
+
+    def wanted(self) -> str:
+        return "a mesh with elements inside the domain, in the lengths of the script"

@@ -1,0 +1,261 @@
+"""Region styles block, cylinder and sphere; union, intersection and difference of regions."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from karamelo_py.language.by_dimension import Forms, place_of
+from karamelo_py.language.signature import Argument
+from karamelo_py.scene import region
+from karamelo_py.scene.domain import require_domain
+from karamelo_py.scene.hub import Hub
+
+_NAMES = ("xlo", "xhi", "ylo", "yhi", "zlo", "zhi")
+
+
+class Primitive(region.Region):
+    """Base of block, cylinder and sphere: between planes across some axes, round along others."""
+
+    slabs: Sequence[tuple] = ()  # axis, lower and upper end of each
+    across: Sequence[int] = ()  # the axes along which it is round, with a centre and a radius
+
+    def contains(self, x: np.ndarray) -> np.ndarray:
+        inside = np.ones(len(x), dtype=bool)
+        if self.across:
+            inside = region.within(x, self.centre, self.across, self.radius + self.tolerance)
+        for axis, lo, hi in self.slabs:
+            if lo > -np.inf:
+                inside &= x[:, axis] >= lo - self.tolerance
+            if hi < np.inf:
+                inside &= x[:, axis] <= hi + self.tolerance
+        return inside
+
+    def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
+        depth = np.full(len(x), reach)
+        if self.across:
+            depth = region.below(x, self.centre, self.across, self.radius)
+        for axis, lo, hi in self.slabs:
+            if lo > -np.inf:
+                np.minimum(depth, x[:, axis] - lo, out=depth)
+            if hi < np.inf:
+                np.minimum(depth, hi - x[:, axis], out=depth)
+        return depth
+
+
+class BlockRegion(Primitive):
+    """A box with faces along the axes; its faces belong to it.
+
+    Parameters
+    ----------
+    bounds
+        In 1D ``xlo, xhi``; in 2D ``xlo, xhi, ylo, yhi``; in 3D
+        ``xlo, xhi, ylo, yhi, zlo, zhi``. Each is a number, or ``INF`` (or ``EDGE``) where the
+        block reaches as far as the domain does. Equal numbers make a plane, a line or a point,
+        which is useful for groups of nodes. A last word ``exterior`` makes the region all that
+        is outside the block.
+
+    Example
+    -------
+    region(bar, block, 0, 1, 0, 0.2)
+    region(left, block, 0, 0, INF, INF)
+    region(rest, block, 0.2, 0.8, 0.2, 0.8, exterior)
+
+    See Also
+    --------
+    cylinder, sphere
+    """
+
+    syntax = "xlo, xhi[, ylo, yhi[, zlo, zhi]][, exterior]"
+    forms = Forms(
+        "region(ID, block, {names}[, exterior])",
+        {dimension: _NAMES[: 2 * dimension] for dimension in (1, 2, 3)},
+        open_ends={name: -math.inf if name.endswith("lo") else math.inf for name in _NAMES},
+    )
+
+    def __init__(self, hub: Hub, *bounds: Argument):
+        given, exterior = region.split_exterior(bounds)
+        values = self.forms.read(hub, given, require_domain(hub).dimension)
+        names, ends = tuple(values), tuple(values.values())
+        self.slabs = [(k // 2, *ends[k : k + 2]) for k in range(0, len(ends), 2)]
+        for axis, *slab in self.slabs:
+            pair = names[2 * axis : 2 * axis + 2]
+            region.check_order(*slab, pair, place_of(names, given, pair[0]))
+        super().__init__(hub, ends[::2], ends[1::2], exterior=exterior)
+
+
+class Cylinder(Primitive):
+    """A disk in 2D, a cylinder along one of the axes in 3D; its surface belongs to it.
+
+    Parameters
+    ----------
+    shape
+        In 2D ``xc, yc, R``: centre and radius. In 3D ``axis, c1, c2, R, lo, hi``: the word x, y
+        or z, the centre in the other two directions (in the order x, y, z), the radius, and the
+        ends along the axis, which may be ``INF`` (or ``EDGE``). A last word ``exterior`` makes
+        the region all that is outside.
+
+    Example
+    -------
+    region(disk, cylinder, -0.3, -0.3, 0.2)
+
+    Notes
+    -----
+    In 3D: ``region(rod, cylinder, z, 0, 0, 0.1, INF, 0.5)``.
+
+    See Also
+    --------
+    block, sphere
+    """
+
+    syntax = "xc, yc, R | axis, c1, c2, R, lo, hi[, exterior]"
+    forms = Forms(
+        "region(ID, cylinder, {names}[, exterior])",
+        {2: ("xc", "yc", "R"), 3: ("axis", "c1", "c2", "R", "lo", "hi")},
+        words={"axis": ("x", "y", "z")},
+        open_ends={"lo": -math.inf, "hi": math.inf},
+    )
+
+    def __init__(self, hub: Hub, *shape: Argument):
+        given, exterior = region.split_exterior(shape)
+        dimension = require_domain(hub).dimension
+        values = self.forms.read(hub, given, dimension)
+        names = tuple(values)
+        self.radius = values["R"]
+        region.check_radius(self.radius, place_of(names, given, "R"))
+        along = "xyz".index(values["axis"]) if dimension == 3 else None
+        self.across = tuple(axis for axis in range(dimension) if axis != along)
+        self.centre = tuple(values[name] for name in names if name in ("xc", "yc", "c1", "c2"))
+        lo, hi = np.empty(dimension), np.empty(dimension)
+        for axis, middle in zip(self.across, self.centre, strict=True):
+            lo[axis], hi[axis] = middle - self.radius, middle + self.radius
+        if along is not None:
+            ends = values["lo"], values["hi"]
+            region.check_order(*ends, ("lo", "hi"), place_of(names, given, "lo"))
+            lo[along], hi[along] = ends
+            self.axis, self.slabs = (along, self.centre), [(along, *ends)]
+        super().__init__(hub, lo, hi, exterior=exterior)
+
+
+class Sphere(Primitive):
+    """A sphere in 3D, a disk in 2D, an interval in 1D; its surface belongs to it.
+
+    Parameters
+    ----------
+    shape
+        Centre and radius: in 1D ``x, R``; in 2D ``x, y, R``; in 3D ``x, y, z, R``. A last word
+        ``exterior`` makes the region all that is outside.
+
+    Example
+    -------
+    region(ball, sphere, 0.1, 0.1, 0.05)
+
+    See Also
+    --------
+    block, cylinder
+    """
+
+    syntax = "x[, y[, z]], R[, exterior]"
+    forms = Forms(
+        "region(ID, sphere, {names}[, exterior])",
+        {1: ("x", "R"), 2: ("x", "y", "R"), 3: ("x", "y", "z", "R")},
+    )
+
+    def __init__(self, hub: Hub, *shape: Argument):
+        given, exterior = region.split_exterior(shape)
+        values = self.forms.read(hub, given, require_domain(hub).dimension)
+        *centre, self.radius = values.values()
+        region.check_radius(self.radius, place_of(tuple(values), given, "R"))
+        self.across, self.centre = range(len(centre)), np.array(centre)
+        lo, hi = self.centre - self.radius, self.centre + self.radius
+        super().__init__(hub, lo, hi, exterior=exterior)
+
+
+class Union(region.Region):
+    """All that lies in at least one of two or more regions.
+
+    Parameters
+    ----------
+    first, second, more
+        IDs of regions. Those made with ``exterior`` count as what is outside their shape.
+
+    Example
+    -------
+    region(a, block, 0, 1, 0, 0.2)
+    region(b, block, 0, 0.2, 0, 1)
+    region(angle, union, a, b)
+
+    See Also
+    --------
+    intersection, difference
+    """
+
+    # How the insides and the corners of the boxes of the parts are put together.
+    joined, low, high = np.logical_or, np.minimum, np.maximum
+
+    def __init__(self, hub: Hub, first: region.Region, second: region.Region, *more: region.Region):
+        parts = (first, second, *more)
+        used = slice(0, require_domain(hub).dimension)
+        super().__init__(
+            hub,
+            self.low.reduce([part.box_lo[used] for part in parts]),
+            self.high.reduce([part.box_hi[used] for part in parts]),
+            parts=parts,
+        )
+
+    def contains(self, x: np.ndarray) -> np.ndarray:
+        return self.joined.reduce([part.inside(x) for part in self.parts])
+
+    def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
+        return self.high.reduce([part.depth(x, reach) for part in self.parts])
+
+
+class Intersection(Union):
+    """All that lies in each of two or more regions.
+
+    Example
+    -------
+    region(disk, cylinder, 0, 0, 0.2)
+    region(above, block, INF, INF, 0, INF)
+    region(half, intersection, disk, above)
+
+    See Also
+    --------
+    union, difference
+    """
+
+    joined, low, high = np.logical_and, np.maximum, np.minimum
+
+
+class Difference(region.Region):
+    """All that lies in the first region and not in the second.
+
+    Parameters
+    ----------
+    first
+        ID of the region to cut from.
+    second
+        ID of the region that is cut off, its surface included.
+
+    Example
+    -------
+    region(plate, block, -1, 1, -1, 1)
+    region(hole, cylinder, 0, 0, 0.2)
+    region(sheet, difference, plate, hole)
+
+    See Also
+    --------
+    union, intersection
+    """
+
+    def __init__(self, hub: Hub, first: region.Region, second: region.Region):
+        used = slice(0, require_domain(hub).dimension)
+        super().__init__(hub, first.box_lo[used], first.box_hi[used], parts=(first, second))
+
+    def contains(self, x: np.ndarray) -> np.ndarray:
+        first, second = self.parts
+        return first.inside(x) & ~second.inside(x)
+
+    def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
+        first, second = (part.depth(x, reach) for part in self.parts)
+        return np.minimum(first, -second)

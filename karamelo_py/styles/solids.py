@@ -1,0 +1,132 @@
+"""Solid style region, and the base of solids."""
+
+from functools import partial
+from typing import Annotated, Literal
+
+from karamelo_py.language.signature import AtLeast, Positive
+from karamelo_py.scene.domain import require_domain
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.machine_memory import most_points
+from karamelo_py.scene.material import Material
+from karamelo_py.scene.placement import fill, lattice_of
+from karamelo_py.scene.region import Region
+from karamelo_py.scene.solid import Solid, own_grids
+from karamelo_py.script.errors import ScriptError
+
+
+class Body(Solid):
+    """Base of solids.
+
+    Parameters
+    ----------
+    material
+        What the points are made of.
+    h
+        Cell size. With a grid shared by all solids (ulmpm) it must be that of the domain.
+    T0
+        Initial temperature; that of the material when left out.
+    GlueToSolid
+        A solid that came before, whose velocity field this one shares, in methods where each
+        solid has its own.
+    """
+
+
+class RegionSolid(Body):
+    """A body that fills a region, with `ppc` points per cell and direction.
+
+    Points are put into the cells of the grid and kept where they lie in the region and in the
+    domain. Each carries the volume ``(h / ppc)^dimension`` (times x where the domain is
+    axisymmetric) and the mass that its material has in it.
+
+    Parameters
+    ----------
+    region
+        The region to fill.
+    ppc
+        Points per cell in each direction: 2 gives 4 points per cell in 2D, 8 in 3D.
+    points
+        ``regular``: at equal distances. ``gauss``: at the Gauss points of the cell, whose weights
+        share out the volume. Left out: at equal distances with equal volumes, but for ``ppc`` 3,
+        where the points stand at the Gauss points (as Karamelo has it, with equal volumes). With
+        domains around the points (ugimp, cpgimp, cpdi) those of 3 are at equal distances, too:
+        domains tile the cell. ``cut``: at equal distances, and what the region cuts of the boxes of
+        the points at its edge is left out: these have the volume and stand in the middle of what
+        is left; less than a tenth of a box goes to the nearest point beside it. Round bodies so
+        have their volume (to 0.01 %) and no steps of h/ppc at the rim, which contact would feel.
+        Parts of a region (fins, slots) as thin as a tenth of h/ppc have their mass to 3 %, whatever
+        their direction; where that of thinner ones may be missing, a message says so. A region of a
+        plug-in without a `distance` is looked at along the axes, where thin parts may be missed.
+        The domains that ugimp and cpgimp give to cut
+        points are squares or cubes of the right volume, which do not tile the body at its edge;
+        cpdi refuses them. For edge_pressure and edge_traction points are whole boxes: they refuse
+        these.
+
+    Example
+    -------
+    solid(s1, region, disk, 2, steel, 0.1, 0)
+    solid(s2, region, disk, 3, steel, 0.1, points=gauss)
+    solid(s3, region, disk, 2, steel, 0.1, points=cut)
+
+    Notes
+    -----
+    Cells are counted from the lower corner of the domain; in methods that lay a grid for each
+    solid, from the lower corner of the box around the region (open sides end at the domain).
+
+    See Also
+    --------
+    mesh, region, material
+    """
+
+    syntax = "regionID, ppc, material, h[, T0][, points=regular|gauss|cut][, GlueToSolid=solidID]"
+
+    def __init__(
+        self,
+        hub: Hub,
+        region: Region,
+        ppc: Annotated[int, AtLeast(1)],
+        material: Material,
+        h: Annotated[float, Positive],
+        T0: float | None = None,
+        *,
+        points: Literal["regular", "gauss", "cut"] | None = None,
+        GlueToSolid: Solid | None = None,
+    ):
+        domain = require_domain(hub)
+        super().__init__(hub, material, h, T0, GlueToSolid)
+        self.region = region
+        self.ppc = ppc
+        self.cut = points == "cut"
+        lattice = lattice_of(region, domain, self.h, own=own_grids(hub))
+        if points is None and hub.update.method.regular_points:
+            points = "regular"
+        corners = {"corners", "half_edges"} & {*getattr(hub.update.method.basis, "shape", ())}
+        if self.cut and corners:
+            raise ScriptError(
+                "the domains of cpdi tile a body, and those of points that are cut do not",
+                argument="points",
+                hint="points=regular, a solid from a mesh, or another basis",
+            )
+        room = partial(most_points, hub, self.first_id, domain.dimension)
+        placement = fill(region, domain, lattice, ppc, points, room)
+        self.put(hub, placement, may_be_empty=region.unknown)
+        if placement.missed:
+            hub.warn(
+                f"parts of {self.described()} are thinner than points=cut sees, "
+                f"{placement.missed:.3g}: their mass may be wrong or missing",
+                hint="smaller cells, or more points per cell",
+            )
+
+    def described(self) -> str:
+        return f"region '{self.region.id}'"
+
+    def why_empty(self) -> str:
+        used = slice(0, self.domain.dimension)
+        if (self.region.box_lo > self.region.box_hi)[used].any():
+            return f"{self.described()} is empty"
+        return f"no point lies in {self.described()}"
+
+    def wanted(self) -> str:
+        return (
+            f"a region that holds points of the grid with cell size {self.h:g} and "
+            f"{self.ppc} per cell and direction, inside the domain"
+        )

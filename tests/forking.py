@@ -1,0 +1,81 @@
+"""Starts of Python that cost no import: an interpreted process has the program at hand, and forks.
+
+``python forking.py SOCKET`` is that process. ``python forking.py SOCKET SELF word ...`` hands it
+what Python would be given, ``-m karamelo_py.app.cli word ...`` or ``-c code word ...``, and ends as
+that does: SELF, a script of this line, is started as Python is.
+"""
+
+import os
+import signal
+import socket
+import sys
+
+
+def ask(path: str, words: list[str]) -> int:
+    """Have something done here, in this folder and with the output of this process."""
+    with socket.socket(socket.AF_UNIX) as link:
+        link.connect(path)
+        said = [os.getcwd(), os.environ.get("PYTHONPATH", ""), *words]
+        socket.send_fds(link, ["\0".join(said).encode()], [1, 2])
+        answer = link.recv(1)
+    return answer[0] if answer else 1
+
+
+def do(said: list[str]) -> int:
+    """Do in this process what a Python of its own would do."""
+    import traceback
+    import warnings
+
+    from karamelo_py.app.start import main
+
+    folder, paths, sys.executable, *words = said
+    os.chdir(folder)
+    sys.path[:0] = paths.split(os.pathsep)
+    while words[0] == "-W":
+        action, _, message = words[1].partition(":")
+        warnings.filterwarnings(action, message)
+        del words[:2]
+    way, what, *sys.argv[1:] = words
+    try:
+        if way == "-m":
+            return main()
+        exec(what, {"__name__": "__main__"})
+    except SystemExit as end:
+        return end.code or 0
+    except BaseException:
+        traceback.print_exc()
+        return 1
+    return 0
+
+
+def serve(path: str) -> None:
+    """Fork for each that asks."""
+    import gc
+
+    import karamelo_py.app.cli
+    import karamelo_py.run.runner  # noqa: F401
+
+    gc.freeze()
+    signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # nobody waits for them
+    with socket.socket(socket.AF_UNIX) as door:
+        door.bind(path)
+        door.listen(16)
+        print("ready", flush=True)
+        while True:
+            link, _ = door.accept()
+            if os.fork():
+                link.close()
+                continue
+            signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+            said, (out, err), _, _ = socket.recv_fds(link, 1 << 16, 2)
+            os.dup2(out, 1)
+            os.dup2(err, 2)
+            status = do(said.decode().split("\0"))
+            sys.stdout.flush()
+            link.send(bytes([status]))
+            os._exit(status)
+
+
+if __name__ == "__main__":
+    place, *rest = sys.argv[1:]
+    sys.exit(ask(place, rest) if rest else serve(place))
