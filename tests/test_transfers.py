@@ -26,14 +26,9 @@ from karamelo_py.points.transfers import (
     updated_velocity,
     zero_moment,
 )
-from karamelo_py.points.transfers.aflip import AFLIP
-from karamelo_py.points.transfers.apic import APIC
-from karamelo_py.points.transfers.asflip import ASFLIP
-from karamelo_py.points.transfers.flip import FLIP
-from karamelo_py.points.transfers.mls import MLS
-from karamelo_py.points.transfers.pic import PIC
-from karamelo_py.points.transfers.tflip import TFLIP
-from karamelo_py.points.transfers.tpic import TPIC
+from karamelo_py.points.transfers.affine import AFLIP, APIC, ASFLIP
+from karamelo_py.points.transfers.flip import FLIP, PIC
+from karamelo_py.points.transfers.taylor import MLS, TFLIP, TPIC
 from karamelo_py.points.transfers.xpic import XPIC
 from karamelo_py.scene.lattice import Lattice
 

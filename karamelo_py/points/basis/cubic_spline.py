@@ -3,10 +3,10 @@
 from typing import NamedTuple
 
 from karamelo_py.compiler.compile import all_lanes, real, where
-from karamelo_py.points.basis.noise import CUBIC
 from karamelo_py.points.basis.product import Along, along, register
 from karamelo_py.points.basis.wide import wide
 from karamelo_py.points.grid import cells_along, in_cells
+from karamelo_py.points.noise import CUBIC
 
 
 class CubicSpline(NamedTuple):

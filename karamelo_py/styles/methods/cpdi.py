@@ -9,7 +9,7 @@ from karamelo_py.points.basis.cpdi.hexahedron import H8
 from karamelo_py.points.basis.cpdi.parallel import R4, R8
 from karamelo_py.points.basis.cpdi.quadrilateral import Q4
 from karamelo_py.points.basis.cpdi.simplex import T3, Tet4
-from karamelo_py.points.transfers.asflip import ASFLIP
+from karamelo_py.points.transfers.affine import ASFLIP
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import ScriptError
