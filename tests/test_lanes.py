@@ -42,17 +42,18 @@ from karamelo_py.points.basis import (
     support,
 )
 from karamelo_py.points.basis.bernstein_quadratic import BernsteinQuadratic
-from karamelo_py.points.basis.cpdi import SQUARE
+from karamelo_py.points.basis.cpdi import SQUARE, AtCorners
 from karamelo_py.points.basis.cpdi.block import InBlock, block_of, of_one
-from karamelo_py.points.basis.cpdi.corners import AtCorners
-from karamelo_py.points.basis.cpdi.parallel import R4
-from karamelo_py.points.basis.cpdi.quadrilateral import Q4
-from karamelo_py.points.basis.cpdi.simplex import T3
-from karamelo_py.points.basis.cpgimp import CPGIMPCorners, CPGIMPDet, CPGIMPDiagonal, CPGIMPStretch
-from karamelo_py.points.basis.cubic_spline import CubicSpline
+from karamelo_py.points.basis.cpdi.domains import Q4, R4, T3
+from karamelo_py.points.basis.gimp import (
+    UGIMP,
+    CPGIMPCorners,
+    CPGIMPDet,
+    CPGIMPDiagonal,
+    CPGIMPStretch,
+)
 from karamelo_py.points.basis.linear import Linear
-from karamelo_py.points.basis.quadratic_spline import QuadraticSpline
-from karamelo_py.points.basis.ugimp import UGIMP
+from karamelo_py.points.basis.splines import CubicSpline, QuadraticSpline
 from karamelo_py.points.boundary import ReflectingGrid, reflected
 from karamelo_py.points.grid import Grid
 from karamelo_py.points.kinematics import PlaneStrain, Space, vector, zero

@@ -9,10 +9,9 @@ from hypothesis import strategies as st
 from tensors import ALL_KINEMATICS, numbers, tensors, vectors
 
 from karamelo_py.points.basis import affine_weight, entry, locate, reach, support
-from karamelo_py.points.basis.cubic_spline import CubicSpline
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.basis.product import evenly, inverse_spread
-from karamelo_py.points.basis.quadratic_spline import QuadraticSpline
+from karamelo_py.points.basis.splines import CubicSpline, QuadraticSpline
 from karamelo_py.points.kinematics import PlaneStrain, Space, gradient, planar, vector
 from karamelo_py.points.transfers import (
     Moment,

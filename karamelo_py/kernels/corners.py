@@ -10,8 +10,8 @@ from karamelo_py.compiler.fields import field
 from karamelo_py.kernels import g2p, p2g
 from karamelo_py.kernels.loss import EnergyLoss
 from karamelo_py.points.basis import carried, support
+from karamelo_py.points.basis.cpdi import AtCorners
 from karamelo_py.points.basis.cpdi.block import InBlock
-from karamelo_py.points.basis.cpdi.corners import AtCorners
 from karamelo_py.points.transfers import add_moment, gradient_weight, nodal_momentum
 
 

@@ -16,7 +16,7 @@ from karamelo_py.kernels.loss import FrictionalHeat, in_company, reflect, warm, 
 from karamelo_py.kernels.visit import Work
 from karamelo_py.points import frames, transfers
 from karamelo_py.points.basis import carried, carrier, carry, deformed, entry, extent
-from karamelo_py.points.basis.cpdi.corners import AtCorners
+from karamelo_py.points.basis.cpdi import AtCorners
 from karamelo_py.points.boundary import Bounces, reflected
 from karamelo_py.points.grid import inside
 from karamelo_py.points.kinematics import I, det, outer, vector, zero, zero_vector

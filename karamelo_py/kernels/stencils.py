@@ -29,8 +29,8 @@ from karamelo_py.kernels.lanes import OneByOne
 from karamelo_py.kernels.p2g import scattered_all
 from karamelo_py.kernels.visit import Work, all_records_of
 from karamelo_py.points.basis import entry, support
+from karamelo_py.points.basis.cpdi import CornerStencil
 from karamelo_py.points.basis.cpdi.block import block_of, is_one_block, is_whole, of_one
-from karamelo_py.points.basis.cpdi.corners import CornerStencil
 from karamelo_py.points.basis.product import Stencil, evenly, sees_same_nodes, with_one_node
 
 
