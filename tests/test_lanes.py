@@ -54,8 +54,7 @@ from karamelo_py.points.basis.gimp import (
 )
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.basis.splines import CubicSpline, QuadraticSpline
-from karamelo_py.points.boundary import ReflectingGrid, reflected
-from karamelo_py.points.grid import Grid
+from karamelo_py.points.grid import Grid, ReflectingGrid, reflected
 from karamelo_py.points.kinematics import PlaneStrain, Space, vector, zero
 from karamelo_py.points.laws import Absent, advance, initial_state, law_kind, plastic_strain
 from karamelo_py.points.laws.damages.damage_johnson_cook import JohnsonCookDamage

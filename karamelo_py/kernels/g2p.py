@@ -17,8 +17,7 @@ from karamelo_py.kernels.visit import Work
 from karamelo_py.points import frames, transfers
 from karamelo_py.points.basis import carried, carrier, carry, deformed, entry, extent
 from karamelo_py.points.basis.cpdi import AtCorners
-from karamelo_py.points.boundary import Bounces, reflected
-from karamelo_py.points.grid import inside
+from karamelo_py.points.grid import Bounces, inside, reflected
 from karamelo_py.points.kinematics import I, det, outer, vector, zero, zero_vector
 from karamelo_py.points.laws import (
     advance,
@@ -373,7 +372,7 @@ def _move(w, stencil, p, dt, total):
     store(field(w.points.fields, transfers.Moment), p, moment)
     store(w.places.y, p, y)
     moved = (y - x).largest() * w.grid.inv_h
-    if not frames.follows(w.frame):
+    if not w.frame.moves:
         return moved
     if carried(w.basis, w.kin) > 0:
         before = visit.place_at(w.basis, w.kin, w.places.x, p)
@@ -407,7 +406,7 @@ def _strain(w, x, p, dt, dl, ratio, fastest):
     store_optional(field(w.points.fields, frames.DeformationGradient), p, now)
     j = jacobian(law, w.kin, state)
     grown = real(0, j)
-    if frames.follows(w.frame) and carried(w.basis, w.kin) == 0:
+    if w.frame.moves and carried(w.basis, w.kin) == 0:
         before = visit.place_at(w.basis, w.kin, x, p)
         after = deformed(w.basis, w.kin, before, growth)
         store_from(w.places.y, p, w.kin.dimension, after)

@@ -69,7 +69,7 @@ from karamelo_py.kernels.visit import (
     present_stencil,
 )
 from karamelo_py.points.basis import locate
-from karamelo_py.points.frames import Total, Updated, follows
+from karamelo_py.points.frames import Total, Updated
 from karamelo_py.points.grid import Grid, inside, renumbered
 from karamelo_py.points.kinematics import zero_vector
 
@@ -255,7 +255,7 @@ def visit_tile(
                 else:
                     totals = gathered_by(lanes, visit.tasks, w, stencil, position_of(w, p))
                 moved, rate = settled_all(visit.tasks, w, stencil, p, dt, totals, fastest)
-            elif follows(s.frame):
+            elif s.frame.moves:
                 moved = where(inside(grid, s.kin, position_of(w, p)), moved, real(inf, moved))
             good = (moved <= 1) & (rate < 1e300)  # so written, NaN counts as wrong too
             if not all_lanes(good):

@@ -12,7 +12,7 @@ from karamelo_py.kernels.laws import elastic_law
 from karamelo_py.language.scene import Scene
 from karamelo_py.output.node_columns import ABSENT_AT_NODES, BROUGHT, NODE_NAMES, NodeFields
 from karamelo_py.output.point_table import AXES, COMPONENTS, PointTable, Rows
-from karamelo_py.points.boundary import Bounces
+from karamelo_py.points.grid import Bounces
 from karamelo_py.points.laws import can, dissipated_energy, energy_density
 from karamelo_py.points.laws.eos import initial_energy, taken_heat
 from karamelo_py.points.laws.plastic_rate import has_rate

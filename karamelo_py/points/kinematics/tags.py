@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import point_function
+from karamelo_py.compiler.compile import shared
 
 
 class Line(NamedTuple):
@@ -53,30 +53,22 @@ TAGS = (Line, PlaneStrain, Axisymmetric, Space)
 KINEMATICS = {1: Line, 2: PlaneStrain, 3: Space}
 
 
-@point_function()
+@shared
 def dimension(kin):
     """Number of components of a vector, a constant at compile time."""
+    return kin.dimension
 
 
-@point_function()
+@shared
 def free_from(kin):
     """First direction in which a body may move as a whole: no radius is one, a constant."""
+    return 1 if isinstance(kin, Axisymmetric) else 0
 
 
-@point_function()
+@shared
 def planar(kin):
     """The tag whose tensors are plain d x d matrices of the same vectors.
 
     Moments of velocity have no part around the axis: those of axisymmetric points are plane.
     """
-
-
-def _give_constants(tag: type) -> None:
-    number, first, flat = tag.dimension, int(tag is Axisymmetric), KINEMATICS[tag.dimension]
-    dimension.on(tag)(lambda kin: number)
-    free_from.on(tag)(lambda kin: first)
-    planar.on(tag)(lambda kin: flat())
-
-
-for _tag in TAGS:
-    _give_constants(_tag)
+    return PlaneStrain() if isinstance(kin, Axisymmetric) else kin

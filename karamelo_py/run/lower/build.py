@@ -31,7 +31,7 @@ from karamelo_py.kernels.loss import EnergyLoss, FrictionalHeat
 from karamelo_py.kernels.rows import Insulated
 from karamelo_py.language.scene import Scene
 from karamelo_py.points.basis import carried, deformed
-from karamelo_py.points.boundary import ReflectingGrid
+from karamelo_py.points.grid import ReflectingGrid
 from karamelo_py.points.kinematics import Line
 from karamelo_py.points.laws import (
     can,

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from karamelo_py.kernels.laws import elastic_law
-from karamelo_py.points.pairs import Hertz
+from karamelo_py.points.bodies import Hertz
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import ScriptError

@@ -3,7 +3,7 @@
 from typing import Annotated, NamedTuple
 
 from karamelo_py.language.signature import NonNegative
-from karamelo_py.points.pairs import MinimizePenetration
+from karamelo_py.points.bodies import MinimizePenetration
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import Solid
 from karamelo_py.styles.fixes.friction import judge_friction

@@ -61,7 +61,7 @@ class PairContact(Fix):
         self._reach = max(solid.h for solid in self.solids)
 
     def law(self) -> NamedTuple:
-        """The tag of :mod:`karamelo_py.points.pairs` that gives the force between two points."""
+        """The tag of :mod:`karamelo_py.points.bodies` that gives the force between two points."""
         raise NotImplementedError
 
     def initial_integrate(self, points: PointsView) -> None:
