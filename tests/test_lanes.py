@@ -57,23 +57,21 @@ from karamelo_py.points.basis.splines import CubicSpline, QuadraticSpline
 from karamelo_py.points.grid import Grid, ReflectingGrid, reflected
 from karamelo_py.points.kinematics import PlaneStrain, Space, vector, zero
 from karamelo_py.points.laws import Absent, advance, initial_state, law_kind, plastic_strain
-from karamelo_py.points.laws.damages.damage_johnson_cook import JohnsonCookDamage
+from karamelo_py.points.laws.damages import JohnsonCookDamage
+from karamelo_py.points.laws.eos import LinearPressure
 from karamelo_py.points.laws.eos.fluid import Tait
-from karamelo_py.points.laws.eos.linear import LinearPressure
 from karamelo_py.points.laws.eos.shock import Shock
 from karamelo_py.points.laws.eos_strength import EosStrength
-from karamelo_py.points.laws.further import Further
+from karamelo_py.points.laws.further import Further, PlasticRate
 from karamelo_py.points.laws.linear import LinearElastic
 from karamelo_py.points.laws.neo_hookean import NeoHookean
-from karamelo_py.points.laws.plastic_rate import PlasticRate
 from karamelo_py.points.laws.strengths.drucker_prager import DruckerPrager
-from karamelo_py.points.laws.strengths.fluid import Viscous
-from karamelo_py.points.laws.strengths.johnson_cook import JohnsonCook
+from karamelo_py.points.laws.strengths.hardening import LinearHardening
+from karamelo_py.points.laws.strengths.linear import Viscous
+from karamelo_py.points.laws.strengths.metals import JohnsonCook, ZerilliArmstrong
 from karamelo_py.points.laws.strengths.mu_i import MuI
-from karamelo_py.points.laws.strengths.plastic import LinearHardening
-from karamelo_py.points.laws.strengths.zerilli_armstrong import ZerilliArmstrong
-from karamelo_py.points.laws.temperatures.plastic_work import PlasticWork
-from karamelo_py.points.laws.viscosity.artificial import ArtificialViscosity
+from karamelo_py.points.laws.temperatures import PlasticWork
+from karamelo_py.points.laws.viscosity import ArtificialViscosity
 from karamelo_py.run.lower.build import lower
 from karamelo_py.scene.hub import Hub
 

@@ -28,7 +28,7 @@ from karamelo_py.points.laws import (
     plastic_strain,
     with_stress,
 )
-from karamelo_py.points.laws.eos.linear import LinearPressure
+from karamelo_py.points.laws.eos import LinearPressure
 from karamelo_py.points.laws.eos.shock import Shock
 from karamelo_py.points.laws.eos_strength import EosStrength
 from karamelo_py.points.laws.strengths.drucker_prager import DruckerPrager

@@ -15,7 +15,7 @@ from karamelo_py.output.point_table import AXES, COMPONENTS, PointTable, Rows
 from karamelo_py.points.grid import Bounces
 from karamelo_py.points.laws import can, dissipated_energy, energy_density
 from karamelo_py.points.laws.eos import initial_energy, taken_heat
-from karamelo_py.points.laws.plastic_rate import has_rate
+from karamelo_py.points.laws.further import has_rate
 
 PIECE = 1 << 17  # points that are looked at together
 PARTICLE_NAMES = (

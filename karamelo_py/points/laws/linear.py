@@ -7,7 +7,7 @@ from karamelo_py.language.rules import gain
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, det, inner, nothing, sym, symmetric_tensor, tr
-from karamelo_py.points.laws.elasticity import check_poisson_ratio, lame_parameters
+from karamelo_py.points.laws.parameters import check_poisson_ratio, lame_parameters
 from karamelo_py.points.laws.thermoelastic import expanding
 
 

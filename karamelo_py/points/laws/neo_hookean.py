@@ -7,7 +7,7 @@ from karamelo_py.compiler.powers import logarithm_near_one as log
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, det, tr, unit
-from karamelo_py.points.laws.elasticity import check_poisson_ratio, lame_parameters
+from karamelo_py.points.laws.parameters import check_poisson_ratio, lame_parameters
 from karamelo_py.points.laws.thermoelastic import expanding
 
 

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 from karamelo_py.language.rules import suggestion
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, symmetric_tensor
-from karamelo_py.points.laws.elasticity import LameParameters
+from karamelo_py.points.laws.parameters import LameParameters
 from karamelo_py.points.laws.temperatures import Warm, initial_heat, thermal_pressure
 from karamelo_py.script.errors import ScriptError
 

@@ -44,7 +44,7 @@ from karamelo_py.points.laws import (
     with_temperature,
 )
 from karamelo_py.points.laws.eos import taken_heat
-from karamelo_py.points.laws.plastic_rate import with_rate, without_rate
+from karamelo_py.points.laws.further import with_rate, without_rate
 from karamelo_py.points.laws.temperatures import initial_heat
 from karamelo_py.points.transfers import Moment, lost_shares
 from karamelo_py.run.mpi.partition import SharedTiles

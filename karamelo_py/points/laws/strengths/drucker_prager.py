@@ -7,12 +7,13 @@ from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.kinematics import inner
 from karamelo_py.points.laws.strengths import pressure_response
 from karamelo_py.points.laws.strengths.frictional import (
+    angles,
     frictional,
     lowest_pressure,
+    residual,
     surface,
     tension_bound,
 )
-from karamelo_py.points.laws.strengths.soils import angles, residual
 
 
 def cone(fit: str, phi: float) -> tuple[float, float]:

@@ -7,8 +7,7 @@ from karamelo_py.compiler.compile import shared
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.kinematics import from_principal, inner, principal
 from karamelo_py.points.laws.strengths import pressure_response
-from karamelo_py.points.laws.strengths.frictional import frictional, surface
-from karamelo_py.points.laws.strengths.soils import angles, residual
+from karamelo_py.points.laws.strengths.frictional import angles, frictional, residual, surface
 
 
 class MohrCoulomb(NamedTuple):

@@ -1,13 +1,13 @@
-"""strength johnson_cook: flow stress by strain, rate and temperature (Johnson & Cook 1983)."""
+"""Strengths johnson_cook, swift and zerilli-armstrong: metals that harden by powers of strain."""
 
 from typing import Annotated, Any, NamedTuple
 
-from karamelo_py.compiler.compile import all_lanes, fma, point_function, real, round_off, where
-from karamelo_py.compiler.powers import logarithm, power
+from karamelo_py.compiler.compile import all_lanes, fma, real, round_off, where
+from karamelo_py.compiler.powers import exponential, logarithm, power
 from karamelo_py.language.rules import suggestion
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.laws import Absent
-from karamelo_py.points.laws.checks import check_temperatures, reference_rate
+from karamelo_py.points.laws.parameters import check_temperatures, reference_rate
 from karamelo_py.points.laws.strengths import remembers, shear_response
 from karamelo_py.points.laws.strengths.hardening import (
     first_guess,
@@ -15,7 +15,7 @@ from karamelo_py.points.laws.strengths.hardening import (
     precompute,
     radial_return,
 )
-from karamelo_py.points.laws.temperatures import Warm, homologous
+from karamelo_py.points.laws.temperatures import homologous, temperature_or
 
 
 class JohnsonCook(NamedTuple):
@@ -165,25 +165,17 @@ class Hardened(NamedTuple):
     soft: Any
 
 
-@point_function(tags=2, otherwise=True)
 def thermal_factor(softening, heat):
     """Factor of the temperature: 1 where there is none."""
-    return 1
-
-
-@thermal_factor.on(Softening, Warm)
-def _thermal_factor_softening_warm(softening, heat):
+    if isinstance(softening, Absent) or not len(heat):
+        return 1
     return 1 - power(homologous(heat, softening.Tr, softening.Tm), softening.m)
 
 
-@point_function(otherwise=True)
 def with_rate_factor(rate, flow, slope, increment, dt):
     """Flow stress and slope with the factor of the rate."""
-    return flow, slope
-
-
-@with_rate_factor.on(RateFactor)
-def _with_rate_factor_rate_factor(rate, flow, slope, increment, dt):
+    if isinstance(rate, Absent):
+        return flow, slope
     relative = increment / (dt * rate.epsdot0)
     faster = relative > 1
     factor = 1 + where(faster, rate.C * logarithm(where(faster, relative, 1)), 0)
@@ -211,3 +203,179 @@ def _flow_stress_johnson_cook(strength, memory, known, increment, heat, dt):
     hard, slope = power_law(strength.B, strength.n, memory.ep, known.hard, increment)
     flow = (strength.A + hard) * known.soft
     return with_rate_factor(strength.rate, flow, slope * known.soft, increment, dt)
+
+
+# --- swift ---------------------------------------------------------------------------------------
+
+
+class Swift(NamedTuple):
+    """Hardening by a power of plastic strain, after a plateau.
+
+    Parameters
+    ----------
+    G
+        Shear modulus.
+    A
+        Flow stress on the plateau.
+    B, n
+        Hardening.
+    C
+        Plastic strain at the end of the plateau. A negative one is a strain that the material has
+        been given before.
+
+    Example
+    -------
+    strength(steel, swift, 80e9, 400e6, 500e6, 0.01, 0.5)
+
+    Notes
+    -----
+    Y = A + B (ep - C)^n where the plastic strain ep is above C, else A (after Swift 1952). Each
+    step solves for the plastic strain with the flow stress at its end.
+
+    See Also
+    --------
+    plastic, johnson_cook, material eos-strength
+    """
+
+    in_lanes = True
+
+    G: Annotated[float, Positive]
+    A: Annotated[float, Positive]
+    B: Annotated[float, NonNegative]
+    C: float
+    n: Annotated[float, NonNegative]
+
+
+remembers(Swift, ep=0.0)
+shear_response.on(Swift)(radial_return)
+
+
+@precompute.on(Swift)
+def _precompute_swift(strength, memory, heat):
+    return power_of_strain(strength.B, strength.n, memory.ep - strength.C)
+
+
+@first_guess.on(Swift)
+def _first_guess_swift(strength, memory, hard, q, slope):
+    excess = q - strength.A - hard
+    return power_law_guess(strength.n, memory.ep - strength.C, hard, excess, slope)
+
+
+@flow_stress.on(Swift)
+def _flow_stress_swift(strength, memory, before, increment, heat, dt):
+    hard, slope = power_law(strength.B, strength.n, memory.ep - strength.C, before, increment)
+    return strength.A + hard, slope
+
+
+# --- zerilli-armstrong ---------------------------------------------------------------------------
+
+
+class ZerilliArmstrong(NamedTuple):
+    """Flow stress of metals by the motion of dislocations: strain, rate and temperature.
+
+    Parameters
+    ----------
+    G
+        Shear modulus.
+    C0
+        Part of the flow stress that depends on nothing (impurities, size of the grains).
+    C1
+        Factor of the thermal part: that of bcc metals.
+    C2
+        The same of its part that grows with the root of plastic strain: that of fcc metals.
+    C3
+        How fast the thermal part falls with temperature, per kelvin.
+    C4
+        How much less so for each e-fold of the rate, per kelvin.
+    C5, n
+        Hardening C5 ep^n that depends on strain alone: that of bcc metals.
+    epsdot0
+        Rate of plastic strain that rates are counted in: 1/s in the units of the script.
+    T
+        Absolute temperature where neither the material nor its solid has one.
+
+    Example
+    -------
+    strength(copper, zerilli-armstrong, 46e9, 65e6, 0, 890e6, 0.0028, 0.000115, 0, 1)
+    strength(iron, zerilli-armstrong, 80e9, 65e6, 1033e6, 0, 0.00698, 0.000415, 266e6, 0.289)
+
+    Notes
+    -----
+    Y = C0 + (C1 + C2 sqrt(ep)) exp(-C3 T + C4 T ln(rate/epsdot0)) + C5 ep^n, with C2 = 0 for bcc
+    and C1 = C5 = 0 for fcc metals (Zerilli & Armstrong 1987). Without rate the thermal part is
+    nothing, so that the strength of a body at rest is C0 + C5 ep^n. Each step solves for the
+    plastic strain with the flow stress at its end and the rate of the step.
+
+    See Also
+    --------
+    johnson_cook, plastic, temperature plastic_work
+    """
+
+    in_lanes = True
+
+    G: float
+    C0: float
+    C1: float
+    C2: float
+    C3: float
+    C4: float
+    C5: float
+    n: float
+    epsdot0: float
+    initial_temperature: float
+
+    @classmethod
+    def given(
+        cls,
+        G: Annotated[float, Positive],
+        C0: Annotated[float, NonNegative],
+        C1: Annotated[float, NonNegative],
+        C2: Annotated[float, NonNegative],
+        C3: Annotated[float, NonNegative],
+        C4: Annotated[float, NonNegative],
+        C5: Annotated[float, NonNegative],
+        n: Annotated[float, NonNegative],
+        *,
+        epsdot0: Annotated[float, Positive] = 1.0,
+        T: Annotated[float, NonNegative] = 293.0,
+    ):
+        """The law from its constants."""
+        return cls(G, C0, C1, C2, C3, C4, C5, n, epsdot0, T)
+
+
+remembers(ZerilliArmstrong, ep=0.0)
+shear_response.on(ZerilliArmstrong)(radial_return)
+
+
+class Thermal(NamedTuple):
+    """Known at the beginning of a step: the parts of the flow stress."""
+
+    athermal: Any  # C5 ep^n
+    root: Any  # C2 sqrt(ep)
+    thermal: Any  # exp(-C3 T)
+
+
+@precompute.on(ZerilliArmstrong)
+def _precompute_zerilli_armstrong(strength, memory, heat):
+    T = temperature_or(heat, strength.initial_temperature)
+    return Thermal(
+        power_of_strain(strength.C5, strength.n, memory.ep),
+        power_of_strain(strength.C2, 0.5, memory.ep),
+        exponential(-strength.C3 * T),
+    )
+
+
+@flow_stress.on(ZerilliArmstrong)
+def _flow_stress_zerilli_armstrong(strength, memory, known, increment, heat, dt):
+    ep = memory.ep
+    athermal, slope = power_law(strength.C5, strength.n, ep, known.athermal, increment)
+    root, root_slope = power_law(strength.C2, 0.5, ep, known.root, increment)
+    # exp(C4 T ln(rate)) is the rate to a power.
+    exponent = strength.C4 * temperature_or(heat, strength.initial_temperature)
+    rate = increment / (dt * strength.epsdot0)
+    at_rate = power_of_strain(1, exponent, rate)
+    rate, rate_slope = power_law(1, exponent, rate, at_rate, 0)
+    rate = where(exponent > 0, rate, 1)
+    factor = strength.C1 + root
+    slope += known.thermal * (rate * root_slope + factor * rate_slope / (dt * strength.epsdot0))
+    return strength.C0 + known.thermal * rate * factor + athermal, slope
