@@ -5,8 +5,7 @@ from typing import NamedTuple
 
 from karamelo_py.compiler.compile import point_function, shared
 from karamelo_py.compiler.powers import power
-from karamelo_py.points.kinematics import Axisymmetric
-from karamelo_py.points.kinematics.tensors import total
+from karamelo_py.points.kinematics import Axisymmetric, total
 
 
 class Hertz(NamedTuple):

@@ -9,8 +9,7 @@ from karamelo_py.language.rules import known_failure
 from karamelo_py.points.basis import carried, carrier, carry, deformed, mapped_again
 from karamelo_py.points.basis.product import Along, along, node_number, product, register, wide
 from karamelo_py.points.grid import cells_along, in_cells
-from karamelo_py.points.kinematics import I, det, planar, tensor
-from karamelo_py.points.kinematics.tensors import total
+from karamelo_py.points.kinematics import I, det, planar, tensor, total
 
 # Half sizes that weights are made with, in cells.
 LEAST = 1e-3

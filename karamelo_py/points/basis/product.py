@@ -115,8 +115,11 @@ def node_number(grid, first, steps):
 
 def digits(k, base, d):
     """Split a number into `d` digits in a base, the highest first."""
-    divided = [k // base**i if i else k for i in reversed(range(d))]
-    return [divided[0], *[n % base for n in divided[1:]]]
+    found = []
+    for _ in range(d - 1):
+        found = [k % base, *found]
+        k = k // base
+    return [k, *found]
 
 
 def item(values, k):

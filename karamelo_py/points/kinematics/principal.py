@@ -4,8 +4,7 @@ from math import sqrt
 from typing import Any, NamedTuple
 
 from karamelo_py.compiler.compile import point_function, round_off, shared, where
-from karamelo_py.points.kinematics.tags import Axisymmetric, Line, PlaneStrain, Space
-from karamelo_py.points.kinematics.tensors import SymmetricTensor
+from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space, SymmetricTensor
 
 
 class Angle(NamedTuple):

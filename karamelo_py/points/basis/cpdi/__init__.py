@@ -37,8 +37,14 @@ from karamelo_py.points.basis.product import (
     product,
 )
 from karamelo_py.points.grid import cells_along, in_cells
-from karamelo_py.points.kinematics import Axisymmetric, gradient, vector
-from karamelo_py.points.kinematics.tensors import cofactor, determinant, total
+from karamelo_py.points.kinematics import (
+    Axisymmetric,
+    cofactor,
+    determinant,
+    gradient,
+    total,
+    vector,
+)
 
 
 class Element(NamedTuple):

@@ -13,8 +13,7 @@ from karamelo_py.points.basis.cpdi import (
     register_carried,
     upright,
 )
-from karamelo_py.points.kinematics import Space, vector
-from karamelo_py.points.kinematics.tensors import cofactor, determinant, total
+from karamelo_py.points.kinematics import Space, cofactor, determinant, total, vector
 
 
 class R4(ConvectedDomain):

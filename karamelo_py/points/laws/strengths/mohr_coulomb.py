@@ -5,7 +5,8 @@ from typing import Annotated, NamedTuple
 
 from karamelo_py.compiler.compile import shared
 from karamelo_py.language.signature import NonNegative, Positive
-from karamelo_py.points.kinematics import from_principal, inner, principal
+from karamelo_py.points.kinematics import inner
+from karamelo_py.points.kinematics.principal import from_principal, principal
 from karamelo_py.points.laws.strengths import pressure_response
 from karamelo_py.points.laws.strengths.frictional import angles, frictional, residual, surface
 
