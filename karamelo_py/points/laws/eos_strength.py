@@ -15,6 +15,7 @@ from karamelo_py.compiler.compile import where
 from karamelo_py.language.arguments import Argument, look_up
 from karamelo_py.language.rules import suggestion
 from karamelo_py.language.scene import Scene
+from karamelo_py.points import laws
 from karamelo_py.points.kinematics import (
     I,
     det,
@@ -25,43 +26,8 @@ from karamelo_py.points.kinematics import (
     tr,
     von_mises,
 )
-from karamelo_py.points.laws import (
-    Absent,
-    advance,
-    can,
-    cauchy_stress,
-    column,
-    conductivity,
-    damage,
-    damage_initiation,
-    dissipated_energy,
-    elastic_strain,
-    energy_density,
-    heat_capacity,
-    initial_state,
-    jacobian,
-    kirchhoff_stress,
-    plastic_strain,
-    shown,
-    specific_volume,
-    strengths,
-    temperature,
-    warmed,
-    wave_speed_squared,
-    with_stress,
-    with_temperature,
-)
+from karamelo_py.points.laws import Absent, can, column, eos, strengths
 from karamelo_py.points.laws.damages import damage_after, initial_damage, initiation, integrity
-from karamelo_py.points.laws.eos import (
-    at_pressure,
-    bulk_modulus,
-    compressed,
-    compression_energy,
-    initial_energy,
-    pressure,
-    stored_heat,
-    taken_heat,
-)
 from karamelo_py.points.laws.further import (
     chained,
     further_after,
@@ -190,14 +156,14 @@ class EosStrength(NamedTuple):
         return cls(**laws, further=chained(further))
 
 
-column(EosStrength, "dissipated", dissipated_energy)
+column(EosStrength, "dissipated", laws.dissipated_energy)
 
 
 # --- parts that never act, told by `check` ------------------------------------------------------
 
 
 def _idle_damage(law, scene):
-    yields = can(law.strength, plastic_strain) or any(
+    yields = can(law.strength, laws.plastic_strain) or any(
         name in law.strength._fields for name in ("yield_stress", "A", "cohesion", "phi")
     )
     return not isinstance(law.damage, Absent) and not yields
@@ -250,11 +216,11 @@ class State(NamedTuple):
     m: Memory
 
 
-@initial_state.on(EosStrength)
+@laws.initial_state.on(EosStrength)
 def _initial_state_eos_strength(law, kin, like):
     viscous = initial_viscous_pressure(law.viscosity, like)
     m = Memory(
-        initial_energy(law.eos, like),
+        eos.initial_energy(law.eos, like),
         viscous,
         initial_damage(law.damage, like),
         initial_heat(law.temperature, like),
@@ -265,7 +231,7 @@ def _initial_state_eos_strength(law, kin, like):
     return State(1, nothing(kin), m)
 
 
-@advance.on(EosStrength)
+@laws.advance.on(EosStrength)
 def _advance_eos_strength(law, kin, state, dl, dt):
     before, s, m = state
     J = before * det(I + dl)
@@ -274,12 +240,12 @@ def _advance_eos_strength(law, kin, state, dl, dt):
     work = J * work * borne_share(law, m.damage)
     viscous = viscous_after(law, J, m, tr(eps) / dt)
     viscous_work = sum(viscous) * (before - J)
-    energy = compressed(law.eos, m.energy, before, J, work + viscous_work)
+    energy = eos.compressed(law.eos, m.energy, before, J, work + viscous_work)
     flow = strengths.equivalent_plastic_strain(law.strength, memory)
     flow -= strengths.equivalent_plastic_strain(law.strength, m.strength)
     now = m._replace(energy=energy, viscous=viscous, strength=memory)
     broken = broken_further(law, now, flow, s, J, dt)
-    heat = heated(law.temperature, m.heat, work * specific_volume(law.eos))
+    heat = heated(law.temperature, m.heat, work * laws.specific_volume(law.eos))
     gone = work + viscous_work + released(law, kin, J, s, now, broken)
     loss = tuple([lost + gone for lost in m.loss])
     further = further_after(law.further, m.further, law, kin, J, s, now, dt)
@@ -292,7 +258,7 @@ def _advance_eos_strength(law, kin, state, dl, dt):
 def intact_pressure(law, j, m):
     """Pressure of the intact material, without viscous pressure."""
     elastic = strengths.elastic_ratio(law.strength, m.strength, j)
-    p = pressure(law.eos, elastic, m.energy, m.heat)
+    p = eos.pressure(law.eos, elastic, m.energy, m.heat)
     p += sum(thermal_pressure(law.temperature, m.heat))
     return further_pressure(law.further, m.further, p)
 
@@ -306,15 +272,15 @@ def full_pressure(law, j, m):
 def sound(law, j, m):
     """Speed of sound without shear."""
     elastic = strengths.elastic_ratio(law.strength, m.strength, j)
-    K = bulk_modulus(law.eos, elastic, m.energy, m.heat)
-    return sqrt(K * specific_volume(law.eos) * j)
+    K = eos.bulk_modulus(law.eos, elastic, m.energy, m.heat)
+    return sqrt(K * laws.specific_volume(law.eos) * j)
 
 
 def viscous_after(law, j, m, rate):
     """Viscous pressure (q,) at a rate of volume change, or ()."""
     if isinstance(law.viscosity, Absent):
         return ()
-    density = 1 / (specific_volume(law.eos) * j)
+    density = 1 / (laws.specific_volume(law.eos) * j)
     return viscous_pressure(law.viscosity, rate, density, sound(law, j, m))
 
 
@@ -343,7 +309,7 @@ def released(law, kin, j, s, m, broken):
         return 0
     shear = j * strengths.shear_energy(law.strength, kin, s)
     tension = intact_pressure(law, j, m) < 0
-    energy = shear + where(tension, compression_energy(law.eos, j, m.energy), 0)
+    energy = shear + where(tension, eos.compression_energy(law.eos, j, m.energy), 0)
     return (integrity(law.damage, m.damage) - integrity(law.damage, broken)) * energy
 
 
@@ -355,29 +321,29 @@ def stress_left(law, state):
 # --- quantities of the whole law --------------------------------------------------------------
 
 
-@cauchy_stress.on(EosStrength)
+@laws.cauchy_stress.on(EosStrength)
 def _cauchy_stress_eos_strength(law, kin, state):
     return stress_left(law, state) - full_pressure(law, state.J, state.m) * I
 
 
-@kirchhoff_stress.on(EosStrength)
+@laws.kirchhoff_stress.on(EosStrength)
 def _kirchhoff_stress_eos_strength(law, kin, state):
     J = state.J
     return J * stress_left(law, state) - J * full_pressure(law, J, state.m) * I
 
 
-@jacobian.on(EosStrength)
+@laws.jacobian.on(EosStrength)
 def _jacobian_eos_strength(law, kin, state):
     return state.J
 
 
-@wave_speed_squared.on(EosStrength)
+@laws.wave_speed_squared.on(EosStrength)
 def _wave_speed_squared_eos_strength(law, kin, state):
     # (K + 4/3 G) / rho, with the elastic moduli: plastic waves are slower.
     J, _, m = state
     elastic = strengths.elastic_ratio(law.strength, m.strength, J)
-    modulus = bulk_modulus(law.eos, elastic, m.energy, m.heat)
-    volume = specific_volume(law.eos) * J
+    modulus = eos.bulk_modulus(law.eos, elastic, m.energy, m.heat)
+    volume = laws.specific_volume(law.eos) * J
     squared = (modulus + 4 / 3 * strengths.shear_modulus(law.strength)) * volume
     squared = strengths.damped_speed_squared(law.strength, squared, 1 / volume)
     if isinstance(law.viscosity, Absent):
@@ -386,13 +352,13 @@ def _wave_speed_squared_eos_strength(law, kin, state):
     return damped(squared, viscous)
 
 
-@energy_density.on(EosStrength)
+@laws.energy_density.on(EosStrength)
 def _energy_density_eos_strength(law, kin, state):
     """Return the energy that unloading at this temperature frees: plastic work is not stored."""
     J, s, m = state
     elastic = strengths.elastic_ratio(law.strength, m.strength, J)
-    volume = compression_energy(law.eos, elastic, m.energy)
-    volume -= stored_heat(law.eos, sum(m.loss))
+    volume = eos.compression_energy(law.eos, elastic, m.energy)
+    volume -= eos.stored_heat(law.eos, sum(m.loss))
     volume += sum(thermal_pressure(law.temperature, m.heat)) * (1 - J)
     tension = intact_pressure(law, J, m) < 0
     share = borne_share(law, m.damage)
@@ -400,12 +366,12 @@ def _energy_density_eos_strength(law, kin, state):
     return volume + J * (share * strengths.shear_energy(law.strength, kin, s))
 
 
-@dissipated_energy.on(EosStrength)
+@laws.dissipated_energy.on(EosStrength)
 def _dissipated_energy_eos_strength(law, kin, state):
     return sum(state.m.loss)
 
 
-@elastic_strain.on(EosStrength)
+@laws.elastic_strain.on(EosStrength)
 def _elastic_strain_eos_strength(law, kin, state):
     """ln J / 3, the mean of the elastic strain increments, and the elastic shear."""
     strain = symmetric_tensor(kin, strengths.shear_strain(law.strength, kin, state.s))
@@ -413,17 +379,17 @@ def _elastic_strain_eos_strength(law, kin, state):
     return strain + 1 / 3 * log(elastic) * I
 
 
-@plastic_strain.on(EosStrength)
+@laws.plastic_strain.on(EosStrength)
 def _plastic_strain_eos_strength(law, kin, state):
     return strengths.equivalent_plastic_strain(law.strength, state.m.strength)
 
 
-@shown.on(strengths.Remembered)
+@laws.shown.on(strengths.Remembered)
 def _shown_remembered(what, law, kin, state):
     return state.m.strength[what.place]
 
 
-@with_stress.on(EosStrength)
+@laws.with_stress.on(EosStrength)
 def _with_stress_eos_strength(law, kin, state, stress):
     # Pressure follows from volume, so the point gets the volume that has this pressure.
     J, _, m = state
@@ -431,51 +397,51 @@ def _with_stress_eos_strength(law, kin, state, stress):
     elastic = strengths.elastic_ratio(law.strength, m.strength, J)
     beside = sum(thermal_pressure(law.temperature, m.heat)) + sum(m.viscous)
     p = -tr(stress) * (1 / 3) - further_pressure(law.further, m.further, beside)
-    after, energy = at_pressure(law.eos, elastic, m.energy, p, m.heat)
+    after, energy = eos.at_pressure(law.eos, elastic, m.energy, p, m.heat)
     return State(J * (after / elastic), dev(stress), m._replace(energy=energy))
 
 
-@specific_volume.on(EosStrength)
+@laws.specific_volume.on(EosStrength)
 def _specific_volume_eos_strength(law):
-    return specific_volume(law.eos)
+    return laws.specific_volume(law.eos)
 
 
-@damage.on(EosStrength)
+@laws.damage.on(EosStrength)
 def _damage_eos_strength(law, kin, state):
     return 1 - borne_share(law, state.m.damage)
 
 
-@damage_initiation.on(EosStrength)
+@laws.damage_initiation.on(EosStrength)
 def _damage_initiation_eos_strength(law, kin, state):
     return initiation(law.damage, state.m.damage)
 
 
-@temperature.on(EosStrength)
+@laws.temperature.on(EosStrength)
 def _temperature_eos_strength(law, kin, state):
     return sum(state.m.heat)
 
 
-@with_temperature.on(EosStrength)
+@laws.with_temperature.on(EosStrength)
 def _with_temperature_eos_strength(law, kin, state, T):
     heat = at_temperature(state.m.heat, T)
     return state._replace(m=state.m._replace(heat=heat))
 
 
-@heat_capacity.on(EosStrength)
+@laws.heat_capacity.on(EosStrength)
 def _heat_capacity_eos_strength(law, like):
-    return heat_capacity(law.temperature, like)
+    return laws.heat_capacity(law.temperature, like)
 
 
-@warmed.on(EosStrength)
+@laws.warmed.on(EosStrength)
 def _warmed_eos_strength(law, kin, state, heat):
     m = state.m
-    taken = taken_heat(law.eos, m.energy, heat)
+    taken = eos.taken_heat(law.eos, m.energy, heat)
     if not len(taken):
         return state
     energy, loss = (m.energy[0] + taken[0],), tuple([lost + taken[0] for lost in m.loss])
     return state._replace(m=m._replace(energy=energy, loss=loss))
 
 
-@conductivity.on(EosStrength)
+@laws.conductivity.on(EosStrength)
 def _conductivity_eos_strength(law, like):
-    return conductivity(law.temperature, like)
+    return laws.conductivity(law.temperature, like)

@@ -102,24 +102,18 @@ def _kirchhoff_stress_thermoelastic(law, kin, state):
     return laws.kirchhoff_stress(law.elastic, kin, state.elastic) - p * I
 
 
-@laws.jacobian.on(Thermoelastic)
-def _jacobian_thermoelastic(law, kin, state):
-    return laws.jacobian(law.elastic, kin, state.elastic)
+def of_elastic_law(function) -> None:
+    """Let a function of a state be that of the elastic law."""
+
+    @function.on(Thermoelastic)
+    def _of_elastic_law(law, kin, state):
+        return function(law.elastic, kin, state.elastic)
 
 
-@laws.deformation.on(Thermoelastic)
-def _deformation_thermoelastic(law, kin, state):
-    return laws.deformation(law.elastic, kin, state.elastic)
-
-
-@laws.wave_speed_squared.on(Thermoelastic)
-def _wave_speed_squared_thermoelastic(law, kin, state):
-    return laws.wave_speed_squared(law.elastic, kin, state.elastic)
-
-
-@laws.wave_speed_bound.on(Thermoelastic)
-def _wave_speed_bound_thermoelastic(law, kin, state):
-    return laws.wave_speed_bound(law.elastic, kin, state.elastic)
+of_elastic_law(laws.jacobian)
+of_elastic_law(laws.deformation)
+of_elastic_law(laws.wave_speed_squared)
+of_elastic_law(laws.wave_speed_bound)
 
 
 @laws.energy_density.on(Thermoelastic)

@@ -133,27 +133,22 @@ def _displacing_velocity_asflip(transfer, v, v_pic, j):
 
 
 def nodal_momentum_affine(transfer, kin, basis, grid, stencil, k, weight, mass, v, B):
-    """See `nodal_momentum`."""
     return weight * mass * v + mass * (B @ affine_weight(basis, kin, grid, stencil, k))
 
 
 def add_moment_affine(transfer, kin, basis, grid, stencil, k, weight, gradient, v, B):
-    """See `add_moment`."""
     return B + outer(weight * v, reach(basis, kin, grid, stencil, k))
 
 
 def affine_velocity_of_moment(transfer, B, inverse_d):
-    """See `affine_velocity`."""
     return inverse_d[0] * B if len(inverse_d) else ()
 
 
 def zero_planar(transfer, kin, like):
-    """See `zero_moment`."""
     return zero(planar(kin), like)
 
 
 def by_arms_alone(transfer, inverse_d):
-    """See `by_arms`."""
     return (1.0,)
 
 

@@ -87,17 +87,14 @@ class MLS(NamedTuple):
 
 
 def nodal_momentum_taylor(transfer, kin, basis, grid, stencil, k, weight, mass, v, L):
-    """See `nodal_momentum`."""
     return weight * mass * (v + L @ reach(basis, kin, grid, stencil, k))
 
 
 def add_moment_taylor(transfer, kin, basis, grid, stencil, k, weight, gradient, v, L):
-    """See `add_moment`."""
     return L + outer(v, gradient.planar())
 
 
 def kept_velocity_gradient(transfer, L, inverse_d):
-    """See `affine_velocity`."""
     return L
 
 

@@ -11,7 +11,6 @@ Trans. Graph. 36(4), section 4.3.4). What plastic flow by shear gains (dilatancy
 """
 
 from math import inf, log, radians, sqrt
-from typing import NamedTuple
 
 from karamelo_py.compiler.compile import point_function
 from karamelo_py.points.kinematics import inner
@@ -103,23 +102,24 @@ def frictional(strength: type) -> None:
 # --- parameters of soils -------------------------------------------------------------------------
 
 
-class Residual(NamedTuple):
-    """Strength at the end of softening: that of the peak where there is none."""
+def peak_and_residual(surface_of, cohesion, phi, psi, to_cohesion, to_phi, over):
+    """Cohesion, friction and dilation at the peak; cohesion, friction at the end, and softening.
 
-    cohesion: float
-    phi: float  # radians
-    softening: float  # 1 / plastic strain at the end, 0 for none
-
-
-def angles(cohesion: float, phi: float, psi: float) -> tuple[float, float]:
-    """Angles of friction and dilatancy in radians.
+    `surface_of` gives cohesion and friction of the yield surface, from the cohesion and the angle
+    of friction (in radians) of a soil. What is None stays as it is.
 
     Raises
     ------
     ScriptError
-        For angles that no soil has, and where there would be no strength at all.
+        For angles that no soil has, where there would be no strength at all, if something is
+        missing, or a residual is above the peak.
     """
-    _check_phi("phi", phi)
+    if not 0 <= phi < 90:
+        raise ScriptError(
+            f"the friction angle phi = {phi:g} is impossible",
+            argument="phi",
+            expected="an angle in degrees, from 0 to below 90",
+        )
     if not 0 <= psi <= phi:
         raise ScriptError(
             f"the angle of dilatancy psi = {psi:g} is impossible with phi = {phi:g}",
@@ -132,28 +132,14 @@ def angles(cohesion: float, phi: float, psi: float) -> tuple[float, float]:
             argument="cohesion",
             expected="a cohesion or a friction angle above 0, or strength(ID, fluid, 0)",
         )
-    return radians(phi), radians(psi)
-
-
-def residual(
-    cohesion: float, phi: float, to_cohesion: float | None, to_phi: float | None, over: float | None
-) -> Residual:
-    """Strength at the end of softening, from what the script says.
-
-    Raises
-    ------
-    ScriptError
-        If something is missing, or a residual is above the peak.
-    """
-    if to_cohesion is None and to_phi is None:
-        if over is not None:
-            raise ScriptError(
-                "softening needs a residual strength",
-                argument="softening",
-                expected="residual_cohesion=... or residual_phi=..., or both",
-            )
-        return Residual(cohesion, radians(phi), 0.0)
-    if over is None:
+    softens = to_cohesion is not None or to_phi is not None
+    if over is not None and not softens:
+        raise ScriptError(
+            "softening needs a residual strength",
+            argument="softening",
+            expected="residual_cohesion=... or residual_phi=..., or both",
+        )
+    if softens and over is None:
         raise ScriptError(
             "softening needs the plastic strain at which the residual strength is reached",
             argument="residual_cohesion" if to_cohesion is not None else "residual_phi",
@@ -166,17 +152,7 @@ def residual(
                 argument=f"residual_{name}",
                 expected=f"a number from 0 to {peak:g}",
             )
-    return Residual(
-        cohesion if to_cohesion is None else to_cohesion,
-        radians(phi if to_phi is None else to_phi),
-        1 / over,
-    )
-
-
-def _check_phi(name: str, phi: float) -> None:
-    if not 0 <= phi < 90:
-        raise ScriptError(
-            f"the friction angle {name} = {phi:g} is impossible",
-            argument=name,
-            expected="an angle in degrees, from 0 to below 90",
-        )
+    left = cohesion if to_cohesion is None else to_cohesion
+    end = surface_of(left, radians(phi if to_phi is None else to_phi))
+    dilation = surface_of(cohesion, radians(psi))[1]
+    return (*surface_of(cohesion, radians(phi)), dilation), (*end, 1 / over if softens else 0.0)
