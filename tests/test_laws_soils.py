@@ -15,9 +15,8 @@ from karamelo_py.points.kinematics import (
     Axisymmetric,
     PlaneStrain,
     Space,
-    from_principal,
-    principal,
 )
+from karamelo_py.points.kinematics.principal import from_principal, principal
 from karamelo_py.points.laws import (
     advance,
     dissipated_energy,
