@@ -8,7 +8,7 @@ from karamelo_py.compiler.tuples import row
 from karamelo_py.kernels.visit import deformation_of, law_of, state_of
 from karamelo_py.points.basis import entry
 from karamelo_py.points.frames import scaled_increment
-from karamelo_py.points.transfers import kept_gradient, straining
+from karamelo_py.points.transfers import straining
 
 
 class VolumeRatio(StepField):
@@ -106,15 +106,4 @@ def kept_out(averaging, w, gradient):
 
 @kept_out.on(FBar)
 def _kept_out_f_bar(averaging, w, gradient):
-    return gradient
-
-
-@point_function(otherwise=True)
-def known_gradient(averaging, w, moment, gradient):
-    """The velocity gradient, gathered or kept by the transfer."""
-    return kept_gradient(w.transfer, w.kin, moment, gradient)
-
-
-@known_gradient.on(FBar)
-def _known_gradient_f_bar(averaging, w, moment, gradient):
     return gradient

@@ -295,7 +295,7 @@ def _settled_second_strain(task, w, stencil, p, dt, total, totals, fastest):
 
 @settled.on(StrainInMove)
 def _settled_strain_in_move(task, w, stencil, p, dt, total, totals, fastest):
-    gradient = averaging.known_gradient(w.averaging, w, totals[0][2], total[0])
+    gradient = total[0] if len(total[0]) else totals[0][2]  # else the point keeps it
     return _strain(w, w.places.x, p, dt, increment(dt, gradient), total[1], fastest)
 
 

@@ -1,17 +1,9 @@
 """Principal values and directions of symmetric tensors, and back."""
 
 from math import sqrt
-from typing import Any, NamedTuple
 
 from karamelo_py.compiler.compile import round_off, shared, where
 from karamelo_py.points.kinematics import Space
-
-
-class Angle(NamedTuple):
-    """Directions in the plane: cosine and sine of twice the angle to the first."""
-
-    cosine: Any
-    sine: Any
 
 
 def principal(s):
@@ -29,8 +21,9 @@ def from_principal(s, values, directions):
         a, b, c = values
         mean = 0.5 * (a + b)
         radius = 0.5 * (a - b)
-        change = radius * directions.cosine
-        return s._make([mean + change, mean - change, c, radius * directions.sine])
+        cosine, sine = directions  # of twice the angle to the first
+        change = radius * cosine
+        return s._make([mean + change, mean - change, c, radius * sine])
 
     def component(i, j):
         a, b, c = [p * u[i] * u[j] for p, u in zip(values, directions, strict=True)]
@@ -46,7 +39,8 @@ def principal_in_plane(s):
     radius = sqrt(apart * apart + s.xy * s.xy)
     turned = radius > 0
     over = where(turned, radius, 1)
-    angle = Angle(where(turned, apart / over, 1), s.xy / over)
+    # Cosine and sine of twice the angle to the first direction.
+    angle = where(turned, apart / over, 1), s.xy / over
     return (mean + radius, mean - radius, s.zz), angle
 
 

@@ -7,7 +7,7 @@ from karamelo_py.language.rules import gain
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, det, inner, nothing, sym, symmetric_tensor, tr
-from karamelo_py.points.laws.parameters import check_poisson_ratio, lame_parameters
+from karamelo_py.points.laws.parameters import lame_parameters
 from karamelo_py.points.laws.thermoelastic import expanding
 
 
@@ -71,10 +71,8 @@ class LinearElastic(NamedTuple):
         rate: Literal["jaumann", "none"] = "jaumann",
     ):
         """The law from Young's modulus and Poisson's ratio; with a temperature where it has one."""
-        check_poisson_ratio(nu)
-        moduli = lame_parameters(E, nu)
         law = cls if rate == "jaumann" else FixedFrame
-        return expanding(law(1 / rho, *moduli), moduli, cp, kappa, alpha)
+        return expanding(law(1 / rho, *lame_parameters(E, nu)), cp, kappa, alpha)
 
 
 class FixedFrame(NamedTuple):

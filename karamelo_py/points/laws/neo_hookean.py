@@ -7,7 +7,7 @@ from karamelo_py.compiler.powers import logarithm_near_one as log
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, det, tr, unit
-from karamelo_py.points.laws.parameters import check_poisson_ratio, lame_parameters
+from karamelo_py.points.laws.parameters import lame_parameters
 from karamelo_py.points.laws.thermoelastic import expanding
 
 
@@ -64,9 +64,7 @@ class NeoHookean(NamedTuple):
         alpha: float = 0.0,
     ):
         """The law from Young's modulus and Poisson's ratio; with a temperature where it has one."""
-        check_poisson_ratio(nu)
-        moduli = lame_parameters(E, nu)
-        return expanding(cls(1 / rho, *moduli), moduli, cp, kappa, alpha)
+        return expanding(cls(1 / rho, *lame_parameters(E, nu)), cp, kappa, alpha)
 
 
 class State(NamedTuple):

@@ -1,31 +1,25 @@
 """Parameters that several laws have: their checks, moduli, and numbers in a row."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 from karamelo_py.script.errors import ScriptError
 
 
-class LameParameters(NamedTuple):
-    """Isotropic elasticity, in consistent units of stress."""
+def lame_parameters(E: float, nu: float) -> tuple[float, float]:
+    """Lame's parameters lambda and G from Young's modulus and Poisson's ratio.
 
-    lam: float  # Lame's first parameter
-    G: float  # shear modulus
-
-
-def check_poisson_ratio(nu: float) -> None:
-    """Refuse a Poisson's ratio for which the elastic energy is not positive or not finite."""
+    Raises
+    ------
+    ScriptError
+        For a ratio for which the elastic energy is not positive or not finite.
+    """
     if not -1 < nu < 0.5:
         raise ScriptError(
             f"Poisson's ratio {nu:g} is impossible",
             argument="nu",
             expected="a number above -1 and below 0.5",
         )
-
-
-def lame_parameters(E: float, nu: float) -> LameParameters:
-    """Lame's parameters from Young's modulus and Poisson's ratio."""
-    return LameParameters(lam=E * nu / ((1 + nu) * (1 - 2 * nu)), G=E / (2 * (1 + nu)))
+    return E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 * (1 + nu))
 
 
 def check_temperatures(Tr: float, Tm: float, name: str = "Tr") -> None:

@@ -5,7 +5,6 @@ from typing import Any, NamedTuple
 from karamelo_py.language.rules import suggestion
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, symmetric_tensor
-from karamelo_py.points.laws.parameters import LameParameters
 from karamelo_py.points.laws.temperatures import Warm, initial_heat, thermal_pressure
 from karamelo_py.script.errors import ScriptError
 
@@ -40,9 +39,7 @@ suggestion(
 )
 
 
-def expanding(
-    law: NamedTuple, moduli: LameParameters, cp: float | None, kappa: float | None, alpha: float
-) -> NamedTuple:
+def expanding(law: Any, cp: float | None, kappa: float | None, alpha: float) -> NamedTuple:
     """An elastic law with a temperature where heat capacity and conductivity are given."""
     if cp is None or kappa is None:
         if cp is not None:
@@ -52,7 +49,7 @@ def expanding(
                 expected="cp and kappa, or neither",
             )
         return law
-    bulk = moduli.lam + 2 / 3 * moduli.G
+    bulk = law.lam + 2 / 3 * law.G
     return Thermoelastic(law, Expansion(cp, kappa, alpha, 3 * bulk * alpha, 0.0))
 
 

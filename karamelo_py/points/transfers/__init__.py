@@ -107,13 +107,10 @@ def forces_by_arms(transfer, kin):
 
 @point_function(otherwise=True)
 def straining(transfer, kin, gradient):
-    """Return the strain's term in a gather of velocity and gradient: `gradient`, or nothing."""
-    return gradient
+    """Return the strain's term in a gather of velocity and gradient: `gradient`.
 
-
-@point_function(otherwise=True)
-def kept_gradient(transfer, kin, moment, gradient):
-    """The gradient of velocity, from what the point keeps and what `straining` let be gathered."""
+    Or nothing, where what the point keeps is the gradient of velocity.
+    """
     return gradient
 
 

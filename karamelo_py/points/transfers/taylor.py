@@ -18,7 +18,6 @@ from karamelo_py.points.transfers import (
     by_arms,
     forces_by_arms,
     gradient_weight,
-    kept_gradient,
     nodal_momentum,
     straining,
     zero_moment,
@@ -134,8 +133,3 @@ def _forces_by_arms_mls(transfer, kin):
 @straining.on(MLS)
 def _straining_mls(transfer, kin, gradient):
     return gradient if isinstance(kin, Axisymmetric) else ()
-
-
-@kept_gradient.on(MLS)
-def _kept_gradient_mls(transfer, kin, moment, gradient):
-    return gradient if isinstance(kin, Axisymmetric) else moment

@@ -58,16 +58,8 @@ def remembers(strength: type, **numbers: float | str) -> None:
     for place, name in enumerate(numbers):
         column(strength, name, Remembered(place))
     if "ep" in numbers:
-        initial_loss.on(strength)(_initial_loss)
-        equivalent_plastic_strain.on(strength)(_plastic_strain_remembered)
-
-
-def _initial_loss(strength, like):
-    return (0.0,)
-
-
-def _plastic_strain_remembered(strength, memory):
-    return memory.ep
+        initial_loss.on(strength)(lambda strength, like: (0.0,))
+        equivalent_plastic_strain.on(strength)(lambda strength, memory: memory.ep)
 
 
 @point_function(otherwise=True)

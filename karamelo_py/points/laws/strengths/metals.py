@@ -158,35 +158,12 @@ def power_law_guess(exponent, strain, hard, excess, slope):
     return x + x * max(min(curved * x, 1), -0.5), abs(curved)
 
 
-class Hardened(NamedTuple):
-    """Known at the beginning of a step: the hardening, and the factor of the temperature."""
-
-    hard: Any
-    soft: Any
-
-
-def thermal_factor(softening, heat):
-    """Factor of the temperature: 1 where there is none."""
-    if isinstance(softening, Absent) or not len(heat):
-        return 1
-    return 1 - power(homologous(heat, softening.Tr, softening.Tm), softening.m)
-
-
-def with_rate_factor(rate, flow, slope, increment, dt):
-    """Flow stress and slope with the factor of the rate."""
-    if isinstance(rate, Absent):
-        return flow, slope
-    relative = increment / (dt * rate.epsdot0)
-    faster = relative > 1
-    factor = 1 + where(faster, rate.C * logarithm(where(faster, relative, 1)), 0)
-    steeper = where(faster, flow * rate.C / where(faster, increment, 1), 0)
-    return flow * factor, slope * factor + steeper
-
-
 @precompute.on(JohnsonCook)
 def _precompute_johnson_cook(strength, memory, heat):
-    hard = power_of_strain(strength.B, strength.n, memory.ep)
-    return Hardened(hard, thermal_factor(strength.softening, heat))
+    hard, softening = power_of_strain(strength.B, strength.n, memory.ep), strength.softening
+    if isinstance(softening, Absent) or not len(heat):
+        return hard, 1
+    return hard, 1 - power(homologous(heat, softening.Tr, softening.Tm), softening.m)
 
 
 @first_guess.on(JohnsonCook)
@@ -200,9 +177,16 @@ def _first_guess_johnson_cook(strength, memory, known, q, slope):
 
 @flow_stress.on(JohnsonCook)
 def _flow_stress_johnson_cook(strength, memory, known, increment, heat, dt):
-    hard, slope = power_law(strength.B, strength.n, memory.ep, known.hard, increment)
-    flow = (strength.A + hard) * known.soft
-    return with_rate_factor(strength.rate, flow, slope * known.soft, increment, dt)
+    before, soft = known
+    hard, slope = power_law(strength.B, strength.n, memory.ep, before, increment)
+    flow, slope = (strength.A + hard) * soft, slope * soft
+    if isinstance(strength.rate, Absent):
+        return flow, slope
+    C, relative = strength.rate.C, increment / (dt * strength.rate.epsdot0)
+    faster = relative > 1
+    factor = 1 + where(faster, C * logarithm(where(faster, relative, 1)), 0)
+    steeper = where(faster, flow * C / where(faster, increment, 1), 0)
+    return flow * factor, slope * factor + steeper
 
 
 # --- swift ---------------------------------------------------------------------------------------
@@ -347,29 +331,18 @@ remembers(ZerilliArmstrong, ep=0.0)
 shear_response.on(ZerilliArmstrong)(radial_return)
 
 
-class Thermal(NamedTuple):
-    """Known at the beginning of a step: the parts of the flow stress."""
-
-    athermal: Any  # C5 ep^n
-    root: Any  # C2 sqrt(ep)
-    thermal: Any  # exp(-C3 T)
-
-
 @precompute.on(ZerilliArmstrong)
 def _precompute_zerilli_armstrong(strength, memory, heat):
     T = temperature_or(heat, strength.initial_temperature)
-    return Thermal(
-        power_of_strain(strength.C5, strength.n, memory.ep),
-        power_of_strain(strength.C2, 0.5, memory.ep),
-        exponential(-strength.C3 * T),
-    )
+    athermal = power_of_strain(strength.C5, strength.n, memory.ep)
+    return athermal, power_of_strain(strength.C2, 0.5, memory.ep), exponential(-strength.C3 * T)
 
 
 @flow_stress.on(ZerilliArmstrong)
 def _flow_stress_zerilli_armstrong(strength, memory, known, increment, heat, dt):
-    ep = memory.ep
-    athermal, slope = power_law(strength.C5, strength.n, ep, known.athermal, increment)
-    root, root_slope = power_law(strength.C2, 0.5, ep, known.root, increment)
+    athermal, root, thermal = known
+    athermal, slope = power_law(strength.C5, strength.n, memory.ep, athermal, increment)
+    root, root_slope = power_law(strength.C2, 0.5, memory.ep, root, increment)
     # exp(C4 T ln(rate)) is the rate to a power.
     exponent = strength.C4 * temperature_or(heat, strength.initial_temperature)
     rate = increment / (dt * strength.epsdot0)
@@ -377,5 +350,5 @@ def _flow_stress_zerilli_armstrong(strength, memory, known, increment, heat, dt)
     rate, rate_slope = power_law(1, exponent, rate, at_rate, 0)
     rate = where(exponent > 0, rate, 1)
     factor = strength.C1 + root
-    slope += known.thermal * (rate * root_slope + factor * rate_slope / (dt * strength.epsdot0))
-    return strength.C0 + known.thermal * rate * factor + athermal, slope
+    slope += thermal * (rate * root_slope + factor * rate_slope / (dt * strength.epsdot0))
+    return strength.C0 + thermal * rate * factor + athermal, slope
