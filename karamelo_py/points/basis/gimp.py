@@ -6,7 +6,14 @@ from typing import NamedTuple
 from karamelo_py.compiler.compile import Weighted, index
 from karamelo_py.compiler.powers import power
 from karamelo_py.language.rules import known_failure
-from karamelo_py.points.basis import carried, carrier, carry, deformed, mapped_again
+from karamelo_py.points.basis import (
+    carried,
+    carrier,
+    carry,
+    deformed,
+    leave_moment_out,
+    mapped_again,
+)
 from karamelo_py.points.basis.product import Along, along, node_number, product, register, wide
 from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.points.kinematics import I, det, planar, tensor, total
@@ -230,10 +237,8 @@ def _end(at, first, top):
     return i, b - i
 
 
-@mapped_again.on(CPGIMPDiagonal)
-def _mapped_again_cpgimp_diagonal(basis, grid, moment):
-    # As with linear functions, which these become where the box vanishes.
-    return (grid.h - grid.h) * moment
+# As with linear functions, which these become where the box vanishes.
+mapped_again.on(CPGIMPDiagonal)(leave_moment_out)
 
 
 # --- boxes ------------------------------------------------------------------------------------

@@ -95,9 +95,7 @@ def _evenly_quadratic_spline(basis, grid, stencil):
     return first
 
 
-@first_node.on(QuadraticSpline)
-def _first_node_quadratic_spline(basis, like):
-    return 0.5
+first_node.on(QuadraticSpline)(lambda basis, like: 0.5)
 
 
 register(QuadraticSpline, 3)

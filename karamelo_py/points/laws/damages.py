@@ -123,9 +123,8 @@ class Accumulated(NamedTuple):
     w: Any  # sum of plastic strain over failure strain
 
 
-@initial_damage.on(JohnsonCookDamage)
-def _initial_damage_johnson_cook_damage(damage, like):
-    return Accumulated(0.0)
+initial_damage.on(JohnsonCookDamage)(lambda damage, like: Accumulated(0.0))
+initiation.on(JohnsonCookDamage)(lambda damage, memory: memory.w)
 
 
 @damage_after.on(JohnsonCookDamage)
@@ -146,8 +145,3 @@ def _damage_after_johnson_cook_damage(damage, memory, strain, triaxiality, heat,
 def _integrity_johnson_cook_damage(damage, memory):
     D = _BRITTLENESS * (memory.w - 1)
     return 1 - min(max(D, 0), 1)
-
-
-@initiation.on(JohnsonCookDamage)
-def _initiation_johnson_cook_damage(damage, memory):
-    return memory.w

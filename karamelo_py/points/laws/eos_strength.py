@@ -332,9 +332,12 @@ def _kirchhoff_stress_eos_strength(law, kin, state):
     return J * stress_left(law, state) - J * full_pressure(law, J, state.m) * I
 
 
-@laws.jacobian.on(EosStrength)
-def _jacobian_eos_strength(law, kin, state):
-    return state.J
+laws.jacobian.on(EosStrength)(lambda law, kin, state: state.J)
+laws.dissipated_energy.on(EosStrength)(lambda law, kin, state: sum(state.m.loss))
+laws.specific_volume.on(EosStrength)(lambda law: laws.specific_volume(law.eos))
+laws.temperature.on(EosStrength)(lambda law, kin, state: sum(state.m.heat))
+laws.heat_capacity.on(EosStrength)(lambda law, like: laws.heat_capacity(law.temperature, like))
+laws.conductivity.on(EosStrength)(lambda law, like: laws.conductivity(law.temperature, like))
 
 
 @laws.wave_speed_squared.on(EosStrength)
@@ -364,11 +367,6 @@ def _energy_density_eos_strength(law, kin, state):
     share = borne_share(law, m.damage)
     volume = where(tension, share * volume, volume)
     return volume + J * (share * strengths.shear_energy(law.strength, kin, s))
-
-
-@laws.dissipated_energy.on(EosStrength)
-def _dissipated_energy_eos_strength(law, kin, state):
-    return sum(state.m.loss)
 
 
 @laws.elastic_strain.on(EosStrength)
@@ -401,11 +399,6 @@ def _with_stress_eos_strength(law, kin, state, stress):
     return State(J * (after / elastic), dev(stress), m._replace(energy=energy))
 
 
-@laws.specific_volume.on(EosStrength)
-def _specific_volume_eos_strength(law):
-    return laws.specific_volume(law.eos)
-
-
 @laws.damage.on(EosStrength)
 def _damage_eos_strength(law, kin, state):
     return 1 - borne_share(law, state.m.damage)
@@ -416,20 +409,10 @@ def _damage_initiation_eos_strength(law, kin, state):
     return initiation(law.damage, state.m.damage)
 
 
-@laws.temperature.on(EosStrength)
-def _temperature_eos_strength(law, kin, state):
-    return sum(state.m.heat)
-
-
 @laws.with_temperature.on(EosStrength)
 def _with_temperature_eos_strength(law, kin, state, T):
     heat = at_temperature(state.m.heat, T)
     return state._replace(m=state.m._replace(heat=heat))
-
-
-@laws.heat_capacity.on(EosStrength)
-def _heat_capacity_eos_strength(law, like):
-    return laws.heat_capacity(law.temperature, like)
 
 
 @laws.warmed.on(EosStrength)
@@ -440,8 +423,3 @@ def _warmed_eos_strength(law, kin, state, heat):
         return state
     energy, loss = (m.energy[0] + taken[0],), tuple([lost + taken[0] for lost in m.loss])
     return state._replace(m=m._replace(energy=energy, loss=loss))
-
-
-@laws.conductivity.on(EosStrength)
-def _conductivity_eos_strength(law, like):
-    return laws.conductivity(law.temperature, like)

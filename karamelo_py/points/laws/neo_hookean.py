@@ -73,9 +73,8 @@ class State(NamedTuple):
     F: Any  # deformation gradient
 
 
-@laws.initial_state.on(NeoHookean)
-def _initial_state_neo_hookean(law, kin, like):
-    return State(unit(kin))
+laws.initial_state.on(NeoHookean)(lambda law, kin, like: State(unit(kin)))
+laws.deformation.on(NeoHookean)(lambda law, kin, state: state.F)
 
 
 @laws.advance.on(NeoHookean)
@@ -93,11 +92,6 @@ def _kirchhoff_stress_neo_hookean(law, kin, state):
 @laws.cauchy_stress.on(NeoHookean)
 def _cauchy_stress_neo_hookean(law, kin, state):
     return laws.kirchhoff_stress(law, kin, state) / det(state.F)
-
-
-@laws.deformation.on(NeoHookean)
-def _deformation_neo_hookean(law, kin, state):
-    return state.F
 
 
 @laws.jacobian.on(NeoHookean)

@@ -105,9 +105,9 @@ class PlasticWork(NamedTuple):
 column(PlasticWork, "T", temperature)
 
 
-@initial_heat.on(PlasticWork)
-def _initial_heat_plastic_work(temperature, like):
-    return Warm(temperature.T0)
+initial_heat.on(PlasticWork)(lambda temperature, like: Warm(temperature.T0))
+heat_capacity.on(PlasticWork)(lambda law, like: law.cp)
+conductivity.on(PlasticWork)(lambda law, like: law.kappa)
 
 
 @heated.on(PlasticWork)
@@ -119,13 +119,3 @@ def _heated_plastic_work(temperature, heat, work):
 @thermal_pressure.on(PlasticWork)
 def _thermal_pressure_plastic_work(temperature, heat):
     return (temperature.alpha * (heat.T - temperature.T0),)
-
-
-@heat_capacity.on(PlasticWork)
-def _heat_capacity_plastic_work(law, like):
-    return law.cp
-
-
-@conductivity.on(PlasticWork)
-def _conductivity_plastic_work(law, like):
-    return law.kappa

@@ -56,9 +56,7 @@ def expanding(law: Any, cp: float | None, kappa: float | None, alpha: float) -> 
 laws.column(Expansion, "T", laws.temperature)
 
 
-@initial_heat.on(Expansion)
-def _initial_heat_expansion(heat, like):
-    return Warm(heat.initial_temperature)
+initial_heat.on(Expansion)(lambda heat, like: Warm(heat.initial_temperature))
 
 
 @thermal_pressure.on(Expansion)
@@ -133,26 +131,12 @@ def _with_stress_thermoelastic(law, kin, state, stress):
     return State(laws.with_stress(law.elastic, kin, state.elastic, elastic), state.T)
 
 
-@laws.specific_volume.on(Thermoelastic)
-def _specific_volume_thermoelastic(law):
-    return laws.specific_volume(law.elastic)
-
-
-@laws.temperature.on(Thermoelastic)
-def _temperature_thermoelastic(law, kin, state):
-    return state.T
+laws.specific_volume.on(Thermoelastic)(lambda law: laws.specific_volume(law.elastic))
+laws.temperature.on(Thermoelastic)(lambda law, kin, state: state.T)
+laws.heat_capacity.on(Thermoelastic)(lambda law, like: law.heat.cp)
+laws.conductivity.on(Thermoelastic)(lambda law, like: law.heat.kappa)
 
 
 @laws.with_temperature.on(Thermoelastic)
 def _with_temperature_thermoelastic(law, kin, state, T):
     return State(state.elastic, T)
-
-
-@laws.heat_capacity.on(Thermoelastic)
-def _heat_capacity_thermoelastic(law, like):
-    return law.heat.cp
-
-
-@laws.conductivity.on(Thermoelastic)
-def _conductivity_thermoelastic(law, like):
-    return law.heat.kappa

@@ -51,9 +51,7 @@ def artificial_viscosity(Q1: float, Q2: float) -> dict[str, NamedTuple]:
     return {"viscosity": ArtificialViscosity(Q1, Q2, 0.0)} if Q1 > 0 or Q2 > 0 else {}
 
 
-@initial_viscous_pressure.on(ArtificialViscosity)
-def _initial_viscous_pressure_artificial_viscosity(viscosity, like):
-    return (0.0,)
+initial_viscous_pressure.on(ArtificialViscosity)(lambda viscosity, like: (0.0,))
 
 
 @viscous_pressure.on(ArtificialViscosity)

@@ -121,9 +121,7 @@ known_failure(
 )
 
 
-@known_volume.on(ASFLIP)
-def _known_volume_asflip(transfer, law, kin, state):
-    return jacobian(law, kin, state)
+known_volume.on(ASFLIP)(lambda transfer, law, kin, state: jacobian(law, kin, state))
 
 
 @displacing_velocity.on(ASFLIP)

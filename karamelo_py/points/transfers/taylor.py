@@ -116,9 +116,7 @@ def _gradient_weight_mls(transfer, basis, kin, grid, stencil, k, gradient):
     return as_gradient(kin, [*moved, *gradient[len(moved) :]])
 
 
-@by_arms.on(MLS)
-def _by_arms_mls(transfer, inverse_d):
-    return inverse_d
+by_arms.on(MLS)(lambda transfer, inverse_d: inverse_d)
 
 
 # The velocity gradient is what the point keeps: gathered once where both come from v*.

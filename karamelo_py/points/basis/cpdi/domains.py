@@ -222,6 +222,8 @@ register_carried(Q4)
 
 # Weights of the ends of an edge at the nearer and the farther of its two Gauss points.
 NEAR, FAR = (1 + 3**-0.5) / 2, (1 - 3**-0.5) / 2
+# Of two directions, in the order of `_at_gauss`.
+PAIRS = (0, 0), (1, 0), (0, 1), (1, 1)
 
 
 class H8(ConvectedDomain):
@@ -291,39 +293,17 @@ def _edges(place):
 
 @domain.on(H8)
 def _domain_h8(basis, kin, place):
-    along = _edges(place)
     # Rows of the Jacobian at the Gauss points: u does not depend on xi, v not on eta, w not on
     # zeta; numbers say at which points of the other two directions.
-    u00, u10, u01, u11 = _at_gauss(along[0][0], along[0][1], along[0][2], along[0][3])
-    v00, v10, v01, v11 = _at_gauss(along[1][0], along[1][1], along[1][2], along[1][3])
-    w00, w10, w01, w11 = _at_gauss(along[2][0], along[2][1], along[2][2], along[2][3])
-    # Cofactors; those along xi are summed over the Gauss points of xi, and so on. The points of v
-    # are (xi, zeta), those of w (xi, eta), those of u (eta, zeta).
-    c000, c100 = _cross(v00, w00), _cross(v10, w10)
-    c010, c110 = _cross(v00, w01), _cross(v10, w11)
-    c001, c101 = _cross(v01, w00), _cross(v11, w10)
-    c011, c111 = _cross(v01, w01), _cross(v11, w11)
-    p = _at_gauss(_add(c000, c100), _add(c010, c110), _add(c001, c101), _add(c011, c111))
-    q = _at_gauss(
-        _add(_cross(w00, u00), _cross(w01, u10)),
-        _add(_cross(w10, u00), _cross(w11, u10)),
-        _add(_cross(w00, u01), _cross(w01, u11)),
-        _add(_cross(w10, u01), _cross(w11, u11)),
-    )
-    r = _at_gauss(
-        _add(_cross(u00, v00), _cross(u01, v01)),
-        _add(_cross(u00, v10), _cross(u01, v11)),
-        _add(_cross(u10, v00), _cross(u11, v01)),
-        _add(_cross(u10, v10), _cross(u11, v11)),
-    )
+    u, v, w = [dict(zip(PAIRS, _at_gauss(*along), strict=True)) for along in _edges(place)]
+    # Cofactors along xi by xi, eta, zeta; summed over the Gauss points of xi, and so on.
+    first = {(a, b, c): _cross(v[a, c], w[a, b]) for a in (0, 1) for b, c in PAIRS}
+    p = _at_gauss(*[_add(first[0, b, c], first[1, b, c]) for b, c in PAIRS])
+    q = _at_gauss(*[_add(_cross(w[a, 0], u[0, c]), _cross(w[a, 1], u[1, c])) for a, c in PAIRS])
+    r = _at_gauss(*[_add(_cross(u[b, 0], v[a, 0]), _cross(u[b, 1], v[a, 1])) for a, b in PAIRS])
     # det J, two Gauss points of xi in each tuple; spread over the corners.
-    d00, d10, d01, d11 = _at_gauss(
-        (_dot(u00, c000), _dot(u00, c100)),
-        (_dot(u10, c010), _dot(u10, c110)),
-        (_dot(u01, c001), _dot(u01, c101)),
-        (_dot(u11, c011), _dot(u11, c111)),
-    )
-    return _means(place, (d00, d10, d01, d11), p, q, r)
+    d = _at_gauss(*[tuple([_dot(u[b, c], first[a, b, c]) for a in (0, 1)]) for b, c in PAIRS])
+    return _means(place, d, p, q, r)
 
 
 def _at(a: int, b: int) -> int:

@@ -180,9 +180,8 @@ class InternalEnergy(NamedTuple):
     E: Any  # per reference volume
 
 
-@initial_energy.on(IdealGas)
-def _initial_energy_ideal_gas(eos, like):
-    return InternalEnergy(eos.energy)
+initial_energy.on(IdealGas)(lambda eos, like: InternalEnergy(eos.energy))
+stored_heat.on(IdealGas)(lambda eos, loss: loss)
 
 
 @compressed.on(IdealGas)
@@ -195,11 +194,6 @@ def _compressed_ideal_gas(eos, memory, before, j, heating):
 def _taken_heat_ideal_gas(eos, memory, heat):
     # A moment may hold a little more than there was: a cold gas does not pay all of that at once.
     return (max(heat, -0.1 * memory.E),)
-
-
-@stored_heat.on(IdealGas)
-def _stored_heat_ideal_gas(eos, loss):
-    return loss
 
 
 @pressure.on(IdealGas)

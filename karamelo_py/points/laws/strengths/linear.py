@@ -77,9 +77,10 @@ class Viscous(NamedTuple):
         return cls(mu, 0.0)
 
 
-@strengths.initial_loss.on(Viscous)
-def _initial_loss_viscous(strength, like):
-    return (0.0,)
+strengths.initial_loss.on(Viscous)(lambda strength, like: (0.0,))
+strengths.shear_modulus.on(Viscous)(lambda strength: 0)
+strengths.shear_strain.on(Viscous)(lambda strength, kin, s: nothing(kin))
+strengths.shear_energy.on(Viscous)(lambda strength, kin, s: 0)
 
 
 @strengths.shear_response.on(Viscous)
@@ -92,18 +93,3 @@ def _shear_response_viscous(strength, kin, s, strain, memory, heat, dt):
 def _damped_speed_squared_viscous(strength, squared, density):
     # nu = 4/3 mu/rho
     return damped(squared, 4 / 3 * strength.mu / (density * strength.cell_size))
-
-
-@strengths.shear_modulus.on(Viscous)
-def _shear_modulus_viscous(strength):
-    return 0
-
-
-@strengths.shear_strain.on(Viscous)
-def _shear_strain_viscous(strength, kin, s):
-    return nothing(kin)
-
-
-@strengths.shear_energy.on(Viscous)
-def _shear_energy_viscous(strength, kin, s):
-    return 0
