@@ -253,27 +253,12 @@ def _deformed_cpgimp_det(basis, kin, place, dl):
 
 
 @deformed.on(CPGIMPDiagonal)
-def _deformed_cpgimp_diagonal(basis, kin, place, dl):
-    F = deformation_of_box(kin, place).after(dl.planar())
-    return stretched_box(kin, place, F.diagonal(), F)
-
-
 @deformed.on(CPGIMPStretch)
 def _deformed_cpgimp_stretch(basis, kin, place, dl):
-    F = deformation_of_box(kin, place).after(dl.planar())
-    return stretched_box(kin, place, F.stretch(), F)
-
-
-def deformation_of_box(kin, place):
-    """F of a place that keeps it."""
-    return tensor(planar(kin), place[3 * kin.dimension :])
-
-
-def stretched_box(kin, place, factors, F):
-    """Make the place with half sizes that are `factors` times those at the start, and with F."""
     d = kin.dimension
-    start = place[2 * d : 3 * d]
-    half = [size * abs(factor) for size, factor in zip(start, factors[:d], strict=True)]
+    start, F = place[2 * d : 3 * d], tensor(planar(kin), place[3 * d :]).after(dl.planar())
+    stretches = F.diagonal() if isinstance(basis, CPGIMPDiagonal) else F.stretch()
+    half = [size * abs(factor) for size, factor in zip(start, stretches[:d], strict=True)]
     return (*place[:d], *half, *start, *F)
 
 

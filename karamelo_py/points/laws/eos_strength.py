@@ -16,16 +16,7 @@ from karamelo_py.language.arguments import Argument, look_up
 from karamelo_py.language.rules import suggestion
 from karamelo_py.language.scene import Scene
 from karamelo_py.points import laws
-from karamelo_py.points.kinematics import (
-    I,
-    det,
-    dev,
-    nothing,
-    sym,
-    symmetric_tensor,
-    tr,
-    von_mises,
-)
+from karamelo_py.points.kinematics import I, det, dev, nothing, sym, symmetric_tensor, tr, von_mises
 from karamelo_py.points.laws import Absent, can, column, eos, strengths
 from karamelo_py.points.laws.damages import damage_after, initial_damage, initiation, integrity
 from karamelo_py.points.laws.further import (
@@ -40,12 +31,7 @@ from karamelo_py.points.laws.temperatures import (
     initial_heat,
     thermal_pressure,
 )
-from karamelo_py.points.laws.viscosity import (
-    damped,
-    initial_viscous_pressure,
-    viscous_pressure,
-    viscous_speed,
-)
+from karamelo_py.points.laws.viscosity import damped, viscous_pressure, viscous_speed
 from karamelo_py.script.errors import ScriptError, nearest
 
 # --- the parts, as a script names them --------------------------------------------------------
@@ -218,7 +204,7 @@ class State(NamedTuple):
 
 @laws.initial_state.on(EosStrength)
 def _initial_state_eos_strength(law, kin, like):
-    viscous = initial_viscous_pressure(law.viscosity, like)
+    viscous = () if isinstance(law.viscosity, Absent) else (0.0,)
     m = Memory(
         eos.initial_energy(law.eos, like),
         viscous,
@@ -281,7 +267,7 @@ def viscous_after(law, j, m, rate):
     if isinstance(law.viscosity, Absent):
         return ()
     density = 1 / (laws.specific_volume(law.eos) * j)
-    return viscous_pressure(law.viscosity, rate, density, sound(law, j, m))
+    return (viscous_pressure(law.viscosity, rate, density, sound(law, j, m)),)
 
 
 # --- damage -----------------------------------------------------------------------------------
@@ -351,7 +337,7 @@ def _wave_speed_squared_eos_strength(law, kin, state):
     squared = strengths.damped_speed_squared(law.strength, squared, 1 / volume)
     if isinstance(law.viscosity, Absent):
         return squared
-    viscous = viscous_speed(law.viscosity, m.viscous, 1 / volume, sound(law, J, m))
+    viscous = viscous_speed(law.viscosity, m.viscous[0], 1 / volume, sound(law, J, m))
     return damped(squared, viscous)
 
 

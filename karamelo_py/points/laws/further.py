@@ -54,38 +54,26 @@ def part_pressure(part, memory):
 # ---- the same of all ----------------------------------------------------------------------------
 
 
-@point_function(otherwise=True)
 def initial_further(parts, like):
-    """Memory of the first part, and that of the others."""
-    return ()
-
-
-@initial_further.on(Further)
-def _initial_further_further(parts, like):
+    """Memory of the first part, and that of the others; () of none."""
+    if isinstance(parts, Absent):
+        return ()
     return initial_part(parts.part, like), initial_further(parts.rest, like)
 
 
-@point_function(otherwise=True)
 def further_after(parts, memory, law, kin, j, s, memories, dt):
     """The memories after a step."""
-    return ()
-
-
-@further_after.on(Further)
-def _further_after_further(parts, memory, law, kin, j, s, memories, dt):
+    if isinstance(parts, Absent):
+        return ()
     own, rest = memory
     after = part_after(parts.part, own, law, kin, j, s, memories, dt)
     return after, further_after(parts.rest, rest, law, kin, j, s, memories, dt)
 
 
-@point_function(otherwise=True)
 def further_pressure(parts, memory, p):
     """p and what all parts add to it."""
-    return p
-
-
-@further_pressure.on(Further)
-def _further_pressure_further(parts, memory, p):
+    if isinstance(parts, Absent):
+        return p
     own, rest = memory
     return further_pressure(parts.rest, rest, p + sum(part_pressure(parts.part, own)))
 

@@ -6,13 +6,7 @@ from karamelo_py.script.errors import ScriptError
 
 
 def lame_parameters(E: float, nu: float) -> tuple[float, float]:
-    """Lame's parameters lambda and G from Young's modulus and Poisson's ratio.
-
-    Raises
-    ------
-    ScriptError
-        For a ratio for which the elastic energy is not positive or not finite.
-    """
+    """Lame's parameters lambda and G; refuse a ratio without positive, finite elastic energy."""
     if not -1 < nu < 0.5:
         raise ScriptError(
             f"Poisson's ratio {nu:g} is impossible",
@@ -33,13 +27,7 @@ def check_temperatures(Tr: float, Tm: float, name: str = "Tr") -> None:
 
 
 def reference_rate(epsdot0: float, factor: float, name: str) -> float:
-    """The reference rate of a factor 1 + `factor` ln(rate/epsdot0), any where that is 1.
-
-    Raises
-    ------
-    ScriptError
-        For a rate of 0 that takes part.
-    """
+    """The reference rate of 1 + `factor` ln(rate/epsdot0), not 0; any where that is always 1."""
     if epsdot0 > 0:
         return epsdot0
     if factor:

@@ -1,39 +1,11 @@
-"""Viscous pressure of one point, which spreads shocks over a few cells.
+"""Artificial viscosity of one point, which spreads shocks over a few cells.
 
-A viscosity is a NamedTuple of parameters (its class is the tag), a part of a composed law
-(`karamelo_py.points.laws.eos_strength`). Its memory is (q,), the viscous pressure.
+It is a part of a composed law (`karamelo_py.points.laws.eos_strength`) that an equation of state
+brings. Its memory is (q,), the viscous pressure.
 """
 
 from math import sqrt
 from typing import NamedTuple
-
-from karamelo_py.compiler.compile import point_function
-
-
-@point_function(otherwise=True)
-def initial_viscous_pressure(viscosity, like):
-    """The viscous pressure at rest, or () where there is none."""
-    return ()
-
-
-@point_function()
-def viscous_pressure(viscosity, rate, density, sound):
-    """The memory at a rate of volume change: viscous pressure, positive in compression."""
-
-
-@point_function()
-def viscous_speed(viscosity, memory, density, sound):
-    """nu / h, nu the kinematic viscosity against compression and h the cell size."""
-
-
-def damped(squared, a):
-    """Square of c' = sqrt(c^2 + a^2) + a, from c^2 and a = nu / h.
-
-    Viscosity nu damps the shortest wave of a cell by xi = nu / (c h), which takes c dt / h down to
-    sqrt(1 + xi^2) - xi (Belytschko et al. 2014, eq. 6.3.10): as if c were c'.
-    """
-    speed = sqrt(squared + a * a) + a
-    return speed * speed
 
 
 class ArtificialViscosity(NamedTuple):
@@ -51,17 +23,24 @@ def artificial_viscosity(Q1: float, Q2: float) -> dict[str, NamedTuple]:
     return {"viscosity": ArtificialViscosity(Q1, Q2, 0.0)} if Q1 > 0 or Q2 > 0 else {}
 
 
-initial_viscous_pressure.on(ArtificialViscosity)(lambda viscosity, like: (0.0,))
-
-
-@viscous_pressure.on(ArtificialViscosity)
-def _viscous_pressure_artificial_viscosity(viscosity, rate, density, sound):
+def viscous_pressure(viscosity, rate, density, sound):
+    """Viscous pressure at a rate of volume change, positive in compression."""
     closing = max(-rate, 0)
     h = viscosity.cell_size
-    return (density * h * closing * (viscosity.Q1 * h * closing + viscosity.Q2 * sound),)
+    return density * h * closing * (viscosity.Q1 * h * closing + viscosity.Q2 * sound)
 
 
-@viscous_speed.on(ArtificialViscosity)
-def _viscous_speed_artificial_viscosity(viscosity, memory, density, sound):
+def viscous_speed(viscosity, q, density, sound):
+    """nu / h, nu the kinematic viscosity against compression and h the cell size."""
     # nu / h = Q1 h |d| + Q2 c, and q / rho >= Q1 (h d)^2
-    return sqrt(viscosity.Q1 * memory[0] / density) + viscosity.Q2 * sound
+    return sqrt(viscosity.Q1 * q / density) + viscosity.Q2 * sound
+
+
+def damped(squared, a):
+    """Square of c' = sqrt(c^2 + a^2) + a, from c^2 and a = nu / h.
+
+    Viscosity nu damps the shortest wave of a cell by xi = nu / (c h), which takes c dt / h down to
+    sqrt(1 + xi^2) - xi (Belytschko et al. 2014, eq. 6.3.10): as if c were c'.
+    """
+    speed = sqrt(squared + a * a) + a
+    return speed * speed

@@ -12,19 +12,11 @@ from typing import Annotated, NamedTuple
 from karamelo_py.compiler.compile import where
 from karamelo_py.language.kinds import In
 from karamelo_py.language.rules import known_failure
+from karamelo_py.points import transfers
 from karamelo_py.points.basis import affine_weight, reach
 from karamelo_py.points.kinematics import outer, planar, zero
 from karamelo_py.points.laws import jacobian
-from karamelo_py.points.transfers import (
-    Moment,
-    add_moment,
-    affine_velocity,
-    by_arms,
-    displacing_velocity,
-    known_volume,
-    nodal_momentum,
-    zero_moment,
-)
+from karamelo_py.points.transfers import Moment
 from karamelo_py.points.transfers.flip import Share, blend, swings, take_nodal_velocity
 
 COMPRESSED = 1e-3  # share of its volume that a point has to lose to go with the grid
@@ -121,10 +113,10 @@ known_failure(
 )
 
 
-known_volume.on(ASFLIP)(lambda transfer, law, kin, state: jacobian(law, kin, state))
+transfers.known_volume.on(ASFLIP)(lambda transfer, law, kin, state: jacobian(law, kin, state))
 
 
-@displacing_velocity.on(ASFLIP)
+@transfers.displacing_velocity.on(ASFLIP)
 def _displacing_velocity_asflip(transfer, v, v_pic, j):
     beta = where(1 - j < COMPRESSED, transfer.beta, 0)
     return v_pic + beta * (v - v_pic)
@@ -152,11 +144,11 @@ def by_arms_alone(transfer, inverse_d):
 
 for _transfer in (APIC, AFLIP, ASFLIP):
     _transfer.keeps_gradient = False
-    nodal_momentum.on(_transfer)(nodal_momentum_affine)
-    add_moment.on(_transfer)(add_moment_affine)
-    affine_velocity.on(_transfer)(affine_velocity_of_moment)
-    zero_moment.on(_transfer)(zero_planar)
-    by_arms.on(_transfer)(by_arms_alone)
+    transfers.nodal_momentum.on(_transfer)(nodal_momentum_affine)
+    transfers.add_moment.on(_transfer)(add_moment_affine)
+    transfers.affine_velocity.on(_transfer)(affine_velocity_of_moment)
+    transfers.zero_moment.on(_transfer)(zero_planar)
+    transfers.by_arms.on(_transfer)(by_arms_alone)
 
 take_nodal_velocity(APIC)
 blend(AFLIP)

@@ -8,20 +8,11 @@ stays the same; for splines as far as velocity is linear over their support.
 
 from typing import Annotated, NamedTuple
 
+from karamelo_py.points import transfers
 from karamelo_py.points.basis import affine_weight, reach
 from karamelo_py.points.kinematics import Axisymmetric, outer
 from karamelo_py.points.kinematics import gradient as as_gradient
-from karamelo_py.points.transfers import (
-    Moment,
-    add_moment,
-    affine_velocity,
-    by_arms,
-    forces_by_arms,
-    gradient_weight,
-    nodal_momentum,
-    straining,
-    zero_moment,
-)
+from karamelo_py.points.transfers import Moment
 from karamelo_py.points.transfers.affine import zero_planar
 from karamelo_py.points.transfers.flip import Share, blend, take_nodal_velocity
 
@@ -99,35 +90,35 @@ def kept_velocity_gradient(transfer, L, inverse_d):
 
 for _transfer in (TPIC, TFLIP, MLS):
     _transfer.keeps_gradient = True
-    nodal_momentum.on(_transfer)(nodal_momentum_taylor)
-    add_moment.on(_transfer)(add_moment_taylor)
-    affine_velocity.on(_transfer)(kept_velocity_gradient)
-    zero_moment.on(_transfer)(zero_planar)
+    transfers.nodal_momentum.on(_transfer)(nodal_momentum_taylor)
+    transfers.add_moment.on(_transfer)(add_moment_taylor)
+    transfers.affine_velocity.on(_transfer)(kept_velocity_gradient)
+    transfers.zero_moment.on(_transfer)(zero_planar)
 
 take_nodal_velocity(TPIC)
 blend(TFLIP)
 take_nodal_velocity(MLS)
 
 
-@gradient_weight.on(MLS)
+@transfers.gradient_weight.on(MLS)
 def _gradient_weight_mls(transfer, basis, kin, grid, stencil, k, gradient):
     # The hoop part N / r of an axisymmetric one stays.
     moved = affine_weight(basis, kin, grid, stencil, k)
     return as_gradient(kin, [*moved, *gradient[len(moved) :]])
 
 
-by_arms.on(MLS)(lambda transfer, inverse_d: inverse_d)
+transfers.by_arms.on(MLS)(lambda transfer, inverse_d: inverse_d)
 
 
 # The velocity gradient is what the point keeps: gathered once where both come from v*.
 # Axisymmetric, the hoop part is missing in it.
 
 
-@forces_by_arms.on(MLS)
+@transfers.forces_by_arms.on(MLS)
 def _forces_by_arms_mls(transfer, kin):
     return not isinstance(kin, Axisymmetric)
 
 
-@straining.on(MLS)
+@transfers.straining.on(MLS)
 def _straining_mls(transfer, kin, gradient):
     return gradient if isinstance(kin, Axisymmetric) else ()

@@ -107,12 +107,6 @@ def peak_and_residual(surface_of, cohesion, phi, psi, to_cohesion, to_phi, over)
 
     `surface_of` gives cohesion and friction of the yield surface, from the cohesion and the angle
     of friction (in radians) of a soil. What is None stays as it is.
-
-    Raises
-    ------
-    ScriptError
-        For angles that no soil has, where there would be no strength at all, if something is
-        missing, or a residual is above the peak.
     """
     if not 0 <= phi < 90:
         raise ScriptError(

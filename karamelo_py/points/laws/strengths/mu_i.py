@@ -63,13 +63,7 @@ class MuI(NamedTuple):
     rho_s: Annotated[float, Positive]
 
     def checked(self):
-        """The law.
-
-        Raises
-        ------
-        ScriptError
-            If friction falls with the rate: such flow is not stable.
-        """
+        """The law, unless friction falls with the rate: such flow is not stable."""
         if self.mu_2 < self.mu_s:
             raise ScriptError(
                 f"the friction of fast flow, {self.mu_2:g}, is below that of slow flow",
