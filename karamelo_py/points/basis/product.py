@@ -83,9 +83,11 @@ def evenly(basis, grid, stencil):
     return True
 
 
-def hoop(weight, gradient, inv_r):
-    """N / r at an axisymmetric point; at r = 0 its limit, dN/dr (`inv_r` is 0 there)."""
-    return where(inv_r > 0, weight * inv_r, gradient)
+def with_hoop(kin, weight, slopes, inv_r):
+    """The gradient of a weight, axisymmetric with N / r behind, or its limit on the axis, dN/dr."""
+    if isinstance(kin, Axisymmetric):
+        slopes = (*slopes, where(inv_r > 0, weight * inv_r, slopes[0]))
+    return gradient(kin, slopes)
 
 
 def inverse_radius(r):
@@ -170,10 +172,9 @@ def _entry_product(basis, kin, grid, stencil, k):
     lines = zip(stencil.lines, at, strict=True)
     slopes = each_for_its_own(weights, [item(line.gradients, n) for line, n in lines])
     weight = product(weights)
-    if isinstance(kin, Axisymmetric):
-        slopes = [*slopes, hoop(weight, slopes[0], stencil.inv_r)]
     first = node_number(grid, grid.first, [line.first for line in stencil.lines])
-    return beside(first, node_number(grid, 0, at)), weight, gradient(kin, slopes)
+    number = beside(first, node_number(grid, 0, at))
+    return number, weight, with_hoop(kin, weight, slopes, stencil.inv_r)
 
 
 def _reach_product(basis, kin, grid, stencil, k):

@@ -30,21 +30,14 @@ from karamelo_py.points.basis import (
 )
 from karamelo_py.points.basis.product import (
     digits,
-    hoop,
     inverse_radius,
     item,
     node_number,
     product,
+    with_hoop,
 )
 from karamelo_py.points.grid import cells_along, in_cells
-from karamelo_py.points.kinematics import (
-    Axisymmetric,
-    cofactor,
-    determinant,
-    gradient,
-    total,
-    vector,
-)
+from karamelo_py.points.kinematics import cofactor, determinant, gradient, total, vector
 
 
 class Element(NamedTuple):
@@ -212,9 +205,7 @@ def _locate_corners(basis, kin, grid, place):
 def seen_at_corner(kin, stencil, c):
     """The c-th corner of a stencil, its weight, and its gradient."""
     weight, slopes = item(stencil.weights, c), item(stencil.gradients, c)
-    if isinstance(kin, Axisymmetric):
-        slopes = (*slopes, hoop(weight, slopes[0], stencil.inv_r))
-    return item(stencil.corners, c), weight, gradient(kin, slopes)
+    return item(stencil.corners, c), weight, with_hoop(kin, weight, slopes, stencil.inv_r)
 
 
 def _entry_corners(basis, kin, grid, stencil, k):

@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 from karamelo_py.compiler.compile import all_lanes, beside, first_lane, fma, is_one, shared
 from karamelo_py.points.basis import affine_weight, entry, reach, support
 from karamelo_py.points.basis.cpdi import CornerStencil, arm, solve
-from karamelo_py.points.basis.product import digits, hoop, item, node_number
+from karamelo_py.points.basis.product import digits, item, node_number, with_hoop
 from karamelo_py.points.grid import cells_along
-from karamelo_py.points.kinematics import Axisymmetric, gradient, vector
+from karamelo_py.points.kinematics import vector
 
 WIDTH = 3  # nodes along each direction
 
@@ -101,11 +101,9 @@ def _support_in_block(basis, kin):
 @entry.on(InBlock)
 def _entry_in_block(basis, kin, grid, stencil, k):
     weight, slopes = item(stencil.weights, k), item(stencil.gradients, k)
-    if isinstance(kin, Axisymmetric):
-        slopes = (*slopes, hoop(weight, slopes[0], stencil.seen.inv_r))
     first = node_number(grid, grid.first, stencil.first)
     number = beside(first, node_number(grid, 0, digits(k, WIDTH, kin.dimension)))
-    return number, weight, gradient(kin, slopes)
+    return number, weight, with_hoop(kin, weight, slopes, stencil.seen.inv_r)
 
 
 @reach.on(InBlock)

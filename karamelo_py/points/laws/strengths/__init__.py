@@ -103,11 +103,6 @@ def elastic_ratio(strength, memory, j):
     return j
 
 
-@point_function()
-def with_elastic_ratio(strength, memory, j, elastic):
-    """The memory with which `elastic_ratio` of j is `elastic`."""
-
-
 @point_function(otherwise=True)
 def shear_modulus(strength):
     """Stiffness against a further change of shape, for the speed of waves."""

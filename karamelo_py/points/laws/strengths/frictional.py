@@ -15,13 +15,7 @@ from math import inf, log, radians, sqrt
 from karamelo_py.compiler.compile import point_function
 from karamelo_py.points.kinematics import inner
 from karamelo_py.points.laws.eos import bulk_modulus, pressure, ratio_at_pressure
-from karamelo_py.points.laws.strengths import (
-    elastic_ratio,
-    pressure_response,
-    remembers,
-    respond,
-    with_elastic_ratio,
-)
+from karamelo_py.points.laws.strengths import elastic_ratio, pressure_response, remembers, respond
 from karamelo_py.points.laws.strengths.hardening import elastic_trial
 from karamelo_py.points.laws.temperatures import thermal_pressure
 from karamelo_py.script.errors import ScriptError
@@ -56,11 +50,6 @@ def elastic_part(strength, memory, j):
     return j / (memory.Jp * memory.Js)
 
 
-def with_elastic_part(strength, memory, j, elastic):
-    """Let the elastic part of the volume ratio j be `elastic`: the rest is plastic."""
-    return memory._replace(Jp=j / (elastic * memory.Js))
-
-
 def respond_by_friction(strength, law, kin, s, strain, j, memories, dt):
     """Return an elastic trial to the yield surface, and give the change of volume to the memory."""
     memory, heat = memories.strength, memories.heat
@@ -86,7 +75,7 @@ def respond_by_friction(strength, law, kin, s, strain, j, memories, dt):
         if p < lowest and reached - lowest <= 1e-6 * (lowest - p):
             memory = memory._replace(Js=j / (memory.Jp * after))
         else:
-            memory = with_elastic_part(strength, memory, j, after)
+            memory = memory._replace(Jp=j / (after * memory.Js))
         work -= reached * log(elastic / after)
     return new, memory, work
 
@@ -95,7 +84,6 @@ def frictional(strength: type) -> None:
     """Give `strength` (with a field ``G`` and those of `surface`) memory, and response."""
     remembers(strength, ep=0.0, Jp=1.0, Js=1.0)
     elastic_ratio.on(strength)(elastic_part)
-    with_elastic_ratio.on(strength)(with_elastic_part)
     respond.on(strength)(respond_by_friction)
 
 
