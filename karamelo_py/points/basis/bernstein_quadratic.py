@@ -52,7 +52,5 @@ def _along_bernstein_quadratic(basis, kin, grid, place, direction):
 
 
 spacing.on(BernsteinQuadratic)(lambda basis: 0.5)
-
-
 mapped_again.on(BernsteinQuadratic)(leave_moment_out)
 register(BernsteinQuadratic, 3)

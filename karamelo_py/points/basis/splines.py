@@ -96,8 +96,6 @@ def _evenly_quadratic_spline(basis, grid, stencil):
 
 
 first_node.on(QuadraticSpline)(lambda basis, like: 0.5)
-
-
 register(QuadraticSpline, 3)
 
 

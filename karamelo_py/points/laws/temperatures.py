@@ -103,8 +103,6 @@ class PlasticWork(NamedTuple):
 
 
 column(PlasticWork, "T", temperature)
-
-
 initial_heat.on(PlasticWork)(lambda temperature, like: Warm(temperature.T0))
 heat_capacity.on(PlasticWork)(lambda law, like: law.cp)
 conductivity.on(PlasticWork)(lambda law, like: law.kappa)

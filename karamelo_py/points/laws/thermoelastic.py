@@ -54,8 +54,6 @@ def expanding(law: Any, cp: float | None, kappa: float | None, alpha: float) -> 
 
 
 laws.column(Expansion, "T", laws.temperature)
-
-
 initial_heat.on(Expansion)(lambda heat, like: Warm(heat.initial_temperature))
 
 
