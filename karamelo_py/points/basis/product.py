@@ -117,7 +117,7 @@ def node_number(grid, first, steps):
 
 def digits(k, base, d):
     """Split a number into `d` digits in a base, the highest first."""
-    found = []
+    found: list = []
     for _ in range(d - 1):
         found = [k % base, *found]
         k = k // base
