@@ -348,7 +348,7 @@ def _flow_stress_zerilli_armstrong(strength, memory, known, increment, heat, dt)
     rate = increment / (dt * strength.epsdot0)
     at_rate = power_of_strain(1, exponent, rate)
     rate, rate_slope = power_law(1, exponent, rate, at_rate, 0)
-    rate = where(exponent > 0, rate, 1)
+    rate = where(exponent > 0, rate, real(1, rate))
     factor = strength.C1 + root
     slope += thermal * (rate * root_slope + factor * rate_slope / (dt * strength.epsdot0))
     return strength.C0 + thermal * rate * factor + athermal, slope
