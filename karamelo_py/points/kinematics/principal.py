@@ -1,60 +1,47 @@
 """Principal values and directions of symmetric tensors, and back."""
 
 from math import sqrt
-from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import point_function, round_off, shared, where
-from karamelo_py.points.kinematics.tags import Axisymmetric, Line, PlaneStrain, Space
-from karamelo_py.points.kinematics.tensors import SymmetricTensor
+from karamelo_py.compiler.compile import round_off, shared, where
+from karamelo_py.points.kinematics import Space
 
 
-class Angle(NamedTuple):
-    """Directions in the plane: cosine and sine of twice the angle to the first."""
-
-    cosine: Any
-    sine: Any
-
-
-@point_function()
-def principal(s: SymmetricTensor):
+def principal(s):
     """Find principal values (3,) of a symmetric tensor, in no order, and their directions."""
+    if s.kin.dimension == 1:
+        return (s.xx, s.yy, s.zz), ()
+    return principal_in_plane(s) if s.kin.dimension == 2 else principal_in_space(s)
 
 
-@point_function()
-def from_principal(s: SymmetricTensor, values, directions):
+def from_principal(s, values, directions):
     """Make the symmetric tensor with principal values in directions; of the class of `s`."""
+    if s.kin.dimension == 1:
+        return s._make(values)
+    if s.kin.dimension == 2:
+        a, b, c = values
+        mean = 0.5 * (a + b)
+        radius = 0.5 * (a - b)
+        cosine, sine = directions  # of twice the angle to the first
+        change = radius * cosine
+        return s._make([mean + change, mean - change, c, radius * sine])
+
+    def component(i, j):
+        a, b, c = [p * u[i] * u[j] for p, u in zip(values, directions, strict=True)]
+        return a + b + c
+
+    return s._make([component(i, j) for i, j in s.places])
 
 
-@principal.on(Line.Symmetric)
-def _principal_line(s):
-    return (s.xx, s.yy, s.zz), ()
-
-
-@from_principal.on(Line.Symmetric)
-def _from_principal_line(s, values, directions):
-    return s._make(values)
-
-
-@principal.on(PlaneStrain.Symmetric)
-@principal.on(Axisymmetric.Symmetric)
-def _principal_plane(s):
+def principal_in_plane(s):
+    """See `principal`."""
     apart = 0.5 * (s.xx - s.yy)
     mean = 0.5 * (s.xx + s.yy)
     radius = sqrt(apart * apart + s.xy * s.xy)
     turned = radius > 0
     over = where(turned, radius, 1)
-    angle = Angle(where(turned, apart / over, 1), s.xy / over)
+    # Cosine and sine of twice the angle to the first direction.
+    angle = where(turned, apart / over, 1), s.xy / over
     return (mean + radius, mean - radius, s.zz), angle
-
-
-@from_principal.on(PlaneStrain.Symmetric)
-@from_principal.on(Axisymmetric.Symmetric)
-def _from_principal_plane(s, values, directions):
-    a, b, c = values
-    mean = 0.5 * (a + b)
-    radius = 0.5 * (a - b)
-    change = radius * directions.cosine
-    return s._make([mean + change, mean - change, c, radius * directions.sine])
 
 
 @shared
@@ -71,8 +58,9 @@ def jacobi_rotation(a, b, c):
 _SWEEPS = 8
 
 
-@principal.on(Space.Symmetric)
-def _principal_space(s):
+@shared
+def principal_in_space(s):
+    """See `principal`."""
     # Jacobi's rotations (Golub & Van Loan 2013, section 8.5): directions are right to round-off
     # whether or not principal values are equal, which closed forms are not.
     a, b, c, d, e, f = s
@@ -99,12 +87,3 @@ def _principal_space(s):
 def rotated(k, g, u, v):
     """Turn two directions in their plane by the angle with the cosine k and the sine g."""
     return k * u - g * v, k * v - (-g) * u  # differences: a sum would be rounded once
-
-
-@from_principal.on(Space.Symmetric)
-def _from_principal_space(s, values, directions):
-    def component(i, j):
-        a, b, c = [p * u[i] * u[j] for p, u in zip(values, directions, strict=True)]
-        return a + b + c
-
-    return s._make([component(i, j) for i, j in s.places])

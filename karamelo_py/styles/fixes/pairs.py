@@ -13,7 +13,7 @@ from karamelo_py.kernels.laws import elastic_law
 from karamelo_py.kernels.p2g import Force
 from karamelo_py.language.rules import gain
 from karamelo_py.language.signature import NonNegative
-from karamelo_py.points.pairs import Hertz, MinimizePenetration
+from karamelo_py.points.bodies import Hertz, MinimizePenetration
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
