@@ -39,7 +39,7 @@ class PairContact(Fix):
     """Base of the fixes by which the points of two solids push each other.
 
     Of many processes the first looks for pairs among the points of all that may touch. The `law` is
-    the tag of :mod:`karamelo_py.points.pairs` that gives the force between two points.
+    the tag of :mod:`karamelo_py.points.bodies` that gives the force between two points.
     """
 
     law: NamedTuple
