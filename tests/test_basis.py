@@ -21,13 +21,17 @@ from karamelo_py.points.basis import (
     support,
 )
 from karamelo_py.points.basis.bernstein_quadratic import BernsteinQuadratic
-from karamelo_py.points.basis.cpgimp import CPGIMPCorners, CPGIMPDet, CPGIMPDiagonal, CPGIMPStretch
-from karamelo_py.points.basis.cubic_spline import CubicSpline
+from karamelo_py.points.basis.gimp import (
+    UGIMP,
+    CPGIMPCorners,
+    CPGIMPDet,
+    CPGIMPDiagonal,
+    CPGIMPStretch,
+)
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.basis.product import along
-from karamelo_py.points.basis.quadratic_spline import QuadraticSpline
+from karamelo_py.points.basis.splines import CubicSpline, QuadraticSpline
 from karamelo_py.points.basis.surface import ENTRIES, profile, surface_table
-from karamelo_py.points.basis.ugimp import UGIMP
 from karamelo_py.points.grid import inside
 from karamelo_py.points.kinematics import Axisymmetric, Line
 from karamelo_py.scene.lattice import Lattice

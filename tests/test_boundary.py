@@ -10,7 +10,7 @@ from states import final_state, same_bits
 from tensors import KINEMATICS
 
 from comparisons.results import read_dump, read_log
-from karamelo_py.points.boundary import turned
+from karamelo_py.points.grid import turned
 
 MASS = {1: 2 * 0.3, 2: 2 * 0.3 * 0.2, 3: 2 * 0.3 * 0.2 * 0.1}
 COUNT = {1: 6, 2: 24, 3: 48}

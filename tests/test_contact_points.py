@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from karamelo_py.kernels.pairs import TwoBodies, cells_for, push_apart
+from karamelo_py.points.bodies import MinimizePenetration
 from karamelo_py.points.kinematics import KINEMATICS
-from karamelo_py.points.pairs import MinimizePenetration
 
 H = 0.1
 MINIMIZE = "contact/minimize_penetration, a, b, 0"

@@ -26,13 +26,9 @@ from karamelo_py.points.basis import (
     reach,
     support,
 )
-from karamelo_py.points.basis.cpdi import CUBE, SQUARE, domain
+from karamelo_py.points.basis.cpdi import CUBE, SQUARE, AtCorners, domain
 from karamelo_py.points.basis.cpdi.block import InBlock, block_of
-from karamelo_py.points.basis.cpdi.corners import AtCorners
-from karamelo_py.points.basis.cpdi.hexahedron import H8
-from karamelo_py.points.basis.cpdi.parallel import R4, R8
-from karamelo_py.points.basis.cpdi.quadrilateral import Q4
-from karamelo_py.points.basis.cpdi.simplex import T3, Tet4
+from karamelo_py.points.basis.cpdi.domains import H8, Q4, R4, R8, T3, Tet4
 from karamelo_py.points.kinematics import Axisymmetric, PlaneStrain, Space
 from karamelo_py.scene.lattice import Lattice
 from karamelo_py.scene.views import PointsView

@@ -36,11 +36,11 @@ from karamelo_py.points.laws import (
     wave_speed_squared,
     with_stress,
 )
-from karamelo_py.points.laws.eos.linear import LinearPressure
+from karamelo_py.points.laws.eos import LinearPressure
 from karamelo_py.points.laws.eos_strength import EosStrength
 from karamelo_py.points.laws.further import chained, initial_part, part_after, part_pressure
+from karamelo_py.points.laws.strengths.hardening import Plastic
 from karamelo_py.points.laws.strengths.linear import Elastic
-from karamelo_py.points.laws.strengths.plastic import Plastic
 from karamelo_py.scene.material import MaterialPart
 from karamelo_py.script.values import Values
 

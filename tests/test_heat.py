@@ -11,8 +11,8 @@ import pytest
 from states import same_bits
 
 from comparisons.results import read_dump
+from karamelo_py.points.bodies import face
 from karamelo_py.points.frames import Total, pulled_back
-from karamelo_py.points.heat import face
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space, tensor, vector
 
 # Heat capacity per volume and conductivity are one: the diffusivity is.

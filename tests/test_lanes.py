@@ -42,38 +42,36 @@ from karamelo_py.points.basis import (
     support,
 )
 from karamelo_py.points.basis.bernstein_quadratic import BernsteinQuadratic
-from karamelo_py.points.basis.cpdi import SQUARE
+from karamelo_py.points.basis.cpdi import SQUARE, AtCorners
 from karamelo_py.points.basis.cpdi.block import InBlock, block_of, of_one
-from karamelo_py.points.basis.cpdi.corners import AtCorners
-from karamelo_py.points.basis.cpdi.parallel import R4
-from karamelo_py.points.basis.cpdi.quadrilateral import Q4
-from karamelo_py.points.basis.cpdi.simplex import T3
-from karamelo_py.points.basis.cpgimp import CPGIMPCorners, CPGIMPDet, CPGIMPDiagonal, CPGIMPStretch
-from karamelo_py.points.basis.cubic_spline import CubicSpline
+from karamelo_py.points.basis.cpdi.domains import Q4, R4, T3
+from karamelo_py.points.basis.gimp import (
+    UGIMP,
+    CPGIMPCorners,
+    CPGIMPDet,
+    CPGIMPDiagonal,
+    CPGIMPStretch,
+)
 from karamelo_py.points.basis.linear import Linear
-from karamelo_py.points.basis.quadratic_spline import QuadraticSpline
-from karamelo_py.points.basis.ugimp import UGIMP
-from karamelo_py.points.boundary import ReflectingGrid, reflected
-from karamelo_py.points.grid import Grid
+from karamelo_py.points.basis.splines import CubicSpline, QuadraticSpline
+from karamelo_py.points.grid import Grid, ReflectingGrid, reflected
 from karamelo_py.points.kinematics import PlaneStrain, Space, vector, zero
 from karamelo_py.points.laws import Absent, advance, initial_state, law_kind, plastic_strain
-from karamelo_py.points.laws.damages.damage_johnson_cook import JohnsonCookDamage
+from karamelo_py.points.laws.damages import JohnsonCookDamage
+from karamelo_py.points.laws.eos import LinearPressure
 from karamelo_py.points.laws.eos.fluid import Tait
-from karamelo_py.points.laws.eos.linear import LinearPressure
 from karamelo_py.points.laws.eos.shock import Shock
 from karamelo_py.points.laws.eos_strength import EosStrength
-from karamelo_py.points.laws.further import Further
+from karamelo_py.points.laws.further import Further, PlasticRate
 from karamelo_py.points.laws.linear import LinearElastic
 from karamelo_py.points.laws.neo_hookean import NeoHookean
-from karamelo_py.points.laws.plastic_rate import PlasticRate
 from karamelo_py.points.laws.strengths.drucker_prager import DruckerPrager
-from karamelo_py.points.laws.strengths.fluid import Viscous
-from karamelo_py.points.laws.strengths.johnson_cook import JohnsonCook
+from karamelo_py.points.laws.strengths.hardening import LinearHardening
+from karamelo_py.points.laws.strengths.linear import Viscous
+from karamelo_py.points.laws.strengths.metals import JohnsonCook, ZerilliArmstrong
 from karamelo_py.points.laws.strengths.mu_i import MuI
-from karamelo_py.points.laws.strengths.plastic import LinearHardening
-from karamelo_py.points.laws.strengths.zerilli_armstrong import ZerilliArmstrong
-from karamelo_py.points.laws.temperatures.plastic_work import PlasticWork
-from karamelo_py.points.laws.viscosity.artificial import ArtificialViscosity
+from karamelo_py.points.laws.temperatures import PlasticWork
+from karamelo_py.points.laws.viscosity import ArtificialViscosity
 from karamelo_py.run.lower.build import lower
 from karamelo_py.scene.hub import Hub
 

@@ -21,13 +21,13 @@ from karamelo_py.points.laws import (
     with_stress,
     with_temperature,
 )
-from karamelo_py.points.laws.damages.damage_johnson_cook import JohnsonCookDamage
-from karamelo_py.points.laws.eos.linear import LinearPressure
+from karamelo_py.points.laws.damages import JohnsonCookDamage
+from karamelo_py.points.laws.eos import LinearPressure
 from karamelo_py.points.laws.eos.shock import Shock
 from karamelo_py.points.laws.eos_strength import EosStrength
-from karamelo_py.points.laws.strengths.johnson_cook import JohnsonCook
-from karamelo_py.points.laws.strengths.plastic import Plastic
-from karamelo_py.points.laws.temperatures.plastic_work import PlasticWork
+from karamelo_py.points.laws.strengths.hardening import Plastic
+from karamelo_py.points.laws.strengths.metals import JohnsonCook
+from karamelo_py.points.laws.temperatures import PlasticWork
 
 K, G, Y = 160.0, 80.0, 0.4
 D1, D2, D3, D4, D5, TR, TM = 0.05, 0.8, -1.5, 0.02, 0.6, 300.0, 1300.0

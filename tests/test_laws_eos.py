@@ -20,21 +20,18 @@ from karamelo_py.points.laws import (
     with_temperature,
 )
 from karamelo_py.points.laws.eos import (
+    LinearPressure,
     bulk_modulus,
     compression_energy,
     pressure,
     ratio_at_pressure,
 )
-from karamelo_py.points.laws.eos.fluid import Tait
-from karamelo_py.points.laws.eos.ideal_gas import IdealGas
-from karamelo_py.points.laws.eos.linear import LinearPressure
+from karamelo_py.points.laws.eos.fluid import IdealGas, Tait
 from karamelo_py.points.laws.eos.shock import Shock
 from karamelo_py.points.laws.eos_strength import EosStrength
-from karamelo_py.points.laws.strengths.fluid import Viscous
-from karamelo_py.points.laws.strengths.linear import Elastic
-from karamelo_py.points.laws.temperatures import Warm
-from karamelo_py.points.laws.temperatures.plastic_work import PlasticWork
-from karamelo_py.points.laws.viscosity.artificial import ArtificialViscosity
+from karamelo_py.points.laws.strengths.linear import Elastic, Viscous
+from karamelo_py.points.laws.temperatures import PlasticWork, Warm
+from karamelo_py.points.laws.viscosity import ArtificialViscosity
 
 RHO, C0, S, GAMMA, CV, TR = 8.96, 0.394, 1.489, 2.02, 383e-8, 298.0  # copper: g/cm3, cm/us
 COPPER = Shock(1 / RHO, RHO * C0**2, S, GAMMA * RHO * CV, TR)

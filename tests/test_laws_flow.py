@@ -15,14 +15,13 @@ from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.laws import law_in, law_on, law_table
 from karamelo_py.points.kinematics import Axisymmetric, PlaneStrain, Space
 from karamelo_py.points.laws import advance, columns_of, dissipated_energy, plastic_strain, shown
-from karamelo_py.points.laws.eos.linear import LinearPressure
+from karamelo_py.points.laws.eos import LinearPressure
 from karamelo_py.points.laws.eos_strength import EosStrength
-from karamelo_py.points.laws.numbers import Numbers
-from karamelo_py.points.laws.strengths.formula import FlowStress
+from karamelo_py.points.laws.parameters import Numbers
+from karamelo_py.points.laws.strengths.curves import FlowStress, Tabulated
+from karamelo_py.points.laws.strengths.metals import ZerilliArmstrong
 from karamelo_py.points.laws.strengths.mu_i import MuI
-from karamelo_py.points.laws.strengths.tabulated import Tabulated
-from karamelo_py.points.laws.strengths.zerilli_armstrong import ZerilliArmstrong
-from karamelo_py.points.laws.temperatures.plastic_work import PlasticWork
+from karamelo_py.points.laws.temperatures import PlasticWork
 
 RHO, K, G = 8.0, 160.0, 80.0
 EOS = LinearPressure(1 / RHO, K)
@@ -264,7 +263,7 @@ def test_below_slow_friction_grains_hold():
 
 def test_compiled_laws_give_the_same_numbers():
     """One kernel for all of them: rows of numbers, the stack of a formula, roots and powers."""
-    formula = Numbers([CONSTANT, 0.4, POINT, 0, OPERATIONS["sqrt"], 0, OPERATIONS["+"], 0])
+    formula = Numbers((CONSTANT, 0.4, POINT, 0, OPERATIONS["sqrt"], 0, OPERATIONS["+"], 0))
     strengths = COPPER, Tabulated.given(G, *np.ravel(POINTS)), FlowStress(G, formula, 4, 293.0)
     laws = [*(EosStrength(EOS, strength) for strength in strengths), SAND]
     shear = flat(Space(), np.array([[-1e-3, 0.02, 0], [0, 0, 0], [0, 0, 0]]))

@@ -24,14 +24,12 @@ from karamelo_py.points.laws import (
     with_stress,
     with_temperature,
 )
-from karamelo_py.points.laws.eos.linear import LinearPressure
+from karamelo_py.points.laws.eos import LinearPressure
 from karamelo_py.points.laws.eos_strength import EosStrength
 from karamelo_py.points.laws.strengths import initial_memory
-from karamelo_py.points.laws.strengths.hardening import plastic_increment
-from karamelo_py.points.laws.strengths.johnson_cook import JohnsonCook
-from karamelo_py.points.laws.strengths.plastic import LinearHardening, Plastic
-from karamelo_py.points.laws.strengths.swift import Swift
-from karamelo_py.points.laws.temperatures.plastic_work import PlasticWork
+from karamelo_py.points.laws.strengths.hardening import LinearHardening, Plastic, plastic_increment
+from karamelo_py.points.laws.strengths.metals import JohnsonCook, Swift
+from karamelo_py.points.laws.temperatures import PlasticWork
 
 RHO, K, G = 8.0, 160.0, 80.0
 EOS = LinearPressure(1 / RHO, K)

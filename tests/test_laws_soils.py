@@ -15,9 +15,8 @@ from karamelo_py.points.kinematics import (
     Axisymmetric,
     PlaneStrain,
     Space,
-    from_principal,
-    principal,
 )
+from karamelo_py.points.kinematics.principal import from_principal, principal
 from karamelo_py.points.laws import (
     advance,
     dissipated_energy,
@@ -28,7 +27,7 @@ from karamelo_py.points.laws import (
     plastic_strain,
     with_stress,
 )
-from karamelo_py.points.laws.eos.linear import LinearPressure
+from karamelo_py.points.laws.eos import LinearPressure
 from karamelo_py.points.laws.eos.shock import Shock
 from karamelo_py.points.laws.eos_strength import EosStrength
 from karamelo_py.points.laws.strengths.drucker_prager import DruckerPrager

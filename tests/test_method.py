@@ -8,8 +8,8 @@ from plugged import install, offer
 from karamelo_py.app.cli import main
 from karamelo_py.language import registry
 from karamelo_py.language.interpreter import Interpreter
-from karamelo_py.points.basis.cpgimp import CPGIMPCorners, CPGIMPStretch
-from karamelo_py.points.transfers.tflip import TFLIP
+from karamelo_py.points.basis.gimp import CPGIMPCorners, CPGIMPStretch
+from karamelo_py.points.transfers.taylor import TFLIP
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 

@@ -10,15 +10,15 @@ from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.slopes import seeded, slopes_of
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
 from karamelo_py.points.laws import advance, initial_state, kirchhoff_stress
-from karamelo_py.points.laws.elasticity import lame_parameters
-from karamelo_py.points.laws.eos.linear import LinearPressure
+from karamelo_py.points.laws.eos import LinearPressure
 from karamelo_py.points.laws.eos_strength import EosStrength
 from karamelo_py.points.laws.linear import LinearElastic
 from karamelo_py.points.laws.neo_hookean import NeoHookean
+from karamelo_py.points.laws.parameters import lame_parameters
 from karamelo_py.points.laws.strengths.drucker_prager import DruckerPrager
-from karamelo_py.points.laws.strengths.johnson_cook import JohnsonCook
+from karamelo_py.points.laws.strengths.hardening import LinearHardening, Plastic
+from karamelo_py.points.laws.strengths.metals import JohnsonCook
 from karamelo_py.points.laws.strengths.mohr_coulomb import MohrCoulomb
-from karamelo_py.points.laws.strengths.plastic import LinearHardening, Plastic
 
 E, NU = 1e6, 0.3
 MODULI = lame_parameters(E, NU)

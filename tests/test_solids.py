@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from meshed import cube_surface, write
 
 from karamelo_py.commands import domain as commands
-from karamelo_py.points.basis.cpdi.parallel import R4
+from karamelo_py.points.basis.cpdi.domains import R4
+from karamelo_py.points.basis.gimp import UGIMP
 from karamelo_py.points.basis.linear import Linear
-from karamelo_py.points.basis.ugimp import UGIMP
 from karamelo_py.scene.placement import cell_pattern
 from karamelo_py.scene.region import Region
 from karamelo_py.script.errors import ScriptError

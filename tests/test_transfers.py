@@ -9,10 +9,9 @@ from hypothesis import strategies as st
 from tensors import ALL_KINEMATICS, numbers, tensors, vectors
 
 from karamelo_py.points.basis import affine_weight, entry, locate, reach, support
-from karamelo_py.points.basis.cubic_spline import CubicSpline
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.basis.product import evenly, inverse_spread
-from karamelo_py.points.basis.quadratic_spline import QuadraticSpline
+from karamelo_py.points.basis.splines import CubicSpline, QuadraticSpline
 from karamelo_py.points.kinematics import PlaneStrain, Space, gradient, planar, vector
 from karamelo_py.points.transfers import (
     Moment,
@@ -26,14 +25,9 @@ from karamelo_py.points.transfers import (
     updated_velocity,
     zero_moment,
 )
-from karamelo_py.points.transfers.aflip import AFLIP
-from karamelo_py.points.transfers.apic import APIC
-from karamelo_py.points.transfers.asflip import ASFLIP
-from karamelo_py.points.transfers.flip import FLIP
-from karamelo_py.points.transfers.mls import MLS
-from karamelo_py.points.transfers.pic import PIC
-from karamelo_py.points.transfers.tflip import TFLIP
-from karamelo_py.points.transfers.tpic import TPIC
+from karamelo_py.points.transfers.affine import AFLIP, APIC, ASFLIP
+from karamelo_py.points.transfers.flip import FLIP, PIC
+from karamelo_py.points.transfers.taylor import MLS, TFLIP, TPIC
 from karamelo_py.points.transfers.xpic import XPIC
 from karamelo_py.scene.lattice import Lattice
 

@@ -18,7 +18,7 @@ _OPAQUE = {"numba", "llvmlite", "numpy", *sys.stdlib_module_names}
 # objects and not to names.
 _HERE = Path(__file__).parent
 WHOLE = sorted(
-    map(str, [*_HERE.rglob("*.py"), _HERE.parent / "points" / "kinematics" / "tensors.py"])
+    map(str, [*_HERE.rglob("*.py"), _HERE.parent / "points" / "kinematics" / "__init__.py"])
 )
 
 

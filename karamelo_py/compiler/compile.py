@@ -282,5 +282,3 @@ def beside(first: int, steps: int) -> int:
 
 
 implements(beside)(lambda first, steps: numba.uint64(first + steps))
-
-

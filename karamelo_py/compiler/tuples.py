@@ -68,26 +68,3 @@ def clear_first(array, i):
     """Set the first number of row `i` of an array that may be absent (None) to zero."""
     if array is not None:
         array[i, 0] = 0
-
-
-def only(present):
-    """present[0], or 0 where `present` is empty."""
-    return present[0] if len(present) else 0
-
-
-@shared
-def increased(present, change):
-    """(present[0] + change,), or nothing where `present` is empty."""
-    return (present[0] + change,) if len(present) else ()
-
-
-@shared
-def added(present, change):
-    """(present[0] + change[0],), or `present` where one of both is empty."""
-    return (present[0] + change[0],) if len(present) and len(change) else present
-
-
-@shared
-def either(first, second):
-    """`first`, or `second` where `first` is empty."""
-    return first if len(first) else second

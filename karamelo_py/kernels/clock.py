@@ -11,7 +11,6 @@ from karamelo_py.compiler.threads import shared_out
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import DT, MASS, TIME, TIMESTEP, Control, Number, Setup, Tag
 from karamelo_py.kernels.totals import agree_on_reports
-from karamelo_py.points.frames import follows
 from karamelo_py.points.grid import inside
 from karamelo_py.points.kinematics import vector
 
@@ -164,7 +163,7 @@ def _check_share(frame, kin, grids, points, tiling, now, k):
             step = (y - load_vector(kin, points.x[now], p)).largest()
             cells = float(step * grid.inv_h)
             furthest = max(furthest, cells)
-            if not (cells <= 1 and (inside(grid, kin, y) or not follows(frame))):
+            if not (cells <= 1 and (inside(grid, kin, y) or not frame.moves)):
                 wrong = p + 1
         tiling.report[t, 0] = furthest
         tiling.report[t, 2] = wrong

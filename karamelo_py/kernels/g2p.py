@@ -16,9 +16,8 @@ from karamelo_py.kernels.loss import FrictionalHeat, in_company, reflect, warm, 
 from karamelo_py.kernels.visit import Work
 from karamelo_py.points import frames, laws, transfers
 from karamelo_py.points.basis import carried, carrier, carry, deformed, entry, extent
-from karamelo_py.points.basis.cpdi.corners import AtCorners
-from karamelo_py.points.boundary import Bounces, reflected
-from karamelo_py.points.grid import inside
+from karamelo_py.points.basis.cpdi import AtCorners
+from karamelo_py.points.grid import Bounces, inside, reflected
 from karamelo_py.points.kinematics import I, det, outer, vector, zero, zero_vector
 from karamelo_py.points.transfers.xpic import Reflected, Series, TermOfSeries
 
@@ -241,8 +240,8 @@ def settled(task, w, stencil, p, dt, total, totals, fastest):
 def _settled_strain(task, w, stencil, p, dt, total, totals, fastest):
     """State of the law and shape of the domain after a step; growth in cells, and rate."""
     gradient, ratio = total
-    if _is_known(task, w):
-        gradient = transfers.kept_gradient(w.transfer, w.kin, totals[0][2], gradient)
+    if not len(gradient):  # the point keeps it
+        gradient = totals[0][2]
     dl = increment(dt, gradient)
     if isinstance(task, StrainOfLastStep):
         dl = frames.of_places_before(w.frame, w.kin, dl)
@@ -255,7 +254,7 @@ def _settled_strain(task, w, stencil, p, dt, total, totals, fastest):
     store(field(w.points.fields, frames.DeformationGradient), p, now)
     j = laws.jacobian(law, w.kin, state)
     grown = real(0, j)
-    if frames.follows(w.frame) and carried(w.basis, w.kin) == 0:
+    if w.frame.moves and carried(w.basis, w.kin) == 0:
         x = w.places.y if isinstance(task, SecondStrain) else w.places.x
         before = visit.place_at(w.basis, w.kin, x, p)
         after = deformed(w.basis, w.kin, before, growth)
@@ -333,7 +332,7 @@ def _settled_move(task, w, stencil, p, dt, total, totals, fastest):
     store(field(w.points.fields, transfers.Moment), p, moment)
     store(w.places.y, p, y)
     moved = (y - x).largest() * w.grid.inv_h
-    if not frames.follows(w.frame):
+    if not w.frame.moves:
         return moved, fastest
     if carried(w.basis, w.kin) > 0:
         before = visit.place_at(w.basis, w.kin, w.places.x, p)

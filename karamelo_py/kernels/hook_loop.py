@@ -23,9 +23,8 @@ from karamelo_py.kernels.clock import kick, step_size
 from karamelo_py.kernels.loss import FrictionalHeat
 from karamelo_py.kernels.walls import FRICTION, rub, stick
 from karamelo_py.points.basis import placed
-from karamelo_py.points.frames import follows
+from karamelo_py.points.bodies import face
 from karamelo_py.points.grid import node_position
-from karamelo_py.points.heat import face
 from karamelo_py.points.kinematics import dimension, planar
 
 # Bare numbers would be types of their own.
@@ -617,7 +616,7 @@ def publish_totals(stage, hooks, control):
 @shared
 def corners_that_move(s):
     """Count the corners that stand behind the position of a point, and move with it."""
-    return placed(s.basis, s.kin) if follows(s.frame) else 0
+    return placed(s.basis, s.kin) if s.frame.moves else 0
 
 
 @point_function(otherwise=True)

@@ -25,9 +25,7 @@ from karamelo_py.kernels.lanes import lanes_with, points_from
 from karamelo_py.kernels.sweep import places_of
 from karamelo_py.kernels.visit import deformation_of, place_at
 from karamelo_py.points.basis import entry, locate, support
-from karamelo_py.points.frames import follows
-from karamelo_py.points.kinematics import I, gradient, inv, outer, unit, vector, zero
-from karamelo_py.points.kinematics.tensors import total
+from karamelo_py.points.kinematics import I, gradient, inv, outer, total, unit, vector, zero
 from karamelo_py.points.laws import advance, initial_state, kirchhoff_stress, specific_volume
 
 
@@ -76,7 +74,7 @@ def see(frame, kin, basis, grids, points, laws, now, seen):
             seen.weights[p, k] = weight
             for j, g in enumerate(slope):
                 seen.gradients[p, k, j] = g
-        if not follows(frame):
+        if not frame.moves:
             law = record(laws, index(points.material[p]))
             state = load(points.state, p, initial_state(law, kin, points.mass[p]))
             back = inv(deformation_of(frame, kin, law, state, points, p)).at()

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.points.laws.numbers import Numbers
+from karamelo_py.points.laws.parameters import Numbers
 
 
 def law_in(law: Any, real: type) -> Any:

@@ -43,7 +43,7 @@ from karamelo_py.kernels.visit import (
 )
 from karamelo_py.points import laws
 from karamelo_py.points.basis import entry, mapped_again
-from karamelo_py.points.frames import follows, force_stress
+from karamelo_py.points.frames import force_stress
 from karamelo_py.points.kinematics import I, dimension, nothing
 from karamelo_py.points.laws import constrained_velocity
 from karamelo_py.points.transfers import Moment, gradient_weight, nodal_momentum, zero_moment
@@ -274,7 +274,7 @@ def _scattered_internal_force(quantity, w, stencil, k, load):
 @load_of.on(MomentumAgain)
 def _load_of_momentum_again(quantity, w, p, like):
     moment = _moment(w, p, like)
-    if len(moment) and follows(w.frame):  # of weights that never change, all is mapped again
+    if len(moment) and w.frame.moves:  # of weights that never change, all is mapped again
         moment = mapped_again(w.basis, w.grid, moment)
     return _mass(w, p), load_vector(w.kin, w.points.v, p), moment
 

@@ -14,9 +14,9 @@ from karamelo_py.compiler.fields import load, load_vector
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import kernel, noinline
 from karamelo_py.compiler.tuples import record
+from karamelo_py.points.bodies import force_between, radius
 from karamelo_py.points.kinematics import dimension, vector
 from karamelo_py.points.laws import initial_state, jacobian, specific_volume
-from karamelo_py.points.pairs import force_between, radius
 
 
 class TwoBodies(NamedTuple):

@@ -15,8 +15,8 @@ from karamelo_py.kernels.p2g import scattered_all
 from karamelo_py.kernels.visit import NodalStress, Work, all_records_of, for_tags
 from karamelo_py.points import transfers
 from karamelo_py.points.basis import carried, entry, product, reach, support
+from karamelo_py.points.basis.cpdi import AtCorners, CornerStencil
 from karamelo_py.points.basis.cpdi.block import InBlock, block_of, is_one_block, is_whole, of_one
-from karamelo_py.points.basis.cpdi.corners import AtCorners, CornerStencil
 from karamelo_py.points.basis.product import Stencil, inverse_spread, spacing
 from karamelo_py.points.kinematics import dimension, from_columns, zero_vector
 

@@ -61,7 +61,6 @@ from karamelo_py.kernels.stencils import gathered_by, scatter_nodes
 from karamelo_py.kernels.totals import take_over
 from karamelo_py.kernels.visit import Work, ask_ahead, place_at
 from karamelo_py.points.basis import locate
-from karamelo_py.points.frames import follows
 from karamelo_py.points.grid import Grid, inside, renumbered
 from karamelo_py.points.kinematics import zero_vector
 
@@ -118,7 +117,7 @@ def work_of(s: Context, grid: Grid, nodes: Nodes, block: Block, places: Places) 
 @shared
 def recompute_stencil(weights: Tag, w: Work, stencil: tuple, p: Index) -> tuple:
     """Return the stencil of the scatter from that of the gather; of reference places it stays."""
-    if isinstance(weights, OldWeights) or not follows(w.frame):
+    if isinstance(weights, OldWeights) or not w.frame.moves:
         return stencil
     return locate(w.basis, w.kin, w.grid, place_at(w.basis, w.kin, w.places.y, p))
 
@@ -138,7 +137,7 @@ def places_of(frame: Tag, points: Points, now: int, then: int) -> Places:
 
     `now` and `then` are rows of `Points.x`.
     """
-    weighed: Any = points.x[now] if follows(frame) else points.home
+    weighed: Any = points.x[now] if frame.moves else points.home
     return Places(weighed, points.x[now], points.x[then])
 
 
@@ -218,7 +217,7 @@ def visit_tile(visit: Visit, s: Context, block: Block, t: int) -> None:
                 else:
                     totals = gathered_by(lanes, visit.tasks, w, stencil, position_of(w, p))
                 moved, rate = settled_all(visit.tasks, w, stencil, p, dt, totals, fastest)
-            elif follows(s.frame):
+            elif s.frame.moves:
                 moved = where(inside(grid, s.kin, position_of(w, p)), moved, real(inf, moved))
             good = (moved <= 1) & (rate < 1e300)  # so written, NaN counts as wrong too
             if not all_lanes(good):

@@ -16,7 +16,7 @@ from karamelo_py.compiler.fields import StepField, SummedField, field, load, loa
 from karamelo_py.compiler.tuples import count_in, record, row
 from karamelo_py.kernels.arrays import Index, Nodes, Number, Places, Points, Tag
 from karamelo_py.points.basis import blank, entry
-from karamelo_py.points.frames import DeformationGradient, follows, scaled_increment
+from karamelo_py.points.frames import DeformationGradient, scaled_increment
 from karamelo_py.points.grid import Grid
 from karamelo_py.points.kinematics import zero
 from karamelo_py.points.laws import deformation, initial_state
@@ -98,7 +98,7 @@ def records_of(tag: Tag, nodes: Nodes) -> np.ndarray | None:
 @shared
 def deformation_of(frame: Tag, kin: Tag, law: Tag, state: tuple, points: Points, p: Index) -> tuple:
     """Return the deformation gradient F of a point where the frame needs it, else ()."""
-    if follows(frame):
+    if frame.moves:
         return ()
     f = load(field(points.fields, DeformationGradient), p, zero(kin, points.mass[p]))
     return f if len(f) else deformation(law, kin, state)

@@ -14,10 +14,10 @@ from karamelo_py.language.scene import Scene
 from karamelo_py.output import node_columns, point_table
 from karamelo_py.output.node_columns import BROUGHT, NodeFields
 from karamelo_py.output.point_table import PointTable, Rows, absent, declared_columns
-from karamelo_py.points.boundary import Bounces
+from karamelo_py.points.grid import Bounces
 from karamelo_py.points.laws import can, dissipated_energy, energy_density
 from karamelo_py.points.laws.eos import initial_energy, taken_heat
-from karamelo_py.points.laws.plastic_rate import has_rate
+from karamelo_py.points.laws.further import has_rate
 from karamelo_py.script.errors import ScriptError, unknown
 
 PIECE = 1 << 17  # points that are looked at together

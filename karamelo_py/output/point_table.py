@@ -19,7 +19,7 @@ from karamelo_py.kernels.export import (
 )
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.language.scene import Scene
-from karamelo_py.points.boundary import ReflectingGrid
+from karamelo_py.points.grid import ReflectingGrid
 from karamelo_py.points.laws import columns_of
 from karamelo_py.points.transfers import Moment
 

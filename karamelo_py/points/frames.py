@@ -7,7 +7,7 @@ needs the deformation gradient F of the points.
 
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import point_function
+from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.fields import Field, tensor
 from karamelo_py.compiler.powers import power
 from karamelo_py.points.kinematics import I, inv, unit
@@ -43,102 +43,53 @@ class Total(NamedTuple):
     point_fields = (DeformationGradient,)
 
 
-@point_function(otherwise=True)
-def follows(frame):
-    """Check that weights follow the points; constant at compile time."""
-    return True
-
-
-@follows.on(Total)
-def _follows_total(frame):
-    return False
-
-
-@point_function(otherwise=True)
+@shared
 def spatial_increment(frame, kin, dl, f):
     """dt grad v from `dl`, dt times the gradient of velocity in the frame, and F before it."""
-    return dl
-
-
-@spatial_increment.on(Total)
-def _spatial_increment_total(frame, kin, dl, f):
     # F + dt Fdot = (I + dt Fdot F^-1) F exactly
-    return dl @ inv(f)
+    return dl if frame.moves else dl @ inv(f)
 
 
-@point_function(otherwise=True)
+@shared
 def of_places_before(frame, kin, dl):
     """`dl` of the places before a motion, from that of the places after it."""
     # grad v there is grad v here (I - dl)^-1, so that F grows by (I - dl)^-1 exactly. As a product
-    # it keeps its digits where dl is small.
-    return dl @ inv(I - dl)
+    # it keeps its digits where dl is small. Gradients of the total frame belong to the reference.
+    return dl @ inv(I - dl) if frame.moves else dl
 
 
-@of_places_before.on(Total)
-def _of_places_before_total(frame, kin, dl):
-    return dl  # gradients belong to the reference
-
-
-@point_function(otherwise=True)
+@shared
 def strained(frame, kin, f, dl):
     """F where the frame needs it, after what `spatial_increment` takes from F before it."""
-    return f
+    return f if frame.moves else f + dl
 
 
-@strained.on(Total)
-def _strained_total(frame, kin, f, dl):
-    return f + dl
-
-
-@point_function(otherwise=True)
+@shared
 def force_stress(frame, kin, tau, f):
     """The stress that makes nodal forces, per reference volume."""
-    return tau
+    return tau if frame.moves else tau.nominal(f)
 
 
-@force_stress.on(Total)
-def _force_stress_total(frame, kin, tau, f):
-    return tau.nominal(f)
-
-
-@point_function(otherwise=True)
+@shared
 def pulled_back(frame, kin, g, f):
     """The direction of a flux down the gradient `g`, pulled back to the frame.
 
     Per deformed volume: in space that is g, and C^-1 g with respect to reference positions, which
     C^-1 = F^-1 F^-T takes to space and back.
     """
-    return g
+    return g if frame.moves else inv(f.planar()).left_cauchy_green().dot(g)
 
 
-@pulled_back.on(Total)
-def _pulled_back_total(frame, kin, g, f):
-    inside = inv(f.planar()).left_cauchy_green()
-    return inside.dot(g)
-
-
-@point_function(otherwise=True)
+@shared
 def scaled_increment(frame, kin, dl, f, ratio):
     """`dl` changed such that the volume after it is `ratio` times what it would be."""
-    # (I + dl) s - I
+    # (I + dl) s - I in space, (F + dl) s - F with respect to the reference
     s = power(ratio, 1 / len(dl.axes))
-    return s * dl + (s - 1) * I
+    return s * dl + (s - 1) * (I if frame.moves else f)
 
 
-@scaled_increment.on(Total)
-def _scaled_increment_total(frame, kin, dl, f, ratio):
-    # (F + dl) s - F
-    s = power(ratio, 1 / len(dl.axes))
-    return s * dl + (s - 1) * f
-
-
-@point_function(otherwise=True)
+@shared
 def inverse_stretch_squared(frame, kin, f, like):
     """(h / size of a deformed cell)^2, one over the least stretch squared: it shortens the step."""
-    return 1
-
-
-@inverse_stretch_squared.on(Total)
-def _inverse_stretch_squared_total(frame, kin, f, like):
-    # 1 / (smallest stretch)^2 is the largest eigenvalue of F^-1 F^-T.
-    return inv(f).left_cauchy_green().largest_row_sum()
+    # The largest eigenvalue of F^-1 F^-T.
+    return 1 if frame.moves else inv(f).left_cauchy_green().largest_row_sum()

@@ -19,7 +19,7 @@ from karamelo_py.kernels.p2g import Force
 from karamelo_py.kernels.sweep import Visit, sweep, sweep_nodes
 from karamelo_py.kernels.table import SUMS
 from karamelo_py.points.laws import law_kind
-from karamelo_py.points.laws.plastic_rate import without_rate
+from karamelo_py.points.laws.further import without_rate
 from karamelo_py.run.access.nodes_by_number import ByNumber
 from karamelo_py.run.access.points_by_id import ById
 from karamelo_py.run.checkpoint import arrays as checkpoint

@@ -56,17 +56,17 @@ shape
 from karamelo_py.compiler.compile import point_function, shared
 
 
-@point_function(tags=2)
+@point_function()
 def locate(basis, kin, grid, place):
     """The stencil of a point: whatever the functions below need, computed once a point."""
 
 
-@point_function(tags=2)
+@point_function()
 def support(basis, kin):
     """The number of nodes a point sees; a constant at compile time."""
 
 
-@point_function(tags=2)
+@point_function()
 def entry(basis, kin, grid, stencil, k):
     """(node number, weight N, gradient of N) of the k-th node of a stencil.
 
@@ -75,12 +75,12 @@ def entry(basis, kin, grid, stencil, k):
     """
 
 
-@point_function(tags=2)
+@point_function()
 def reach(basis, kin, grid, stencil, k):
     """X_I - x, the vector from the point to the k-th node of its stencil."""
 
 
-@point_function(tags=2)
+@point_function()
 def affine_weight(basis, kin, grid, stencil, k):
     """N_I D^-1 (X_I - x) of the affine transfers, with D = sum_I N_I (X_I - x)(X_I - x)^T."""
 
@@ -89,6 +89,14 @@ def affine_weight(basis, kin, grid, stencil, k):
 def mapped_again(basis, grid, moment):
     """The part of a point's moment of velocity that MUSL maps to the nodes the second time."""
     return moment
+
+
+def leave_moment_out(basis, grid, moment):
+    """Map no moment again: B D^-1 grows without bound where D vanishes.
+
+    The velocity that deforms the points leaves it out; they keep B, so that nothing is lost.
+    """
+    return (grid.h - grid.h) * moment
 
 
 @point_function(otherwise=True)

@@ -2,9 +2,8 @@
 
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import real
 from karamelo_py.language.rules import known_failure
-from karamelo_py.points.basis import mapped_again
+from karamelo_py.points.basis import leave_moment_out, mapped_again
 from karamelo_py.points.basis.product import Along, along, register, spacing
 from karamelo_py.points.grid import cells_along, in_cells
 
@@ -43,7 +42,7 @@ known_failure(
 def _along_bernstein_quadratic(basis, kin, grid, place, direction):
     a = in_cells(grid, direction, place[direction])
     i = min(int(a), cells_along(grid, direction) - 1)  # the last face belongs to the last cell
-    s = a - real(i, a)
+    s = a - i
     t = 1 - s
     twice = grid.inv_h + grid.inv_h
     weights = (t * t, (s + s) * t, s * s)
@@ -52,15 +51,6 @@ def _along_bernstein_quadratic(basis, kin, grid, place, direction):
     return Along(i + i, s, weights, gradients, gradients)
 
 
-@spacing.on(BernsteinQuadratic)
-def _spacing_bernstein_quadratic(basis):
-    return 0.5
-
-
-@mapped_again.on(BernsteinQuadratic)
-def _mapped_again_bernstein_quadratic(basis, grid, moment):
-    # As with linear functions: B D^-1 grows without bound where D vanishes.
-    return (grid.h - grid.h) * moment
-
-
+spacing.on(BernsteinQuadratic)(lambda basis: 0.5)
+mapped_again.on(BernsteinQuadratic)(leave_moment_out)
 register(BernsteinQuadratic, 3)

@@ -2,9 +2,8 @@
 
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import real
 from karamelo_py.language.rules import known_failure
-from karamelo_py.points.basis import mapped_again
+from karamelo_py.points.basis import leave_moment_out, mapped_again
 from karamelo_py.points.basis.product import Along, along, register
 from karamelo_py.points.grid import cells_along, in_cells
 
@@ -71,7 +70,7 @@ known_failure(
 def _along_linear(basis, kin, grid, place, direction):
     a = in_cells(grid, direction, place[direction])
     i = min(int(a), cells_along(grid, direction) - 1)  # the last face belongs to the last cell
-    r = a - real(i, a)
+    r = a - i
     gradients = (-grid.inv_h, grid.inv_h)
     # D = r (1 - r) h^2 vanishes at the nodes, but N D^-1 (X - x) is the gradient everywhere
     # (Jiang, Schroeder & Teran 2017, "An angular momentum conserving affine-particle-in-cell
@@ -79,11 +78,5 @@ def _along_linear(basis, kin, grid, place, direction):
     return Along(i, r, (1 - r, r), gradients, gradients)
 
 
-@mapped_again.on(Linear)
-def _mapped_again_linear(basis, grid, moment):
-    # B D^-1 grows without bound where D vanishes: the velocity that deforms the points leaves it
-    # out, and the points keep B, so that nothing is lost.
-    return (grid.h - grid.h) * moment
-
-
+mapped_again.on(Linear)(leave_moment_out)
 register(Linear, 2)

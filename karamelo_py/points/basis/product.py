@@ -4,7 +4,7 @@ The one-dimensional part is the point function `along`; everything else is the s
 number of directions.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from karamelo_py.compiler.compile import (
     beside,
@@ -15,8 +15,9 @@ from karamelo_py.compiler.compile import (
     shared,
     where,
 )
+from karamelo_py.language.rules import suggestion
 from karamelo_py.points.basis import affine_weight, entry, locate, reach, support
-from karamelo_py.points.kinematics import TAGS, Axisymmetric, gradient, vector
+from karamelo_py.points.kinematics import Axisymmetric, gradient, vector
 
 
 class Along(NamedTuple):
@@ -27,6 +28,7 @@ class Along(NamedTuple):
     weights: tuple[float, ...]  # N of each
     gradients: tuple[float, ...]  # dN/dx of each
     affine: tuple[float, ...]  # N D^-1 (X_I - x) of each, D the mean of (X_I - x)^2 under N
+    ends: tuple[tuple[int, float], ...] = ()  # cell from `first` on and place in it, of box ends
 
 
 class Stencil(NamedTuple):
@@ -54,7 +56,7 @@ def with_one_node(stencil):
 
 @point_function()
 def along(basis, kin, grid, place, direction):
-    """The nodes that a point sees in one direction: an :class:`Along`, perhaps with more."""
+    """The nodes that a point sees in one direction: an :class:`Along`."""
 
 
 @point_function(otherwise=True)
@@ -81,9 +83,11 @@ def evenly(basis, grid, stencil):
     return True
 
 
-def hoop(weight, gradient, inv_r):
-    """N / r at an axisymmetric point; at r = 0 its limit, dN/dr (`inv_r` is 0 there)."""
-    return where(inv_r > 0, weight * inv_r, gradient)
+def with_hoop(kin, weight, slopes, inv_r):
+    """The gradient of a weight, axisymmetric with N / r behind, or its limit on the axis, dN/dr."""
+    if isinstance(kin, Axisymmetric):
+        slopes = (*slopes, where(inv_r > 0, weight * inv_r, slopes[0]))
+    return gradient(kin, slopes)
 
 
 def inverse_radius(r):
@@ -113,8 +117,11 @@ def node_number(grid, first, steps):
 
 def digits(k, base, d):
     """Split a number into `d` digits in a base, the highest first."""
-    divided = [k // base**i if i else k for i in reversed(range(d))]
-    return [divided[0], *[n % base for n in divided[1:]]]
+    found: list = []
+    for _ in range(d - 1):
+        found = [k % base, *found]
+        k = k // base
+    return [k, *found]
 
 
 def item(values, k):
@@ -149,40 +156,34 @@ def weights_of(stencil, at):
     return [item(line.weights, n) for line, n in zip(stencil.lines, at, strict=True)]
 
 
-def locate_product(basis, kin, grid, place):
-    """See `locate`."""
+def _locate_product(basis, kin, grid, place):
     lines = tuple([along(basis, kin, grid, place, i) for i in range(kin.dimension)])
     axis = isinstance(kin, Axisymmetric)
     return Stencil(lines, inverse_radius(radius(basis, grid, lines[0])) if axis else 0)
 
 
-def support_of_product(basis, kin):
-    """See `support`."""
+def _support_product(basis, kin):
     return basis.line_nodes**kin.dimension
 
 
-def entry_of_product(basis, kin, grid, stencil, k):
-    """See `entry`."""
+def _entry_product(basis, kin, grid, stencil, k):
     at = places_of(stencil, k)
     weights = weights_of(stencil, at)
     lines = zip(stencil.lines, at, strict=True)
     slopes = each_for_its_own(weights, [item(line.gradients, n) for line, n in lines])
     weight = product(weights)
-    if isinstance(kin, Axisymmetric):
-        slopes = [*slopes, hoop(weight, slopes[0], stencil.inv_r)]
     first = node_number(grid, grid.first, [line.first for line in stencil.lines])
-    return beside(first, node_number(grid, 0, at)), weight, gradient(kin, slopes)
+    number = beside(first, node_number(grid, 0, at))
+    return number, weight, with_hoop(kin, weight, slopes, stencil.inv_r)
 
 
-def reach_of_product(basis, kin, grid, stencil, k):
-    """See `reach`."""
+def _reach_product(basis, kin, grid, stencil, k):
     pairs = zip(stencil.lines, places_of(stencil, k), strict=True)
     steps = [real(n, line.r) * spacing(basis) - line.r for line, n in pairs]
     return vector(kin, [step * grid.h for step in steps])
 
 
-def affine_weight_of_product(basis, kin, grid, stencil, k):
-    """See `affine_weight`."""
+def _affine_weight_product(basis, kin, grid, stencil, k):
     at = places_of(stencil, k)
     lines = enumerate(zip(stencil.lines, at, strict=True))
     affine = [item(affine_along(basis, grid, line, i), n) for i, (line, n) in lines]
@@ -199,9 +200,23 @@ def register(basis: type, width: int) -> None:
     for name, value in usual.items():
         setattr(basis, name, getattr(basis, name, value))
     basis.line_nodes = width
-    for kin in TAGS:
-        locate.on(basis, kin)(locate_product)
-        support.on(basis, kin)(support_of_product)
-        entry.on(basis, kin)(entry_of_product)
-        reach.on(basis, kin)(reach_of_product)
-        affine_weight.on(basis, kin)(affine_weight_of_product)
+    locate.on(basis)(_locate_product)
+    support.on(basis)(_support_product)
+    entry.on(basis)(_entry_product)
+    reach.on(basis)(_reach_product)
+    affine_weight.on(basis)(_affine_weight_product)
+
+
+def wide(basis: type) -> None:
+    """Let functions of four nodes a direction be judged where no point crosses cells."""
+    suggestion(
+        basis,
+        when=_seen,
+        cost="{scene.basis_name} sees {nodes} nodes a point; in a total Lagrangian method no point "
+        "crosses cells, and linear functions, which see {scene.corners}, are of the same order",
+        instead="linear in method(...); karamelo-py sweep shows the errors of both",
+    )
+
+
+def _seen(basis: Any, scene: Any) -> dict[str, int] | None:
+    return None if scene.moves else {"nodes": (basis.cells + 1) ** scene.d}

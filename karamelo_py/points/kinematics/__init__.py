@@ -11,42 +11,624 @@ tag               vector          velocity gradient, F           symmetric tenso
 
 The gradient of a basis function has the components of a vector, and a third, N/r, at an
 axisymmetric point. The tags are empty NamedTuples: kernels are made for each of them, without
-branches.
+branches. Each has classes of its own, NamedTuples of the components that exist there: an object
+knows where it belongs, and no `kin` is passed on. Kernels are traced: loops, classes and operators
+here are gone when they run. A number times a tensor, added to another one, is rounded once (`fma`):
+a + dt * b.
 """
 
-from karamelo_py.points.kinematics.principal import from_principal, principal
-from karamelo_py.points.kinematics.tags import (
-    KINEMATICS,
-    TAGS,
-    Axisymmetric,
-    Line,
-    PlaneStrain,
-    Space,
-    dimension,
-    free_from,
-    planar,
-)
-from karamelo_py.points.kinematics.tensors import (
-    I,
-    Isotropic,
-    SymmetricTensor,
-    Tensor,
-    Vector,
-    det,
-    dev,
-    from_columns,
-    gradient,
-    inner,
-    inv,
-    nothing,
-    outer,
-    sym,
-    symmetric_tensor,
-    tensor,
-    tr,
-    unit,
-    vector,
-    von_mises,
-    zero,
-    zero_vector,
-)
+from collections import namedtuple
+from math import sqrt
+from typing import NamedTuple
+
+from numba import config
+
+from karamelo_py.compiler.algebra import algebra
+from karamelo_py.compiler.compile import fma, real, shared
+
+COMPILED = not config.DISABLE_JIT  # interpreted, `fma` rounds twice: nothing has to be remembered
+
+
+# --- tags ----------------------------------------------------------------------------------------
+
+
+class Line(NamedTuple):
+    """One dimension: uniaxial strain, the limit that plane strain and space have too."""
+
+    word = "1D"
+    dimension = 1
+    tensor_size = 1
+    tensor_names = ("11",)
+    symmetric_names = ("11", "22", "33")
+
+
+class PlaneStrain(NamedTuple):
+    """Two dimensions, unit thickness, no strain out of the plane."""
+
+    word = "plane-strain"
+    dimension = 2
+    tensor_size = 4
+    tensor_names = ("11", "12", "21", "22")
+    symmetric_names = ("11", "22", "33", "12")
+
+
+class Axisymmetric(NamedTuple):
+    """Two dimensions, x the radius and y the axis: a body of revolution without torsion.
+
+    The gradient of a basis function N at such a point has three components,
+    (dN/dr, dN/dz, N/r): the last makes the strain and the force around the axis.
+    """
+
+    word = "axisymmetric"
+    dimension = 2
+    tensor_size = 5
+    tensor_names = ("11", "12", "21", "22", "33")
+    symmetric_names = ("11", "22", "33", "12")
+
+
+class Space(NamedTuple):
+    """Three dimensions."""
+
+    word = "3D"
+    dimension = 3
+    tensor_size = 9
+    tensor_names = ("11", "12", "13", "21", "22", "23", "31", "32", "33")
+    symmetric_names = ("11", "22", "33", "12", "13", "23")
+
+
+TAGS = (Line, PlaneStrain, Axisymmetric, Space)
+KINEMATICS = {1: Line, 2: PlaneStrain, 3: Space}
+
+
+@shared
+def dimension(kin):
+    """Number of components of a vector, a constant at compile time."""
+    return kin.dimension
+
+
+@shared
+def free_from(kin):
+    """First direction in which a body may move as a whole: no radius is one, a constant."""
+    return 1 if isinstance(kin, Axisymmetric) else 0
+
+
+@shared
+def planar(kin):
+    """The tag whose tensors are plain d x d matrices of the same vectors.
+
+    Moments of velocity have no part around the axis: those of axisymmetric points are plane.
+    """
+    return PlaneStrain() if isinstance(kin, Axisymmetric) else kin
+
+
+def total(terms):
+    """Sum terms, from the first on."""
+    return sum(terms[1:], terms[0])
+
+
+# --- what vectors and tensors share -----------------------------------------------------------
+
+
+class Elements(tuple):
+    """Components that exist in a kinematics.
+
+    Attributes
+    ----------
+    kin
+        The kinematics that they belong to.
+    places
+        Row and column of each component (for vectors the direction, twice), from 0.
+    axes
+        Rows of components.
+
+    Tensors have besides:
+
+    acting
+        As `places`, but for the direction that a row acts along: around an axis that is the radius.
+    rows
+        For each direction, number and column of the components that act along it, the last first.
+    """
+
+    __slots__ = ()
+    __array_ufunc__ = None  # NumPy's numbers leave products to these
+
+    def __add__(self, other):
+        if type(other) is Isotropic:
+            return self.with_diagonal(other.p)
+        origin = getattr(other, "origin", None)
+        if origin is not None:
+            add, a, b = origin
+            return add(self, a, b)
+        return self._make([a + b for a, b in zip(self, other, strict=True)])
+
+    def __sub__(self, other):
+        if type(other) is Isotropic:
+            return self.with_diagonal(-other.p)
+        return self._make([a - b for a, b in zip(self, other, strict=True)])
+
+    def __mul__(self, factor):
+        if isinstance(factor, (Elements, Isotropic)):
+            return NotImplemented
+        out = self._make([factor * a for a in self])
+        if COMPILED:
+            out.origin = add_scaled, factor, self
+        return out
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, number):
+        return (1 / number) * self
+
+    def __neg__(self):
+        return self._make([-a for a in self])
+
+    def with_diagonal(self, p):
+        """Add p I; of p = 0 nothing is left."""
+        pairs = zip(self, self.places, strict=True)
+        return self._make([a + p if i == j else a for a, (i, j) in pairs])
+
+    def at(self):
+        """Find components by row and column."""
+        return dict(zip(self.places, self, strict=True))
+
+
+def add_scaled(start, factor, a):
+    """start + factor a, rounded once."""
+    return start._make([fma(factor, b, t) for t, b in zip(start, a, strict=True)])
+
+
+def add_outer(start, a, b):
+    """t_ij + a_i b_j, rounded once."""
+    pairs = zip(start, start.acting, strict=True)
+    return start._make([fma(a[i], b[j], t) for t, (i, j) in pairs])
+
+
+def add_product(start, s, gradient):
+    """v_i + s_ij g_j, rounded once a term (`Matrix.dot`)."""
+    return s.vector._make(
+        [add_row(s, terms, gradient, a) for a, terms in zip(start, s.rows, strict=True)]
+    )
+
+
+def add_row(s, terms, gradient, a):
+    """a + s_ij g_j of one row, rounded once a term."""
+    for k, j in terms:
+        a = fma(s[k], gradient[j], a)
+    return a
+
+
+class Isotropic(namedtuple("Isotropic", "p")):
+    """p I, whatever the number of dimensions."""
+
+    __slots__ = ()
+    __array_ufunc__ = None
+
+    def __mul__(self, factor):
+        return Isotropic(factor * self.p)
+
+    __rmul__ = __mul__
+
+    def __neg__(self):
+        return Isotropic(-self.p)
+
+    def __add__(self, other):
+        return other + self
+
+    def __sub__(self, other):
+        return -other + self
+
+
+algebra(Isotropic)
+I = Isotropic(1)  # noqa: E741
+
+
+# --- vectors ----------------------------------------------------------------------------------
+
+
+class Vector(Elements):
+    """A vector, or the gradient of a basis function (axisymmetric with N/r behind)."""
+
+    __slots__ = ()
+
+    def planar(self):
+        """Leave out what is around an axis."""
+        return self if self.vector is type(self) else self.vector._make(self[:2])
+
+    def squared(self):
+        """a_i a_i."""
+        return total([a * a for a in self])
+
+    def largest(self):
+        """max_i |a_i|."""
+        return max(*map(abs, self)) if len(self) > 1 else abs(self[0])
+
+
+# --- tensors ----------------------------------------------------------------------------------
+
+
+class Matrix(Elements):
+    """Base of tensors, symmetric or not."""
+
+    __slots__ = ()
+
+    def dot(self, gradient):
+        """s_ij g_j of a stress and a gradient, rounded once a term.
+
+        What is around an axis acts along the radius. It is the force of the stress on a node.
+        """
+        made = []
+        for (k, j), *rest in self.rows:
+            made.append(add_row(self, rest, gradient, self[k] * gradient[j]))
+        out = self.vector._make(made)
+        out.origin = add_product, self, gradient
+        return out
+
+    def columns(self):
+        """Take the columns as vectors, without what is around an axis."""
+        a, d = self.at(), self.kin.dimension
+        return tuple([self.vector._make([a[i, j] for i in range(d)]) for j in range(d)])
+
+    def diagonal(self):
+        """(t_xx, t_yy, t_zz), as far as vectors go."""
+        a = self.at()
+        return self.vector._make([a[i, i] for i in range(self.kin.dimension)])
+
+
+class Tensor(Matrix):
+    """A tensor such as F or grad v."""
+
+    __slots__ = ()
+
+    def __matmul__(self, other):
+        """a_ik b_kj, or a_ij b_j of a vector."""
+        if isinstance(other, Vector):
+            d = self.kin.dimension
+            rows = [zip(self[d * i : d * i + d], other, strict=False) for i in range(d)]
+            return self.vector._make([total([a * b for a, b in row]) for row in rows])
+        a, b = self.at(), other.at()
+        return self._make(
+            [
+                total([a[i, k] * b[k, j] for k in self.axes if (i, k) in a and (k, j) in b])
+                for i, j in self.places
+            ]
+        )
+
+    def transposed(self):
+        """t_ji."""
+        a = self.at()
+        return self._make([a[j, i] for i, j in self.places])
+
+    def planar(self):
+        """Leave out what is around an axis."""
+        made = self.vector.tensor
+        return self if made is type(self) else made._make(self[:4])
+
+    def after(self, dl):
+        """(I + dl) F, as F + dl F: small increments keep their digits."""
+        a, b = dl.at(), self.at()
+        return self._make(
+            [
+                total([f, *[a[i, k] * b[k, j] for k in self.axes if (i, k) in a and (k, j) in b]])
+                for f, (i, j) in zip(self, self.places, strict=True)
+            ]
+        )
+
+    # Where a kinematics has no component F_ii, F_ii is 1.
+
+    def left_cauchy_green(self):
+        """b = F F^T."""
+        a = self.at()
+        return self.symmetric._make([squares(a, self.axes, i, j) for i, j in self.symmetric.places])
+
+    def right_cauchy_green(self):
+        """C = F^T F."""
+        a = self.transposed().at()
+        return self.symmetric._make([squares(a, self.axes, i, j) for i, j in self.symmetric.places])
+
+    def stretch(self):
+        """Right stretch U = sqrt(F^T F), for det F not 0.
+
+        In the plane U = (C + |det F| I) / sqrt(tr C + 2 |det F|), from Cayley and Hamilton (Hoger &
+        Carlson 1984, J. Elasticity 14). In space Newton's iteration X <- (g X + X^-T / g) / 2 takes
+        F to its rotation R, then U = R^T F (Higham 1986, SIAM J. Sci. Stat. Comput. 7, with his
+        scaling by Frobenius norms): right to round-off whether or not principal stretches are
+        equal, which closed forms are not.
+        """
+        if self.kin.dimension == 3:
+            r = self
+            for _ in range(POLAR_STEPS):
+                r = r.towards_rotation()
+            return r.turned_back(self)
+        a = self.at()
+        if self.kin.dimension == 1:
+            return self.symmetric._make([abs(a[0, 0]), 1, 1])
+        size = abs(a[0, 0] * a[1, 1] + a[0, 1] * -a[1, 0])
+        c = {(i, j): a[0, i] * a[0, j] + a[1, i] * a[1, j] for i in (0, 1) for j in (0, 1)}
+        k = 1 / sqrt(c[0, 0] + c[1, 1] + size + size)
+        around = abs(a.get((2, 2), 1))
+        return self.symmetric._make(
+            [k * (c[0, 0] + size), k * (c[1, 1] + size), around, k * c[0, 1]]
+        )
+
+    def towards_rotation(self):
+        """Take a step of Newton's iteration to the rotation."""
+        back = inv(self)
+        g = sqrt(sqrt(total([t * t for t in back]) / total([t * t for t in self])))
+        pairs = zip(self, back.transposed(), strict=True)
+        return self._make([(0.5 * g) * a + (0.5 / g) * b for a, b in pairs])
+
+    def turned_back(self, f):
+        """The symmetric part of R^T F."""
+        r, f = self.at(), f.at()
+
+        def component(i, j):
+            terms = [r[k, i] * f[k, j] for k in range(3)]
+            if i == j:
+                return total(terms)
+            return 0.5 * total([*terms, *[r[k, j] * f[k, i] for k in range(3)]])
+
+        return self.symmetric._make([component(i, j) for i, j in self.symmetric.places])
+
+
+# Round-off is reached after four steps for ratios of principal stretches up to 2, and after seven
+# for whatever the inverse itself can bear.
+POLAR_STEPS = 7
+
+
+def cofactor(a, d, i, j):
+    """Cofactor of a[i, j] in the d x d matrix with components `a`, by row and column."""
+    if d == 1:
+        return 1
+    if d == 2:
+        return a[1 - i, 1 - j] if i == j else -a[1 - i, 1 - j]
+    p, q, r, s = (i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3
+    return a[p, r] * a[q, s] - a[p, s] * a[q, r]
+
+
+def determinant(a, d):
+    """Determinant of the d x d matrix with components `a`, by row and column."""
+    return total([a[0, j] * cofactor(a, d, 0, j) for j in range(d)])
+
+
+def squares(a, axes, i, j):
+    """a_ik a_jk; 1 where there is no such component."""
+    terms = [a[i, k] * a[j, k] for k in axes if (i, k) in a and (j, k) in a]
+    return total(terms) if len(terms) else 1
+
+
+class SymmetricTensor(Matrix):
+    """A tensor such as stress or strain."""
+
+    __slots__ = ()
+
+    def at(self):
+        """Find components by row and column, on both sides of the diagonal."""
+        a = dict(zip(self.places, self, strict=True))
+        return a | {(j, i): value for (i, j), value in a.items()}
+
+    def mean_of_stretching(self):
+        """Mean over the directions that can stretch."""
+        axes = self.kin.Tensor.axes
+        return total([self[i] for i in axes]) / len(axes)
+
+    def turned(self, dl):
+        """Turn with the increment dl, R s R^T by its rotation R: objective (Jaumann).
+
+        R is the rotation by the vector w = axial(skew(dl)), built by Cayley's formula from
+        tan(|w|/2) ~ |w|/2 (1 + |w|^2/12): orthogonal to round-off, its angle right to |w|^5/120
+        (Hughes & Winget 1980 use tan(|w|/2) ~ |w|/2, right to |w|^3/12).
+        """
+        if self.kin.dimension == 1:
+            return self
+        return self.turned_in_plane(dl) if self.kin.dimension == 2 else self.turned_in_space(dl)
+
+    def turned_in_plane(self, dl):
+        """See `turned`."""
+        dl = dl.at()
+        xx, yy, zz, xy = self
+        t = 0.25 * (dl[1, 0] - dl[0, 1])
+        t = fma(t * (t * t), 1 / 3, t)
+        tt = t * t
+        scale = 1 / (1 + tt)
+        cosine = (1 - tt) * scale
+        sine = (t + t) * scale
+        # The deviator in the plane turns by twice the angle; written as a change, which is exactly
+        # nothing where nothing turns.
+        double_sine = 2 * sine * cosine
+        double_versine = -2 * sine * sine
+        apart = 0.5 * (xx - yy)
+        change = fma(double_versine, apart, -(double_sine * xy))
+        shear = fma(double_sine, apart, double_versine * xy)
+        return self._make([xx + change, yy - change, zz, xy + shear])
+
+    def turned_in_space(self, dl):
+        """See `turned`."""
+        # R = I + k (T + T T), T the cross product with the scaled w / 2
+        dl, s, axes = dl.at(), self.at(), range(3)
+        w = [0.25 * (dl[(i + 2) % 3, (i + 1) % 3] - dl[(i + 1) % 3, (i + 2) % 3]) for i in axes]
+        longer = 1 + total([x * x for x in w]) * (1 / 3)
+        w = [x * longer for x in w]
+        k = 2 / total([1, *[x * x for x in w]])
+
+        def rotation(i, j):
+            if i == j:
+                return 1 - k * total([w[m] * w[m] for m in axes if m != i])
+            cross = w[3 - i - j]
+            return k * (w[i] * w[j] - cross) if (j - i) % 3 == 1 else k * (w[i] * w[j] + cross)
+
+        r = {(i, j): rotation(i, j) for i in axes for j in axes}
+        a = {(i, j): total([r[i, m] * s[m, j] for m in axes]) for i in axes for j in axes}
+        return self._make([total([a[i, m] * r[j, m] for m in axes]) for i, j in self.places])
+
+    def largest_row_sum(self):
+        """max_i sum_j |s_ij|: a bound of the largest eigenvalue (Gershgorin)."""
+        a = self.at()
+        rows = [[(i, i), *[(i, j) for j in range(3) if j != i]] for i in range(3)]
+        return max(*[total([abs(a[place]) for place in row if place in a]) for row in rows])
+
+    def nominal(self, F):
+        """First Piola-Kirchhoff stress P = tau F^-T of a Kirchhoff stress.
+
+        P times the reference volume and the gradient by reference positions makes nodal forces.
+        """
+        if self.kin.dimension == 1:
+            return type(F)._make([self[0] / F[0]])
+        a, back = self.at(), inv(F).at()
+        return type(F)._make(
+            [
+                total([a[i, k] * back[j, k] for k in F.axes if (i, k) in a and (j, k) in back])
+                for i, j in F.places
+            ]
+        )
+
+
+for _kind in (Elements, Vector, Matrix, Tensor, SymmetricTensor):
+    algebra(_kind)
+
+
+# --- one class for each kinematics ------------------------------------------------------------
+
+
+def _class(kind: type, tag: type, names: tuple) -> type:
+    words = ["around" if name == "around" else name.translate(_WORDS) for name in names]
+    name = f"{tag.__name__}{kind.__name__}" + ("Gradient" if "around" in words else "")
+    one = type(name, (kind, namedtuple(name, words)), {"__module__": __name__})
+    one._make = classmethod(tuple.__new__)
+    one.kin = tag()
+    places = ("33" if name == "around" else name for name in names)
+    one.places = tuple((int(n[0]) - 1, int(n[-1]) - 1) for n in places)
+    one.axes = tuple(sorted({i for i, _ in one.places}))
+    globals()[name] = one
+    return one
+
+
+def _rows(one: type, whole: type) -> None:
+    """Note how the components of tensors act on vectors; `whole` is the class of F."""
+    d = one.kin.dimension
+    one.acting = tuple((i if i < d else 0, j) for i, j in one.places)
+    number = {(j, i): k for k, (i, j) in enumerate(one.places)}
+    number |= {place: k for k, place in enumerate(one.places)}
+    acting = [(i if i < d else 0, number[i, j], j) for i, j in reversed(whole.places)]
+    one.rows = tuple(tuple((k, j) for i, k, j in acting if i == n) for n in range(d))
+
+
+_WORDS = str.maketrans("123", "xyz")
+for _tag in TAGS:
+    _tag.Symmetric = _class(SymmetricTensor, _tag, _tag.symmetric_names)
+    _tag.Tensor = _class(Tensor, _tag, _tag.tensor_names)
+    _tag.Tensor.symmetric = _tag.Symmetric
+    if _tag is Axisymmetric:
+        # In the plane vectors are the same.
+        _tag.Vector = PlaneStrain.Vector
+        _tag.Gradient = _class(Vector, _tag, ("1", "2", "around"))
+        _tag.Gradient.tensor = _tag.Tensor
+    else:
+        _tag.Vector = _tag.Gradient = _class(Vector, _tag, "123"[: _tag.dimension])
+        _tag.Vector.tensor = _tag.Tensor
+    for _one in (_tag.Tensor, _tag.Symmetric):
+        _rows(_one, _tag.Tensor)
+    for _one in (_tag.Vector, _tag.Gradient, _tag.Tensor, _tag.Symmetric):
+        _one.vector = _tag.Vector
+
+
+def vector(kin, numbers):
+    """Take numbers as a vector."""
+    return kin.Vector._make(numbers)
+
+
+def gradient(kin, numbers):
+    """Take numbers as the gradient of a basis function."""
+    return kin.Gradient._make(numbers)
+
+
+def tensor(kin, numbers):
+    """Take numbers as a tensor."""
+    return kin.Tensor._make(numbers)
+
+
+def symmetric_tensor(kin, numbers):
+    """Take numbers as a symmetric tensor."""
+    return kin.Symmetric._make(numbers)
+
+
+def unit(kin):
+    """I as a tensor."""
+    return kin.Tensor._make([1 if i == j else 0 for i, j in kin.Tensor.places])
+
+
+def nothing(kin):
+    """The symmetric tensor 0."""
+    return kin.Symmetric._make([0 for _ in kin.Symmetric.places])
+
+
+def zero(kin, like):
+    """The tensor 0, as numbers of the type of `like` to begin sums in loops with."""
+    return kin.Tensor._make([real(0, like) for _ in kin.Tensor.places])
+
+
+def zero_vector(kin, like):
+    """The vector 0, likewise."""
+    return kin.Vector._make([real(0, like) for _ in kin.Vector.places])
+
+
+# --- as on the blackboard -------------------------------------------------------------------------
+
+
+def det(f):
+    """Determinant; axisymmetric with the stretch around the axis."""
+    a, d = f.at(), f.kin.dimension
+    plane = determinant(a, d)
+    return plane * a[2, 2] if len(f.axes) > d else plane
+
+
+def inv(f):
+    """F^-1 by the transposed cofactors over the determinant (Cramer), det F not 0."""
+    a, d = f.at(), f.kin.dimension
+    k = 1 / determinant(a, d)
+    return f._make(
+        [k * cofactor(a, d, j, i) if max(i, j) < d else 1 / a[i, j] for i, j in f.places]
+    )
+
+
+def sym(a):
+    """(a_ij + a_ji) / 2."""
+    made, a = a.symmetric, a.at()
+    return made._make(
+        [0.5 * (a[i, j] + a[j, i]) if i != j else a.get((i, i), 0) for i, j in made.places]
+    )
+
+
+def tr(s):
+    """Trace of a symmetric tensor."""
+    return s[0] + s[1] + s[2]
+
+
+def dev(s):
+    """Deviator of a symmetric tensor."""
+    return s + (-1 / 3 * tr(s)) * I
+
+
+def inner(s, e):
+    """s_ij e_ij of symmetric tensors."""
+    normal = s[0] * e[0] + s[1] * e[1] + s[2] * e[2]
+    shears = [a * b for a, b in zip(s[3:], e[3:], strict=True)]
+    return normal + 2 * total(shears) if len(shears) else normal
+
+
+def von_mises(s):
+    """sqrt(3/2 s:s) of a deviatoric tensor, which is |s_xx - s_yy| in uniaxial stress."""
+    return sqrt(1.5 * inner(s, s))
+
+
+def outer(a, b):
+    """a_i b_j; of a gradient with N/r also a_r N/r around the axis."""
+    out = b.tensor._make([a[i] * b[j] for i, j in b.tensor.acting])
+    if COMPILED:
+        out.origin = add_outer, a, b
+    return out
+
+
+def from_columns(columns):
+    """The tensor with these columns."""
+    made = columns[0].tensor
+    return made._make([columns[j][i] for i, j in made.places])

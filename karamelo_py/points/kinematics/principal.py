@@ -3,59 +3,49 @@
 from math import sqrt
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import implements, point_function, round_off, shared, where
+from karamelo_py.compiler.compile import implements, round_off, shared, where
 from karamelo_py.compiler.slopes import Dual, size_of, slopes_of, value_of
-from karamelo_py.points.kinematics.tags import Axisymmetric, Line, PlaneStrain, Space
-from karamelo_py.points.kinematics.tensors import SymmetricTensor, total
+from karamelo_py.points.kinematics import Space
 
 
-class Angle(NamedTuple):
-    """Directions in the plane: cosine and sine of twice the angle to the first."""
-
-    cosine: Any
-    sine: Any
-
-
-@point_function()
-def principal(s: SymmetricTensor):
+@shared
+def principal(s):
     """Find principal values (3,) of a symmetric tensor, in no order, and their directions."""
+    if s.kin.dimension == 1:
+        return (s.xx, s.yy, s.zz), ()
+    return principal_in_plane(s) if s.kin.dimension == 2 else principal_in_space(s)
 
 
-@point_function()
-def from_principal(s: SymmetricTensor, values, directions):
+@shared
+def from_principal(s, values, directions):
     """Make the symmetric tensor with principal values in directions; of the class of `s`."""
+    if s.kin.dimension == 1:
+        return s._make(values)
+    if s.kin.dimension == 2:
+        a, b, c = values
+        mean = 0.5 * (a + b)
+        radius = 0.5 * (a - b)
+        cosine, sine = directions  # of twice the angle to the first
+        change = radius * cosine
+        return s._make([mean + change, mean - change, c, radius * sine])
+
+    def component(i, j):
+        a, b, c = [p * u[i] * u[j] for p, u in zip(values, directions, strict=True)]
+        return a + b + c
+
+    return s._make([component(i, j) for i, j in s.places])
 
 
-@principal.on(Line.Symmetric)
-def _principal_line(s):
-    return (s.xx, s.yy, s.zz), ()
-
-
-@from_principal.on(Line.Symmetric)
-def _from_principal_line(s, values, directions):
-    return s._make(values)
-
-
-@principal.on(PlaneStrain.Symmetric)
-@principal.on(Axisymmetric.Symmetric)
-def _principal_plane(s):
+def principal_in_plane(s):
+    """See `principal`."""
     apart = 0.5 * (s.xx - s.yy)
     mean = 0.5 * (s.xx + s.yy)
     radius = sqrt(apart * apart + s.xy * s.xy)
     turned = radius > 0
     over = where(turned, radius, 1)
-    angle = Angle(where(turned, apart / over, 1), s.xy / over)
+    # Cosine and sine of twice the angle to the first direction.
+    angle = where(turned, apart / over, 1), s.xy / over
     return (mean + radius, mean - radius, s.zz), angle
-
-
-@from_principal.on(PlaneStrain.Symmetric)
-@from_principal.on(Axisymmetric.Symmetric)
-def _from_principal_plane(s, values, directions):
-    a, b, c = values
-    mean = 0.5 * (a + b)
-    radius = 0.5 * (a - b)
-    change = radius * directions.cosine
-    return s._make([mean + change, mean - change, c, radius * directions.sine])
 
 
 @shared
@@ -72,8 +62,9 @@ def jacobi_rotation(a, b, c):
 _SWEEPS = 8
 
 
-@principal.on(Space.Symmetric)
-def _principal_space(s):
+@shared
+def principal_in_space(s):
+    """See `principal`."""
     # Jacobi's rotations (Golub & Van Loan 2013, section 8.5): directions are right to round-off
     # whether or not principal values are equal, which closed forms are not.
     a, b, c, d, e, f = s
@@ -102,20 +93,13 @@ def rotated(k, g, u, v):
     return k * u - g * v, k * v - (-g) * u  # differences: a sum would be rounded once
 
 
-@from_principal.on(Space.Symmetric)
-def _from_principal_space(s, values, directions):
-    def component(i, j):
-        a, b, c = [p * u[i] * u[j] for p, u in zip(values, directions, strict=True)]
-        return a + b + c
-
-    return s._make([component(i, j) for i, j in s.places])
-
-
 # --- slopes -----------------------------------------------------------------------------------
 # Jacobi's rotations end where a tensor is diagonal, its slopes need not be. With S' in the frame of
 # the principal directions n, f(S)' = sum_a f_a' n_a n_a
 # + sum_ab (f_a - f_b) / (s_a - s_b) (n_a . S' n_b) (n_a n_b + n_b n_a), a < b
 # (Ogden 1997, "Non-linear elastic deformations", section 6.1).
+
+PAIRS = (0, 1), (0, 2), (1, 2)
 
 
 class TurningFrame(NamedTuple):
@@ -126,76 +110,53 @@ class TurningFrame(NamedTuple):
     apart: tuple  # s_a - s_b of the pairs
 
 
-@point_function()
-def in_frame(s: SymmetricTensor, directions):
-    """Find components of a tensor in a frame: (3,) of the diagonal, and those of the pairs."""
-
-
-@point_function()
-def out_of_frame(s: SymmetricTensor, diagonal, shears, directions):
-    """Make the tensor with components in a frame; of the class of `s`."""
-
-
-@in_frame.on(PlaneStrain.Symmetric)
-@in_frame.on(Axisymmetric.Symmetric)
-def _in_frame_plane(s, directions):
-    k, g = directions
-    apart, mean = 0.5 * (s.xx - s.yy), 0.5 * (s.xx + s.yy)
-    radius = apart * k + s.xy * g
-    return (mean + radius, mean - radius, s.zz), (s.xy * k - apart * g,)
-
-
-@out_of_frame.on(PlaneStrain.Symmetric)
-@out_of_frame.on(Axisymmetric.Symmetric)
-def _out_of_frame_plane(s, diagonal, shears, directions):
-    a, b, c = diagonal
-    k, g = directions
-    radius, mean = 0.5 * (a - b), 0.5 * (a + b)
-    apart = radius * k - shears[0] * g
-    return s._make([mean + apart, mean - apart, c, radius * g + shears[0] * k])
-
-
-PAIRS = (0, 1), (0, 2), (1, 2)
-
-
 def product(a, b):
     """a_i b_i."""
-    return total([x * y for x, y in zip(a, b, strict=True)])
+    x, y, z = [p * q for p, q in zip(a, b, strict=True)]
+    return x + y + z
 
 
-@in_frame.on(Space.Symmetric)
-def _in_frame_space(s, directions):
+def in_frame(s, directions):
+    """Find components of a tensor in a frame: (3,) of the diagonal, and those of the pairs."""
+    if s.kin.dimension == 2:
+        k, g = directions
+        apart, mean = 0.5 * (s.xx - s.yy), 0.5 * (s.xx + s.yy)
+        radius = apart * k + s.xy * g
+        return (mean + radius, mean - radius, s.zz), (s.xy * k - apart * g,)
     a = s.at()
     along = [tuple([product([a[i, j] for j in range(3)], n) for i in range(3)]) for n in directions]
     shears = tuple([product(directions[a], along[b]) for a, b in PAIRS])
     return tuple([product(n, t) for n, t in zip(directions, along, strict=True)]), shears
 
 
-@out_of_frame.on(Space.Symmetric)
-def _out_of_frame_space(s, diagonal, shears, directions):
+def out_of_frame(s, diagonal, shears, directions):
+    """Make the tensor with components in a frame; of the class of `s`."""
+    if s.kin.dimension == 2:
+        a, b, c = diagonal
+        k, g = directions
+        radius, mean = 0.5 * (a - b), 0.5 * (a + b)
+        apart = radius * k - shears[0] * g
+        return s._make([mean + apart, mean - apart, c, radius * g + shears[0] * k])
+
     def component(i, j):
-        own = [p * n[i] * n[j] for p, n in zip(diagonal, directions, strict=True)]
-        mixed = [
-            c * (directions[a][i] * directions[b][j] + directions[b][i] * directions[a][j])
-            for c, (a, b) in zip(shears, PAIRS, strict=True)
-        ]
-        return total([*own, *mixed])
+        n = directions
+        own = product(diagonal, [m[i] * m[j] for m in n])
+        return own + product(shears, [n[a][i] * n[b][j] + n[b][i] * n[a][j] for a, b in PAIRS])
 
     return s._make([component(i, j) for i, j in s.places])
 
 
-def columns(numbers: tuple, n: int) -> list:
+def columns(numbers, n):
     """Give the `n` slopes of numbers: for each a tuple of theirs."""
     return list(zip(*[slopes_of(x, n) for x in numbers], strict=True))
 
 
 @implements(principal, Dual)
 def _principal_slopes(s):
-    values, directions = principal(value_of(s))
-    n = size_of(*s)
-    if isinstance(s.kin, Line):
+    if s.kin.dimension == 1:
         return (s.xx, s.yy, s.zz), ()
-    turned = [in_frame(s._make(slopes), directions) for slopes in columns(s, n)]
+    values, directions = principal(value_of(s))
+    turned = [in_frame(s._make(slopes), directions) for slopes in columns(s, size_of(*s))]
     along = zip(*[diagonal for diagonal, _ in turned], strict=True)
     made = [Dual(value, tuple(slopes)) for value, slopes in zip(values, along, strict=True)]
     apart = [values[a] - values[b] for a, b in PAIRS[: len(turned[0][1])]]
@@ -213,13 +174,10 @@ def _from_principal_slopes(s, values, directions):
         where(apart == 0, 0, (plain[a] - plain[b]) / where(apart == 0, 1, apart))
         for (a, b), apart in pairs
     ]
+    each = zip(columns(values, len(directions.shears)), directions.shears, strict=True)
     tensors = [
         out_of_frame(s, slopes, tuple([r * c for r, c in zip(ratios, shears, strict=True)]), frame)
-        for slopes, shears in zip(
-            columns(values, len(directions.shears)), directions.shears, strict=True
-        )
+        for slopes, shears in each
     ]
-    made = from_principal(value_of(s), plain, frame)
-    return s._make(
-        [Dual(v, tuple(t)) for v, t in zip(made, zip(*tensors, strict=True), strict=True)]
-    )
+    made = zip(from_principal(value_of(s), plain, frame), zip(*tensors, strict=True), strict=True)
+    return s._make([Dual(value, tuple(slopes)) for value, slopes in made])

@@ -8,65 +8,79 @@ remembers (`Memory`), and the dissipated energy where there is any. Parts of oth
 a plug-in's, are chained (`karamelo_py.points.laws.further`).
 """
 
-from math import inf, isinf, log
-from typing import Any, NamedTuple
+from math import inf, isinf, log, sqrt
+from typing import Any, ClassVar, NamedTuple
 
 from karamelo_py.compiler.compile import where
-from karamelo_py.compiler.tuples import added, increased, only
+from karamelo_py.language.arguments import Argument, look_up
 from karamelo_py.language.rules import suggestion
-from karamelo_py.points.kinematics import I, det, dev, nothing, sym, symmetric_tensor, tr
-from karamelo_py.points.laws import (
-    Absent,
-    advance,
-    can,
-    cauchy_stress,
-    column,
-    composed,
-    conductivity,
-    damage,
-    damage_initiation,
-    dissipated_energy,
-    elastic_strain,
-    energy_density,
-    heat_capacity,
-    initial_state,
-    jacobian,
-    kirchhoff_stress,
-    plastic_strain,
-    shown,
-    specific_volume,
-    strengths,
-    temperature,
-    warmed,
-    wave_speed_squared,
-    with_stress,
-    with_temperature,
-)
-from karamelo_py.points.laws.damages import initial_damage, initiation
-from karamelo_py.points.laws.eos import (
-    at_pressure,
-    bulk_modulus,
-    compressed,
-    compression_energy,
-    initial_energy,
-    stored_heat,
-    taken_heat,
-)
+from karamelo_py.language.scene import Scene
+from karamelo_py.points import laws
+from karamelo_py.points.kinematics import I, det, dev, nothing, sym, symmetric_tensor, tr, von_mises
+from karamelo_py.points.laws import Absent, can, column, eos, strengths
+from karamelo_py.points.laws.damages import damage_after, initial_damage, initiation, integrity
 from karamelo_py.points.laws.further import (
     chained,
     further_after,
     further_pressure,
     initial_further,
 )
-from karamelo_py.points.laws.named import Eos, Option, Strength
 from karamelo_py.points.laws.temperatures import (
     at_temperature,
     heated,
     initial_heat,
     thermal_pressure,
 )
-from karamelo_py.points.laws.viscosity import initial_viscous_pressure
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.points.laws.viscosity import damped, viscous_pressure, viscous_speed
+from karamelo_py.script.errors import ScriptError, nearest
+
+# --- the parts, as a script names them --------------------------------------------------------
+
+
+class Eos:
+    """For signatures: an equation of state that the script has named."""
+
+    script_kind: ClassVar[str] = "the ID of an equation of state"
+    kind: ClassVar[str] = "eos"
+
+    @classmethod
+    def from_script(cls, hub: Scene, argument: Argument) -> Any:
+        """The part that `argument` names."""
+        return look_up(hub.parts[cls.kind], argument)
+
+
+class Strength(Eos):
+    """For signatures: a strength."""
+
+    script_kind = "the ID of a strength"
+    kind = "strength"
+
+
+class Option:
+    """For signatures: a part that may be left out."""
+
+    script_kind: ClassVar[str] = "the ID of a damage or of a temperature"
+
+    @classmethod
+    def from_script(cls, hub: Scene, argument: Argument) -> Any:
+        """The part that `argument` names."""
+        word = argument.word()
+        optional = {
+            kind: named for kind, named in hub.parts.items() if kind not in ("eos", "strength")
+        }
+        known = {ID: part for named in optional.values() for ID, part in named.items()}
+        if word in known:
+            return known[word]
+        close = nearest(word, known) if word else None
+        raise ScriptError(
+            f"unknown {' or '.join(optional)} '{argument.text}'",
+            place=argument.place,
+            expected=f"one of {', '.join(known)}" if known else "none is defined yet",
+            hint=f"did you mean '{close}'?" if close else None,
+        )
+
+
+# --- the style ----------------------------------------------------------------------------------
 
 
 class EosStrength(NamedTuple):
@@ -128,14 +142,14 @@ class EosStrength(NamedTuple):
         return cls(**laws, further=chained(further))
 
 
-column(EosStrength, "dissipated", dissipated_energy)
+column(EosStrength, "dissipated", laws.dissipated_energy)
 
 
 # --- parts that never act, told by `check` ------------------------------------------------------
 
 
 def _idle_damage(law, scene):
-    yields = can(law.strength, plastic_strain) or any(
+    yields = can(law.strength, laws.plastic_strain) or any(
         name in law.strength._fields for name in ("yield_stress", "A", "cohesion", "phi")
     )
     return not isinstance(law.damage, Absent) and not yields
@@ -165,96 +179,183 @@ suggestion(
 )
 
 
-@initial_state.on(EosStrength)
+# --- state ------------------------------------------------------------------------------------
+
+
+class Memory(NamedTuple):
+    """States of the parts of a law at one point: tuples, empty for parts without."""
+
+    energy: Any  # of the equation of state
+    viscous: Any  # viscous pressure
+    damage: Any
+    heat: Any  # temperature
+    loss: Any  # dissipated energy per reference volume
+    strength: Any
+    further: Any
+
+
+class State(NamedTuple):
+    """State of a point."""
+
+    J: Any  # det F
+    s: Any  # deviatoric stress of the intact material
+    m: Memory
+
+
+@laws.initial_state.on(EosStrength)
 def _initial_state_eos_strength(law, kin, like):
-    m = composed.Memory(
-        initial_energy(law.eos, like),
-        initial_viscous_pressure(law.viscosity, like),
+    viscous = () if isinstance(law.viscosity, Absent) else (0.0,)
+    m = Memory(
+        eos.initial_energy(law.eos, like),
+        viscous,
         initial_damage(law.damage, like),
         initial_heat(law.temperature, like),
-        composed.lossless(law, like),
+        strengths.initial_loss(law.strength, like) or viscous,  # (0,) where a part dissipates
         strengths.initial_memory(law.strength, like),
         initial_further(law.further, like),
     )
-    return composed.State(1, nothing(kin), m)
+    return State(1, nothing(kin), m)
 
 
-@advance.on(EosStrength)
+@laws.advance.on(EosStrength)
 def _advance_eos_strength(law, kin, state, dl, dt):
     before, s, m = state
     J = before * det(I + dl)
     eps = sym(dl)
     s, memory, work = strengths.respond(law.strength, law, kin, s.turned(dl), eps, J, m, dt)
-    work = J * work * composed.borne_share(law.damage, m.damage, work)
-    viscous = composed.viscous_after(law.viscosity, law, J, m, tr(eps) / dt)
-    viscous_work = only(viscous) * (before - J)
-    energy = compressed(law.eos, m.energy, before, J, work + viscous_work)
+    work = J * work * borne_share(law, m.damage)
+    viscous = viscous_after(law, J, m, tr(eps) / dt)
+    viscous_work = sum(viscous) * (before - J)
+    energy = eos.compressed(law.eos, m.energy, before, J, work + viscous_work)
     flow = strengths.equivalent_plastic_strain(law.strength, memory)
     flow -= strengths.equivalent_plastic_strain(law.strength, m.strength)
-    now = composed.Memory(energy, viscous, m.damage, m.heat, m.loss, memory, m.further)
-    broken = composed.broken_further(law.damage, law, kin, now, flow, s, J, dt)
-    heat = heated(law.temperature, m.heat, work * specific_volume(law.eos))
-    gone = work + viscous_work + composed.released(law.damage, law, kin, J, s, now, broken)
-    loss = increased(m.loss, gone)
+    now = m._replace(energy=energy, viscous=viscous, strength=memory)
+    broken = broken_further(law, now, flow, s, J, dt)
+    heat = heated(law.temperature, m.heat, work * laws.specific_volume(law.eos))
+    gone = work + viscous_work + released(law, kin, J, s, now, broken)
+    loss = tuple([lost + gone for lost in m.loss])
     further = further_after(law.further, m.further, law, kin, J, s, now, dt)
-    return composed.State(
-        J, s, composed.Memory(energy, viscous, broken, heat, loss, memory, further)
-    )
+    return State(J, s, now._replace(damage=broken, heat=heat, loss=loss, further=further))
+
+
+# --- pressure ---------------------------------------------------------------------------------
+
+
+def intact_pressure(law, j, m):
+    """Pressure of the intact material, without viscous pressure."""
+    elastic = strengths.elastic_ratio(law.strength, m.strength, j)
+    p = eos.pressure(law.eos, elastic, m.energy, m.heat)
+    p += sum(thermal_pressure(law.temperature, m.heat))
+    return further_pressure(law.further, m.further, p)
+
+
+def full_pressure(law, j, m):
+    """The pressure in the stress: damage takes of tension, not of compression."""
+    p = intact_pressure(law, j, m)
+    return where(p < 0, p * borne_share(law, m.damage), p) + sum(m.viscous)
+
+
+def sound(law, j, m):
+    """Speed of sound without shear."""
+    elastic = strengths.elastic_ratio(law.strength, m.strength, j)
+    K = eos.bulk_modulus(law.eos, elastic, m.energy, m.heat)
+    return sqrt(K * laws.specific_volume(law.eos) * j)
+
+
+def viscous_after(law, j, m, rate):
+    """Viscous pressure (q,) at a rate of volume change, or ()."""
+    if isinstance(law.viscosity, Absent):
+        return ()
+    density = 1 / (laws.specific_volume(law.eos) * j)
+    return (viscous_pressure(law.viscosity, rate, density, sound(law, j, m)),)
+
+
+# --- damage -----------------------------------------------------------------------------------
+
+
+def borne_share(law, memory):
+    """The share of a stress or energy that the damaged material bears, 1 - D."""
+    return 1 if isinstance(law.damage, Absent) else integrity(law.damage, memory)
+
+
+def broken_further(law, m, strain, s, j, dt):
+    """Memory of the damage after an increment of plastic strain; () where nothing breaks."""
+    if isinstance(law.damage, Absent):
+        return ()
+    p = intact_pressure(law, j, m)
+    bound = von_mises(s) + 1e-3 * abs(p)
+    known = bound > 0
+    triaxiality = where(known, -p / where(known, bound, 1), 0)
+    return damage_after(law.damage, m.damage, strain, triaxiality, m.heat, dt)
+
+
+def released(law, kin, j, s, m, broken):
+    """Stored energy that an increment of damage sets free."""
+    if isinstance(law.damage, Absent):
+        return 0
+    shear = j * strengths.shear_energy(law.strength, kin, s)
+    tension = intact_pressure(law, j, m) < 0
+    energy = shear + where(tension, eos.compression_energy(law.eos, j, m.energy), 0)
+    return (integrity(law.damage, m.damage) - integrity(law.damage, broken)) * energy
 
 
 def stress_left(law, state):
     """The deviatoric stress that damage leaves, (1 - D) s."""
-    return composed.borne_share(law.damage, state.m.damage, state.J) * state.s
+    return borne_share(law, state.m.damage) * state.s
 
 
-@cauchy_stress.on(EosStrength)
+# --- quantities of the whole law --------------------------------------------------------------
+
+
+@laws.cauchy_stress.on(EosStrength)
 def _cauchy_stress_eos_strength(law, kin, state):
-    return stress_left(law, state) - composed.full_pressure(law, state.J, state.m) * I
+    return stress_left(law, state) - full_pressure(law, state.J, state.m) * I
 
 
-@kirchhoff_stress.on(EosStrength)
+@laws.kirchhoff_stress.on(EosStrength)
 def _kirchhoff_stress_eos_strength(law, kin, state):
     J = state.J
-    return J * stress_left(law, state) - J * composed.full_pressure(law, J, state.m) * I
+    return J * stress_left(law, state) - J * full_pressure(law, J, state.m) * I
 
 
-@jacobian.on(EosStrength)
-def _jacobian_eos_strength(law, kin, state):
-    return state.J
+laws.jacobian.on(EosStrength)(lambda law, kin, state: state.J)
+laws.dissipated_energy.on(EosStrength)(lambda law, kin, state: sum(state.m.loss))
+laws.specific_volume.on(EosStrength)(lambda law: laws.specific_volume(law.eos))
+laws.temperature.on(EosStrength)(lambda law, kin, state: sum(state.m.heat))
+laws.heat_capacity.on(EosStrength)(lambda law, like: laws.heat_capacity(law.temperature, like))
+laws.conductivity.on(EosStrength)(lambda law, like: laws.conductivity(law.temperature, like))
 
 
-@wave_speed_squared.on(EosStrength)
+@laws.wave_speed_squared.on(EosStrength)
 def _wave_speed_squared_eos_strength(law, kin, state):
     # (K + 4/3 G) / rho, with the elastic moduli: plastic waves are slower.
     J, _, m = state
     elastic = strengths.elastic_ratio(law.strength, m.strength, J)
-    modulus = bulk_modulus(law.eos, elastic, m.energy, m.heat)
-    volume = specific_volume(law.eos) * J
+    modulus = eos.bulk_modulus(law.eos, elastic, m.energy, m.heat)
+    volume = laws.specific_volume(law.eos) * J
     squared = (modulus + 4 / 3 * strengths.shear_modulus(law.strength)) * volume
     squared = strengths.damped_speed_squared(law.strength, squared, 1 / volume)
-    return composed.slowed_by_viscosity(law.viscosity, law, J, m, squared, 1 / volume)
+    if isinstance(law.viscosity, Absent):
+        return squared
+    viscous = viscous_speed(law.viscosity, m.viscous[0], 1 / volume, sound(law, J, m))
+    return damped(squared, viscous)
 
 
-@energy_density.on(EosStrength)
+@laws.energy_density.on(EosStrength)
 def _energy_density_eos_strength(law, kin, state):
     """Return the energy that unloading at this temperature frees: plastic work is not stored."""
     J, s, m = state
     elastic = strengths.elastic_ratio(law.strength, m.strength, J)
-    volume = compression_energy(law.eos, elastic, m.energy)
-    volume -= stored_heat(law.eos, only(m.loss))
-    volume += only(thermal_pressure(law.temperature, m.heat)) * (1 - J)
-    tension = composed.intact_pressure(law, J, m) < 0
-    share = composed.borne_share(law.damage, m.damage, J)
+    volume = eos.compression_energy(law.eos, elastic, m.energy)
+    volume -= eos.stored_heat(law.eos, sum(m.loss))
+    volume += sum(thermal_pressure(law.temperature, m.heat)) * (1 - J)
+    tension = intact_pressure(law, J, m) < 0
+    share = borne_share(law, m.damage)
     volume = where(tension, share * volume, volume)
     return volume + J * (share * strengths.shear_energy(law.strength, kin, s))
 
 
-@dissipated_energy.on(EosStrength)
-def _dissipated_energy_eos_strength(law, kin, state):
-    return only(state.m.loss)
-
-
-@elastic_strain.on(EosStrength)
+@laws.elastic_strain.on(EosStrength)
 def _elastic_strain_eos_strength(law, kin, state):
     """ln J / 3, the mean of the elastic strain increments, and the elastic shear."""
     strain = symmetric_tensor(kin, strengths.shear_strain(law.strength, kin, state.s))
@@ -262,67 +363,49 @@ def _elastic_strain_eos_strength(law, kin, state):
     return strain + 1 / 3 * log(elastic) * I
 
 
-@plastic_strain.on(EosStrength)
+@laws.plastic_strain.on(EosStrength)
 def _plastic_strain_eos_strength(law, kin, state):
     return strengths.equivalent_plastic_strain(law.strength, state.m.strength)
 
 
-@shown.on(strengths.Remembered)
+@laws.shown.on(strengths.Remembered)
 def _shown_remembered(what, law, kin, state):
     return state.m.strength[what.place]
 
 
-@with_stress.on(EosStrength)
+@laws.with_stress.on(EosStrength)
 def _with_stress_eos_strength(law, kin, state, stress):
     # Pressure follows from volume, so the point gets the volume that has this pressure.
     J, _, m = state
     stress = symmetric_tensor(kin, stress)
     elastic = strengths.elastic_ratio(law.strength, m.strength, J)
-    beside = only(thermal_pressure(law.temperature, m.heat)) + only(m.viscous)
+    beside = sum(thermal_pressure(law.temperature, m.heat)) + sum(m.viscous)
     p = -tr(stress) * (1 / 3) - further_pressure(law.further, m.further, beside)
-    after, energy = at_pressure(law.eos, elastic, m.energy, p, m.heat)
-    return composed.State(J * (after / elastic), dev(stress), m._replace(energy=energy))
+    after, energy = eos.at_pressure(law.eos, elastic, m.energy, p, m.heat)
+    return State(J * (after / elastic), dev(stress), m._replace(energy=energy))
 
 
-@specific_volume.on(EosStrength)
-def _specific_volume_eos_strength(law):
-    return specific_volume(law.eos)
-
-
-@damage.on(EosStrength)
+@laws.damage.on(EosStrength)
 def _damage_eos_strength(law, kin, state):
-    return 1 - composed.borne_share(law.damage, state.m.damage, state.J)
+    return 1 - borne_share(law, state.m.damage)
 
 
-@damage_initiation.on(EosStrength)
+@laws.damage_initiation.on(EosStrength)
 def _damage_initiation_eos_strength(law, kin, state):
     return initiation(law.damage, state.m.damage)
 
 
-@temperature.on(EosStrength)
-def _temperature_eos_strength(law, kin, state):
-    return only(state.m.heat)
-
-
-@with_temperature.on(EosStrength)
+@laws.with_temperature.on(EosStrength)
 def _with_temperature_eos_strength(law, kin, state, T):
     heat = at_temperature(state.m.heat, T)
     return state._replace(m=state.m._replace(heat=heat))
 
 
-@heat_capacity.on(EosStrength)
-def _heat_capacity_eos_strength(law, like):
-    return heat_capacity(law.temperature, like)
-
-
-@warmed.on(EosStrength)
+@laws.warmed.on(EosStrength)
 def _warmed_eos_strength(law, kin, state, heat):
     m = state.m
-    taken = taken_heat(law.eos, m.energy, heat)
-    m = m._replace(energy=added(m.energy, taken), loss=added(m.loss, taken))
-    return state._replace(m=m)
-
-
-@conductivity.on(EosStrength)
-def _conductivity_eos_strength(law, like):
-    return conductivity(law.temperature, like)
+    taken = eos.taken_heat(law.eos, m.energy, heat)
+    if not len(taken):
+        return state
+    energy, loss = (m.energy[0] + taken[0],), tuple([lost + taken[0] for lost in m.loss])
+    return state._replace(m=m._replace(energy=energy, loss=loss))

@@ -1,15 +1,19 @@
 """Parts of a composed law of further kinds, which a plug-in may bring: any number of them.
 
+Lowering adds one itself when asked: the rate of plastic strain, for output.
+
 A part is a NamedTuple of parameters (its class is the tag). It may remember numbers of its own, and
 add a pressure. What is not defined for a class is that of a part that remembers and adds nothing.
 """
 
 from functools import reduce
+from math import sqrt
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import point_function
-from karamelo_py.compiler.tuples import only
+from karamelo_py.compiler.compile import point_function, where
+from karamelo_py.points import laws
 from karamelo_py.points.laws import Absent
+from karamelo_py.points.laws.strengths import equivalent_plastic_strain
 
 
 class Further(NamedTuple):
@@ -50,37 +54,104 @@ def part_pressure(part, memory):
 # ---- the same of all ----------------------------------------------------------------------------
 
 
-@point_function(otherwise=True)
 def initial_further(parts, like):
-    """Memory of the first part, and that of the others."""
-    return ()
-
-
-@initial_further.on(Further)
-def _initial_further_further(parts, like):
+    """Memory of the first part, and that of the others; () of none."""
+    if isinstance(parts, Absent):
+        return ()
     return initial_part(parts.part, like), initial_further(parts.rest, like)
 
 
-@point_function(otherwise=True)
 def further_after(parts, memory, law, kin, j, s, memories, dt):
     """The memories after a step."""
-    return ()
-
-
-@further_after.on(Further)
-def _further_after_further(parts, memory, law, kin, j, s, memories, dt):
+    if isinstance(parts, Absent):
+        return ()
     own, rest = memory
     after = part_after(parts.part, own, law, kin, j, s, memories, dt)
     return after, further_after(parts.rest, rest, law, kin, j, s, memories, dt)
 
 
-@point_function(otherwise=True)
 def further_pressure(parts, memory, p):
     """p and what all parts add to it."""
-    return p
-
-
-@further_pressure.on(Further)
-def _further_pressure_further(parts, memory, p):
+    if isinstance(parts, Absent):
+        return p
     own, rest = memory
-    return further_pressure(parts.rest, rest, p + only(part_pressure(parts.part, own)))
+    return further_pressure(parts.rest, rest, p + sum(part_pressure(parts.part, own)))
+
+
+# --- the rate of plastic strain ------------------------------------------------------------------
+
+# Karamelo smooths over the time in which sound goes through this many cells.
+CELLS = 1000
+
+
+class PlasticRate(NamedTuple):
+    """Rate of the equivalent plastic strain, smoothed over a time."""
+
+    in_lanes = True
+
+    time: float
+
+
+class Smoothed(NamedTuple):
+    """Tag of the smoothed rate."""
+
+
+laws.column(PlasticRate, "epdot", Smoothed())
+
+
+class RateMemory(NamedTuple):
+    """State of a point."""
+
+    rate: Any
+    ep: Any  # plastic strain, -1 where none is known yet
+
+
+@initial_part.on(PlasticRate)
+def _initial_part_plastic_rate(part, like):
+    return RateMemory(0.0, -1.0)
+
+
+@part_after.on(PlasticRate)
+def _part_after_plastic_rate(part, memory, law, kin, j, s, memories, dt):
+    ep = equivalent_plastic_strain(law.strength, memories.strength)
+    before = where(memory.ep < 0, ep, memory.ep)
+    change = (ep - before - dt * memory.rate) / part.time
+    return RateMemory(max(memory.rate + change, 0), ep)
+
+
+@laws.shown.on(Smoothed)
+def _shown_smoothed(what, law, kin, state):
+    return last_memory(state.m.further).rate
+
+
+def last_memory(memories):
+    """Find the memory of the last of several further parts."""
+    own, rest = memories
+    return last_memory(rest) if len(rest) else own
+
+
+def has_rate(law: NamedTuple) -> bool:
+    """Check that a law has plastic strain, so that it has a rate."""
+    return hasattr(law, "further") and "ep" in laws.columns_of(law)
+
+
+def with_rate(law: NamedTuple, kin: NamedTuple, h: float) -> NamedTuple:
+    """A law that keeps its rate behind all that it keeps else; `h` is the cell size."""
+    if not has_rate(law):
+        return law
+    speed = sqrt(laws.wave_speed_squared(law, kin, laws.initial_state(law, kin, 1.0)))
+    return law._replace(further=_behind(law.further, PlasticRate(CELLS * h / speed)))
+
+
+def without_rate(kinds: tuple[type, ...]) -> tuple[type, ...]:
+    """The kinds of a law (`law_kind`) as they are when nobody asks for the rate."""
+    if PlasticRate not in kinds:
+        return kinds
+    k = kinds.index(PlasticRate)
+    return kinds[: k - 1] + kinds[k + 1 :]
+
+
+def _behind(parts: NamedTuple, part: NamedTuple) -> NamedTuple:
+    if isinstance(parts, Absent):
+        return Further(part, parts)
+    return parts._replace(rest=_behind(parts.rest, part))

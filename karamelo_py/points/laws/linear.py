@@ -2,12 +2,11 @@
 
 from typing import Annotated, Any, Literal, NamedTuple
 
-from karamelo_py.compiler.compile import point_function
 from karamelo_py.language.rules import gain
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, det, inner, nothing, sym, symmetric_tensor, tr
-from karamelo_py.points.laws.elasticity import check_poisson_ratio, lame_parameters
+from karamelo_py.points.laws.parameters import lame_parameters
 from karamelo_py.points.laws.thermoelastic import expanding
 
 
@@ -53,6 +52,7 @@ class LinearElastic(NamedTuple):
 
     in_lanes = True
     rebounds = True
+    turns = True
 
     specific_volume: float  # reference volume per mass
     lam: float  # Lame's first parameter
@@ -71,20 +71,26 @@ class LinearElastic(NamedTuple):
         rate: Literal["jaumann", "none"] = "jaumann",
     ):
         """The law from Young's modulus and Poisson's ratio; with a temperature where it has one."""
-        check_poisson_ratio(nu)
-        moduli = lame_parameters(E, nu)
         law = cls if rate == "jaumann" else FixedFrame
-        return expanding(law(1 / rho, *moduli), moduli, cp, kappa, alpha)
+        return expanding(law(1 / rho, *lame_parameters(E, nu)), cp, kappa, alpha)
 
 
 class FixedFrame(NamedTuple):
     """The same law without the turn: its stress stays behind when a point turns (Karamelo's)."""
 
     in_lanes = True
+    turns = False
 
     specific_volume: float  # reference volume per mass
     lam: float  # Lame's first parameter
     G: float  # shear modulus
+
+
+class State(NamedTuple):
+    """State of a point."""
+
+    J: Any  # det F
+    sigma: Any  # Cauchy stress
 
 
 for _law in (LinearElastic, FixedFrame):
@@ -95,60 +101,24 @@ for _law in (LinearElastic, FixedFrame):
         "work than it took",
         cure="material neo-hookean, which stores what it is given",
     )
-
-
-class State(NamedTuple):
-    """State of a point."""
-
-    J: Any  # det F
-    sigma: Any  # Cauchy stress
-
-
-@point_function()
-def turned(law, dl, sigma):
-    """The old stress in the frame after the increment dl."""
-
-
-@turned.on(LinearElastic)
-def _turned_linear_elastic(law, dl, sigma):
-    return sigma.turned(dl)
-
-
-@turned.on(FixedFrame)
-def _turned_fixed_frame(law, dl, sigma):
-    return sigma
-
-
-@laws.initial_state.on(LinearElastic)
-@laws.initial_state.on(FixedFrame)
-def _initial_state_fixed_frame(law, kin, like):
-    return State(1, nothing(kin))
+    laws.initial_state.on(_law)(lambda law, kin, like: State(1, nothing(kin)))
+    laws.cauchy_stress.on(_law)(lambda law, kin, state: state.sigma)
+    laws.jacobian.on(_law)(lambda law, kin, state: state.J)
 
 
 @laws.advance.on(LinearElastic)
 @laws.advance.on(FixedFrame)
 def _advance_fixed_frame(law, kin, state, dl, dt):
     eps = sym(dl)
+    sigma = state.sigma.turned(dl) if law.turns else state.sigma
     increment = 2 * law.G * eps + law.lam * tr(eps) * I
-    return State(state.J * det(I + dl), turned(law, dl, state.sigma) + increment)
+    return State(state.J * det(I + dl), sigma + increment)
 
 
 @laws.kirchhoff_stress.on(LinearElastic)
 @laws.kirchhoff_stress.on(FixedFrame)
 def _kirchhoff_stress_fixed_frame(law, kin, state):
     return state.J * state.sigma
-
-
-@laws.cauchy_stress.on(LinearElastic)
-@laws.cauchy_stress.on(FixedFrame)
-def _cauchy_stress_fixed_frame(law, kin, state):
-    return state.sigma
-
-
-@laws.jacobian.on(LinearElastic)
-@laws.jacobian.on(FixedFrame)
-def _jacobian_fixed_frame(law, kin, state):
-    return state.J
 
 
 @laws.wave_speed_squared.on(LinearElastic)

@@ -7,7 +7,7 @@ from karamelo_py.compiler.powers import logarithm_near_one as log
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, det, tr, unit
-from karamelo_py.points.laws.elasticity import check_poisson_ratio, lame_parameters
+from karamelo_py.points.laws.parameters import lame_parameters
 from karamelo_py.points.laws.thermoelastic import expanding
 
 
@@ -64,9 +64,7 @@ class NeoHookean(NamedTuple):
         alpha: float = 0.0,
     ):
         """The law from Young's modulus and Poisson's ratio; with a temperature where it has one."""
-        check_poisson_ratio(nu)
-        moduli = lame_parameters(E, nu)
-        return expanding(cls(1 / rho, *moduli), moduli, cp, kappa, alpha)
+        return expanding(cls(1 / rho, *lame_parameters(E, nu)), cp, kappa, alpha)
 
 
 class State(NamedTuple):
@@ -75,9 +73,8 @@ class State(NamedTuple):
     F: Any  # deformation gradient
 
 
-@laws.initial_state.on(NeoHookean)
-def _initial_state_neo_hookean(law, kin, like):
-    return State(unit(kin))
+laws.initial_state.on(NeoHookean)(lambda law, kin, like: State(unit(kin)))
+laws.deformation.on(NeoHookean)(lambda law, kin, state: state.F)
 
 
 @laws.advance.on(NeoHookean)
@@ -95,11 +92,6 @@ def _kirchhoff_stress_neo_hookean(law, kin, state):
 @laws.cauchy_stress.on(NeoHookean)
 def _cauchy_stress_neo_hookean(law, kin, state):
     return laws.kirchhoff_stress(law, kin, state) / det(state.F)
-
-
-@laws.deformation.on(NeoHookean)
-def _deformation_neo_hookean(law, kin, state):
-    return state.F
 
 
 @laws.jacobian.on(NeoHookean)

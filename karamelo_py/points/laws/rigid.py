@@ -48,34 +48,11 @@ class Rigid(NamedTuple):
         return cls(1 / rho)
 
 
-@laws.initial_state.on(Rigid)
-def _initial_state_rigid(law, kin, like):
-    return ()
-
-
-@laws.advance.on(Rigid)
-def _advance_rigid(law, kin, state, dl, dt):
-    return ()
-
-
-@laws.constrained_velocity.on(Rigid)
-def _constrained_velocity_rigid(law, own, given):
-    return own
-
-
-@laws.cauchy_stress.on(Rigid)
-@laws.kirchhoff_stress.on(Rigid)
-@laws.elastic_strain.on(Rigid)
-def _elastic_strain_rigid(law, kin, state):
-    return nothing(kin)
-
-
-@laws.jacobian.on(Rigid)
-def _jacobian_rigid(law, kin, state):
-    return 1
-
-
-@laws.wave_speed_squared.on(Rigid)
-@laws.energy_density.on(Rigid)
-def _energy_density_rigid(law, kin, state):
-    return 0
+laws.initial_state.on(Rigid)(lambda law, kin, like: ())
+laws.advance.on(Rigid)(lambda law, kin, state, dl, dt: ())
+laws.constrained_velocity.on(Rigid)(lambda law, own, given: own)
+laws.jacobian.on(Rigid)(lambda law, kin, state: 1)
+for _stress in (laws.cauchy_stress, laws.kirchhoff_stress, laws.elastic_strain):
+    _stress.on(Rigid)(lambda law, kin, state: nothing(kin))
+for _number in (laws.wave_speed_squared, laws.energy_density):
+    _number.on(Rigid)(lambda law, kin, state: 0)

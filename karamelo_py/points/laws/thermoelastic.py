@@ -5,7 +5,6 @@ from typing import Any, NamedTuple
 from karamelo_py.language.rules import suggestion
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, symmetric_tensor
-from karamelo_py.points.laws.elasticity import LameParameters
 from karamelo_py.points.laws.temperatures import Warm, initial_heat, thermal_pressure
 from karamelo_py.script.errors import ScriptError
 
@@ -40,9 +39,7 @@ suggestion(
 )
 
 
-def expanding(
-    law: NamedTuple, moduli: LameParameters, cp: float | None, kappa: float | None, alpha: float
-) -> NamedTuple:
+def expanding(law: Any, cp: float | None, kappa: float | None, alpha: float) -> NamedTuple:
     """An elastic law with a temperature where heat capacity and conductivity are given."""
     if cp is None or kappa is None:
         if cp is not None:
@@ -52,16 +49,12 @@ def expanding(
                 expected="cp and kappa, or neither",
             )
         return law
-    bulk = moduli.lam + 2 / 3 * moduli.G
+    bulk = law.lam + 2 / 3 * law.G
     return Thermoelastic(law, Expansion(cp, kappa, alpha, 3 * bulk * alpha, 0.0))
 
 
 laws.column(Expansion, "T", laws.temperature)
-
-
-@initial_heat.on(Expansion)
-def _initial_heat_expansion(heat, like):
-    return Warm(heat.initial_temperature)
+initial_heat.on(Expansion)(lambda heat, like: Warm(heat.initial_temperature))
 
 
 @thermal_pressure.on(Expansion)
@@ -102,24 +95,18 @@ def _kirchhoff_stress_thermoelastic(law, kin, state):
     return laws.kirchhoff_stress(law.elastic, kin, state.elastic) - p * I
 
 
-@laws.jacobian.on(Thermoelastic)
-def _jacobian_thermoelastic(law, kin, state):
-    return laws.jacobian(law.elastic, kin, state.elastic)
+def of_elastic_law(function) -> None:
+    """Let a function of a state be that of the elastic law."""
+
+    @function.on(Thermoelastic)
+    def _of_elastic_law(law, kin, state):
+        return function(law.elastic, kin, state.elastic)
 
 
-@laws.deformation.on(Thermoelastic)
-def _deformation_thermoelastic(law, kin, state):
-    return laws.deformation(law.elastic, kin, state.elastic)
-
-
-@laws.wave_speed_squared.on(Thermoelastic)
-def _wave_speed_squared_thermoelastic(law, kin, state):
-    return laws.wave_speed_squared(law.elastic, kin, state.elastic)
-
-
-@laws.wave_speed_bound.on(Thermoelastic)
-def _wave_speed_bound_thermoelastic(law, kin, state):
-    return laws.wave_speed_bound(law.elastic, kin, state.elastic)
+of_elastic_law(laws.jacobian)
+of_elastic_law(laws.deformation)
+of_elastic_law(laws.wave_speed_squared)
+of_elastic_law(laws.wave_speed_bound)
 
 
 @laws.energy_density.on(Thermoelastic)
@@ -142,26 +129,12 @@ def _with_stress_thermoelastic(law, kin, state, stress):
     return State(laws.with_stress(law.elastic, kin, state.elastic, elastic), state.T)
 
 
-@laws.specific_volume.on(Thermoelastic)
-def _specific_volume_thermoelastic(law):
-    return laws.specific_volume(law.elastic)
-
-
-@laws.temperature.on(Thermoelastic)
-def _temperature_thermoelastic(law, kin, state):
-    return state.T
+laws.specific_volume.on(Thermoelastic)(lambda law: laws.specific_volume(law.elastic))
+laws.temperature.on(Thermoelastic)(lambda law, kin, state: state.T)
+laws.heat_capacity.on(Thermoelastic)(lambda law, like: law.heat.cp)
+laws.conductivity.on(Thermoelastic)(lambda law, like: law.heat.kappa)
 
 
 @laws.with_temperature.on(Thermoelastic)
 def _with_temperature_thermoelastic(law, kin, state, T):
     return State(state.elastic, T)
-
-
-@laws.heat_capacity.on(Thermoelastic)
-def _heat_capacity_thermoelastic(law, like):
-    return law.heat.cp
-
-
-@laws.conductivity.on(Thermoelastic)
-def _conductivity_thermoelastic(law, like):
-    return law.heat.kappa

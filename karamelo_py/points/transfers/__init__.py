@@ -1,4 +1,4 @@
-"""Transfers: how velocity travels from points to nodes and back. One file each.
+"""Transfers: how velocity travels from points to nodes and back. One file for each family.
 
 A transfer is a NamedTuple of its parameters (its class is the tag). It says what a point keeps
 beside its velocity (`keeps`: nothing, or a tensor such as the moment of velocity B) and how the
@@ -22,7 +22,7 @@ What else is not defined for a class is that of PIC: nothing is kept, v alone is
 from karamelo_py.compiler.compile import point_function
 from karamelo_py.compiler.fields import Field, planar
 from karamelo_py.language.rules import known_failure
-from karamelo_py.points.transfers import noise
+from karamelo_py.points import noise
 
 
 class Moment(Field):
@@ -43,18 +43,6 @@ def lost_shares(transfer, like):
     Two numbers. What is not lost comes back with what the points keep. Left out where nobody knows:
     the energy then goes without trace.
     """
-
-
-def take_nodal_velocity(transfer: type) -> None:
-    """Let the points of `transfer` take the velocity of the nodes after the step, as PIC's do."""
-
-    @lost_shares.on(transfer)
-    def _lost_shares_transfer(transfer, like):
-        return 1.0, 1.0
-
-    @updated_velocity.on(transfer)
-    def _updated_velocity_transfer(transfer, v, v_pic, dv):
-        return v_pic
 
 
 @point_function(otherwise=True)
@@ -111,21 +99,18 @@ def gradient_weight(transfer, basis, kin, grid, stencil, k, gradient):
     return gradient
 
 
-@point_function(tags=2, otherwise=True)
+@point_function(otherwise=True)
 def forces_by_arms(transfer, kin):
     """Check that N_I D^-1 (X_I - x) is all of `gradient_weight`; constant at compile time."""
     return False
 
 
-@point_function(tags=2, otherwise=True)
+@point_function(otherwise=True)
 def straining(transfer, kin, gradient):
-    """Return the strain's term in a gather of velocity and gradient: `gradient`, or nothing."""
-    return gradient
+    """Return the strain's term in a gather of velocity and gradient: `gradient`.
 
-
-@point_function(tags=2, otherwise=True)
-def kept_gradient(transfer, kin, moment, gradient):
-    """The gradient of velocity, from what the point keeps and what `straining` let be gathered."""
+    Or nothing, where what the point keeps is the gradient of velocity.
+    """
     return gradient
 
 

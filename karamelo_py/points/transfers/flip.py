@@ -1,21 +1,37 @@
-"""FLIP: the point takes the change of the nodal velocity (Brackbill & Ruppel 1986)."""
+"""PIC and FLIP: the point takes the velocity of the nodes, or its change."""
 
 from types import MappingProxyType
 from typing import Annotated, NamedTuple
 
 from karamelo_py.language.kinds import Constraint
 from karamelo_py.language.rules import known_failure
-from karamelo_py.points.transfers import lost_shares, noise, updated_velocity
+from karamelo_py.points import noise
+from karamelo_py.points.transfers import lost_shares, updated_velocity
 
 Share = Constraint("from 0 (PIC) to 1 (pure FLIP)", lambda value: 0 <= value <= 1)
 SWING = 0.05  # strain of vibrations that bodies do not bear for long
+
+
+class PIC(NamedTuple):
+    """v_p = v_pic, the updated nodal velocity at the point.
+
+    Very stable and very dissipative: each step smooths the velocity over a cell, and angular
+    momentum is lost (Harlow 1964).
+
+    Example
+    -------
+    method(ulmpm, PIC, linear)
+    """
+
+    inverts_spread = False
+    in_lanes = True
 
 
 class FLIP(NamedTuple):
     """v_p = (1 - alpha) v_pic + alpha (v_p + dv): alpha = 1 is pure FLIP, alpha = 0 is PIC.
 
     Keeps energy well; keeps noise in the null space of the grid too, which a little PIC
-    (alpha = 0.99) damps.
+    (alpha = 0.99) damps (Brackbill & Ruppel 1986).
 
     Parameters
     ----------
@@ -36,7 +52,19 @@ class FLIP(NamedTuple):
     variants = MappingProxyType({"gradient-enhanced": "TFLIP"})
 
 
-def blended(transfer: type) -> None:
+def take_nodal_velocity(transfer: type) -> None:
+    """Let the points of `transfer` take the velocity of the nodes after the step, as PIC's do."""
+
+    @lost_shares.on(transfer)
+    def _lost_shares_transfer(transfer, like):
+        return 1.0, 1.0
+
+    @updated_velocity.on(transfer)
+    def _updated_velocity_transfer(transfer, v, v_pic, dv):
+        return v_pic
+
+
+def blend(transfer: type) -> None:
     """Let the velocity of points follow from `transfer` as that of FLIP does, by its `alpha`."""
 
     @updated_velocity.on(transfer)
@@ -71,7 +99,16 @@ def swings(transfer: type) -> None:
     )
 
 
-blended(FLIP)
+known_failure(
+    PIC,
+    "angular momentum",
+    when=lambda pic, scene: scene.turns,
+    reason="PIC takes a per cent or more of the angular momentum of a turning body in every step",
+    cure="APIC, or FLIP, in the place of PIC",
+)
+take_nodal_velocity(PIC)
+
+blend(FLIP)
 swings(FLIP)
 noise.drifts(FLIP)
 noise.turns(FLIP)

@@ -1,4 +1,4 @@
-"""Base of the Taylor transfers: the gradient of velocity that a point keeps.
+"""Taylor transfers: the point keeps the gradient of velocity L beside its velocity.
 
 The point gives the node m_p N_I (v_p + L_p (X_I - x_p)), with L_p = sum_I v*_I (x) grad N_I: no D
 is inverted, so that every basis will do. Where D^-1 N_I (X_I - x) is the gradient (linear,
@@ -6,31 +6,119 @@ Bernstein-quadratic) this is APIC in another form, and angular momentum is conse
 stays the same; for splines as far as velocity is linear over their support.
 """
 
-from karamelo_py.points.basis import reach
-from karamelo_py.points.kinematics import outer
-from karamelo_py.points.transfers import add_moment, affine_velocity, nodal_momentum, zero_moment
+from typing import Annotated, NamedTuple
+
+from karamelo_py.points import transfers
+from karamelo_py.points.basis import affine_weight, reach
+from karamelo_py.points.kinematics import Axisymmetric, outer
+from karamelo_py.points.kinematics import gradient as as_gradient
+from karamelo_py.points.transfers import Moment
 from karamelo_py.points.transfers.affine import zero_planar
+from karamelo_py.points.transfers.flip import Share, blend, take_nodal_velocity
+
+
+class TPIC(NamedTuple):
+    """v_p = v_pic, and the gradient of velocity L_p travels with the point.
+
+    A Taylor expansion of the velocity around the point: less damping than PIC, and no D to invert
+    (Nakamura, Matsumura & Mizutani 2023, "Taylor particle-in-cell transfer and kernel correction
+    for material point method"). With functions whose D vanishes at nodes (linear,
+    Bernstein-quadratic), in a grid that the points move through, a body that drifts gains energy
+    without bounds.
+
+    Example
+    -------
+    method(ulmpm, TPIC, quadratic-spline)
+    """
+
+    point_fields = (Moment,)
+    inverts_spread = False
+    in_lanes = True
+
+
+class TFLIP(NamedTuple):
+    """FLIP's velocity, mapped to the nodes as N_I (v_p + L_p (X_I - x_p)): Karamelo's projection.
+
+    ``method(kind, FLIP, basis, alpha, gradient-enhanced)`` is the same thing.
+
+    Parameters
+    ----------
+    alpha
+        Share of FLIP.
+
+    Example
+    -------
+    method(ulmpm, TFLIP, cubic-spline, 0.99)
+    """
+
+    alpha: Annotated[float, Share]
+
+    point_fields = (Moment,)
+    inverts_spread = False
+    in_lanes = True
+
+
+class MLS(NamedTuple):
+    """APIC; N_I D^-1 (X_I - x), a moving least squares fit, stands for the gradient everywhere.
+
+    The point keeps the velocity gradient C = B D^-1, and its force on a node is
+    -V sigma N_I D^-1 (X_I - x) (Hu et al. 2018, "A moving least squares material point method",
+    eqs. 16 to 18). Angular momentum is conserved to round-off where D is constant: with splines,
+    more than a cell away from the walls.
+
+    Example
+    -------
+    method(ulmpm, MLS, quadratic-spline)
+    """
+
+    point_fields = (Moment,)
+    inverts_spread = True
+    in_lanes = True
 
 
 def nodal_momentum_taylor(transfer, kin, basis, grid, stencil, k, weight, mass, v, L):
-    """See `nodal_momentum`."""
     return weight * mass * (v + L @ reach(basis, kin, grid, stencil, k))
 
 
 def add_moment_taylor(transfer, kin, basis, grid, stencil, k, weight, gradient, v, L):
-    """See `add_moment`."""
     return L + outer(v, gradient.planar())
 
 
 def kept_velocity_gradient(transfer, L, inverse_d):
-    """See `affine_velocity`."""
     return L
 
 
-def register(transfer: type) -> None:
-    """Let the points of `transfer` keep the gradient of velocity and map it with their velocity."""
-    transfer.keeps_gradient = True
-    nodal_momentum.on(transfer)(nodal_momentum_taylor)
-    add_moment.on(transfer)(add_moment_taylor)
-    affine_velocity.on(transfer)(kept_velocity_gradient)
-    zero_moment.on(transfer)(zero_planar)
+for _transfer in (TPIC, TFLIP, MLS):
+    _transfer.keeps_gradient = True
+    transfers.nodal_momentum.on(_transfer)(nodal_momentum_taylor)
+    transfers.add_moment.on(_transfer)(add_moment_taylor)
+    transfers.affine_velocity.on(_transfer)(kept_velocity_gradient)
+    transfers.zero_moment.on(_transfer)(zero_planar)
+
+take_nodal_velocity(TPIC)
+blend(TFLIP)
+take_nodal_velocity(MLS)
+
+
+@transfers.gradient_weight.on(MLS)
+def _gradient_weight_mls(transfer, basis, kin, grid, stencil, k, gradient):
+    # The hoop part N / r of an axisymmetric one stays.
+    moved = affine_weight(basis, kin, grid, stencil, k)
+    return as_gradient(kin, [*moved, *gradient[len(moved) :]])
+
+
+transfers.by_arms.on(MLS)(lambda transfer, inverse_d: inverse_d)
+
+
+# The velocity gradient is what the point keeps: gathered once where both come from v*.
+# Axisymmetric, the hoop part is missing in it.
+
+
+@transfers.forces_by_arms.on(MLS)
+def _forces_by_arms_mls(transfer, kin):
+    return not isinstance(kin, Axisymmetric)
+
+
+@transfers.straining.on(MLS)
+def _straining_mls(transfer, kin, gradient):
+    return gradient if isinstance(kin, Axisymmetric) else ()

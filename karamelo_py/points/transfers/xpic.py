@@ -71,6 +71,4 @@ def _updated_velocity_xpic(transfer, v, v_pic, dv):
     return dv
 
 
-@terms.on(XPIC)
-def _terms_xpic(transfer):
-    return transfer.order
+terms.on(XPIC)(lambda transfer: transfer.order)

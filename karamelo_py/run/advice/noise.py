@@ -5,9 +5,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.points.basis.noise import borne
 from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.strengths import shear_modulus
+from karamelo_py.points.noise import borne
 from karamelo_py.run.body_motion import BodyMotion
 
 SLOW = 0.01  # of the speed of waves, up to where nothing is fed in any time that was tried

@@ -8,7 +8,7 @@ import numpy as np
 from karamelo_py.kernels.step import Fused, Staged, rows_of
 from karamelo_py.kernels.table import says
 from karamelo_py.points.laws import law_kind
-from karamelo_py.points.laws.plastic_rate import without_rate
+from karamelo_py.points.laws.further import without_rate
 from karamelo_py.run.advice.known_failures import refuse_endless_speeds
 from karamelo_py.run.advice.suggestions import suggestions
 from karamelo_py.run.diagnosis.energy import not_watched, unknown_work

@@ -7,7 +7,7 @@ import numpy as np
 from karamelo_py.kernels.arrays import DT, MASS, TIME, TIMESTEP, Hooks, of_change, of_force
 from karamelo_py.kernels.clock import finish
 from karamelo_py.kernels.step import DONE, SORT, take_rows
-from karamelo_py.points.kinematics.tags import free_from
+from karamelo_py.points.kinematics import free_from
 from karamelo_py.run.implicit.equations import Equations
 from karamelo_py.run.implicit.inertia import Motion, Rest
 from karamelo_py.run.implicit.newton import Failed, Newton

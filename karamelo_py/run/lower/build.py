@@ -32,7 +32,7 @@ from karamelo_py.kernels.visit import NodalMean
 from karamelo_py.language.scene import Scene
 from karamelo_py.output.point_table import owners_of_fields
 from karamelo_py.points.basis import carried, deformed
-from karamelo_py.points.boundary import ReflectingGrid
+from karamelo_py.points.grid import ReflectingGrid
 from karamelo_py.points.kinematics import Line
 from karamelo_py.points.laws import (
     can,
@@ -45,7 +45,7 @@ from karamelo_py.points.laws import (
     with_temperature,
 )
 from karamelo_py.points.laws.eos import taken_heat
-from karamelo_py.points.laws.plastic_rate import with_rate, without_rate
+from karamelo_py.points.laws.further import with_rate, without_rate
 from karamelo_py.points.laws.temperatures import initial_heat
 from karamelo_py.points.transfers import Moment, lost_shares
 from karamelo_py.run.implicit import check as implicit

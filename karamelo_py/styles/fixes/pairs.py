@@ -13,7 +13,7 @@ from karamelo_py.kernels.laws import elastic_law
 from karamelo_py.kernels.p2g import Force
 from karamelo_py.language.rules import gain
 from karamelo_py.language.signature import NonNegative
-from karamelo_py.points.pairs import Hertz, MinimizePenetration
+from karamelo_py.points.bodies import Hertz, MinimizePenetration
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
@@ -39,7 +39,7 @@ class PairContact(Fix):
     """Base of the fixes by which the points of two solids push each other.
 
     Of many processes the first looks for pairs among the points of all that may touch. The `law` is
-    the tag of :mod:`karamelo_py.points.pairs` that gives the force between two points.
+    the tag of :mod:`karamelo_py.points.bodies` that gives the force between two points.
     """
 
     law: NamedTuple

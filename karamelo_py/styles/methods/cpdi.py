@@ -5,11 +5,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from karamelo_py.points.basis import carried
-from karamelo_py.points.basis.cpdi.hexahedron import H8
-from karamelo_py.points.basis.cpdi.parallel import R4, R8
-from karamelo_py.points.basis.cpdi.quadrilateral import Q4
-from karamelo_py.points.basis.cpdi.simplex import T3, Tet4
-from karamelo_py.points.transfers.asflip import ASFLIP
+from karamelo_py.points.basis.cpdi.domains import H8, Q4, R4, R8, T3, Tet4
+from karamelo_py.points.transfers.affine import ASFLIP
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import ScriptError

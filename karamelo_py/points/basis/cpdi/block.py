@@ -8,12 +8,12 @@ before it gets there. In space that takes more than it saves: 27 nodes, eight co
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import all_lanes, beside, first_lane, fma, is_one, real, shared
+from karamelo_py.compiler.compile import all_lanes, beside, first_lane, fma, is_one, shared
 from karamelo_py.points.basis import affine_weight, entry, reach, support
-from karamelo_py.points.basis.cpdi.corners import CornerStencil, arm, solve
-from karamelo_py.points.basis.product import digits, hoop, item, node_number
+from karamelo_py.points.basis.cpdi import CornerStencil, arm, solve
+from karamelo_py.points.basis.product import digits, item, node_number, with_hoop
 from karamelo_py.points.grid import cells_along
-from karamelo_py.points.kinematics import TAGS, Axisymmetric, gradient, vector
+from karamelo_py.points.kinematics import vector
 
 WIDTH = 3  # nodes along each direction
 
@@ -48,7 +48,7 @@ def block_of(kin, grid, stencil):
     for k, at in enumerate(stencil.point):
         low = at - 0.5
         number = int(low)
-        of_corners = [corner.at[k] - real(number, at) for corner in stencil.corners]
+        of_corners = [corner.at[k] - number for corner in stencil.corners]
         inside = (low >= 0) & (number + 2 <= cells_along(grid, k))
         inside = inside & (min(*of_corners) >= 0) & (max(*of_corners) <= 2)
         holds = inside & holds
@@ -93,36 +93,27 @@ def _spread_out(hats: Iterable, values: Iterable) -> tuple:
     return totals
 
 
-def support_of_block(basis, kin):
-    """See `support`."""
+@support.on(InBlock)
+def _support_in_block(basis, kin):
     return WIDTH**kin.dimension
 
 
-def entry_of_block(basis, kin, grid, stencil, k):
-    """See `entry`."""
+@entry.on(InBlock)
+def _entry_in_block(basis, kin, grid, stencil, k):
     weight, slopes = item(stencil.weights, k), item(stencil.gradients, k)
-    if isinstance(kin, Axisymmetric):
-        slopes = (*slopes, hoop(weight, slopes[0], stencil.seen.inv_r))
     first = node_number(grid, grid.first, stencil.first)
     number = beside(first, node_number(grid, 0, digits(k, WIDTH, kin.dimension)))
-    return number, weight, gradient(kin, slopes)
+    return number, weight, with_hoop(kin, weight, slopes, stencil.seen.inv_r)
 
 
-def reach_of_block(basis, kin, grid, stencil, k):
-    """See `reach`."""
+@reach.on(InBlock)
+def _reach_in_block(basis, kin, grid, stencil, k):
     places = zip(stencil.first, digits(k, WIDTH, kin.dimension), stencil.seen.centre, strict=True)
     return vector(kin, [arm(grid, *place) for place in places])
 
 
-def affine_weight_of_block(basis, kin, grid, stencil, k):
-    """See `affine_weight`."""
-    solved = solve(kin, stencil.seen.spread, reach_of_block(basis, kin, grid, stencil, k))
+@affine_weight.on(InBlock)
+def _affine_weight_in_block(basis, kin, grid, stencil, k):
+    solved = solve(kin, stencil.seen.spread, _reach_in_block(basis, kin, grid, stencil, k))
     weight = item(stencil.weights, k)
     return vector(kin, [weight * a for a in solved])
-
-
-for _tag in (tag for tag in TAGS if tag.dimension == 2):
-    support.on(InBlock, _tag)(support_of_block)
-    entry.on(InBlock, _tag)(entry_of_block)
-    reach.on(InBlock, _tag)(reach_of_block)
-    affine_weight.on(InBlock, _tag)(affine_weight_of_block)

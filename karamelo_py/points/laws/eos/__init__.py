@@ -1,4 +1,4 @@
-"""Equations of state of one point: pressure from volume. One file each.
+"""Equations of state of one point: pressure from volume.
 
 An equation of state is a NamedTuple of parameters (its class is the tag), a part of a composed law
 (`karamelo_py.points.laws.eos_strength`). Pressure is positive in compression; `j` = det F is
@@ -12,7 +12,10 @@ least_density
     below which, in kg/m^3, units are likely wrong.
 """
 
+from typing import Annotated, NamedTuple
+
 from karamelo_py.compiler.compile import point_function
+from karamelo_py.language.signature import Positive
 
 
 @point_function(otherwise=True)
@@ -66,3 +69,61 @@ def ratio_at_pressure(eos, p, heat):
 def at_pressure(eos, j, memory, p, heat):
     """Volume ratio and memory of a point with the pressure p (fix initial_stress)."""
     return ratio_at_pressure(eos, p, heat), memory
+
+
+# --- eos linear ----------------------------------------------------------------------------------
+
+
+class LinearPressure(NamedTuple):
+    """Pressure in proportion to the change of volume.
+
+    Parameters
+    ----------
+    rho0
+        Density before deformation.
+    K
+        Bulk modulus.
+
+    Example
+    -------
+    eos(bulk, linear, 7850, 160e9)
+
+    Notes
+    -----
+    p = K (1 - J), with J the volume over the volume before deformation; positive in compression.
+
+    See Also
+    --------
+    strength, material eos-strength
+    """
+
+    in_lanes = True
+
+    specific_volume: float  # reference volume per mass
+    K: float
+
+    @classmethod
+    def given(cls, rho0: Annotated[float, Positive], K: Annotated[float, Positive]):
+        """The law from density and bulk modulus."""
+        return cls(1 / rho0, K)
+
+
+@pressure.on(LinearPressure)
+def _pressure_linear_pressure(eos, j, memory, heat):
+    return eos.K * (1 - j)
+
+
+@bulk_modulus.on(LinearPressure)
+def _bulk_modulus_linear_pressure(eos, j, memory, heat):
+    return eos.K * j
+
+
+@compression_energy.on(LinearPressure)
+def _compression_energy_linear_pressure(eos, j, memory):
+    change = 1 - j
+    return 0.5 * eos.K * change * change
+
+
+@ratio_at_pressure.on(LinearPressure)
+def _ratio_at_pressure_linear_pressure(eos, p, heat):
+    return 1 - p / eos.K

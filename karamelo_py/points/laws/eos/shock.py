@@ -3,7 +3,7 @@
 from math import sqrt
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import point_function, where
+from karamelo_py.compiler.compile import where
 from karamelo_py.compiler.powers import logarithm
 from karamelo_py.language.rules import known_failure
 from karamelo_py.language.signature import NonNegative, Positive
@@ -13,8 +13,7 @@ from karamelo_py.points.laws.eos import (
     pressure,
     ratio_at_pressure,
 )
-from karamelo_py.points.laws.temperatures import Warm
-from karamelo_py.points.laws.viscosity.artificial import artificial_viscosity
+from karamelo_py.points.laws.viscosity import artificial_viscosity
 
 # S (1 - J) from where on the pressure goes on along its tangent: at 1 the Hugoniot has a pole.
 _STEEPEST = 0.9
@@ -126,15 +125,9 @@ def cold_pressure(eos, j):
     return eos.modulus * where(in_tension, closed * inverse, curve)
 
 
-@point_function(otherwise=True)
 def with_heat(heat, p, Tr, factor):
     """p + factor (T - Tr) above the temperature Tr, p without a temperature."""
-    return p
-
-
-@with_heat.on(Warm)
-def _with_heat_warm(heat, p, Tr, factor):
-    return p + max(heat.T - Tr, 0) * factor
+    return p + max(heat.T - Tr, 0) * factor if len(heat) else p
 
 
 @pressure.on(Shock)

@@ -58,16 +58,8 @@ def remembers(strength: type, **numbers: float | str) -> None:
     for place, name in enumerate(numbers):
         column(strength, name, Remembered(place))
     if "ep" in numbers:
-        initial_loss.on(strength)(_initial_loss)
-        equivalent_plastic_strain.on(strength)(_plastic_strain_remembered)
-
-
-def _initial_loss(strength, like):
-    return (0.0,)
-
-
-def _plastic_strain_remembered(strength, memory):
-    return memory.ep
+        initial_loss.on(strength)(lambda strength, like: (0.0,))
+        equivalent_plastic_strain.on(strength)(lambda strength, memory: memory.ep)
 
 
 @point_function(otherwise=True)
@@ -109,11 +101,6 @@ def initial_loss(strength, like):
 def elastic_ratio(strength, memory, j):
     """The part of the volume ratio j that is elastic: what makes pressure."""
     return j
-
-
-@point_function()
-def with_elastic_ratio(strength, memory, j, elastic):
-    """The memory with which `elastic_ratio` of j is `elastic`."""
 
 
 @point_function(otherwise=True)

@@ -9,20 +9,20 @@ from karamelo_py.points.laws.strengths import pressure_response
 from karamelo_py.points.laws.strengths.frictional import (
     frictional,
     lowest_pressure,
+    peak_and_residual,
     surface,
     tension_bound,
 )
-from karamelo_py.points.laws.strengths.soils import angles, residual
 
 
-def cone(fit: str, phi: float) -> tuple[float, float]:
-    """Factors of cohesion and of pressure for a friction angle in radians (see `DruckerPrager`)."""
+def cone(fit: str, c: float, phi: float) -> tuple[float, float]:
+    """xi c and eta for a friction angle in radians (see `DruckerPrager`)."""
     if fit == "plane-strain":
         root = sqrt(9 + 12 * tan(phi) ** 2)
-        return 3 / root, 3 * tan(phi) / root
+        return 3 / root * c, 3 * tan(phi) / root
     sign = -1 if fit == "compression" else 1
     below = sqrt(3) * (3 + sign * sin(phi))
-    return 6 * cos(phi) / below, 6 * sin(phi) / below
+    return 6 * cos(phi) / below * c, 6 * sin(phi) / below
 
 
 class DruckerPrager(NamedTuple):
@@ -98,12 +98,8 @@ class DruckerPrager(NamedTuple):
         softening: Annotated[float, Positive] | None = None,
     ):
         """The cone from cohesion and angles: sqrt(s:s / 2) <= cohesion + friction p."""
-        a, b = angles(cohesion, phi, psi)
-        end = residual(cohesion, phi, residual_cohesion, residual_phi, softening)
-        xi, eta = cone(fit, a)
-        peak = (xi * cohesion, eta, cone(fit, b)[1])
-        xi, eta = cone(fit, end.phi)
-        left = (xi * end.cohesion, eta, end.softening)
+        of_soil = cohesion, phi, psi, residual_cohesion, residual_phi, softening
+        peak, left = peak_and_residual(lambda c, angle: cone(fit, c, angle), *of_soil)
         return cls(G, *peak, inf if tension is None else tension, *left)
 
 

@@ -10,21 +10,15 @@ modelling and simulation of granular flows through their many phases", J. Fluid 
 Trans. Graph. 36(4), section 4.3.4). What plastic flow by shear gains (dilatancy) stays.
 """
 
-from math import inf, log, sqrt
+from math import inf, log, radians, sqrt
 
 from karamelo_py.compiler.compile import point_function
-from karamelo_py.compiler.tuples import only
 from karamelo_py.points.kinematics import inner
 from karamelo_py.points.laws.eos import bulk_modulus, pressure, ratio_at_pressure
-from karamelo_py.points.laws.strengths import (
-    elastic_ratio,
-    pressure_response,
-    remembers,
-    respond,
-    with_elastic_ratio,
-)
-from karamelo_py.points.laws.strengths.linear import elastic_trial
+from karamelo_py.points.laws.strengths import elastic_ratio, pressure_response, remembers, respond
+from karamelo_py.points.laws.strengths.hardening import elastic_trial
 from karamelo_py.points.laws.temperatures import thermal_pressure
+from karamelo_py.script.errors import ScriptError
 
 
 def surface(strength, strain):
@@ -56,17 +50,12 @@ def elastic_part(strength, memory, j):
     return j / (memory.Jp * memory.Js)
 
 
-def with_elastic_part(strength, memory, j, elastic):
-    """Let the elastic part of the volume ratio j be `elastic`: the rest is plastic."""
-    return memory._replace(Jp=j / (elastic * memory.Js))
-
-
 def respond_by_friction(strength, law, kin, s, strain, j, memories, dt):
     """Return an elastic trial to the yield surface, and give the change of volume to the memory."""
     memory, heat = memories.strength, memories.heat
     trial = elastic_trial(strength.G, s, strain)
     elastic = elastic_part(strength, memory, j)
-    warm = only(thermal_pressure(law.temperature, heat))
+    warm = sum(thermal_pressure(law.temperature, heat))
     p = pressure(law.eos, elastic, memories.energy, heat) + warm
     if memory.Js > 1 and p > 0:
         # What had come apart closes before it bears pressure.
@@ -86,7 +75,7 @@ def respond_by_friction(strength, law, kin, s, strain, j, memories, dt):
         if p < lowest and reached - lowest <= 1e-6 * (lowest - p):
             memory = memory._replace(Js=j / (memory.Jp * after))
         else:
-            memory = with_elastic_part(strength, memory, j, after)
+            memory = memory._replace(Jp=j / (after * memory.Js))
         work -= reached * log(elastic / after)
     return new, memory, work
 
@@ -95,5 +84,57 @@ def frictional(strength: type) -> None:
     """Give `strength` (with a field ``G`` and those of `surface`) memory, and response."""
     remembers(strength, ep=0.0, Jp=1.0, Js=1.0)
     elastic_ratio.on(strength)(elastic_part)
-    with_elastic_ratio.on(strength)(with_elastic_part)
     respond.on(strength)(respond_by_friction)
+
+
+# --- parameters of soils -------------------------------------------------------------------------
+
+
+def peak_and_residual(surface_of, cohesion, phi, psi, to_cohesion, to_phi, over):
+    """Cohesion, friction and dilation at the peak; cohesion, friction at the end, and softening.
+
+    `surface_of` gives cohesion and friction of the yield surface, from the cohesion and the angle
+    of friction (in radians) of a soil. What is None stays as it is.
+    """
+    if not 0 <= phi < 90:
+        raise ScriptError(
+            f"the friction angle phi = {phi:g} is impossible",
+            argument="phi",
+            expected="an angle in degrees, from 0 to below 90",
+        )
+    if not 0 <= psi <= phi:
+        raise ScriptError(
+            f"the angle of dilatancy psi = {psi:g} is impossible with phi = {phi:g}",
+            argument="psi",
+            expected=f"an angle from 0 to {phi:g} degrees: beyond, flow would make energy",
+        )
+    if cohesion == 0 and phi == 0:
+        raise ScriptError(
+            "without cohesion and friction there is no strength",
+            argument="cohesion",
+            expected="a cohesion or a friction angle above 0, or strength(ID, fluid, 0)",
+        )
+    softens = to_cohesion is not None or to_phi is not None
+    if over is not None and not softens:
+        raise ScriptError(
+            "softening needs a residual strength",
+            argument="softening",
+            expected="residual_cohesion=... or residual_phi=..., or both",
+        )
+    if softens and over is None:
+        raise ScriptError(
+            "softening needs the plastic strain at which the residual strength is reached",
+            argument="residual_cohesion" if to_cohesion is not None else "residual_phi",
+            expected="softening=plastic strain",
+        )
+    for name, peak, value in (("cohesion", cohesion, to_cohesion), ("phi", phi, to_phi)):
+        if value is not None and value > peak:
+            raise ScriptError(
+                f"the residual {name} {value:g} is above its peak, {peak:g}",
+                argument=f"residual_{name}",
+                expected=f"a number from 0 to {peak:g}",
+            )
+    left = cohesion if to_cohesion is None else to_cohesion
+    end = surface_of(left, radians(phi if to_phi is None else to_phi))
+    dilation = surface_of(cohesion, radians(psi))[1]
+    return (*surface_of(cohesion, radians(phi)), dilation), (*end, 1 / over if softens else 0.0)

@@ -1,6 +1,7 @@
-"""Base of strengths of von Mises: the radial return to a flow stress with any hardening."""
+"""strength plastic, and the base of strengths of von Mises with any hardening."""
 
 from math import sqrt
+from typing import Annotated, NamedTuple
 
 from karamelo_py.compiler.compile import (
     any_lane,
@@ -12,8 +13,83 @@ from karamelo_py.compiler.compile import (
     where,
 )
 from karamelo_py.compiler.slopes import Dual, value_of
-from karamelo_py.points.kinematics import von_mises
-from karamelo_py.points.laws.strengths.linear import elastic_trial
+from karamelo_py.language.signature import NonNegative, Positive
+from karamelo_py.points.kinematics import dev, von_mises
+from karamelo_py.points.laws.strengths import remembers, shear_response
+
+
+def elastic_trial(G, s, strain):
+    """Deviatoric stress after a strain increment, were it all elastic."""
+    # The deviator of the sum: rounding errors of many steps would give s a trace otherwise.
+    return dev(s + 2 * G * strain)
+
+
+class LinearHardening(NamedTuple):
+    """Elastic shear up to a yield stress, constant or with linear hardening (von Mises).
+
+    Parameters
+    ----------
+    G
+        Shear modulus.
+    yield_stress
+        Yield stress in uniaxial tension; in pure shear it yields at 1/sqrt(3) of it.
+    H
+        Hardening modulus: by how much the yield stress rises for each unit of plastic strain.
+
+    Example
+    -------
+    strength(mild, plastic, 80e9, 400e6)
+    strength(copper, plastic, 43.3e9, 400e6, 100e6)
+
+    Notes
+    -----
+    Where the von Mises stress q = sqrt(3/2 s:s) of an elastic step is above the yield stress Y, the
+    equivalent plastic strain (the column ep of dumps) grows by (q - Y)/(3 G + H) and the deviatoric
+    stress s shrinks to the yield stress (radial return; Wilkins 1964; de Souza Neto et al. 2008,
+    section 7.3).
+
+    See Also
+    --------
+    linear, johnson_cook, swift, eos, material eos-strength, compute max_plastic_strain
+    """
+
+    in_lanes = True
+
+    G: Annotated[float, Positive]
+    yield_stress: Annotated[float, Positive]
+    H: Annotated[float, NonNegative] = 0.0
+
+    def checked(self):
+        """The law; that without hardening where there is none."""
+        return self if self.H > 0 else Plastic(self.G, self.yield_stress)
+
+
+class Plastic(NamedTuple):
+    """The same with a yield stress that stays."""
+
+    in_lanes = True
+    H = 0.0
+
+    G: float
+    yield_stress: float
+
+
+remembers(Plastic, ep=0.0)
+remembers(LinearHardening, ep=0.0)
+
+
+@shear_response.on(Plastic)
+@shear_response.on(LinearHardening)
+def _shear_response_linear_hardening(strength, kin, s, strain, memory, heat, dt):
+    trial = elastic_trial(strength.G, s, strain)
+    q = von_mises(trial)
+    flow = strength.yield_stress + strength.H * memory.ep
+    x = max(q - flow, 0) / (3 * strength.G + strength.H)
+    flow += strength.H * x
+    return onto_yield_surface(trial, q, flow, x), memory._replace(ep=memory.ep + x), flow * x
+
+
+# --- any hardening -------------------------------------------------------------------------------
 
 
 @point_function()

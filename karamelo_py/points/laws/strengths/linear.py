@@ -1,10 +1,12 @@
-"""strength linear: elastic shear without limit."""
+"""Strengths linear and fluid: elastic shear, and viscous shear, without limit."""
 
 from typing import Annotated, NamedTuple
 
-from karamelo_py.language.signature import Positive
-from karamelo_py.points.kinematics import dev
-from karamelo_py.points.laws.strengths import shear_response
+from karamelo_py.language.signature import NonNegative, Positive
+from karamelo_py.points.kinematics import dev, inner, nothing
+from karamelo_py.points.laws import strengths
+from karamelo_py.points.laws.strengths.hardening import elastic_trial
+from karamelo_py.points.laws.viscosity import damped
 
 
 class Elastic(NamedTuple):
@@ -35,12 +37,59 @@ class Elastic(NamedTuple):
     G: Annotated[float, Positive]
 
 
-def elastic_trial(G, s, strain):
-    """Deviatoric stress after a strain increment, were it all elastic."""
-    # The deviator of the sum: rounding errors of many steps would give s a trace otherwise.
-    return dev(s + 2 * G * strain)
-
-
-@shear_response.on(Elastic)
+@strengths.shear_response.on(Elastic)
 def _shear_response_elastic(strength, kin, s, strain, memory, heat, dt):
     return elastic_trial(strength.G, s, strain), memory, 0
+
+
+class Viscous(NamedTuple):
+    """Viscous shear of a Newtonian fluid: no stress at rest.
+
+    Parameters
+    ----------
+    mu
+        Dynamic viscosity; 0 for none.
+
+    Example
+    -------
+    strength(thin, fluid, 1e-3)
+
+    Notes
+    -----
+    s = 2 mu dev(D), D the rate of strain. The time step takes account of the viscosity, which
+    matters where 4/3 mu/(rho h) is not small against the speed of sound. Equivalent plastic strain
+    and elastic shear are 0; viscous work counts as dissipated energy.
+
+    See Also
+    --------
+    eos fluid, eos ideal-gas, material eos-strength
+    """
+
+    in_lanes = True
+    flows = True
+
+    mu: float  # dynamic viscosity
+    cell_size: float  # h, known when the scene is lowered
+
+    @classmethod
+    def given(cls, mu: Annotated[float, NonNegative]):
+        """The law from the viscosity."""
+        return cls(mu, 0.0)
+
+
+strengths.initial_loss.on(Viscous)(lambda strength, like: (0.0,))
+strengths.shear_modulus.on(Viscous)(lambda strength: 0)
+strengths.shear_strain.on(Viscous)(lambda strength, kin, s: nothing(kin))
+strengths.shear_energy.on(Viscous)(lambda strength, kin, s: 0)
+
+
+@strengths.shear_response.on(Viscous)
+def _shear_response_viscous(strength, kin, s, strain, memory, heat, dt):
+    new = 2 * strength.mu / dt * dev(strain)
+    return new, memory, inner(new, strain)
+
+
+@strengths.damped_speed_squared.on(Viscous)
+def _damped_speed_squared_viscous(strength, squared, density):
+    # nu = 4/3 mu/rho
+    return damped(squared, 4 / 3 * strength.mu / (density * strength.cell_size))

@@ -5,10 +5,10 @@ from typing import Annotated, NamedTuple
 
 from karamelo_py.compiler.compile import shared
 from karamelo_py.language.signature import NonNegative, Positive
-from karamelo_py.points.kinematics import from_principal, inner, principal
+from karamelo_py.points.kinematics import inner
+from karamelo_py.points.kinematics.principal import from_principal, principal
 from karamelo_py.points.laws.strengths import pressure_response
-from karamelo_py.points.laws.strengths.frictional import frictional, surface
-from karamelo_py.points.laws.strengths.soils import angles, residual
+from karamelo_py.points.laws.strengths.frictional import frictional, peak_and_residual, surface
 
 
 class MohrCoulomb(NamedTuple):
@@ -76,10 +76,8 @@ class MohrCoulomb(NamedTuple):
         softening: Annotated[float, Positive] | None = None,
     ):
         """The yield surface from cohesion and angles."""
-        a, b = angles(cohesion, phi, psi)
-        end = residual(cohesion, phi, residual_cohesion, residual_phi, softening)
-        peak = (cohesion * cos(a), sin(a), sin(b))
-        left = (end.cohesion * cos(end.phi), sin(end.phi), end.softening)
+        of_soil = cohesion, phi, psi, residual_cohesion, residual_phi, softening
+        peak, left = peak_and_residual(lambda c, angle: (c * cos(angle), sin(angle)), *of_soil)
         return cls(G, *peak, *left)
 
 

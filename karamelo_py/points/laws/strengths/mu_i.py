@@ -4,12 +4,11 @@ from math import sqrt
 from typing import Annotated, NamedTuple
 
 from karamelo_py.compiler.compile import where
-from karamelo_py.compiler.tuples import only
 from karamelo_py.language.signature import Positive
 from karamelo_py.points.kinematics import inner
 from karamelo_py.points.laws.eos import pressure
 from karamelo_py.points.laws.strengths import elastic_ratio, remembers, respond
-from karamelo_py.points.laws.strengths.linear import elastic_trial
+from karamelo_py.points.laws.strengths.hardening import elastic_trial
 from karamelo_py.points.laws.temperatures import thermal_pressure
 from karamelo_py.script.errors import ScriptError
 
@@ -64,13 +63,7 @@ class MuI(NamedTuple):
     rho_s: Annotated[float, Positive]
 
     def checked(self):
-        """The law.
-
-        Raises
-        ------
-        ScriptError
-            If friction falls with the rate: such flow is not stable.
-        """
+        """The law, unless friction falls with the rate: such flow is not stable."""
         if self.mu_2 < self.mu_s:
             raise ScriptError(
                 f"the friction of fast flow, {self.mu_2:g}, is below that of slow flow",
@@ -93,7 +86,7 @@ def _respond_mu_i(strength, law, kin, s, strain, j, memories, dt):
     memory = memories.strength
     elastic = elastic_ratio(strength, memory, j)
     p = pressure(law.eos, elastic, memories.energy, memories.heat)
-    p += only(thermal_pressure(law.temperature, memories.heat))
+    p += sum(thermal_pressure(law.temperature, memories.heat))
     together = p > 0
     trial = elastic_trial(strength.G, s, strain)
     shear = sqrt(0.5 * inner(trial, trial))

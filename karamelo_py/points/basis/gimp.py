@@ -1,17 +1,22 @@
-"""Contiguous-particle GIMP: hat functions averaged over a box that deforms with the point."""
+"""GIMP: hat functions averaged over the box that a point stands for, which may deform with it."""
 
 from types import MappingProxyType
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import Weighted, index, real
+from karamelo_py.compiler.compile import Weighted, index
 from karamelo_py.compiler.powers import power
 from karamelo_py.language.rules import known_failure
-from karamelo_py.points.basis import carried, carrier, carry, deformed, mapped_again
-from karamelo_py.points.basis.product import along, node_number, product, register
-from karamelo_py.points.basis.ugimp import averaged_hats, box
-from karamelo_py.points.basis.wide import wide
-from karamelo_py.points.grid import cells_along
-from karamelo_py.points.kinematics import I, det, planar, tensor
+from karamelo_py.points.basis import (
+    carried,
+    carrier,
+    carry,
+    deformed,
+    leave_moment_out,
+    mapped_again,
+)
+from karamelo_py.points.basis.product import Along, along, node_number, product, register, wide
+from karamelo_py.points.grid import cells_along, in_cells
+from karamelo_py.points.kinematics import I, det, planar, tensor, total
 
 # Half sizes that weights are made with, in cells.
 LEAST = 1e-3
@@ -29,7 +34,22 @@ class _Box(NamedTuple):
     in_lanes = True
 
 
-wide(_Box)
+class UGIMP(_Box):
+    """Uniform GIMP: a point stands for a box of constant size (Bardenhagen & Kober 2004).
+
+    Weights are the averages of the hat functions over [x - l, x + l] in each direction, with l the
+    half size that the point starts with: smooth, and only as wide as the point. Where the material
+    stretches much, gaps open between the boxes; cpgimp lets them grow. A wall cuts the box, and
+    the point then acts from the centre of what is left.
+
+    Example
+    -------
+    method(ulmpm, FLIP, ugimp, 0.99)
+    """
+
+    steep_edge = True
+    in_lanes = True
+    shape = ("half_size",)
 
 
 class CPGIMPDet(_Box):
@@ -141,39 +161,70 @@ class CPGIMP(_Box):
 # --- weights ----------------------------------------------------------------------------------
 
 
-def _along(kin, grid, place, direction):
-    a, lo, hi = box(grid, kin, place, direction, LEAST, MOST)
+def box(grid, kin, place, direction, least, most):
+    """Centre and both ends of a domain along one direction, in cells, before walls cut it."""
+    a = in_cells(grid, direction, place[direction])
+    half = place[kin.dimension + direction] * grid.inv_h
+    half = min(max(half, least), most)
+    return a, a - half, a + half
+
+
+def in_cell(lo, hi, j):
+    """Integrate over the part of [lo, hi] in the cell between nodes j and j + 1.
+
+    The integrals over the cell of 1 and of the hat function of node j + 1.
+    """
+    p = max(lo - j, 0)
+    q = min(hi - j, 1)
+    length = max(q - p, 0)
+    return length, length * (0.5 * (p + q))
+
+
+def averaged_hats(cells, grid, first, lo, hi):
+    """Hats from node `first` on, averaged over [lo, hi].
+
+    The domain lies within so many `cells` from that node; lengths are in cells, counted from it.
+    """
+    lengths, ahead = zip(*[in_cell(lo, hi, j) for j in range(cells)], strict=True)
+    behind = [length - share for length, share in zip(lengths, ahead, strict=True)]
+    between = [a + b for a, b in zip(ahead[:-1], behind[1:], strict=True)]
+    falls = [lengths[j] - lengths[j + 1] for j in range(cells - 1)]
+    k = 1 / total(lengths)
+    slope = k * grid.inv_h
+    weights = tuple([k * w for w in (behind[0], *between, ahead[-1])])
+    gradients = tuple([slope * g for g in (-lengths[0], *falls, lengths[-1])])
+    r = 0.5 * (lo + hi)
+    arms = [j - r if j else -r for j in range(cells + 1)]
+    pairs = list(zip(weights, arms, strict=True))
+    k = grid.inv_h / total([w * arm * arm for w, arm in pairs])
+    return Along(first, r, weights, gradients, tuple([k * arm * w for w, arm in pairs]))
+
+
+@along.on(UGIMP)
+def _along_ugimp(basis, kin, grid, place, direction):
+    _, lo, hi = box(grid, kin, place, direction, 1e-3, 0.5)
     last = cells_along(grid, direction)
-    first = max(min(min(int(a), last - 1) - 1, last - 3), 0)
-    start = real(first, a)
-    return averaged_hats(3, grid, first, max(lo, 0) - start, min(hi, real(last, a)) - start)
+    lo, hi = max(lo, 0), min(hi, last)
+    first = max(min(int(lo), last - 2), 0)
+    return averaged_hats(2, grid, first, lo - first, hi - first)
 
 
 @along.on(CPGIMPDet)
 @along.on(CPGIMPDiagonal)
 @along.on(CPGIMPStretch)
-def _along_cpgimp_stretch(basis, kin, grid, place, direction):
-    return _along(kin, grid, place, direction)
-
-
-class AlongWithEnds(NamedTuple):
-    """As :class:`~karamelo_py.points.basis.product.Along`, with where the box ends."""
-
-    first: int
-    r: float
-    weights: tuple[float, ...]
-    gradients: tuple[float, ...]
-    affine: tuple[float, ...]
-    ends: tuple[tuple[int, float], ...]  # of each: its cell from `first` on, and how far into it
+def _along_box(basis, kin, grid, place, direction):
+    a, lo, hi = box(grid, kin, place, direction, LEAST, MOST)
+    last = cells_along(grid, direction)
+    first = max(min(min(int(a), last - 1) - 1, last - 3), 0)
+    return averaged_hats(3, grid, first, max(lo, 0) - first, min(hi, last) - first)
 
 
 @along.on(CPGIMPCorners)
 def _along_cpgimp_corners(basis, kin, grid, place, direction):
-    line = _along(kin, grid, place, direction)
+    line = _along_box(basis, kin, grid, place, direction)
     _, lo, hi = box(grid, kin, place, direction, LEAST, MOST)
     top = cells_along(grid, direction) - 1 - line.first
-    ends = (_end(lo, line.first, top), _end(hi, line.first, top))
-    return AlongWithEnds(line.first, line.r, line.weights, line.gradients, line.affine, ends)
+    return line._replace(ends=tuple([_end(at, line.first, top) for at in (lo, hi)]))
 
 
 def _end(at, first, top):
@@ -181,15 +232,13 @@ def _end(at, first, top):
 
     Of an end beyond a wall: the cell at the wall, the `top`-th at most.
     """
-    b = at - real(first, at)
+    b = at - first
     i = min(max(int(b), 0), min(top, 2))
-    return i, b - real(i, at)
+    return i, b - i
 
 
-@mapped_again.on(CPGIMPDiagonal)
-def _mapped_again_cpgimp_diagonal(basis, grid, moment):
-    # As with linear functions, which these become where the box vanishes.
-    return (grid.h - grid.h) * moment
+# As with linear functions, which these become where the box vanishes.
+mapped_again.on(CPGIMPDiagonal)(leave_moment_out)
 
 
 # --- boxes ------------------------------------------------------------------------------------
@@ -204,27 +253,12 @@ def _deformed_cpgimp_det(basis, kin, place, dl):
 
 
 @deformed.on(CPGIMPDiagonal)
-def _deformed_cpgimp_diagonal(basis, kin, place, dl):
-    F = deformation_of_box(kin, place).after(dl.planar())
-    return stretched_box(kin, place, F.diagonal(), F)
-
-
 @deformed.on(CPGIMPStretch)
 def _deformed_cpgimp_stretch(basis, kin, place, dl):
-    F = deformation_of_box(kin, place).after(dl.planar())
-    return stretched_box(kin, place, F.stretch(), F)
-
-
-def deformation_of_box(kin, place):
-    """F of a place that keeps it."""
-    return tensor(planar(kin), place[3 * kin.dimension :])
-
-
-def stretched_box(kin, place, factors, F):
-    """Make the place with half sizes that are `factors` times those at the start, and with F."""
     d = kin.dimension
-    start = place[2 * d : 3 * d]
-    half = [size * abs(factor) for size, factor in zip(start, factors[:d], strict=True)]
+    start, F = place[2 * d : 3 * d], tensor(planar(kin), place[3 * d :]).after(dl.planar())
+    stretches = F.diagonal() if isinstance(basis, CPGIMPDiagonal) else F.stretch()
+    half = [size * abs(factor) for size, factor in zip(start, stretches[:d], strict=True)]
     return (*place[:d], *half, *start, *F)
 
 
@@ -264,5 +298,7 @@ def _carry_cpgimp_corners(basis, kin, place, old, corner, displacement):
     return (*place[:d], *half)
 
 
+register(UGIMP, 3)
 for _basis in (CPGIMPDet, CPGIMPDiagonal, CPGIMPStretch, CPGIMPCorners):
     register(_basis, 4)
+wide(_Box)

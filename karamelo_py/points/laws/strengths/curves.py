@@ -1,5 +1,6 @@
-"""strength formula: a flow stress that the script says."""
+"""Strengths tabulated and formula: a flow stress that the script gives."""
 
+from pathlib import Path
 from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
@@ -9,13 +10,117 @@ from karamelo_py.compiler.formula import CONSTANT, POINT, SPREAD, UNIFORM
 from karamelo_py.compiler.operations import FIRST_BINARY, SELECT, of_one, of_two
 from karamelo_py.language.arguments import Argument
 from karamelo_py.language.scene import Scene
-from karamelo_py.language.signature import NonNegative, Positive
-from karamelo_py.points.laws.numbers import Numbers
+from karamelo_py.language.signature import NonNegative, Positive, TableFile
+from karamelo_py.points.laws.parameters import Numbers
 from karamelo_py.points.laws.strengths import remembers, shear_response
 from karamelo_py.points.laws.strengths.hardening import flow_stress, radial_return
 from karamelo_py.points.laws.temperatures import temperature_or
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
+
+
+class Tabulated(NamedTuple):
+    """Flow stress by plastic strain, as measured: straight lines between points of a curve.
+
+    Parameters
+    ----------
+    G
+        Shear modulus.
+    curve
+        Plastic strain and flow stress, in turn, from strain 0 on; or the name of a file with a line
+        for each point, the two numbers with blanks or a comma between. Lines that begin with #
+        are comments.
+
+    Example
+    -------
+    strength(steel, tabulated, 80e9, 0, 350e6, 0.02, 420e6, 0.1, 510e6, 0.4, 600e6)
+
+    Notes
+    -----
+    Beyond the last point the flow stress stays. It may fall, but not so steeply that a point could
+    not follow: by less than 3 G for each unit of plastic strain. With ``strength(steel, tabulated,
+    80e9, curve.txt)`` the points are read from a file. Each step solves for the plastic strain with
+    the flow stress at its end.
+
+    See Also
+    --------
+    plastic, swift, johnson_cook, formula
+    """
+
+    G: float
+    strain: Numbers
+    stress: Numbers
+    count: float
+
+    syntax = "G, ep1, Y1[, ep2, Y2, ...] | file"
+
+    @classmethod
+    def given(cls, G: Annotated[float, Positive], *curve: float | TableFile):
+        """The law from the points of its curve."""
+        points = _points(curve)
+        _check_curve(points, G)
+        strain, stress = map(tuple, points.T.tolist())
+        return cls(G, Numbers(strain), Numbers(stress), len(points))
+
+
+def _points(curve: tuple) -> np.ndarray:
+    """(n, 2) plastic strain and flow stress."""
+    if len(curve) == 1 and isinstance(curve[0], Path):
+        path = curve[0]
+        try:
+            text = path.read_text(encoding="utf-8").replace(",", " ")
+            points = np.loadtxt(text.splitlines(), ndmin=2)
+        except ValueError as error:
+            raise ScriptError(f"{path}: {error}", argument="curve") from None
+        if points.shape[1:] != (2,):
+            raise ScriptError(f"{path} has no two numbers in a line", argument="curve")
+    elif any(isinstance(value, Path) for value in curve) or not curve or len(curve) % 2:
+        raise ScriptError(
+            "a curve is made of pairs of numbers, or is one file",
+            argument="curve",
+            expected="ep1, Y1, ep2, Y2, ..., or the name of a file",
+        )
+    else:
+        points = np.array(curve, float).reshape(-1, 2)
+    return points
+
+
+def _check_curve(points: np.ndarray, G: float) -> None:
+    strain, stress = points.T
+    if not len(points) or strain[0] != 0:
+        raise ScriptError(
+            "the curve does not begin where plastic flow does",
+            argument="curve",
+            expected="a first point at the plastic strain 0, with the yield stress",
+        )
+    if not (np.diff(strain) > 0).all():
+        raise ScriptError("plastic strains of the curve do not rise", argument="curve")
+    if not (stress > 0).all():
+        raise ScriptError("a flow stress of the curve is not above 0", argument="curve")
+    if not (np.diff(stress) > -3 * G * np.diff(strain)).all():
+        raise ScriptError(
+            "the curve falls by more than 3 G for each unit of plastic strain", argument="curve"
+        )
+
+
+remembers(Tabulated, ep=0.0)
+shear_response.on(Tabulated)(radial_return)
+
+
+@flow_stress.on(Tabulated)
+def _flow_stress_tabulated(strength, memory, known, increment, heat, dt):
+    x = memory.ep + increment
+    last = int(strength.count) - 1
+    for k in range(last):
+        above = strength.strain[k + 1]
+        if x < above:
+            low = strength.stress[k]
+            slope = (strength.stress[k + 1] - low) / (above - strength.strain[k])
+            return low + slope * (x - strength.strain[k]), slope
+    return strength.stress[last], 0 * x
+
+
+# --- formula -------------------------------------------------------------------------------------
 
 SEEDS = ("ep", "epdot", "T")
 DEPTH = 8  # of the stack, a tuple
@@ -51,7 +156,7 @@ class FlowFormula:
             if op != SPREAD:
                 constant = op == CONSTANT
                 instructions += [op, program.constants[operand] if constant else operand]
-        return Numbers(instructions)
+        return Numbers(tuple(map(float, instructions)))
 
 
 class FlowStress(NamedTuple):
@@ -99,11 +204,11 @@ class FlowStress(NamedTuple):
     ):
         """The law from its formula."""
         law = cls(G, Y, len(Y) // 2, T)
-        _check(law)
+        _check_formula(law)
         return law
 
 
-def _check(law: FlowStress) -> None:
+def _check_formula(law: FlowStress) -> None:
     """Refuse a formula that has no value where plastic flow begins, or further on."""
     for ep in (0.0, 1e-3, 0.1, 1.0):
         for epdot in (0.0, 1.0, 1e4):
@@ -121,39 +226,23 @@ def _check(law: FlowStress) -> None:
 
 
 @shared
-def pushed(stack, number):
-    """The stack with a number on top; the lowest one goes."""
-    return (number, stack[0], stack[1], stack[2], stack[3], stack[4], stack[5], stack[6])
-
-
-@shared
-def replaced(stack, taken, number):
-    """The stack with a number in the place of the `taken` upmost ones."""
-    if taken == 1:
-        return (number, stack[1], stack[2], stack[3], stack[4], stack[5], stack[6], stack[7])
-    if taken == 2:
-        return (number, stack[2], stack[3], stack[4], stack[5], stack[6], stack[7], 0.0)
-    return (number, stack[3], stack[4], stack[5], stack[6], stack[7], 0.0, 0.0)
-
-
-@shared
 def value(strength, ep, epdot, T):
     """The formula at a plastic strain, a rate and a temperature, in double precision."""
-    stack = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    stack = (0.0,) * DEPTH  # the top first
     for k in range(int(strength.count)):
         op = int(strength.program[2 * k])
         operand = real(strength.program[2 * k + 1], 1.0)
         if op == CONSTANT:
-            stack = pushed(stack, operand)
+            stack = (operand, *stack[:-1])
         elif op == POINT:
             seed = ep if operand == 0 else (epdot if operand == 1 else T)
-            stack = pushed(stack, real(seed, 1.0))
+            stack = (real(seed, 1.0), *stack[:-1])
         elif op < FIRST_BINARY:
-            stack = replaced(stack, 1, of_one(op, stack[0]))
+            stack = (of_one(op, stack[0]), *stack[1:])
         elif op < SELECT:
-            stack = replaced(stack, 2, of_two(op, stack[1], stack[0]))
+            stack = (of_two(op, stack[1], stack[0]), *stack[2:], 0.0)
         else:
-            stack = replaced(stack, 3, stack[1] if stack[2] != 0.0 else stack[0])
+            stack = (stack[1] if stack[2] != 0.0 else stack[0], *stack[3:], 0.0, 0.0)
     return stack[0]
 
 

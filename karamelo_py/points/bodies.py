@@ -1,10 +1,11 @@
-"""Forces between two points of different bodies. The laws are tags; bodies touch as spheres do."""
+"""Points as bodies: the face that one shows to heat, forces between two that touch as spheres."""
 
 from math import pi, sqrt
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import point_function
-from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space, dimension
+from karamelo_py.compiler.compile import point_function, shared
+from karamelo_py.compiler.powers import power
+from karamelo_py.points.kinematics import Axisymmetric, total
 
 
 class Hertz(NamedTuple):
@@ -19,30 +20,28 @@ class MinimizePenetration(NamedTuple):
     friction: float  # coefficient of Coulomb friction
 
 
-@point_function()
+@shared
+def face(kin, volume, x):
+    """Area that a point of this volume shows to what is around it: the side of a cube.
+
+    Per length across the plane, per radian where axisymmetric.
+    """
+    if isinstance(kin, Axisymmetric):
+        return sqrt(volume * x[0])  # r times the side of the square volume / r
+    if kin.dimension == 2:
+        return sqrt(volume)
+    return power(volume, 2 / 3) if kin.dimension == 3 else 1
+
+
+@shared
 def radius(kin, volume, x):
     """Radius of the point's body: half the side of a cube of its volume."""
-
-
-@radius.on(Line)
-def _radius_line(kin, volume, x):
-    return 0.5 * volume
-
-
-@radius.on(PlaneStrain)
-def _radius_plane_strain(kin, volume, x):
-    return 0.5 * sqrt(volume)
-
-
-@radius.on(Axisymmetric)
-def _radius_axisymmetric(kin, volume, x):
-    # The volume is that of one radian of a ring.
-    return 0.5 * sqrt(volume / x[0]) if x[0] > 0 else 0.0
-
-
-@radius.on(Space)
-def _radius_space(kin, volume, x):
-    return 0.5 * volume ** (1.0 / 3.0)
+    if isinstance(kin, Axisymmetric):
+        # The volume is that of one radian of a ring.
+        return 0.5 * sqrt(volume / x[0]) if x[0] > 0 else 0.0
+    if kin.dimension == 2:
+        return 0.5 * sqrt(volume)
+    return 0.5 * volume ** (1.0 / 3.0) if kin.dimension == 3 else 0.5 * volume
 
 
 @point_function()
@@ -54,7 +53,7 @@ def force_between(law, kin, dx, r, radius1, radius2, mass1, mass2, dv, dt, kick)
 def _force_between_hertz(law, kin, dx, r, radius1, radius2, mass1, mass2, dv, dt, kick):
     p = radius1 + radius2 - r
     round_ = radius1 * radius2 / (radius1 + radius2)
-    stiffness = 4.0 / 3.0 if dimension(kin) == 3 else pi / 4.0
+    stiffness = 4.0 / 3.0 if kin.dimension == 3 else pi / 4.0
     return -stiffness * law.modulus * sqrt(round_ * p * p * p) / r * dx
 
 
@@ -67,14 +66,9 @@ def _force_between_minimize_penetration(
     push = reduced * p / (dt * kick)
     force = -push / r * dx
     if law.friction > 0:
-        along = 0.0
-        for k in range(dimension(kin)):
-            along += dv[k] * dx[k]
+        along = total([a * b for a, b in zip(dv, dx, strict=True)])
         slide = dv + -along / (r * r) * dx
-        slip = 0.0
-        for k in range(dimension(kin)):
-            slip += slide[k] * slide[k]
-        slip = sqrt(slip)
+        slip = sqrt(slide.squared())
         if slip > 0:
             # Friction stops the slip of two free points at most: it does not turn it around.
             rub = min(law.friction * push, reduced * slip / kick)

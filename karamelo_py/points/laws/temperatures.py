@@ -1,12 +1,55 @@
-"""temperature plastic_work: heating by plastic work."""
+"""Temperature of one point, as far as the law itself changes it.
+
+A temperature is a NamedTuple of parameters (its class is the tag), a part of a composed law
+(`karamelo_py.points.laws.eos_strength`). Its memory is the temperature itself (`Warm`), which the
+other parts see as `heat`: () where the law has no temperature.
+"""
 
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import where
+from karamelo_py.compiler.compile import point_function, where
 from karamelo_py.language.signature import In, NonNegative, Positive
 from karamelo_py.points.laws import column, conductivity, heat_capacity, temperature
-from karamelo_py.points.laws.checks import check_temperatures
-from karamelo_py.points.laws.temperatures import Warm, heated, initial_heat, thermal_pressure
+from karamelo_py.points.laws.parameters import check_temperatures
+
+
+class Warm(NamedTuple):
+    """Temperature of a point of a law that has one."""
+
+    T: float
+
+
+@point_function(otherwise=True)
+def initial_heat(temperature, like):
+    """Warm(T) at the start, or ()."""
+    return ()
+
+
+@point_function(otherwise=True)
+def heated(temperature, heat, work):
+    """`heat` after plastic work per mass."""
+    return heat
+
+
+@point_function(otherwise=True)
+def thermal_pressure(temperature, heat):
+    """(p,), the pressure of the temperature, or ()."""
+    return ()
+
+
+def temperature_or(heat, otherwise):
+    """The temperature, or `otherwise` where the law has none."""
+    return heat.T if len(heat) else otherwise
+
+
+def at_temperature(heat, T):
+    """Warm(T), or () where the law has no temperature."""
+    return Warm(T) if len(heat) else ()
+
+
+def homologous(heat, Tr, Tm):
+    """(T - Tr) / (Tm - Tr), between 0 and 1."""
+    return min(max((heat.T - Tr) / (Tm - Tr), 0), 1)
 
 
 class PlasticWork(NamedTuple):
@@ -60,11 +103,9 @@ class PlasticWork(NamedTuple):
 
 
 column(PlasticWork, "T", temperature)
-
-
-@initial_heat.on(PlasticWork)
-def _initial_heat_plastic_work(temperature, like):
-    return Warm(temperature.T0)
+initial_heat.on(PlasticWork)(lambda temperature, like: Warm(temperature.T0))
+heat_capacity.on(PlasticWork)(lambda law, like: law.cp)
+conductivity.on(PlasticWork)(lambda law, like: law.kappa)
 
 
 @heated.on(PlasticWork)
@@ -76,13 +117,3 @@ def _heated_plastic_work(temperature, heat, work):
 @thermal_pressure.on(PlasticWork)
 def _thermal_pressure_plastic_work(temperature, heat):
     return (temperature.alpha * (heat.T - temperature.T0),)
-
-
-@heat_capacity.on(PlasticWork)
-def _heat_capacity_plastic_work(law, like):
-    return law.cp
-
-
-@conductivity.on(PlasticWork)
-def _conductivity_plastic_work(law, like):
-    return law.kappa

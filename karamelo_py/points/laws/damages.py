@@ -1,4 +1,10 @@
-"""damage damage_johnson_cook: ductile failure by plastic strain."""
+"""Damage of one point: the share D of its strength that is gone.
+
+A damage is a NamedTuple of parameters (its class is the tag), a part of a composed law
+(`karamelo_py.points.laws.eos_strength`): the stress is 1 - D times that of the intact
+material, but for pressure, which also rubble bears. Equation of state and strength know nothing of
+it, so that it enters once. What it remembers is its memory, a tuple.
+"""
 
 from typing import Annotated, Any, NamedTuple
 
@@ -6,10 +12,36 @@ from karamelo_py.compiler.compile import any_lane, point_function, where
 from karamelo_py.compiler.powers import exponential, logarithm
 from karamelo_py.language.signature import NonNegative
 from karamelo_py.points.laws import column, damage, damage_initiation
-from karamelo_py.points.laws.checks import check_temperatures, reference_rate
-from karamelo_py.points.laws.damages import damage_after, initial_damage, initiation, integrity
-from karamelo_py.points.laws.temperatures import Warm, homologous
+from karamelo_py.points.laws.parameters import check_temperatures, reference_rate
+from karamelo_py.points.laws.temperatures import homologous
 from karamelo_py.script.errors import ScriptError
+
+
+@point_function(otherwise=True)
+def initial_damage(damage, like):
+    """The memory of an intact point, or () where nothing breaks."""
+    return ()
+
+
+@point_function()
+def damage_after(damage, memory, strain, triaxiality, heat, dt):
+    """The memory after an increment of the equivalent plastic strain in a step dt.
+
+    `triaxiality` is the mean stress over the von Mises stress.
+    """
+
+
+@point_function()
+def integrity(damage, memory):
+    """1 - D."""
+
+
+@point_function()
+def initiation(damage, memory):
+    """Return the initiation of damage: it grows to 1 before damage begins."""
+
+
+# --- damage_johnson_cook ------------------------------------------------------------------------
 
 # Under triaxialities below this, failure strain is without bounds for most metals.
 _CLOSED = -3.0
@@ -91,20 +123,8 @@ class Accumulated(NamedTuple):
     w: Any  # sum of plastic strain over failure strain
 
 
-@point_function(otherwise=True)
-def temperature_factor(heat, damage):
-    """1 + d5 T*, and 1 without a temperature."""
-    return 1
-
-
-@temperature_factor.on(Warm)
-def _temperature_factor_warm(heat, damage):
-    return 1 + damage.d5 * homologous(heat, damage.Tr, damage.Tm)
-
-
-@initial_damage.on(JohnsonCookDamage)
-def _initial_damage_johnson_cook_damage(damage, like):
-    return Accumulated(0.0)
+initial_damage.on(JohnsonCookDamage)(lambda damage, like: Accumulated(0.0))
+initiation.on(JohnsonCookDamage)(lambda damage, memory: memory.w)
 
 
 @damage_after.on(JohnsonCookDamage)
@@ -115,7 +135,8 @@ def _damage_after_johnson_cook_damage(damage, memory, strain, triaxiality, heat,
     failure = damage.d1 + damage.d2 * exponential(min(damage.d3 * triaxiality, 50))
     rate = max(strain / (dt * damage.epsdot0), 1)
     failure *= 1 + damage.d4 * logarithm(rate)
-    failure *= temperature_factor(heat, damage)
+    if len(heat):
+        failure *= 1 + damage.d5 * homologous(heat, damage.Tr, damage.Tm)
     further = strain / max(failure, _SMALLEST_FAILURE_STRAIN)
     return Accumulated(where(grows, memory.w + further, memory.w))
 
@@ -124,8 +145,3 @@ def _damage_after_johnson_cook_damage(damage, memory, strain, triaxiality, heat,
 def _integrity_johnson_cook_damage(damage, memory):
     D = _BRITTLENESS * (memory.w - 1)
     return 1 - min(max(D, 0), 1)
-
-
-@initiation.on(JohnsonCookDamage)
-def _initiation_johnson_cook_damage(damage, memory):
-    return memory.w

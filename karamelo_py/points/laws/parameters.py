@@ -1,0 +1,60 @@
+"""Parameters that several laws have: their checks, moduli, and numbers in a row."""
+
+from dataclasses import dataclass
+
+from karamelo_py.script.errors import ScriptError
+
+
+def lame_parameters(E: float, nu: float) -> tuple[float, float]:
+    """Lame's parameters lambda and G; refuse a ratio without positive, finite elastic energy."""
+    if not -1 < nu < 0.5:
+        raise ScriptError(
+            f"Poisson's ratio {nu:g} is impossible",
+            argument="nu",
+            expected="a number above -1 and below 0.5",
+        )
+    return E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 * (1 + nu))
+
+
+def check_temperatures(Tr: float, Tm: float, name: str = "Tr") -> None:
+    """Refuse a melting temperature that is not above the reference temperature."""
+    if not Tm > Tr:
+        raise ScriptError(
+            f"the melting temperature Tm = {Tm:g} is not above {name} = {Tr:g}",
+            argument="Tm",
+            expected=f"a number above {Tr:g}",
+        )
+
+
+def reference_rate(epsdot0: float, factor: float, name: str) -> float:
+    """The reference rate of 1 + `factor` ln(rate/epsdot0), not 0; any where that is always 1."""
+    if epsdot0 > 0:
+        return epsdot0
+    if factor:
+        raise ScriptError(
+            f"there is no rate to compare with, and {name} = {factor:g} is not 0",
+            argument="epsdot0",
+            expected=f"a number above 0, or {name} = 0",
+        )
+    return 1.0
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """Numbers in a row, a curve or a formula, which do not change; kernels see an array.
+
+    Laws of one kind may have rows of different lengths: the shorter ones are filled up with their
+    last number, so that a law that has to know the length keeps it beside.
+    """
+
+    values: tuple[float, ...]
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def __getitem__(self, k: int) -> float:
+        return self.values[k]
+
+    def filled(self, length: int) -> list[float]:
+        """The numbers, the last one repeated up to `length`."""
+        return [*self.values, *self.values[-1:] * (length - len(self.values))]

@@ -1,0 +1,354 @@
+"""Strengths johnson_cook, swift and zerilli-armstrong: metals that harden by powers of strain."""
+
+from typing import Annotated, Any, NamedTuple
+
+from karamelo_py.compiler.compile import all_lanes, fma, real, round_off, where
+from karamelo_py.compiler.powers import exponential, logarithm, power
+from karamelo_py.language.rules import suggestion
+from karamelo_py.language.signature import NonNegative, Positive
+from karamelo_py.points.laws import Absent
+from karamelo_py.points.laws.parameters import check_temperatures, reference_rate
+from karamelo_py.points.laws.strengths import remembers, shear_response
+from karamelo_py.points.laws.strengths.hardening import (
+    first_guess,
+    flow_stress,
+    precompute,
+    radial_return,
+)
+from karamelo_py.points.laws.temperatures import homologous, temperature_or
+
+
+class JohnsonCook(NamedTuple):
+    """Flow stress of metals that depends on plastic strain, its rate, and temperature.
+
+    Parameters
+    ----------
+    G
+        Shear modulus.
+    A
+        Flow stress at first, at the reference rate and temperature.
+    B, n
+        Hardening: the flow stress rises by B ep^n with the plastic strain ep.
+    epsdot0
+        Reference rate of plastic strain; may be 0 where C is.
+    C
+        Coefficient of the rate; 0 for none.
+    m
+        Exponent of thermal softening; 0 for none.
+    Tr
+        Reference temperature, up to which there is no softening.
+    Tm
+        Melting temperature, from which on there is no strength.
+
+    Example
+    -------
+    strength(copper, johnson_cook, 46e9, 90e6, 292e6, 0.31, 1, 0.025, 1.09, 298, 1356)
+
+    Notes
+    -----
+    Y = (A + B ep^n) (1 + C ln(rate/epsdot0)) (1 - T*^m), T* = (T - Tr)/(Tm - Tr) (Johnson & Cook
+    1983). At and below the reference rate the second factor is 1; without a temperature the third
+    one is. Each step solves for the plastic strain with the flow stress at its end and the rate of
+    the step, which has one solution whatever the size of the step; the temperature is that of its
+    beginning.
+
+    See Also
+    --------
+    plastic, swift, eos shock, damage damage_johnson_cook, temperature plastic_work
+    """
+
+    in_lanes = True
+
+    G: float
+    A: float
+    B: float
+    n: float
+    rate: Any  # `RateFactor` or `Absent`
+    softening: Any  # `Softening` or `Absent`
+
+    @classmethod
+    def given(
+        cls,
+        G: Annotated[float, Positive],
+        A: Annotated[float, Positive],
+        B: Annotated[float, NonNegative],
+        n: Annotated[float, NonNegative],
+        epsdot0: Annotated[float, NonNegative],
+        C: Annotated[float, NonNegative],
+        m: Annotated[float, NonNegative],
+        Tr: float,
+        Tm: float,
+    ):
+        """The law with the factors that are not 1 anyway: others cost no logarithm and no power."""
+        check_temperatures(Tr, Tm)
+        epsdot0 = reference_rate(epsdot0, C, "C")
+        rate = RateFactor(epsdot0, C) if C > 0 else Absent()
+        return cls(G, A, B, n, rate, Softening(m, Tr, Tm) if m > 0 else Absent())
+
+
+suggestion(
+    JohnsonCook,
+    when=lambda s, scene: s.B == 0 and all(isinstance(f, Absent) for f in (s.rate, s.softening)),
+    cost="the strength of {owner.id} neither hardens nor depends on rate or heat",
+    instead="strength(..., plastic, {part.G:g}, {part.A:g})",
+)
+
+
+class RateFactor(NamedTuple):
+    """1 + C ln(rate/epsdot0) above the reference rate."""
+
+    in_lanes = True
+
+    epsdot0: float
+    C: float
+
+
+class Softening(NamedTuple):
+    """1 - T*^m."""
+
+    in_lanes = True
+
+    m: float
+    Tr: float
+    Tm: float
+
+
+remembers(JohnsonCook, ep=0.0)
+shear_response.on(JohnsonCook)(radial_return)
+
+
+# Increments of strain up to this share of it are a series of so many terms.
+_NEAR, _TERMS = 1 / 32, 9
+
+
+def power_of_strain(factor, exponent, strain):
+    """factor strain^exponent, 0 at no strain."""
+    some = strain > 0
+    return where(some, factor * power(where(some, strain, 1), exponent), 0)
+
+
+def power_law(factor, exponent, strain, value, increment):
+    """factor (strain + increment)^exponent and its slope; at no strain the slope is left out.
+
+    `value` is that without the increment: (1 + x)^n times as much is a short series for small x.
+    """
+    near = max(exponent, 1) * increment <= _NEAR * strain
+    x = increment / where(strain > 0, strain, 1)
+    series = real(1, x)
+    for k in range(_TERMS, 0, -1):
+        series = fma(x * ((exponent - (k - 1)) * real(1 / k, x)), series, 1)
+    after = strain + increment
+    value = value * series
+    if not all_lanes(near):
+        value = where(near, value, power_of_strain(factor, exponent, after))
+    return value, value * (exponent / where(after > 0, after, 1))
+
+
+def power_law_guess(exponent, strain, hard, excess, slope):
+    """A `first_guess` from the first two derivatives of the power law `hard` (Chebyshev's method).
+
+    `excess` is how far the stress lies above the flow stress; it falls by `slope` with the strain.
+    """
+    some = strain > round_off(strain)
+    inverse = where(some, 1 / where(some, strain, 1), 0)
+    steeper = hard * exponent * inverse
+    flatter = 1 / (slope + steeper)
+    curved = 0.5 * (1 - exponent) * steeper * inverse * flatter
+    x = max(excess, 0) * flatter
+    return x + x * max(min(curved * x, 1), -0.5), abs(curved)
+
+
+@precompute.on(JohnsonCook)
+def _precompute_johnson_cook(strength, memory, heat):
+    hard, softening = power_of_strain(strength.B, strength.n, memory.ep), strength.softening
+    if isinstance(softening, Absent) or not len(heat):
+        return hard, 1
+    return hard, 1 - power(homologous(heat, softening.Tr, softening.Tm), softening.m)
+
+
+@first_guess.on(JohnsonCook)
+def _first_guess_johnson_cook(strength, memory, known, q, slope):
+    if not isinstance(strength.rate, Absent):
+        return real(0, q), real(0, q)  # the rate rises with the strain: what is known is for none
+    hard, soft = known
+    excess = q - (strength.A + hard) * soft
+    return power_law_guess(strength.n, memory.ep, hard * soft, excess, slope)
+
+
+@flow_stress.on(JohnsonCook)
+def _flow_stress_johnson_cook(strength, memory, known, increment, heat, dt):
+    before, soft = known
+    hard, slope = power_law(strength.B, strength.n, memory.ep, before, increment)
+    flow, slope = (strength.A + hard) * soft, slope * soft
+    if isinstance(strength.rate, Absent):
+        return flow, slope
+    C, relative = strength.rate.C, increment / (dt * strength.rate.epsdot0)
+    faster = relative > 1
+    factor = 1 + where(faster, C * logarithm(where(faster, relative, 1)), 0)
+    steeper = where(faster, flow * C / where(faster, increment, 1), 0)
+    return flow * factor, slope * factor + steeper
+
+
+# --- swift ---------------------------------------------------------------------------------------
+
+
+class Swift(NamedTuple):
+    """Hardening by a power of plastic strain, after a plateau.
+
+    Parameters
+    ----------
+    G
+        Shear modulus.
+    A
+        Flow stress on the plateau.
+    B, n
+        Hardening.
+    C
+        Plastic strain at the end of the plateau. A negative one is a strain that the material has
+        been given before.
+
+    Example
+    -------
+    strength(steel, swift, 80e9, 400e6, 500e6, 0.01, 0.5)
+
+    Notes
+    -----
+    Y = A + B (ep - C)^n where the plastic strain ep is above C, else A (after Swift 1952). Each
+    step solves for the plastic strain with the flow stress at its end.
+
+    See Also
+    --------
+    plastic, johnson_cook, material eos-strength
+    """
+
+    in_lanes = True
+
+    G: Annotated[float, Positive]
+    A: Annotated[float, Positive]
+    B: Annotated[float, NonNegative]
+    C: float
+    n: Annotated[float, NonNegative]
+
+
+remembers(Swift, ep=0.0)
+shear_response.on(Swift)(radial_return)
+
+
+@precompute.on(Swift)
+def _precompute_swift(strength, memory, heat):
+    return power_of_strain(strength.B, strength.n, memory.ep - strength.C)
+
+
+@first_guess.on(Swift)
+def _first_guess_swift(strength, memory, hard, q, slope):
+    excess = q - strength.A - hard
+    return power_law_guess(strength.n, memory.ep - strength.C, hard, excess, slope)
+
+
+@flow_stress.on(Swift)
+def _flow_stress_swift(strength, memory, before, increment, heat, dt):
+    hard, slope = power_law(strength.B, strength.n, memory.ep - strength.C, before, increment)
+    return strength.A + hard, slope
+
+
+# --- zerilli-armstrong ---------------------------------------------------------------------------
+
+
+class ZerilliArmstrong(NamedTuple):
+    """Flow stress of metals by the motion of dislocations: strain, rate and temperature.
+
+    Parameters
+    ----------
+    G
+        Shear modulus.
+    C0
+        Part of the flow stress that depends on nothing (impurities, size of the grains).
+    C1
+        Factor of the thermal part: that of bcc metals.
+    C2
+        The same of its part that grows with the root of plastic strain: that of fcc metals.
+    C3
+        How fast the thermal part falls with temperature, per kelvin.
+    C4
+        How much less so for each e-fold of the rate, per kelvin.
+    C5, n
+        Hardening C5 ep^n that depends on strain alone: that of bcc metals.
+    epsdot0
+        Rate of plastic strain that rates are counted in: 1/s in the units of the script.
+    T
+        Absolute temperature where neither the material nor its solid has one.
+
+    Example
+    -------
+    strength(copper, zerilli-armstrong, 46e9, 65e6, 0, 890e6, 0.0028, 0.000115, 0, 1)
+    strength(iron, zerilli-armstrong, 80e9, 65e6, 1033e6, 0, 0.00698, 0.000415, 266e6, 0.289)
+
+    Notes
+    -----
+    Y = C0 + (C1 + C2 sqrt(ep)) exp(-C3 T + C4 T ln(rate/epsdot0)) + C5 ep^n, with C2 = 0 for bcc
+    and C1 = C5 = 0 for fcc metals (Zerilli & Armstrong 1987). Without rate the thermal part is
+    nothing, so that the strength of a body at rest is C0 + C5 ep^n. Each step solves for the
+    plastic strain with the flow stress at its end and the rate of the step.
+
+    See Also
+    --------
+    johnson_cook, plastic, temperature plastic_work
+    """
+
+    in_lanes = True
+
+    G: float
+    C0: float
+    C1: float
+    C2: float
+    C3: float
+    C4: float
+    C5: float
+    n: float
+    epsdot0: float
+    initial_temperature: float
+
+    @classmethod
+    def given(
+        cls,
+        G: Annotated[float, Positive],
+        C0: Annotated[float, NonNegative],
+        C1: Annotated[float, NonNegative],
+        C2: Annotated[float, NonNegative],
+        C3: Annotated[float, NonNegative],
+        C4: Annotated[float, NonNegative],
+        C5: Annotated[float, NonNegative],
+        n: Annotated[float, NonNegative],
+        *,
+        epsdot0: Annotated[float, Positive] = 1.0,
+        T: Annotated[float, NonNegative] = 293.0,
+    ):
+        """The law from its constants."""
+        return cls(G, C0, C1, C2, C3, C4, C5, n, epsdot0, T)
+
+
+remembers(ZerilliArmstrong, ep=0.0)
+shear_response.on(ZerilliArmstrong)(radial_return)
+
+
+@precompute.on(ZerilliArmstrong)
+def _precompute_zerilli_armstrong(strength, memory, heat):
+    T = temperature_or(heat, strength.initial_temperature)
+    athermal = power_of_strain(strength.C5, strength.n, memory.ep)
+    return athermal, power_of_strain(strength.C2, 0.5, memory.ep), exponential(-strength.C3 * T)
+
+
+@flow_stress.on(ZerilliArmstrong)
+def _flow_stress_zerilli_armstrong(strength, memory, known, increment, heat, dt):
+    athermal, root, thermal = known
+    athermal, slope = power_law(strength.C5, strength.n, memory.ep, athermal, increment)
+    root, root_slope = power_law(strength.C2, 0.5, memory.ep, root, increment)
+    # exp(C4 T ln(rate)) is the rate to a power.
+    exponent = strength.C4 * temperature_or(heat, strength.initial_temperature)
+    rate = increment / (dt * strength.epsdot0)
+    at_rate = power_of_strain(1, exponent, rate)
+    rate, rate_slope = power_law(1, exponent, rate, at_rate, 0)
+    rate = where(exponent > 0, rate, real(1, rate))
+    factor = strength.C1 + root
+    slope += thermal * (rate * root_slope + factor * rate_slope / (dt * strength.epsdot0))
+    return strength.C0 + thermal * rate * factor + athermal, slope

@@ -1,0 +1,46 @@
+"""Artificial viscosity of one point, which spreads shocks over a few cells.
+
+It is a part of a composed law (`karamelo_py.points.laws.eos_strength`) that an equation of state
+brings. Its memory is (q,), the viscous pressure.
+"""
+
+from math import sqrt
+from typing import NamedTuple
+
+
+class ArtificialViscosity(NamedTuple):
+    """q = rho h (Q1 h d^2 - Q2 c d) where the rate of volume change d is negative."""
+
+    in_lanes = True
+
+    Q1: float  # quadratic coefficient
+    Q2: float  # linear coefficient
+    cell_size: float  # h, known when the scene is lowered
+
+
+def artificial_viscosity(Q1: float, Q2: float) -> dict[str, NamedTuple]:
+    """The part that an equation of state with these coefficients brings; none where both are 0."""
+    return {"viscosity": ArtificialViscosity(Q1, Q2, 0.0)} if Q1 > 0 or Q2 > 0 else {}
+
+
+def viscous_pressure(viscosity, rate, density, sound):
+    """Viscous pressure at a rate of volume change, positive in compression."""
+    closing = max(-rate, 0)
+    h = viscosity.cell_size
+    return density * h * closing * (viscosity.Q1 * h * closing + viscosity.Q2 * sound)
+
+
+def viscous_speed(viscosity, q, density, sound):
+    """nu / h, nu the kinematic viscosity against compression and h the cell size."""
+    # nu / h = Q1 h |d| + Q2 c, and q / rho >= Q1 (h d)^2
+    return sqrt(viscosity.Q1 * q / density) + viscosity.Q2 * sound
+
+
+def damped(squared, a):
+    """Square of c' = sqrt(c^2 + a^2) + a, from c^2 and a = nu / h.
+
+    Viscosity nu damps the shortest wave of a cell by xi = nu / (c h), which takes c dt / h down to
+    sqrt(1 + xi^2) - xi (Belytschko et al. 2014, eq. 6.3.10): as if c were c'.
+    """
+    speed = sqrt(squared + a * a) + a
+    return speed * speed
