@@ -5,9 +5,7 @@ from typing import Annotated, Literal
 
 from karamelo_py.language.signature import Positive
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
-from karamelo_py.run.element.load_path import COMPONENTS, NORMAL, LoadPath
-from karamelo_py.run.element.point import Point, Unreachable
-from karamelo_py.run.element.response import Response
+from karamelo_py.run.element import COMPONENTS, NORMAL, LoadPath, Point, Response, Unreachable
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
 from karamelo_py.script.errors import ScriptError

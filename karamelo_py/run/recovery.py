@@ -3,7 +3,7 @@
 from typing import Any
 
 from karamelo_py.kernels.step import DONE, STOPPED
-from karamelo_py.run.checkpoint.rollback import RollbackPoint
+from karamelo_py.run.checkpoint.parts import RollbackPoint
 from karamelo_py.run.diagnosis import energy, explain
 from karamelo_py.run.timestep import own_step_instead
 from karamelo_py.scene import boundary

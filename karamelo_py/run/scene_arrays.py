@@ -21,8 +21,7 @@ from karamelo_py.kernels.rows import SUMS
 from karamelo_py.kernels.sweep import Visit, sweep, sweep_nodes
 from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.plastic_rate import without_rate
-from karamelo_py.run.access.nodes_by_number import ByNumber
-from karamelo_py.run.access.points_by_id import ById
+from karamelo_py.run.access import ById, ByNumber
 from karamelo_py.run.checkpoint import arrays as checkpoint
 from karamelo_py.run.checkpoint import part_state
 from karamelo_py.run.lower.build import State, lower, thread_count, warms_by_friction

@@ -18,10 +18,10 @@ from karamelo_py.kernels.totals import agree_on_heat
 from karamelo_py.kernels.watch import COARSE, ROUND_OFF, begin_to_look, measure_heat, sum_energies
 from karamelo_py.run.body_motion import BodyMotion, motions
 from karamelo_py.run.diagnosis.energy import unknown_heat, unknown_work
-from karamelo_py.run.lower.python_hooks import PythonHooks, sets_initial_state, views_of
+from karamelo_py.run.lower.hooks import PythonHooks, sets_initial_state, views_of
 from karamelo_py.run.mpi.whole import PointsMoved, Whole
 from karamelo_py.run.scene_arrays import SceneArrays
-from karamelo_py.run.tiles.tiles import DIRECT_UP_TO, in_tiles
+from karamelo_py.run.tiles import DIRECT_UP_TO, in_tiles
 from karamelo_py.run.timestep import (
     common_velocity,
     moves_already,

@@ -20,7 +20,7 @@ from karamelo_py.kernels.sums import columns_of
 from karamelo_py.kernels.sweep import sum_buffers, sweep_nodes, sweep_points
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
-from karamelo_py.run.lower.sizes import node_fields, nodes_in_use, point_fields
+from karamelo_py.run.lower.memory import node_fields, nodes_in_use, point_fields
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError

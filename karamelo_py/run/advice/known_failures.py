@@ -6,22 +6,201 @@ run before its first step, once.
 """
 
 from collections.abc import Iterator
-from math import isfinite
+from math import fsum, inf, isfinite
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from karamelo_py.kernels.watch import BORNE
 from karamelo_py.language.rules import Advice
+from karamelo_py.output.point_table import COMPONENTS, PointTable
 from karamelo_py.output.units import DENSITY, STRESS, VELOCITY
-from karamelo_py.points.laws import law_kind, specific_volume
+from karamelo_py.points.laws import can, constrained_velocity, law_kind, specific_volume
 from karamelo_py.run.advice.facts import SceneFacts
-from karamelo_py.run.advice.large_steps import duration_of_later, warn_about_steps
-from karamelo_py.run.advice.resting import UNITS, warn_about_rest
-from karamelo_py.run.diagnosis.explain import no_number
+from karamelo_py.run.diagnosis.nonfinite import no_number
 from karamelo_py.run.simulation import Simulation
-from karamelo_py.run.timestep import blows_up, elastic_speed
+from karamelo_py.run.timestep import (
+    blows_up,
+    elastic_speed,
+    fastest_wave,
+    own_step_instead,
+    ruling_limit,
+    what_follows,
+)
 from karamelo_py.scene.group import NOTHING_THERE, NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
+
+LOOK = 100  # steps: shorter runs look at a scene
+ENDLESS = 1e8  # steps
+REST = "a scene at rest"
+UNITS = (
+    "in m, kg, s water has the density 1000, steel the modulus 2e11; in mm, t, s 1e-9 and 2e5 (MPa)"
+)
+
+
+def warn_about_rest(hub: Hub, simulation: Any, duration: float) -> None:
+    """Say so, once, where nothing can move in a run of `duration`."""
+    if duration >= LOOK * simulation.dt and _rests(hub, simulation) and hub.update.first_time(REST):
+        hub.warn(
+            "nothing moves in this run: no point has a velocity or a stress, and no fix a load",
+            hint="fix(ID, initial_velocity_particles, ...), fix(ID, body_force, ...) or another "
+            "load, in front of it",
+        )
+
+
+def _rests(hub: Hub, simulation: Any) -> bool:
+    """Tell whether nothing can move, by the parts of this program: others may do anything."""
+    laws = [solid.material.law for solid in hub.solids.values()]
+    update = hub.update
+    parts = [type(p) for p in (update.method, update.method.basis, update.transfer, update.scheme)]
+    parts += [kind for law in laws for kind in law_kind(law)]
+    own = all(kind.__module__.startswith("karamelo_py.") for kind in parts)
+    acting = any((fix.hooks() and not _zero(fix)) or fix.for_method for fix in hub.fixes.values())
+    if acting or not own or update.thermal or any(can(law, constrained_velocity) for law in laws):
+        return False
+    return simulation.fastest() == 0 and simulation.largest(_stress)[0] == 0
+
+
+def _zero(fix: Any) -> bool:
+    """Tell whether a fix holds what it acts on at zero: walls, loads that are none."""
+    formulas = getattr(fix, "formulas", ())
+    return bool(formulas) and all(
+        formula is None or (formula.is_constant and formula.constant == 0) for formula in formulas
+    )
+
+
+def _stress(points: PointTable) -> np.ndarray:
+    return np.max([np.abs(points.particle("s" + c)) for c in COMPONENTS], axis=0)
+
+
+def warn_about_length(hub: Hub, simulation: Any, end_time: float) -> None:
+    """Say so where a run to `end_time` takes more steps than anybody waits for."""
+    span = end_time - simulation.time
+    if not (isfinite(span) and span > ENDLESS * simulation.dt > 0):
+        return
+    about = f"about {span / simulation.dt:.2g} steps of {simulation.dt:.3g} from here to time"
+    if hub.update.fixed_dt is not None:
+        hub.warn(f"{about} {end_time:.6g}", hint="a larger step with set_dt, or an earlier end")
+        return
+    if ruling_limit(simulation) == "conduction":
+        hub.warn(
+            f"{about} {end_time:.6g}: heat goes through cells of {hub.domain.h:g} that fast. The "
+            "units of conductivities, heat capacities, lengths and times may be mixed",
+            hint="an earlier end, or larger cells; in m, kg, s, K copper has kappa = 401, cp = 385",
+        )
+        return
+    hub.warn(f"{about} {end_time:.6g}: {mixed_units(hub, simulation)}", hint=UNITS)
+
+
+def mixed_units(hub: Hub, simulation: Any) -> str:
+    """Doubt the units where a step does not fit the numbers of a scene by any means."""
+    return (
+        f"waves move at {fastest_wave(simulation):.3g} through cells of {hub.domain.h:g}. The "
+        "units of densities, moduli, lengths and times may be mixed"
+    )
+
+
+MIXED = 300  # times the stable step, from where on units are likelier wrong than a guess
+
+
+class Step(NamedTuple):
+    """The step that a run has, where the script asks for it, and what its stable limit depends on.
+
+    `span` says how long the run is, in time or in steps; infinite where a condition ends it.
+    """
+
+    place: Any
+    fixed_dt: float | None
+    dt_factor: float | None
+    halves: bool
+    scene: tuple
+    span: tuple[float, float] = (inf, inf)
+
+    @property
+    def command(self) -> str:
+        """Command by which the script asks for it."""
+        return "set_dt" if self.fixed_dt else "dt_factor"
+
+    @property
+    def name(self) -> str:
+        """By what is known that it has been told."""
+        return f"{self.command} {self.fixed_dt or self.dt_factor}"
+
+
+def step_of(hub: Hub, halves: bool, span: tuple[float, float] = (inf, inf)) -> Step:
+    """The step that a run asks for here, which goes back and halves it in trouble or not."""
+    update = hub.update
+    method, scheme, transfer = update.method, update.scheme, update.transfer
+    scene = (
+        *(hub.domain.h, *hub.solids.values(), method, update.thermal),
+        *(type(scheme), scheme, type(transfer), transfer),
+    )
+    return Step(update.dt_place, update.fixed_dt, update.dt_factor, halves, scene, span)
+
+
+def step_was_told(hub: Hub) -> bool:
+    """Tell whether a warning has said that the step is above the stable limit."""
+    return step_of(hub, False).name in hub.update.warned_of
+
+
+def warn_about_steps(
+    hub: Hub, simulation: Simulation, halves: bool, *, again: bool = False
+) -> None:
+    """Say so, once, where the step of this run or of a later one is above the stable limit.
+
+    Who goes on from a file is told `again`.
+
+    Raises
+    ------
+    ScriptError
+        See `known_failures.warn`.
+    """
+    present = step_of(hub, halves)
+    _warn_about_step(hub, simulation, present, again=again)
+    for step in hub.later[len(hub.runs) :]:
+        if step.scene == present.scene:
+            _warn_about_step(hub, simulation, step, later=True)
+    hub.later.clear()
+
+
+def duration_of_later(hub: Hub, simulation: Simulation) -> float:
+    """Duration of the runs behind the next one that have the same scene, as far as is known."""
+    present = step_of(hub, False).scene
+    later = [step for step in hub.later[len(hub.runs) :] if step.scene == present]
+    spans = [min(s.span[0], s.span[1] * (s.fixed_dt or simulation.dt)) for s in later]
+    return fsum(span for span in spans if isfinite(span))
+
+
+def _warn_about_step(
+    hub: Hub, simulation: Simulation, step: Step, *, later: bool = False, again: bool = False
+) -> None:
+    limit = simulation.limit_moving
+    asked = step.fixed_dt or (step.dt_factor or 0) * limit
+    if not asked > limit * (1 + 1e-12):
+        return
+    of_heat = float(simulation.control.clock[0].heat_limit)
+    words = f"the step {asked:.4g} of {step.command} is "
+    hint = own_step_instead(hub, step.command)
+    if asked > BORNE * of_heat and not step.halves:
+        words += (
+            f"{asked / of_heat:.3g} times the stable one of conduction: temperatures would swing"
+        )
+        if not later:
+            raise ScriptError(words, place=step.place, hint=hint)
+    else:
+        words += f"above the stable limit {limit:.4g}"
+        words += (
+            f" of conduction; beyond {BORNE:g} times that temperatures swing"
+            if limit == of_heat
+            else what_follows(hub, simulation, asked)
+        )
+        if step.fixed_dt and asked > MIXED * limit and limit != of_heat:
+            words += f"; {mixed_units(hub, simulation)}"
+            hint = f"{UNITS}. If they are as they should be, {hint}"
+    if hub.update.first_time(step.name) or again:
+        hub.warn(words, place=step.place, hint=hint)
+
 
 DENSITIES = 10.0, 1e5  # kg/m^3, of all but gases: foams to beyond osmium
 IMPOSSIBLE = 30.0  # times the speed of waves: mm/s in the place of m/s make 1000 of 1

@@ -10,8 +10,8 @@ import numpy as np
 from karamelo_py.compiler.fields import as_rows_of_points, name_of
 from karamelo_py.kernels.arrays import Nodes, Points, Tiling, arrays_of
 from karamelo_py.kernels.totals import WORK, carry
-from karamelo_py.run.tiles.boxes import numbers, used
-from karamelo_py.run.tiles.tiles import in_use
+from karamelo_py.run.boxes import numbers, used
+from karamelo_py.run.tiles import in_use
 from karamelo_py.script.errors import ScriptError
 
 # What else a simulation knows of its state; `measured` comes before what depends on its version.

@@ -9,6 +9,7 @@ import numpy as np
 from karamelo_py.compiler.fields import rows_of_points
 from karamelo_py.kernels.arrays import Tiling, arrays_of
 from karamelo_py.output.fields import PIECE
+from karamelo_py.run.boxes import between, numbers
 from karamelo_py.run.checkpoint.arrays import (
     Stored,
     changing,
@@ -21,8 +22,7 @@ from karamelo_py.run.checkpoint.arrays import (
 )
 from karamelo_py.run.mpi.pack import by_tile, join_tilings, share_of_tiling, stripped
 from karamelo_py.run.mpi.partition import work_of
-from karamelo_py.run.tiles.boxes import between, numbers
-from karamelo_py.run.tiles.tiles import SHARES, Tiles, in_use
+from karamelo_py.run.tiles import SHARES, Tiles, in_use
 
 
 def points_of_tiles(

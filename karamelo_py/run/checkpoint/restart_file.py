@@ -19,8 +19,7 @@ from karamelo_py.language.replay import Record, Replay
 from karamelo_py.output.files import whole
 from karamelo_py.output.rhythm import ByTime, Rhythmic
 from karamelo_py.run.checkpoint.arrays import Stored, reading
-from karamelo_py.run.checkpoint.parts import PartStates, for_json, parts_of
-from karamelo_py.run.checkpoint.rollback import RollbackPoint
+from karamelo_py.run.checkpoint.parts import PartStates, RollbackPoint, for_json, parts_of
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 

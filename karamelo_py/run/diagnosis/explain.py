@@ -14,12 +14,11 @@ from karamelo_py.kernels.step import ABOVE_LIMIT, DONE, GAINED, HEATED, SHRUNK, 
 from karamelo_py.kernels.watch import GROWTH, LOOK, unit_of
 from karamelo_py.output.point_table import PointTable
 from karamelo_py.points.basis import carried, extent
-from karamelo_py.run.advice.large_steps import step_was_told
+from karamelo_py.run.advice.known_failures import step_was_told
 from karamelo_py.run.checkpoint import restart_file
-from karamelo_py.run.checkpoint.parts import OUTPUTS, PartStates
-from karamelo_py.run.checkpoint.rollback import RollbackPoint
+from karamelo_py.run.checkpoint.parts import OUTPUTS, PartStates, RollbackPoint
 from karamelo_py.run.diagnosis import energy
-from karamelo_py.run.diagnosis.nonfinite import culprit
+from karamelo_py.run.diagnosis.nonfinite import Trouble, no_number, place_words
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.timestep import own_step_instead
 from karamelo_py.scene.hub import Hub
@@ -42,14 +41,6 @@ class Stopped(ScriptError):
 
 class OthersWait(Exception):
     """This process cannot write a file, and others go on to give it what belongs there."""
-
-
-class Trouble(NamedTuple):
-    """Trouble of a run, what can be done, and the line of the script at fault, if known."""
-
-    message: str
-    hint: str
-    place: Place | None = None
 
 
 class StepTooLarge(NamedTuple):
@@ -263,21 +254,6 @@ def _shrunk(hub: Hub, simulation: Simulation) -> tuple[str, str]:
     return message, f"something went wrong before: look at the dumps; {smaller}"
 
 
-def no_number(hub: Hub, simulation: Simulation, message: str, hint: str) -> Trouble:
-    """The trouble with what is NaN, and the formula that it comes from, where that is found."""
-    found = culprit(hub, simulation)
-    if found is None:
-        return Trouble(message, hint)
-    what = "NaN" if np.isnan(found.value) else f"{found.value:g}"
-    where = "" if found.x is None else f" at {_place(found.x[: hub.domain.dimension])}"
-    return Trouble(
-        f"{message}: fix {found.fix.id} gets {what}{where} from {found.formula.text}",
-        "a formula that is a number at all times and places of the run, such as by max(a, b) or "
-        "if(condition, a, b)",
-        found.fix.place,
-    )
-
-
 class Wrong(NamedTuple):
     """A point that went wrong in a step."""
 
@@ -325,19 +301,19 @@ def _wrong_point(hub: Hub, simulation: Simulation) -> tuple:
         return no_number(
             hub,
             simulation,
-            f"{name} at {_place(old)} gets a velocity that is not a number",
+            f"{name} at {place_words(old)} gets a velocity that is not a number",
             f"look for a formula that gives NaN, such as a division by zero; else {smaller}",
         )
     lo, hi = hub.domain.lo[:d], hub.domain.hi[:d]
     if hub.update.method.frame.moves and ((new < lo).any() or (new > hi).any()):
         side = next(k for k in range(d) if new[k] < lo[k] or new[k] > hi[k])
         if simulation.above_limit():
-            return f"{name} at {_place(old)} is thrown out of the domain", smaller
+            return f"{name} at {place_words(old)} is thrown out of the domain", smaller
         loose = _loose(simulation, number, old, LOOSE * h)
         why = f", come loose from its solid ({APART}: numerical fracture)," if loose else ""
         keep = f"; against fracture, {energy.WHOLE}" if loose else ""
         return (
-            f"{name}{why} leaves the domain at {_place(new)} (through {'xyz'[side]} = "
+            f"{name}{why} leaves the domain at {place_words(new)} (through {'xyz'[side]} = "
             f"{lo[side] if new[side] < lo[side] else hi[side]:g})",
             "make the domain larger, hold the point back with fix velocity_nodes at the wall, let "
             f"it go with boundary(delete), or, if it should not have got there, {smaller}{keep}",
@@ -345,19 +321,19 @@ def _wrong_point(hub: Hub, simulation: Simulation) -> tuple:
     move = float(np.abs(new - old).max()) / h
     if move > 1:
         return (
-            f"{name} at {_place(old)} moves by {move:.3g} cells in one step",
+            f"{name} at {place_words(old)} moves by {move:.3g} cells in one step",
             f"the run is unstable: {smaller}",
         )
     if any(simulation.seen(_is_tangled, place, grid)):
         tangled, plain = type(hub.update.method.basis).__name__, "R4" if d == 2 else "R8"
         instead = f", {plain} in the place of {tangled}" if tangled in ("Q4", "H8") else ""
         return (
-            f"the domain of {name} at {_place(old)} is tangled: one of its corners folds over",
+            f"the domain of {name} at {place_words(old)} is tangled: one of its corners folds over",
             f"finer points, so that the corners of a domain move more alike{instead}, or method "
             f"tlcpdi, whose domains keep their shape; or {smaller}",
         )
     return (
-        f"{name} at {_place(old)} is turned inside out (det F <= 0)",
+        f"{name} at {place_words(old)} is turned inside out (det F <= 0)",
         f"{smaller}, or a finer grid, or a law that resists the compression (neo-hookean)",
     )
 
@@ -402,10 +378,6 @@ def _smaller_step(hub: Hub, simulation: Simulation) -> str:
         )
     fixed = hub.update.fixed_dt is not None
     return "use a smaller step (set_dt)" if fixed else "use a smaller dt_factor"
-
-
-def _place(x: np.ndarray) -> str:
-    return "(" + ", ".join(f"{value:.6g}" for value in x) + ")"
 
 
 def _write_last_good(hub: Hub) -> Path | None:

@@ -8,8 +8,17 @@ import numpy as np
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
+from karamelo_py.script.errors import Place
 from karamelo_py.script.expressions import POINT_SEEDS, Expression
 from karamelo_py.script.values import Values
+
+
+class Trouble(NamedTuple):
+    """Trouble of a run, what can be done, and the line of the script at fault, if known."""
+
+    message: str
+    hint: str
+    place: Place | None = None
 
 
 class Culprit(NamedTuple):
@@ -85,3 +94,22 @@ def _places(simulation: Simulation, group: Any, formula: Expression) -> Iterator
         for some in simulation.some(group):
             there = np.isfinite(some.position).all(axis=1)
             yield some.ids[there], some.position[there], some.reference_position[there]
+
+
+def no_number(hub: Hub, simulation: Simulation, message: str, hint: str) -> Trouble:
+    """The trouble with what is NaN, and the formula that it comes from, where that is found."""
+    found = culprit(hub, simulation)
+    if found is None:
+        return Trouble(message, hint)
+    what = "NaN" if np.isnan(found.value) else f"{found.value:g}"
+    where = "" if found.x is None else f" at {place_words(found.x[: hub.domain.dimension])}"
+    return Trouble(
+        f"{message}: fix {found.fix.id} gets {what}{where} from {found.formula.text}",
+        "a formula that is a number at all times and places of the run, such as by max(a, b) or "
+        "if(condition, a, b)",
+        found.fix.place,
+    )
+
+
+def place_words(x: np.ndarray) -> str:
+    return "(" + ", ".join(f"{value:.6g}" for value in x) + ")"

@@ -47,9 +47,9 @@ from karamelo_py.points.laws.eos import taken_heat
 from karamelo_py.points.laws.plastic_rate import with_rate, without_rate
 from karamelo_py.points.laws.temperatures import initial_heat
 from karamelo_py.points.transfers import Moment, lost_shares
+from karamelo_py.run.boxes import no_nodes
 from karamelo_py.run.mpi.partition import SharedTiles
-from karamelo_py.run.tiles.buffers import no_nodes
-from karamelo_py.run.tiles.tiles import Tiles
+from karamelo_py.run.tiles import Tiles
 from karamelo_py.run.timestep import sparse
 from karamelo_py.scene import boundary
 from karamelo_py.scene.comm import SerialComm

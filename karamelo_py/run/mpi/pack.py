@@ -4,9 +4,9 @@ import numpy as np
 
 from karamelo_py.compiler.fields import some_points
 from karamelo_py.kernels.arrays import Block, Setup, Tiling, arrays_of
+from karamelo_py.run.boxes import between
 from karamelo_py.run.mpi.partition import occupied
-from karamelo_py.run.tiles.boxes import between
-from karamelo_py.run.tiles.tiles import in_use, one_after_another, shares_of
+from karamelo_py.run.tiles import in_use, one_after_another, shares_of
 
 ROWS = ("number", "range", "grid", "box", "rows")  # of a tiling
 

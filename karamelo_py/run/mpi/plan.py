@@ -8,12 +8,11 @@ from karamelo_py.kernels.arrays import NoHooks, Setup, Tiling, arrays_of
 from karamelo_py.kernels.step import Fused, Staged, step
 from karamelo_py.kernels.sums import given
 from karamelo_py.kernels.sweep import sum_buffers, sweep_nodes, sweep_points
-from karamelo_py.run.lower.sizes import memory_of
+from karamelo_py.run.boxes import Boxes, buffers_of, chosen_of, no_nodes, numbers, summed
+from karamelo_py.run.lower.memory import memory_of
 from karamelo_py.run.mpi.partition import SharedTiles, occupied
 from karamelo_py.run.simulation import Simulation
-from karamelo_py.run.tiles.boxes import Boxes, numbers
-from karamelo_py.run.tiles.buffers import buffers_of, chosen_of, no_nodes, summed
-from karamelo_py.run.tiles.tiles import SHARES
+from karamelo_py.run.tiles import SHARES
 from karamelo_py.run.timestep import sparse
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.styles.fixes.pairs import SENT

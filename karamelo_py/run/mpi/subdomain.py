@@ -1,17 +1,154 @@
-"""The share of one of several processes in a scene: its work, and points on their way to others."""
+"""The share of one of several processes in a scene: its points, and its work, which is measured."""
 
-from typing import Any
+import time
+from collections.abc import Callable
+from typing import Any, ClassVar
 
 import numpy as np
 
-from karamelo_py.kernels.arrays import TIMESTEP, Block, Setup
+from karamelo_py.compiler.addresses import address_of_python
+from karamelo_py.compiler.formula import GLOBAL, UNIFORM
+from karamelo_py.kernels import ranks
+from karamelo_py.kernels.arrays import DT, TIMESTEP, Block, Setup
 from karamelo_py.kernels.ranks import Linked
+from karamelo_py.kernels.totals import WORK, rounded
+from karamelo_py.run.boxes import numbers
 from karamelo_py.run.checkpoint.arrays import remembered_at, take_points, take_tiling
-from karamelo_py.run.mpi.callbacks import Callbacks, reads_totals
-from karamelo_py.run.mpi.load import Load
 from karamelo_py.run.mpi.pack import by_tile, join_tilings, share_of, stripped
 from karamelo_py.run.mpi.partition import SharedTiles, nodes_of, occupied, work_of
-from karamelo_py.run.tiles.boxes import numbers
+from karamelo_py.scene.comm import SerialComm
+
+
+class Load:
+    """Time in sweeps over the points of each block, and in all else that is no waiting.
+
+    Attributes
+    ----------
+    costs
+        (blocks + 1,) of a point of each block in a step, and of a node that the points of a tile
+        may reach; at first all points cost the same, and nodes nothing.
+    """
+
+    def __init__(self, blocks: int):
+        self.costs = np.append(np.ones(blocks), 0.0)
+        self._spent = np.zeros((2, blocks + 1), np.int64)  # nanoseconds, and points times steps
+        self._rest = self._at = blocks
+        self._since: int | None = None
+
+    def pause(self) -> None:
+        """Do not count the time until the next sweep."""
+        self._since = None
+
+    def note(self) -> None:
+        """Count the time since the last `resume`."""
+        if self._since is not None:
+            self._spent[0, self._at] += time.perf_counter_ns() - self._since
+
+    def resume(self, block: int | None = None) -> None:
+        """Begin to count the time of a sweep over the points of a block, or of something else."""
+        self._at = self._rest if block is None else block
+        self._since = time.perf_counter_ns()
+
+    def next_block(self) -> None:
+        """Go on with the next block, from the last with the first."""
+        self.resume((self._at + 1) % self._rest)
+
+    def done(self, counts: list[int], steps: int) -> None:
+        """Take note of so many steps with these numbers of points, and of nodes."""
+        self._spent[1] += np.array(counts) * steps
+
+    def learn(self, comm: SerialComm) -> None:
+        """Find the costs from what all have spent; later times count more."""
+        seconds, done = comm.allreduce(self._spent)
+        self._spent //= 2
+        if (seconds[:-1] > 0).all() and (done > 0).all():
+            self.costs = seconds / done
+
+
+class Callbacks:
+    """Functions that kernels call where they need other processes.
+
+    Attributes
+    ----------
+    address
+        Of the function that kernels call.
+    at_once
+        Whether what fixes publish is added up in each step.
+    due
+        Otherwise: which of these values are, when the last is over.
+    """
+
+    at_once = False
+
+    def __init__(self, simulation: Any, load: Load):
+        self.simulation, self.comm, self.load = simulation, simulation.comm, load
+        self.control = simulation.setup.control
+        self.due: set[int] = set()
+        self.address = address_of_python(self.answer, ranks.CALL)
+
+    def answer(self, what: int, a: int, b: int) -> int:
+        """Do what kernels ask for."""
+        try:
+            self.load.note()
+            found = self._answers[what](self, a, b) or 0
+            if what == ranks.NEXT:
+                self.load.next_block()
+            else:
+                self.load.resume(0 if what in {ranks.SWEEP, ranks.GIVE} else None)
+            return found
+        except BaseException as error:
+            # Nothing can be raised through a kernel, and the others wait.
+            self.comm.fail(error)
+            raise
+
+    def _go_on(self, *_: int) -> None:
+        """Take the time alone."""
+
+    def _give(self, number: int, what: int) -> None:
+        self.simulation.tiles.give(self.simulation.setup, number, what)
+
+    def _take(self, *_: int) -> None:
+        self.simulation.tiles.take()
+
+    def _totals(self, first: int, count: int) -> None:
+        rows = slice(first, first + count)
+        if WORK < first < len(self.control.values) and not self.at_once:
+            self.due.update(range(first, first + count))
+            self.control.answer[:count] = self.control.values[rows]
+            return
+        of_all = self.comm.allreduce(self.control.totals[rows])
+        for k in range(count):
+            self.control.answer[k] = rounded(of_all[k])
+
+    def publish(self) -> None:
+        """Add up the values of the last step over all: their totals are kept until the next."""
+        rows, values = sorted(self.due), self.control.values
+        self.due.clear()
+        if rows:
+            for row, total in zip(
+                rows, self.comm.allreduce(self.control.totals[rows]), strict=True
+            ):
+                values[row] = rounded(total)
+            for of, to in getattr(self.simulation.setup.contact, "copies", ()):
+                values[to : to + 3] = values[of : of + 3]
+
+    def _largest(self, count: int, _: int) -> None:
+        self.comm.allreduce_max(self.control.answer[:count])
+
+    def _number(self, number: int, _: int) -> int:
+        return int(self.comm.allreduce(np.array([number]))[0])
+
+    _answers: ClassVar[dict[int, Callable]] = {
+        ranks.SWEEP: _go_on, ranks.NEXT: _go_on, ranks.GIVE: _give, ranks.TAKE: _take,
+        ranks.TOTALS: _totals, ranks.LARGEST: _largest, ranks.NUMBER: _number,
+    }  # fmt: skip
+
+
+def reads_totals(hooks: Any) -> bool:
+    """Tell whether formulas read within steps what fixes publish."""
+    code = getattr(hooks, "code", np.empty((0, 2), np.int64))
+    return bool(((code[:, 0] % UNIFORM == GLOBAL) & (code[:, 1] > DT)).any())
+
 
 LEARN_EVERY = 100  # steps from output to output, after which it is seen how work is shared
 

@@ -10,12 +10,12 @@ import numpy as np
 
 from karamelo_py.kernels.arrays import Setup, arrays_of
 from karamelo_py.kernels.totals import WORK
+from karamelo_py.run.boxes import numbers
 from karamelo_py.run.checkpoint.arrays import of_nodes
 from karamelo_py.run.lower.build import lower
 from karamelo_py.run.mpi.pack import by_tile, join_tilings, share_of, tilings_in_use
 from karamelo_py.run.mpi.partition import sized, work_of
-from karamelo_py.run.tiles.boxes import numbers
-from karamelo_py.run.tiles.tiles import SHARES
+from karamelo_py.run.tiles import SHARES
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.script.errors import Quit
 

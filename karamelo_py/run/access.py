@@ -1,18 +1,21 @@
-"""Points in the order of their ids: all of a scene, or a piece of them."""
+"""Points by their ids and nodes by their numbers: all of a scene, or so many at a time."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import cached_property
 from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.kernels.arrays import Block, Control, Setup, arrays_of, some_of
+from karamelo_py.kernels.arrays import MASS, Block, Control, Setup, arrays_of, some_of
 from karamelo_py.kernels.totals import LIMBS, add_all, add_rows, rounded
 from karamelo_py.output.fields import PIECE, SUMMED
+from karamelo_py.output.node_columns import NodeRows, brought, loaded
 from karamelo_py.output.point_table import Part, PointTable, Rows, places_before
+from karamelo_py.run.boxes import numbers
+from karamelo_py.run.checkpoint.arrays import of_nodes
 from karamelo_py.run.mpi.partition import joined
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.hub import Hub
@@ -253,3 +256,99 @@ class Ordered:
     def between(self, first: int, end: int) -> Block:
         """The points with ids from `first` to before `end`, in a block."""
         return some_of(self.block, self._order[slice(*np.searchsorted(self._ids, (first, end)))])
+
+
+class ByNumber:
+    """The nodes of a scene."""
+
+    setup: Setup
+
+    def node_pieces(self, names: Iterable[str], *, to_first: bool = False) -> Iterator[NodeRows]:
+        """All nodes, so many at a time, with the sums over points that have these names.
+
+        With `to_first`, of several processes the first alone gets them.
+        """
+        self.show_on_nodes()
+        self.bring(names)
+        gather = self.comm.gather if to_first else self.comm.allgather
+        for first, end in self.node_ranges():
+            if self.comm.size == 1:
+                arrays = {name: array[first:end] for name, array in of_nodes(self.setup)}
+                sums = {name: of[first:end] for name, of in self._brought.items()}
+            else:
+                parts = gather(self._rows_between(first, end))
+                if parts is None:
+                    continue
+                arrays, sums = self._joined(first, end, parts)
+            sums = {name: of.sum(axis=1) for name, of in sums.items()}
+            yield NodeRows(first, end, self.kin, arrays, sums, self._loaded)
+        self.bring(())
+
+    def _rows_between(self, first: int, end: int) -> tuple:
+        """The nodes from `first` to before `end`: what of them others do not show, and sums."""
+        own, used = (
+            nodes[slice(*np.searchsorted(nodes, (first, end)))]
+            for nodes in (self.counted(), numbers(self.setup.spans))
+        )
+        rows = [array[own] for _, array in of_nodes(self.setup)]
+        return own, rows, used, {name: of[used] for name, of in self._brought.items()}
+
+    def _joined(self, first: int, end: int, parts: list[tuple]) -> tuple[dict, dict]:
+        """The same of all nodes from those of all processes."""
+        kinds = of_nodes(self.setup)
+        arrays = {n: np.zeros((end - first, *a.shape[1:]), a.dtype) for n, a in kinds}
+        sums = {name: np.zeros((end - first, 2)) for name in self._brought}
+        for own, rows, used, given in parts:
+            for array, found in zip(arrays.values(), rows, strict=True):
+                array[own - first] = found
+            for name, of in given.items():
+                sums[name][used - first] += of
+        return arrays, sums
+
+    def bring(self, names: Iterable[str]) -> None:
+        """Keep the sums over the points at hand that have these names."""
+        self._brought = {name: brought(self, name) for name in names}
+        self._loaded = loaded(self.hub, self) if self._brought else {}
+
+    def node_ranges(self) -> Iterator[tuple[int, int]]:
+        """The numbers of pieces, from and to, one after another."""
+        count = self.hub.fields.node_count
+        for first in range(0, count, PIECE):
+            yield first, min(first + PIECE, count)
+
+    def counted(self) -> np.ndarray:
+        """The numbers of the nodes in use, of each at one process."""
+        if self.subdomain is not None:
+            return self.subdomain.counted()
+        return numbers(self.setup.spans)
+
+    def nodes_with_mass(self) -> np.ndarray:
+        """The numbers of those with mass."""
+        nodes = self.counted()
+        return nodes[self.setup.nodes.sums[nodes, MASS] > 0]
+
+    def mass_at_nodes(self, ID: str) -> np.ndarray:
+        """(4,) the mass of the nodes of a group, and this times x, y and z; rounded once."""
+        nodes = np.intersect1d(
+            self.nodes_with_mass(), self.hub.groups[ID].members, assume_unique=True
+        )
+        mass = self.setup.nodes.sums[nodes, MASS].astype(float)
+        ones = np.ones(len(nodes))
+        return self.summed(mass[:, None] * np.column_stack([ones, self.places_of(nodes)]))
+
+    def places_of(self, nodes: np.ndarray) -> np.ndarray:
+        """(n, 3) positions of nodes, of ascending numbers."""
+        x = np.empty((len(nodes), 3))
+        for lattice in self.hub.lattices:
+            ends = lattice.first, lattice.first + lattice.node_count
+            rows = slice(*np.searchsorted(nodes, ends))
+            x[rows] = lattice.positions(nodes[rows])
+        return x
+
+    def occupied_nodes(self) -> tuple[int, int]:
+        """Count the nodes that have mass, and find the last of them."""
+        there = self.nodes_with_mass()
+        count = self.comm.allreduce(np.array([len(there)]))
+        return int(count[0]), int(
+            self.comm.allreduce_max(np.array([there.max(initial=-1)], float))[0]
+        )

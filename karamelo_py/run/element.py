@@ -1,14 +1,111 @@
-"""A point of a material that goes along a load path, increment by increment."""
+"""One point of a material under prescribed strains and stresses (commands load_path, element).
 
-from collections.abc import Callable
+The law's own point functions are called from plain Python: nothing is compiled.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from karamelo_py.language.signature import Argument
+from karamelo_py.output.files import savefig, whole
+from karamelo_py.output.plot_style import blank_figure, tidy
 from karamelo_py.points import laws
+from karamelo_py.points import laws as materials
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space, tensor
-from karamelo_py.run.element.load_path import COMPONENTS, LoadPath
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.region import look_up
+from karamelo_py.script.errors import ScriptError
+
+# Components of symmetric tensors, in the order of the point functions.
+COMPONENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
+NORMAL = COMPONENTS[:3]
+
+
+@dataclass
+class LoadPath:
+    """Targets at the end of a piece of path; every strain that is not named stays as it is.
+
+    Parameters
+    ----------
+    increments
+        Number of equal increments.
+    duration
+        Time it takes.
+    strain, stress
+        Targets by component.
+    shear
+        Shear components (of `strain`) that are simple shear, not pure.
+    volumetric
+        Target of the sum of normal strains, reached by those that are not named; or None.
+    turn
+        Angle about z by which the point turns meanwhile.
+
+    Raises
+    ------
+    ScriptError
+        If both strain and stress of a component, or too much of the volume, are prescribed.
+    """
+
+    increments: int
+    duration: float
+    strain: Mapping[str, float]
+    stress: Mapping[str, float]
+    shear: Sequence[str] = ()
+    volumetric: float | None = None
+    turn: float = 0.0
+
+    id: str = ""
+    place: Any = None
+
+    @classmethod
+    def from_script(cls, hub: Hub, argument: Argument) -> LoadPath:
+        """The load path that `argument` names."""
+        return look_up(hub.load_paths, argument)
+
+    def __post_init__(self) -> None:
+        for name in self.stress:
+            if name in self.strain:
+                raise ScriptError(
+                    f"strain and stress of the component {name} are both prescribed",
+                    argument=f"s{name}",
+                    expected=f"s{name}, or the strain of that component",
+                )
+        if self.volumetric is None:
+            return
+        normal = [name for name in NORMAL if name in self.stress]
+        if normal:
+            raise ScriptError(
+                f"the volume is prescribed, and s{normal[0]} needs it free",
+                argument="volumetric",
+                expected="normal strains beside volumetric, no normal stresses",
+            )
+        if set(NORMAL) <= set(self.strain):
+            raise ScriptError(
+                "all normal strains are prescribed: the volume follows from them",
+                argument="volumetric",
+                expected="two normal strains at most beside volumetric",
+            )
+
+    def strain_at_end(self, strain: np.ndarray, free: Sequence[str]) -> np.ndarray:
+        """(6,) strain at the end, from that at the start; where stress is prescribed, no change.
+
+        `free` are the components of strain that the kinematics has.
+        """
+        end = strain.copy()
+        for name, value in self.strain.items():
+            end[COMPONENTS.index(name)] = value
+        if self.volumetric is not None:
+            rest = [k for k, name in enumerate(NORMAL) if name in free and name not in self.strain]
+            end[rest] += (self.volumetric - end[:3].sum()) / len(rest)
+        return end
+
 
 # Where the components of the velocity gradient lie in the flat tuples of each kinematics.
 _PLANE = ((0, 0), (0, 1), (1, 0), (1, 1))
@@ -261,3 +358,100 @@ class Point:
         after = laws.jacobian(self.law, self.kin, self.state) * self.stress
         self.work += float(weights * (before + after) / 2 @ increment)
         self.strain = self.strain + increment
+
+
+WIDTH = 17  # as many as a number of ten digits, its sign and its exponent take, and a blank
+
+
+def pressure(point: Point) -> float:
+    """-tr(stress)/3."""
+    return -float(point.stress[:3].sum()) / 3
+
+
+def von_mises_stress(point: Point) -> float:
+    """sqrt(3/2 s:s), s the deviatoric stress."""
+    xx, yy, zz, *shear = point.stress
+    normal = (xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2
+    return float(np.sqrt(normal / 2 + 3 * np.sum(np.square(shear))))
+
+
+def columns(point: Point) -> dict[str, Callable[[], float]]:
+    """Return the columns that are written of a point, by name."""
+    law, kin = point.law, point.kin
+    count = len(kin.symmetric_names)
+    found: dict[str, Callable[[], float]] = {"time": lambda: point.time}
+    for k, name in enumerate(COMPONENTS[:count]):
+        found[f"e{name}"] = lambda k=k: point.strain[k]
+    for k, name in enumerate(COMPONENTS[:count]):
+        found[f"s{name}"] = lambda k=k: point.stress[k]
+    found["p"] = lambda: pressure(point)
+    found["q"] = lambda: von_mises_stress(point)
+    found["J"] = lambda: materials.jacobian(law, kin, point.state)
+    found["stored"] = lambda: materials.energy_density(law, kin, point.state)
+    found["work"] = lambda: point.work
+    for name, what in materials.columns_of(law).items():
+        found[name] = lambda what=what: materials.shown(what, law, kin, point.state)
+    return found
+
+
+class Response:
+    """The answer of a point so far, a row for each increment.
+
+    Attributes
+    ----------
+    names
+        Names of the columns.
+    rows
+        Lists of their values.
+    """
+
+    def __init__(self, point: Point):
+        self._columns = columns(point)
+        self.names = list(self._columns)
+        self.rows: list[list[float]] = []
+        self.observe()
+
+    def observe(self) -> None:
+        """Add the present state."""
+        # A zero is added so that none is negative.
+        self.rows.append([float(value()) + 0.0 for value in self._columns.values()])
+
+    def last(self) -> dict[str, float]:
+        """The last row, by column."""
+        return dict(zip(self.names, self.rows[-1], strict=True))
+
+    def write(self, path: Path) -> None:
+        """Write the table, in the form of the log: a line of names, a line for each row."""
+        formats = [f"%-{WIDTH}.10g"] * (len(self.names) - 1) + ["%.10g"]
+        header = "".join(name.ljust(WIDTH) for name in self.names).rstrip()
+        with whole(path) as file:
+            np.savetxt(file, self.rows, fmt=formats, delimiter="", header=header, comments="")
+
+    def draw(self, path: Path, title: str) -> None:
+        """Draw the stresses over the strain that changes most, and q over p."""
+        table = dict(zip(self.names, np.transpose(self.rows), strict=True))
+        strains = [name for name in self.names if name.startswith("e") and name[1:] in COMPONENTS]
+        driven = max(strains, key=lambda name: np.ptp(table[name]))
+        stresses = [f"s{name[1:]}" for name in strains]
+        largest = max(float(np.abs(table[name]).max()) for name in stresses)
+        figure = blank_figure(9.6, 4.0)
+        left, right = figure.subplots(1, 2)
+        # Dashes let a curve show that lies under another.
+        for name, dashes in zip(stresses, ("-", "--", ":") * 2, strict=False):
+            if np.abs(table[name]).max() > 1e-6 * largest:
+                left.plot(table[driven], table[name], dashes, label=name, linewidth=1.4)
+        left.set_xlabel(driven)
+        left.set_ylabel("Cauchy stress")
+        right.plot(table["p"], table["q"], linewidth=1.4)
+        right.plot(table["p"][:1], table["q"][:1], "o", color="0.3", label="start")
+        right.set_xlabel("pressure p")
+        right.set_ylabel("von Mises stress q")
+        for axes in (left, right):
+            tidy(axes)
+            # Room for labels such as 0.0025 side by side, and powers of ten for longer ones.
+            axes.locator_params(axis="x", nbins=6)
+            axes.ticklabel_format(scilimits=(-3, 4))
+            if axes.get_legend_handles_labels()[0]:
+                axes.legend(frameon=False)
+        figure.suptitle(title)
+        savefig(figure, path)

@@ -34,20 +34,23 @@ from karamelo_py.kernels.sorting import (
 from karamelo_py.kernels.sweep import ROUNDING
 from karamelo_py.points.basis import first_node, shape_size
 from karamelo_py.points.kinematics import planar
-from karamelo_py.run.tiles.boxes import (
+from karamelo_py.run.boxes import (
     Boxes,
     Reached,
+    buffers_of,
     extents,
+    grow,
     joined_spans,
     numbered,
     ragged,
     ranges_of_shares,
+    room_of,
     rows_of,
     steps_of,
+    summed,
     used,
     without,
 )
-from karamelo_py.run.tiles.buffers import buffers_of, grow, room_of, summed
 from karamelo_py.scene.lattice import MAX_NODES, Lattice
 
 # By dimension: cells of a tile of points per direction, and nodes of a tile of nodes. Small boxes
