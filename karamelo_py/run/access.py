@@ -25,19 +25,7 @@ LAST = 2**62  # behind all numbers of points
 
 
 class ById:
-    """The points of a simulation: by their ids (from 0), in pieces, and sums over them.
-
-    Attributes
-    ----------
-    setup : Setup
-        Arrays with the points at hand, in any order.
-    count : int
-        Number of points there have ever been.
-    present : ndarray (count,)
-        False for points that were deleted.
-    comm
-        The processes that share them.
-    """
+    """The points of a simulation: by their ids (from 0), in pieces, and sums over them."""
 
     hub: Hub
     comm = SerialComm()
@@ -120,8 +108,8 @@ class ById:
     def added_up(self, part: Any, name: str, *arguments: Any) -> np.ndarray:
         """Sums over the points of a part's group of what its method `name` says; no rounding.
 
-        The method is called with tables of some of the points, and the `arguments`. It returns
-        rows of terms (k, n), or the number of sums, to which of them (n,) a term goes, and terms.
+        Called with tables of some of the points, and the `arguments`, it returns rows of terms
+        (k, n), or the number of sums, to which of them (n,) a term goes, and terms.
         """
         limbs = np.empty((0, LIMBS), np.int64)
         for some in self.some(part.group):
@@ -165,13 +153,7 @@ class ById:
         return value, -number
 
     def everyone(self, what: str, thing: Any) -> list:
-        """Gather the things of all processes, which have to ask for the same (in words).
-
-        Raises
-        ------
-        ScriptError
-            If a function in Python asks on one process for what it does not on another.
-        """
+        """Gather the things of all processes, which have to ask for the same (in words)."""
         asked, found = zip(*self.comm.allgather((what, thing)), strict=True)
         if other := next((one for one in asked if one != asked[0]), None):
             raise ScriptError(
@@ -264,10 +246,7 @@ class ByNumber:
     setup: Setup
 
     def node_pieces(self, names: Iterable[str], *, to_first: bool = False) -> Iterator[NodeRows]:
-        """All nodes, so many at a time, with the sums over points that have these names.
-
-        With `to_first`, of several processes the first alone gets them.
-        """
+        """All nodes, so many at a time, with the sums over points that have these names."""
         self.show_on_nodes()
         self.bring(names)
         gather = self.comm.gather if to_first else self.comm.allgather

@@ -185,13 +185,7 @@ class Point:
         return np.pad(found, (0, 6 - len(found)))
 
     def follow(self, path: LoadPath, observe: Callable[[], None]) -> None:
-        """Go along a path; `observe` is called after every increment.
-
-        Raises
-        ------
-        Unreachable
-            With what went wrong and in which increment.
-        """
+        """Go along a path; `observe` is called after every increment."""
         prescribed = np.array([k for k, name in enumerate(COMPONENTS) if name in path.stress], int)
         motion = Loading(
             strain=path.strain_at_end(self.strain, self.free) - self.strain,
@@ -395,15 +389,7 @@ def columns(point: Point) -> dict[str, Callable[[], float]]:
 
 
 class Response:
-    """The answer of a point so far, a row for each increment.
-
-    Attributes
-    ----------
-    names
-        Names of the columns.
-    rows
-        Lists of their values.
-    """
+    """The answer of a point so far, a row for each increment."""
 
     def __init__(self, point: Point):
         self._columns = columns(point)

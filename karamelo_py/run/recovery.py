@@ -15,21 +15,9 @@ RETURNS = 2  # at most, to one state from where energy grows: what two halves do
 
 
 class RollBack:
-    """The last good state of a run, and the way back to it.
+    """The last good state of a run (`point`), and the way back to it.
 
-    Parameters
-    ----------
-    hub
-        The scene.
-    halve
-        Whether to go on from there with half the step; else the run ends.
-
-    Attributes
-    ----------
-    point
-        The last good state.
-    halvings, returns
-        How often the step was halved, and how often since that state because energy grew.
+    With `halve` it goes on from there with half the step; else the run ends.
     """
 
     def __init__(self, hub: Hub, *, halve: bool):
@@ -40,16 +28,8 @@ class RollBack:
     def begin(self, simulation: Any, first_step: int, *, ruined: bool, looks_always: bool) -> None:
         """Begin with the present state, or with the good one of the file that a run goes on from.
 
-        Parameters
-        ----------
-        simulation
-            The arrays of the scene.
-        first_step
-            The first step of the run, which the present state may lie behind.
-        ruined
-            Whether a step above the limit, from a file, has spoilt the present state.
-        looks_always
-            Whether the values of parts are looked at between any two steps.
+        A step above the limit may have spoilt the present state (`ruined`); values of parts may be
+        looked at between any two steps (`looks_always`).
         """
         self.simulation, self.first_step, self._always = simulation, first_step, looks_always
         too_large = not simulation.control.clock[0].watch_limit
@@ -75,13 +55,7 @@ class RollBack:
             self.point.note(always=self._always)
 
     def after(self, status: int) -> bool:
-        """Judge steps that ended with `status`: go on from there (True), or from where it is now.
-
-        Raises
-        ------
-        ScriptError
-            If a step went wrong, and there is no way on.
-        """
+        """Judge steps that ended with `status`: go on from there (True), or from where it is."""
         hub, simulation = self.hub, self.simulation
         if status != DONE:
             if status == STOPPED and boundary.delete_leaving(hub, simulation, self.point.arrays):

@@ -193,16 +193,8 @@ class ChunkLength:
 class Runner:
     """Runs a scene for a number of steps, to a time, or by a condition.
 
-    Parameters
-    ----------
-    hub
-        The scene.
-    steps, end_time, condition
-        What ends the run: a number of steps, a time, or a formula.
-    until
-        Whether the run ends where the condition holds; else where it does not.
-    halve
-        Whether to go back and halve the step where it goes wrong.
+    It ends where the condition holds (`until`), else where it does not. With `halve` it goes back
+    and halves the step where that goes wrong.
     """
 
     def __init__(

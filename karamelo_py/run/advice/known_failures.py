@@ -147,15 +147,7 @@ def step_was_told(hub: Hub) -> bool:
 def warn_about_steps(
     hub: Hub, simulation: Simulation, halves: bool, *, again: bool = False
 ) -> None:
-    """Say so, once, where the step of this run or of a later one is above the stable limit.
-
-    Who goes on from a file is told `again`.
-
-    Raises
-    ------
-    ScriptError
-        See `known_failures.warn`.
-    """
+    """Say so once (or `again`) where this or a later step is above the stable limit."""
     present = step_of(hub, halves)
     _warn_about_step(hub, simulation, present, again=again)
     for step in hub.later[len(hub.runs) :]:
@@ -246,14 +238,7 @@ def _other_units(s: SceneFacts) -> Iterator[Advice]:
 
 
 def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> None:
-    """Tell what will go wrong in a run of `duration`, and the next; each failure once in a script.
-
-    Raises
-    ------
-    ScriptError
-        If temperatures would swing, in a run that does not halve its step then, or if points have
-        velocities that are no numbers.
-    """
+    """Tell what will go wrong in a run of `duration` and the next; each failure once."""
     _warn_about_groups(hub)
     refuse_endless_speeds(hub, simulation)
     scene = SceneFacts(hub, simulation, duration)
@@ -270,13 +255,7 @@ def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> Non
 
 
 def refuse_endless_speeds(hub: Hub, simulation: Simulation) -> None:
-    """Refuse velocities of points that are no numbers, with the formula that they come from.
-
-    Raises
-    ------
-    ScriptError
-        If there are some.
-    """
+    """Refuse velocities of points that are no numbers, with the formula that they come from."""
     if not isfinite(simulation.fastest()):
         found = no_number(
             hub,

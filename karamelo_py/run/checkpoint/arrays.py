@@ -148,20 +148,7 @@ def reading() -> Iterator[None]:
 
 
 def restore(simulation: Any, state: Mapping[str, Any]) -> None:
-    """Put the arrays of a simulation into a state.
-
-    Parameters
-    ----------
-    simulation
-        With a setup, tiles and a hub; also the own part of one of several processes.
-    state
-        As `copied` or a file has it; without published values these stay.
-
-    Raises
-    ------
-    ScriptError
-        If arrays are missing, or of another kind than those of this scene.
-    """
+    """Put the arrays of a simulation into a state, as `copied` or a file has it."""
     s = simulation.setup
     for k, block in enumerate(s.blocks):
         check_points(block.points, state, f"points/{k}/")

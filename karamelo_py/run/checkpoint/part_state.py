@@ -39,10 +39,9 @@ def points_of_tiles(
 
 
 def stored(simulation: Any, kept: dict[str, np.ndarray] | None = None) -> Iterator[Stored]:
-    """Yield the arrays of a file, with the bits and in the order of one process.
+    """Yield the arrays of a file, with the bits and in the order of one process, at the first.
 
-    They are those of the present state, or of the one that each process has `kept`. All processes
-    go through this together; the first gets the arrays.
+    They are those of the present state, or of the one that each process has `kept`.
     """
     s, comm, tiles = simulation.setup, simulation.comm, simulation.tiles
     own = kept or dict(changing(simulation)) | touched(simulation)

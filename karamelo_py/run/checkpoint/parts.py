@@ -205,13 +205,7 @@ MADE = {kind.__name__: make for kind, (_, make) in KINDS.items()}
 
 
 def plain(value: Any, arrays: list[np.ndarray]) -> Any:
-    """Return a value as JSON knows it; arrays are copied into `arrays` and numbered.
-
-    Raises
-    ------
-    TypeError
-        If no file takes it.
-    """
+    """Return a value as JSON knows it; arrays are copied into `arrays` and numbered."""
     kind = np.generic if isinstance(value, np.generic) else type(value)
     if value is None or (isinstance(value, (bool, int, float, str)) and kind is not np.generic):
         return value
@@ -238,15 +232,7 @@ def value_of(kept: Any, arrays: list[np.ndarray]) -> Any:
 
 
 class RollbackPoint:
-    """The last good state of a run, and the states of parts there and at later steps.
-
-    Attributes
-    ----------
-    arrays
-        Copies of the arrays of that state, empty before there is one.
-    step
-        Its step.
-    """
+    """The last good state of a run, and the states of parts there and at later steps."""
 
     def __init__(self, hub: Hub) -> None:
         self.hub = hub
@@ -300,10 +286,7 @@ class RollbackPoint:
             now.give(self.hub)
 
     def again(self, advance: Callable[[int], int], end: int) -> int:
-        """Take the steps up to `end` once more; parts remember on the way what they did there.
-
-        Returns how the last of them ended.
-        """
+        """Take the steps up to `end` once more, parts remembering it; how that ended."""
         update = self.hub.update
         while update.step < end:
             noted = min((step for step in self._parts if update.step < step < end), default=end)

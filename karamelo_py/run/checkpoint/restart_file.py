@@ -33,16 +33,7 @@ FLAT = {"track_times": False}
 
 
 class Restarts(Rhythmic):
-    """Writes a file to go on from, again and again while the scene runs.
-
-    Parameters
-    ----------
-    every
-        How often.
-    file
-        File name. The first ``*`` becomes the step number; without ``*`` each file takes the place
-        of the one before.
-    """
+    """Writes a file, again and again; a first ``*`` in its name becomes the step number."""
 
     place: Any = None
     style = ""
@@ -66,10 +57,7 @@ def path_of(hub: Hub, file: Path) -> Path:
 
 
 def write(hub: Hub, file: Path, *, within: bool) -> Path:
-    """Write the present state of a scene; `within` a run or between two.
-
-    The file appears under its name when all of it is written.
-    """
+    """Write the present state of a scene, `within` a run or between two, and return the name."""
     path, comm, simulation = path_of(hub, file), hub.settings.comm, hub.simulation
     if comm.leads:
         _write(hub, path, within)
@@ -150,18 +138,7 @@ def is_restart(path: Path) -> bool:
 
 
 class Restart:
-    """The content of a file.
-
-    Parameters
-    ----------
-    path
-        Its name. With a ``*`` it is the one with the largest number in that place.
-
-    Raises
-    ------
-    ScriptError
-        If there is none, or it is no file to go on from.
-    """
+    """The content of a file; of those that a ``*`` stands for, of the largest number."""
 
     def __init__(self, path: Path):
         import h5py
@@ -197,13 +174,7 @@ class Restart:
         return self.content["runs"]
 
     def presets(self, given: dict[str, str]) -> dict[str, str]:
-        """Return the variables of the command line that wrote the file; `given` ones are those.
-
-        Raises
-        ------
-        ScriptError
-            If one that is given is another.
-        """
+        """Return the variables of the command line that wrote the file; `given` ones are those."""
         before = self.content["presets"]
         for name, text in given.items():
             if before.get(name) != text:
@@ -223,13 +194,7 @@ class Restart:
         return Replay(record, self.content["within"], str(self.path))
 
     def take(self, hub: Hub, *, outputs: bool) -> None:
-        """Put the scene into the state of the file; with `outputs` they go on in their files.
-
-        Raises
-        ------
-        ScriptError
-            If the file was written by another scene.
-        """
+        """Put the scene into the state of the file; with `outputs` they go on in their files."""
         check(hub, self)
         simulation, content = hub.simulation, self.content
         try:

@@ -26,13 +26,7 @@ NUMBERS = (laws.jacobian, laws.wave_speed_squared, laws.energy_density)
 
 
 def try_parts(hub: Hub, setup: Any) -> None:
-    """Try the laws, the basis and the transfer of a scene that plug-ins brought.
-
-    Raises
-    ------
-    ScriptError
-        Naming the part, its package and its place in the script.
-    """
+    """Try the laws, the basis and the transfer of a scene that plug-ins brought."""
     for solid in hub.solids.values():
         if any(is_foreign(kind) for kind in laws.law_kind(solid.material.law)):
             _try_law(hub, setup, solid)

@@ -188,10 +188,7 @@ def _call(simulation: Any, fix: Any, hook: Callable, view: Any) -> None:
 
 
 def _agree(simulation: Any, fix: Any) -> None:
-    """See that all processes have asked for the same, and have published the same.
-
-    Otherwise one would wait for the others for ever, or the values would be those of a part.
-    """
+    """See that all processes have asked for the same, and have published the same."""
     values = simulation.hub.values
     names = (f"{fix.id}_{name}" if name else fix.id for name in fix.published)
     own = {name: values.get(name) for name in names if name in values}

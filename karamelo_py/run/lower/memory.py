@@ -127,19 +127,9 @@ FEW = 100_000  # points; so many have room everywhere
 
 
 def check_room(hub: Hub, *, copied: bool) -> None:
-    """Refuse a scene that needs more memory than this machine has, and warn of what is not free.
+    """Refuse a scene that needs more memory than this machine has; warn of what is not free.
 
-    Parameters
-    ----------
-    hub
-        The scene.
-    copied
-        Whether there will be a copy of the last good state, as in a run.
-
-    Raises
-    ------
-    ScriptError
-        At the line of the largest solid.
+    In a run there is a copy of the last good state, too (`copied`).
     """
     count = sum(solid.count for solid in hub.solids.values())
     if count <= FEW or (there := machine_memory(on_machine(hub))) is None:

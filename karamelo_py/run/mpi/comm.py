@@ -63,20 +63,7 @@ def launched() -> tuple[int, int]:
 class MpiComm(SerialComm):
     """All processes of a run, in the order of their ranks. The first writes.
 
-    Parameters
-    ----------
-    ends
-        Ends all of them because of an error, of which it tells.
-
-    Attributes
-    ----------
-    parted
-        Whether the processes do not go on together: one has failed, or has another script.
-
-    Raises
-    ------
-    ScriptError
-        If mpi4py is not there, or finds no MPI.
+    `ends` ends all of them because of an error, of which it tells.
     """
 
     parted = False
@@ -106,13 +93,7 @@ class MpiComm(SerialComm):
         near.Free()
 
     def barrier(self) -> None:
-        """Wait for all processes.
-
-        Raises
-        ------
-        Quit
-            If one of them has failed, which tells of it.
-        """
+        """Wait for all processes; quit if one of them has failed, which tells of it."""
         if (self.agree(HERE) == FAILED).any():
             self.parted = True
             raise Quit
@@ -218,15 +199,7 @@ class MpiComm(SerialComm):
 
 
 def check_same_run(hub: Scene) -> None:
-    """See that all processes are about to do the same run.
-
-    Raises
-    ------
-    Quit
-        If another process tells what is wrong.
-    ScriptError
-        If the scripts are not the same.
-    """
+    """See that all processes are about to do the same run; one tells, the others quit."""
     comm = hub.settings.comm
     if comm.size == 1:
         return

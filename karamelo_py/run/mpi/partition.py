@@ -34,16 +34,9 @@ def bisected(places: np.ndarray, work: np.ndarray, parts: int, rows: float = 1) 
 
     After Berger, M. J. and Bokhari, S. H. (1987), "A partitioning strategy for nonuniform problems
     on multiprocessors", IEEE Transactions on Computers C-36, 570-580. Where the work of a layer of
-    tiles has to be shared, it is cut across the next longest direction.
-
-    Parameters
-    ----------
-    places
-        (T, d) lower corners of the tiles.
-    work
-        (T,) in whole numbers; tiles without work fill the parts, wherever they lie.
-    rows
-        How many times as long as the others the last direction is to be where it is cut.
+    tiles has to be shared, it is cut across the next longest direction. `places` (T, d) are lower
+    corners, `work` (T,) whole numbers; tiles without work fill the parts. The last direction is to
+    be `rows` times as long as the others where it is cut.
     """
     d = places.shape[1]
     least = np.append(np.ones(d - 1), rows)
@@ -92,12 +85,7 @@ class Needs(NamedTuple):
 class SharedTiles(Tiles):
     """Tiles of a process among others.
 
-    Parameters
-    ----------
-    comm
-        The processes.
-    one_place
-        Whether a node has others at its place, in grids that are alike: bodies in contact.
+    With `one_place` a node has others at its place, in grids that are alike: bodies in contact.
     """
 
     def __init__(

@@ -66,17 +66,7 @@ class Load:
 
 
 class Callbacks:
-    """Functions that kernels call where they need other processes.
-
-    Attributes
-    ----------
-    address
-        Of the function that kernels call.
-    at_once
-        Whether what fixes publish is added up in each step.
-    due
-        Otherwise: which of these values are, when the last is over.
-    """
+    """Functions that kernels call where they need other processes."""
 
     at_once = False
 
@@ -154,15 +144,7 @@ LEARN_EVERY = 100  # steps from output to output, after which it is seen how wor
 
 
 class Subdomain:
-    """Keep the share of this process in balance with those of others.
-
-    Attributes
-    ----------
-    load
-        Measured cost of points and nodes.
-    callbacks
-        Functions that kernels call.
-    """
+    """Keep the share of this process in balance with those of others."""
 
     def __init__(self, simulation: Any):
         self.simulation, self.comm = simulation, simulation.comm

@@ -38,12 +38,8 @@ class Whole:
     def act(self, function: Callable[[Setup], None]) -> None:
         """Let the first process call a function of the whole; all take over what it has done.
 
-        Raises
-        ------
-        PointsMoved
-            If points were moved and sorted anew, so that the step has to be begun anew.
-        Quit
-            On the other processes if the function fails: the first tells of it.
+        Where points were moved the step has to be begun anew (`PointsMoved`). If the function fails
+        the first process tells of it, and the others quit.
         """
         simulation, comm = self.simulation, self.simulation.comm
         self.gather()
