@@ -27,7 +27,7 @@ def save_state(request: dict) -> int:
     from states import final_columns, final_hub, final_state
 
     from karamelo_py.run import access, tiles
-    from karamelo_py.run.checkpoint import part_state as storing
+    from karamelo_py.run.checkpoint import arrays as storing
     from karamelo_py.run.mpi import partition, subdomain
     from karamelo_py.run.mpi.whole import Whole
     from karamelo_py.script.errors import ScriptError

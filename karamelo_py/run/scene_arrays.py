@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,7 +22,6 @@ from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.plastic_rate import without_rate
 from karamelo_py.run.access import ById, ByNumber
 from karamelo_py.run.checkpoint import arrays as checkpoint
-from karamelo_py.run.checkpoint import part_state
 from karamelo_py.run.lower.build import State, lower, thread_count, warms_by_friction
 from karamelo_py.run.lower.check_plugins import try_parts
 from karamelo_py.run.lower.memory import check_room, no_room
@@ -233,51 +231,12 @@ class SceneArrays(ById, ByNumber):
         show_heat(s.heat, s, self.mode)
 
     def snapshot(self, before: dict[str, np.ndarray] | None = None) -> dict[str, np.ndarray]:
-        """Copy every array that a step changes, and the published values.
-
-        The copies of the snapshot `before`, which is lost, are used again where they fit.
-        """
-        found = checkpoint.copied(self, before or {})
-        return found if self.subdomain is None else found | {"owner": self.tiles.owner}
+        """Copy every array that a step changes, and the published values; see `copied`."""
+        return checkpoint.copied(self, before or {})
 
     def restore(self, snapshot: dict[str, np.ndarray]) -> None:
         """Return to a snapshot."""
-        if self.subdomain is not None:
-            self.tiles.owner = snapshot["owner"]
         checkpoint.restore(self, snapshot)
-        self.version += 1
-
-    def stored(self) -> Iterator[checkpoint.Stored]:
-        """Yield what a file to go on from holds, array by array."""
-        if self.subdomain is None:
-            return checkpoint.stored(self)
-        return part_state.stored(self)
-
-    def stored_snapshot(self, snapshot: dict[str, np.ndarray]) -> Iterator[checkpoint.Stored]:
-        """Yield what such a file holds of a snapshot."""
-        if self.subdomain is None:
-            return checkpoint.in_file(snapshot)
-        return part_state.stored(self, snapshot)
-
-    def take_snapshot(self, path: Path) -> dict[str, np.ndarray]:
-        """Read the snapshot that a file holds; each process reads its own share."""
-        with checkpoint.opened(path, "good") as found:
-            if self.subdomain is not None:
-                return part_state.own_share(self, found)
-            # In the order in which copies are made, and written.
-            names = [*(name for name, _ in checkpoint.changing(self)), "values", *found]
-            return {name: found[name][()] for name in dict.fromkeys(names)}
-
-    def take_stored(self, path: Path) -> None:
-        """Take the state that a file to go on from holds; each process reads its own share."""
-        with checkpoint.opened(path) as state, self.comm.joint():
-            shared = self.subdomain is not None
-            # Nothing of the arrays changes where the file is of another scene.
-            for k, block in enumerate(self.setup.blocks):
-                checkpoint.check_points(block.points, state, f"points/{k}/")
-            self.restore(part_state.own_share(self, state) if shared else state)
-            checkpoint.take_known(self, state)
-            (part_state if shared else checkpoint).take_nodes(self, state)
 
     def wrong_points(self) -> Iterator[tuple[Any, int]]:
         """Block and index of points at hand that the last sweep found wrong, one a tile at most."""

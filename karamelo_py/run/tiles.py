@@ -1,6 +1,6 @@
 """The grids cut into tiles: which points lie in which, which nodes they give to or are in use."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from math import inf
 from typing import Any
 
@@ -169,17 +169,6 @@ class Tiles:
             )
         self.sets += 1
         return Buffers(of, *self._layout, self.sets - 1)
-
-    def in_use(self, s: Setup) -> list[tuple[str, np.ndarray, int]]:
-        """The arrays that a sort changes beside the points, and how many rows of them are in use.
-
-        All others follow from them (`lay_out`).
-        """
-        return [
-            (f"tiling/{k}/{name}", getattr(block.tiling, name), rows)
-            for k, block in enumerate(s.blocks)
-            for name, rows in in_use(block.tiling)
-        ]
 
     def empty_nodes(self, s: Setup) -> None:
         """Set the sums of points at the nodes in use to zero."""
@@ -361,6 +350,14 @@ class Tiles:
             return tile
         first, along = self._first_of_nodes[grid], self._tile_steps[grid, -2]
         return tile - (tile - first) % along
+
+    def reached_by(self, s: Setup) -> tuple[np.ndarray, ...]:
+        """Of the nodes in use here what `spans_of_all` asks for."""
+        return (used(s.spans)[1:],)
+
+    def spans_of_all(self, reached: Iterable[tuple[np.ndarray, ...]]) -> np.ndarray:
+        """(k, 2) spans of the nodes in use, from what all processes reach: one has them all."""
+        return np.concatenate([spans for (spans,) in reached])
 
     def spans_of(self, tile: np.ndarray, begin: np.ndarray, end: np.ndarray) -> np.ndarray:
         """(k, 2) spans of nodes in use, from boxes of them (n, d) in tiles of nodes (n,)."""

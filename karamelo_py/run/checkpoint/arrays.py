@@ -2,20 +2,26 @@
 
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from karamelo_py.compiler.fields import as_rows_of_points, name_of
+from karamelo_py.compiler.fields import as_rows_of_points, name_of, rows_of_points
 from karamelo_py.kernels.arrays import Nodes, Points, Tiling, arrays_of
 from karamelo_py.kernels.totals import WORK, carry
-from karamelo_py.run.boxes import numbers, used
-from karamelo_py.run.tiles import in_use
+from karamelo_py.output.fields import PIECE
+from karamelo_py.run.boxes import between, numbers, used
+from karamelo_py.run.mpi.pack import by_tile, join_tilings, share_of_tiling, stripped
+from karamelo_py.run.mpi.partition import work_of
+from karamelo_py.run.tiles import SHARES, Tiles, in_use
 from karamelo_py.script.errors import ScriptError
 
 # What else a simulation knows of its state; `measured` comes before what depends on its version.
 SHOWN = ("measured", "mapped", "followed", "told_of_growth")
+
+ALL_HAVE = ("clock", "work", "values")
 
 # Name and shape of an array, where in it something belongs, and that.
 Stored = tuple[str, tuple[int, ...], Any, np.ndarray]
@@ -24,8 +30,11 @@ Stored = tuple[str, tuple[int, ...], Any, np.ndarray]
 def changing(simulation: Any) -> Iterator[tuple[str, np.ndarray]]:
     """Yield every array that a step changes and the next one needs, as far as it is in use."""
     s = simulation.setup
-    for name, array, rows in simulation.tiles.in_use(s):
-        yield name, array[:rows]
+    for k, block in enumerate(s.blocks):
+        for name, rows in in_use(block.tiling):
+            yield f"tiling/{k}/{name}", getattr(block.tiling, name)[:rows]
+    if simulation.subdomain is not None:
+        yield "owner", simulation.tiles.owner
     yield "clock", s.control.clock
     yield "work", s.control.totals[WORK]
     for k, block in enumerate(s.blocks):
@@ -65,13 +74,20 @@ def touched(simulation: Any) -> dict[str, np.ndarray]:
     return {"touched/nodes": numbers(spans)[there], "touched/rows": rows[there]}
 
 
-def stored(simulation: Any) -> Iterator[Stored]:
-    """Yield what a file to go on from holds: the state, what is known of it, nodes as they are."""
-    yield from in_file(dict(changing(simulation)) | touched(simulation))
-    s = simulation.setup
-    nodes = numbers(s.spans)
-    # Of zeros without a sign: which nodes beside a body are visited depends on who has its tiles.
-    yield from wholes(known(simulation) | {name: array[nodes] + 0 for name, array in of_nodes(s)})
+def stored(simulation: Any, kept: dict[str, np.ndarray] | None = None) -> Iterator[Stored]:
+    """Yield what a file to go on from holds of the present state, or of the one that is `kept`.
+
+    All processes go through this together; the first gets the arrays, with the bits and in the
+    order of one process.
+    """
+    s, comm, tiles = simulation.setup, simulation.comm, simulation.tiles
+    own = kept or dict(changing(simulation)) | touched(simulation)
+    yield from in_file(own) if comm.size == 1 else _joined(simulation, own)
+    if kept:
+        return
+    yield from wholes(known(simulation))
+    reached = comm.gather(tiles.reached_by(s))
+    yield from _nodes(simulation, comm.bcast(reached and tiles.spans_of_all(reached)))
 
 
 def in_file(state: dict[str, np.ndarray]) -> Iterator[Stored]:
@@ -150,8 +166,6 @@ def reading() -> Iterator[None]:
 def restore(simulation: Any, state: Mapping[str, Any]) -> None:
     """Put the arrays of a simulation into a state, as `copied` or a file has it."""
     s = simulation.setup
-    for k, block in enumerate(s.blocks):
-        check_points(block.points, state, f"points/{k}/")
     # Nodes that were not in use then have to be empty, as they were.
     simulation.tiles.empty_nodes(s)
     blocks = []
@@ -176,20 +190,47 @@ def restore(simulation: Any, state: Mapping[str, Any]) -> None:
         memory[memory != 0] = 0
         if "touched/nodes" in state:  # a process that has no points has no nodes in use, either
             memory[state["touched/nodes"][()]] = state["touched/rows"]
+    simulation.version += 1
 
 
-def take_known(simulation: Any, state: Mapping[str, Any]) -> None:
-    """Take what all processes know."""
-    simulation.present[:] = _checked(state, "present", simulation.present)
-    for name, known in zip(SHOWN, _checked(state, "shown", np.ones(len(SHOWN), bool)), strict=True):
-        setattr(simulation, name, bool(known))
+def take_snapshot(simulation: Any, path: Path) -> dict[str, np.ndarray]:
+    """Read the snapshot that a file holds; each process reads its own share."""
+    with opened(path, "good") as found:
+        if simulation.subdomain is not None:
+            return own_share(simulation, found)
+        # In the order in which copies are made, and written.
+        names = [*(name for name, _ in changing(simulation)), "values", *found]
+        return {name: found[name][()] for name in dict.fromkeys(names)}
 
 
-def take_nodes(simulation: Any, state: Mapping[str, Any]) -> None:
-    """Let the nodes in use show what they did."""
-    nodes = numbers(simulation.setup.spans)
-    for name, array in of_nodes(simulation.setup):
-        array[nodes] = _checked(state, name, array[nodes])
+def take_stored(simulation: Any, path: Path) -> None:
+    """Take the state that a file to go on from holds; each process reads its own share."""
+    with opened(path) as state, simulation.comm.joint():
+        # Nothing of the arrays changes where the file is of another scene.
+        for k, block in enumerate(simulation.setup.blocks):
+            check_points(block.points, state, f"points/{k}/")
+        shared = simulation.subdomain is not None
+        restore(simulation, own_share(simulation, state) if shared else state)
+        simulation.present[:] = _checked(state, "present", simulation.present)
+        for name, of in zip(
+            SHOWN, _checked(state, "shown", np.ones(len(SHOWN), bool)), strict=True
+        ):
+            setattr(simulation, name, bool(of))
+        _take_nodes(simulation, state)
+
+
+def _take_nodes(simulation: Any, state: Mapping[str, Any]) -> None:
+    """Let the nodes in use here show what they did; all processes come to it."""
+    s, tiles = simulation.setup, simulation.tiles
+    spans = tiles.spans_of_all(simulation.comm.allgather(tiles.reached_by(s)))
+    total, used = int(np.diff(spans).sum()), np.zeros(simulation.hub.fields.node_count, np.bool_)
+    used[numbers(s.spans)] = True
+    for name, array in of_nodes(s):
+        like = np.broadcast_to(array[:1], (total, *array.shape[1:]))
+        _checked(state, name, like, read=False)
+        for own, nodes in _pieces(spans):
+            here = used[nodes]
+            array[nodes[here]] = state[name][own][here]
 
 
 def of_nodes(s: Any) -> Iterator[tuple[str, np.ndarray]]:
@@ -252,11 +293,11 @@ def remembered_at(simulation: Any, spans: np.ndarray) -> list[np.ndarray]:
     return method.remembered(simulation.setup.contact, spans)
 
 
-def _checked(found: Mapping[str, Any], name: str, like: np.ndarray) -> np.ndarray:
+def _checked(found: Mapping[str, Any], name: str, like: np.ndarray, *, read: bool = True) -> Any:
     there = found.get(name)
     if there is None or there.shape != like.shape or there.dtype != like.dtype:
         raise _misfit(name)
-    return there[()]
+    return there[()] if read else None
 
 
 def _misfit(what: str) -> ScriptError:
@@ -264,3 +305,145 @@ def _misfit(what: str) -> ScriptError:
         f"its state is not one of this scene: {what}",
         expected="a file that the same scene has written: the same solids, materials and method",
     )
+
+
+# --- of several processes -------------------------------------------------------------------------
+
+
+def _joined(simulation: Any, own: dict[str, np.ndarray]) -> Iterator[Stored]:
+    """Yield a state of which each process has its `own` part, so many points at a time."""
+    s, comm = simulation.setup, simulation.comm
+    parts = comm.gather(
+        {
+            "tiling": [stripped(own, f"tiling/{k}/") for k in range(len(s.blocks))],
+            "work": own["work"].copy(),
+            "touched": stripped(own, "touched/"),
+        }
+    )
+    tilings, rows = (
+        [Tiles.empty_tiling(simulation.tiles) for _ in s.blocks],
+        {},
+    )  # as of one process
+    for k, tiling in enumerate(tilings if parts is not None else ()):
+        tiling.count[1] = 1 if simulation.tiles.direct else SHARES
+        join_tilings(tiling, [part["tiling"][k] for part in parts])
+        rows |= {f"tiling/{k}/{name}": getattr(tiling, name)[:n] for name, n in in_use(tiling)}
+    if parts is not None:
+        work = sum(part["work"] for part in parts)
+        yield from in_file(rows | {"clock": own["clock"], "work": work})
+    for k, tiling in enumerate(tilings):
+        yield from _points(simulation, k, tiling, own)
+    if "values" in own:
+        yield from wholes({"values": own["values"]})
+    if found := [part["touched"] for part in parts or () if part["touched"]]:
+        nodes, first = np.unique(np.concatenate([of["nodes"] for of in found]), True)
+        rows = np.concatenate([of["rows"] for of in found])[first]
+        yield from wholes({"touched/nodes": nodes, "touched/rows": rows})
+
+
+def points_of_tiles(
+    tiling: dict[str, np.ndarray], arrays: list[np.ndarray], first: int, end: int
+) -> dict[str, Any]:
+    """Own points in tiles with numbers from `first` to before `end`, and how they lie in them."""
+    own = slice(*np.searchsorted(tiling["number"], (first, end)))
+    ranges = tiling["range"][own]
+    points = slice(ranges[0, 0], ranges[-1, 1]) if len(ranges) else slice(0, 0)
+    return {
+        "number": tiling["number"][own], "range": ranges, "count": [len(ranges)],
+        "points": [array[..., points] for array in arrays],
+    }  # fmt: skip
+
+
+def _points(
+    simulation: Any, k: int, tiling: Tiling, own: dict[str, np.ndarray]
+) -> Iterator[Stored]:
+    """Yield the points of a block, tile after tile."""
+    comm = simulation.comm
+    number, ends = (array[: tiling.count[0]] for array in (tiling.number, tiling.range[:, 1]))
+    total = int(ends[-1]) if len(ends) else 0
+    limits = [
+        (int(number[first]), int(number[end - 1]) + 1) if total else None
+        for first, end in _cuts(ends)
+    ]
+    names = [name for name, _ in arrays_of(simulation.setup.blocks[k].points)]
+    arrays = [own[f"points/{k}/{name}"] for name in names]
+    begin = 0
+    for of_piece in comm.bcast(limits):
+        if of_piece is not None:
+            found = comm.gather(points_of_tiles(stripped(own, f"tiling/{k}/"), arrays, *of_piece))
+        else:  # not sorted yet: each has those of an equal share of the ids
+            found = comm.gather({"points": arrays})
+        if found is None:
+            continue
+        total = total or sum(part["points"][0].shape[-1] for part in found)
+        order = np.arange(total) if of_piece is None else by_tile(found)
+        for name, *same in zip(names, *(part["points"] for part in found), strict=True):
+            array = np.take(np.concatenate(same, axis=-1), order, axis=-1)
+            where = ..., slice(begin, begin + len(order))
+            yield f"points/{k}/{name}", (*array.shape[:-1], total), where, array
+        begin += len(order)
+
+
+def _nodes(simulation: Any, spans: np.ndarray) -> Iterator[Stored]:
+    """Yield rows of the arrays of nodes, of nodes in use."""
+    kinds, counted = dict(of_nodes(simulation.setup)), simulation.counted()
+    total = int((spans[:, 1] - spans[:, 0]).sum())
+    for own, nodes in _pieces(spans):
+        limits = (int(nodes[0]), int(nodes[-1]) + 1) if len(nodes) else (0, 0)
+        here = counted[slice(*np.searchsorted(counted, limits))]
+        found = simulation.comm.gather((here, [array[here] for array in kinds.values()]))
+        if found is None:
+            continue
+        rows = {n: np.zeros((len(nodes), *a.shape[1:]), a.dtype) for n, a in kinds.items()}
+        for there, some in found:
+            for array, of in zip(rows.values(), some, strict=True):
+                array[np.searchsorted(nodes, there)] = of
+        for name, array in rows.items():
+            yield name, (total, *array.shape[1:]), own, array + 0
+
+
+def _cuts(ends: np.ndarray) -> Iterator[tuple[int, int]]:
+    """From where to where what ends there has some `PIECE` rows."""
+    total = int(ends[-1]) if len(ends) else 0
+    cuts = np.searchsorted(ends, np.arange(PIECE, total, PIECE), side="right")
+    return pairwise([*np.unique([0, *cuts]).tolist(), len(ends)])
+
+
+def _pieces(spans: np.ndarray) -> Iterator[tuple[slice, np.ndarray]]:
+    """Nodes in spans, so many at a time: which of all, and their numbers."""
+    begin = 0
+    for first, end in _cuts(np.cumsum(spans[:, 1] - spans[:, 0])):
+        nodes = between(*spans[first:end].T)
+        yield slice(begin, begin + len(nodes)), nodes
+        begin += len(nodes)
+
+
+def own_share(simulation: Any, state: Mapping) -> dict[str, np.ndarray]:
+    """Read the state in a file as far as it is of this process, of tiles that are cut for it."""
+    blocks, comm, tiles = simulation.setup.blocks, simulation.comm, simulation.tiles
+    tilings = [take_tiling(tiles.empty_tiling(), state, f"tiling/{k}/") for k in range(len(blocks))]
+    whole = [b._replace(tiling=of) for b, of in zip(blocks, tilings, strict=True)]
+    before = tiles.owner
+    tiles.share_out(work_of(tiles.loads(whole), simulation.subdomain.load.costs))
+    owner, tiles.owner = tiles.owner, before
+    found = {n: state[n][()] for n in state if n in ALL_HAVE or n.startswith("touched/")}
+    if not comm.leads:
+        found["work"] = np.zeros_like(found["work"])
+    for k, tiling in enumerate(tilings):
+        points, of_tiles = share_of_tiling(k, tiling, owner == comm.rank)
+        if not tiling.count[0]:  # not sorted yet: an equal share
+            count = state[f"points/{k}/id"].size
+            points = np.arange(count * comm.rank // comm.size, count * (comm.rank + 1) // comm.size)
+        names = [f"points/{k}/{name}" for name, _ in arrays_of(blocks[k].points)]
+        found |= of_tiles | {name: _chosen(state[name], points) for name in names}
+    return found | {"owner": owner}
+
+
+def _chosen(array: Any, points: np.ndarray) -> np.ndarray:
+    """Some points (ascending) of an array in a file, of which so many are read at a time."""
+    found = rows_of_points((*array.shape[:-1], len(points)), array.dtype)
+    for begin in range(0, array.shape[-1], PIECE):
+        own = slice(*np.searchsorted(points, (begin, begin + PIECE)))
+        if own.start < own.stop:
+            found[..., own] = array[..., begin : begin + PIECE][..., points[own] - begin]
+    return found

@@ -18,7 +18,7 @@ from karamelo_py import __version__
 from karamelo_py.language.replay import Record, Replay
 from karamelo_py.output.files import whole
 from karamelo_py.output.rhythm import ByTime, Rhythmic
-from karamelo_py.run.checkpoint.arrays import Stored, reading
+from karamelo_py.run.checkpoint.arrays import Stored, reading, stored, take_snapshot, take_stored
 from karamelo_py.run.checkpoint.parts import PartStates, RollbackPoint, for_json, parts_of
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
@@ -62,10 +62,10 @@ def write(hub: Hub, file: Path, *, within: bool) -> Path:
     if comm.leads:
         _write(hub, path, within)
     else:
-        for _ in simulation.stored():
+        for _ in stored(simulation):
             pass
         if point := _good(hub):
-            for _ in simulation.stored_snapshot(point.arrays):
+            for _ in stored(simulation, point.arrays):
                 pass
     comm.barrier()
     return path
@@ -109,9 +109,9 @@ def _write(hub: Hub, path: Path, within: bool) -> None:
         for name, one in states.items():
             for k, array in enumerate(one.arrays):
                 root.create_dataset(f"{name}/{k}", data=array, **FLAT)
-        _put(root.create_group("state"), hub.simulation.stored())
+        _put(root.create_group("state"), stored(hub.simulation))
         if point:
-            _put(root.create_group("good"), hub.simulation.stored_snapshot(point.arrays))
+            _put(root.create_group("good"), stored(hub.simulation, point.arrays))
 
 
 def _put(group: Any, found: Iterator[Stored]) -> None:
@@ -198,7 +198,7 @@ class Restart:
         check(hub, self)
         simulation, content = hub.simulation, self.content
         try:
-            simulation.take_stored(self.path)
+            take_stored(simulation, self.path)
             states = self._parts("parts", content["values"])
         except ScriptError as error:
             error.message = f"{self.path}: {error.message}"
@@ -210,7 +210,9 @@ class Restart:
         run = hub.running.rollback
         run.halvings, run.returns, good = content["run"]
         if run.halve and good is not None:
-            run.point.take(simulation.take_snapshot(self.path), good, self._parts("good parts", {}))
+            run.point.take(
+                take_snapshot(simulation, self.path), good, self._parts("good parts", {})
+            )
 
     def _parts(self, name: str, values: dict[str, float]) -> PartStates:
         import h5py

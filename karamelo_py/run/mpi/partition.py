@@ -352,16 +352,12 @@ class SharedTiles(Tiles):
         self.foreign[self._marked] = 1
 
     def reached_by(self, s: Setup) -> tuple[np.ndarray, ...]:
-        """Of the nodes in use here what `spans_of_all` asks for."""
-        return (s.spans[1 : 1 + s.spans[0, 0]],) if self.direct else self.reached
+        return super().reached_by(s) if self.direct else self.reached
 
     def spans_of_all(self, reached: Iterable[tuple[np.ndarray, ...]]) -> np.ndarray:
-        """(k, 2) spans of the nodes in use, from what all processes reach.
-
-        Where points give straight to the nodes one process has them all.
-        """
-        found = [np.concatenate(of) for of in zip(*reached, strict=True)]
-        return found[0] if self.direct else self.spans_of(*found)
+        if self.direct:
+            return super().spans_of_all(reached)
+        return self.spans_of(*(np.concatenate(of) for of in zip(*reached, strict=True)))
 
     def give(self, s: Setup, number: int, what: int) -> None:
         """Begin to pass on what the own tiles give to nodes of others, and theirs to own ones."""
