@@ -31,8 +31,8 @@ class ById:
     comm = SerialComm()
     setup: Setup
     control: Control
-    count: int
-    present: np.ndarray
+    count: int  # of the points there have ever been
+    present: np.ndarray  # (count,) False for points that were deleted
 
     @property
     def kin(self) -> NamedTuple:
@@ -44,14 +44,9 @@ class ById:
         """The number of the present of the two position arrays."""
         return int(self.control.clock[0].now)
 
-    @property
-    def blocks(self) -> tuple[Block, ...]:
-        """The kinds of points, with those that are at hand."""
-        return self.setup.blocks
-
     def rows(self) -> Rows:
         """Return all points, in the order of their ids, for a table."""
-        parts = [Part(block, None, block.points.id) for block in self.blocks]
+        parts = [Part(block, None, block.points.id) for block in self.setup.blocks]
         comm = self.comm if self.comm.size > 1 else None
         return Rows(self.setup, parts, np.arange(self.count), self.present, comm)
 
@@ -99,7 +94,7 @@ class ById:
         """Yield the points of a group that are at hand, so many at a time, and at last none."""
         for block, rows in self.rows_of(group):
             yield self._some(block, rows)
-        yield self._some(self.blocks[0], np.empty(0, np.int64))
+        yield self._some(self.setup.blocks[0], np.empty(0, np.int64))
 
     def _some(self, block: Block, rows: np.ndarray) -> PointTable:
         parts, ids = [Part(block, rows, slice(None))], block.points.id[rows]
@@ -135,13 +130,9 @@ class ById:
 
     def each(self, part: Any, name: str, *arguments: Any) -> list:
         """Collect the answers of a part's method for some points of its group after others."""
-        own = list(self._said(part, name, *arguments))
+        found = (getattr(part, name)(some, *arguments) for some in self.some(part.group))
+        own = [one for one in found if one is not None]
         return [one for of_rank in self.comm.allgather(own) for one in of_rank]
-
-    def _said(self, part: Any, name: str, *arguments: Any) -> Iterator[Any]:
-        say = getattr(part, name)
-        found = (say(some, *arguments) for some in self.some(part.group))
-        return (one for one in found if one is not None)
 
     def seen(self, say: Callable, *arguments: Any) -> list:
         """Gather a function's answer for the points of each process."""
@@ -169,38 +160,20 @@ class ById:
         found = self.comm.gather(thing)
         return self.comm.scatter(None if found is None else make(found))
 
-    def counts(self) -> list[int]:
-        """Count the points of each block."""
-        own = [len(block.points.id) for block in self.setup.blocks]
-        return self.comm.allreduce(np.array(own)).tolist()
-
-    def of_all(self, numbers: np.ndarray) -> np.ndarray:
-        """Sums over all processes that have some of the points."""
-        return self.comm.allreduce(numbers)
-
-    def most(self, numbers: np.ndarray) -> np.ndarray:
-        """The largest of each number of all processes."""
-        return self.comm.allreduce_max(numbers)
-
     @cached_property
     def x0(self) -> np.ndarray:
         """(N, d) positions before the first step."""
-        return places_before(self.hub, np.arange(self.count))
+        return self.x0_of(np.arange(self.count))
 
     def x0_of(self, ids: np.ndarray) -> np.ndarray:
         """Return (n, d) positions of some points before the first step."""
         return places_before(self.hub, ids)
 
-    def ranges(self) -> Iterator[tuple[int, int]]:
-        """The ids of pieces, from and to, one after another."""
-        for first in range(0, self.count, PIECE):
-            yield first, min(first + PIECE, self.count)
-
     def pieces(self, *, to_first: bool = False) -> Iterator[PointTable]:
         """Yield all points, so many at a time; `to_first`, to the first of several processes."""
         s, ordered = self.setup, list(map(Ordered, self.setup.blocks))
         gather = self.comm.gather if to_first else self.comm.allgather
-        for first, end in self.ranges():
+        for first, end in _ranges(self.count):
             blocks = [one.between(first, end) for one in ordered]
             if self.comm.size > 1:
                 own = [[array for _, array in arrays_of(block.points)] for block in blocks]
@@ -240,60 +213,54 @@ class Ordered:
         return some_of(self.block, self._order[slice(*np.searchsorted(self._ids, (first, end)))])
 
 
+def _ranges(count: int) -> Iterator[tuple[int, int]]:
+    """The numbers of pieces of so many, from and to before, one after another."""
+    return ((first, min(first + PIECE, count)) for first in range(0, count, PIECE))
+
+
 class ByNumber:
     """The nodes of a scene."""
 
     setup: Setup
 
     def node_pieces(self, names: Iterable[str], *, to_first: bool = False) -> Iterator[NodeRows]:
-        """All nodes, so many at a time, with the sums over points that have these names."""
+        """All nodes, so many at a time, with the sums over points of these names; see `pieces`."""
         self.show_on_nodes()
-        self.bring(names)
+        sums = {name: brought(self, name) for name in names}
+        weights = loaded(self.hub, self) if sums else {}
         gather = self.comm.gather if to_first else self.comm.allgather
-        for first, end in self.node_ranges():
+        for first, end in _ranges(self.hub.fields.node_count):
             if self.comm.size == 1:
                 arrays = {name: array[first:end] for name, array in of_nodes(self.setup)}
-                sums = {name: of[first:end] for name, of in self._brought.items()}
+                own = {name: of[first:end] for name, of in sums.items()}
             else:
-                parts = gather(self._rows_between(first, end))
+                parts = gather(self._rows_between(first, end, sums))
                 if parts is None:
                     continue
-                arrays, sums = self._joined(first, end, parts)
-            sums = {name: of.sum(axis=1) for name, of in sums.items()}
-            yield NodeRows(first, end, self.kin, arrays, sums, self._loaded)
-        self.bring(())
+                arrays, own = self._joined(first, end, parts, sums)
+            own = {name: of.sum(axis=1) for name, of in own.items()}
+            yield NodeRows(first, end, self.kin, arrays, own, weights)
 
-    def _rows_between(self, first: int, end: int) -> tuple:
+    def _rows_between(self, first: int, end: int, sums: dict) -> tuple:
         """The nodes from `first` to before `end`: what of them others do not show, and sums."""
         own, used = (
             nodes[slice(*np.searchsorted(nodes, (first, end)))]
             for nodes in (self.counted(), numbers(self.setup.spans))
         )
         rows = [array[own] for _, array in of_nodes(self.setup)]
-        return own, rows, used, {name: of[used] for name, of in self._brought.items()}
+        return own, rows, used, {name: of[used] for name, of in sums.items()}
 
-    def _joined(self, first: int, end: int, parts: list[tuple]) -> tuple[dict, dict]:
+    def _joined(self, first: int, end: int, parts: list[tuple], names: Iterable[str]) -> tuple:
         """The same of all nodes from those of all processes."""
         kinds = of_nodes(self.setup)
         arrays = {n: np.zeros((end - first, *a.shape[1:]), a.dtype) for n, a in kinds}
-        sums = {name: np.zeros((end - first, 2)) for name in self._brought}
+        sums = {name: np.zeros((end - first, 2)) for name in names}
         for own, rows, used, given in parts:
             for array, found in zip(arrays.values(), rows, strict=True):
                 array[own - first] = found
             for name, of in given.items():
                 sums[name][used - first] += of
         return arrays, sums
-
-    def bring(self, names: Iterable[str]) -> None:
-        """Keep the sums over the points at hand that have these names."""
-        self._brought = {name: brought(self, name) for name in names}
-        self._loaded = loaded(self.hub, self) if self._brought else {}
-
-    def node_ranges(self) -> Iterator[tuple[int, int]]:
-        """The numbers of pieces, from and to, one after another."""
-        count = self.hub.fields.node_count
-        for first in range(0, count, PIECE):
-            yield first, min(first + PIECE, count)
 
     def counted(self) -> np.ndarray:
         """The numbers of the nodes in use, of each at one process."""

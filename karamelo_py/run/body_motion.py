@@ -102,7 +102,8 @@ def motions(simulation: Any) -> list[BodyMotion]:
         for row, values in enumerate(terms):
             add_all(limbs[k], row, values)
         ends[k] = np.maximum(ends[k], np.concatenate([xv.max(axis=1), -xv.min(axis=1)]))
-    limbs, ends = simulation.of_all(limbs), simulation.most(ends)
+    comm = simulation.comm
+    limbs, ends = comm.allreduce(limbs), comm.allreduce_max(ends)
     found = []
     for k, (own, end) in enumerate(zip(limbs, ends, strict=True)):
         mass, *sums = map(rounded, own)

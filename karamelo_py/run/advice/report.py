@@ -89,8 +89,10 @@ def _size(count: float) -> str:
 
 def bytes_per_point(simulation: Simulation) -> int:
     """Bytes of all fields of a point, the mean over the points of all kinds."""
-    counts = simulation.counts()
-    of_one = [sum(size for *_, size in point_fields(block)) for block in simulation.blocks]
+    blocks = simulation.setup.blocks
+    own = np.array([len(block.points.id) for block in blocks])
+    counts = simulation.comm.allreduce(own).tolist()
+    of_one = [sum(size for *_, size in point_fields(block)) for block in blocks]
     return round(np.dot(counts, of_one) / max(1, sum(counts)))
 
 
