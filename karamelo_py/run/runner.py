@@ -23,6 +23,7 @@ from karamelo_py.run.lower.build import check_scene
 from karamelo_py.run.mpi.comm import check_same_run, handled_signals
 from karamelo_py.run.recovery import CHUNK, RollBack
 from karamelo_py.run.simulation import Simulation
+from karamelo_py.run.tiles import DIRECT_UP_TO
 from karamelo_py.run.timestep import ruling_limit, words_of_own_step, words_of_share
 from karamelo_py.scene import boundary
 from karamelo_py.scene.hub import Hub
@@ -167,6 +168,14 @@ def _pass_over(hub: Hub) -> None:
         if name in hub.values:
             hub.values.set(name, value)
     hub.runs.append(after)
+
+
+def _processes(simulation: Simulation) -> dict[str, str]:
+    """Words of a banner for the processes that share the scene."""
+    if simulation.comm.size == 1:
+        return {}
+    alone = f", one has all points: up to {DIRECT_UP_TO} are not shared out"
+    return {"processes": f"{simulation.comm.size}{alone if simulation.tiles.direct else ''}"}
 
 
 class ChunkLength:
@@ -429,7 +438,7 @@ class Runner:
                 **({"own dt": own} if own else {}),
                 "limited by": f"{ruling_limit(simulation)}; {words_of_share(hub)}",
                 **({"energy": energy.not_watched(why)} if why else {}),
-                **simulation.processes,
+                **_processes(simulation),
                 "threads": simulation.threads,
                 "precision": hub.settings.precision,
                 **({"units": str(hub.output.units)} if hub.output.units else {}),

@@ -80,14 +80,10 @@ class SceneArrays(ById, ByNumber):
         self.subdomain = Subdomain(self) if comm.size > 1 else None
         self.control = self.setup.control
         self.version = 0  # grows when fields change without a step
-        self._measured = -1  # the version whose fastest point is known
-        self._watched = -1  # the version whose balance of energy is followed
+        self.measured = False  # whether the rate of the fastest point is that of the present state
+        self.followed = False  # whether the clock knows the balance of energy up to it
+        self.told_of_growth = False  # since the balance of energy is followed
         self.mapped = False  # whether the nodes show a state of this simulation
-
-    @property
-    def contact(self) -> Any:
-        """Return how solids touch."""
-        return self.setup.contact
 
     def fits(self, hub: Hub) -> bool:
         """Tell whether the arrays are still those of the scene."""
@@ -166,28 +162,14 @@ class SceneArrays(ById, ByNumber):
         )
         self.setup = self.setup._replace(blocks=blocks)
         self.control.clock[0].drift = np.inf
-        self.version += 1
+        self.changed()
         # The rate of the last step stays: the same whether or not a run begins here.
-        self._measured = self.version
+        self.measured = True
 
-    @property
-    def measured(self) -> bool:
-        """Tell whether the rate of the fastest point is that of the present state."""
-        return self._measured == self.version
-
-    @measured.setter
-    def measured(self, known: bool) -> None:
+    def changed(self) -> None:
+        """Take note that fields have changed without a step."""
         self.version += 1
-        self._measured = self.version if known else -1
-
-    @property
-    def followed(self) -> bool:
-        """Tell whether the clock knows the balance of energy up to the present state."""
-        return self._watched == self.version
-
-    @followed.setter
-    def followed(self, known: bool) -> None:
-        self._watched = self.version if known else -1
+        self.measured = self.followed = False
 
     @property
     def bounces(self) -> int:

@@ -16,12 +16,11 @@ from karamelo_py.kernels.hooks import POINT_STAGES
 from karamelo_py.kernels.step import DONE, SORT, Fused, Staged, advance, measure, run_steps
 from karamelo_py.kernels.totals import agree_on_heat
 from karamelo_py.kernels.watch import COARSE, ROUND_OFF, begin_to_look, measure_heat, sum_energies
-from karamelo_py.run.body_motion import BodyMotion, motions
 from karamelo_py.run.diagnosis.energy import unknown_heat, unknown_work
 from karamelo_py.run.lower.hooks import PythonHooks, sets_initial_state, views_of
 from karamelo_py.run.mpi.whole import PointsMoved, Whole
 from karamelo_py.run.scene_arrays import SceneArrays
-from karamelo_py.run.tiles import DIRECT_UP_TO, in_tiles
+from karamelo_py.run.tiles import in_tiles
 from karamelo_py.run.timestep import (
     common_velocity,
     moves_already,
@@ -41,22 +40,13 @@ class Simulation(SceneArrays):
         super().__init__(hub, previous)
         # Fixes of the first step that have acted: not again when the scene is lowered anew.
         self._begun: set[Any] = set(previous._begun) if previous else set()
-        self.staged = False
+        self.visits: Staged | Fused = Fused()
         self.hooks: Hooks | NoHooks = NoHooks()
         self._first: PythonHooks | None = None
         self._first_fixes: list = []
         self.beginning: list = []  # fixes of the first step that act in this run
-        self.told_of_growth = False  # since the balance of energy is followed
 
     taken_up = False  # a step goes on whose first moment has been, with other arrays
-
-    @property
-    def processes(self) -> dict[str, str]:
-        """Words of a banner for the processes that share the scene."""
-        if self.comm.size == 1:
-            return {}
-        alone = f", one has all points: up to {DIRECT_UP_TO} are not shared out"
-        return {"processes": f"{self.comm.size}{alone if self.tiles.direct else ''}"}
 
     @cached_property
     def _whole(self) -> Whole:
@@ -146,20 +136,20 @@ class Simulation(SceneArrays):
             clock[name] = number
         weight = weight_of_drift(self.hub)
         if weight != clock.weight:
-            clock.weight, self._measured = weight, -1
+            clock.weight, self.measured = weight, False
         return numbers != before
 
     def _choose_dt(self) -> None:
-        if self._measured != self.version:
+        if not self.measured:
             # Otherwise the last step has measured, and a run in pieces takes the steps of a whole.
             clock = self.control.clock[0]
             clock.common[:] = common_velocity(self, float(clock.weight))
-            self.measure()
+            self._measure()
             clock.wave = clock.speed = 0.0
             if clock.weight != 1:
                 clock.wave = clock.rate - self.fastest(clock.common[0])
                 clock.speed = self.fastest() / clock.spacing
-            self._measured = self.version
+            self.measured = True
         choose_dt(self.control)
 
     def rate_with(self, weight: float) -> float:
@@ -167,12 +157,12 @@ class Simulation(SceneArrays):
         clock = self.control.clock[0]
         common, rate = clock.common.copy(), float(clock.rate)
         clock.common[:] = common_velocity(self, weight)
-        self.measure()
+        self._measure()
         found = float(clock.rate)
         clock.common[:], clock.rate = common, rate
         return found
 
-    def measure(self) -> None:
+    def _measure(self) -> None:
         """Measure the rate of the fastest point."""
         measure(self.setup)
         clock = self.control.clock[0]
@@ -185,10 +175,6 @@ class Simulation(SceneArrays):
         components = ((a, c) for v in velocities if v.size for a, c in zip(v, common, strict=False))
         own = max((max(a.max() - c, c - a.min()) for a, c in components), default=0.0)
         return float(self.comm.allreduce_max(np.array([own], float))[0])
-
-    def motions(self) -> list[BodyMotion]:
-        """Measure how the solids lie and move."""
-        return motions(self)
 
     @property
     def limit(self) -> float:
@@ -229,16 +215,16 @@ class Simulation(SceneArrays):
         if clock.watch_energy:
             # Velocities belong to half a step before, stresses to the share strained before.
             level = 0.25 + 0.5 * getattr(self.hub.update.scheme, "strained_before", 0.0)
-            self.begin_to_look(level, anew)
+            self._begin_to_look(level, anew)
         clock.watch_heat = int(self.hub.update.thermal and not unknown_heat(self.hub))
         if clock.watch_heat and anew:
-            self.measure_heat()
+            measure_heat(self.setup)
+            agree_on_heat(self.control.ranks, self.control)
             clock.coldest, clock.hottest = clock.T_low, clock.T_high
 
-    def begin_to_look(self, level: float, anew: bool) -> None:
+    def _begin_to_look(self, level: float, anew: bool) -> None:
         """Measure the energies of all points, which the watch over them starts from."""
-        s = self.setup
-        clock = s.control.clock[0]
+        s, clock = self.setup, self.control.clock[0]
         strain = COARSE * float(np.finfo(s.nodes.sums.dtype).eps)
         clock.energy_floor = max(ROUND_OFF, strain**2) * self.total("mass") * float(clock.rate) ** 2
         clock.born_with = self.total("born with")
@@ -256,21 +242,14 @@ class Simulation(SceneArrays):
 
     def energy(self) -> float:
         """Kinetic, stored and dissipated energy less the work; NaN where nobody watches it."""
-        s = self.setup
-        clock = s.control.clock
+        clock = self.control.clock
         if self._outside_tiles() or not clock[0].watch_energy:
             return np.nan
         present = clock.copy()
-        sum_energies(s, self.mode)
+        sum_energies(self.setup, self.mode)
         energy = float(clock[0].kinetic + clock[0].stored - clock[0].work)
         clock[:] = present
         return energy
-
-    def measure_heat(self) -> None:
-        """Measure the lowest and highest temperatures of all points."""
-        s = self.setup
-        measure_heat(s)
-        agree_on_heat(s.control.ranks, s.control)
 
     def advance(self, count: int) -> int:
         """Take up to `count` steps (to the end time at most); DONE, or why it stopped.
@@ -291,20 +270,16 @@ class Simulation(SceneArrays):
         control = self.control
         while True:
             self.sort_if_due()
-            status = self._take_steps(target)
-            self.mapped = True
-            ended = self.step >= target or control.values[TIME] >= control.clock[0].end_time
-            if status != SORT:
-                return status
-            if ended:
-                return DONE
-
-    def _take_steps(self, target: int) -> int:
-        while True:
             try:
-                return self._advance(target - self.step)
+                status = self._advance(target - self.step)
             except PointsMoved:
                 self.taken_up = True
+                continue
+            self.mapped = True
+            if status != SORT:
+                return status
+            if self.step >= target or control.values[TIME] >= control.clock[0].end_time:
+                return DONE
 
     def _advance(self, count: int) -> int:
         scheme = self.hub.update.scheme
@@ -318,12 +293,7 @@ class Simulation(SceneArrays):
             return status
         if self._python.by_stage:
             return run_steps(scheme, Staged(), self.mode, self.setup, self._python, count)
-        visits = Staged() if self.staged else Fused()
-        return advance(scheme, visits, self.mode, self.setup, self.hooks, count)
-
-    def waits(self) -> np.ndarray:
-        """Seconds that each process has waited for others in steps so far."""
-        return np.array(self.comm.allgather(self.comm.waited))
+        return advance(scheme, self.visits, self.mode, self.setup, self.hooks, count)
 
     def compile(self) -> None:
         """Have the loop over the steps compiled now: nobody waits for it in the midst of a log.
@@ -332,8 +302,7 @@ class Simulation(SceneArrays):
         """
         if config.DISABLE_JIT or self._python.by_stage:
             return
-        visits = Staged() if self.staged else Fused()
-        arguments = self.hub.update.scheme, visits, self.mode, self.setup, self.hooks, 1
+        arguments = self.hub.update.scheme, self.visits, self.mode, self.setup, self.hooks, 1
         self.comm.in_turn(lambda: advance.compile(*arguments))
 
     def _make_ready(self) -> None:
@@ -341,7 +310,7 @@ class Simulation(SceneArrays):
         if self.threads > 1:
             set_threads(self.threads)
         self._prepare_hooks()
-        self.hub.update.method.begin(self.hub, self.contact)
+        self.hub.update.method.begin(self.hub, self.setup.contact)
 
     def _prepare_hooks(self) -> None:
         """Sort the fixes by how they act: once before the first step, in it, in every step."""
@@ -350,9 +319,10 @@ class Simulation(SceneArrays):
         new = [fix for fix in fixes if fix.first_step_only and fix not in self._begun]
         self._python = PythonHooks(self, lasting)
         self.hooks = self._python.compiled
-        self.staged = bool(self._python.by_stage) or any(
+        staged = self._python.by_stage or any(
             name in POINT_STAGES for fix in lasting for name in fix.hooks()
         )
+        self.visits = Staged() if staged else Fused()
         at_once = [fix for fix in new if sets_initial_state(fix)]
         for fix in at_once:
             # Nothing happens in a step before this hook: the state shows it from the start.
@@ -380,4 +350,4 @@ class Simulation(SceneArrays):
         else:
             self.sort_if_due()  # tiles are gathered, too
             self.act(act, self.setup)
-        self.version += 1
+        self.changed()

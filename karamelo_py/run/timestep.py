@@ -18,6 +18,7 @@ from karamelo_py.points.laws import (
 from karamelo_py.points.laws.eos import taken_heat
 from karamelo_py.points.laws.strengths import shear_modulus
 from karamelo_py.points.transfers import Moment
+from karamelo_py.run.body_motion import motions
 from karamelo_py.scene.hub import Hub
 
 USUAL = 0.9
@@ -147,11 +148,11 @@ def common_velocity(simulation: Any, weight: float) -> np.ndarray:
     """(3,) The velocity that speeds are measured from so that the common drift has this weight."""
     if weight == 1:
         return np.zeros(3)
-    motions = simulation.motions()
-    mass = sum(one.mass for one in motions)
+    bodies = motions(simulation)
+    mass = sum(one.mass for one in bodies)
     common = np.zeros(3)
     if mass > 0:
-        common[: simulation.kin.dimension] = sum(one.mass * one.velocity for one in motions) / mass
+        common[: simulation.kin.dimension] = sum(one.mass * one.velocity for one in bodies) / mass
     return (1 - weight) * common
 
 

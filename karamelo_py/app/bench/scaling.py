@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from math import inf
 from pathlib import Path
 from types import SimpleNamespace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -101,6 +101,11 @@ def grown(script: str, presets: Mapping[str, str], times: int) -> dict[str, str]
     return {name: repr(value / times ** (1 / d))}
 
 
+def _waits(simulation: Any) -> np.ndarray:
+    """Seconds that each process has waited for others in steps so far."""
+    return np.array(simulation.comm.allgather(simulation.comm.waited))
+
+
 def _measured(part: ScalingRun, *, weak: bool = False) -> Scaled:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "found.json"
@@ -137,9 +142,9 @@ def measure(part: ScalingRun, comm: MpiComm | None = None) -> int:
     found = []
     for _ in range(REPETITIONS):
         simulation.restore(start)
-        before, begun = simulation.waits(), time.perf_counter()
+        before, begun = _waits(simulation), time.perf_counter()
         timed_steps(simulation, count)
-        after = simulation.waits()  # all have finished then
+        after = _waits(simulation)  # all have finished then
         taken = time.perf_counter() - begun
         found.append((taken, (after - before) / taken))
     taken, waits = min(found, key=lambda one: one[0])

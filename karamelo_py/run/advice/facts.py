@@ -12,7 +12,7 @@ from karamelo_py.language import registry, rules
 from karamelo_py.output.point_table import PointTable
 from karamelo_py.points.transfers import Moment
 from karamelo_py.run import timestep
-from karamelo_py.run.body_motion import BodyMotion, Noise, drift_of, turn_of
+from karamelo_py.run.body_motion import BodyMotion, Noise, drift_of, motions, turn_of
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.plugins import attributed, foreign_parts
 
@@ -96,7 +96,7 @@ class SceneFacts:
     @cached_property
     def motions(self) -> list[BodyMotion]:
         """Motions of the solids."""
-        return self.simulation.motions()
+        return motions(self.simulation)
 
     @cached_property
     def drift(self) -> Noise | None:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.kernels.step import Fused, Staged, rows_of
+from karamelo_py.kernels.step import Staged, rows_of
 from karamelo_py.kernels.table import says
 from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.plastic_rate import without_rate
@@ -69,7 +69,7 @@ def report(hub: Hub, end_time: float = inf) -> None:
         for line in report_lines(simulation, hub.settings.ranks):
             say(line)
     say("")
-    say(f"stages of a step, {'one by one' if simulation.staged else 'fused'}")
+    say(f"stages of a step, {'one by one' if isinstance(simulation.visits, Staged) else 'fused'}")
     for stage in stages(hub, simulation):
         say(f"  {stage}")
     found = suggestions(hub, simulation)
@@ -108,14 +108,13 @@ def materials(hub: Hub, block: Any) -> list[Material]:
 
 def stages(hub: Hub, simulation: Simulation) -> list[str]:
     """The stages of a step with the fixes that act in them."""
-    visits = Staged if simulation.staged else Fused
     acting: dict[str, list[str]] = {}
     for fix in hub.fixes.values():
         for name in fix.hooks():
             once = " (first step only)" if fix.first_step_only else ""
             acting.setdefault(name, []).append(fix.id + once)
     lines = [f"{name}: {', '.join(ids)}" for name, ids in acting.items()]
-    rows = rows_of(type(hub.update.scheme), visits)
+    rows = rows_of(type(hub.update.scheme), type(simulation.visits))
     first = [text for row in rows if (text := says(row, simulation.setup)) is not None]
     if not lines:
         lines = ["no fix acts between them"]

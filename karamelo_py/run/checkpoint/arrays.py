@@ -18,7 +18,7 @@ from karamelo_py.run.mpi.partition import work_of
 from karamelo_py.run.tiles import SHARES, Tiles, in_use
 from karamelo_py.script.errors import ScriptError
 
-# What else a simulation knows of its state; `measured` comes before what depends on its version.
+# What else a simulation knows of its state.
 SHOWN = ("measured", "mapped", "followed", "told_of_growth")
 
 ALL_HAVE = ("clock", "work", "values")
@@ -190,7 +190,7 @@ def restore(simulation: Any, state: Mapping[str, Any]) -> None:
         memory[memory != 0] = 0
         if "touched/nodes" in state:  # a process that has no points has no nodes in use, either
             memory[state["touched/nodes"][()]] = state["touched/rows"]
-    simulation.version += 1
+    simulation.changed()
 
 
 def take_snapshot(simulation: Any, path: Path) -> dict[str, np.ndarray]:

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.kernels.arrays import NoHooks, Setup, Tiling, arrays_of
-from karamelo_py.kernels.step import Fused, Staged, step
+from karamelo_py.kernels.step import step
 from karamelo_py.kernels.sums import given
 from karamelo_py.kernels.sweep import sum_buffers, sweep_nodes, sweep_points
 from karamelo_py.run.boxes import Boxes, buffers_of, chosen_of, no_nodes, numbers, summed
@@ -87,8 +87,7 @@ def bytes_of_node(simulation: Simulation) -> int:
     s, sums = simulation.setup, _Sums([])
     control = s.control
     kept = control.values.copy(), control.clock.copy(), control.totals.copy()
-    visits = Staged() if simulation.staged else Fused()
-    step(simulation.hub.update.scheme, visits, sums, s, NoHooks(), True)
+    step(simulation.hub.update.scheme, simulation.visits, sums, s, NoHooks(), True)
     control.values[:], control.clock[:], control.totals[:] = kept
     total = 0
     for what, nodes in sums.found:
