@@ -13,8 +13,7 @@ from karamelo_py.kernels.arrays import Nodes, Points, Tiling, arrays_of
 from karamelo_py.kernels.totals import WORK, carry
 from karamelo_py.output.fields import PIECE
 from karamelo_py.run.boxes import between, numbers, used
-from karamelo_py.run.mpi.pack import by_tile, join_tilings, share_of_tiling, stripped
-from karamelo_py.run.mpi.partition import work_of
+from karamelo_py.run.mpi.partition import by_tile, join_tilings, share_of_tiling, stripped, work_of
 from karamelo_py.run.tiles import SHARES, Tiles, in_use
 from karamelo_py.script.errors import ScriptError
 

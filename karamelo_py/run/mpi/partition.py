@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.fields import length_of_rows, rows_of_points
+from karamelo_py.compiler.fields import length_of_rows, rows_of_points, some_points
 from karamelo_py.kernels.arrays import Block, Points, Setup, Tiling, arrays_of, made_of
 from karamelo_py.run.boxes import (
     Boxes,
@@ -64,6 +64,7 @@ IMBALANCE = 1.1  # largest share of the work over that after a new cut: above it
 # Times longer than across, from which on bodies are cut along long tiles: to go through rows of
 # nodes with gaps between them takes twice as long, and longer than to pass on more nodes.
 ROWS = 4
+OF_TILES = ("number", "range", "grid", "box", "rows")  # what a tiling has a row of for each tile
 FINE = 1000  # parts of the unit of costs, in which work is added up as whole numbers
 
 
@@ -444,3 +445,59 @@ def _rows(lo: np.ndarray, hi: np.ndarray, first: np.ndarray, steps: np.ndarray) 
     inner = steps_of(shape)[box]
     places = lo[box] + left[:, None] // inner % shape[box]
     return first[box] + (places * steps[box]).sum(axis=1)
+
+
+def share_of(s: Setup, own: np.ndarray) -> dict[str, np.ndarray]:
+    """Pack the points and tiles of `s` in tiles of which `own` says so, by name."""
+    found = {}
+    for k, block in enumerate(s.blocks):
+        points, tiles = share_of_tiling(k, block.tiling, own)
+        arrays = arrays_of(block.points)
+        found |= tiles | {f"points/{k}/{name}": some_points(of, points) for name, of in arrays}
+    return found
+
+
+def share_of_tiling(
+    k: int, tiling: Tiling, own: np.ndarray
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Find the points in tiles of which `own` says so, and pack these tiles."""
+    which = np.flatnonzero(own[occupied(tiling)[0]])
+    ranges = tiling.range[which]
+    points = between(*ranges.T)
+    rows = {name: getattr(tiling, name)[which] for name in OF_TILES}
+    rows["range"] = one_after_another(ranges)
+    rows["count"] = np.array([len(which), *tiling.count[1:]])
+    rows["share"] = shares_of(rows["range"], int(tiling.count[1]), len(tiling.share))
+    return points, {f"tiling/{k}/{name}": array for name, array in rows.items()}
+
+
+def stripped(found: dict[str, np.ndarray], stem: str) -> dict[str, np.ndarray]:
+    """Choose the arrays whose names begin so, and name them without that."""
+    return {n.removeprefix(stem): array for n, array in found.items() if n.startswith(stem)}
+
+
+def _joint(tilings: list[dict[str, np.ndarray]], name: str) -> np.ndarray:
+    """Join rows of the tiles of all processes, one process after another."""
+    return np.concatenate([part[name][: part["count"][0]] for part in tilings])
+
+
+def by_tile(tilings: list[dict[str, np.ndarray]]) -> np.ndarray:
+    """Find the order of tiles for points that stand one process after another."""
+    ranges = one_after_another(_joint(tilings, "range"))
+    return between(*ranges[np.argsort(_joint(tilings, "number"))].T)
+
+
+def join_tilings(tiling: Tiling, tilings: list[dict[str, np.ndarray]]) -> None:
+    """Join the tiles of all processes, in the order of their numbers."""
+    order = np.argsort(_joint(tilings, "number"))
+    tiling.count[0] = len(order)
+    names = [name for name in (*OF_TILES, "report") if name in tilings[0]]
+    rows = {name: _joint(tilings, name)[order] for name in names}
+    ranges = one_after_another(rows["range"])
+    if "report" in rows:
+        # Points that went wrong keep their place in their tile.
+        wrong = rows["report"][:, 2] > 0
+        rows["report"][wrong, 2] += (ranges - rows["range"])[wrong, 0]
+    for name, array in (rows | {"range": ranges}).items():
+        getattr(tiling, name)[: len(order)] = array
+    tiling.share[:] = shares_of(ranges, int(tiling.count[1]), len(tiling.share))

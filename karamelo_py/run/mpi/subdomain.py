@@ -14,9 +14,19 @@ from karamelo_py.kernels.ranks import Linked
 from karamelo_py.kernels.totals import WORK, rounded
 from karamelo_py.run.boxes import numbers
 from karamelo_py.run.checkpoint.arrays import remembered_at, take_points, take_tiling
-from karamelo_py.run.mpi.pack import by_tile, join_tilings, share_of, stripped
-from karamelo_py.run.mpi.partition import SharedTiles, nodes_of, occupied, work_of
+from karamelo_py.run.mpi.partition import (
+    SharedTiles,
+    by_tile,
+    join_tilings,
+    nodes_of,
+    occupied,
+    share_of,
+    stripped,
+    work_of,
+)
 from karamelo_py.scene.comm import SerialComm
+
+LEARN_EVERY = 100  # steps from output to output, after which it is seen how work is shared
 
 
 class Load:
@@ -65,94 +75,21 @@ class Load:
             self.costs = seconds / done
 
 
-class Callbacks:
-    """Functions that kernels call where they need other processes."""
-
-    at_once = False
-
-    def __init__(self, simulation: Any, load: Load):
-        self.simulation, self.comm, self.load = simulation, simulation.comm, load
-        self.control = simulation.setup.control
-        self.due: set[int] = set()
-        self.address = address_of_python(self.answer, ranks.CALL)
-
-    def answer(self, what: int, a: int, b: int) -> int:
-        """Do what kernels ask for."""
-        try:
-            self.load.note()
-            found = self._answers[what](self, a, b) or 0
-            if what == ranks.NEXT:
-                self.load.next_block()
-            else:
-                self.load.resume(0 if what in {ranks.SWEEP, ranks.GIVE} else None)
-            return found
-        except BaseException as error:
-            # Nothing can be raised through a kernel, and the others wait.
-            self.comm.fail(error)
-            raise
-
-    def _go_on(self, *_: int) -> None:
-        """Take the time alone."""
-
-    def _give(self, number: int, what: int) -> None:
-        self.simulation.tiles.give(self.simulation.setup, number, what)
-
-    def _take(self, *_: int) -> None:
-        self.simulation.tiles.take()
-
-    def _totals(self, first: int, count: int) -> None:
-        rows = slice(first, first + count)
-        if WORK < first < len(self.control.values) and not self.at_once:
-            self.due.update(range(first, first + count))
-            self.control.answer[:count] = self.control.values[rows]
-            return
-        of_all = self.comm.allreduce(self.control.totals[rows])
-        for k in range(count):
-            self.control.answer[k] = rounded(of_all[k])
-
-    def publish(self) -> None:
-        """Add up the values of the last step over all: their totals are kept until the next."""
-        rows, values = sorted(self.due), self.control.values
-        self.due.clear()
-        if rows:
-            for row, total in zip(
-                rows, self.comm.allreduce(self.control.totals[rows]), strict=True
-            ):
-                values[row] = rounded(total)
-            for of, to in getattr(self.simulation.setup.contact, "copies", ()):
-                values[to : to + 3] = values[of : of + 3]
-
-    def _largest(self, count: int, _: int) -> None:
-        self.comm.allreduce_max(self.control.answer[:count])
-
-    def _number(self, number: int, _: int) -> int:
-        return int(self.comm.allreduce(np.array([number]))[0])
-
-    _answers: ClassVar[dict[int, Callable]] = {
-        ranks.SWEEP: _go_on, ranks.NEXT: _go_on, ranks.GIVE: _give, ranks.TAKE: _take,
-        ranks.TOTALS: _totals, ranks.LARGEST: _largest, ranks.NUMBER: _number,
-    }  # fmt: skip
-
-
-def reads_totals(hooks: Any) -> bool:
-    """Tell whether formulas read within steps what fixes publish."""
-    code = getattr(hooks, "code", np.empty((0, 2), np.int64))
-    return bool(((code[:, 0] % UNIFORM == GLOBAL) & (code[:, 1] > DT)).any())
-
-
-LEARN_EVERY = 100  # steps from output to output, after which it is seen how work is shared
-
-
 class Subdomain:
-    """Keep the share of this process in balance with those of others."""
+    """Keeps the share of this process in balance with those of others, and answers kernels.
+
+    Kernels call `answer` where they need other processes (:mod:`karamelo_py.kernels.ranks`).
+    """
 
     def __init__(self, simulation: Any):
         self.simulation, self.comm = simulation, simulation.comm
         self.tiles: SharedTiles = simulation.tiles
         s = simulation.setup
         self.load = Load(len(s.blocks))
-        self.callbacks = Callbacks(simulation, self.load)
-        linked = Linked(self.callbacks.address, self.tiles.foreign)
+        self.control = s.control
+        self.at_once = False  # whether what fixes publish is added up in each step
+        self.due: set[int] = set()  # else which of these values are, when the last is over
+        linked = Linked(address_of_python(self.answer, ranks.CALL), self.tiles.foreign)
         simulation.setup = s._replace(control=s.control._replace(ranks=linked))
         self._counted_at = self._learned_at = int(s.control.values[TIMESTEP])
 
@@ -202,7 +139,7 @@ class Subdomain:
 
     def begin(self, hooks: Any, *, from_python: bool) -> None:
         """Make ready for steps whose work is measured."""
-        self.callbacks.at_once = from_python or reads_totals(hooks)
+        self.at_once = from_python or reads_totals(hooks)
         self.rebalance()
         self._counted_at = self.simulation.step
         self.load.pause()
@@ -210,7 +147,7 @@ class Subdomain:
     def end(self) -> None:
         """Account for the last steps, and publish what their fixes have added up."""
         self.account()
-        self.callbacks.publish()
+        self._publish()
 
     def account(self) -> None:
         """Take note of the steps so far; what comes before the next is not counted."""
@@ -259,3 +196,68 @@ class Subdomain:
             blocks.append(block._replace(points=take_points(block.points, arrays, "")))
         simulation.setup = s._replace(blocks=tuple(blocks))
         tiles.lay_out(simulation.setup)
+
+    # --- what kernels ask for ---------------------------------------------------------------------
+
+    def answer(self, what: int, a: int, b: int) -> int:
+        """Do what kernels ask for."""
+        try:
+            self.load.note()
+            found = self._answers[what](self, a, b) or 0
+            if what == ranks.NEXT:
+                self.load.next_block()
+            else:
+                self.load.resume(0 if what in {ranks.SWEEP, ranks.GIVE} else None)
+            return found
+        except BaseException as error:
+            # Nothing can be raised through a kernel, and the others wait.
+            self.comm.fail(error)
+            raise
+
+    def _go_on(self, *_: int) -> None:
+        """Take the time alone."""
+
+    def _give(self, number: int, what: int) -> None:
+        self.tiles.give(self.simulation.setup, number, what)
+
+    def _take(self, *_: int) -> None:
+        self.tiles.take()
+
+    def _totals(self, first: int, count: int) -> None:
+        rows = slice(first, first + count)
+        if WORK < first < len(self.control.values) and not self.at_once:
+            self.due.update(range(first, first + count))
+            self.control.answer[:count] = self.control.values[rows]
+            return
+        of_all = self.comm.allreduce(self.control.totals[rows])
+        for k in range(count):
+            self.control.answer[k] = rounded(of_all[k])
+
+    def _publish(self) -> None:
+        """Add up the values of the last step over all: their totals are kept until the next."""
+        rows, values = sorted(self.due), self.control.values
+        self.due.clear()
+        if rows:
+            for row, total in zip(
+                rows, self.comm.allreduce(self.control.totals[rows]), strict=True
+            ):
+                values[row] = rounded(total)
+            for of, to in getattr(self.simulation.setup.contact, "copies", ()):
+                values[to : to + 3] = values[of : of + 3]
+
+    def _largest(self, count: int, _: int) -> None:
+        self.comm.allreduce_max(self.control.answer[:count])
+
+    def _number(self, number: int, _: int) -> int:
+        return int(self.comm.allreduce(np.array([number]))[0])
+
+    _answers: ClassVar[dict[int, Callable]] = {
+        ranks.SWEEP: _go_on, ranks.NEXT: _go_on, ranks.GIVE: _give, ranks.TAKE: _take,
+        ranks.TOTALS: _totals, ranks.LARGEST: _largest, ranks.NUMBER: _number,
+    }  # fmt: skip
+
+
+def reads_totals(hooks: Any) -> bool:
+    """Tell whether formulas read within steps what fixes publish."""
+    code = getattr(hooks, "code", np.empty((0, 2), np.int64))
+    return bool(((code[:, 0] % UNIFORM == GLOBAL) & (code[:, 1] > DT)).any())

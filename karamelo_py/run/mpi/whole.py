@@ -13,9 +13,8 @@ from karamelo_py.kernels.totals import WORK
 from karamelo_py.run.boxes import numbers
 from karamelo_py.run.checkpoint.arrays import of_nodes
 from karamelo_py.run.lower.build import lower
-from karamelo_py.run.mpi.pack import by_tile, join_tilings, share_of, tilings_in_use
-from karamelo_py.run.mpi.partition import sized, work_of
-from karamelo_py.run.tiles import SHARES
+from karamelo_py.run.mpi.partition import by_tile, join_tilings, share_of, sized, work_of
+from karamelo_py.run.tiles import SHARES, in_use
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.script.errors import Quit
 
@@ -115,8 +114,9 @@ class Whole:
         return {
             "counts": [block.points.mass.size for block in s.blocks],
             "tiling": [
-                tiling | {"report": block.tiling.report[: block.tiling.count[0]]}
-                for tiling, block in zip(tilings_in_use(s), s.blocks, strict=True)
+                {name: getattr(tiling, name)[:rows] for name, rows in in_use(tiling)}
+                | {"report": tiling.report[: tiling.count[0]]}
+                for tiling in (block.tiling for block in s.blocks)
             ],
             "nodes": own,
             "at nodes": [array[own] for _, array in of_nodes(s)],
