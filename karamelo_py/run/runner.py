@@ -30,6 +30,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.plugins import attributed
 from karamelo_py.script.errors import Pause, Quit, ScriptError, render_message
 
+PATIENCE = 0.3  # seconds between two looks, about: for Ctrl-C and the progress bar
 ANOTHER_FOLDER = "the environment variable KARAMELO_PY_CACHE names another folder"
 
 
@@ -67,13 +68,9 @@ class Timings:
         self._depth = 0  # of compilation in the midst of compilation
         self._begun = np.zeros(2)
 
-    def passed(self) -> dict[str, float]:
-        """Return the seconds that have passed so far."""
-        return {name: float(seconds[0]) for name, seconds in self.on.items()}
-
-    def since(self, before: dict[str, float], name: str) -> float:
-        """Return those that have passed since then, for one thing."""
-        return float(self.on[name][0]) - before[name]
+    def passed(self, name: str) -> float:
+        """Return the seconds that have passed so far with one thing."""
+        return float(self.on[name][0])
 
     @contextmanager
     def counted(self, name: str) -> Iterator[None]:
@@ -119,9 +116,6 @@ class Timings:
             self.on["compilation"] += _clocks() - self._begun
 
 
-PATIENCE = 0.3  # seconds between two looks, about: for Ctrl-C and the progress bar
-
-
 class Interrupted(Exception):
     """The user pressed Ctrl-C, or another signal (its number) came; everything is written."""
 
@@ -136,7 +130,9 @@ def carry_out(hub: Hub, **length: Any) -> None:
     check_scene(hub)
     runner.check_condition()
     if hub.rehearsing:
-        _note_in_rehearsal(runner)
+        span = runner.end_time - hub.update.time, inf if runner.steps is None else runner.steps
+        hub.later.append(known_failures.step_of(hub, runner.rollback.halve, span))
+        hub.in_runs += hub.lasting()
         return
     if hub.pausing:
         raise Pause
@@ -147,22 +143,9 @@ def carry_out(hub: Hub, **length: Any) -> None:
         runner.warn(hub.simulation)
         raise Quit
     replay = hub.interpreter.replay
-    if replay is not None and not replay.at_end:
-        _pass_over(hub)
-    else:
+    if replay is None or replay.at_end:
         runner.run()
-
-
-def _note_in_rehearsal(runner: "Runner") -> None:
-    """Note what the run asks for, and what acts in it."""
-    hub = runner.hub
-    span = runner.end_time - hub.update.time, inf if runner.steps is None else runner.steps
-    hub.later.append(known_failures.step_of(hub, runner.rollback.halve, span))
-    hub.in_runs += hub.lasting()
-
-
-def _pass_over(hub: Hub) -> None:
-    """Take the values of a run that was over in the file that a script goes on from."""
+        return
     after = hub.restart.runs[len(hub.runs)]
     for name, value in after.items():
         if name in hub.values:
@@ -176,27 +159,6 @@ def _processes(simulation: Simulation) -> dict[str, str]:
         return {}
     alone = f", one has all points: up to {DIRECT_UP_TO} are not shared out"
     return {"processes": f"{simulation.comm.size}{alone if simulation.tiles.direct else ''}"}
-
-
-class ChunkLength:
-    """The number of steps between two looks at a run, at most `longest`."""
-
-    def __init__(self, longest: int = CHUNK):
-        self.longest = longest
-        self.restart()
-
-    def restart(self) -> None:
-        """Begin with single steps."""
-        self.steps = 1
-
-    def end(self, step: int) -> int:
-        """Return where a chunk from `step` on ends: at a state that may be kept, at the latest."""
-        return min(step + self.steps, (step // CHUNK + 1) * CHUNK)
-
-    def next(self, elapsed: float, taken: int) -> None:
-        """Choose the next one, from the seconds that a number of steps took."""
-        steps = PATIENCE * max(taken, 1) / max(elapsed, 1e-9)
-        self.steps = int(min(self.longest, max(1, steps)))
 
 
 class Runner:
@@ -241,15 +203,10 @@ class Runner:
 
     def warn(self, simulation: Simulation) -> None:
         """Warn of what is known to go wrong in this run, and of one that is very long."""
-        known_failures.warn(self.hub, simulation, self.duration, self.rollback.halve)
-        known_failures.warn_about_length(self.hub, simulation, self.end_time)
-
-    @property
-    def duration(self) -> float:
-        """The length of this run, as far as that is known."""
-        simulation = self.hub.simulation
         steps = inf if self.steps is None else self.steps * simulation.dt
-        return min(self.end_time - simulation.time, steps)
+        duration = min(self.end_time - simulation.time, steps)
+        known_failures.warn(self.hub, simulation, duration, self.rollback.halve)
+        known_failures.warn_about_length(self.hub, simulation, self.end_time)
 
     def check_condition(self) -> None:
         """Refuse a condition that differs from point to point."""
@@ -327,47 +284,47 @@ class Runner:
             message = f"{holds}, the end of this run: it takes no further step"
             self.hub.console.say(render_message("note", message, hint=hint))
 
-    def _tell_of_no_first_step(self) -> None:
-        """Warn of a comparison that was forgotten, or turned round: it ends a run at once."""
-        holds = "holds" if self.until else "does not hold"
-        self.hub.warn(
-            f"the condition {holds} before the first step of this run: it takes none",
-            hint="run_until ends where its condition is anything but 0, run_while where it is 0; "
-            "comparisons are 1 or 0",
-            place=self.place,
-        )
-
     def _loop(self, simulation: Simulation) -> None:
         hub, rollback, timings = self.hub, self.rollback, self.timings
-        length = ChunkLength(CHUNK if self.condition is None else 1)
+        length, longest = 1, CHUNK if self.condition is None else 1
         while self._goes_on(simulation):
             rollback.before()
-            step, before = simulation.step, timings.passed()
-            end = min(hub.output.next_step(step), self.last_step, length.end(step))
+            step, before = simulation.step, {name: timings.passed(name) for name in timings.on}
+            kept = (step // CHUNK + 1) * CHUNK  # where a state may be kept
+            end = min(hub.output.next_step(step), self.last_step, step + length, kept)
             with timings.counted("steps"):
                 status = simulation.advance(int(end) - step)
             self._agree(simulation)  # what is written shows steps that no process has failed in
             if not rollback.after(status):
-                length.restart()
+                length = 1
                 continue
             boundary.tell_of_bounces(hub, simulation)
-            elapsed = simulation.comm.bcast(timings.since(before, "steps"))
-            length.next(elapsed, simulation.step - step)
+            elapsed = simulation.comm.bcast(timings.passed("steps") - before["steps"])
+            in_time = PATIENCE * max(simulation.step - step, 1) / max(elapsed, 1e-9)
+            length = int(min(longest, max(1, in_time)))
             with timings.counted("output"):
                 if self._steps_left(simulation):
                     hub.output.write()
-                self._show_progress(simulation, anew=timings.since(before, "compilation") > 0)
+                anew = timings.passed("compilation") > before["compilation"]
+                self._show_progress(simulation, anew=anew)
 
     def _goes_on(self, simulation: Simulation) -> bool:
         """Tell whether there is a step to take."""
         if not self._steps_left(simulation):
             return False
-        if not self._condition_allows():
-            if simulation.step == self.first_step:
-                self._tell_of_no_first_step()
-            return False
-        self._agree(simulation)
-        return not self.interrupted
+        if self._condition_allows():
+            self._agree(simulation)
+            return not self.interrupted
+        if simulation.step == self.first_step:
+            # A comparison that was forgotten, or turned round, ends a run at once.
+            holds = "holds" if self.until else "does not hold"
+            self.hub.warn(
+                f"the condition {holds} before the first step of this run: it takes none",
+                hint="run_until ends where its condition is anything but 0, run_while where it is "
+                "0; comparisons are 1 or 0",
+                place=self.place,
+            )
+        return False
 
     def _agree(self, simulation: Simulation) -> None:
         """Learn which signal any of the processes has been sent."""
@@ -397,18 +354,15 @@ class Runner:
 
     def _show_progress(self, simulation: Simulation, *, anew: bool) -> None:
         """Show how far the run is, `anew` where a rate would count compilation, too."""
-        console, fraction = self.hub.console, self._fraction(simulation)
+        console, fraction = self.hub.console, None
+        if self.steps:
+            fraction = (simulation.step - self.first_step) / self.steps
+        elif isfinite(self.end_time) and self.end_time > self.first_time:
+            fraction = (simulation.time - self.first_time) / (self.end_time - self.first_time)
         if anew:
             console.end_run()
             console.begin_run(simulation.step, fraction or 0.0)
         console.progress(simulation.step, simulation.time, fraction)
-
-    def _fraction(self, simulation: Simulation) -> float | None:
-        if self.steps:
-            return (simulation.step - self.first_step) / self.steps
-        if isfinite(self.end_time) and self.end_time > self.first_time:
-            return (simulation.time - self.first_time) / (self.end_time - self.first_time)
-        return None
 
     # --- around the loop ----------------------------------------------------------------------
 
