@@ -20,33 +20,17 @@ from karamelo_py.run.boxes import unique
 
 
 class BodyMotion(NamedTuple):
-    """Motion of a solid with points.
+    """Motion of a solid with points."""
 
-    Attributes
-    ----------
-    number
-        Of the solid among those of the scene.
-    mass
-        Its mass.
-    centre, velocity
-        (d,) Of the centre of mass.
-    spread
-        (d, d) sum m X X, with X from the centre.
-    shear
-        (d, d) sum m X V, with X and V from those of the centre.
-    low, high, slow, fast
-        (d,) Least and largest coordinates and velocities of points.
-    """
-
-    number: int
+    number: int  # of the solid among those of the scene
     mass: float
-    centre: np.ndarray
-    velocity: np.ndarray
-    spread: np.ndarray
-    shear: np.ndarray
-    low: np.ndarray
+    centre: np.ndarray  # (d,) of mass
+    velocity: np.ndarray  # (d,) of the centre
+    spread: np.ndarray  # (d, d) sum m X X, with X from the centre
+    shear: np.ndarray  # (d, d) sum m X V, with X and V from those of the centre
+    low: np.ndarray  # (d,) least and largest coordinates of points
     high: np.ndarray
-    slow: np.ndarray
+    slow: np.ndarray  # (d,) least and largest velocities
     fast: np.ndarray
 
     @property
@@ -139,28 +123,14 @@ TORN = 9.0, 14.0  # angle, in radian, that a body bears with one point a cell: F
 
 
 class Noise(NamedTuple):
-    """The motion that feeds most.
+    """The motion that feeds most."""
 
-    Attributes
-    ----------
-    share
-        How much of what is borne it takes.
-    speed
-        Of the body, or of its rim, over the speed of waves.
-    cells
-        How many the body, or its rim, goes through.
-    angle
-        Of a turn, in radian.
-    noisy, torn
-        Whether noise grows, and whether the rim comes loose.
-    """
-
-    share: float
-    speed: float
-    cells: float
-    angle: float = 0.0
-    noisy: bool = True
-    torn: bool = False
+    share: float  # of what is borne
+    speed: float  # of the body, or of its rim, over the speed of waves
+    cells: float  # that the body, or its rim, goes through
+    angle: float = 0.0  # of a turn, in radian
+    noisy: bool = True  # whether noise grows
+    torn: bool = False  # whether the rim comes loose
 
 
 def rings(law: Any) -> bool:

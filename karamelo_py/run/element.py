@@ -32,34 +32,17 @@ NORMAL = COMPONENTS[:3]
 class LoadPath:
     """Targets at the end of a piece of path; every strain that is not named stays as it is.
 
-    Parameters
-    ----------
-    increments
-        Number of equal increments.
-    duration
-        Time it takes.
-    strain, stress
-        Targets by component.
-    shear
-        Shear components (of `strain`) that are simple shear, not pure.
-    volumetric
-        Target of the sum of normal strains, reached by those that are not named; or None.
-    turn
-        Angle about z by which the point turns meanwhile.
-
-    Raises
-    ------
-    ScriptError
-        If both strain and stress of a component, or too much of the volume, are prescribed.
+    If both strain and stress of a component, or too much of the volume, are prescribed, it is
+    refused.
     """
 
-    increments: int
+    increments: int  # number of equal ones
     duration: float
-    strain: Mapping[str, float]
+    strain: Mapping[str, float]  # targets by component
     stress: Mapping[str, float]
-    shear: Sequence[str] = ()
-    volumetric: float | None = None
-    turn: float = 0.0
+    shear: Sequence[str] = ()  # components of `strain` that are simple shear, not pure
+    volumetric: float | None = None  # sum of normal strains, reached by those that are not named
+    turn: float = 0.0  # angle about z by which the point turns meanwhile
 
     id: str = ""
     place: Any = None
@@ -147,28 +130,14 @@ class Loading(NamedTuple):
 
 
 class Point:
-    """A point of a material, and where it has come to.
-
-    Attributes
-    ----------
-    law, kin
-        The law's NamedTuple and the kinematics' tag.
-    state
-        State of the law.
-    strain : ndarray (6,)
-        Sum of the strain increments, the symmetric parts of dt grad v.
-    time
-        Time.
-    work
-        Work of the stress per reference volume.
-    """
+    """A point of a material, and where it has come to."""
 
     def __init__(self, law: NamedTuple, kin: NamedTuple):
         self.law, self.kin = law, kin
         self.state = laws.initial_state(law, kin, 1.0)
-        self.strain = np.zeros(6)
+        self.strain = np.zeros(6)  # sum of the strain increments, symmetric parts of dt grad v
         self.time = 0.0
-        self.work = 0.0
+        self.work = 0.0  # of the stress, per reference volume
 
     @property
     def free(self) -> tuple[str, ...]:

@@ -75,32 +75,15 @@ DIRECT_DRIFT, DIRECT_STEPS = 4.0, 1000
 
 
 class Tiles:
-    """Sorts the points of a setup by tile; says what nodes the points of a tile may reach.
+    """Sorts the points of a setup by tile; says what nodes the points of a tile may reach."""
 
-    Attributes
-    ----------
-    size
-        (d,) cells of a tile.
-    count
-        Number of tiles, of all grids.
-    occupied
-        How many of them hold points.
-    direct
-        Whether points give straight to the nodes, tile after tile: scenes of few points.
-    sorts
-        How often points were sorted.
-    rows
-        How many rows of the buffers the boxes of all tiles take.
-    threads, mode
-        How many sum at nodes and sort, and how.
-    """
-
-    threads = 1
+    threads = 1  # that sum at nodes and sort
     mode: Serial | Threaded = Serial()
 
     def __init__(self, lattices: Sequence[Lattice], basis: Any, points: int, sparse: bool):
-        self.direct = points <= DIRECT_UP_TO
+        self.direct = points <= DIRECT_UP_TO  # points give straight to the nodes, tile after tile
         self.dimension = d = lattices[0].dimension
+        # Cells of a tile of points, nodes of one of nodes, by direction.
         self.size, self.node_size = np.full(d, TILES[d]), np.full(d, NODES[d])
         self.long = sparse and d == 3
         if self.long:
@@ -109,8 +92,9 @@ class Tiles:
         self.per_cell = type(basis).nodes_per_cell
         self.least_nodes = type(basis).least_nodes
         self.beyond = type(basis).cells // 2  # nodes that points see beyond those of their cell
-        self.sorts = self.sets = self.rows = 0
-        self.occupied = 0
+        self.sorts = self.sets = 0  # how often points were sorted; sets of buffers
+        self.rows = 0  # of the buffers, that the boxes of all tiles take
+        self.occupied = 0  # tiles that hold points
         # By grid and direction: nodes, cells, and so on.
         self._nodes = np.array([x.shape[:d] for x in lattices], np.int64)
         self._cells = np.array([x.cells[:d] for x in lattices], np.int64)
@@ -125,7 +109,7 @@ class Tiles:
         self._most_rows = inf if shaped else most
         rows = np.prod(widest[:, :-1], axis=1, dtype=np.int64).max()
         self._most_in_box = int(rows) if self._by_rows(shaped) else 0  # rows of a box, at most
-        self.count = int(self.first[-1])
+        self.count = int(self.first[-1])  # of tiles, of all grids
         self._cut = TileGrid(self.size, self.shapes, self.first)
         tiles = -(-self._nodes // self.node_size)
         self._tile_steps = steps_of(tiles)

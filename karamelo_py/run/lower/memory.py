@@ -32,14 +32,11 @@ THERE = 1  # bytes of each point of the whole scene, for those that were deleted
 
 
 class MemoryTaken(NamedTuple):
-    """Bytes touched by the steps, of a copy of the last good state, and known to each process.
-
-    Of places, the copy has only those of the present.
-    """
+    """Bytes that a scene takes in steps."""
 
     touched: int
-    copied: int
-    known: int
+    copied: int  # of the last good state, with places of the present alone
+    known: int  # to each process, of the whole scene
 
 
 def memory_of(simulation: Any, s: Setup, boxes: int) -> MemoryTaken:

@@ -21,28 +21,15 @@ MAY_CHANGE = 1.25  # largest share of the points over the mean that is no waste 
 
 
 class ProcessShare(NamedTuple):
-    """Share of one process.
-
-    Attributes
-    ----------
-    points, tiles, nodes
-        Points, occupied tiles of them, nodes in use.
-    others
-        Processes that it passes something on to.
-    given
-        Bytes that it passes on in a step.
-    memory, known
-        Bytes that it touches in steps, and of a copy of its last good state; those of them of what
-        each process knows of the whole scene.
-    """
+    """Share of one process."""
 
     points: int
-    tiles: int
-    nodes: int
-    others: int
-    given: int
-    memory: int
-    known: int
+    tiles: int  # of points, that are occupied
+    nodes: int  # in use
+    others: int  # that it passes something on to
+    given: int  # bytes that it passes on in a step
+    memory: int  # bytes that it touches in steps, and of a copy of its last good state
+    known: int  # of these, of what each process knows of the whole scene
 
 
 class _Sums(NamedTuple):

@@ -30,16 +30,10 @@ LEARN_EVERY = 100  # steps from output to output, after which it is seen how wor
 
 
 class Load:
-    """Time in sweeps over the points of each block, and in all else that is no waiting.
-
-    Attributes
-    ----------
-    costs
-        (blocks + 1,) of a point of each block in a step, and of a node that the points of a tile
-        may reach; at first all points cost the same, and nodes nothing.
-    """
+    """Time in sweeps over the points of each block, and in all else that is no waiting."""
 
     def __init__(self, blocks: int):
+        # Of a point of each block in a step, and of a node that the points of a tile may reach.
         self.costs = np.append(np.ones(blocks), 0.0)
         self._spent = np.zeros((2, blocks + 1), np.int64)  # nanoseconds, and points times steps
         self._rest = self._at = blocks
