@@ -4,13 +4,11 @@ What is compared is the least that a run has to hold: of what would run nothing 
 """
 
 import gc
-from collections.abc import Iterator
 from math import ceil
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.fields import name_of
 from karamelo_py.kernels.arrays import (
     SUMS_WIDTH,
     UPDATE_WIDTH,
@@ -19,7 +17,8 @@ from karamelo_py.kernels.arrays import (
     Setup,
     arrays_of,
 )
-from karamelo_py.kernels.heat import Conducting
+from karamelo_py.run.boxes import used
+from karamelo_py.run.checkpoint.arrays import of_nodes
 from karamelo_py.run.lower.build import PRECISIONS, check_scene, lower_points, part_of, point_kinds
 from karamelo_py.run.mpi.partition import occupied
 from karamelo_py.scene.hub import Hub
@@ -49,8 +48,7 @@ def memory_of(simulation: Any, s: Setup, boxes: int) -> MemoryTaken:
     of_point = [{name: size for name, _, size in point_fields(block)} for block in s.blocks]
     points = sum(sum(of.values()) * n for of, n in zip(of_point, counts, strict=True))
     moved = sum(of["x moved"] * n for of, n in zip(of_point, counts, strict=True))
-    spans = s.spans[1 : 1 + s.spans[0, 0]]
-    nodes = sum(bytes_in(spans, array) for _, array in node_fields(simulation.setup))
+    nodes = sum(bytes_in(used(s.spans)[1:], array) for _, array in node_fields(simulation.setup))
     hooks = sum(getattr(simulation.hooks, name, np.empty(0)).nbytes for name in ("x0", "members"))
     whole = known(simulation.hub) + hooks
     return MemoryTaken(points + nodes + boxes, points - moved, whole)
@@ -92,23 +90,13 @@ def bytes_in(spans: np.ndarray, array: np.ndarray) -> int:
 
 def nodes_in_use(s: Setup) -> int:
     """Count the nodes that points may give to before they are sorted again."""
-    spans = s.spans[1 : 1 + s.spans[0, 0]]
-    return int(np.sum(spans[:, 1] - spans[:, 0]))
+    return int(np.diff(used(s.spans)[1:]).sum())
 
 
 def node_fields(s: Any) -> list[tuple[str, np.ndarray]]:
     """List the arrays of the nodes, and of those that heat flows through, with their names."""
-    found = list(_arrays_of_nodes(s.nodes))
-    if isinstance(s.heat, Conducting):
-        found += [(f"{name} (heat)", array) for name, array in _arrays_of_nodes(s.heat.nodes)]
-    return found
-
-
-def _arrays_of_nodes(nodes: Any) -> Iterator[tuple[str, np.ndarray]]:
-    for name in ("sums", "update", "velocity"):
-        yield name, getattr(nodes, name)
-    for one in nodes.fields:
-        yield name_of(type(one)), one.array
+    parts = ((name.partition("/"), array) for name, array in of_nodes(s))
+    return [(name + " (heat)" * (kind == "heat"), array) for (kind, _, name), array in parts]
 
 
 def point_fields(block: Any) -> list[tuple[str, str, int]]:

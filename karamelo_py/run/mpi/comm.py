@@ -99,7 +99,6 @@ class MpiComm(SerialComm):
             raise Quit
 
     def agree(self, word: int, patience: float = inf) -> np.ndarray | None:
-        """Gather a word of each process (size,), or None if one has not come in time."""
         own, found = np.array([word], np.int64), np.empty(self.size, np.int64)
         request = self._aside.Iallgather(own, found)
         end = time.monotonic() + patience
@@ -110,27 +109,21 @@ class MpiComm(SerialComm):
         return found
 
     def bcast(self, thing: Any = None) -> Any:
-        """Hand what the first process has to all."""
         return self.world.bcast(thing)
 
     def gather(self, thing: Any) -> list | None:
-        """Gather what each process has at the first; None at the others."""
         return self.world.gather(thing)
 
     def allgather(self, thing: Any) -> list:
-        """Gather what each process has at all of them."""
         return self.world.allgather(thing)
 
     def gather_rows(self, own: np.ndarray, out: np.ndarray | None, counts: Sequence[int]) -> None:
-        """Put the numbers of all processes, one after another, into `out` of the first."""
         self.world.Gatherv(own, (out, counts) if self.leads else None)
 
     def scatter(self, things: Sequence | None) -> Any:
-        """Hand out what the first process has for each."""
         return self.world.scatter(things)
 
     def exchange(self, things: dict[int, Any]) -> dict[int, Any]:
-        """Swap things with some other processes, by rank; both sides name each other."""
         sent = [self.world.isend(thing, rank) for rank, thing in things.items()]
         found = {rank: self.world.recv(source=rank) for rank in things}
         for one in sent:
@@ -138,27 +131,23 @@ class MpiComm(SerialComm):
         return found
 
     def alltoall(self, numbers: np.ndarray) -> np.ndarray:
-        """Swap a number (size,) with each process."""
         out = np.empty_like(numbers)
         self.world.Alltoall(numbers, out)
         return out
 
     def allreduce(self, array: np.ndarray) -> np.ndarray:
-        """Add up whole numbers over all processes: for such, order does not matter."""
         out, begun = np.empty_like(array), time.perf_counter()
         self.world.Allreduce(array, out)
         self.waited += time.perf_counter() - begun
         return out
 
     def allreduce_max(self, array: np.ndarray) -> np.ndarray:
-        """Take the largest of each number over all processes, in place."""
         begun = time.perf_counter()
         self.world.Allreduce(self.mpi.IN_PLACE, array, self.mpi.MAX)
         self.waited += time.perf_counter() - begun
         return array
 
     def in_turn(self, act: Callable[[], None]) -> None:
-        """Let the first process act, and then all others: they find what it has made."""
         if self.leads:
             act()
         self.barrier()
