@@ -39,6 +39,7 @@ def lower_hooks(
     if not builder.rows:
         return arrays.NoHooks()
     solids = hub.solids.values() if builder.uses_first else ()
+    own, values = threads if threads > 1 else 0, len(hub.values.array)
     return arrays.Hooks(
         evaluate=address_of(evaluate_in_table, EVALUATE),
         table=np.array(builder.rows, arrays.HOOK).view(np.recarray),
@@ -52,18 +53,14 @@ def lower_hooks(
         held=np.zeros((builder.shared_nodes(), dimension), arrays.HELD).view(np.recarray),
         loads=np.zeros((builder.loaded_nodes, dimension)),
         mode=mode or Serial(),
-        apart=_apart(threads if threads > 1 else 0, len(hub.values.array)),
-    )
-
-
-def _apart(threads: int, values: int) -> arrays.Apart:
-    """Make room for what threads have of their own, with space between the values of two."""
-    return arrays.Apart(
-        chosen=np.zeros((threads, BLOCK), np.int64),
-        scratch=np.zeros((threads, STACK + ROWS, BLOCK)),
-        values=np.zeros((threads, values + 16)),
-        totals=np.zeros((threads, values, LIMBS), np.int64),
-        clock=np.zeros((threads, 1), arrays.CLOCK).view(np.recarray),
+        # What threads have of their own, with space between the values of two.
+        apart=arrays.Apart(
+            chosen=np.zeros((own, BLOCK), np.int64),
+            scratch=np.zeros((own, STACK + ROWS, BLOCK)),
+            values=np.zeros((own, values + 16)),
+            totals=np.zeros((own, values, LIMBS), np.int64),
+            clock=np.zeros((own, 1), arrays.CLOCK).view(np.recarray),
+        ),
     )
 
 
@@ -92,15 +89,11 @@ class _Builder:
             slot = self.hub.values.slot(f"{fix.id}_{first}")
         with as_script_error(f"fix {fix.style}", moment, hook.function, fix.place):
             address = address_of(hook.function, hook.signature)
-        uses = (
-            int(hook.uses_before),
-            int(hook.uses_share),
-            int(hook.holds and (slot >= 0 or not hook.on_nodes)),
-        )
         formulas = [f for f in (*fix.formulas, fix.wall_friction) if f is not None]
+        holds = hook.holds and (slot >= 0 or not hook.on_nodes)
         uses_place = any(f.names & set(POINT_SEEDS) for f in formulas)
-        row = (address, STAGES[moment], begin, end, slot, *uses, int(uses_place))
-        self.rows.append(row)
+        uses = map(int, (hook.uses_before, hook.uses_share, holds, uses_place))
+        self.rows.append((address, STAGES[moment], begin, end, slot, *uses))
         programs = [self._program(formula) for formula in fix.formulas]
         programs += [NO_PROGRAM] * (FRICTION - len(programs))
         self.programs.append([*programs, self._program(fix.wall_friction)])
@@ -125,27 +118,24 @@ class _Builder:
         if fix.group.all:
             return -1, -1
         if hook.on_nodes:
-            members = unique(fix.nodes)
-        else:
-            members = fix.group.bits(self.points).view("<i8").astype(np.int64, copy=False)
-        begin = sum(len(m) for m in self.members)
-        self.members.append(members)
-        return begin, begin + len(members)
+            return _put(self.members, unique(fix.nodes))
+        members = fix.group.bits(self.points).view("<i8").astype(np.int64, copy=False)
+        return _put(self.members, members)
 
     def _program(self, formula: Any) -> tuple:
         if formula is None:
             return NO_PROGRAM
         if formula.is_constant:  # without code: the number
-            first = sum(len(p) for p in self.constants)
-            self.constants.append(np.array([formula.constant]))
-            return 0, 0, first, first + 1
+            return 0, 0, *_put(self.constants, np.array([formula.constant]))
         program = formula.program(self.hub.values)
-        ranges = []
-        for pieces, piece in ((self.code, program.code), (self.constants, program.constants)):
-            begin = sum(len(p) for p in pieces)
-            pieces.append(piece)
-            ranges += [begin, begin + len(piece)]
-        return tuple(ranges)
+        return *_put(self.code, program.code), *_put(self.constants, program.constants)
+
+
+def _put(pieces: list[np.ndarray], piece: np.ndarray) -> tuple[int, int]:
+    """Append a piece, and return where it begins and ends."""
+    begin = sum(map(len, pieces))
+    pieces.append(piece)
+    return begin, begin + len(piece)
 
 
 def sets_initial_state(fix: Any) -> bool:
@@ -177,7 +167,11 @@ class PythonHooks:
 
 
 def _call(simulation: Any, fix: Any, hook: Callable, view: Any) -> None:
-    """Call a hook; of one that each process calls for its own, see that all agree."""
+    """Call a hook; of one that each process calls for its own, see that all agree.
+
+    All have to have asked for the same, else one would wait for the others for ever, and to have
+    published the same, else the values would be those of a part.
+    """
     try:
         hook(view)
         if fix.point_by_point:
@@ -188,7 +182,6 @@ def _call(simulation: Any, fix: Any, hook: Callable, view: Any) -> None:
 
 
 def _agree(simulation: Any, fix: Any) -> None:
-    """See that all processes have asked for the same, and have published the same."""
     values = simulation.hub.values
     names = (f"{fix.id}_{name}" if name else fix.id for name in fix.published)
     own = {name: values.get(name) for name in names if name in values}

@@ -8,8 +8,8 @@ from karamelo_py.kernels.arrays import NoHooks, Setup, Tiling, arrays_of
 from karamelo_py.kernels.step import step
 from karamelo_py.kernels.sums import given
 from karamelo_py.kernels.sweep import sum_buffers, sweep_nodes, sweep_points
-from karamelo_py.run.boxes import Boxes, buffers_of, chosen_of, no_nodes, numbers, summed
-from karamelo_py.run.lower.memory import memory_of
+from karamelo_py.run.boxes import Boxes, chosen_of, no_nodes
+from karamelo_py.run.lower.memory import memory_of, nodes_in_use
 from karamelo_py.run.mpi.partition import SharedTiles, occupied
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.tiles import SHARES
@@ -84,22 +84,19 @@ def bytes_of_node(simulation: Simulation) -> int:
 
 def plan(simulation: Simulation, ranks: int) -> list[ProcessShare]:
     """Plan the shares of so many processes in a scene whose points are sorted."""
-    s, hub = simulation.setup, simulation.hub
-    method = hub.update.method
-    lattices, one_place = method.lattices(hub), method.fields_per_solid
-    per_node = bytes_of_node(simulation)
-
-    def tiles_of(comm: SerialComm) -> SharedTiles:
-        return SharedTiles(
-            comm, lattices, s.basis, simulation.count, sparse(simulation.hub), one_place=one_place
-        )
-
-    of_all = [tiles_of(_PretendedComm(rank, ranks)) for rank in range(ranks)]
+    s, method = simulation.setup, simulation.hub.update.method
+    lattices, one_place = method.lattices(simulation.hub), method.fields_per_solid
+    few = simulation.count, sparse(simulation.hub)
+    of_all = [
+        SharedTiles(_PretendedComm(rank, ranks), lattices, s.basis, *few, one_place=one_place)
+        for rank in range(ranks)
+    ]
     of_all[0].share_out(of_all[0].loads(s.blocks)[:-1].sum(axis=0))
     parts = [_part(s, of_all[0].owner == rank) for rank in range(ranks)]
     boxes = [(tiles, tiles.own_boxes(part)) for tiles, part in zip(of_all, parts, strict=True)]
     for tiles in of_all:
         tiles.comm.others = boxes
+    per_node = bytes_of_node(simulation)
     return [
         _share(simulation, part, tiles, per_node) for part, tiles in zip(parts, of_all, strict=True)
     ]
@@ -110,31 +107,28 @@ def _share(simulation: Simulation, s: Setup, tiles: SharedTiles, per_node: int) 
         sums=s.nodes.sums[:, :0], velocity=s.nodes.velocity[:, :0], fields=()
     )  # boxes of nothing: only their places matter
     tiles.lay_out(s._replace(buffers=tiles.empty_buffers(none, len(s.blocks))))
-    given = [array for one in buffers_of(simulation.setup) for array in summed(one.nodes)]
-    row = sum(array.itemsize * array.shape[1] for array in given)
-    boxes = 0 if tiles.direct else row * tiles.rows
     tilings = [block.tiling for block in s.blocks]
-    points = sum(int(occupied(one)[1].sum()) for one in tilings)
-    rows = sum(map(len, tiles.given.values()))
-    count = sum(int(one.count[0]) for one in tilings)
-    nodes = len(numbers(s.spans))
-    memory = memory_of(simulation, s, boxes)
-    given = rows * per_node
-    return ProcessShare(points, count, nodes, len(tiles.given), given, sum(memory), memory.known)
+    memory = memory_of(simulation, s, tiles.box_bytes(simulation.setup))
+    return ProcessShare(
+        points=sum(int(occupied(one)[1].sum()) for one in tilings),
+        tiles=sum(int(one.count[0]) for one in tilings),
+        nodes=nodes_in_use(s),
+        others=len(tiles.given),
+        given=per_node * sum(map(len, tiles.given.values())),
+        memory=sum(memory),
+        known=memory.known,
+    )
 
 
 def _part(s: Setup, own: np.ndarray) -> Setup:
     """Choose the tiles of which `own` says so."""
     blocks = []
     for block in s.blocks:
-        tiling = block.tiling
-        which = np.flatnonzero(own[occupied(tiling)[0]])
-        rows = {name: getattr(tiling, name)[which] for name in Tiling._fields[2:]}
-        rows |= {
-            "count": np.array([len(which), *tiling.count[1:]]),
-            "share": np.zeros(2 * SHARES + 1, np.int64),
-        }
-        blocks.append(block._replace(tiling=tiling._replace(**rows)))
+        which = np.flatnonzero(own[occupied(block.tiling)[0]])
+        rows = {name: getattr(block.tiling, name)[which] for name in Tiling._fields[2:]}
+        rows["count"] = np.array([len(which), *block.tiling.count[1:]])
+        rows["share"] = np.zeros(2 * SHARES + 1, np.int64)
+        blocks.append(block._replace(tiling=block.tiling._replace(**rows)))
     return s._replace(blocks=tuple(blocks), **no_nodes(), heat=None)
 
 
