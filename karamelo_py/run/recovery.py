@@ -1,17 +1,41 @@
 """Recovery of a run where a step went wrong, or energy has grown: half the step, or an end."""
 
-from typing import Any
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, NoReturn
 
-from karamelo_py.kernels.step import DONE, STOPPED
-from karamelo_py.run.checkpoint.parts import RollbackPoint
+from karamelo_py.kernels import growth
+from karamelo_py.kernels.step import DONE, GAINED, HEATED, STOPPED
+from karamelo_py.kernels.watch import GROWTH, LOOK, unit_of
+from karamelo_py.run.checkpoint import restart_file
+from karamelo_py.run.checkpoint.parts import OUTPUTS, PartStates, RollbackPoint
 from karamelo_py.run.diagnosis import energy, explain
 from karamelo_py.run.timestep import own_step_instead
 from karamelo_py.scene import boundary
 from karamelo_py.scene.hub import Hub
+from karamelo_py.script.errors import ScriptError
 
 CHUNK = 100  # steps between two looks at the run, and between two good states, at most
 HALVINGS = 5  # at most, in a run
 RETURNS = 2  # at most, to one state from where energy grows: what two halves do not mend stays
+
+
+LAST_GOOD = "last_good.*.h5"
+GOES_ON = (
+    "karamelo-py SCRIPT -restart {} goes on from there, with a smaller step (set_dt, dt_factor): "
+    "as it is, it would end here again"
+)
+FAR = 100  # steps, more of which are not taken once more for the last rows of log and dumps
+
+
+class Stopped(ScriptError):
+    """A run has ended at a fault; all processes know, and its last good state is written."""
+
+
+class OthersWait(Exception):
+    """This process cannot write a file, and others go on to give it what belongs there."""
 
 
 class RollBack:
@@ -61,10 +85,7 @@ class RollBack:
             if status == STOPPED and boundary.delete_leaving(hub, simulation, self.point.arrays):
                 self._keep()
             elif not self._halve_step(status=status):
-                start = None
-                if self.smaller and not simulation.control.clock[0].watch_limit:
-                    start = explain.StepTooLarge(self.smaller, self.point.step == self.begun_at)
-                explain.stop(hub, simulation, status, self.point, start, self.place)
+                self._stop(status)
             return False
         found = None if simulation.told_of_growth else energy.words_of_growth(hub, simulation)
         if found is not None:
@@ -89,7 +110,7 @@ class RollBack:
         hub, simulation = self.hub, self.simulation
         if not self.halve or self.halvings == HALVINGS:
             return False
-        if status == STOPPED and explain.only_leave(hub, simulation, self.point.arrays):
+        if status == STOPPED and self._points_only_leave():
             return False
         message = message or explain.trouble(hub, simulation, status)[0]
         self.halvings += 1
@@ -107,3 +128,140 @@ class RollBack:
             place=self.place,
         )
         return True
+
+    def _points_only_leave(self) -> bool:
+        """Tell whether a step went wrong since points leave the domain, at no more energy.
+
+        No smaller step keeps these. Where nobody watches energy, who knows.
+        """
+        simulation, moves = self.simulation, self.hub.update.method.frame.moves
+        if not (moves and len(simulation.leaving()) and energy.grown_little(simulation)):
+            return False
+        step = simulation.step
+        simulation.restore(self.point.arrays)
+        before, steps = simulation.energy(), step - simulation.step
+        if steps:
+            simulation.advance(steps)
+        kept = energy.growth_since(simulation, before) <= growth.WITHIN
+        healthy = kept and not simulation.above_limit()
+        simulation.advance(1)  # which goes wrong again, for others to look at
+        return healthy
+
+    # --- an end -----------------------------------------------------------------------------------
+
+    def _stop(self, status: int) -> NoReturn:
+        """Return to the last good state, write it, and raise what the user should know.
+
+        Where energy has grown before, that is the last state in which it had not; log and dumps end
+        with the last state that has no trouble of its own. Where the step was too large from the
+        start on it is the state of the start: nothing behind that is a good one.
+        """
+        too_large = self.smaller and not self.simulation.control.clock[0].watch_limit
+        message, hint, at_fault = explain.trouble(self.hub, self.simulation, status)
+        kind = ScriptError
+        with suppress(OthersWait):
+            hint += self._keep_start(status) if too_large else self._keep_good(status)
+            kind = Stopped
+        error = kind(message, place=at_fault or self.place, hint=hint)
+        error.complete = at_fault is not None
+        raise error
+
+    def _keep_start(self, status: int) -> str:
+        """Write the state that the run began with, end the outputs, and say how to begin anew."""
+        simulation, good = self.simulation, self.point
+        step, path = simulation.step, None
+        simulation.restore(good.arrays)
+        if good.step == self.begun_at:
+            with good.remembered():
+                path = self._write_last_good()
+        back = step - simulation.step - (status in (GAINED, HEATED))
+        if back <= FAR:
+            if back > 0:
+                simulation.advance(back)
+            self._end_outputs()
+        words = f". Begin anew with {self.smaller}"
+        if path is None:
+            return words
+        name = os.path.relpath(path)
+        return (
+            f"{words}. The state before the first step of this run is in {name}; karamelo-py "
+            f"SCRIPT -restart {name} goes on from there, with such a step"
+        )
+
+    def _keep_good(self, status: int) -> str:
+        """Return to the last good state, write it, end the outputs, and say how to go on."""
+        simulation, good = self.simulation, self.point
+        step, present = simulation.step, PartStates.of(self.hub, OUTPUTS)
+        grown, path = not energy.grown_little(simulation), None
+        if grown:
+            path = self._write_before_growth(step)
+        else:
+            good.return_to(simulation)
+            if status not in (GAINED, HEATED, STOPPED):
+                # What nodes have depends on how many steps ran at once: here always on as many.
+                good.again(simulation.advance, step)
+        if status not in (GAINED, HEATED) and step > simulation.step:
+            before = simulation.energy()
+            good.again(simulation.advance, step)
+            if path is None and energy.growth_since(simulation, before) > growth.WITHIN:
+                # The watch looks at means of a hundred steps, and has not seen it yet.
+                grown, path = True, self._write_before_growth(step)
+                good.again(simulation.advance, step)
+        path = path or self._write_last_good()
+        if simulation.step < step:
+            present.give(self.hub)  # their files stay as they are, with later rows
+        self._end_outputs()
+        if path is None:
+            return ""
+        name = os.path.relpath(path)
+        which = "The state from before energy grew" if grown else "The last good state"
+        return f". {which} is in {name}; {GOES_ON.format(name)}"
+
+    def _write_before_growth(self, end: int) -> Path | None:
+        """Return to the last state before step `end` whose energy has not grown, and write it.
+
+        Steps since the good state are taken once more, from one look at the energy to the next.
+        """
+        simulation, good = self.simulation, self.point
+        good.return_to(simulation)
+        clock = simulation.control.clock[0]
+        before = float(clock.balance)
+        while clock.watch_energy and simulation.step + LOOK < end:
+            look = simulation.step + LOOK - (simulation.step - 1) % LOOK
+            healthy = good.again(simulation.advance, look) == DONE
+            if not (healthy and energy.grown_little(simulation)):
+                break
+            if clock.balance - before < GROWTH * unit_of(clock):
+                good.move(simulation)
+        good.return_to(simulation)
+        return self._write_last_good()
+
+    def _write_last_good(self) -> Path | None:
+        """Write the present state to a file to go on from; one of somebody else is left alone."""
+        hub, path = self.hub, restart_file.path_of(self.hub, Path(LAST_GOOD))
+        may_be = hub.settings.comm.bcast(not path.exists() or restart_file.is_restart(path))
+        if not (hub.output.takes_part and may_be):
+            return None
+        with self._as_warnings():
+            path = restart_file.write(hub, Path(LAST_GOOD), within=True)
+            # The files of restart(...) would hold the same once more.
+            for item in hub.output.last:
+                item.last_step = hub.update.step
+            return path
+        return None
+
+    def _end_outputs(self) -> None:
+        with self._as_warnings():
+            self.hub.output.write(last=True)
+
+    @contextmanager
+    def _as_warnings(self) -> Iterator[None]:
+        """Warn of what prevents writing: another error is on its way."""
+        try:
+            yield
+        except ScriptError as error:
+            hub = self.hub
+            hub.warn(error.message, hint=error.hint, place=error.place)
+            if hub.settings.comm.size > 1:
+                hub.settings.comm.failed_within = True
+                raise OthersWait from None

@@ -18,10 +18,9 @@ from karamelo_py.output.console import duration
 from karamelo_py.run.advice import known_failures
 from karamelo_py.run.advice.report import bytes_per_point, report
 from karamelo_py.run.diagnosis import energy
-from karamelo_py.run.diagnosis.explain import Stopped
 from karamelo_py.run.lower.build import check_scene
 from karamelo_py.run.mpi.comm import check_same_run, handled_signals
-from karamelo_py.run.recovery import CHUNK, RollBack
+from karamelo_py.run.recovery import CHUNK, RollBack, Stopped
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.tiles import DIRECT_UP_TO
 from karamelo_py.run.timestep import ruling_limit, words_of_own_step, words_of_share

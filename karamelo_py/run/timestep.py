@@ -263,6 +263,11 @@ def own_step_instead(hub: Hub, command: str = "") -> str:
     return f"dt_factor({share:.3g}) or less, or leave dt_factor out"
 
 
+def step_by_script(fixed_dt: float | None, dt_factor: float | None) -> str:
+    """Name the step that a script asks for, by which it is known that it has been told."""
+    return f"set_dt {fixed_dt}" if fixed_dt else f"dt_factor {dt_factor}"
+
+
 def words_of_share(hub: Hub) -> str:
     """Say what share of the stable step is taken, and what it means."""
     asked, keeping = hub.update.dt_factor, keeping_share(hub)

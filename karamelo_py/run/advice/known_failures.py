@@ -17,7 +17,7 @@ from karamelo_py.output.point_table import COMPONENTS, PointTable
 from karamelo_py.output.units import DENSITY, STRESS, VELOCITY
 from karamelo_py.points.laws import can, constrained_velocity, law_kind, specific_volume
 from karamelo_py.run.advice.facts import SceneFacts
-from karamelo_py.run.diagnosis.nonfinite import no_number
+from karamelo_py.run.diagnosis.explain import no_number
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.timestep import (
     blows_up,
@@ -25,6 +25,7 @@ from karamelo_py.run.timestep import (
     fastest_wave,
     own_step_instead,
     ruling_limit,
+    step_by_script,
     what_follows,
 )
 from karamelo_py.scene.group import NOTHING_THERE, NodeGroup
@@ -122,11 +123,6 @@ class Step(NamedTuple):
         """Command by which the script asks for it."""
         return "set_dt" if self.fixed_dt else "dt_factor"
 
-    @property
-    def name(self) -> str:
-        """By what is known that it has been told."""
-        return f"{self.command} {self.fixed_dt or self.dt_factor}"
-
 
 def step_of(hub: Hub, halves: bool, span: tuple[float, float] = (inf, inf)) -> Step:
     """The step that a run asks for here, which goes back and halves it in trouble or not."""
@@ -137,11 +133,6 @@ def step_of(hub: Hub, halves: bool, span: tuple[float, float] = (inf, inf)) -> S
         *(type(scheme), scheme, type(transfer), transfer),
     )
     return Step(update.dt_place, update.fixed_dt, update.dt_factor, halves, scene, span)
-
-
-def step_was_told(hub: Hub) -> bool:
-    """Tell whether a warning has said that the step is above the stable limit."""
-    return step_of(hub, False).name in hub.update.warned_of
 
 
 def warn_about_steps(
@@ -190,7 +181,7 @@ def _warn_about_step(
         if step.fixed_dt and asked > MIXED * limit and limit != of_heat:
             words += f"; {mixed_units(hub, simulation)}"
             hint = f"{UNITS}. If they are as they should be, {hint}"
-    if hub.update.first_time(step.name) or again:
+    if hub.update.first_time(step_by_script(step.fixed_dt, step.dt_factor)) or again:
         hub.warn(words, place=step.place, hint=hint)
 
 
