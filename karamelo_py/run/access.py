@@ -36,7 +36,6 @@ class ById:
 
     @property
     def kin(self) -> NamedTuple:
-        """The kinematics."""
         return self.setup.kin
 
     @property
@@ -65,7 +64,6 @@ class ById:
 
     @property
     def x(self) -> np.ndarray:
-        """(N, d) present positions."""
         return PointTable(self.hub, self.rows()).position
 
     def total(self, name: str, group: Any = None) -> float:
@@ -162,7 +160,6 @@ class ById:
 
     @cached_property
     def x0(self) -> np.ndarray:
-        """(N, d) positions before the first step."""
         return self.x0_of(np.arange(self.count))
 
     def x0_of(self, ids: np.ndarray) -> np.ndarray:
@@ -269,7 +266,6 @@ class ByNumber:
         return numbers(self.setup.spans)
 
     def nodes_with_mass(self) -> np.ndarray:
-        """The numbers of those with mass."""
         nodes = self.counted()
         return nodes[self.setup.nodes.sums[nodes, MASS] > 0]
 

@@ -54,7 +54,6 @@ class BodyMotion(NamedTuple):
 
     @property
     def spin(self) -> float:
-        """Angular velocity."""
         return float(np.linalg.norm(self.turning))
 
     @property

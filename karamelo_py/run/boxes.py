@@ -125,7 +125,6 @@ def no_nodes() -> dict[str, np.ndarray]:
 
 
 def buffers_of(s: Setup) -> list[Buffers]:
-    """All buffers of a scene, in the order of their numbers."""
     return [s.buffers] + ([s.heat.buffers] if isinstance(s.heat, Conducting) else [])
 
 

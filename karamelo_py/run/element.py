@@ -49,7 +49,6 @@ class LoadPath:
 
     @classmethod
     def from_script(cls, hub: Hub, argument: Argument) -> LoadPath:
-        """The load path that `argument` names."""
         return look_up(hub.load_paths, argument)
 
     def __post_init__(self) -> None:
@@ -141,12 +140,10 @@ class Point:
 
     @property
     def free(self) -> tuple[str, ...]:
-        """Components of strain that the kinematics has."""
         return FREE[type(self.kin)]
 
     @property
     def stress(self) -> np.ndarray:
-        """(6,) Cauchy stress."""
         return self._stress(self.state)
 
     def _stress(self, state: tuple) -> np.ndarray:
@@ -310,7 +307,6 @@ class Point:
         return min(forms, key=stored)
 
     def _flat(self, gradient: np.ndarray) -> tuple:
-        """A (3, 3) tensor as the kinematics has it."""
         return tensor(self.kin, [float(gradient[place]) for place in GRADIENT[type(self.kin)]])
 
     def _accept(self, state: tuple, increment: np.ndarray) -> None:
@@ -327,7 +323,6 @@ WIDTH = 17  # as many as a number of ten digits, its sign and its exponent take,
 
 
 def pressure(point: Point) -> float:
-    """-tr(stress)/3."""
     return -float(point.stress[:3].sum()) / 3
 
 
@@ -367,12 +362,10 @@ class Response:
         self.observe()
 
     def observe(self) -> None:
-        """Add the present state."""
         # A zero is added so that none is negative.
         self.rows.append([float(value()) + 0.0 for value in self._columns.values()])
 
     def last(self) -> dict[str, float]:
-        """The last row, by column."""
         return dict(zip(self.names, self.rows[-1], strict=True))
 
     def write(self, path: Path) -> None:

@@ -68,7 +68,6 @@ class Timings:
         self._begun = np.zeros(2)
 
     def passed(self, name: str) -> float:
-        """Return the seconds that have passed so far with one thing."""
         return float(self.on[name][0])
 
     @contextmanager
@@ -109,7 +108,6 @@ class Timings:
                 self._words = ""
 
     def on_end(self) -> None:
-        """It has."""
         self._depth -= 1
         if self._depth == 0:
             self.on["compilation"] += _clocks() - self._begun
@@ -189,7 +187,6 @@ class Runner:
         self.interrupted = 0  # the signal that all processes end with
 
     def run(self) -> None:
-        """Take the steps."""
         hub = self.hub
         hub.running = self
         try:
@@ -308,7 +305,6 @@ class Runner:
                 self._show_progress(simulation, anew=anew)
 
     def _goes_on(self, simulation: Simulation) -> bool:
-        """Tell whether there is a step to take."""
         if not self._steps_left(simulation):
             return False
         if self._condition_allows():
@@ -330,11 +326,9 @@ class Runner:
         self.interrupted = int(simulation.comm.allreduce_max(np.array([self.signal]))[0])
 
     def _steps_left(self, simulation: Simulation) -> bool:
-        """Tell whether neither the last step nor the end time is reached."""
         return simulation.step < self.last_step and simulation.time < self.end_time
 
     def _condition_allows(self) -> bool:
-        """Tell whether the condition, if there is one, lets the run go on."""
         if self.condition is None:
             return True
         values = self.hub.values

@@ -86,17 +86,14 @@ class SceneArrays(ById, ByNumber):
         self.mapped = False  # whether the nodes show a state of this simulation
 
     def fits(self, hub: Hub) -> bool:
-        """Tell whether the arrays are still those of the scene."""
         return self.key == scene_key(hub)
 
     @property
     def dt(self) -> float:
-        """Length of the next step."""
         return float(self.control.values[DT])
 
     @property
     def time(self) -> float:
-        """Present time."""
         return float(self.control.values[TIME])
 
     @property
@@ -173,7 +170,6 @@ class SceneArrays(ById, ByNumber):
 
     @property
     def bounces(self) -> int:
-        """Number of times that points were reflected at the edge of the domain."""
         return int(self.total("bounces"))
 
     def clear_forces(self) -> None:
@@ -202,7 +198,6 @@ class SceneArrays(ById, ByNumber):
             self.mapped = True
 
     def map_to_nodes(self) -> None:
-        """Let the nodes show the present state."""
         self.sort_if_due()
         s = self.setup
         dt = step_size(s)
@@ -217,7 +212,6 @@ class SceneArrays(ById, ByNumber):
         return checkpoint.copied(self, before or {})
 
     def restore(self, snapshot: dict[str, np.ndarray]) -> None:
-        """Return to a snapshot."""
         checkpoint.restore(self, snapshot)
 
     def wrong_points(self) -> Iterator[tuple[Any, int]]:

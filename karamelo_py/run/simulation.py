@@ -163,7 +163,6 @@ class Simulation(SceneArrays):
         return found
 
     def _measure(self) -> None:
-        """Measure the rate of the fastest point."""
         measure(self.setup)
         clock = self.control.clock[0]
         clock.rate = self.comm.allreduce_max(np.array([clock.rate]))[0]
@@ -183,7 +182,6 @@ class Simulation(SceneArrays):
 
     @property
     def ruling_limit(self) -> str:
-        """Name of what limits the step now."""
         return ruling_limit(self)
 
     @property
@@ -194,7 +192,6 @@ class Simulation(SceneArrays):
         return float(min(waves, clock.heat_limit))
 
     def above_limit(self) -> bool:
-        """Tell whether the step is above the stable limit."""
         return self.control.values[DT] > self.limit * (1 + 1e-12)
 
     def _watch_limit(self) -> None:

@@ -126,7 +126,6 @@ class Tiles:
         return self.long and not shaped and not self.direct
 
     def empty_tiling(self) -> Tiling:
-        """Room for the tiles of a block."""
         return Tiling(
             count=np.array([0, 1, 0]),
             share=np.zeros(SHARES + 1, np.int64),
@@ -245,7 +244,6 @@ class Tiles:
         return occupied
 
     def box_bytes(self, s: Setup) -> int:
-        """Bytes of the boxes of all tiles."""
         if self.direct:
             return 0
         given = [array for one in buffers_of(s) for array in summed(one.nodes)]
@@ -362,7 +360,6 @@ class Tiles:
         return np.concatenate(found)
 
     def _boxes(self, s: Setup) -> Boxes:
-        """The boxes of the tiles of all blocks."""
         d, tilings = self.dimension, [block.tiling for block in s.blocks]
         grid = np.concatenate([one.grid[: one.count[0]] for one in tilings])
         box = np.concatenate([one.box[: one.count[0]] for one in tilings])
@@ -370,7 +367,6 @@ class Tiles:
         return Boxes(np.arange(len(box)), grid, box[:, :d], box[:, d:], rows)
 
     def _reached(self, boxes: Boxes) -> tuple[Boxes, Reached]:
-        """Find the tiles of nodes that the boxes reach."""
         size = self.node_size
         low = boxes.lo // size
         across = boxes.hi // size - low + 1
@@ -489,5 +485,4 @@ def one_after_another(ranges: np.ndarray) -> np.ndarray:
 
 
 def in_tiles(tiling: Tiling) -> int:
-    """Number of the points in the tiles."""
     return int(tiling.range[: tiling.count[0], 1].max(initial=0))

@@ -199,7 +199,6 @@ def step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
 
 
 def share_of_heat(hub: Hub) -> float:
-    """The share of the stable step of conduction."""
     return USUAL if hub.update.dt_factor is None else hub.update.dt_factor
 
 

@@ -95,7 +95,6 @@ class SceneFacts:
 
     @cached_property
     def motions(self) -> list[BodyMotion]:
-        """Motions of the solids."""
         return motions(self.simulation)
 
     @cached_property
@@ -186,7 +185,6 @@ def _equivalent_stress(points: PointTable) -> np.ndarray:
 
 
 def law_parts(law: Any) -> Iterator[Any]:
-    """Give a law and its parts."""
     yield law
     for part in law:
         if isinstance(part, tuple):

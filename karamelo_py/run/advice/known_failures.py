@@ -120,7 +120,6 @@ class Step(NamedTuple):
 
     @property
     def command(self) -> str:
-        """Command by which the script asks for it."""
         return "set_dt" if self.fixed_dt else "dt_factor"
 
 
@@ -191,7 +190,6 @@ SPEEDS = 1.0, 5e4  # m/s, of waves: jelly to beyond diamond
 
 
 def _impossible_speeds(s: SceneFacts) -> Iterator[Advice]:
-    """Look for speeds that no solid bears."""
     laws = [solid.material.law for solid in s.hub.solids.values()]
     solid = any(not any(getattr(k, "any_speed", False) for k in law_kind(law)) for law in laws)
     if solid and s.speed > IMPOSSIBLE:

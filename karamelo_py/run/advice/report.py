@@ -82,7 +82,6 @@ def report(hub: Hub, end_time: float = inf) -> None:
 
 
 def _size(count: float) -> str:
-    """So many bytes, in words."""
     mib = count / 2**20
     return f"{mib:.0f} MiB" if mib > 100 else f"{mib:.3g} MiB"
 

@@ -26,7 +26,6 @@ def suggestions(hub: Hub, simulation: Any) -> list[Advice]:
 
 
 def _of_parts(hub: Hub, simulation: Any) -> Iterator[Advice]:
-    """Ask the rules of the parts."""
     return SceneFacts(hub, simulation, inf).advice("suggestion")
 
 
@@ -118,7 +117,6 @@ def _averaging(hub: Hub, simulation: Any) -> Iterator[Advice]:
 
 
 def _acting(hub: Hub) -> list[Any]:
-    """The fixes that do something in a run."""
     return [fix for fix in hub.fixes.values() if fix.hooks() or fix.for_method]
 
 

@@ -97,13 +97,11 @@ def in_file(state: dict[str, np.ndarray]) -> Iterator[Stored]:
 
 
 def wholes(arrays: Mapping[str, np.ndarray]) -> Iterator[Stored]:
-    """Yield arrays that are written at once."""
     for name, array in arrays.items():
         yield name, array.shape, ..., array
 
 
 def known(simulation: Any) -> dict[str, np.ndarray]:
-    """Return what all processes know."""
     shown = np.array([getattr(simulation, name) for name in SHOWN])
     return {"present": simulation.present, "shown": shown}
 
@@ -233,7 +231,6 @@ def _take_nodes(simulation: Any, state: Mapping[str, Any]) -> None:
 
 
 def of_nodes(s: Any) -> Iterator[tuple[str, np.ndarray]]:
-    """Every array of nodes, with its name."""
     for kind, nodes in (("nodes", s.nodes), ("heat", getattr(s.heat, "nodes", None))):
         if nodes is None:
             continue
@@ -244,14 +241,12 @@ def of_nodes(s: Any) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def take_tiling(tiling: Tiling, found: Mapping[str, np.ndarray], stem: str) -> Tiling:
-    """Put what `in_use` has given into a tiling."""
     for name, _ in in_use(tiling):
         _fill(getattr(tiling, name), found, stem + name)
     return tiling
 
 
 def _fill(array: np.ndarray, found: Mapping[str, np.ndarray], name: str) -> None:
-    """The first rows of `array` become those of the file."""
     if name not in found or len(found[name]) > len(array):
         raise _misfit(name)
     array[: len(found[name])] = found[name]

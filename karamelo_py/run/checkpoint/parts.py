@@ -122,7 +122,6 @@ def state_of(part: Any, arrays: list[np.ndarray], *, grows: bool = False) -> dic
 
 
 def give_state(part: Any, state: dict[str, Any], arrays: list[np.ndarray]) -> None:
-    """Give a part back what it remembered."""
     for name in named(part):
         kept, there = state.get(name, part), getattr(part, name)
         if isinstance(kept, dict) and "part" in kept:
@@ -139,11 +138,9 @@ class Grown:
         self.items, self.length, self.arrays = items, length, arrays
 
     def value(self) -> list:
-        """Return the items of then."""
         return self.items[: self.length]
 
     def plain(self) -> Any:
-        """Return them as JSON knows it."""
         return plain(self.value(), self.arrays)
 
 
@@ -154,11 +151,9 @@ class Unwritable:
         self.kept, self.fault = kept, fault
 
     def value(self) -> Any:
-        """Return a copy of it."""
         return _copied(self.kept)
 
     def plain(self) -> Any:
-        """Refuse to write it."""
         raise self.fault
 
 
@@ -242,7 +237,6 @@ class RollbackPoint:
 
     @property
     def parts(self) -> PartStates:
-        """The states of parts there."""
         return self._parts[self.step]
 
     def keep(self, simulation: Any) -> None:
@@ -260,7 +254,6 @@ class RollbackPoint:
         self._parts = {self.step: PartStates.of(self.hub)}
 
     def take(self, arrays: dict[str, np.ndarray], step: int, parts: PartStates) -> None:
-        """Take a state that a file holds."""
         self.arrays, self.step, self._parts = arrays, step, {step: parts}
 
     def note(self, *, always: bool) -> None:

@@ -46,13 +46,11 @@ class Restarts(Rhythmic):
         self.last_step = hub.update.step
 
     def write(self) -> None:
-        """Write the present state."""
         self.last_step = self.hub.update.step  # goes into the file
         write(self.hub, self.file, within=True)
 
 
 def path_of(hub: Hub, file: Path) -> Path:
-    """Name the file of the present state."""
     return hub.folder / str(file).replace("*", str(hub.update.step), 1)
 
 

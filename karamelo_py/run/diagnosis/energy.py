@@ -21,7 +21,6 @@ WHOLE = "more points a cell, a finer grid, cpgimp or ulcpdi, or method tlmpm"
 
 
 def not_watched(why: str) -> str:
-    """Say that energy is not watched."""
     return f"is not watched: nobody adds up the work of {why}"
 
 
@@ -116,7 +115,6 @@ def _time_across(simulation: Any) -> float:
 
 
 def _step_of(hub: Hub, simulation: Any, share: float) -> str:
-    """The words that make the step this share of the stable one."""
     if hub.update.fixed_dt is not None:
         return f"set_dt({share * simulation.limit:.3g})"
     return f"dt_factor({share:g})"

@@ -126,7 +126,6 @@ class Wrong(NamedTuple):
 
 
 def _first_wrong(simulation: Simulation) -> Wrong | None:
-    """The first of the points at hand that went wrong."""
     wrong = [(int(block.points.id[p]), block.points, p) for block, p in simulation.wrong_points()]
     if not wrong:
         return None
@@ -224,7 +223,6 @@ def _is_tangled(simulation: Simulation, place: np.ndarray, grid: int) -> bool:
 
 
 def _step_was_told(hub: Hub) -> bool:
-    """Tell whether a warning has said that the step is above the stable limit."""
     update = hub.update
     return step_by_script(update.fixed_dt, update.dt_factor) in update.warned_of
 

@@ -80,7 +80,6 @@ class _Builder:
         self.loaded_nodes = 0  # the number of nodes, where hooks bring forces
 
     def add(self, fix: Any, moment: str, hook: CompiledHook) -> None:
-        """Add one compiled hook of a fix, which acts at `moment` of a step."""
         begin, end = self._members(fix, hook)
         slot = -1
         if hook.publishes and fix.published:

@@ -146,7 +146,6 @@ def check_room(hub: Hub, *, copied: bool) -> None:
 
 
 def in_words(count: float) -> str:
-    """Write a number of bytes."""
     size = count / GIB
     return f"{size:.0f} GiB" if size >= 100 else f"{size:.3g} GiB"
 
@@ -187,7 +186,6 @@ def least_bytes(hub: Hub, real: type, copied: bool) -> float:
 
 
 def _largest(hub: Hub) -> Solid:
-    """Find the solid with most points."""
     return max(hub.solids.values(), key=lambda solid: solid.count)
 
 

@@ -170,7 +170,6 @@ class MpiComm(SerialComm):
         self.waited += time.perf_counter() - begun
 
     def disconnect(self, link: Any) -> None:
-        """Free requests."""
         for request in link:
             request.Free()
 
@@ -183,7 +182,6 @@ class MpiComm(SerialComm):
         self.abort()
 
     def abort(self, status: int = 1) -> None:
-        """End all processes at once."""
         self.world.Abort(status)
 
 

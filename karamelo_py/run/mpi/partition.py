@@ -373,7 +373,6 @@ class SharedTiles(Tiles):
         self.comm.start(self._under_way)
 
     def take(self) -> None:
-        """Wait for what others give."""
         self.comm.finish(self._under_way)
 
     def _link(self, arrays: list[np.ndarray]) -> tuple[list, Any]:

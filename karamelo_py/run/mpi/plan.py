@@ -121,7 +121,6 @@ def _share(simulation: Simulation, s: Setup, tiles: SharedTiles, per_node: int) 
 
 
 def _part(s: Setup, own: np.ndarray) -> Setup:
-    """Choose the tiles of which `own` says so."""
     blocks = []
     for block in s.blocks:
         which = np.flatnonzero(own[occupied(block.tiling)[0]])

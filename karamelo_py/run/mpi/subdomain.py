@@ -153,7 +153,6 @@ class Subdomain:
         self.load.pause()
 
     def learn(self) -> np.ndarray:
-        """Find what points and nodes cost."""
         self._learned_at = self.simulation.step
         self.load.learn(self.comm)
         return self.load.costs
@@ -194,7 +193,6 @@ class Subdomain:
     # --- what kernels ask for ---------------------------------------------------------------------
 
     def answer(self, what: int, a: int, b: int) -> int:
-        """Do what kernels ask for."""
         try:
             self.load.note()
             found = self._answers[what](self, a, b) or 0

@@ -153,7 +153,6 @@ class Whole:
         return tiles.owner, nodes, [one[nodes] for one in subdomain.contact_memory()]
 
     def _shares(self) -> list[dict[str, np.ndarray]] | None:
-        """Pack what each process has of the whole."""
         comm, owner = self.simulation.comm, self.simulation.tiles.owner
         if not comm.leads:
             return None
