@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.language import registry, rules
-from karamelo_py.output.point_table import PointTable
 from karamelo_py.points.transfers import Moment
 from karamelo_py.run import timestep
 from karamelo_py.run.body_motion import BodyMotion, Noise, drift_of, motions, turn_of
@@ -140,10 +139,9 @@ class SceneFacts:
         """Half of the largest difference of velocities over the speed of waves."""
         if not (self.motions and self.waves > 0):
             return 0.0
-        fast, slow = (
-            np.array([getattr(m, name) for m in self.motions]) for name in ("fast", "slow")
-        )
-        return float((fast.max(axis=0) - slow.min(axis=0)).max()) / 2 / self.waves
+        fast = np.max([one.fast for one in self.motions], axis=0)
+        slow = np.min([one.slow for one in self.motions], axis=0)
+        return float((fast - slow).max()) / 2 / self.waves
 
     @cached_property
     def vibration(self) -> Vibration:
@@ -177,11 +175,12 @@ class SceneFacts:
     @cached_property
     def shear_stress(self) -> float:
         """The largest equivalent stress of a point."""
-        return self.simulation.largest(_equivalent_stress)[0]
+        return self.simulation.largest(lambda points: points.particle("seq"))[0]
 
 
-def _equivalent_stress(points: PointTable) -> np.ndarray:
-    return points.particle("seq")
+def is_zero(formula: Any) -> bool:
+    """Tell whether a formula is not given, or always 0."""
+    return formula is None or (getattr(formula, "is_constant", False) and formula.constant == 0)
 
 
 def law_parts(law: Any) -> Iterator[Any]:

@@ -16,7 +16,7 @@ from karamelo_py.language.rules import Advice
 from karamelo_py.output.point_table import COMPONENTS, PointTable
 from karamelo_py.output.units import DENSITY, STRESS, VELOCITY
 from karamelo_py.points.laws import can, constrained_velocity, law_kind, specific_volume
-from karamelo_py.run.advice.facts import SceneFacts
+from karamelo_py.run.advice.facts import SceneFacts, is_zero
 from karamelo_py.run.diagnosis.explain import no_number
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.timestep import (
@@ -34,6 +34,10 @@ from karamelo_py.script.errors import ScriptError
 
 LOOK = 100  # steps: shorter runs look at a scene
 ENDLESS = 1e8  # steps
+MIXED = 300  # times the stable step, from where on units are likelier wrong than a guess
+DENSITIES = 10.0, 1e5  # kg/m^3, of all but gases: foams to beyond osmium
+IMPOSSIBLE = 30.0  # times the speed of waves: mm/s in the place of m/s make 1000 of 1
+SPEEDS = 1.0, 5e4  # m/s, of waves: jelly to beyond diamond
 REST = "a scene at rest"
 UNITS = (
     "in m, kg, s water has the density 1000, steel the modulus 2e11; in mm, t, s 1e-9 and 2e5 (MPa)"
@@ -57,22 +61,18 @@ def _rests(hub: Hub, simulation: Any) -> bool:
     parts = [type(p) for p in (update.method, update.method.basis, update.transfer, update.scheme)]
     parts += [kind for law in laws for kind in law_kind(law)]
     own = all(kind.__module__.startswith("karamelo_py.") for kind in parts)
-    acting = any((fix.hooks() and not _zero(fix)) or fix.for_method for fix in hub.fixes.values())
-    if acting or not own or update.thermal or any(can(law, constrained_velocity) for law in laws):
+    for fix in hub.fixes.values():
+        formulas = getattr(fix, "formulas", ())
+        holds_at_zero = formulas and all(map(is_zero, formulas))  # walls, loads that are none
+        if fix.for_method or (fix.hooks() and not holds_at_zero):
+            return False
+    if not own or update.thermal or any(can(law, constrained_velocity) for law in laws):
         return False
-    return simulation.fastest() == 0 and simulation.largest(_stress)[0] == 0
 
+    def stress(points: PointTable) -> np.ndarray:
+        return np.max([np.abs(points.particle("s" + c)) for c in COMPONENTS], axis=0)
 
-def _zero(fix: Any) -> bool:
-    """Tell whether a fix holds what it acts on at zero: walls, loads that are none."""
-    formulas = getattr(fix, "formulas", ())
-    return bool(formulas) and all(
-        formula is None or (formula.is_constant and formula.constant == 0) for formula in formulas
-    )
-
-
-def _stress(points: PointTable) -> np.ndarray:
-    return np.max([np.abs(points.particle("s" + c)) for c in COMPONENTS], axis=0)
+    return simulation.fastest() == 0 and simulation.largest(stress)[0] == 0
 
 
 def warn_about_length(hub: Hub, simulation: Any, end_time: float) -> None:
@@ -81,17 +81,16 @@ def warn_about_length(hub: Hub, simulation: Any, end_time: float) -> None:
     if not (isfinite(span) and span > ENDLESS * simulation.dt > 0):
         return
     about = f"about {span / simulation.dt:.2g} steps of {simulation.dt:.3g} from here to time"
+    why, hint = mixed_units(hub, simulation), UNITS
     if hub.update.fixed_dt is not None:
-        hub.warn(f"{about} {end_time:.6g}", hint="a larger step with set_dt, or an earlier end")
-        return
-    if ruling_limit(simulation) == "conduction":
-        hub.warn(
-            f"{about} {end_time:.6g}: heat goes through cells of {hub.domain.h:g} that fast. The "
-            "units of conductivities, heat capacities, lengths and times may be mixed",
-            hint="an earlier end, or larger cells; in m, kg, s, K copper has kappa = 401, cp = 385",
+        why, hint = "", "a larger step with set_dt, or an earlier end"
+    elif ruling_limit(simulation) == "conduction":
+        why = (
+            f"heat goes through cells of {hub.domain.h:g} that fast. The units of conductivities, "
+            "heat capacities, lengths and times may be mixed"
         )
-        return
-    hub.warn(f"{about} {end_time:.6g}: {mixed_units(hub, simulation)}", hint=UNITS)
+        hint = "an earlier end, or larger cells; in m, kg, s, K copper has kappa = 401, cp = 385"
+    hub.warn(f"{about} {end_time:.6g}" + (f": {why}" if why else ""), hint=hint)
 
 
 def mixed_units(hub: Hub, simulation: Any) -> str:
@@ -100,9 +99,6 @@ def mixed_units(hub: Hub, simulation: Any) -> str:
         f"waves move at {fastest_wave(simulation):.3g} through cells of {hub.domain.h:g}. The "
         "units of densities, moduli, lengths and times may be mixed"
     )
-
-
-MIXED = 300  # times the stable step, from where on units are likelier wrong than a guess
 
 
 class Step(NamedTuple):
@@ -117,10 +113,6 @@ class Step(NamedTuple):
     halves: bool
     scene: tuple
     span: tuple[float, float] = (inf, inf)
-
-    @property
-    def command(self) -> str:
-        return "set_dt" if self.fixed_dt else "dt_factor"
 
 
 def step_of(hub: Hub, halves: bool, span: tuple[float, float] = (inf, inf)) -> Step:
@@ -138,55 +130,31 @@ def warn_about_steps(
     hub: Hub, simulation: Simulation, halves: bool, *, again: bool = False
 ) -> None:
     """Say so once (or `again`) where this or a later step is above the stable limit."""
-    present = step_of(hub, halves)
-    _warn_about_step(hub, simulation, present, again=again)
-    for step in hub.later[len(hub.runs) :]:
-        if step.scene == present.scene:
-            _warn_about_step(hub, simulation, step, later=True)
-    hub.later.clear()
-
-
-def duration_of_later(hub: Hub, simulation: Simulation) -> float:
-    """Duration of the runs behind the next one that have the same scene, as far as is known."""
-    present = step_of(hub, False).scene
-    later = [step for step in hub.later[len(hub.runs) :] if step.scene == present]
-    spans = [min(s.span[0], s.span[1] * (s.fixed_dt or simulation.dt)) for s in later]
-    return fsum(span for span in spans if isfinite(span))
-
-
-def _warn_about_step(
-    hub: Hub, simulation: Simulation, step: Step, *, later: bool = False, again: bool = False
-) -> None:
-    limit = simulation.limit_moving
-    asked = step.fixed_dt or (step.dt_factor or 0) * limit
-    if not asked > limit * (1 + 1e-12):
-        return
+    present, limit = step_of(hub, halves), simulation.limit_moving
     of_heat = float(simulation.control.clock[0].heat_limit)
-    words = f"the step {asked:.4g} of {step.command} is "
-    hint = own_step_instead(hub, step.command)
-    if asked > BORNE * of_heat and not step.halves:
-        words += (
-            f"{asked / of_heat:.3g} times the stable one of conduction: temperatures would swing"
-        )
-        if not later:
-            raise ScriptError(words, place=step.place, hint=hint)
-    else:
-        words += f"above the stable limit {limit:.4g}"
-        words += (
-            f" of conduction; beyond {BORNE:g} times that temperatures swing"
-            if limit == of_heat
-            else what_follows(hub, simulation, asked)
-        )
-        if step.fixed_dt and asked > MIXED * limit and limit != of_heat:
-            words += f"; {mixed_units(hub, simulation)}"
-            hint = f"{UNITS}. If they are as they should be, {hint}"
-    if hub.update.first_time(step_by_script(step.fixed_dt, step.dt_factor)) or again:
-        hub.warn(words, place=step.place, hint=hint)
-
-
-DENSITIES = 10.0, 1e5  # kg/m^3, of all but gases: foams to beyond osmium
-IMPOSSIBLE = 30.0  # times the speed of waves: mm/s in the place of m/s make 1000 of 1
-SPEEDS = 1.0, 5e4  # m/s, of waves: jelly to beyond diamond
+    for step in (present, *hub.later[len(hub.runs) :]):
+        asked = step.fixed_dt or (step.dt_factor or 0) * limit
+        if step.scene != present.scene or not asked > limit * (1 + 1e-12):
+            continue
+        name = step_by_script(step.fixed_dt, step.dt_factor)
+        command = name.split()[0]
+        words, hint = f"the step {asked:.4g} of {command} is ", own_step_instead(hub, command)
+        if asked > BORNE * of_heat and not step.halves:
+            words += f"{asked / of_heat:.3g} times the stable one of conduction: "
+            words += "temperatures would swing"
+            if step is present:
+                raise ScriptError(words, place=step.place, hint=hint)
+        elif limit == of_heat:
+            words += f"above the stable limit {limit:.4g} of conduction; "
+            words += f"beyond {BORNE:g} times that temperatures swing"
+        else:
+            words += f"above the stable limit {limit:.4g}{what_follows(hub, simulation, asked)}"
+            if step.fixed_dt and asked > MIXED * limit:
+                words += f"; {mixed_units(hub, simulation)}"
+                hint = f"{UNITS}. If they are as they should be, {hint}"
+        if hub.update.first_time(name) or (again and step is present):
+            hub.warn(words, place=step.place, hint=hint)
+    hub.later.clear()
 
 
 def _impossible_speeds(s: SceneFacts) -> Iterator[Advice]:
@@ -231,7 +199,7 @@ def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> Non
     _warn_about_groups(hub)
     refuse_endless_speeds(hub, simulation)
     scene = SceneFacts(hub, simulation, duration)
-    scene.duration += _gone(hub, simulation) + duration_of_later(hub, simulation)
+    scene.duration += _gone(hub, simulation) + _duration_of_later(hub, simulation)
     if scene.waves > 0 and blows_up(hub, simulation):
         scene.duration = 0.0  # it never comes so far
     warn_about_steps(hub, simulation, halves)
@@ -253,6 +221,14 @@ def refuse_endless_speeds(hub: Hub, simulation: Simulation) -> None:
             "look for a formula that gives NaN or infinity, such as a division by zero",
         )
         raise ScriptError(found.message, place=found.place, hint=found.hint)
+
+
+def _duration_of_later(hub: Hub, simulation: Simulation) -> float:
+    """Duration of the runs behind the next one that have the same scene, as far as is known."""
+    present = step_of(hub, False).scene
+    later = [step for step in hub.later[len(hub.runs) :] if step.scene == present]
+    spans = [min(s.span[0], s.span[1] * (s.fixed_dt or simulation.dt)) for s in later]
+    return fsum(span for span in spans if isfinite(span))
 
 
 def _gone(hub: Hub, simulation: Simulation) -> float:

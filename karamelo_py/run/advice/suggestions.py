@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.language.rules import Advice
-from karamelo_py.run.advice.facts import SceneFacts
+from karamelo_py.run.advice.facts import SceneFacts, is_zero
 from karamelo_py.run.timestep import own_step
 from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
@@ -125,10 +125,6 @@ def _given(fix: Any) -> tuple:
     return tuple(fix.formulas) or (np.nan,) * 3
 
 
-def _is_zero(formula: Any) -> bool:
-    return formula is None or (getattr(formula, "is_constant", False) and formula.constant == 0)
-
-
 def _depends(formula: Any, axes: str) -> bool:
     if formula is None:
         return False
@@ -186,7 +182,7 @@ def _moves_nothing(hub: Hub, k: int, rest: list[int]) -> bool:
     """Tell whether fixes say nothing that is not 0 along direction k, nor depends on it."""
     for fix in _acting(hub):
         given = _given(fix)
-        if len(given) <= len(rest) or not _is_zero(given[k]):
+        if len(given) <= len(rest) or not is_zero(given[k]):
             return False
         if any(_depends(act, AXES[k]) for act in (*(given[j] for j in rest), fix.wall_friction)):
             return False
@@ -230,7 +226,7 @@ def _faces_held(hub: Hub, k: int, low: float, high: float) -> bool:
     held = np.zeros(lattice.shape, np.bool_)
     for fix in hub.fixes.values():
         if fix.prescribes_velocity and len(fix.formulas) > k and fix.formulas[k] is not None:
-            held.ravel()[fix.nodes - lattice.first] = _is_zero(fix.formulas[k])
+            held.ravel()[fix.nodes - lattice.first] = is_zero(fix.formulas[k])
     if held.all():
         return True
     planes = [(end * lattice.h - lattice.lo[k]) / lattice.spacing for end in (low, high)]
@@ -260,7 +256,7 @@ def _round(hub: Hub, simulation: Any) -> Iterator[Advice]:
 
     for fix in _acting(hub):
         act = _given(fix)
-        if len(act) < 3 or not all(_is_zero(act[axis]) for axis in across):
+        if len(act) < 3 or not all(is_zero(act[axis]) for axis in across):
             return
         if _depends(act[along], "".join(AXES[axis] for axis in across)):
             return
