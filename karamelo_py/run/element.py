@@ -174,13 +174,7 @@ class Point:
             observe()
 
     def _go(
-        self,
-        motion: Loading,
-        duration: float,
-        a: float,
-        b: float,
-        rate: np.ndarray,
-        divisions: int,
+        self, motion: Loading, duration: float, a: float, b: float, rate: np.ndarray, divisions: int
     ) -> np.ndarray:
         """Go from the part `a` of a motion to the part `b`, in halves where it must be."""
         try:
@@ -201,44 +195,39 @@ class Point:
         increment = (b - a) * motion.strain
         rigid = self._turned((b - a) * motion.turn, dt)
 
-        def state_after(unknown: np.ndarray) -> tuple:
+        def after(unknown: np.ndarray) -> tuple[tuple, np.ndarray] | None:
+            """The state and its stress; None where there is none."""
             increment[prescribed] = unknown
             dl = self._flat(self._strained(increment, motion) + rigid)
-            return laws.advance(self.law, self.kin, self.state, dl, dt)
-
-        def misfit(unknown: np.ndarray) -> np.ndarray:
             try:
-                state = state_after(unknown)
+                state = laws.advance(self.law, self.kin, self.state, dl, dt)
                 if laws.jacobian(self.law, self.kin, state) > 0:
-                    return self._stress(state)[prescribed] - target
+                    return state, self._stress(state)
             except (ArithmeticError, ValueError):
                 pass  # a logarithm of what is turned inside out, an overflow
-            return np.full(len(prescribed), np.inf)
+            return None
+
+        def misfit(unknown: np.ndarray) -> np.ndarray:
+            found = after(unknown)
+            return (
+                np.full(len(prescribed), np.inf) if found is None else found[1][prescribed] - target
+            )
 
         unknown = self._newton(misfit, rate * (b - a), increment, target)
-        try:
-            new = state_after(unknown)
-            sound = (
-                laws.jacobian(self.law, self.kin, new) > 0 and np.isfinite(self._stress(new)).all()
-            )
-        except (ArithmeticError, ValueError):
-            sound = False
-        if not sound:
+        found = after(unknown)
+        if found is None or not np.isfinite(found[1]).all():
             raise Unreachable("the point is turned inside out (det F <= 0) or has no stress")
-        self._accept(new, increment)
+        self._accept(found[0], increment)
         return unknown
 
     def _newton(
-        self,
-        misfit: Callable[[np.ndarray], np.ndarray],
-        guess: np.ndarray,
-        increment: np.ndarray,
-        target: np.ndarray,
+        self, misfit: Callable, guess: np.ndarray, increment: np.ndarray, target: np.ndarray
     ) -> np.ndarray:
         """The strains at which `misfit` vanishes, by a tangent from finite differences."""
         if not len(guess):
             return guess
-        modulus = self._modulus()
+        volume = laws.specific_volume(self.law) * laws.jacobian(self.law, self.kin, self.state)
+        modulus = laws.wave_speed_squared(self.law, self.kin, self.state) / volume
         unknown, found = guess, misfit(guess)
         if not np.isfinite(found).all():
             unknown = np.zeros(len(guess))
@@ -268,11 +257,6 @@ class Point:
                 break
             unknown, found = trial, there
         raise Unreachable("the law does not reach the prescribed stress")
-
-    def _modulus(self) -> float:
-        """Density times the square of the speed of waves."""
-        volume = laws.specific_volume(self.law) * laws.jacobian(self.law, self.kin, self.state)
-        return laws.wave_speed_squared(self.law, self.kin, self.state) / volume
 
     def _strained(self, increment: np.ndarray, motion: Loading) -> np.ndarray:
         """(3, 3) dt grad v of a strain increment: pure, or simple where the motion says so."""
@@ -322,10 +306,6 @@ class Point:
 WIDTH = 17  # as many as a number of ten digits, its sign and its exponent take, and a blank
 
 
-def pressure(point: Point) -> float:
-    return -float(point.stress[:3].sum()) / 3
-
-
 def von_mises_stress(point: Point) -> float:
     """sqrt(3/2 s:s), s the deviatoric stress."""
     xx, yy, zz, *shear = point.stress
@@ -342,7 +322,7 @@ def columns(point: Point) -> dict[str, Callable[[], float]]:
         found[f"e{name}"] = lambda k=k: point.strain[k]
     for k, name in enumerate(COMPONENTS[:count]):
         found[f"s{name}"] = lambda k=k: point.stress[k]
-    found["p"] = lambda: pressure(point)
+    found["p"] = lambda: -float(point.stress[:3].sum()) / 3
     found["q"] = lambda: von_mises_stress(point)
     found["J"] = lambda: materials.jacobian(law, kin, point.state)
     found["stored"] = lambda: materials.energy_density(law, kin, point.state)

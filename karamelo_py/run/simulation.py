@@ -20,7 +20,6 @@ from karamelo_py.run.diagnosis.energy import unknown_heat, unknown_work
 from karamelo_py.run.lower.hooks import PythonHooks, sets_initial_state, views_of
 from karamelo_py.run.mpi.whole import PointsMoved, Whole
 from karamelo_py.run.scene_arrays import SceneArrays
-from karamelo_py.run.tiles import in_tiles
 from karamelo_py.run.timestep import (
     common_velocity,
     moves_already,
@@ -233,8 +232,9 @@ class Simulation(SceneArrays):
 
     def _outside_tiles(self) -> int:
         """Count the blocks that have points which were not sorted yet."""
-        blocks = self.setup.blocks
-        own = sum(in_tiles(block.tiling) != block.points.mass.size for block in blocks)
+        own = 0
+        for points, tiling in ((block.points, block.tiling) for block in self.setup.blocks):
+            own += tiling.range[: tiling.count[0], 1].max(initial=0) != points.mass.size
         return int(self.comm.allreduce(np.array([own]))[0])
 
     def energy(self) -> float:

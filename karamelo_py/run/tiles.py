@@ -108,7 +108,10 @@ class Tiles:
         shaped = shape_size(type(basis), d) > 0
         self._most_rows = inf if shaped else most
         rows = np.prod(widest[:, :-1], axis=1, dtype=np.int64).max()
-        self._most_in_box = int(rows) if self._by_rows(shaped) else 0  # rows of a box, at most
+        # Of each row of a box the part that points may reach is known where rows of nodes are tiles:
+        # of the boxes around a bar that has spread at one end they reach little at the other.
+        by_rows = self.long and not shaped and not self.direct
+        self._most_in_box = int(rows) if by_rows else 0  # rows of a box, at most
         self.count = int(self.first[-1])  # of tiles, of all grids
         self._cut = TileGrid(self.size, self.shapes, self.first)
         tiles = -(-self._nodes // self.node_size)
@@ -116,14 +119,6 @@ class Tiles:
         self._first_of_nodes = numbered(tiles)
         # Of all buffers of a scene: count, first and parts.
         self._layout = np.zeros(2, np.int64), np.zeros(1, np.int64), np.zeros((0, 10), np.int64)
-
-    def _by_rows(self, shaped: bool) -> bool:
-        """Check that the part that points may reach is known of each row of a box.
-
-        Rows of nodes are tiles of nodes then. Of the boxes around a bar that has spread at one end
-        points reach little at the other.
-        """
-        return self.long and not shaped and not self.direct
 
     def empty_tiling(self) -> Tiling:
         return Tiling(
@@ -206,11 +201,12 @@ class Tiles:
         reach = self._reach(s, block, x)
         # Some parts for each thread: tiles are not of like size, and others may need a core. Of few
         # points, or fewer than tiles, one thread has sorted all before several have met.
-        parts = min(4 * self.threads, x.shape[1] // PART, 4 * x.shape[1] // self.count)
+        parts, mode = (
+            min(4 * self.threads, x.shape[1] // PART, 4 * x.shape[1] // self.count),
+            self.mode,
+        )
         if self.threads == 1 or parts < 2:
             parts, mode = 1, Serial()
-        else:
-            mode = self.mode
         scratch = np.empty((4, x.shape[1]), np.int64)
         found = SortedOrder(
             lanes_for(8 * x.itemsize).width,
@@ -274,12 +270,8 @@ class Tiles:
         parts = np.ones((len(spans), 10), np.int64)
         parts[:, 0], parts[:, 4] = spans[:, 0], spans[:, 1] - spans[:, 0]
         parts[:, 9] = CLEAR
-        return (
-            spans,
-            ranges_of_shares(spans, np.zeros(len(spans), np.int64), 1),
-            [0, len(spans)],
-            parts,
-        )
+        ranges = ranges_of_shares(spans, np.zeros(len(spans), np.int64), 1)
+        return spans, ranges, [0, len(spans)], parts
 
     def _parts_to_sum(self, s: Setup) -> tuple[np.ndarray, ...]:
         """Spans and ranges of the nodes in tiles that boxes reach; first of each share, and parts.
@@ -313,12 +305,8 @@ class Tiles:
         firsts = np.append(starts + np.cumsum(more) - more, len(parts))
         rows = np.stack(rows_of(own), axis=1)
         ranges = ranges_of_shares(rows, np.repeat(owner, own[:, 2] * own[:, 3]), SHARES)
-        return (
-            joined_spans(own),
-            ranges,
-            firsts[np.searchsorted(owner, np.arange(SHARES + 1))],
-            parts,
-        )
+        firsts = firsts[np.searchsorted(owner, np.arange(SHARES + 1))]
+        return joined_spans(own), ranges, firsts, parts
 
     def _beside(self, tile: np.ndarray, grid: np.ndarray) -> np.ndarray:
         """The first of the tiles of nodes (n,) that are of one share with each.
@@ -393,7 +381,12 @@ class Tiles:
         begins = np.concatenate([[0], ends])[:-1]
         first = begins - (boxes.lo * steps).sum(axis=1)
         self._tell_buffers(s, begins, ends, first, steps)
-        self._make_room(s, int(ends[-1]) if len(ends) else 0)
+        self.rows = int(ends[-1]) if len(ends) else 0
+        if self.rows > MAX_NODES:
+            raise MemoryError(f"tiles of points would need {self.rows} records of nodes")
+        for one in buffers_of(s):
+            for array in summed(one.nodes):
+                grow(array, self.rows)
         return first, steps
 
     def _tell_buffers(self, s: Setup, begins, ends, first, steps) -> None:
@@ -406,15 +399,6 @@ class Tiles:
             count = block.tiling.count[0]
             block.tiling.buffer[:count] = columns[done : done + count]
             done += count
-
-    def _make_room(self, s: Setup, rows: int) -> None:
-        """Make the buffers as large as the boxes of all tiles need."""
-        if rows > MAX_NODES:
-            raise MemoryError(f"tiles of points would need {rows} records of nodes")
-        self.rows = rows
-        for one in buffers_of(s):
-            for array in summed(one.nodes):
-                grow(array, rows)
 
     def _see_nodes(
         self, tiles: np.ndarray, grid: np.ndarray, begin: np.ndarray, end: np.ndarray
@@ -482,7 +466,3 @@ def one_after_another(ranges: np.ndarray) -> np.ndarray:
     """Ranges (k, 2) as long as these, each from the end of the one before."""
     ends = np.cumsum(ranges[:, 1] - ranges[:, 0])
     return np.stack([np.append(0, ends)[:-1], ends], axis=1)
-
-
-def in_tiles(tiling: Tiling) -> int:
-    return int(tiling.range[: tiling.count[0], 1].max(initial=0))
