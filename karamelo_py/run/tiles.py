@@ -108,8 +108,8 @@ class Tiles:
         shaped = shape_size(type(basis), d) > 0
         self._most_rows = inf if shaped else most
         rows = np.prod(widest[:, :-1], axis=1, dtype=np.int64).max()
-        # Of each row of a box the part that points may reach is known where rows of nodes are tiles:
-        # of the boxes around a bar that has spread at one end they reach little at the other.
+        # What points may reach is known of each row of a box where rows of nodes are tiles: of the
+        # boxes around a bar that has spread at one end they reach little at the other.
         by_rows = self.long and not shaped and not self.direct
         self._most_in_box = int(rows) if by_rows else 0  # rows of a box, at most
         self.count = int(self.first[-1])  # of tiles, of all grids

@@ -7,7 +7,7 @@ which fields exist (`karamelo-py check` prints them) and, by their types, what i
 import copy
 import os
 from collections.abc import Iterable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -78,34 +78,34 @@ class State(NamedTuple):
 
 def check_scene(hub: Hub) -> None:
     """A scene without domain, method or solids cannot run: say what is missing."""
-    if hub.domain is None:
-        raise ScriptError(
-            "no domain is defined", hint="put dimension(2, xmin, xmax, ymin, ymax, h) before run"
-        )
-    if hub.update.method is None:
-        raise ScriptError(
-            "no method is defined", hint="put method(ulmpm, FLIP, linear, 0.99) before run"
-        )
-    if not hub.solids:
-        raise ScriptError(
+    missing = (
+        (hub.domain, "no domain is defined", "dimension(2, xmin, xmax, ymin, ymax, h)"),
+        (hub.update.method, "no method is defined", "method(ulmpm, FLIP, linear, 0.99)"),
+        (
+            hub.solids or None,
             "there is no solid to move",
-            hint="put solid(ID, region, regionID, points per cell, material, h, T0) before run",
-        )
+            "solid(ID, region, regionID, points per cell, material, h, T0)",
+        ),
+    )
+    for part, message, command in missing:
+        if part is None:
+            raise ScriptError(message, hint=f"put {command} before run")
     method = hub.update.method
     try:
         method.check(hub)
-        check_heat(hub)
+        warm = any(can(solid.material.law, initial_heat) for solid in hub.solids.values())
+        if hub.update.thermal and not warm:
+            raise ScriptError(
+                "the method is thermo-mechanical, and no solid has a temperature",
+                hint="give a material one: material(ID, linear, rho, E, nu, cp, kappa), or "
+                "temperature(...) with eos-strength",
+            )
     except ScriptError as error:
         if error.place is None:
             error.place, error.command = method.place, "method"
         raise
     boundary.check(hub)
-    check_rigid(hub)
-
-
-def check_rigid(hub: Hub) -> None:
-    """Refuse rigid bodies whose points would have domains that deform."""
-    method = hub.update.method
+    # Points of rigid bodies would have domains that deform.
     basis = type(method.basis)
     if not method.frame.moves or not (deformed.defined(basis) or carried.defined(basis)):
         return
@@ -154,18 +154,6 @@ def stable_conduction(hub: Hub) -> float:
     return min(limits)
 
 
-def check_heat(hub: Hub) -> None:
-    """Heat needs a body that it can flow in."""
-    if hub.update.thermal and not any(
-        can(solid.material.law, initial_heat) for solid in hub.solids.values()
-    ):
-        raise ScriptError(
-            "the method is thermo-mechanical, and no solid has a temperature",
-            hint="give a material one: material(ID, linear, rho, E, nu, cp, kappa), or "
-            "temperature(...) with eos-strength",
-        )
-
-
 def lower(
     hub: Hub,
     previous: State | None = None,
@@ -211,8 +199,7 @@ def lower(
     if hub.update.thermal:
         at_nodes = lower_nodes((NodalMean,), Line(), count, real)
         heat = Conducting(at_nodes, tiles.empty_buffers(at_nodes, len(hub.solids)))
-    owners = [method.frame, transfer, averaging, contact, heat, grids]
-    owners += [*hub.fixes.values(), hub.update.scheme, basis, method]
+    owners = owners_of(hub, basis, transfer, averaging, contact, heat, grids)
     kinds = [
         kind
         for kind in fields.declared(owners, "node_fields")
@@ -223,6 +210,16 @@ def lower(
     if warms_by_friction(hub):
         kinds.append(FrictionalHeat)
     at_nodes = lower_nodes(kinds, kin, count, real)
+    # One block for each kind of law, in the order in which the solids use them.
+    alike: dict[tuple, list] = {}
+    for solid in hub.solids.values():
+        part = solid if ids is None else part_of(solid, *ids)
+        alike.setdefault(law_kind(solid.material.law), []).append(part)
+    of_points = fields.declared(owners, "point_fields")
+    blocks = (
+        Block(*lower_points(hub, solids, kin, of_points, real), tiles.empty_tiling())
+        for solids in alike.values()
+    )
     setup = Setup(
         frame=method.frame,
         kin=kin,
@@ -234,15 +231,7 @@ def lower(
         grids=grids,
         nodes=at_nodes,
         buffers=tiles.empty_buffers(at_nodes, len(hub.solids)),
-        blocks=lower_blocks(
-            hub,
-            [solid if ids is None else part_of(solid, *ids) for solid in hub.solids.values()],
-            kin,
-            fields.declared(owners, "point_fields"),
-            tiles,
-            real,
-            previous,
-        ),
+        blocks=tuple(blocks if previous is None else (resumed(one, previous) for one in blocks)),
         **no_nodes(),
         control=control,
     )
@@ -296,48 +285,19 @@ def part_of(solid: Solid, first: int, end: int) -> Solid:
     return other
 
 
-def lower_blocks(
-    hub, solids: Iterable[Solid], kin, kinds: tuple, tiles: Tiles, real: type,
-    previous: State | None,
-) -> tuple:  # fmt: skip
-    """One block for each kind of law, in the order in which the solids use them."""
-    alike: dict[tuple, list] = {}
-    for solid in solids:
-        alike.setdefault(law_kind(solid.material.law), []).append(solid)
-    return tuple(
-        lower_block(hub, members, kin, kinds, tiles, real, previous) for members in alike.values()
-    )
-
-
-def start(law, T0: float | None, kin, real: type) -> np.ndarray:
-    """The state (s,) of a point at rest."""
-    state = initial_state(law, kin, real(1))
-    state = state if T0 is None else with_temperature(law, kin, state, real(T0))
-    return np.array(flat(state), real)
+def owners_of(hub: Hub, basis: Any, *others: Any) -> list:
+    """List what may declare fields: the parts of a scene, and `others`."""
+    update = hub.update
+    return [update.method.frame, *others, *hub.fixes.values(), update.scheme, basis, update.method]
 
 
 def point_kinds(hub: Hub, real: type) -> tuple[type, ...]:
     """The declared fields of the points, as far as no array of nodes has to be made for that."""
-    method, thermal = hub.update.method, hub.update.thermal
-    owners = [method.frame, hub.update.transfer_tag(real), method.averaging(hub)]
-    owners += [Conducting] if thermal else []
-    owners += [ReflectingGrid] if hub.update.boundary == "reflect" else []
-    owners += [*hub.fixes.values(), hub.update.scheme, method.basis, method]
-    return fields.declared(owners, "point_fields")
-
-
-def lower_block(
-    hub: Scene,
-    solids: list,
-    kin: NamedTuple,
-    kinds: tuple[type, ...],
-    tiles: Tiles,
-    real: type,
-    previous: State | None,
-) -> Block:
-    """The points of all solids whose law is of one kind."""
-    block = Block(*lower_points(hub, solids, kin, kinds, real), tiles.empty_tiling())
-    return block if previous is None else resumed(block, previous)
+    update = hub.update
+    others = [update.transfer_tag(real), update.method.averaging(hub)]
+    others += [Conducting] if update.thermal else []
+    others += [ReflectingGrid] if update.boundary == "reflect" else []
+    return fields.declared(owners_of(hub, update.method.basis, *others), "point_fields")
 
 
 def lower_points(
@@ -365,7 +325,13 @@ def lower_points(
             array[..., end - s.count : end] = value
         return array
 
-    states = (start(law_in(k, real), s.T0, kin, real) for s, k in zip(solids, known, strict=True))
+    def at_rest(solid: Solid, law: NamedTuple) -> np.ndarray:
+        state = initial_state(law, kin, real(1))
+        if solid.T0 is not None:
+            state = with_temperature(law, kin, state, real(solid.T0))
+        return np.array(flat(state), real)[:, None]
+
+    states = (at_rest(s, law_in(k, real)) for s, k in zip(solids, known, strict=True))
     places = joined((method.places(kin, s, real).T for s in solids), real)
     here = places if method.frame.moves else places[: kin.dimension]
     x = fields.rows_of_points((2, *here.shape), real)
@@ -377,7 +343,7 @@ def lower_points(
         home=None if method.frame.moves else places,
         v=joined((np.zeros((kin.dimension, 1)) for _ in solids), real),
         mass=joined((s.mass for s in solids), real),
-        state=joined((state[:, None] for state in states), real),
+        state=joined(states, real),
         material=joined((laws_of_solids.index(law) for law in known), np.int32),
         grid=joined((method.lattice_of(hub, s) for s in solids), np.int32),
         id=joined((np.arange(s.first_id, s.first_id + s.count) for s in solids), np.int64),
