@@ -214,12 +214,9 @@ def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> Non
 def refuse_endless_speeds(hub: Hub, simulation: Simulation) -> None:
     """Refuse velocities of points that are no numbers, with the formula that they come from."""
     if not isfinite(simulation.fastest()):
-        found = no_number(
-            hub,
-            simulation,
-            f"points have a velocity that is not a number at time {simulation.time:.6g}",
-            "look for a formula that gives NaN or infinity, such as a division by zero",
-        )
+        what = f"points have a velocity that is not a number at time {simulation.time:.6g}"
+        hint = "look for a formula that gives NaN or infinity, such as a division by zero"
+        found = no_number(hub, simulation, what, hint)
         raise ScriptError(found.message, place=found.place, hint=found.hint)
 
 

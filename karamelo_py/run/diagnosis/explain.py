@@ -50,14 +50,16 @@ def trouble(hub: Hub, simulation: Simulation, status: int) -> Trouble:
     return Trouble(message, hint, place)
 
 
+def _when(simulation: Simulation) -> str:
+    return f"step {simulation.step}, time {simulation.time:.6g}"
+
+
 def _above_limit(hub: Hub, simulation: Simulation) -> tuple[str, str]:
-    limit = simulation.limit
-    message = (
-        f"step {simulation.step}, time {simulation.time:.6g}: the step {simulation.dt:g} is above "
-        f"the stable limit, which has fallen to {limit:.4g}"
-    )
     speed, fastest = simulation.largest(_speeds)
-    message += f" ({named(hub, fastest)} moves at {speed:.4g})"
+    message = (
+        f"{_when(simulation)}: the step {simulation.dt:g} is above the stable limit, which has "
+        f"fallen to {simulation.limit:.4g} ({named(hub, fastest)} moves at {speed:.4g})"
+    )
     return message, own_step_instead(hub)
 
 
@@ -65,26 +67,20 @@ def _speeds(points: PointTable) -> np.ndarray:
     return np.abs(points.velocity).max(axis=1, initial=0.0)
 
 
-def _no_number(points: PointTable) -> np.ndarray:
-    return 1.0 * ~np.isfinite(points.particle("ienergy"))
-
-
 def _gained(hub: Hub, simulation: Simulation) -> tuple[str, str]:
-    clock = simulation.control.clock[0]
+    clock, when = simulation.control.clock[0], _when(simulation)
     if not np.isfinite(clock.balance):
-        _, first = simulation.largest(_no_number)
-        message = (
-            f"step {simulation.step}, time {simulation.time:.6g}: energy is no number any more; "
-            f"the first point whose state is none is {named(hub, first)}"
-        )
+        _, first = simulation.largest(lambda points: 1.0 * ~np.isfinite(points.particle("ienergy")))
+        message = f"{when}: energy is no number any more; "
+        message += f"the first point whose state is none is {named(hub, first)}"
         return message, "look at the parameters of its material, and at what acts on it from Python"
     given = abs(clock.first_balance) + clock.supplied
     cause, cure = energy.cause_of_gain(hub, simulation)
     times = (clock.balance - clock.first_balance) / given if given > 0 else np.inf
     message = (
-        f"step {simulation.step}, time {simulation.time:.6g}: {times:.3g} times the energy that "
-        "there was at the start and that loads have brought has come from nowhere "
-        f"(kinetic + stored + dissipated - work). Known to do that here: {cause}"
+        f"{when}: {times:.3g} times the energy that there was at the start and that loads have "
+        "brought has come from nowhere (kinetic + stored + dissipated - work). Known to do that "
+        f"here: {cause}"
     )
     return message, cure
 
@@ -92,7 +88,7 @@ def _gained(hub: Hub, simulation: Simulation) -> tuple[str, str]:
 def _heated(hub: Hub, simulation: Simulation) -> tuple[str, str]:
     clock = simulation.control.clock[0]
     share = clock.last_dt / clock.heat_limit
-    message = f"step {simulation.step}, time {simulation.time:.6g}: "
+    message = f"{_when(simulation)}: "
     if share > 1:
         message += f"the step is {share:.3g} times the stable one of conduction, and "
     message += (
@@ -106,10 +102,9 @@ def _heated(hub: Hub, simulation: Simulation) -> tuple[str, str]:
 def _shrunk(hub: Hub, simulation: Simulation) -> tuple[str, str]:
     (speed, fastest), (volume, widest) = map(simulation.largest, (_speeds, energy.swelling))
     message = (
-        f"step {simulation.step}, time {simulation.time:.6g}: the stable step has fallen to "
-        f"{simulation.limit:.3g}, less than a millionth of the first "
-        f"({named(hub, fastest)} moves at {speed:.3g}, "
-        f"{named(hub, widest)} has {volume:.3g} times its volume)"
+        f"{_when(simulation)}: the stable step has fallen to {simulation.limit:.3g}, less than a "
+        f"millionth of the first ({named(hub, fastest)} moves at {speed:.3g}, {named(hub, widest)} "
+        f"has {volume:.3g} times its volume)"
     )
     smaller = _smaller_step(hub, simulation)
     return message, f"something went wrong before: look at the dumps; {smaller}"
@@ -138,12 +133,10 @@ def _wrong_point(hub: Hub, simulation: Simulation) -> tuple:
     """Find what is wrong with the first point that went wrong, and what can be done."""
     wrong = [one for one in simulation.seen(_first_wrong) if one is not None]
     if not wrong and hub.update.thermal:
-        return no_number(
-            hub,
-            simulation,
-            "the temperature of a point is not a number",
-            "look at the fixes that act on heat: a formula that gives NaN, or heat without bounds",
+        hint = (
+            "look at the fixes that act on heat: a formula that gives NaN, or heat without bounds"
         )
+        return no_number(hub, simulation, "the temperature of a point is not a number", hint)
     if not wrong:
         return "a point went wrong", "use a smaller step"
     number, old, place, v, grid = min(wrong, key=lambda one: one.number)
@@ -151,19 +144,12 @@ def _wrong_point(hub: Hub, simulation: Simulation) -> tuple:
     old, new = old[:d], place[:d]
     smaller = _smaller_step(hub, simulation)
     if not np.isfinite(old).all():
-        return no_number(
-            hub,
-            simulation,
-            f"{name} has no position (NaN)",
-            f"look for a formula that gives NaN; {smaller}",
-        )
+        hint = f"look for a formula that gives NaN; {smaller}"
+        return no_number(hub, simulation, f"{name} has no position (NaN)", hint)
     if not np.isfinite(new).all() or not np.isfinite(v).all():
-        return no_number(
-            hub,
-            simulation,
-            f"{name} at {_place(old)} gets a velocity that is not a number",
-            f"look for a formula that gives NaN, such as a division by zero; else {smaller}",
-        )
+        what = f"{name} at {_place(old)} gets a velocity that is not a number"
+        hint = f"look for a formula that gives NaN, such as a division by zero; else {smaller}"
+        return no_number(hub, simulation, what, hint)
     lo, hi = hub.domain.lo[:d], hub.domain.hi[:d]
     if hub.update.method.frame.moves and ((new < lo).any() or (new > hi).any()):
         side = next(k for k in range(d) if new[k] < lo[k] or new[k] > hi[k])
@@ -180,10 +166,8 @@ def _wrong_point(hub: Hub, simulation: Simulation) -> tuple:
         )
     move = float(np.abs(new - old).max()) / h
     if move > 1:
-        return (
-            f"{name} at {_place(old)} moves by {move:.3g} cells in one step",
-            f"the run is unstable: {smaller}",
-        )
+        what = f"{name} at {_place(old)} moves by {move:.3g} cells in one step"
+        return what, f"the run is unstable: {smaller}"
     if any(simulation.seen(_is_tangled, place, grid)):
         tangled, plain = type(hub.update.method.basis).__name__, "R4" if d == 2 else "R8"
         instead = f", {plain} in the place of {tangled}" if tangled in ("Q4", "H8") else ""
@@ -200,18 +184,18 @@ def _wrong_point(hub: Hub, simulation: Simulation) -> tuple:
 
 def _loose(simulation: Simulation, number: int, x: np.ndarray, reach: float) -> bool:
     """Tell whether a point has a solid of others, none of which is near."""
-    others, near = np.sum(simulation.seen(_others, number, x, reach), axis=0)
-    return others > 0 and near == 0
+    solid = solid_with(simulation.hub, number)
 
+    def others(simulation: Simulation) -> tuple[int, int]:
+        found, near = 0, 0
+        for some in simulation.some(None):
+            own = (some.solid == solid.index) & (some.ids != number)
+            apart = np.abs(some.position[own] - x).max(axis=1, initial=0.0)
+            found, near = found + len(apart), near + int(np.sum(~(apart > reach)))
+        return found, near
 
-def _others(simulation: Simulation, number: int, x: np.ndarray, reach: float) -> tuple[int, int]:
-    """Count the other points of the solid of a point, at hand and near it."""
-    solid, others, near = solid_with(simulation.hub, number), 0, 0
-    for some in simulation.some(None):
-        own = (some.solid == solid.index) & (some.ids != number)
-        apart = np.abs(some.position[own] - x).max(axis=1, initial=0.0)
-        others, near = others + len(apart), near + int(np.sum(~(apart > reach)))
-    return others, near
+    found, near = np.sum(simulation.seen(others), axis=0)
+    return found > 0 and near == 0
 
 
 def _is_tangled(simulation: Simulation, place: np.ndarray, grid: int) -> bool:
