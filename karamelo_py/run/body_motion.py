@@ -146,15 +146,6 @@ def yields(law: Any) -> bool:
     return not any(getattr(kind, "rebounds", False) for kind in law_kind(law))
 
 
-def _feeds(s: Any) -> bool:
-    """Tell whether the scheme is one of which these numbers are known."""
-    return hasattr(s.scheme, "keeping")
-
-
-def _averages(s: Any) -> bool:
-    return getattr(s.scheme, "bears_drift", False)
-
-
 def _bodies(s: Any) -> list[tuple[BodyMotion, Any]]:
     """The solids that may vibrate, and how they move."""
     solids = list(s.hub.solids.values())
@@ -163,11 +154,15 @@ def _bodies(s: Any) -> list[tuple[BodyMotion, Any]]:
 
 
 def drift_of(s: Any) -> Noise | None:
-    """Measure what the drift in the scene `s` (SceneFacts) feeds, also where that is borne."""
-    if not (_feeds(s) and s.moves and s.kept > 0.9):
+    """Measure what the drift in the scene `s` (SceneFacts) feeds, also where that is borne.
+
+    Schemes of which these numbers are known say what steps keep energy (`keeping`).
+    """
+    if not (hasattr(s.scheme, "keeping") and s.moves and s.kept > 0.9):
         return None
     known, spacing = borne(s.basis), float(s.simulation.control.clock[0].spacing)
-    bound = (known.averaged if _averages(s) else known.drift)[s.sparse]
+    averages = getattr(s.scheme, "bears_drift", False)
+    bound = (known.averaged if averages else known.drift)[s.sparse]
     bound /= known.line if s.d == 1 else 1
     speed = cells = 0.0
     for one, law in _bodies(s):
@@ -186,11 +181,12 @@ def drift_of(s: Any) -> Noise | None:
 def turn_of(s: Any) -> Noise | None:
     """Measure what the turn in the scene `s` feeds, also where that is borne."""
     turns = s.moments or (s.moves and s.kept > 0.9)
-    if not (_feeds(s) and turns and s.d > 1) or s.hub.domain.axisymmetric:
+    if not (hasattr(s.scheme, "keeping") and turns and s.d > 1) or s.hub.domain.axisymmetric:
         return None
     known, spacing = borne(s.basis), float(s.simulation.control.clock[0].spacing)
     dt, one_point, most = s.simulation.dt, s.sparse, None
-    bound = (known.rim_averaged if _averages(s) else known.rim)[one_point]
+    averages = getattr(s.scheme, "bears_drift", False)
+    bound = (known.rim_averaged if averages else known.rim)[one_point]
     for one, _ in _bodies(s):
         speed, angle = one.spin * one.reach / s.waves, one.spin * s.duration
         if speed <= SLOW or held(s, one).any():

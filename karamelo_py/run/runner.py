@@ -143,7 +143,7 @@ def carry_out(hub: Hub, **length: Any) -> None:
     if replay is None or replay.at_end:
         runner.run()
         return
-    after = hub.restart.runs[len(hub.runs)]
+    after = hub.restart.content["runs"][len(hub.runs)]
     for name, value in after.items():
         if name in hub.values:
             hub.values.set(name, value)

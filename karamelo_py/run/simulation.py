@@ -21,10 +21,10 @@ from karamelo_py.run.lower.hooks import PythonHooks, sets_initial_state, views_o
 from karamelo_py.run.mpi.whole import PointsMoved, Whole
 from karamelo_py.run.scene_arrays import SceneArrays
 from karamelo_py.run.timestep import (
+    USUAL,
     common_velocity,
     moves_already,
     ruling_limit,
-    share_of_heat,
     step_of_waves,
     weight_of_drift,
 )
@@ -66,13 +66,6 @@ class Simulation(SceneArrays):
     @begun.setter
     def begun(self, IDs: list[str]) -> None:
         self._begun = {self.hub.fixes[ID] for ID in IDs if ID in self.hub.fixes}
-
-    @property
-    def acting_from_python(self) -> list[str]:
-        """Words for the fixes that act in Python in each step, on the whole scene."""
-        acting = (fix for pairs in self._python.by_stage.values() for fix, _ in pairs)
-        whole = (fix for fix in dict.fromkeys(acting) if not fix.point_by_point)
-        return [f"fix {fix.style} '{fix.id}'" for fix in whole]
 
     def begin(self, end_time: float) -> None:
         """Start of a run: choose the first dt; the run ends at `end_time` at the latest."""
@@ -125,13 +118,18 @@ class Simulation(SceneArrays):
     def _ask_for_steps(self, halvings: int) -> bool:
         """Tell the clock which steps are asked for; whether these are others than before."""
         clock = self.control.clock[0]
-        names = "fixed_dt", "heat_factor", "dt_factor", "dt_factor_moving"
-        courants = "courant", "courant_moving"
-        before = [clock[name] for name in (*courants, *names)]
         now, moving = (step_of_waves(self.hub, still=s) for s in (clock.path <= STILL, False))
-        asked = self.hub.update.fixed_dt or 0.0, share_of_heat(self.hub), now[1], moving[1]
-        numbers = [now[0], moving[0], *(number / 2**halvings for number in asked)]
-        for name, number in zip((*courants, *names), numbers, strict=True):
+        update, share = self.hub.update, 1 / 2**halvings
+        numbers = {
+            "courant": now[0],
+            "courant_moving": moving[0],
+            "fixed_dt": (update.fixed_dt or 0.0) * share,
+            "heat_factor": (update.dt_factor or USUAL) * share,
+            "dt_factor": now[1] * share,
+            "dt_factor_moving": moving[1] * share,
+        }
+        before = {name: clock[name] for name in numbers}
+        for name, number in numbers.items():
             clock[name] = number
         weight = weight_of_drift(self.hub)
         if weight != clock.weight:
@@ -257,7 +255,7 @@ class Simulation(SceneArrays):
         with self.comm.joint():
             if self.subdomain is None:
                 return self._advance_to(self.step + count)
-            from_python = bool(self._python.by_stage or self._first is not None)
+            from_python = bool(self.python.by_stage or self._first is not None)
             self.subdomain.begin(self.hooks, from_python=from_python)
             status = self._advance_to(self.step + count)
             self.subdomain.end()
@@ -288,8 +286,8 @@ class Simulation(SceneArrays):
                 self.clear_forces()  # the steps to come may have no hook that does it
                 return SORT  # there is more to do, unless that was all
             return status
-        if self._python.by_stage:
-            return run_steps(scheme, Staged(), self.mode, self.setup, self._python, count)
+        if self.python.by_stage:
+            return run_steps(scheme, Staged(), self.mode, self.setup, self.python, count)
         return advance(scheme, self.visits, self.mode, self.setup, self.hooks, count)
 
     def compile(self) -> None:
@@ -297,7 +295,7 @@ class Simulation(SceneArrays):
 
         The first process does that, and the others find it on disk.
         """
-        if config.DISABLE_JIT or self._python.by_stage:
+        if config.DISABLE_JIT or self.python.by_stage:
             return
         arguments = self.hub.update.scheme, self.visits, self.mode, self.setup, self.hooks, 1
         self.comm.in_turn(lambda: advance.compile(*arguments))
@@ -306,17 +304,13 @@ class Simulation(SceneArrays):
         """Prepare threads, the hooks of the fixes, and contact for a run."""
         if self.threads > 1:
             set_threads(self.threads)
-        self._prepare_hooks()
-        self.hub.update.method.begin(self.hub, self.setup.contact)
-
-    def _prepare_hooks(self) -> None:
-        """Sort the fixes by how they act: once before the first step, in it, in every step."""
+        # Fixes act once before the first step, in it, or in every step.
         fixes = sorted(self.hub.fixes.values(), key=lambda fix: fix.acts_last)
         lasting = [fix for fix in fixes if not fix.first_step_only]
         new = [fix for fix in fixes if fix.first_step_only and fix not in self._begun]
-        self._python = PythonHooks(self, lasting)
-        self.hooks = self._python.compiled
-        staged = self._python.by_stage or any(
+        self.python = PythonHooks(self, lasting)
+        self.hooks = self.python.compiled
+        staged = self.python.by_stage or any(
             name in POINT_STAGES for fix in lasting for name in fix.hooks()
         )
         self.visits = Staged() if staged else Fused()
@@ -331,6 +325,7 @@ class Simulation(SceneArrays):
         if self._first_fixes:
             together = [fix for fix in fixes if fix in lasting or fix in self._first_fixes]
             self._first = PythonHooks(self, together)
+        self.hub.update.method.begin(self.hub, self.setup.contact)
 
     def set_initial(self, ID: str) -> None:
         """Let the fix `ID` set the state that a run begins with."""

@@ -82,12 +82,6 @@ def _flows(law: Any) -> bool:
     )
 
 
-def one_body(hub: Hub) -> bool:
-    """Tell whether all that deforms is one solid, of an elastic law or a metal."""
-    laws = _deforming(hub)
-    return len(laws) == 1 and not any(map(_flows, laws))
-
-
 def lone_point(hub: Hub) -> float:
     """The stable step over h/c of a point that has its nodes for itself and keeps a moment.
 
@@ -114,9 +108,11 @@ def bears_drift(hub: Hub) -> bool:
     that meet tear sooner by these steps.
     """
     basis, scheme = hub.update.method.basis, hub.update.scheme
+    laws = _deforming(hub)
     return (
         _keeps_velocities(hub)
-        and one_body(hub)
+        and len(laws) == 1  # one solid, of an elastic law or a metal
+        and not _flows(laws[0])
         and not getattr(basis, "gradient_jumps", False)
         and (getattr(basis, "bears_drift", False) or getattr(scheme, "bears_drift", False))
         and keeping_share(hub) == USUAL
@@ -198,10 +194,6 @@ def step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
     return courant_number(hub, longer=False), update.dt_factor or keeping_share(hub)
 
 
-def share_of_heat(hub: Hub) -> float:
-    return USUAL if hub.update.dt_factor is None else hub.update.dt_factor
-
-
 def moves_already(simulation: Any) -> bool:
     """Tell whether points are so fast that they are not at rest for a hundred steps."""
     clock = simulation.control.clock[0]
@@ -274,12 +266,13 @@ def words_of_share(hub: Hub) -> str:
         share = hub.update.fixed_dt / hub.simulation.limit
         words = f"{share:.3g} of the stable step"
     elif asked is None:
-        clock, conduction = hub.simulation.control.clock[0], "conduction"
-        keeping = USUAL if ruling_limit(hub.simulation) == conduction else float(clock.dt_factor)
-        words = f"{keeping:g} of the stable step, the program's own"
+        clock = hub.simulation.control.clock[0]
+        of_heat = ruling_limit(hub.simulation) == "conduction"
+        words = f"{USUAL if of_heat else float(clock.dt_factor):g} of the stable step, "
+        words += "the program's own"
         after = clock.dt_factor_moving * clock.courant_moving / (clock.dt_factor * clock.courant)
-        far = "once points have gone a quarter of a cell"
-        return words if after == 1 else f"{words}; {after:.2g} of that {far}"
+        far = f"; {after:.2g} of that once points have gone a quarter of a cell"
+        return words if after == 1 else words + far
     else:
         share = asked
         words = f"{share:g} of the stable step, by dt_factor"
@@ -312,18 +305,14 @@ def ruling_limit(simulation: Any) -> str:
     speed = simulation.fastest(clock.common[0])
     if speed > 0.5 * clock.rate:
         return "speed"
-    without = _speed_without_viscosity(simulation)
-    if 0 < without < (clock.rate - speed) / 1.2:
+    undeformed = [elastic_speed(simulation, solid) for solid in simulation.hub.solids.values()]
+    without = max(wave for wave, _ in undeformed)
+    slowed = any(viscous for _, viscous in undeformed)
+    if slowed and 0 < without < (clock.rate - speed) / 1.2:
         return "viscosity"
     if clock.courant < 1:
         return "lone_points" if clock.courant == lone_point(simulation.hub) else "light_nodes"
     return "waves"
-
-
-def _speed_without_viscosity(simulation: Any) -> float:
-    """Fastest wave in the undeformed materials without viscosity; 0 where none is viscous."""
-    found = [elastic_speed(simulation, solid) for solid in simulation.hub.solids.values()]
-    return max(speed for speed, _ in found) if any(viscous for _, viscous in found) else 0.0
 
 
 def fastest_wave(simulation: Any) -> float:

@@ -29,10 +29,6 @@ def _of_parts(hub: Hub, simulation: Any) -> Iterator[Advice]:
     return SceneFacts(hub, simulation, inf).advice("suggestion")
 
 
-def _suggestion(cost: str, instead: str) -> Advice:
-    return Advice("", cost, instead)
-
-
 # --- the step ------------------------------------------------------------------------------------
 
 
@@ -49,10 +45,10 @@ def _step(hub: Hub, simulation: Any) -> Iterator[Advice]:
         return
     times = f"{best / dt:.3g} times as many steps as the program's own step asks for"
     if hub.update.fixed_dt is not None:
-        yield _suggestion(f"set_dt({dt:g}): {times}", f"leave set_dt out, or set_dt({best:.3g})")
+        yield Advice("", f"set_dt({dt:g}): {times}", f"leave set_dt out, or set_dt({best:.3g})")
     else:
-        yield _suggestion(
-            f"dt_factor({hub.update.dt_factor:g}): {times}", f"dt_factor({best / limit:.3g})"
+        yield Advice(
+            "", f"dt_factor({hub.update.dt_factor:g}): {times}", f"dt_factor({best / limit:.3g})"
         )
 
 
@@ -69,9 +65,12 @@ def _unread(hub: Hub, simulation: Any) -> Iterator[Advice]:
             defined = rf"\b{kind}\s*\(\s*{re.escape(ID)}\s*,"
             uses = len(re.findall(rf"\b{re.escape(ID)}(?:_\w+)?\b", text))
             if 0 < uses <= len(re.findall(defined, text)):
-                yield _suggestion(
+                suffix = item.published[0]
+                name = f"{ID}_{suffix}" if suffix else ID
+                yield Advice(
+                    "",
                     f"{kind} {ID} ({item.style}) is measured at each output and shown nowhere",
-                    f"leave it out, or name {_published(ID, item)} in log_modify",
+                    f"leave it out, or name {name} in log_modify",
                 )
 
 
@@ -83,12 +82,7 @@ def _unused(hub: Hub, simulation: Any) -> Iterator[Advice]:
     for ID in hub.groups:
         made = len(re.findall(rf"\bgroup\s*\(\s*{re.escape(ID)}\s*,", text))
         if 0 < len(re.findall(rf"(?<!\w){re.escape(ID)}(?!\w)", text)) <= made:
-            yield _suggestion(f"group {ID} is used by nothing", "leave it out, or name it in a fix")
-
-
-def _published(ID: str, item: Any) -> str:
-    suffix = item.published[0]
-    return f"{ID}_{suffix}" if suffix else ID
+            yield Advice("", f"group {ID} is used by nothing", "leave it out, or name it in a fix")
 
 
 def _script(hub: Hub) -> str:
@@ -106,7 +100,8 @@ def _averaging(hub: Hub, simulation: Any) -> Iterator[Advice]:
         moduli = (getattr(law, "lam", None), getattr(law, "G", None))
         if None in moduli or moduli[0] / (2 * sum(moduli)) >= NEARLY_INCOMPRESSIBLE:
             return
-    yield _suggestion(
+    yield Advice(
+        "",
         "anti_volumetric_locking(true): a visit of the points more, and nothing is nearly "
         "incompressible or flows",
         "leave it out",
@@ -170,7 +165,8 @@ def _flat(hub: Hub, simulation: Any) -> Iterator[Advice]:
             given = [f"{domain.lo[axis]:g}, {domain.hi[axis]:g}" for axis in rest]
             kept = " and ".join(AXES[axis] for axis in rest)
             named = "" if k == d - 1 else f", with {kept} called {' and '.join(AXES[: d - 1])}"
-            yield _suggestion(
+            yield Advice(
+                "",
                 f"all solids are the same along {AXES[k]}, in which nothing moves: {layers} times "
                 f"the points of {'plane strain' if d == 3 else 'a line'}",
                 f"dimension({d - 1}, {', '.join(given)}, {domain.h:g}){named}",
@@ -265,7 +261,8 @@ def _round(hub: Hub, simulation: Any) -> Iterator[Advice]:
     radius = max(region.radius for region in regions)
     lo, hi = hub.domain.lo[along], hub.domain.hi[along]
     h = hub.domain.h
-    yield _suggestion(
+    yield Advice(
+        "",
         "cylinders about one axis, and nothing acts around it: about "
         f"{np.pi * radius / h:.3g} times the points of the plane of radius and axis",
         f"dimension(2, 0, {max(hub.domain.hi[axis] for axis in across):g}, {lo:g}, {hi:g}, {h:g}) "
@@ -278,7 +275,8 @@ def _points(hub: Hub, simulation: Any) -> Iterator[Advice]:
         ppc = getattr(solid, "ppc", 0)
         if ppc >= MANY_POINTS:
             each = ppc**hub.domain.dimension
-            yield _suggestion(
+            yield Advice(
+                "",
                 f"solid {solid.id} has {each} points a cell; more than two a direction gain little "
                 "once points have moved",
                 f"2 or 3 points a direction, and finer cells for what {each} cost",

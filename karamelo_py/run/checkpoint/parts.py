@@ -157,11 +157,6 @@ class Unwritable:
         raise self.fault
 
 
-def for_json(late: Grown | Unwritable) -> Any:
-    """Return what JSON knows of a value that is turned into that in a file alone."""
-    return late.plain()
-
-
 def _copied(value: Any) -> Any:
     try:
         return copy.deepcopy(value)

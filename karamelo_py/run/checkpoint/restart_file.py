@@ -19,7 +19,7 @@ from karamelo_py.language.replay import Record, Replay
 from karamelo_py.output.files import whole
 from karamelo_py.output.rhythm import ByTime, Rhythmic
 from karamelo_py.run.checkpoint.arrays import Stored, reading, stored, take_snapshot, take_stored
-from karamelo_py.run.checkpoint.parts import PartStates, RollbackPoint, for_json, parts_of
+from karamelo_py.run.checkpoint.parts import PartStates, RollbackPoint, parts_of
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
@@ -102,7 +102,9 @@ def _write(hub: Hub, path: Path, within: bool) -> None:
         root.attrs["format"], root.attrs["version"] = FORMAT, VERSION
         root.attrs["program"] = __version__
         root.attrs["step"], root.attrs["time"] = hub.update.step, hub.update.time
-        text = np.frombuffer(json.dumps(content, default=for_json).encode(), np.uint8)
+        text = np.frombuffer(
+            json.dumps(content, default=lambda late: late.plain()).encode(), np.uint8
+        )
         root.create_dataset("content", data=text, **FLAT)
         for name, one in states.items():
             for k, array in enumerate(one.arrays):
@@ -165,11 +167,6 @@ class Restart:
         except (OSError, KeyError, ValueError, TypeError) as error:
             why = "" if "signature" in str(error) else f": {error}"
             raise ScriptError(f"{what}{why}", argument="file", expected=OURS) from None
-
-    @property
-    def runs(self) -> list[dict[str, float]]:
-        """Values at the end of each run that was over."""
-        return self.content["runs"]
 
     def presets(self, given: dict[str, str]) -> dict[str, str]:
         """Return the variables of the command line that wrote the file; `given` ones are those."""
@@ -263,17 +260,11 @@ def described(hub: Hub) -> dict[str, str]:
         where = 0
         for _, x in solid.pieces():
             where = zlib.crc32(np.ascontiguousarray(x).tobytes(), where)
-        kind = "-".join(type(part).__name__ for part in _parts_of(solid.material.law))
+        law = solid.material.law
+        parts = [part for part in law if isinstance(part, tuple) and hasattr(part, "_fields")]
+        kind = "-".join(type(part).__name__ for part in (law, *parts))
         words[f"solid '{solid.id}'"] = f"{solid.count} points of {kind}, {where:08x}"
     return words
-
-
-def _parts_of(law: Any) -> Iterator[Any]:
-    yield law
-    if isinstance(law, tuple):
-        for part in law:
-            if isinstance(part, tuple) and hasattr(part, "_fields"):
-                yield part
 
 
 def check(hub: Hub, restart: Restart) -> None:

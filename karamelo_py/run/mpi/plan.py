@@ -152,12 +152,13 @@ def report_lines(simulation: Simulation, ranks: int) -> list[str]:
         lines.append("  so few points are not shared out: the first process has them all")
     elif over > MAY_CHANGE:
         lines.append("  tiles are not cut: fewer processes would wait less for the largest share")
-    if acting := simulation.acting_from_python:
+    acting = (fix for pairs in simulation.python.by_stage.values() for fix, _ in pairs)
+    if fix := next((fix for fix in acting if not fix.point_by_point), None):
         blocks = simulation.setup.blocks
         moved = sum(array.nbytes for block in blocks for _, array in arrays_of(block.points))
         lines.append(
-            f"  {acting[0]} acts on the whole scene: in each step the first process takes in and "
-            f"gives back {moved >> 20} MiB, and has the memory of a single one"
+            f"  fix {fix.style} '{fix.id}' acts on the whole scene: in each step the first "
+            f"process takes in and gives back {moved >> 20} MiB, and has the memory of a single one"
         )
     for fix in simulation.hub.fixes.values():
         if hasattr(fix, "sent"):
