@@ -15,7 +15,7 @@ from karamelo_py.output.fields import PIECE, SUMMED
 from karamelo_py.output.node_columns import NodeRows, brought, loaded
 from karamelo_py.output.point_table import Part, PointTable, Rows, places_before
 from karamelo_py.run.boxes import numbers
-from karamelo_py.run.checkpoint.arrays import of_nodes
+from karamelo_py.run.checkpoint.arrays import of_nodes, rows_at
 from karamelo_py.run.mpi.partition import joined
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.hub import Hub
@@ -231,33 +231,22 @@ class ByNumber:
                 arrays = {name: array[first:end] for name, array in of_nodes(self.setup)}
                 own = {name: of[first:end] for name, of in sums.items()}
             else:
-                parts = gather(self._rows_between(first, end, sums))
-                if parts is None:
+                arrays = rows_at(self, np.arange(first, end), gather)
+                own = self._sums_between(first, end, sums, gather)
+                if arrays is None:
                     continue
-                arrays, own = self._joined(first, end, parts, sums)
             own = {name: of.sum(axis=1) for name, of in own.items()}
             yield NodeRows(first, end, self.kin, arrays, own, weights)
 
-    def _rows_between(self, first: int, end: int, sums: dict) -> tuple:
-        """The nodes from `first` to before `end`: what of them others do not show, and sums."""
-        own, used = (
-            nodes[slice(*np.searchsorted(nodes, (first, end)))]
-            for nodes in (self.counted(), numbers(self.setup.spans))
-        )
-        rows = [array[own] for _, array in of_nodes(self.setup)]
-        return own, rows, used, {name: of[used] for name, of in sums.items()}
-
-    def _joined(self, first: int, end: int, parts: list[tuple], names: Iterable[str]) -> tuple:
-        """The same of all nodes from those of all processes."""
-        kinds = of_nodes(self.setup)
-        arrays = {n: np.zeros((end - first, *a.shape[1:]), a.dtype) for n, a in kinds}
-        sums = {name: np.zeros((end - first, 2)) for name in names}
-        for own, rows, used, given in parts:
-            for array, found in zip(arrays.values(), rows, strict=True):
-                array[own - first] = found
-            for name, of in given.items():
-                sums[name][used - first] += of
-        return arrays, sums
+    def _sums_between(self, first: int, end: int, sums: dict, gather: Callable) -> dict:
+        """Sums over the points of all processes at the nodes from `first` to before `end`."""
+        nodes = numbers(self.setup.spans)
+        used = nodes[slice(*np.searchsorted(nodes, (first, end)))]
+        own = {name: np.zeros((end - first, 2)) for name in sums}
+        for there, given in gather((used, [of[used] for of in sums.values()])) or ():
+            for total, of in zip(own.values(), given, strict=True):
+                total[there - first] += of
+        return own
 
     def counted(self) -> np.ndarray:
         """The numbers of the nodes in use, of each at one process."""

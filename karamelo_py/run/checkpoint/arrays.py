@@ -1,6 +1,6 @@
 """The state of a simulation as arrays by name: to return to, to write, to read."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from itertools import pairwise
 from pathlib import Path
@@ -80,13 +80,17 @@ def stored(simulation: Any, kept: dict[str, np.ndarray] | None = None) -> Iterat
     order of one process.
     """
     s, comm, tiles = simulation.setup, simulation.comm, simulation.tiles
-    own = kept or dict(changing(simulation)) | touched(simulation)
-    yield from in_file(own) if comm.size == 1 else _joined(simulation, own)
+    state = kept or dict(changing(simulation)) | touched(simulation)
+    yield from in_file(state) if comm.size == 1 else _joined(simulation, state)
     if kept:
         return
     yield from wholes(known(simulation))
     reached = comm.gather(tiles.reached_by(s))
-    yield from _nodes(simulation, comm.bcast(reached and tiles.spans_of_all(reached)))
+    spans = comm.bcast(reached and tiles.spans_of_all(reached))
+    total = int(np.diff(spans).sum())
+    for own, nodes in _pieces(spans):
+        for name, array in (rows_at(simulation, nodes, comm.gather) or {}).items():
+            yield name, (total, *array.shape[1:]), own, array + 0
 
 
 def in_file(state: dict[str, np.ndarray]) -> Iterator[Stored]:
@@ -240,6 +244,24 @@ def of_nodes(s: Any) -> Iterator[tuple[str, np.ndarray]]:
             yield f"{kind}/{name_of(type(one))}", one.array
 
 
+def rows_at(simulation: Any, nodes: np.ndarray, gather: Callable) -> dict[str, np.ndarray] | None:
+    """Gather the rows of all arrays of nodes, of ascending numbers; zero where none is in use.
+
+    None where the processes `gather` them at another.
+    """
+    counted, kinds = simulation.counted(), dict(of_nodes(simulation.setup))
+    limits = (nodes[0], nodes[-1] + 1) if len(nodes) else (0, 0)
+    here = counted[slice(*np.searchsorted(counted, limits))]
+    found = gather((here, [array[here] for array in kinds.values()]))
+    if found is None:
+        return None
+    rows = {name: np.zeros((len(nodes), *a.shape[1:]), a.dtype) for name, a in kinds.items()}
+    for there, some in found:
+        for array, of in zip(rows.values(), some, strict=True):
+            array[np.searchsorted(nodes, there)] = of
+    return rows
+
+
 def take_tiling(tiling: Tiling, found: Mapping[str, np.ndarray], stem: str) -> Tiling:
     for name, _ in in_use(tiling):
         _fill(getattr(tiling, name), found, stem + name)
@@ -314,10 +336,8 @@ def _joined(simulation: Any, own: dict[str, np.ndarray]) -> Iterator[Stored]:
             "touched": stripped(own, "touched/"),
         }
     )
-    tilings, rows = (
-        [Tiles.empty_tiling(simulation.tiles) for _ in s.blocks],
-        {},
-    )  # as of one process
+    # Tiles as of one process.
+    tilings, rows = [Tiles.empty_tiling(simulation.tiles) for _ in s.blocks], {}
     for k, tiling in enumerate(tilings if parts is not None else ()):
         tiling.count[1] = 1 if simulation.tiles.direct else SHARES
         join_tilings(tiling, [part["tiling"][k] for part in parts])
@@ -376,24 +396,6 @@ def _points(
             where = ..., slice(begin, begin + len(order))
             yield f"points/{k}/{name}", (*array.shape[:-1], total), where, array
         begin += len(order)
-
-
-def _nodes(simulation: Any, spans: np.ndarray) -> Iterator[Stored]:
-    """Yield rows of the arrays of nodes, of nodes in use."""
-    kinds, counted = dict(of_nodes(simulation.setup)), simulation.counted()
-    total = int((spans[:, 1] - spans[:, 0]).sum())
-    for own, nodes in _pieces(spans):
-        limits = (int(nodes[0]), int(nodes[-1]) + 1) if len(nodes) else (0, 0)
-        here = counted[slice(*np.searchsorted(counted, limits))]
-        found = simulation.comm.gather((here, [array[here] for array in kinds.values()]))
-        if found is None:
-            continue
-        rows = {n: np.zeros((len(nodes), *a.shape[1:]), a.dtype) for n, a in kinds.items()}
-        for there, some in found:
-            for array, of in zip(rows.values(), some, strict=True):
-                array[np.searchsorted(nodes, there)] = of
-        for name, array in rows.items():
-            yield name, (total, *array.shape[1:]), own, array + 0
 
 
 def _cuts(ends: np.ndarray) -> Iterator[tuple[int, int]]:
