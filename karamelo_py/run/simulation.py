@@ -16,18 +16,11 @@ from karamelo_py.kernels.hooks import POINT_STAGES
 from karamelo_py.kernels.step import DONE, SORT, Fused, Staged, advance, measure, run_steps
 from karamelo_py.kernels.totals import agree_on_heat
 from karamelo_py.kernels.watch import COARSE, ROUND_OFF, begin_to_look, measure_heat, sum_energies
+from karamelo_py.run import timestep
 from karamelo_py.run.diagnosis.energy import unknown_heat, unknown_work
 from karamelo_py.run.lower.hooks import PythonHooks, sets_initial_state, views_of
 from karamelo_py.run.mpi.whole import PointsMoved, Whole
 from karamelo_py.run.scene_arrays import SceneArrays
-from karamelo_py.run.timestep import (
-    USUAL,
-    common_velocity,
-    moves_already,
-    ruling_limit,
-    step_of_waves,
-    weight_of_drift,
-)
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
@@ -78,7 +71,7 @@ class Simulation(SceneArrays):
         self._choose_dt()
         begun_before = len(self._begun)
         self._make_ready()
-        if self.step == 0 and moves_already(self):
+        if self.step == 0 and timestep.moves_already(self):
             clock.path = np.inf
             self._ask_for_steps(0)
         self._choose_dt()
@@ -118,20 +111,22 @@ class Simulation(SceneArrays):
     def _ask_for_steps(self, halvings: int) -> bool:
         """Tell the clock which steps are asked for; whether these are others than before."""
         clock = self.control.clock[0]
-        now, moving = (step_of_waves(self.hub, still=s) for s in (clock.path <= STILL, False))
+        now, moving = (
+            timestep.step_of_waves(self.hub, still=s) for s in (clock.path <= STILL, False)
+        )
         update, share = self.hub.update, 1 / 2**halvings
         numbers = {
             "courant": now[0],
             "courant_moving": moving[0],
             "fixed_dt": (update.fixed_dt or 0.0) * share,
-            "heat_factor": (update.dt_factor or USUAL) * share,
+            "heat_factor": (update.dt_factor or timestep.USUAL) * share,
             "dt_factor": now[1] * share,
             "dt_factor_moving": moving[1] * share,
         }
         before = {name: clock[name] for name in numbers}
         for name, number in numbers.items():
             clock[name] = number
-        weight = weight_of_drift(self.hub)
+        weight = timestep.weight_of_drift(self.hub)
         if weight != clock.weight:
             clock.weight, self.measured = weight, False
         return numbers != before
@@ -140,7 +135,7 @@ class Simulation(SceneArrays):
         if not self.measured:
             # Otherwise the last step has measured, and a run in pieces takes the steps of a whole.
             clock = self.control.clock[0]
-            clock.common[:] = common_velocity(self, float(clock.weight))
+            clock.common[:] = timestep.common_velocity(self, float(clock.weight))
             self._measure()
             clock.wave = clock.speed = 0.0
             if clock.weight != 1:
@@ -153,7 +148,7 @@ class Simulation(SceneArrays):
         """Measure the rate of the fastest point, if the common drift of all had this weight."""
         clock = self.control.clock[0]
         common, rate = clock.common.copy(), float(clock.rate)
-        clock.common[:] = common_velocity(self, weight)
+        clock.common[:] = timestep.common_velocity(self, weight)
         self._measure()
         found = float(clock.rate)
         clock.common[:], clock.rate = common, rate
@@ -179,7 +174,7 @@ class Simulation(SceneArrays):
 
     @property
     def ruling_limit(self) -> str:
-        return ruling_limit(self)
+        return timestep.ruling_limit(self)
 
     @property
     def limit_moving(self) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 from karamelo_py.compiler.lanes import lanes_for
 from karamelo_py.compiler.rows import addresses_of_rows
 from karamelo_py.compiler.threads import Serial, Threaded
+from karamelo_py.kernels import sorting
 from karamelo_py.kernels.arrays import (
     ADD,
     CLEAR,
@@ -22,15 +23,6 @@ from karamelo_py.kernels.arrays import (
     arrays_of,
 )
 from karamelo_py.kernels.heat import Conducting
-from karamelo_py.kernels.sorting import (
-    Neighbourhood,
-    SortedOrder,
-    TileGrid,
-    find_rows,
-    find_tiles,
-    sort_points,
-    widest,
-)
 from karamelo_py.kernels.sweep import ROUNDING
 from karamelo_py.points.basis import first_node, shape_size
 from karamelo_py.points.kinematics import planar
@@ -103,17 +95,19 @@ class Tiles:
         self.shapes = -(-self._cells // self.size)
         self.first = numbered(self.shapes)
         # Points without a domain reach no further than two cells from those of their tile.
-        widest = np.minimum((self.size + 4) * self.per_cell + 1 + 2 * self.beyond, self._nodes)
-        most = float(np.diff(self.first) @ np.prod(widest, axis=1, dtype=float))
+        sorting.widest = np.minimum(
+            (self.size + 4) * self.per_cell + 1 + 2 * self.beyond, self._nodes
+        )
+        most = float(np.diff(self.first) @ np.prod(sorting.widest, axis=1, dtype=float))
         shaped = shape_size(type(basis), d) > 0
         self._most_rows = inf if shaped else most
-        rows = np.prod(widest[:, :-1], axis=1, dtype=np.int64).max()
+        rows = np.prod(sorting.widest[:, :-1], axis=1, dtype=np.int64).max()
         # What points may reach is known of each row of a box where rows of nodes are tiles: of the
         # boxes around a bar that has spread at one end they reach little at the other.
         by_rows = self.long and not shaped and not self.direct
         self._most_in_box = int(rows) if by_rows else 0  # rows of a box, at most
         self.count = int(self.first[-1])  # of tiles, of all grids
-        self._cut = TileGrid(self.size, self.shapes, self.first)
+        self._cut = sorting.TileGrid(self.size, self.shapes, self.first)
         tiles = -(-self._nodes // self.node_size)
         self._tile_steps = steps_of(tiles)
         self._first_of_nodes = numbered(tiles)
@@ -177,7 +171,7 @@ class Tiles:
         """Bound the distance of points' contributions from their present positions, in cells."""
         far = 0.0
         if len(x) > self.dimension:
-            far = widest(s.kin, s.basis, s.grids, x, block.points.grid)
+            far = sorting.widest(s.kin, s.basis, s.grids, x, block.points.grid)
         cells = float(self._cells.max())
         rounding = ROUNDING + 4 * np.finfo(x.dtype).eps * cells
         drift = s.control.clock[0].drift_limit + rounding if s.frame.moves else 0.0
@@ -191,7 +185,7 @@ class Tiles:
         """(n,) the tile of each point."""
         x, ends = self._where(s, points), np.empty((self.threads, self.count), np.int64)
         tile = np.empty(x.shape[1], np.int64)
-        find_tiles(self.mode, planar(s.kin), s.grids, self._cut, x, points.grid, ends, tile)
+        sorting.find_tiles(self.mode, planar(s.kin), s.grids, self._cut, x, points.grid, ends, tile)
         return tile
 
     def _sort_block(self, s: Setup, block: Block) -> np.ndarray:
@@ -208,7 +202,7 @@ class Tiles:
         if self.threads == 1 or parts < 2:
             parts, mode = 1, Serial()
         scratch = np.empty((4, x.shape[1]), np.int64)
-        found = SortedOrder(
+        found = sorting.SortedOrder(
             lanes_for(8 * x.itemsize).width,
             np.empty((parts, self.count), np.int64),
             np.empty(parts + 1, np.int64),
@@ -219,10 +213,10 @@ class Tiles:
         )
         top, least = self._nodes - 1, self.least_nodes - 1
         offset = first_node(s.basis, s.grids.h[0])
-        sight = Neighbourhood(top, self.per_cell, self.beyond, least, reach, offset)
+        sight = sorting.Neighbourhood(top, self.per_cell, self.beyond, least, reach, offset)
         kin, of, ids = planar(s.kin), points.grid, points.id
         rows = addresses_of_rows(array for _, array in arrays_of(points))
-        sort_points(mode, kin, s.grids, sight, self._cut, x, of, ids, found, rows)
+        sorting.sort_points(mode, kin, s.grids, sight, self._cut, x, of, ids, found, rows)
         ends = found.ends[-1]
         begins = np.append(0, ends[:-1])
         occupied = np.flatnonzero(ends > begins)
@@ -236,7 +230,7 @@ class Tiles:
         tiling.grid[:count] = grid
         tiling.box[:count] = np.concatenate(found.boxes[:, occupied], axis=1)
         if self._most_in_box:
-            find_rows(mode, s.kin, s.grids, sight, x, tiling, parts)
+            sorting.find_rows(mode, s.kin, s.grids, sight, x, tiling, parts)
         return occupied
 
     def box_bytes(self, s: Setup) -> int:

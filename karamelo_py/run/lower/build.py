@@ -13,17 +13,7 @@ import numpy as np
 
 from karamelo_py.compiler import fields
 from karamelo_py.compiler.tuples import flat
-from karamelo_py.kernels.arrays import (
-    SUMS_WIDTH,
-    UPDATE_WIDTH,
-    VELOCITY_WIDTH,
-    Block,
-    Nodes,
-    Points,
-    Setup,
-    new_control,
-    some_of,
-)
+from karamelo_py.kernels import arrays
 from karamelo_py.kernels.averaging import NodalMean
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.laws import elastic_law, law_in, law_on, law_table
@@ -160,7 +150,7 @@ def lower(
     *,
     ids: tuple[int, int] | None = None,
     comm: SerialComm | None = None,
-) -> tuple[Setup, Tiles]:
+) -> tuple[arrays.Setup, Tiles]:
     """Make the arrays of a run from the scene, taking over the state of points that exist.
 
     With `ids`, from and to before, only with those points; tiles are those of a process of `comm`.
@@ -183,7 +173,7 @@ def lower(
     if previous is not None:
         method.resume(contact, previous.contact)
     firsts = [solid.first_id for solid in hub.solids.values()]
-    control = new_control(hub.values.array, firsts, kin.dimension)
+    control = arrays.new_control(hub.values.array, firsts, kin.dimension)
     clock = control.clock[0]
     clock.last_dt, clock.path = (previous.last_dt, previous.path) if previous else (0.0, 0.0)
     clock.spacing = min(lattice.h for lattice in lattices)
@@ -217,10 +207,10 @@ def lower(
         alike.setdefault(law_kind(solid.material.law), []).append(part)
     of_points = fields.declared(owners, "point_fields")
     blocks = (
-        Block(*lower_points(hub, solids, kin, of_points, real), tiles.empty_tiling())
+        arrays.Block(*lower_points(hub, solids, kin, of_points, real), tiles.empty_tiling())
         for solids in alike.values()
     )
-    setup = Setup(
+    setup = arrays.Setup(
         frame=method.frame,
         kin=kin,
         basis=basis,
@@ -262,13 +252,13 @@ def warms_by_friction(hub: Hub) -> bool:
     return rubs and any(heat_capacity(s.material.law, 1.0) > 0 for s in hub.solids.values())
 
 
-def lower_nodes(kinds: Iterable[type], kin: NamedTuple, count: int, real: type) -> Nodes:
+def lower_nodes(kinds: Iterable[type], kin: NamedTuple, count: int, real: type) -> arrays.Nodes:
     """Fields of `count` nodes, zero."""
     d = kin.dimension
-    return Nodes(
-        sums=fields.records(count, SUMS_WIDTH[d], real),
-        update=fields.records(count, UPDATE_WIDTH[d], real),
-        velocity=fields.records(count, VELOCITY_WIDTH[d], real),
+    return arrays.Nodes(
+        sums=fields.records(count, arrays.SUMS_WIDTH[d], real),
+        update=fields.records(count, arrays.UPDATE_WIDTH[d], real),
+        velocity=fields.records(count, arrays.VELOCITY_WIDTH[d], real),
         fields=tuple(fields.at_nodes(kind, kin, count, real) for kind in kinds),
     )
 
@@ -302,7 +292,7 @@ def point_kinds(hub: Hub, real: type) -> tuple[type, ...]:
 
 def lower_points(
     hub: Scene, solids: list, kin: NamedTuple, kinds: tuple[type, ...], real: type
-) -> tuple[Points, NamedTuple]:
+) -> tuple[arrays.Points, NamedTuple]:
     """The points of solids whose laws are of one kind, and these laws."""
     method = hub.update.method
     known = [law_on(s.material.law, s.h, s.T0) for s in solids]
@@ -338,7 +328,7 @@ def lower_points(
     x[:] = here
     elastic = elastic_law(laws)
     own = [kind for kind in kinds if getattr(kind, "needed", lambda law: True)(elastic)]
-    points = Points(
+    points = arrays.Points(
         x=x,
         home=None if method.frame.moves else places,
         v=joined((np.zeros((kin.dimension, 1)) for _ in solids), real),
@@ -352,7 +342,7 @@ def lower_points(
     return points, laws
 
 
-def resumed(block: Block, previous: State) -> Block:
+def resumed(block: arrays.Block, previous: State) -> arrays.Block:
     """The block with what its points had before, as far as they were there."""
     points = block.points
     old = points.id < previous.count
@@ -370,4 +360,4 @@ def resumed(block: Block, previous: State) -> Block:
         take(one.array, previous.fields.get(type(one)))
     present = np.ones(len(points.id), np.bool_)
     present[old] = previous.present[ids]
-    return block if present.all() else some_of(block, np.flatnonzero(present))
+    return block if present.all() else arrays.some_of(block, np.flatnonzero(present))

@@ -9,14 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.kernels.arrays import (
-    SUMS_WIDTH,
-    UPDATE_WIDTH,
-    VELOCITY_WIDTH,
-    Block,
-    Setup,
-    arrays_of,
-)
+from karamelo_py.kernels import arrays
 from karamelo_py.run.boxes import used
 from karamelo_py.run.checkpoint.arrays import of_nodes
 from karamelo_py.run.lower.build import PRECISIONS, check_scene, lower_points, part_of, point_kinds
@@ -38,7 +31,7 @@ class MemoryTaken(NamedTuple):
     known: int  # to each process, of the whole scene
 
 
-def memory_of(simulation: Any, s: Setup, boxes: int) -> MemoryTaken:
+def memory_of(simulation: Any, s: arrays.Setup, boxes: int) -> MemoryTaken:
     """Count what the points in the tiles of `s`, its nodes in use, and boxes of so many bytes take.
 
     Places before the first step and members of groups, where fixes act on points by them, and
@@ -88,7 +81,7 @@ def bytes_in(spans: np.ndarray, array: np.ndarray) -> int:
     return int(np.maximum(end - np.maximum(first, before), 0).sum()) * page
 
 
-def nodes_in_use(s: Setup) -> int:
+def nodes_in_use(s: arrays.Setup) -> int:
     """Count the nodes that points may give to before they are sorted again."""
     return int(np.diff(used(s.spans)[1:]).sum())
 
@@ -102,7 +95,7 @@ def node_fields(s: Any) -> list[tuple[str, np.ndarray]]:
 def point_fields(block: Any) -> list[tuple[str, str, int]]:
     """List name, shape and bytes of each field that a point of this block carries."""
     found = [("x", block.points.x[0]), ("x moved", block.points.x[1])]
-    found += [(name, array) for name, array in arrays_of(block.points) if name != "x"]
+    found += [(name, array) for name, array in arrays.arrays_of(block.points) if name != "x"]
     sizes = [(name, len(array) if array.ndim > 1 else 1, array) for name, array in found]
     return [(name, str(size), size * array.itemsize) for name, size, array in sizes]
 
@@ -174,13 +167,15 @@ def least_bytes(hub: Hub, real: type, copied: bool) -> float:
         if not solid.count:
             continue
         one = part_of(solid, solid.first_id, solid.first_id + 1)
-        block = Block(*lower_points(hub, [one], kin, kinds, real), None)
+        block = arrays.Block(*lower_points(hub, [one], kin, kinds, real), None)
         sizes = {name: size for name, _, size in point_fields(block)}
         of_one = sum(sizes.values())
         points += solid.count * (of_one + (of_one - sizes["x moved"] if copied else 0))
         cells.append(_cells(solid))
     d, per_cell = kin.dimension, hub.update.method.basis.nodes_per_cell**kin.dimension
-    of_node = np.dtype(real).itemsize * (SUMS_WIDTH[d] + UPDATE_WIDTH[d] + VELOCITY_WIDTH[d])
+    of_node = np.dtype(real).itemsize * (
+        arrays.SUMS_WIDTH[d] + arrays.UPDATE_WIDTH[d] + arrays.VELOCITY_WIDTH[d]
+    )
     nodes = sum(cells) if own_grids(hub) else max(cells)
     return points + nodes * per_cell * of_node
 

@@ -14,16 +14,7 @@ from karamelo_py.kernels.ranks import Linked
 from karamelo_py.kernels.totals import WORK, rounded
 from karamelo_py.run.boxes import numbers
 from karamelo_py.run.checkpoint.arrays import remembered_at, take_points, take_tiling
-from karamelo_py.run.mpi.partition import (
-    SharedTiles,
-    by_tile,
-    join_tilings,
-    nodes_of,
-    occupied,
-    share_of,
-    stripped,
-    work_of,
-)
+from karamelo_py.run.mpi import partition
 from karamelo_py.scene.comm import SerialComm
 
 LEARN_EVERY = 100  # steps from output to output, after which it is seen how work is shared
@@ -77,7 +68,7 @@ class Subdomain:
 
     def __init__(self, simulation: Any):
         self.simulation, self.comm = simulation, simulation.comm
-        self.tiles: SharedTiles = simulation.tiles
+        self.tiles: partition.SharedTiles = simulation.tiles
         s = simulation.setup
         self.load = Load(len(s.blocks))
         self.control = s.control
@@ -147,7 +138,7 @@ class Subdomain:
         """Take note of the steps so far; what comes before the next is not counted."""
         blocks, step = self.simulation.setup.blocks, self.simulation.step
         counts = [block.points.mass.size for block in blocks]
-        counts.append(sum(int(nodes_of(block.tiling).sum()) for block in blocks))
+        counts.append(sum(int(partition.nodes_of(block.tiling).sum()) for block in blocks))
         self.load.done(counts, step - self._counted_at)
         self._counted_at = step
         self.load.pause()
@@ -165,27 +156,27 @@ class Subdomain:
         sorted_next = clock.drift > clock.drift_limit  # and cut anew then
         due = abs(simulation.step - self._learned_at) >= LEARN_EVERY
         due = due and not (tiles.direct or sorted_next)
-        if not due or not tiles.balance(work_of(tiles.loads(s.blocks), self.learn())):
+        if not due or not tiles.balance(partition.work_of(tiles.loads(s.blocks), self.learn())):
             return
         self.share_contact()
-        own = [tiles.owner[occupied(block.tiling)[0]] for block in s.blocks]
+        own = [tiles.owner[partition.occupied(block.tiling)[0]] for block in s.blocks]
         others = tiles.partners(np.bincount(np.concatenate(own), minlength=self.comm.size))
-        given = {rank: share_of(s, tiles.owner == rank) for rank in others}
-        mine = share_of(s, tiles.owner == self.comm.rank)
+        given = {rank: partition.share_of(s, tiles.owner == rank) for rank in others}
+        mine = partition.share_of(s, tiles.owner == self.comm.rank)
         shares = [mine, *self.comm.exchange(given).values()]
         tiles.empty_nodes(s)
         blocks = []
         for k, block in enumerate(s.blocks):
-            tilings = [stripped(share, f"tiling/{k}/") for share in shares]
-            points = [stripped(share, f"points/{k}/") for share in shares]
-            order = by_tile(tilings)
+            tilings = [partition.stripped(share, f"tiling/{k}/") for share in shares]
+            points = [partition.stripped(share, f"points/{k}/") for share in shares]
+            order = partition.by_tile(tilings)
             arrays = {
                 name: np.take(
                     np.concatenate([one[name] for one in points], axis=-1), order, axis=-1
                 )
                 for name in points[0]
             }
-            join_tilings(block.tiling, tilings)
+            partition.join_tilings(block.tiling, tilings)
             blocks.append(block._replace(points=take_points(block.points, arrays, "")))
         simulation.setup = s._replace(blocks=tuple(blocks))
         tiles.lay_out(simulation.setup)
