@@ -138,7 +138,17 @@ class ById:
 
     def largest(self, of: Callable[[PointTable], np.ndarray]) -> tuple[float, int]:
         """The largest number that a function says of all points, and the first point with it."""
-        value, number = max(self.seen(_largest, of))
+
+        def own(points: ById) -> tuple[float, int]:
+            found = -inf, 0
+            for some in points.some(None):
+                values = of(some)
+                value = np.fmax.reduce(values, initial=-inf)
+                first = some.ids[values == value].min(initial=LAST)
+                found = max(found, (float(value), -int(first)))
+            return found
+
+        value, number = max(self.seen(own))
         return value, -number
 
     def everyone(self, what: str, thing: Any) -> list:
@@ -168,10 +178,15 @@ class ById:
 
     def pieces(self, *, to_first: bool = False) -> Iterator[PointTable]:
         """Yield all points, so many at a time; `to_first`, to the first of several processes."""
-        s, ordered = self.setup, list(map(Ordered, self.setup.blocks))
+        s = self.setup
+        orders = [np.argsort(block.points.id) for block in s.blocks]
+        known = [block.points.id[order] for block, order in zip(s.blocks, orders, strict=True)]
         gather = self.comm.gather if to_first else self.comm.allgather
         for first, end in _ranges(self.count):
-            blocks = [one.between(first, end) for one in ordered]
+            blocks = [
+                some_of(block, order[slice(*np.searchsorted(ids, (first, end)))])
+                for block, order, ids in zip(s.blocks, orders, known, strict=True)
+            ]
             if self.comm.size > 1:
                 own = [[array for _, array in arrays_of(block.points)] for block in blocks]
                 found = gather(own)
@@ -184,30 +199,6 @@ class ById:
             parts = [Part(block, None, block.points.id - first) for block in blocks]
             ids = np.arange(first, end)
             yield PointTable(self.hub, Rows(s, parts, ids, self.present[first:end]))
-
-
-def _largest(points: ById, of: Callable[[PointTable], np.ndarray]) -> tuple[float, int]:
-    """As `largest` of the points at hand: (value, -number), -infinity without a number."""
-    found = -inf, 0
-    for some in points.some(None):
-        values = of(some)
-        value = np.fmax.reduce(values, initial=-inf)
-        first = some.ids[values == value].min(initial=LAST)
-        found = max(found, (float(value), -int(first)))
-    return found
-
-
-class Ordered:
-    """The points of a block, to be had by id."""
-
-    def __init__(self, block: Block):
-        self.block = block
-        self._order = np.argsort(block.points.id)
-        self._ids = block.points.id[self._order]
-
-    def between(self, first: int, end: int) -> Block:
-        """The points with ids from `first` to before `end`, in a block."""
-        return some_of(self.block, self._order[slice(*np.searchsorted(self._ids, (first, end)))])
 
 
 def _ranges(count: int) -> Iterator[tuple[int, int]]:

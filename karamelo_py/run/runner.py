@@ -5,9 +5,9 @@ import signal
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import InitVar, dataclass
 from functools import partial
 from math import inf, isfinite, isnan
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -158,6 +158,7 @@ def _processes(simulation: Simulation) -> dict[str, str]:
     return {"processes": f"{simulation.comm.size}{alone if simulation.tiles.direct else ''}"}
 
 
+@dataclass(eq=False)
 class Runner:
     """Runs a scene for a number of steps, to a time, or by a condition.
 
@@ -165,26 +166,20 @@ class Runner:
     and halves the step where that goes wrong.
     """
 
-    def __init__(
-        self,
-        hub: Hub,
-        *,
-        steps: int | None = None,
-        end_time: float = inf,
-        condition: Any = None,
-        until: bool = False,
-        halve: bool = False,
-    ):
-        self.hub = hub
-        self.steps = steps
-        self.end_time = end_time
-        self.condition = condition
-        self.until = until
-        self.rollback = RollBack(hub, halve=halve)
-        self.place = hub.place
-        self.timings = Timings(hub)
-        self.signal = 0  # that this process has been sent
-        self.interrupted = 0  # the signal that all processes end with
+    hub: Hub
+    steps: int | None = None
+    end_time: float = inf
+    condition: Any = None
+    until: bool = False
+    halve: InitVar[bool] = False
+
+    signal = 0  # that this process has been sent
+    interrupted = 0  # the signal that all processes end with
+
+    def __post_init__(self, halve: bool) -> None:
+        self.rollback = RollBack(self.hub, halve=halve)
+        self.place = self.hub.place
+        self.timings = Timings(self.hub)
 
     def run(self) -> None:
         hub = self.hub
@@ -207,8 +202,7 @@ class Runner:
     def check_condition(self) -> None:
         """Refuse a condition that differs from point to point."""
         names = self.condition.names if self.condition is not None else frozenset()
-        per_point = names & {"x", "y", "z", "x0", "y0", "z0"}
-        if per_point:
+        if per_point := names & {"x", "y", "z", "x0", "y0", "z0"}:
             raise ScriptError(
                 f"the condition depends on {min(per_point)}, which differs from point to point",
                 argument="condition",
@@ -260,15 +254,10 @@ class Runner:
         hub.restart.take(hub, outputs=True)
         hub.restart = hub.interpreter.replay = None
         watched = simulation.control.clock[0].watch_limit
-        ruined = not watched and simulation.step > self.first_step
         simulation.go_on(self.end_time, self.rollback.halvings)
         if not self.rollback.halvings:  # else the step is not that of the script
             known_failures.warn_about_steps(hub, simulation, self.rollback.halve, again=True)
-        self._tell_of_no_step_left(file, simulation)
-        return ruined
-
-    def _tell_of_no_step_left(self, file: Path, simulation: Simulation) -> None:
-        """Say so where a file holds the end of this run already, or what comes behind it."""
+        # It may hold the end of this run already, or what comes behind it.
         step, time, last_step = simulation.step, simulation.time, self.last_step
         holds = f"{file} holds step {step}, time {time:.6g}"
         hint = "a longer run, or a file from before its end"
@@ -279,6 +268,7 @@ class Runner:
         elif step == last_step or time == self.end_time or not self._condition_allows():
             message = f"{holds}, the end of this run: it takes no further step"
             self.hub.console.say(render_message("note", message, hint=hint))
+        return not watched and step > self.first_step
 
     def _loop(self, simulation: Simulation) -> None:
         hub, rollback, timings = self.hub, self.rollback, self.timings

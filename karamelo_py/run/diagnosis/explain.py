@@ -229,30 +229,8 @@ def _smaller_step(hub: Hub, simulation: Simulation) -> str:
     return "use a smaller step (set_dt)" if fixed else "use a smaller dt_factor"
 
 
-class Culprit(NamedTuple):
-    """A fix, its formula, and what that gives where; `x` is None where it is the same anywhere."""
-
-    fix: Any
-    formula: Expression
-    value: float
-    x: np.ndarray | None
-
-
-def culprit(hub: Hub, simulation: Simulation) -> Culprit | None:
-    """The first fix with a formula that makes NaN or infinity of the present numbers.
-
-    A formula that reads what is NaN already shows the damage, and not where it comes from.
-    """
-    found = [one for one in simulation.seen(_first_bad) if one is not None]
-    if not found:
-        return None
-    (which, k, _), value, x = min(found, key=lambda one: one[0])
-    fix = list(hub.fixes.values())[which]
-    return Culprit(fix, list(_formulas(tuple(vars(fix).values())))[k], value, x)
-
-
 def _first_bad(simulation: Simulation) -> tuple | None:
-    """The same by numbers, as far as places at hand tell: (fix, formula, place), value, place."""
+    """Find its numbers as far as places at hand tell: (fix, formula, place), value, position."""
     hub = simulation.hub
     for which, fix in enumerate(hub.fixes.values()):
         over = simulation.step > 0 and fix.id in simulation.begun
@@ -305,17 +283,23 @@ def _places(simulation: Simulation, group: Any, formula: Expression) -> Iterator
 
 
 def no_number(hub: Hub, simulation: Simulation, message: str, hint: str) -> Trouble:
-    """The trouble with what is NaN, and the formula that it comes from, where that is found."""
-    found = culprit(hub, simulation)
-    if found is None:
+    """The trouble with what is NaN, and the first fix with a formula that gives NaN or infinity.
+
+    A formula that reads what is NaN already shows the damage, and not where it comes from.
+    """
+    found = [one for one in simulation.seen(_first_bad) if one is not None]
+    if not found:
         return Trouble(message, hint)
-    what = "NaN" if np.isnan(found.value) else f"{found.value:g}"
-    where = "" if found.x is None else f" at {_place(found.x[: hub.domain.dimension])}"
+    (which, k, _), value, x = min(found, key=lambda one: one[0])
+    fix = list(hub.fixes.values())[which]
+    formula = list(_formulas(tuple(vars(fix).values())))[k]
+    what = "NaN" if np.isnan(value) else f"{value:g}"
+    where = "" if x is None else f" at {_place(x[: hub.domain.dimension])}"
     return Trouble(
-        f"{message}: fix {found.fix.id} gets {what}{where} from {found.formula.text}",
+        f"{message}: fix {fix.id} gets {what}{where} from {formula.text}",
         "a formula that is a number at all times and places of the run, such as by max(a, b) or "
         "if(condition, a, b)",
-        found.fix.place,
+        fix.place,
     )
 
 

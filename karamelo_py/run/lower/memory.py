@@ -171,7 +171,8 @@ def least_bytes(hub: Hub, real: type, copied: bool) -> float:
         sizes = {name: size for name, _, size in point_fields(block)}
         of_one = sum(sizes.values())
         points += solid.count * (of_one + (of_one - sizes["x moved"] if copied else 0))
-        cells.append(_cells(solid))
+        ppc = getattr(solid, "ppc", 0)  # else nothing is known of the cells that it fills
+        cells.append(solid.count / ppc**solid.domain.dimension if ppc else 0.0)
     d, per_cell = kin.dimension, hub.update.method.basis.nodes_per_cell**kin.dimension
     of_node = np.dtype(real).itemsize * (
         arrays.SUMS_WIDTH[d] + arrays.UPDATE_WIDTH[d] + arrays.VELOCITY_WIDTH[d]
@@ -182,12 +183,6 @@ def least_bytes(hub: Hub, real: type, copied: bool) -> float:
 
 def _largest(hub: Hub) -> Solid:
     return max(hub.solids.values(), key=lambda solid: solid.count)
-
-
-def _cells(solid: Solid) -> float:
-    """Count the cells that a solid fills at least."""
-    ppc = getattr(solid, "ppc", 0)
-    return solid.count / ppc**solid.domain.dimension if ppc else 0.0
 
 
 def no_room(hub: Hub, error: MemoryError) -> ScriptError:
