@@ -13,6 +13,8 @@ from karamelo_py.run.timestep import own_step
 from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
 
+Words = Iterator[tuple[str, str]]  # the cost, and what to write instead
+
 AXES = "xyz"
 SMALL_STEP = 0.4  # of the stable one; scripts with moderate reserve are left alone
 NEARLY_INCOMPRESSIBLE = 0.4  # Poisson's ratio from where on linear functions lock
@@ -22,17 +24,18 @@ MANY_POINTS = 4  # a cell and direction
 def suggestions(hub: Hub, simulation: Any) -> list[Advice]:
     """Find all that is known to be paid for without need, before anything has run."""
     rules = (_step, _unread, _unused, _of_parts, _averaging, _flat, _round, _points)
-    return [suggestion for rule in rules for suggestion in rule(hub, simulation)]
+    return [Advice("", *words) for rule in rules for words in rule(hub, simulation)]
 
 
-def _of_parts(hub: Hub, simulation: Any) -> Iterator[Advice]:
-    return SceneFacts(hub, simulation, inf).advice("suggestion")
+def _of_parts(hub: Hub, simulation: Any) -> Words:
+    said = SceneFacts(hub, simulation, inf).advice("suggestion")
+    return ((one.reason, one.cure) for one in said)
 
 
 # --- the step ------------------------------------------------------------------------------------
 
 
-def _step(hub: Hub, simulation: Any) -> Iterator[Advice]:
+def _step(hub: Hub, simulation: Any) -> Words:
     share, limit = hub.update.dt_factor, simulation.limit
     if hub.update.fixed_dt is not None:
         dt = simulation.dt
@@ -45,17 +48,15 @@ def _step(hub: Hub, simulation: Any) -> Iterator[Advice]:
         return
     times = f"{best / dt:.3g} times as many steps as the program's own step asks for"
     if hub.update.fixed_dt is not None:
-        yield Advice("", f"set_dt({dt:g}): {times}", f"leave set_dt out, or set_dt({best:.3g})")
+        yield f"set_dt({dt:g}): {times}", f"leave set_dt out, or set_dt({best:.3g})"
     else:
-        yield Advice(
-            "", f"dt_factor({hub.update.dt_factor:g}): {times}", f"dt_factor({best / limit:.3g})"
-        )
+        yield f"dt_factor({hub.update.dt_factor:g}): {times}", f"dt_factor({best / limit:.3g})"
 
 
 # --- what nobody reads ---------------------------------------------------------------------------
 
 
-def _unread(hub: Hub, simulation: Any) -> Iterator[Advice]:
+def _unread(hub: Hub, simulation: Any) -> Words:
     text = _script(hub)
     for kind, catalogue in (("compute", hub.computes), ("fix", hub.fixes)):
         for ID, item in catalogue.items():
@@ -67,14 +68,13 @@ def _unread(hub: Hub, simulation: Any) -> Iterator[Advice]:
             if 0 < uses <= len(re.findall(defined, text)):
                 suffix = item.published[0]
                 name = f"{ID}_{suffix}" if suffix else ID
-                yield Advice(
-                    "",
+                yield (
                     f"{kind} {ID} ({item.style}) is measured at each output and shown nowhere",
                     f"leave it out, or name {name} in log_modify",
                 )
 
 
-def _unused(hub: Hub, simulation: Any) -> Iterator[Advice]:
+def _unused(hub: Hub, simulation: Any) -> Words:
     """Groups whose names stand nowhere but where they are made."""
     text = _script(hub)
     if re.search(r"\binclude\s*\(", text):
@@ -82,7 +82,7 @@ def _unused(hub: Hub, simulation: Any) -> Iterator[Advice]:
     for ID in hub.groups:
         made = len(re.findall(rf"\bgroup\s*\(\s*{re.escape(ID)}\s*,", text))
         if 0 < len(re.findall(rf"(?<!\w){re.escape(ID)}(?!\w)", text)) <= made:
-            yield Advice("", f"group {ID} is used by nothing", "leave it out, or name it in a fix")
+            yield f"group {ID} is used by nothing", "leave it out, or name it in a fix"
 
 
 def _script(hub: Hub) -> str:
@@ -92,7 +92,7 @@ def _script(hub: Hub) -> str:
     return "\n".join(line.partition("#")[0] for line in lines)
 
 
-def _averaging(hub: Hub, simulation: Any) -> Iterator[Advice]:
+def _averaging(hub: Hub, simulation: Any) -> Words:
     if not hub.update.anti_locking:
         return
     for solid in hub.solids.values():
@@ -100,8 +100,7 @@ def _averaging(hub: Hub, simulation: Any) -> Iterator[Advice]:
         moduli = (getattr(law, "lam", None), getattr(law, "G", None))
         if None in moduli or moduli[0] / (2 * sum(moduli)) >= NEARLY_INCOMPRESSIBLE:
             return
-    yield Advice(
-        "",
+    yield (
         "anti_volumetric_locking(true): a visit of the points more, and nothing is nearly "
         "incompressible or flows",
         "leave it out",
@@ -152,7 +151,7 @@ def _alike(hub: Hub, fix: Any, key: Callable[[np.ndarray], np.ndarray]) -> bool:
     return True
 
 
-def _flat(hub: Hub, simulation: Any) -> Iterator[Advice]:
+def _flat(hub: Hub, simulation: Any) -> Words:
     """Solids that are the same all along a direction in which nothing moves."""
     domain = hub.domain
     d = domain.dimension
@@ -165,8 +164,7 @@ def _flat(hub: Hub, simulation: Any) -> Iterator[Advice]:
             given = [f"{domain.lo[axis]:g}, {domain.hi[axis]:g}" for axis in rest]
             kept = " and ".join(AXES[axis] for axis in rest)
             named = "" if k == d - 1 else f", with {kept} called {' and '.join(AXES[: d - 1])}"
-            yield Advice(
-                "",
+            yield (
                 f"all solids are the same along {AXES[k]}, in which nothing moves: {layers} times "
                 f"the points of {'plane strain' if d == 3 else 'a line'}",
                 f"dimension({d - 1}, {', '.join(given)}, {domain.h:g}){named}",
@@ -233,7 +231,7 @@ def _faces_held(hub: Hub, k: int, low: float, high: float) -> bool:
     return inside and bool(held.take(numbers, axis=k).all())
 
 
-def _round(hub: Hub, simulation: Any) -> Iterator[Advice]:
+def _round(hub: Hub, simulation: Any) -> Words:
     """Cylinders about one axis, along which all acts."""
     if hub.domain.dimension != 3:
         return
@@ -261,8 +259,7 @@ def _round(hub: Hub, simulation: Any) -> Iterator[Advice]:
     radius = max(region.radius for region in regions)
     lo, hi = hub.domain.lo[along], hub.domain.hi[along]
     h = hub.domain.h
-    yield Advice(
-        "",
+    yield (
         "cylinders about one axis, and nothing acts around it: about "
         f"{np.pi * radius / h:.3g} times the points of the plane of radius and axis",
         f"dimension(2, 0, {max(hub.domain.hi[axis] for axis in across):g}, {lo:g}, {hi:g}, {h:g}) "
@@ -270,13 +267,12 @@ def _round(hub: Hub, simulation: Any) -> Iterator[Advice]:
     )
 
 
-def _points(hub: Hub, simulation: Any) -> Iterator[Advice]:
+def _points(hub: Hub, simulation: Any) -> Words:
     for solid in hub.solids.values():
         ppc = getattr(solid, "ppc", 0)
         if ppc >= MANY_POINTS:
             each = ppc**hub.domain.dimension
-            yield Advice(
-                "",
+            yield (
                 f"solid {solid.id} has {each} points a cell; more than two a direction gain little "
                 "once points have moved",
                 f"2 or 3 points a direction, and finer cells for what {each} cost",

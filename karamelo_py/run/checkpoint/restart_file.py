@@ -19,7 +19,7 @@ from karamelo_py.language.replay import Record, Replay
 from karamelo_py.output.files import whole
 from karamelo_py.output.rhythm import ByTime, Rhythmic
 from karamelo_py.run.checkpoint.arrays import Stored, reading, stored, take_snapshot, take_stored
-from karamelo_py.run.checkpoint.parts import PartStates, RollbackPoint, parts_of
+from karamelo_py.run.checkpoint.parts import PartStates, parts_of
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
@@ -57,34 +57,31 @@ def path_of(hub: Hub, file: Path) -> Path:
 def write(hub: Hub, file: Path, *, within: bool) -> Path:
     """Write the present state of a scene, `within` a run or between two, and return the name."""
     path, comm, simulation = path_of(hub, file), hub.settings.comm, hub.simulation
+    run = hub.running and hub.running.rollback
+    # The last good state, where the run in progress may go back to it.
+    point = run.point if run and run.halve and run.point.arrays else None
+    groups = {"state": stored(simulation)}
+    if point:
+        groups["good"] = stored(simulation, point.arrays)
     if comm.leads:
-        _write(hub, path, within)
+        _write(hub, path, within, run, groups)
     else:
-        for _ in stored(simulation):
-            pass
-        if point := _good(hub):
-            for _ in stored(simulation, point.arrays):
+        for found in groups.values():
+            for _ in found:
                 pass
     comm.barrier()
     return path
 
 
-def _good(hub: Hub) -> RollbackPoint | None:
-    """Find the last good state, where the run in progress may go back to it."""
-    run = hub.running and hub.running.rollback
-    return run.point if run and run.halve and run.point.arrays else None
-
-
-def _write(hub: Hub, path: Path, within: bool) -> None:
+def _write(hub: Hub, path: Path, within: bool, run: Any, groups: dict[str, Iterator]) -> None:
     import h5py
 
     for _, part in parts_of(hub):
         if hasattr(part, "filed"):
             part.filed()
     interpreter, states = hub.interpreter, {"parts": PartStates.of(hub)}
-    run, point = hub.running and hub.running.rollback, _good(hub)
-    if point:
-        states["good parts"] = point.parts
+    if "good" in groups:
+        states["good parts"] = run.point.parts
     content = {
         "within": within,
         "statements": interpreter.record.statements,
@@ -93,25 +90,22 @@ def _write(hub: Hub, path: Path, within: bool) -> None:
         "variables": {name: str(value) for name, value in interpreter.variables.items()},
         "runs": hub.runs,
         "scene": described(hub),
-        "values": {name: hub.values.get(name) for name in hub.values.names()},
+        "values": states["parts"].values,
         "begun": hub.simulation.begun,
-        "run": run and [run.halvings, run.returns, point and point.step],
+        "run": run and [run.halvings, run.returns, run.point.step if "good" in groups else None],
         **{name: [[*key, of] for key, of in one.parts.items()] for name, one in states.items()},
     }
     with whole(path) as out, h5py.File(out, "w") as root:
         root.attrs["format"], root.attrs["version"] = FORMAT, VERSION
         root.attrs["program"] = __version__
         root.attrs["step"], root.attrs["time"] = hub.update.step, hub.update.time
-        text = np.frombuffer(
-            json.dumps(content, default=lambda late: late.plain()).encode(), np.uint8
-        )
-        root.create_dataset("content", data=text, **FLAT)
+        text = json.dumps(content, default=lambda late: late.plain()).encode()
+        root.create_dataset("content", data=np.frombuffer(text, np.uint8), **FLAT)
         for name, one in states.items():
             for k, array in enumerate(one.arrays):
                 root.create_dataset(f"{name}/{k}", data=array, **FLAT)
-        _put(root.create_group("state"), stored(hub.simulation))
-        if point:
-            _put(root.create_group("good"), stored(hub.simulation, point.arrays))
+        for name, found in groups.items():
+            _put(root.create_group(name), found)
 
 
 def _put(group: Any, found: Iterator[Stored]) -> None:
