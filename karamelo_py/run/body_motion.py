@@ -72,10 +72,7 @@ class BodyMotion(NamedTuple):
 
 
 def motions(simulation: Any) -> list[BodyMotion]:
-    """Measure how all solids with points move; all processes know it.
-
-    Each looks at its own points, so many at a time; sums are without rounding.
-    """
+    """Measure how all solids with points move; all processes know it; sums are without rounding."""
     d, count = simulation.kin.dimension, len(simulation.hub.solids)
     limbs = np.zeros((count, 1 + 2 * d + 2 * d * d, LIMBS), np.int64)
     ends = np.full((count, 4 * d), -np.inf)
@@ -154,10 +151,7 @@ def _bodies(s: Any) -> list[tuple[BodyMotion, Any]]:
 
 
 def drift_of(s: Any) -> Noise | None:
-    """Measure what the drift in the scene `s` (SceneFacts) feeds, also where that is borne.
-
-    Schemes of which these numbers are known say what steps keep energy (`keeping`).
-    """
+    """Measure what the drift in the scene `s` (SceneFacts) feeds, also where that is borne."""
     if not (hasattr(s.scheme, "keeping") and s.moves and s.kept > 0.9):
         return None
     known, spacing = borne(s.basis), float(s.simulation.control.clock[0].spacing)

@@ -30,11 +30,7 @@ NORMAL = COMPONENTS[:3]
 
 @dataclass
 class LoadPath:
-    """Targets at the end of a piece of path; every strain that is not named stays as it is.
-
-    If both strain and stress of a component, or too much of the volume, are prescribed, it is
-    refused.
-    """
+    """Targets at the end of a piece of path; every strain that is not named stays as it is."""
 
     increments: int  # number of equal ones
     duration: float
@@ -76,10 +72,7 @@ class LoadPath:
             )
 
     def strain_at_end(self, strain: np.ndarray, free: Sequence[str]) -> np.ndarray:
-        """(6,) strain at the end, from that at the start; where stress is prescribed, no change.
-
-        `free` are the components of strain that the kinematics has.
-        """
+        """(6,) strain at the end, from that at the start and the components that are `free`."""
         end = strain.copy()
         for name, value in self.strain.items():
             end[COMPONENTS.index(name)] = value

@@ -39,10 +39,7 @@ class OthersWait(Exception):
 
 
 class RollBack:
-    """The last good state of a run (`point`), and the way back to it.
-
-    With `halve` it goes on from there with half the step; else the run ends.
-    """
+    """The last good state of a run, and the way back to it: to `halve` the step, or to end."""
 
     def __init__(self, hub: Hub, *, halve: bool):
         self.hub, self.halve, self.place = hub, halve, hub.place
@@ -130,10 +127,7 @@ class RollBack:
         return True
 
     def _points_only_leave(self) -> bool:
-        """Tell whether a step went wrong since points leave the domain, at no more energy.
-
-        No smaller step keeps these. Where nobody watches energy, who knows.
-        """
+        """Tell whether points leave, at no more energy: no smaller step keeps them."""
         simulation, moves = self.simulation, self.hub.update.method.frame.moves
         if not (moves and len(simulation.leaving()) and energy.grown_little(simulation)):
             return False
@@ -218,10 +212,7 @@ class RollBack:
         return f". {which} is in {name}; {GOES_ON.format(name)}"
 
     def _write_before_growth(self, end: int) -> Path | None:
-        """Return to the last state before step `end` whose energy has not grown, and write it.
-
-        Steps since the good state are taken once more, from one look at the energy to the next.
-        """
+        """Return to the last state before step `end` whose energy has not grown, and write it."""
         simulation, good = self.simulation, self.point
         good.return_to(simulation)
         clock = simulation.control.clock[0]

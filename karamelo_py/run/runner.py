@@ -56,10 +56,7 @@ def _clocks() -> np.ndarray:
 
 
 class Timings:
-    """Seconds that a run spends: (2,) those that have passed, and those of all threads.
-
-    While it tells of compilation it is told of it.
-    """
+    """Seconds that a run spends: (2,) those that have passed, and those of all threads."""
 
     def __init__(self, hub: Hub):
         self.hub = hub
@@ -350,10 +347,7 @@ class Runner:
     # --- around the loop ----------------------------------------------------------------------
 
     def _note(self, number: int, _: Any = None) -> None:
-        """Note a signal: Ctrl-C ends the run after the present chunk; a second one at once.
-
-        So do the signals of batch systems and of terminals that are closed.
-        """
+        """Note a signal: it ends the run after the present chunk; a second one at once."""
         if self.signal:
             raise KeyboardInterrupt
         self.signal = number

@@ -87,10 +87,7 @@ class Simulation(SceneArrays):
         self._watch_energy(begun_before)
 
     def go_on(self, end_time: float, halvings: int) -> None:
-        """In place of `begin`: go on with a run whose state was put into the arrays.
-
-        Steps, and the end of the run, may be others than in the run that wrote the state.
-        """
+        """In place of `begin`: go on, to this end, with a state that was put into the arrays."""
         clock = self.control.clock[0]
         self._make_ready()
         other_end, clock.end_time = clock.end_time != end_time, end_time
@@ -242,11 +239,7 @@ class Simulation(SceneArrays):
         return energy
 
     def advance(self, count: int) -> int:
-        """Take up to `count` steps (to the end time at most); DONE, or why it stopped.
-
-        Points that are due to be sorted are sorted before the next step, so that the nodes keep
-        showing the last one.
-        """
+        """Take up to `count` steps (to the end time at most); DONE, or why it stopped."""
         with self.comm.joint():
             if self.subdomain is None:
                 return self._advance_to(self.step + count)
@@ -259,7 +252,7 @@ class Simulation(SceneArrays):
     def _advance_to(self, target: int) -> int:
         control = self.control
         while True:
-            self.sort_if_due()
+            self.sort_if_due()  # not behind the last step, which the nodes keep showing
             try:
                 status = self._advance(target - self.step)
             except PointsMoved:
@@ -286,10 +279,7 @@ class Simulation(SceneArrays):
         return advance(scheme, self.visits, self.mode, self.setup, self.hooks, count)
 
     def compile(self) -> None:
-        """Have the loop over the steps compiled now: nobody waits for it in the midst of a log.
-
-        The first process does that, and the others find it on disk.
-        """
+        """Have the loop over the steps compiled now: nobody waits for it amid a log."""
         if config.DISABLE_JIT or self.python.by_stage:
             return
         arguments = self.hub.update.scheme, self.visits, self.mode, self.setup, self.hooks, 1

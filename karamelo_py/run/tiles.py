@@ -240,10 +240,7 @@ class Tiles:
         return self.rows * sum(array.itemsize * array.shape[1] for array in given)
 
     def lay_out(self, s: Setup) -> None:
-        """Lay the boxes of all blocks one after another; find the tiles of nodes that they reach.
-
-        Everything follows from the boxes of the tiles.
-        """
+        """Lay boxes of all blocks one after another; find the tiles of nodes that they reach."""
         spans, *found = self._rows_to_clear(s) if self.direct else self._parts_to_sum(s)
         s.buffers.count[:] = len(found[1]) - 1, self.direct
         spans = np.concatenate([[[len(spans), 0]], spans])
@@ -253,10 +250,7 @@ class Tiles:
             room[: len(rows)] = rows
 
     def _rows_to_clear(self, s: Setup) -> tuple[np.ndarray, ...]:
-        """The same as `_parts_to_sum` where points are few: one share, a part for each span.
-
-        Boxes have the numbers of the grids.
-        """
+        """As `_parts_to_sum` where points are few: one share, a part for each span."""
         boxes = Tiles._boxes(self, s)
         steps = self._steps[boxes.grid]
         self._tell_buffers(s, 0, 0, self._first_node[boxes.grid], steps)

@@ -128,10 +128,7 @@ def _depends(formula: Any, axes: str) -> bool:
 
 
 def _alike(hub: Hub, fix: Any, key: Callable[[np.ndarray], np.ndarray]) -> bool:
-    """Tell whether all points (or nodes) of a grid with one key are in the group, or none.
-
-    `key` makes one or two numbers of each of positions (n, 3).
-    """
+    """Tell whether all points (or nodes) at places of one `key` are in the group, or none."""
     group = fix.group
     if group is None or group.all:
         return group is not None
@@ -193,10 +190,7 @@ def _acts_alike(hub: Hub, rest: list[int]) -> bool:
 
 
 def _layers(hub: Hub, k: int, rest: list[int]) -> int:
-    """In how many equal layers across direction k the points lie, between faces that are held.
-
-    0 where layers differ, where solids do not begin and end together, or a face is free.
-    """
+    """Count the equal layers of solids across direction k, between faces that are held; or 0."""
     most, ends = 0, set()
     for solid in hub.solids.values():
         if not solid.count:

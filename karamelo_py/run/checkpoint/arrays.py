@@ -44,12 +44,9 @@ def changing(simulation: Any) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def copied(simulation: Any, before: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Copy the state of a simulation, and the published values.
-
-    Copies of the state `before`, which is lost, are used again. One array after another: where
-    points have come or gone none is there twice.
-    """
+    """Copy the state of a simulation, and published values, into copies of a state that is lost."""
     found = {}
+    # One array after another: where points have come or gone none is there twice.
     for name, array in (*changing(simulation), ("values", simulation.setup.control.values)):
         copy = before.pop(name, None)
         if copy is None or copy.shape != array.shape or copy.dtype != array.dtype:
@@ -151,10 +148,7 @@ def opened(path: Path, group: str = "state") -> Iterator[dict[str, InFile]]:
 
 @contextmanager
 def reading() -> Iterator[None]:
-    """Within this, what HDF5 cannot read is told of as a file that is damaged.
-
-    Only what reads belongs there: what else fails for the system is not the fault of the file.
-    """
+    """Within this, what HDF5 cannot read is a damaged file; only what reads belongs there."""
     try:
         yield
     except OSError as error:
@@ -245,10 +239,7 @@ def of_nodes(s: Any) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def rows_at(simulation: Any, nodes: np.ndarray, gather: Callable) -> dict[str, np.ndarray] | None:
-    """Gather the rows of all arrays of nodes, of ascending numbers; zero where none is in use.
-
-    None where the processes `gather` them at another.
-    """
+    """Gather rows of all arrays of nodes, of ascending numbers, zero where not in use; or None."""
     counted, kinds = simulation.counted(), dict(of_nodes(simulation.setup))
     limits = (nodes[0], nodes[-1] + 1) if len(nodes) else (0, 0)
     here = counted[slice(*np.searchsorted(counted, limits))]

@@ -53,11 +53,7 @@ class PartStates(NamedTuple):
         return cls(parts, arrays, {name: hub.values.get(name) for name in names})
 
     def give(self, hub: Hub, *, cut: bool = False, anew: bool = False) -> None:
-        """Let all parts remember that.
-
-        With `cut` outputs go on from there in their files. Those that begin them `anew` get what
-        they carry into other files.
-        """
+        """Let all parts remember that; with `cut` outputs go on in their files, or `anew`."""
         for name, value in self.values.items():
             if name in hub.values:
                 hub.values.set(name, value)
@@ -100,10 +96,7 @@ def _all_parts(hub: Hub) -> Iterator[tuple[Key, Any]]:
 
 
 def state_of(part: Any, arrays: list[np.ndarray], *, grows: bool = False) -> dict[str, Any]:
-    """Return what a part remembers as JSON knows it; arrays are copied and numbered.
-
-    Where lists are only ever added to (`grows`), nothing of them is copied before a file takes it.
-    """
+    """Return what a part remembers as JSON knows it; arrays are copied and numbered."""
     found: dict[str, Any] = {}
     for name in named(part):
         value = getattr(part, name)

@@ -212,10 +212,7 @@ def _step_was_told(hub: Hub) -> bool:
 
 
 def _smaller_step(hub: Hub, simulation: Simulation) -> str:
-    """Say how to take a smaller step, and that the present one is too large where it is.
-
-    One that was so from the start on has ruined the state, and its limit with it.
-    """
+    """Say how to take a smaller step, and that the present one is too large where it is."""
     if not simulation.control.clock[0].watch_limit:
         return "the step is too large" + ", as the warning says" * _step_was_told(hub)
     if simulation.above_limit():
@@ -237,6 +234,7 @@ def _first_bad(simulation: Simulation) -> tuple | None:
         if over or not fix.hooks():
             continue
         for k, formula in enumerate(_formulas(tuple(vars(fix).values()))):
+            # What reads a NaN shows the damage, and not where it comes from.
             if formula.is_constant or not _readable(formula, hub.values):
                 continue
             bad = []
@@ -283,10 +281,7 @@ def _places(simulation: Simulation, group: Any, formula: Expression) -> Iterator
 
 
 def no_number(hub: Hub, simulation: Simulation, message: str, hint: str) -> Trouble:
-    """The trouble with what is NaN, and the first fix with a formula that gives NaN or infinity.
-
-    A formula that reads what is NaN already shows the damage, and not where it comes from.
-    """
+    """The trouble with what is NaN, and the first fix whose formula gives NaN or infinity."""
     found = [one for one in simulation.seen(_first_bad) if one is not None]
     if not found:
         return Trouble(message, hint)

@@ -32,11 +32,7 @@ class MemoryTaken(NamedTuple):
 
 
 def memory_of(simulation: Any, s: arrays.Setup, boxes: int) -> MemoryTaken:
-    """Count what the points in the tiles of `s`, its nodes in use, and boxes of so many bytes take.
-
-    Places before the first step and members of groups, where fixes act on points by them, and
-    the marks of deleted points are known of the whole scene.
-    """
+    """Count what points in the tiles of `s`, nodes in use, and boxes of so many bytes take."""
     counts = [int(occupied(block.tiling)[1].sum()) for block in s.blocks]
     of_point = [{name: size for name, _, size in point_fields(block)} for block in s.blocks]
     points = sum(sum(of.values()) * n for of, n in zip(of_point, counts, strict=True))
@@ -105,10 +101,7 @@ FEW = 100_000  # points; so many have room everywhere
 
 
 def check_room(hub: Hub, *, copied: bool) -> None:
-    """Refuse a scene that needs more memory than this machine has; warn of what is not free.
-
-    In a run there is a copy of the last good state, too (`copied`).
-    """
+    """Refuse a scene that memory does not hold, perhaps with a copy; warn of what is not free."""
     count = sum(solid.count for solid in hub.solids.values())
     if count <= FEW or (there := machine_memory(on_machine(hub))) is None:
         return
@@ -156,10 +149,7 @@ def _ways(hub: Hub, need: float, there: float, copied: bool) -> str:
 
 
 def least_bytes(hub: Hub, real: type, copied: bool) -> float:
-    """Count the bytes that points, their copy, and the nodes of the cells that they fill take.
-
-    It is the least: boxes of tiles, groups and what the program itself takes come on top.
-    """
+    """Count the least bytes of points, their copy, and the nodes of the cells that they fill."""
     kin = hub.update.method.kinematics(hub)
     kinds = point_kinds(hub, real)
     points, cells = 0, [0.0]

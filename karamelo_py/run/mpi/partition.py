@@ -84,10 +84,7 @@ class Needs(NamedTuple):
 
 
 class SharedTiles(Tiles):
-    """Tiles of a process among others.
-
-    With `one_place` a node has others at its place, in grids that are alike: bodies in contact.
-    """
+    """Tiles of a process among others."""
 
     def __init__(
         self,
@@ -101,7 +98,7 @@ class SharedTiles(Tiles):
     ):
         super().__init__(lattices, basis, points, sparse)
         self.comm = comm
-        self.one_place = one_place
+        self.one_place = one_place  # a node has others there: of bodies in contact
         self._places = np.concatenate(
             [
                 one.lo[: self.dimension] + one.h * self.size * np.argwhere(np.ones(shape, bool))
@@ -184,12 +181,9 @@ class SharedTiles(Tiles):
     def _with(
         self, k: int, points: Points, stay: np.ndarray, come: list[list[np.ndarray]]
     ) -> Points:
-        """Join those of the points of block `k` that stay, and what has come.
-
-        They take the place of what was there at the sort before: fresh memory for all of them would
-        cost more than all else that a sort does.
-        """
+        """Join the points that stay and those that have come, in the memory of the sort before."""
         count = len(stay) + sum(parts[0].shape[-1] for parts in come)
+        # Fresh memory for all of them would cost more than all else that a sort does.
         arrays = []
         for i, (name, old) in enumerate(arrays_of(points)):
             new = [parts[i] for parts in come]

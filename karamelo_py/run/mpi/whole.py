@@ -81,10 +81,7 @@ class Whole:
     # --- gathering --------------------------------------------------------------------------------
 
     def gather(self) -> None:
-        """Gather the points of all at the first process, tile after tile, and the nodes.
-
-        Points come component by component, so that nothing of that size is there twice.
-        """
+        """Gather the points of all, component by component and tile after tile, and the nodes."""
         simulation, comm = self.simulation, self.simulation.comm
         totals = simulation.control.totals
         parts = comm.gather(self._own() | {"work": totals[WORK].copy()})
