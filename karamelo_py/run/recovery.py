@@ -65,8 +65,9 @@ class RollBack:
 
     def before(self) -> None:
         """Keep the present state where it is due and good; else note what parts remember."""
-        if self._keeps_start():  # whose rows are not gone back to
-            return
+        watched = self.simulation.control.clock[0].watch_limit
+        if self.point.step == self.begun_at and not watched:
+            return  # the first state alone is good, whose rows are not gone back to
         step = self.simulation.step
         # When states are kept must not depend on how fast steps are: runs go back to them.
         due = step != self.point.step and (step % CHUNK == 0 or step == self.first_step + 1)
@@ -97,10 +98,6 @@ class RollBack:
     def _keep(self) -> None:
         self.point.keep(self.simulation)
         self.returns = 0
-
-    def _keeps_start(self) -> bool:
-        """Tell whether the first state alone is good: the step was too large from there on."""
-        return self.point.step == self.begun_at and not self.simulation.control.clock[0].watch_limit
 
     def _halve_step(self, message: str = "", status: int = DONE) -> bool:
         """Go back to the last good state with half the step, where the script asks for that."""

@@ -33,14 +33,6 @@ PATIENCE = 0.3  # seconds between two looks, about: for Ctrl-C and the progress 
 ANOTHER_FOLDER = "the environment variable KARAMELO_PY_CACHE names another folder"
 
 
-def _kind_of_scene(hub: Hub) -> str:
-    """Describe roughly the loops of a scene: for how long they take to compile."""
-    parts = {type(material).__name__ for material in hub.materials.values()}
-    parts |= {type(fix).__name__ for fix in hub.fixes.values()}
-    parts |= {str(hub.settings.precision), f"threads={hub.settings.threads}"}
-    return f"{hub.domain.dimension}D {hub.update.words} {' '.join(sorted(parts))}"
-
-
 def _about(seconds: float) -> str:
     """Estimate the time for so many seconds of work; longer where others want the processor."""
     wanted = 1 + (os.getloadavg()[0] if hasattr(os, "getloadavg") else 0)
@@ -77,7 +69,11 @@ class Timings:
     @contextmanager
     def telling_of_compilation(self) -> Iterator[None]:
         """Say so when kernels are compiled, how long it may take, and count the time."""
-        scene = _kind_of_scene(self.hub)
+        hub = self.hub
+        # Roughly the loops of a scene, for how long they take to compile.
+        parts = {type(one).__name__ for one in (*hub.materials.values(), *hub.fixes.values())}
+        parts |= {str(hub.settings.precision), f"threads={hub.settings.threads}"}
+        scene = f"{hub.domain.dimension}D {hub.update.words} {' '.join(sorted(parts))}"
         expected = cache.time_for(scene)
         about = f": {_about(expected)}" if expected else ""
         self._words = (
@@ -86,7 +82,7 @@ class Timings:
         )
         try:
             compilation.listeners.append(self)
-            with cache.telling(partial(self.hub.warn, hint=ANOTHER_FOLDER)):
+            with cache.telling(partial(hub.warn, hint=ANOTHER_FOLDER)):
                 yield
         finally:
             compilation.listeners.remove(self)

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any
-
 import numpy as np
 
 from karamelo_py.compiler import fields
@@ -101,13 +98,6 @@ class SceneArrays(ById, ByNumber):
         """Number of steps taken in the whole script."""
         return int(self.control.values[TIMESTEP])
 
-    @property
-    def point_fields(self) -> tuple[type, ...]:
-        """Declared fields of the points, of all blocks."""
-        return tuple(
-            dict.fromkeys(type(one) for block in self.setup.blocks for one in block.points.fields)
-        )
-
     def state(self) -> State:
         """All that a new lowering takes over."""
         if self.subdomain is not None:
@@ -119,7 +109,8 @@ class SceneArrays(ById, ByNumber):
             for ids, own in self.rows().of_all([(block.points.id, state)]):
                 rows[:, ids] = own
             laws[without_rate(law_kind(block.laws))] = rows
-        kept = [kind for kind in self.point_fields if fields.is_kept(kind)]
+        found = (type(one) for block in self.setup.blocks for one in block.points.fields)
+        kept = [kind for kind in dict.fromkeys(found) if fields.is_kept(kind)]
         return State(
             self.count,
             self.present,
@@ -193,11 +184,8 @@ class SceneArrays(ById, ByNumber):
 
     def show_on_nodes(self) -> None:
         """See that the nodes show the present state when no step has been taken yet."""
-        if not self.mapped:
-            self.map_to_nodes()
-            self.mapped = True
-
-    def map_to_nodes(self) -> None:
+        if self.mapped:
+            return
         self.sort_if_due()
         s = self.setup
         dt = step_size(s)
@@ -206,6 +194,7 @@ class SceneArrays(ById, ByNumber):
         all_well(s)
         sweep_nodes(self.mode, SumsToVelocity(), s.kin, s.nodes, s.ranges, dt)
         show_heat(s.heat, s, self.mode)
+        self.mapped = True
 
     def snapshot(self, before: dict[str, np.ndarray] | None = None) -> dict[str, np.ndarray]:
         """Copy every array that a step changes, and the published values; see `copied`."""
@@ -213,11 +202,3 @@ class SceneArrays(ById, ByNumber):
 
     def restore(self, snapshot: dict[str, np.ndarray]) -> None:
         checkpoint.restore(self, snapshot)
-
-    def wrong_points(self) -> Iterator[tuple[Any, int]]:
-        """Block and index of points at hand that the last sweep found wrong, one a tile at most."""
-        for block in self.setup.blocks:
-            tiling = block.tiling
-            for t in range(max(int(tiling.count[0]), 1)):
-                if tiling.report[t, 2] > 0:
-                    yield block, int(tiling.report[t, 2]) - 1

@@ -71,9 +71,11 @@ class Simulation(SceneArrays):
         self._choose_dt()
         begun_before = len(self._begun)
         self._make_ready()
-        if self.step == 0 and timestep.moves_already(self):
-            clock.path = np.inf
-            self._ask_for_steps(0)
+        if self.step == 0:
+            in_hundred_steps = 100 * self.fastest() * clock.courant * clock.dt_factor
+            if in_hundred_steps > STILL * clock.rate:
+                clock.path = np.inf
+                self._ask_for_steps(0)
         self._choose_dt()
         if not np.isfinite(self.dt):
             raise ScriptError(
@@ -123,7 +125,9 @@ class Simulation(SceneArrays):
         before = {name: clock[name] for name in numbers}
         for name, number in numbers.items():
             clock[name] = number
-        weight = timestep.weight_of_drift(self.hub)
+        # Steps that a script may ask for are shares of h/(c + |v|).
+        own = update.dt_factor is None and update.fixed_dt is None
+        weight = timestep.own_weight_of_drift(self.hub) if own else 1.0
         if weight != clock.weight:
             clock.weight, self.measured = weight, False
         return numbers != before

@@ -134,12 +134,6 @@ def own_weight_of_drift(hub: Hub) -> float:
     return BOXES if fed and hub.update.transfer.alpha > 0.99 and not sparse(hub) else 1.0
 
 
-def weight_of_drift(hub: Hub) -> float:
-    """The same where the script may ask for steps, which are shares of h/(c + |v|)."""
-    own = hub.update.dt_factor is None and hub.update.fixed_dt is None
-    return own_weight_of_drift(hub) if own else 1.0
-
-
 def common_velocity(simulation: Any, weight: float) -> np.ndarray:
     """(3,) The velocity that speeds are measured from so that the common drift has this weight."""
     if weight == 1:
@@ -192,12 +186,6 @@ def step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
     if update.dt_factor is None and update.fixed_dt is None:
         return own_step_of_waves(hub, still=still)
     return courant_number(hub, longer=False), update.dt_factor or keeping_share(hub)
-
-
-def moves_already(simulation: Any) -> bool:
-    """Tell whether points are so fast that they are not at rest for a hundred steps."""
-    clock = simulation.control.clock[0]
-    return 100 * simulation.fastest() * clock.courant * clock.dt_factor > STILL * clock.rate
 
 
 def own_step(hub: Hub, simulation: Any, *, still: bool = False) -> float:

@@ -18,6 +18,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -124,11 +125,13 @@ def give_state(part: Any, state: dict[str, Any], arrays: list[np.ndarray]) -> No
             setattr(part, name, value_of(kept, arrays))
 
 
+@dataclass
 class Grown:
     """A list that is only ever added to, and how long it was."""
 
-    def __init__(self, items: list, length: int, arrays: list[np.ndarray]):
-        self.items, self.length, self.arrays = items, length, arrays
+    items: list
+    length: int
+    arrays: list[np.ndarray]
 
     def value(self) -> list:
         return self.items[: self.length]
@@ -137,11 +140,12 @@ class Grown:
         return plain(self.value(), self.arrays)
 
 
+@dataclass
 class Unwritable:
     """A copy of what a function in Python keeps and no file takes, and what is said of it."""
 
-    def __init__(self, kept: Any, fault: ScriptError):
-        self.kept, self.fault = kept, fault
+    kept: Any
+    fault: ScriptError
 
     def value(self) -> Any:
         return _copied(self.kept)

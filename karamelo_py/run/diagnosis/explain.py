@@ -121,7 +121,12 @@ class Wrong(NamedTuple):
 
 
 def _first_wrong(simulation: Simulation) -> Wrong | None:
-    wrong = [(int(block.points.id[p]), block.points, p) for block, p in simulation.wrong_points()]
+    wrong = []
+    for block in simulation.setup.blocks:
+        tiling = block.tiling
+        # The last sweep has found one a tile at most.
+        at = tiling.report[: max(int(tiling.count[0]), 1), 2]
+        wrong += [(int(block.points.id[p]), block.points, p) for p in (at[at > 0] - 1).astype(int)]
     if not wrong:
         return None
     number, points, p = min(wrong, key=lambda item: item[0])

@@ -1,8 +1,7 @@
 """The share of one of several processes in a scene: its points, and its work, which is measured."""
 
 import time
-from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -186,7 +185,7 @@ class Subdomain:
     def answer(self, what: int, a: int, b: int) -> int:
         try:
             self.load.note()
-            found = self._answers[what](self, a, b) or 0
+            found = self._answer(what, a, b)
             if what == ranks.NEXT:
                 self.load.next_block()
             else:
@@ -197,14 +196,18 @@ class Subdomain:
             self.comm.fail(error)
             raise
 
-    def _go_on(self, *_: int) -> None:
-        """Take the time alone."""
-
-    def _give(self, number: int, what: int) -> None:
-        self.tiles.give(self.simulation.setup, number, what)
-
-    def _take(self, *_: int) -> None:
-        self.tiles.take()
+    def _answer(self, what: int, a: int, b: int) -> int:
+        if what == ranks.GIVE:
+            self.tiles.give(self.simulation.setup, a, b)
+        elif what == ranks.TAKE:
+            self.tiles.take()
+        elif what == ranks.TOTALS:
+            self._totals(a, b)
+        elif what == ranks.LARGEST:
+            self.comm.allreduce_max(self.control.answer[:a])
+        elif what == ranks.NUMBER:
+            return int(self.comm.allreduce(np.array([a]))[0])
+        return 0  # for the others the time is taken alone
 
     def _totals(self, first: int, count: int) -> None:
         rows = slice(first, first + count)
@@ -227,17 +230,6 @@ class Subdomain:
                 values[row] = rounded(total)
             for of, to in getattr(self.simulation.setup.contact, "copies", ()):
                 values[to : to + 3] = values[of : of + 3]
-
-    def _largest(self, count: int, _: int) -> None:
-        self.comm.allreduce_max(self.control.answer[:count])
-
-    def _number(self, number: int, _: int) -> int:
-        return int(self.comm.allreduce(np.array([number]))[0])
-
-    _answers: ClassVar[dict[int, Callable]] = {
-        ranks.SWEEP: _go_on, ranks.NEXT: _go_on, ranks.GIVE: _give, ranks.TAKE: _take,
-        ranks.TOTALS: _totals, ranks.LARGEST: _largest, ranks.NUMBER: _number,
-    }  # fmt: skip
 
 
 def reads_totals(hooks: Any) -> bool:
