@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.kernels.totals import LIMBS, add_all, rounded
-from karamelo_py.output.fields import PIECE
 from karamelo_py.points.basis.noise import borne
 from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.strengths import shear_modulus
@@ -92,26 +91,21 @@ def motions(simulation: Any) -> list[BodyMotion]:
         mean = np.array(sums[: 2 * d]) / mass
         moments = np.array(sums[2 * d :]).reshape(d, 2 * d) - mass * np.outer(mean[:d], mean)
         high, fast, low, slow = end.reshape(4, d) * [[1], [1], [-1], [-1]]
-        found.append(
-            BodyMotion(
-                k, mass, mean[:d], mean[d:], moments[:, :d], moments[:, d:], low, high, slow, fast
-            )
-        )
+        about_centre = mean[:d], mean[d:], moments[:, :d], moments[:, d:]
+        found.append(BodyMotion(k, mass, *about_centre, low, high, slow, fast))
     return found
 
 
 def _pieces(simulation: Any, d: int) -> Iterator[tuple[int, np.ndarray, np.ndarray, np.ndarray]]:
     """Number of a solid, masses (n,), places and velocities (d, n) of some of its points."""
     firsts = [solid.first_id for solid in simulation.hub.solids.values()]
-    for block in simulation.setup.blocks:
+    for block, rows in simulation.rows_of(None):
         points = block.points
-        for begin in range(0, len(points.id), PIECE):
-            own = slice(begin, begin + PIECE)
-            solid = np.searchsorted(firsts, points.id[own], side="right") - 1
-            for k in unique(solid):
-                here = solid == k
-                x, v = points.x[simulation.now, :d, own], points.v[:, own]
-                yield k, *(a[..., here].astype(float) for a in (points.mass[own], x, v))
+        solid = np.searchsorted(firsts, points.id[rows], side="right") - 1
+        for k in unique(solid):
+            here = rows[solid == k]
+            x, v = points.x[simulation.now][:d, here], points.v[:, here]
+            yield k, *(a.astype(float) for a in (points.mass[here], x, v))
 
 
 SLOW = 0.01  # of the speed of waves, up to where nothing is fed in any time that was tried

@@ -16,9 +16,10 @@ from karamelo_py.compiler import cache
 from karamelo_py.compiler.loops import compilation
 from karamelo_py.output.console import duration
 from karamelo_py.run.advice import known_failures
-from karamelo_py.run.advice.report import bytes_per_point, report
+from karamelo_py.run.advice.report import report
 from karamelo_py.run.diagnosis import energy
 from karamelo_py.run.lower.build import check_scene
+from karamelo_py.run.lower.memory import bytes_per_point
 from karamelo_py.run.mpi.comm import check_same_run, handled_signals
 from karamelo_py.run.recovery import CHUNK, RollBack, Stopped
 from karamelo_py.run.simulation import Simulation

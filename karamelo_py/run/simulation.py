@@ -31,7 +31,7 @@ class Simulation(SceneArrays):
     def __init__(self, hub: Hub, previous: Simulation | None = None):
         super().__init__(hub, previous)
         # Fixes of the first step that have acted: not again when the scene is lowered anew.
-        self._begun: set[Any] = set(previous._begun) if previous else set()
+        self.begun: set[Any] = set(previous.begun) if previous else set()
         self.visits: Staged | Fused = Fused()
         self.hooks: Hooks | NoHooks = NoHooks()
         self._first: PythonHooks | None = None
@@ -51,15 +51,6 @@ class Simulation(SceneArrays):
         else:
             self._whole.act(function)
 
-    @property
-    def begun(self) -> list[str]:
-        """IDs of the fixes of the first step that have acted."""
-        return [ID for ID, fix in self.hub.fixes.items() if fix in self._begun]
-
-    @begun.setter
-    def begun(self, IDs: list[str]) -> None:
-        self._begun = {self.hub.fixes[ID] for ID in IDs if ID in self.hub.fixes}
-
     def begin(self, end_time: float) -> None:
         """Start of a run: choose the first dt; the run ends at `end_time` at the latest."""
         update = self.hub.update
@@ -69,7 +60,7 @@ class Simulation(SceneArrays):
         clock.over_limit = 0
         # Twice: initial values may be formulas of dt, and dt follows the fastest point.
         self._choose_dt()
-        begun_before = len(self._begun)
+        begun_before = len(self.begun)
         self._make_ready()
         if self.step == 0:
             in_hundred_steps = 100 * self.fastest() * clock.courant * clock.dt_factor
@@ -197,7 +188,7 @@ class Simulation(SceneArrays):
         """Begin to watch the balance of energy, or go on where nothing was set since."""
         clock = self.control.clock[0]
         clock.watch_energy = int(not unknown_work(self.hub))
-        set_anew = len(self._begun) > begun_before or bool(self._first_fixes)
+        set_anew = len(self.begun) > begun_before or bool(self._first_fixes)
         anew = not self.followed or set_anew
         self.followed = True
         if anew:
@@ -273,7 +264,7 @@ class Simulation(SceneArrays):
         if self._first is not None:
             status = run_steps(scheme, Staged(), self.mode, self.setup, self._first, 1)
             if status in (DONE, SORT):
-                self._begun |= set(self._first_fixes)
+                self.begun |= set(self._first_fixes)
                 self._first = None
                 self.clear_forces()  # the steps to come may have no hook that does it
                 return SORT  # there is more to do, unless that was all
@@ -296,7 +287,7 @@ class Simulation(SceneArrays):
         # Fixes act once before the first step, in it, or in every step.
         fixes = sorted(self.hub.fixes.values(), key=lambda fix: fix.acts_last)
         lasting = [fix for fix in fixes if not fix.first_step_only]
-        new = [fix for fix in fixes if fix.first_step_only and fix not in self._begun]
+        new = [fix for fix in fixes if fix.first_step_only and fix not in self.begun]
         self.python = PythonHooks(self, lasting)
         self.hooks = self.python.compiled
         staged = self.python.by_stage or any(
@@ -307,7 +298,7 @@ class Simulation(SceneArrays):
         for fix in at_once:
             # Nothing happens in a step before this hook: the state shows it from the start.
             self.set_initial(fix.id)
-        self._begun |= set(at_once)
+        self.begun |= set(at_once)
         self.beginning = new
         self._first_fixes = [fix for fix in new if fix not in at_once]
         self._first = None

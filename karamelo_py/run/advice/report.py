@@ -3,8 +3,6 @@
 from math import inf
 from typing import Any
 
-import numpy as np
-
 from karamelo_py.kernels.step import Staged, rows_of
 from karamelo_py.kernels.table import says
 from karamelo_py.points.laws import law_kind
@@ -86,23 +84,11 @@ def _size(count: float) -> str:
     return f"{mib:.0f} MiB" if mib > 100 else f"{mib:.3g} MiB"
 
 
-def bytes_per_point(simulation: Simulation) -> int:
-    """Bytes of all fields of a point, the mean over the points of all kinds."""
-    blocks = simulation.setup.blocks
-    own = np.array([len(block.points.id) for block in blocks])
-    counts = simulation.comm.allreduce(own).tolist()
-    of_one = [sum(size for *_, size in point_fields(block)) for block in blocks]
-    return round(np.dot(counts, of_one) / max(1, sum(counts)))
-
-
 def materials(hub: Hub, block: Any) -> list[Material]:
     """The materials of the points of this block: those in use whose laws are of its kind."""
     used = dict.fromkeys(solid.material for solid in hub.solids.values())
-    return [
-        material
-        for material in used
-        if law_kind(material.law) == without_rate(law_kind(block.laws))
-    ]
+    kind = without_rate(law_kind(block.laws))
+    return [material for material in used if law_kind(material.law) == kind]
 
 
 def stages(hub: Hub, simulation: Simulation) -> list[str]:
@@ -115,6 +101,4 @@ def stages(hub: Hub, simulation: Simulation) -> list[str]:
     lines = [f"{name}: {', '.join(ids)}" for name, ids in acting.items()]
     rows = rows_of(type(hub.update.scheme), type(simulation.visits))
     first = [text for row in rows if (text := says(row, simulation.setup)) is not None]
-    if not lines:
-        lines = ["no fix acts between them"]
-    return [*first, *lines]
+    return [*first, *(lines or ["no fix acts between them"])]

@@ -90,8 +90,8 @@ def _write(hub: Hub, path: Path, within: bool, run: Any, groups: dict[str, Itera
         "variables": {name: str(value) for name, value in interpreter.variables.items()},
         "runs": hub.runs,
         "scene": described(hub),
-        "values": states["parts"].values,
-        "begun": hub.simulation.begun,
+        "values": {name: hub.values.get(name) for name in hub.values.names()},
+        "begun": [ID for ID, fix in hub.fixes.items() if fix in hub.simulation.begun],
         "run": run and [run.halvings, run.returns, run.point.step if "good" in groups else None],
         **{name: [[*key, of] for key, of in one.parts.items()] for name, one in states.items()},
     }
@@ -192,7 +192,7 @@ class Restart:
         except ScriptError as error:
             error.message = f"{self.path}: {error.message}"
             raise
-        simulation.begun = content["begun"]
+        simulation.begun = {fix for ID, fix in hub.fixes.items() if ID in content["begun"]}
         states.give(hub, cut=outputs, anew=not outputs)
         if hub.running is None or content["run"] is None:
             return

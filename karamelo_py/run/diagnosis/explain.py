@@ -235,7 +235,7 @@ def _first_bad(simulation: Simulation) -> tuple | None:
     """Find its numbers as far as places at hand tell: (fix, formula, place), value, position."""
     hub = simulation.hub
     for which, fix in enumerate(hub.fixes.values()):
-        over = simulation.step > 0 and fix.id in simulation.begun
+        over = simulation.step > 0 and fix in simulation.begun
         if over or not fix.hooks():
             continue
         for k, formula in enumerate(_formulas(tuple(vars(fix).values()))):

@@ -96,6 +96,15 @@ def point_fields(block: Any) -> list[tuple[str, str, int]]:
     return [(name, str(size), size * array.itemsize) for name, size, array in sizes]
 
 
+def bytes_per_point(simulation: Any) -> int:
+    """Bytes of all fields of a point, the mean over the points of all kinds."""
+    blocks = simulation.setup.blocks
+    own = np.array([len(block.points.id) for block in blocks])
+    counts = simulation.comm.allreduce(own).tolist()
+    of_one = [sum(size for *_, size in point_fields(block)) for block in blocks]
+    return round(np.dot(counts, of_one) / max(1, sum(counts)))
+
+
 GIB = 2**30
 FEW = 100_000  # points; so many have room everywhere
 
