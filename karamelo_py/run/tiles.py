@@ -95,13 +95,11 @@ class Tiles:
         self.shapes = -(-self._cells // self.size)
         self.first = numbered(self.shapes)
         # Points without a domain reach no further than two cells from those of their tile.
-        sorting.widest = np.minimum(
-            (self.size + 4) * self.per_cell + 1 + 2 * self.beyond, self._nodes
-        )
-        most = float(np.diff(self.first) @ np.prod(sorting.widest, axis=1, dtype=float))
+        widest = np.minimum((self.size + 4) * self.per_cell + 1 + 2 * self.beyond, self._nodes)
+        most = float(np.diff(self.first) @ np.prod(widest, axis=1, dtype=float))
         shaped = shape_size(type(basis), d) > 0
         self._most_rows = inf if shaped else most
-        rows = np.prod(sorting.widest[:, :-1], axis=1, dtype=np.int64).max()
+        rows = np.prod(widest[:, :-1], axis=1, dtype=np.int64).max()
         # What points may reach is known of each row of a box where rows of nodes are tiles: of the
         # boxes around a bar that has spread at one end they reach little at the other.
         by_rows = self.long and not shaped and not self.direct
