@@ -138,8 +138,6 @@ class RollBack:
         simulation.advance(1)  # which goes wrong again, for others to look at
         return healthy
 
-    # --- an end -----------------------------------------------------------------------------------
-
     def _stop(self, status: int) -> NoReturn:
         """Return to the last good state, write it, and raise what the user should know.
 

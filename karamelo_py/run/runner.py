@@ -144,14 +144,6 @@ def carry_out(hub: Hub, **length: Any) -> None:
     hub.runs.append(after)
 
 
-def _processes(simulation: Simulation) -> dict[str, str]:
-    """Words of a banner for the processes that share the scene."""
-    if simulation.comm.size == 1:
-        return {}
-    alone = f", one has all points: up to {DIRECT_UP_TO} are not shared out"
-    return {"processes": f"{simulation.comm.size}{alone if simulation.tiles.direct else ''}"}
-
-
 @dataclass(eq=False)
 class Runner:
     """Runs a scene for a number of steps, to a time, or by a condition.
@@ -341,8 +333,6 @@ class Runner:
             console.begin_run(simulation.step, fraction or 0.0)
         console.progress(simulation.step, simulation.time, fraction)
 
-    # --- around the loop ----------------------------------------------------------------------
-
     def _note(self, number: int, _: Any = None) -> None:
         """Note a signal: it ends the run after the present chunk; a second one at once."""
         if self.signal:
@@ -354,6 +344,8 @@ class Runner:
     def _banner(self, simulation: Simulation, going_on: bool) -> None:
         hub, why = self.hub, energy.unknown_work(self.hub)
         own = words_of_own_step(hub, simulation)
+        alone = f", one has all points: up to {DIRECT_UP_TO} are not shared out"
+        processes = f"{simulation.comm.size}{alone if simulation.tiles.direct else ''}"
         hub.console.banner(
             f"Run, continued from step {simulation.step}" if going_on else "Run",
             {
@@ -366,7 +358,7 @@ class Runner:
                 **({"own dt": own} if own else {}),
                 "limited by": f"{ruling_limit(simulation)}; {words_of_share(hub)}",
                 **({"energy": energy.not_watched(why)} if why else {}),
-                **_processes(simulation),
+                **({"processes": processes} if simulation.comm.size > 1 else {}),
                 "threads": simulation.threads,
                 "precision": hub.settings.precision,
                 **({"units": str(hub.output.units)} if hub.output.units else {}),

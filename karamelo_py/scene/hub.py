@@ -131,7 +131,7 @@ class Hub:
     begun
         Whether a run has begun, in fact or in the rehearsal of what follows it.
     later
-        What the runs ask for that a rehearsal came to (`run.large_steps.Step`).
+        What the runs ask for that a rehearsal came to (`run.advice.known_failures.Step`).
     restart
         What the script goes on from, until it is where that was written.
     open_ended

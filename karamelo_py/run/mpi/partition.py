@@ -116,8 +116,6 @@ class SharedTiles(Tiles):
         self._links: dict[tuple[int, int], tuple[list, Any]] = {}  # by number of buffers, arrays
         self._from = np.empty(0, np.int64)  # whose the boxes of others are
 
-    # --- points -----------------------------------------------------------------------------------
-
     def share_out(self, work: np.ndarray) -> None:
         """Cut the tiles into parts of nearly as much work each."""
         if not self.direct:
@@ -207,8 +205,6 @@ class SharedTiles(Tiles):
 
     def _reach(self, s: Setup, block: Block, x: np.ndarray) -> float:
         return float(self.comm.allreduce_max(np.array([super()._reach(s, block, x)]))[0])
-
-    # --- nodes ------------------------------------------------------------------------------------
 
     def _boxes(self, s: Setup) -> Boxes:
         own = self.own_boxes(s)

@@ -77,8 +77,6 @@ class Subdomain:
         simulation.setup = s._replace(control=s.control._replace(ranks=linked))
         self._counted_at = self._learned_at = int(s.control.values[TIMESTEP])
 
-    # --- points -----------------------------------------------------------------------------------
-
     def migrate(self, s: Setup) -> Setup:
         """Hand over the points that have left the own tiles; they are to be sorted then."""
         self.share_contact()
@@ -118,8 +116,6 @@ class Subdomain:
         """Number the nodes in use here that no other process counts."""
         nodes = numbers(self.simulation.setup.spans)
         return nodes[self.tiles.foreign[nodes] == 0]
-
-    # --- work -------------------------------------------------------------------------------------
 
     def begin(self, hooks: Any, *, from_python: bool) -> None:
         """Make ready for steps whose work is measured."""
@@ -179,8 +175,6 @@ class Subdomain:
             blocks.append(block._replace(points=take_points(block.points, arrays, "")))
         simulation.setup = s._replace(blocks=tuple(blocks))
         tiles.lay_out(simulation.setup)
-
-    # --- what kernels ask for ---------------------------------------------------------------------
 
     def answer(self, what: int, a: int, b: int) -> int:
         try:

@@ -78,8 +78,6 @@ class Whole:
             self.setup = simulation.setup
             simulation.setup, simulation.tiles, simulation.comm, simulation.subdomain = own
 
-    # --- gathering --------------------------------------------------------------------------------
-
     def gather(self) -> None:
         """Gather the points of all, component by component and tile after tile, and the nodes."""
         simulation, comm = self.simulation, self.simulation.comm
@@ -137,8 +135,6 @@ class Whole:
                 array[part["nodes"]] = rows
             for array, rows in zip(memory, part["memory"], strict=True):
                 array[part["nodes"]] = rows
-
-    # --- handing out ------------------------------------------------------------------------------
 
     def _nodes(self, moved: bool) -> tuple:
         """Find what all are to know: who has which tile, where points were moved, and of nodes."""
