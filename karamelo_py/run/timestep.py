@@ -58,13 +58,18 @@ def keeping_share(hub: Hub) -> float:
     return max(share, DAMPED) if sparse(hub) else USUAL
 
 
+def keeps_moments(hub: Hub) -> bool:
+    """Tell whether points keep moments or gradients of their velocity."""
+    return Moment in getattr(hub.update.transfer, "point_fields", ())
+
+
 def _keeps_velocities(hub: Hub) -> bool:
     """Tell whether points of FLIP and its kin move through the grid, without moments and usl."""
     update = hub.update
     return (
         update.method.frame.moves
         and getattr(update.transfer, "alpha", 0.0) > 0.9
-        and Moment not in getattr(update.transfer, "point_fields", ())
+        and not keeps_moments(hub)
         and min(getattr(update.scheme, "courant", (1.0,))) >= 1
     )
 
@@ -91,7 +96,7 @@ def lone_point(hub: Hub) -> float:
     those of a gas keep no moments then (`kernels.loss.in_company`).
     """
     update = hub.update
-    keeps = Moment in getattr(update.transfer, "point_fields", ()) and update.method.frame.moves
+    keeps = keeps_moments(hub) and update.method.frame.moves
     stiff = getattr(update.method.basis, "lone", None)
     flowing = any(_flows(law) and not can(law, taken_heat) for law in _deforming(hub))
     if not (keeps and stiff and flowing):
@@ -172,7 +177,7 @@ def own_step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
     """
     method, share = hub.update.method, keeping_share(hub)
     # Transfers of moments bear 1.3 h/c with quadratic splines, 1.5 with cubic ones.
-    still &= method.frame.moves and Moment not in getattr(hub.update.transfer, "point_fields", ())
+    still &= method.frame.moves and not keeps_moments(hub)
     if still:
         # A lone point of linear functions is stable up to 0.8 h/c in space.
         share = max(share, DAMPED if sparse(hub) and hub.domain.dimension == 3 else USUAL)

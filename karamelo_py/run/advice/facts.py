@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.language import registry, rules
-from karamelo_py.points.transfers import Moment
 from karamelo_py.run import timestep
 from karamelo_py.run.body_motion import BodyMotion, Noise, drift_of, motions, turn_of
 from karamelo_py.scene.hub import Hub
@@ -61,7 +60,7 @@ class SceneFacts:
         self.basis_name = self.method.basis_name
         self.transfer_name = registry.name_of("transfer", type(self.transfer))
         self.d, self.moves = hub.domain.dimension, self.method.frame.moves
-        self.corners, keeps = 2**self.d, Moment in getattr(self.transfer, "point_fields", ())
+        self.corners, keeps = 2**self.d, timestep.keeps_moments(hub)
         self.moments = self.moves and keeps
         self.vanishing = self.moves and not self.basis.steady_moment
         self.kept = 0.0 if keeps else getattr(self.transfer, "alpha", 0.0)

@@ -36,11 +36,11 @@ from karamelo_py.points.laws import (
 from karamelo_py.points.laws.eos import taken_heat
 from karamelo_py.points.laws.plastic_rate import with_rate, without_rate
 from karamelo_py.points.laws.temperatures import initial_heat
-from karamelo_py.points.transfers import Moment, lost_shares
+from karamelo_py.points.transfers import lost_shares
 from karamelo_py.run.boxes import no_nodes
 from karamelo_py.run.mpi.partition import SharedTiles
 from karamelo_py.run.tiles import Tiles
-from karamelo_py.run.timestep import sparse
+from karamelo_py.run.timestep import keeps_moments, sparse
 from karamelo_py.scene import boundary
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.hub import Hub
@@ -235,9 +235,7 @@ def returns_loss(hub: Hub) -> bool:
     XPIC has its own way (`kernels.loss.reflect`).
     """
     transfer = hub.update.transfer
-    keeps_all = getattr(transfer, "alpha", 0) == 1 and Moment not in getattr(
-        transfer, "point_fields", ()
-    )
+    keeps_all = getattr(transfer, "alpha", 0) == 1 and not keeps_moments(hub)
     if not lost_shares.defined(type(transfer)) or keeps_all:
         return False
     return any(can(solid.material.law, taken_heat) for solid in hub.solids.values())
