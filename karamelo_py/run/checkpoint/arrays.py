@@ -1,7 +1,7 @@
 """The state of a simulation as arrays by name: to return to, to write, to read."""
 
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -131,16 +131,18 @@ def opened(path: Path, group: str = "state") -> Iterator[dict[str, InFile]]:
     """The arrays in a file to go on from, by name; they are read when they are looked at."""
     import h5py
 
-    with ExitStack() as until_end:
-        found: dict[str, InFile] = {}
+    found: dict[str, InFile] = {}
+
+    def note(name: str, item: Any) -> None:
+        if hasattr(item, "shape"):
+            found[name] = InFile(item)
+
+    with reading():
+        root = h5py.File(path, "r", locking=False)
+    with root:
         with reading():
-            root = until_end.enter_context(h5py.File(path, "r", locking=False))
             try:
-                root[group].visititems(
-                    lambda name, item: (
-                        found.update({name: InFile(item)}) if hasattr(item, "shape") else None
-                    )
-                )
+                root[group].visititems(note)
             except (RuntimeError, KeyError, ValueError) as error:
                 raise OSError(str(error)) from error
         yield found
