@@ -17,7 +17,6 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import named, solid_with
 from karamelo_py.script.errors import Place
 from karamelo_py.script.expressions import POINT_SEEDS, Expression
-from karamelo_py.script.values import Values
 
 LOOSE = 1.5  # cells: points of an unstrained solid are at most one apart
 APART = "no other point of it within a cell"
@@ -110,17 +109,8 @@ def _shrunk(hub: Hub, simulation: Simulation) -> tuple[str, str]:
     return message, f"something went wrong before: look at the dumps; {smaller}"
 
 
-class Wrong(NamedTuple):
-    """A point that went wrong in a step."""
-
-    number: int
-    old: np.ndarray  # its position before the step and after it, with corners that it carries
-    new: np.ndarray
-    v: np.ndarray
-    grid: int
-
-
-def _first_wrong(simulation: Simulation) -> Wrong | None:
+def _first_wrong(simulation: Simulation) -> tuple | None:
+    """The first point that went wrong: number, positions before and after, velocity, grid."""
     wrong = []
     for block in simulation.setup.blocks:
         tiling = block.tiling
@@ -131,7 +121,7 @@ def _first_wrong(simulation: Simulation) -> Wrong | None:
         return None
     number, points, p = min(wrong, key=lambda item: item[0])
     old, new = (points.x[k][:, p].astype(float) for k in (simulation.now, 1 - simulation.now))
-    return Wrong(number, old, new, points.v[:, p], int(points.grid[p]))
+    return number, old, new, points.v[:, p], int(points.grid[p])
 
 
 def _wrong_point(hub: Hub, simulation: Simulation) -> tuple:
@@ -144,7 +134,7 @@ def _wrong_point(hub: Hub, simulation: Simulation) -> tuple:
         return no_number(hub, simulation, "the temperature of a point is not a number", hint)
     if not wrong:
         return "a point went wrong", "use a smaller step"
-    number, old, place, v, grid = min(wrong, key=lambda one: one.number)
+    number, old, place, v, grid = min(wrong, key=lambda one: one[0])
     d, h, name = hub.domain.dimension, hub.lattices[grid].h, named(hub, number)
     old, new = old[:d], place[:d]
     smaller = _smaller_step(hub, simulation)
@@ -232,24 +222,26 @@ def _smaller_step(hub: Hub, simulation: Simulation) -> str:
 
 
 def _first_bad(simulation: Simulation) -> tuple | None:
-    """Find its numbers as far as places at hand tell: (fix, formula, place), value, position."""
-    hub = simulation.hub
+    """The first such fix by numbers, at hand: (fix, formula, place), value, position."""
+    hub, values = simulation.hub, simulation.hub.values
     for which, fix in enumerate(hub.fixes.values()):
         over = simulation.step > 0 and fix in simulation.begun
         if over or not fix.hooks():
             continue
         for k, formula in enumerate(_formulas(tuple(vars(fix).values()))):
             # What reads a NaN shows the damage, and not where it comes from.
-            if formula.is_constant or not _readable(formula, hub.values):
+            read = formula.names.difference(POINT_SEEDS)
+            readable = all(n in values and np.isfinite(values.get(n)) for n in read)
+            if formula.is_constant or not readable:
                 continue
             bad = []
             for numbers, x, x0 in _places(simulation, fix.group, formula):
-                values = formula.evaluate_points(hub.values, x, x0)
-                rows = np.flatnonzero(~np.isfinite(values))
+                given = formula.evaluate_points(values, x, x0)
+                rows = np.flatnonzero(~np.isfinite(given))
                 if len(rows):
                     p = rows[np.argmin(numbers[rows])]
                     key = which, k, int(numbers[p])
-                    bad.append((key, float(values[p]), x[p] if x.size else None))
+                    bad.append((key, float(given[p]), x[p] if x.size else None))
             if bad:
                 return min(bad, key=lambda one: one[0])
     return None
@@ -262,12 +254,6 @@ def _formulas(value: Any) -> Iterator[Expression]:
     elif isinstance(value, (tuple, list)):
         for one in value:
             yield from _formulas(one)
-
-
-def _readable(formula: Expression, values: Values) -> bool:
-    """Tell whether all that a formula reads, beside positions, is there and is a number."""
-    read = formula.names.difference(POINT_SEEDS)
-    return all(name in values and np.isfinite(values.get(name)) for name in read)
 
 
 def _places(simulation: Simulation, group: Any, formula: Expression) -> Iterator[tuple]:
