@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.run.mpi.comm import MpiComm
-from karamelo_py.run.mpi.load import Load
+from karamelo_py.run.mpi.subdomain import Load
 
 PATIENCE = 60  # seconds that one waits for the others
 

@@ -510,7 +510,7 @@ def test_boxes_grow_with_domains(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     path = tmp_path / "in.script"
 
-    monkeypatch.setattr("karamelo_py.run.tiles.tiles.DIRECT_UP_TO", 0)
+    monkeypatch.setattr("karamelo_py.run.tiles.DIRECT_UP_TO", 0)
 
     def run(threads, *lines):
         path.write_text("\n".join([TORN.format("Q4"), *lines]), encoding="utf-8")

@@ -9,7 +9,7 @@ import pytest
 from conftest import INPUTS
 
 from comparisons.results import read_log
-from karamelo_py.run.element import response
+from karamelo_py.run import element
 
 K, G, Y = 160e9, 80e9, 400e6
 E = 9 * K * G / (3 * K + G)
@@ -33,13 +33,13 @@ def answer(run_script):
 
 def test_the_example(run_script, monkeypatch):
     """inputs/in.element: every closed form to the second order of strains of one per cent."""
-    drawn, save = [], response.savefig
+    drawn, save = [], element.savefig
 
     def kept(figure, path):
         drawn.append(figure)
         save(figure, path)
 
-    monkeypatch.setattr(response, "savefig", kept)
+    monkeypatch.setattr(element, "savefig", kept)
     result = run_script(INPUTS / "in.element")
     assert len(drawn) == 6
     for figure in drawn:  # labels do not touch

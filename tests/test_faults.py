@@ -16,7 +16,7 @@ from plugged import offer
 
 from karamelo_py.language import registry
 from karamelo_py.language.interpreter import Interpreter
-from karamelo_py.run.lower.hook_tables import lower_hooks
+from karamelo_py.run.lower.hooks import lower_hooks
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.views import PointsView
 from karamelo_py.script.errors import ScriptError

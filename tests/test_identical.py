@@ -12,7 +12,7 @@ from states import final_hub, same_bits, state_of
 
 from karamelo_py.kernels.arrays import arrays_of
 from karamelo_py.kernels.totals import WORK
-from karamelo_py.run.tiles import tiles
+from karamelo_py.run import tiles
 
 
 @pytest.fixture(autouse=True)

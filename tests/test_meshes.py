@@ -14,7 +14,7 @@ from meshed import CUTS, grid_mesh, write
 from test_scene_script import message
 
 from karamelo_py.app.cli import main
-from karamelo_py.run.lower.sizes import known
+from karamelo_py.run.lower.memory import known
 from karamelo_py.scene.meshes.elements import SHAPES, elements_of, measured
 from karamelo_py.scene.meshes.reading import read
 from karamelo_py.script.errors import ScriptError

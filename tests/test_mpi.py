@@ -98,7 +98,7 @@ def test_compiled_in_the_plane(tmp_path, further):
 
 # Few points are shared out, too, in tiles of few cells.
 SMALL_TILES = """
-from karamelo_py.run.tiles import tiles
+from karamelo_py.run import tiles
 tiles.DIRECT_UP_TO, tiles.TILES = 0, {1: 4, 2: 4, 3: 2}
 """
 # Every method: contact, heat, mesh, damage, axisymmetry, one to three dimensions.
@@ -148,7 +148,7 @@ def test_bench(tmp_path):
 
 NOBODY = """
 from karamelo_py.run.mpi.whole import Whole
-from karamelo_py.run.tiles import tiles
+from karamelo_py.run import tiles
 tiles.DIRECT_UP_TO = 0
 def gathers(*_, **__):
     raise MemoryError("of the whole scene")
@@ -375,9 +375,8 @@ BREAKS = """
 import json
 import os
 import re
-from karamelo_py.run import simulation
+from karamelo_py.run import simulation, tiles
 from karamelo_py.run.mpi import partition
-from karamelo_py.run.tiles import tiles
 from karamelo_py.styles.computes import conserved
 tiles.DIRECT_UP_TO = 0
 if os.environ.get("OMPI_COMM_WORLD_RANK") == "1":
@@ -410,7 +409,7 @@ def test_only_one_fails(tmp_path, function):
 READ_ONLY = """
 import errno
 import os
-from karamelo_py.run.tiles import tiles
+from karamelo_py.run import tiles
 tiles.DIRECT_UP_TO = 0
 if os.environ.get("OMPI_COMM_WORLD_RANK") == "0":
     from karamelo_py.output import files
@@ -590,7 +589,7 @@ def test_one_rank_is_no_other_run(tmp_path, run_interpreted):
 # --- check ----------------------------------------------------------------------------------------
 
 COUNTS = """
-from karamelo_py.run.tiles import tiles
+from karamelo_py.run import tiles
 from karamelo_py.run.mpi.comm import MpiComm
 tiles.DIRECT_UP_TO, tiles.TILES = 0, {2: 2}
 connect, start = MpiComm.connect, MpiComm.start

@@ -21,9 +21,8 @@ from karamelo_py.kernels.step import advance
 from karamelo_py.kernels.visit import NodalMean
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
-from karamelo_py.run.advice.report import bytes_per_point
 from karamelo_py.run.advice.suggestions import suggestions
-from karamelo_py.run.lower.sizes import node_fields, point_fields
+from karamelo_py.run.lower.memory import bytes_per_point, node_fields, point_fields
 from karamelo_py.run.timestep import own_weight_of_drift
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Quit

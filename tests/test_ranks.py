@@ -19,11 +19,10 @@ from test_restart import ways
 
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
-from karamelo_py.run.mpi.bisection import bisected
-from karamelo_py.run.mpi.load import Load
-from karamelo_py.run.mpi.partition import SharedTiles, work_of
+from karamelo_py.run import tiles
+from karamelo_py.run.mpi.partition import SharedTiles, bisected, work_of
 from karamelo_py.run.mpi.plan import bytes_of_node, plan
-from karamelo_py.run.tiles import tiles
+from karamelo_py.run.mpi.subdomain import Load
 from karamelo_py.scene.hub import Hub
 
 MOVING = (

@@ -19,8 +19,7 @@ from karamelo_py import Simulation
 from karamelo_py.app.cli import main
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
-from karamelo_py.run.lower.memory import check_room, least_bytes
-from karamelo_py.run.lower.sizes import memory_of, point_fields
+from karamelo_py.run.lower.memory import check_room, least_bytes, memory_of, point_fields
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.machine_memory import SLACK, MachineMemory, machine_memory
@@ -161,7 +160,7 @@ def test_it_is_never_more_than_check_says_and_most_of_it(run_interpreted, monkey
     hub.checking = True
     monkeypatch.setattr("karamelo_py.run.runner.report", lambda *_: None)
     monkeypatch.setattr("karamelo_py.run.runner.known_failures.warn", lambda *_: None)
-    monkeypatch.setattr("karamelo_py.run.runner.warn_about_length", lambda *_: None)
+    monkeypatch.setattr("karamelo_py.run.runner.known_failures.warn_about_length", lambda *_: None)
     hub.interpreter = Interpreter(hub)
     with suppress(Quit):
         hub.interpreter.run_file(str(INPUTS / f"in.{script}"))

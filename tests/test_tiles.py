@@ -12,8 +12,8 @@ import pytest
 from karamelo_py.kernels.hooks import POINT_STAGES
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
-from karamelo_py.run.lower.sizes import PAGE, bytes_in, nodes_in_use
-from karamelo_py.run.tiles.tiles import ROUNDING, SHARES
+from karamelo_py.run.lower.memory import PAGE, bytes_in, nodes_in_use
+from karamelo_py.run.tiles import ROUNDING, SHARES
 from karamelo_py.scene.hub import Hub
 
 # Two bodies that pass each other, at 0.7 of a cell a step and more: sorted at every other one.

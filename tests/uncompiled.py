@@ -26,25 +26,23 @@ def save_state(request: dict) -> int:
     from comms import learn_at_random, together
     from states import final_columns, final_hub, final_state
 
-    from karamelo_py.run.access import nodes_by_number as by_number
-    from karamelo_py.run.access import points_by_id as by_id
-    from karamelo_py.run.checkpoint import part_state as storing
-    from karamelo_py.run.mpi import load, partition, subdomain
+    from karamelo_py.run import access, tiles
+    from karamelo_py.run.checkpoint import arrays as storing
+    from karamelo_py.run.mpi import partition, subdomain
     from karamelo_py.run.mpi.whole import Whole
-    from karamelo_py.run.tiles import tiles
     from karamelo_py.script.errors import ScriptError
     from karamelo_py.styles.dumps import hdf5
 
     script, columns = request["arguments"][0], request["columns"]
     usual = tiles.DIRECT_UP_TO, tiles.TILES, Whole.gather
-    subdomain.LEARN_EVERY, partition.IMBALANCE, load.Load.learn = 2, 1.0, learn_at_random
+    subdomain.LEARN_EVERY, partition.IMBALANCE, subdomain.Load.learn = 2, 1.0, learn_at_random
     if request["fails"]:  # no process may need the whole scene to say why
         Whole.gather = None
     if request["boxes"]:
         tiles.DIRECT_UP_TO, tiles.TILES = 0, {1: 4, 2: 2, 3: 2}
     # One process has all points in a piece, several a few; files of HDF5 are the same then, too.
     piece = 16 if request["ranks"] > 1 else 1 << 17
-    by_id.PIECE = by_number.PIECE = storing.PIECE = piece
+    access.PIECE = storing.PIECE = piece
     hdf5.PIECE = 16
     try:
         folder = request["out"] and Path(request["out"])

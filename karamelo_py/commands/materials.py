@@ -9,9 +9,7 @@ from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument, Positive
 from karamelo_py.language.unknown import longer
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
-from karamelo_py.run.element.load_path import COMPONENTS, NORMAL, LoadPath
-from karamelo_py.run.element.point import Point, Unreachable
-from karamelo_py.run.element.response import Response
+from karamelo_py.run.element import COMPONENTS, NORMAL, LoadPath, Point, Response, Unreachable
 from karamelo_py.scene.hub import Catalogue, Hub
 from karamelo_py.scene.material import Material, MaterialPart
 from karamelo_py.scene.plugins import check_columns

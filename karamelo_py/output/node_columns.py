@@ -197,7 +197,7 @@ def brought(simulation: Any, name: str) -> np.ndarray:
     found = [(block, BROUGHT[name](simulation, block)) for block in s.blocks]
     found = [(block, np.ascontiguousarray(of, float)) for block, of in found if of is not None]
     largest = max((float(np.abs(of).max(initial=0)) for _, of in found), default=0.0)
-    largest = float(simulation.most(np.array([largest]))[0])
+    largest = float(simulation.comm.allreduce_max(np.array([largest]))[0])
     unit = 2.0 ** (frexp(largest)[1] - 36)
     for block, of in found if largest > 0 else ():
         points = block.points
@@ -216,4 +216,6 @@ def loaded(hub: Scene, simulation: Any) -> dict[str, int]:
         len(there) if fix.group.all else np.count_nonzero(np.isin(there, fix.nodes))
         for fix in loading.values()
     ]
-    return dict(zip(loading, simulation.of_all(np.array(own, np.int64)).tolist(), strict=True))
+    return dict(
+        zip(loading, simulation.comm.allreduce(np.array(own, np.int64)).tolist(), strict=True)
+    )

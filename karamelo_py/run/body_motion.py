@@ -1,44 +1,35 @@
-"""Positions and motion of the solids of a scene: sums over their points, without the points."""
+"""Positions and motion of the solids of a scene, and how much of it feeds noise.
+
+Motions are sums over points, without the points. What the grid does not see of velocities grows
+where bodies move through it.
+"""
 
 from collections.abc import Iterator
 from itertools import product
+from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from karamelo_py.kernels.totals import LIMBS, add_all, rounded
-from karamelo_py.output.fields import PIECE
-from karamelo_py.run.tiles.unique import unique
+from karamelo_py.points.laws import law_kind
+from karamelo_py.points.laws.strengths import shear_modulus
+from karamelo_py.points.noise import borne
+from karamelo_py.run.boxes import unique
 
 
 class BodyMotion(NamedTuple):
-    """Motion of a solid with points.
+    """Motion of a solid with points."""
 
-    Attributes
-    ----------
-    number
-        Of the solid among those of the scene.
-    mass
-        Its mass.
-    centre, velocity
-        (d,) Of the centre of mass.
-    spread
-        (d, d) sum m X X, with X from the centre.
-    shear
-        (d, d) sum m X V, with X and V from those of the centre.
-    low, high, slow, fast
-        (d,) Least and largest coordinates and velocities of points.
-    """
-
-    number: int
+    number: int  # of the solid among those of the scene
     mass: float
-    centre: np.ndarray
-    velocity: np.ndarray
-    spread: np.ndarray
-    shear: np.ndarray
-    low: np.ndarray
+    centre: np.ndarray  # (d,) of mass
+    velocity: np.ndarray  # (d,) of the centre
+    spread: np.ndarray  # (d, d) sum m X X, with X from the centre
+    shear: np.ndarray  # (d, d) sum m X V, with X and V from those of the centre
+    low: np.ndarray  # (d,) least and largest coordinates of points
     high: np.ndarray
-    slow: np.ndarray
+    slow: np.ndarray  # (d,) least and largest velocities
     fast: np.ndarray
 
     @property
@@ -62,7 +53,6 @@ class BodyMotion(NamedTuple):
 
     @property
     def spin(self) -> float:
-        """Angular velocity."""
         return float(np.linalg.norm(self.turning))
 
     @property
@@ -81,10 +71,7 @@ class BodyMotion(NamedTuple):
 
 
 def motions(simulation: Any) -> list[BodyMotion]:
-    """Measure how all solids with points move; all processes know it.
-
-    Each looks at its own points, so many at a time; sums are without rounding.
-    """
+    """Measure how all solids with points move; all processes know it; sums are without rounding."""
     d, count = simulation.kin.dimension, len(simulation.hub.solids)
     limbs = np.zeros((count, 1 + 2 * d + 2 * d * d, LIMBS), np.int64)
     ends = np.full((count, 4 * d), -np.inf)
@@ -94,7 +81,8 @@ def motions(simulation: Any) -> list[BodyMotion]:
         for row, values in enumerate(terms):
             add_all(limbs[k], row, values)
         ends[k] = np.maximum(ends[k], np.concatenate([xv.max(axis=1), -xv.min(axis=1)]))
-    limbs, ends = simulation.of_all(limbs), simulation.most(ends)
+    comm = simulation.comm
+    limbs, ends = comm.allreduce(limbs), comm.allreduce_max(ends)
     found = []
     for k, (own, end) in enumerate(zip(limbs, ends, strict=True)):
         mass, *sums = map(rounded, own)
@@ -103,23 +91,144 @@ def motions(simulation: Any) -> list[BodyMotion]:
         mean = np.array(sums[: 2 * d]) / mass
         moments = np.array(sums[2 * d :]).reshape(d, 2 * d) - mass * np.outer(mean[:d], mean)
         high, fast, low, slow = end.reshape(4, d) * [[1], [1], [-1], [-1]]
-        found.append(
-            BodyMotion(
-                k, mass, mean[:d], mean[d:], moments[:, :d], moments[:, d:], low, high, slow, fast
-            )
-        )
+        about_centre = mean[:d], mean[d:], moments[:, :d], moments[:, d:]
+        found.append(BodyMotion(k, mass, *about_centre, low, high, slow, fast))
     return found
 
 
 def _pieces(simulation: Any, d: int) -> Iterator[tuple[int, np.ndarray, np.ndarray, np.ndarray]]:
     """Number of a solid, masses (n,), places and velocities (d, n) of some of its points."""
     firsts = [solid.first_id for solid in simulation.hub.solids.values()]
-    for block in simulation.setup.blocks:
+    for block, rows in simulation.rows_of(None):
         points = block.points
-        for begin in range(0, len(points.id), PIECE):
-            own = slice(begin, begin + PIECE)
-            solid = np.searchsorted(firsts, points.id[own], side="right") - 1
-            for k in unique(solid):
-                here = solid == k
-                x, v = points.x[simulation.now, :d, own], points.v[:, own]
-                yield k, *(a[..., here].astype(float) for a in (points.mass[own], x, v))
+        solid = np.searchsorted(firsts, points.id[rows], side="right") - 1
+        for k in unique(solid):
+            here = rows[solid == k]
+            x, v = points.x[simulation.now][:d, here], points.v[:, here]
+            yield k, *(a.astype(float) for a in (points.mass[here], x, v))
+
+
+SLOW = 0.01  # of the speed of waves, up to where nothing is fed in any time that was tried
+TORN = 9.0, 14.0  # angle, in radian, that a body bears with one point a cell: FLIP, moments
+
+
+class Noise(NamedTuple):
+    """The motion that feeds most."""
+
+    share: float  # of what is borne
+    speed: float  # of the body, or of its rim, over the speed of waves
+    cells: float  # that the body, or its rim, goes through
+    angle: float = 0.0  # of a turn, in radian
+    noisy: bool = True  # whether noise grows
+    torn: bool = False  # whether the rim comes loose
+
+
+def rings(law: Any) -> bool:
+    """Tell whether a body of this law vibrates: not fluids, nor what flows like one."""
+    if getattr(law, "rebounds", False):
+        return True
+    strength = getattr(law, "strength", None)
+    silent = strength is None or not getattr(strength, "rings", True)
+    return not silent and shear_modulus(strength) > 0
+
+
+def yields(law: Any) -> bool:
+    """Tell whether it stops where it hits something: its impact is spent on plastic flow."""
+    return not any(getattr(kind, "rebounds", False) for kind in law_kind(law))
+
+
+def _bodies(s: Any) -> list[tuple[BodyMotion, Any]]:
+    """The solids that may vibrate, and how they move."""
+    solids = list(s.hub.solids.values())
+    bodies = [(one, solids[one.number].material.law) for one in s.motions if s.waves > 0]
+    return [(one, law) for one, law in bodies if rings(law)]
+
+
+def drift_of(s: Any) -> Noise | None:
+    """Measure what the drift in the scene `s` (SceneFacts) feeds, also where that is borne."""
+    if not (hasattr(s.scheme, "keeping") and s.moves and s.kept > 0.9):
+        return None
+    known, spacing = borne(s.basis), float(s.simulation.control.clock[0].spacing)
+    averages = getattr(s.scheme, "bears_drift", False)
+    bound = (known.averaged if averages else known.drift)[s.sparse]
+    bound /= known.line if s.d == 1 else 1
+    speed = cells = 0.0
+    for one, law in _bodies(s):
+        velocity = one.drift(s.hub.domain.axisymmetric)
+        if np.linalg.norm(velocity) <= SLOW * s.waves:
+            continue
+        own = float(np.linalg.norm(velocity[~held(s, one)]))
+        time = min(s.duration, _free_time(s, one)) if yields(law) else s.duration
+        if SLOW < own / s.waves < known.fastest and own * time / spacing > cells:
+            speed, cells = own / s.waves, own * time / spacing
+    if not cells:
+        return None
+    return Noise(cells * s.simulation.dt * s.waves / spacing / bound, speed, cells)
+
+
+def turn_of(s: Any) -> Noise | None:
+    """Measure what the turn in the scene `s` feeds, also where that is borne."""
+    turns = s.moments or (s.moves and s.kept > 0.9)
+    if not (hasattr(s.scheme, "keeping") and turns and s.d > 1) or s.hub.domain.axisymmetric:
+        return None
+    known, spacing = borne(s.basis), float(s.simulation.control.clock[0].spacing)
+    dt, one_point, most = s.simulation.dt, s.sparse, None
+    averages = getattr(s.scheme, "bears_drift", False)
+    bound = (known.rim_averaged if averages else known.rim)[one_point]
+    for one, _ in _bodies(s):
+        speed, angle = one.spin * one.reach / s.waves, one.spin * s.duration
+        if speed <= SLOW or held(s, one).any():
+            continue
+        cells = angle * one.reach / spacing
+        torn = angle / TORN[s.moments] if one_point else 0.0
+        noise = 0.0 if s.moments else cells * dt * s.waves / spacing / bound
+        share = max(noise, torn)
+        if share > (most.share if most else 0.0):
+            most = Noise(share, speed, cells, angle, noise > 0, torn > 1)
+    return most
+
+
+def held(s: Any, one: BodyMotion) -> np.ndarray:
+    """(d,) Find the directions in which fixes hold nodes at a body: it goes nowhere."""
+    found, lattices = np.zeros(s.d, np.bool_), s.hub.lattices
+    solid = list(s.hub.solids.values())[one.number]
+    lattice = lattices[s.method.lattice_of(s.hub, solid)]
+    for fix in s.hub.fixes.values():
+        if not fix.prescribes_velocity:
+            continue
+        nodes = fix.group.nodes
+        own = (nodes >= lattice.first) & (nodes < lattice.first + lattice.node_count)
+        x = lattice.positions(nodes[own])[:, : s.d]
+        near = ((x >= one.low - lattice.h) & (x <= one.high + lattice.h)).all(axis=1)
+        given = [formula is not None for formula in fix.formulas[: s.d]]
+        found |= near.any() & np.array(given)
+    return found
+
+
+def _free_time(s: Any, one: BodyMotion) -> float:
+    """Time of flight of a body until it meets another, or the edge of the domain."""
+    d, domain = s.d, s.hub.domain
+    ways = zip(one.velocity, one.low, one.high, domain.lo[:d], domain.hi[:d], strict=True)
+    first = min(
+        ((hi - high) / v if v > 0 else (lo - low) / v for v, low, high, lo, hi in ways if v),
+        default=inf,
+    )
+    for other in s.motions:
+        if other is not one:
+            first = min(first, _meeting(one, other))
+    return max(first, 0.0)
+
+
+def _meeting(one: BodyMotion, other: BodyMotion) -> float:
+    """Time at which the boxes around two bodies meet; infinite if they never do."""
+    begin, end = 0.0, inf
+    for v, gap, over in zip(
+        one.velocity - other.velocity, other.low - one.high, other.high - one.low, strict=True
+    ):
+        if v == 0:
+            if gap > 0 or over < 0:
+                return inf
+        else:
+            times = sorted((gap / v, over / v))
+            begin, end = max(begin, times[0]), min(end, times[1])
+    return begin if begin <= end else inf

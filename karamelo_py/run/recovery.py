@@ -1,36 +1,44 @@
 """Recovery of a run where a step went wrong, or energy has grown: half the step, or an end."""
 
-from typing import Any
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, NoReturn
 
-from karamelo_py.kernels.step import DONE, STOPPED
-from karamelo_py.run.checkpoint.rollback import RollbackPoint
+from karamelo_py.kernels.step import DONE, GAINED, HEATED, STOPPED
+from karamelo_py.kernels.watch import GROWTH, LOOK, WITHIN, unit_of
+from karamelo_py.run.checkpoint import restart_file
+from karamelo_py.run.checkpoint.parts import OUTPUTS, PartStates, RollbackPoint
 from karamelo_py.run.diagnosis import energy, explain
 from karamelo_py.run.timestep import own_step_instead
 from karamelo_py.scene import boundary
 from karamelo_py.scene.hub import Hub
+from karamelo_py.script.errors import ScriptError
 
 CHUNK = 100  # steps between two looks at the run, and between two good states, at most
 HALVINGS = 5  # at most, in a run
 RETURNS = 2  # at most, to one state from where energy grows: what two halves do not mend stays
 
 
+LAST_GOOD = "last_good.*.h5"
+GOES_ON = (
+    "karamelo-py SCRIPT -restart {} goes on from there, with a smaller step (set_dt, dt_factor): "
+    "as it is, it would end here again"
+)
+FAR = 100  # steps, more of which are not taken once more for the last rows of log and dumps
+
+
+class Stopped(ScriptError):
+    """A run has ended at a fault; all processes know, and its last good state is written."""
+
+
+class OthersWait(Exception):
+    """This process cannot write a file, and others go on to give it what belongs there."""
+
+
 class RollBack:
-    """The last good state of a run, and the way back to it.
-
-    Parameters
-    ----------
-    hub
-        The scene.
-    halve
-        Whether to go on from there with half the step; else the run ends.
-
-    Attributes
-    ----------
-    point
-        The last good state.
-    halvings, returns
-        How often the step was halved, and how often since that state because energy grew.
-    """
+    """The last good state of a run, and the way back to it: to `halve` the step, or to end."""
 
     def __init__(self, hub: Hub, *, halve: bool):
         self.hub, self.halve, self.place = hub, halve, hub.place
@@ -40,16 +48,8 @@ class RollBack:
     def begin(self, simulation: Any, first_step: int, *, ruined: bool, looks_always: bool) -> None:
         """Begin with the present state, or with the good one of the file that a run goes on from.
 
-        Parameters
-        ----------
-        simulation
-            The arrays of the scene.
-        first_step
-            The first step of the run, which the present state may lie behind.
-        ruined
-            Whether a step above the limit, from a file, has spoilt the present state.
-        looks_always
-            Whether the values of parts are looked at between any two steps.
+        A step above the limit may have spoilt the present state (`ruined`); values of parts may be
+        looked at between any two steps (`looks_always`).
         """
         self.simulation, self.first_step, self._always = simulation, first_step, looks_always
         too_large = not simulation.control.clock[0].watch_limit
@@ -64,8 +64,9 @@ class RollBack:
 
     def before(self) -> None:
         """Keep the present state where it is due and good; else note what parts remember."""
-        if self._keeps_start():  # whose rows are not gone back to
-            return
+        watched = self.simulation.control.clock[0].watch_limit
+        if self.point.step == self.begun_at and not watched:
+            return  # the first state alone is good, whose rows are not gone back to
         step = self.simulation.step
         # When states are kept must not depend on how fast steps are: runs go back to them.
         due = step != self.point.step and (step % CHUNK == 0 or step == self.first_step + 1)
@@ -75,22 +76,13 @@ class RollBack:
             self.point.note(always=self._always)
 
     def after(self, status: int) -> bool:
-        """Judge steps that ended with `status`: go on from there (True), or from where it is now.
-
-        Raises
-        ------
-        ScriptError
-            If a step went wrong, and there is no way on.
-        """
+        """Judge steps that ended with `status`: go on from there (True), or from where it is."""
         hub, simulation = self.hub, self.simulation
         if status != DONE:
             if status == STOPPED and boundary.delete_leaving(hub, simulation, self.point.arrays):
                 self._keep()
             elif not self._halve_step(status=status):
-                start = None
-                if self.smaller and not simulation.control.clock[0].watch_limit:
-                    start = explain.StepTooLarge(self.smaller, self.point.step == self.begun_at)
-                explain.stop(hub, simulation, status, self.point, start, self.place)
+                self._stop(status)
             return False
         found = None if simulation.told_of_growth else energy.words_of_growth(hub, simulation)
         if found is not None:
@@ -106,16 +98,12 @@ class RollBack:
         self.point.keep(self.simulation)
         self.returns = 0
 
-    def _keeps_start(self) -> bool:
-        """Tell whether the first state alone is good: the step was too large from there on."""
-        return self.point.step == self.begun_at and not self.simulation.control.clock[0].watch_limit
-
     def _halve_step(self, message: str = "", status: int = DONE) -> bool:
         """Go back to the last good state with half the step, where the script asks for that."""
         hub, simulation = self.hub, self.simulation
         if not self.halve or self.halvings == HALVINGS:
             return False
-        if status == STOPPED and explain.only_leave(hub, simulation, self.point.arrays):
+        if status == STOPPED and self._points_only_leave():
             return False
         message = message or explain.trouble(hub, simulation, status)[0]
         self.halvings += 1
@@ -133,3 +121,132 @@ class RollBack:
             place=self.place,
         )
         return True
+
+    def _points_only_leave(self) -> bool:
+        """Tell whether points leave, at no more energy: no smaller step keeps them."""
+        simulation, moves = self.simulation, self.hub.update.method.frame.moves
+        if not (moves and len(simulation.leaving()) and energy.grown_little(simulation)):
+            return False
+        step = simulation.step
+        simulation.restore(self.point.arrays)
+        before, steps = simulation.energy(), step - simulation.step
+        if steps:
+            simulation.advance(steps)
+        kept = energy.growth_since(simulation, before) <= WITHIN
+        healthy = kept and not simulation.above_limit()
+        simulation.advance(1)  # which goes wrong again, for others to look at
+        return healthy
+
+    def _stop(self, status: int) -> NoReturn:
+        """Return to the last good state, write it, and raise what the user should know.
+
+        Where energy has grown before, that is the last state in which it had not; log and dumps end
+        with the last state that has no trouble of its own. Where the step was too large from the
+        start on it is the state of the start: nothing behind that is a good one.
+        """
+        too_large = self.smaller and not self.simulation.control.clock[0].watch_limit
+        message, hint, at_fault = explain.trouble(self.hub, self.simulation, status)
+        kind = ScriptError
+        with suppress(OthersWait):
+            hint += self._keep_start(status) if too_large else self._keep_good(status)
+            kind = Stopped
+        error = kind(message, place=at_fault or self.place, hint=hint)
+        error.complete = at_fault is not None
+        raise error
+
+    def _keep_start(self, status: int) -> str:
+        """Write the state that the run began with, end the outputs, and say how to begin anew."""
+        simulation, good = self.simulation, self.point
+        step, path = simulation.step, None
+        simulation.restore(good.arrays)
+        if good.step == self.begun_at:
+            with good.remembered():
+                path = self._write_last_good()
+        back = step - simulation.step - (status in (GAINED, HEATED))
+        if back <= FAR:
+            if back > 0:
+                simulation.advance(back)
+            self._end_outputs()
+        words = f". Begin anew with {self.smaller}"
+        if path is None:
+            return words
+        name = os.path.relpath(path)
+        return (
+            f"{words}. The state before the first step of this run is in {name}; karamelo-py "
+            f"SCRIPT -restart {name} goes on from there, with such a step"
+        )
+
+    def _keep_good(self, status: int) -> str:
+        """Return to the last good state, write it, end the outputs, and say how to go on."""
+        simulation, good = self.simulation, self.point
+        step, present = simulation.step, PartStates.of(self.hub, OUTPUTS)
+        grown, path = not energy.grown_little(simulation), None
+        if grown:
+            path = self._write_before_growth(step)
+        else:
+            good.return_to(simulation)
+            if status not in (GAINED, HEATED, STOPPED):
+                # What nodes have depends on how many steps ran at once: here always on as many.
+                good.again(simulation.advance, step)
+        if status not in (GAINED, HEATED) and step > simulation.step:
+            before = simulation.energy()
+            good.again(simulation.advance, step)
+            if path is None and energy.growth_since(simulation, before) > WITHIN:
+                # The watch looks at means of a hundred steps, and has not seen it yet.
+                grown, path = True, self._write_before_growth(step)
+                good.again(simulation.advance, step)
+        path = path or self._write_last_good()
+        if simulation.step < step:
+            present.give(self.hub)  # their files stay as they are, with later rows
+        self._end_outputs()
+        if path is None:
+            return ""
+        name = os.path.relpath(path)
+        which = "The state from before energy grew" if grown else "The last good state"
+        return f". {which} is in {name}; {GOES_ON.format(name)}"
+
+    def _write_before_growth(self, end: int) -> Path | None:
+        """Return to the last state before step `end` whose energy has not grown, and write it."""
+        simulation, good = self.simulation, self.point
+        good.return_to(simulation)
+        clock = simulation.control.clock[0]
+        before = float(clock.balance)
+        while clock.watch_energy and simulation.step + LOOK < end:
+            look = simulation.step + LOOK - (simulation.step - 1) % LOOK
+            healthy = good.again(simulation.advance, look) == DONE
+            if not (healthy and energy.grown_little(simulation)):
+                break
+            if clock.balance - before < GROWTH * unit_of(clock):
+                good.move(simulation)
+        good.return_to(simulation)
+        return self._write_last_good()
+
+    def _write_last_good(self) -> Path | None:
+        """Write the present state to a file to go on from; one of somebody else is left alone."""
+        hub, path = self.hub, restart_file.path_of(self.hub, Path(LAST_GOOD))
+        may_be = hub.settings.comm.bcast(not path.exists() or restart_file.is_restart(path))
+        if not (hub.output.takes_part and may_be):
+            return None
+        with self._as_warnings():
+            path = restart_file.write(hub, Path(LAST_GOOD), within=True)
+            # The files of restart(...) would hold the same once more.
+            for item in hub.output.last:
+                item.last_step = hub.update.step
+            return path
+        return None
+
+    def _end_outputs(self) -> None:
+        with self._as_warnings():
+            self.hub.output.write(last=True)
+
+    @contextmanager
+    def _as_warnings(self) -> Iterator[None]:
+        """Warn of what prevents writing: another error is on its way."""
+        try:
+            yield
+        except ScriptError as error:
+            hub = self.hub
+            hub.warn(error.message, hint=error.hint, place=error.place)
+            if hub.settings.comm.size > 1:
+                hub.settings.comm.failed_within = True
+                raise OthersWait from None

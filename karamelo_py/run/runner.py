@@ -1,30 +1,110 @@
 """One run command: steps in chunks, outputs when they are due, and an eye on what goes wrong."""
 
+import os
 import signal
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import InitVar, dataclass
+from functools import partial
 from math import inf, isfinite, isnan
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from karamelo_py.run.advice import known_failures, large_steps
-from karamelo_py.run.advice.report import bytes_per_point, report
-from karamelo_py.run.advice.resting import warn_about_length
+from karamelo_py.compiler import cache
+from karamelo_py.compiler.loops import compilation
+from karamelo_py.output.console import duration
+from karamelo_py.run.advice import known_failures
+from karamelo_py.run.advice.report import report
 from karamelo_py.run.diagnosis import energy
-from karamelo_py.run.diagnosis.explain import Stopped
 from karamelo_py.run.lower.build import check_scene
+from karamelo_py.run.lower.memory import bytes_per_point
 from karamelo_py.run.mpi.comm import check_same_run, handled_signals
-from karamelo_py.run.recovery import CHUNK, RollBack
+from karamelo_py.run.recovery import CHUNK, RollBack, Stopped
 from karamelo_py.run.simulation import Simulation
+from karamelo_py.run.tiles import DIRECT_UP_TO
 from karamelo_py.run.timestep import ruling_limit, words_of_own_step, words_of_share
-from karamelo_py.run.timings import Timings
 from karamelo_py.scene import boundary
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.plugins import attributed
 from karamelo_py.script.errors import Pause, Quit, ScriptError, render_message
 
 PATIENCE = 0.3  # seconds between two looks, about: for Ctrl-C and the progress bar
+ANOTHER_FOLDER = "the environment variable KARAMELO_PY_CACHE names another folder"
+
+
+def _about(seconds: float) -> str:
+    """Estimate the time for so many seconds of work; longer where others want the processor."""
+    wanted = 1 + (os.getloadavg()[0] if hasattr(os, "getloadavg") else 0)
+    longest = seconds * max(1.0, wanted / (os.cpu_count() or 1))
+    if longest < 1.5 * seconds or duration(longest) == duration(seconds):
+        return f"about {duration(seconds)}"
+    return f"{duration(seconds)} to {duration(longest)}, as others use the processors"
+
+
+def _clocks() -> np.ndarray:
+    """Read the seconds that have passed, and that all threads have worked."""
+    return np.array([time.perf_counter(), time.process_time()])
+
+
+class Timings:
+    """Seconds that a run spends: (2,) those that have passed, and those of all threads."""
+
+    def __init__(self, hub: Hub):
+        self.hub = hub
+        self.on = {name: np.zeros(2) for name in ("compilation", "steps", "output")}
+        self._depth = 0  # of compilation in the midst of compilation
+        self._begun = np.zeros(2)
+
+    def passed(self, name: str) -> float:
+        return float(self.on[name][0])
+
+    @contextmanager
+    def counted(self, name: str) -> Iterator[None]:
+        """Count what is done meanwhile, without compilation."""
+        begun = _clocks() - self.on["compilation"]
+        yield
+        self.on[name] += _clocks() - self.on["compilation"] - begun
+
+    @contextmanager
+    def telling_of_compilation(self) -> Iterator[None]:
+        """Say so when kernels are compiled, how long it may take, and count the time."""
+        hub = self.hub
+        # Roughly the loops of a scene, for how long they take to compile.
+        parts = {type(one).__name__ for one in (*hub.materials.values(), *hub.fixes.values())}
+        parts |= {str(hub.settings.precision), f"threads={hub.settings.threads}"}
+        scene = f"{hub.domain.dimension}D {hub.update.words} {' '.join(sorted(parts))}"
+        expected = cache.time_for(scene)
+        about = f": {_about(expected)}" if expected else ""
+        self._words = (
+            f"Compiling the loops of this kind of scene, once{about}"
+            " (the next run starts at once) ..."
+        )
+        try:
+            compilation.listeners.append(self)
+            with cache.telling(partial(hub.warn, hint=ANOTHER_FOLDER)):
+                yield
+        finally:
+            compilation.listeners.remove(self)
+            spent = self.on["compilation"][1]
+            # Where most was in the cache already, the time says nothing about the whole.
+            if spent > 0.5 * (expected or 0.0):
+                cache.keep_time(scene, spent)
+
+    def on_start(self, _: str) -> None:
+        """Note that a kernel is compiled, or another process does, and this one waits for it."""
+        self._depth += 1
+        if self._depth == 1:
+            self._begun = _clocks()
+            if self._words:
+                self.hub.console.say(self._words)
+                self._words = ""
+
+    def on_end(self) -> None:
+        self._depth -= 1
+        if self._depth == 0:
+            self.on["compilation"] += _clocks() - self._begun
 
 
 class Interrupted(Exception):
@@ -41,7 +121,10 @@ def carry_out(hub: Hub, **length: Any) -> None:
     check_scene(hub)
     runner.check_condition()
     if hub.rehearsing:
-        _note_in_rehearsal(runner)
+        span = runner.end_time - hub.update.time, inf if runner.steps is None else runner.steps
+        if not getattr(hub.update.scheme, "implicit", False):
+            hub.later.append(known_failures.step_of(hub, runner.rollback.halve, span))
+        hub.in_runs += hub.lasting()
         return
     if hub.pausing:
         raise Pause
@@ -52,89 +135,40 @@ def carry_out(hub: Hub, **length: Any) -> None:
         runner.warn(hub.simulation)
         raise Quit
     replay = hub.interpreter.replay
-    if replay is not None and not replay.at_end:
-        _pass_over(hub)
-    else:
+    if replay is None or replay.at_end:
         runner.run()
-
-
-def _note_in_rehearsal(runner: "Runner") -> None:
-    """Note what the run asks for, and what acts in it."""
-    hub = runner.hub
-    span = runner.end_time - hub.update.time, inf if runner.steps is None else runner.steps
-    if not getattr(hub.update.scheme, "implicit", False):
-        hub.later.append(large_steps.step_of(hub, runner.rollback.halve, span))
-    hub.in_runs += hub.lasting()
-
-
-def _pass_over(hub: Hub) -> None:
-    """Take the values of a run that was over in the file that a script goes on from."""
-    after = hub.restart.runs[len(hub.runs)]
+        return
+    after = hub.restart.content["runs"][len(hub.runs)]
     for name, value in after.items():
         if name in hub.values:
             hub.values.set(name, value)
     hub.runs.append(after)
 
 
-class ChunkLength:
-    """The number of steps between two looks at a run, at most `longest`."""
-
-    def __init__(self, longest: int = CHUNK):
-        self.longest = longest
-        self.restart()
-
-    def restart(self) -> None:
-        """Begin with single steps."""
-        self.steps = 1
-
-    def end(self, step: int) -> int:
-        """Return where a chunk from `step` on ends: at a state that may be kept, at the latest."""
-        return min(step + self.steps, (step // CHUNK + 1) * CHUNK)
-
-    def next(self, elapsed: float, taken: int) -> None:
-        """Choose the next one, from the seconds that a number of steps took."""
-        steps = PATIENCE * max(taken, 1) / max(elapsed, 1e-9)
-        self.steps = int(min(self.longest, max(1, steps)))
-
-
+@dataclass(eq=False)
 class Runner:
     """Runs a scene for a number of steps, to a time, or by a condition.
 
-    Parameters
-    ----------
-    hub
-        The scene.
-    steps, end_time, condition
-        What ends the run: a number of steps, a time, or a formula.
-    until
-        Whether the run ends where the condition holds; else where it does not.
-    halve
-        Whether to go back and halve the step where it goes wrong.
+    It ends where the condition holds (`until`), else where it does not. With `halve` it goes back
+    and halves the step where that goes wrong.
     """
 
-    def __init__(
-        self,
-        hub: Hub,
-        *,
-        steps: int | None = None,
-        end_time: float = inf,
-        condition: Any = None,
-        until: bool = False,
-        halve: bool = False,
-    ):
-        self.hub = hub
-        self.steps = steps
-        self.end_time = end_time
-        self.condition = condition
-        self.until = until
-        self.rollback = RollBack(hub, halve=halve)
-        self.place = hub.place
-        self.timings = Timings(hub)
-        self.signal = 0  # that this process has been sent
-        self.interrupted = 0  # the signal that all processes end with
+    hub: Hub
+    steps: int | None = None
+    end_time: float = inf
+    condition: Any = None
+    until: bool = False
+    halve: InitVar[bool] = False
+
+    signal = 0  # that this process has been sent
+    interrupted = 0  # the signal that all processes end with
+
+    def __post_init__(self, halve: bool) -> None:
+        self.rollback = RollBack(self.hub, halve=halve)
+        self.place = self.hub.place
+        self.timings = Timings(self.hub)
 
     def run(self) -> None:
-        """Take the steps."""
         hub = self.hub
         hub.running = self
         try:
@@ -149,21 +183,15 @@ class Runner:
         """Warn of what is known to go wrong in this run, and of one that is very long."""
         if simulation.implicit:
             return
-        known_failures.warn(self.hub, simulation, self.duration, self.rollback.halve)
-        warn_about_length(self.hub, simulation, self.end_time)
-
-    @property
-    def duration(self) -> float:
-        """The length of this run, as far as that is known."""
-        simulation = self.hub.simulation
         steps = inf if self.steps is None else self.steps * simulation.dt
-        return min(self.end_time - simulation.time, steps)
+        duration = min(self.end_time - simulation.time, steps)
+        known_failures.warn(self.hub, simulation, duration, self.rollback.halve)
+        known_failures.warn_about_length(self.hub, simulation, self.end_time)
 
     def check_condition(self) -> None:
         """Refuse a condition that differs from point to point."""
         names = self.condition.names if self.condition is not None else frozenset()
-        per_point = names & {"x", "y", "z", "x0", "y0", "z0"}
-        if per_point:
+        if per_point := names & {"x", "y", "z", "x0", "y0", "z0"}:
             raise ScriptError(
                 f"the condition depends on {min(per_point)}, which differs from point to point",
                 argument="condition",
@@ -215,15 +243,10 @@ class Runner:
         hub.restart.take(hub, outputs=True)
         hub.restart = hub.interpreter.replay = None
         watched = simulation.control.clock[0].watch_limit
-        ruined = not watched and simulation.step > self.first_step
         simulation.go_on(self.end_time, self.rollback.halvings)
         if not self.rollback.halvings:  # else the step is not that of the script
-            large_steps.warn_about_steps(hub, simulation, self.rollback.halve, again=True)
-        self._tell_of_no_step_left(file, simulation)
-        return ruined
-
-    def _tell_of_no_step_left(self, file: Path, simulation: Simulation) -> None:
-        """Say so where a file holds the end of this run already, or what comes behind it."""
+            known_failures.warn_about_steps(hub, simulation, self.rollback.halve, again=True)
+        # It may hold the end of this run already, or what comes behind it.
         step, time, last_step = simulation.step, simulation.time, self.last_step
         holds = f"{file} holds step {step}, time {time:.6g}"
         hint = "a longer run, or a file from before its end"
@@ -234,59 +257,57 @@ class Runner:
         elif step == last_step or time == self.end_time or not self._condition_allows():
             message = f"{holds}, the end of this run: it takes no further step"
             self.hub.console.say(render_message("note", message, hint=hint))
-
-    def _tell_of_no_first_step(self) -> None:
-        """Warn of a comparison that was forgotten, or turned round: it ends a run at once."""
-        holds = "holds" if self.until else "does not hold"
-        self.hub.warn(
-            f"the condition {holds} before the first step of this run: it takes none",
-            hint="run_until ends where its condition is anything but 0, run_while where it is 0; "
-            "comparisons are 1 or 0",
-            place=self.place,
-        )
+        return not watched and step > self.first_step
 
     def _loop(self, simulation: Simulation) -> None:
         hub, rollback, timings = self.hub, self.rollback, self.timings
-        length = ChunkLength(CHUNK if self.condition is None else 1)
+        length, longest = 1, CHUNK if self.condition is None else 1
         while self._goes_on(simulation):
             rollback.before()
-            step, before = simulation.step, timings.passed()
-            end = min(hub.output.next_step(step), self.last_step, length.end(step))
+            step, before = simulation.step, {name: timings.passed(name) for name in timings.on}
+            kept = (step // CHUNK + 1) * CHUNK  # where a state may be kept
+            end = min(hub.output.next_step(step), self.last_step, step + length, kept)
             with timings.counted("steps"):
                 status = simulation.advance(int(end) - step)
             self._agree(simulation)  # what is written shows steps that no process has failed in
             if not rollback.after(status):
-                length.restart()
+                length = 1
                 continue
             boundary.tell_of_bounces(hub, simulation)
-            elapsed = simulation.comm.bcast(timings.since(before, "steps"))
-            length.next(elapsed, simulation.step - step)
+            elapsed = simulation.comm.bcast(timings.passed("steps") - before["steps"])
+            in_time = PATIENCE * max(simulation.step - step, 1) / max(elapsed, 1e-9)
+            length = int(min(longest, max(1, in_time)))
             with timings.counted("output"):
                 if self._steps_left(simulation):
                     hub.output.write()
-                self._show_progress(simulation, anew=timings.since(before, "compilation") > 0)
+                anew = timings.passed("compilation") > before["compilation"]
+                self._show_progress(simulation, anew=anew)
 
     def _goes_on(self, simulation: Simulation) -> bool:
-        """Tell whether there is a step to take."""
         if not self._steps_left(simulation):
             return False
-        if not self._condition_allows():
-            if simulation.step == self.first_step:
-                self._tell_of_no_first_step()
-            return False
-        self._agree(simulation)
-        return not self.interrupted
+        if self._condition_allows():
+            self._agree(simulation)
+            return not self.interrupted
+        if simulation.step == self.first_step:
+            # A comparison that was forgotten, or turned round, ends a run at once.
+            holds = "holds" if self.until else "does not hold"
+            self.hub.warn(
+                f"the condition {holds} before the first step of this run: it takes none",
+                hint="run_until ends where its condition is anything but 0, run_while where it is "
+                "0; comparisons are 1 or 0",
+                place=self.place,
+            )
+        return False
 
     def _agree(self, simulation: Simulation) -> None:
         """Learn which signal any of the processes has been sent."""
         self.interrupted = int(simulation.comm.allreduce_max(np.array([self.signal]))[0])
 
     def _steps_left(self, simulation: Simulation) -> bool:
-        """Tell whether neither the last step nor the end time is reached."""
         return simulation.step < self.last_step and simulation.time < self.end_time
 
     def _condition_allows(self) -> bool:
-        """Tell whether the condition, if there is one, lets the run go on."""
         if self.condition is None:
             return True
         values = self.hub.values
@@ -305,26 +326,18 @@ class Runner:
 
     def _show_progress(self, simulation: Simulation, *, anew: bool) -> None:
         """Show how far the run is, `anew` where a rate would count compilation, too."""
-        console, fraction = self.hub.console, self._fraction(simulation)
+        console, fraction = self.hub.console, None
+        if self.steps:
+            fraction = (simulation.step - self.first_step) / self.steps
+        elif isfinite(self.end_time) and self.end_time > self.first_time:
+            fraction = (simulation.time - self.first_time) / (self.end_time - self.first_time)
         if anew:
             console.end_run()
             console.begin_run(simulation.step, fraction or 0.0)
         console.progress(simulation.step, simulation.time, fraction)
 
-    def _fraction(self, simulation: Simulation) -> float | None:
-        if self.steps:
-            return (simulation.step - self.first_step) / self.steps
-        if isfinite(self.end_time) and self.end_time > self.first_time:
-            return (simulation.time - self.first_time) / (self.end_time - self.first_time)
-        return None
-
-    # --- around the loop ----------------------------------------------------------------------
-
     def _note(self, number: int, _: Any = None) -> None:
-        """Note a signal: Ctrl-C ends the run after the present chunk; a second one at once.
-
-        So do the signals of batch systems and of terminals that are closed.
-        """
+        """Note a signal: it ends the run after the present chunk; a second one at once."""
         if self.signal:
             raise KeyboardInterrupt
         self.signal = number
@@ -334,6 +347,8 @@ class Runner:
     def _banner(self, simulation: Simulation, going_on: bool) -> None:
         hub, why = self.hub, energy.unknown_work(self.hub)
         own = words_of_own_step(hub, simulation)
+        alone = f", one has all points: up to {DIRECT_UP_TO} are not shared out"
+        processes = f"{simulation.comm.size}{alone if simulation.tiles.direct else ''}"
         hub.console.banner(
             f"Run, continued from step {simulation.step}" if going_on else "Run",
             {
@@ -346,7 +361,7 @@ class Runner:
                 **({"own dt": own} if own else {}),
                 "limited by": f"{ruling_limit(simulation)}; {words_of_share(hub)}",
                 **({"energy": energy.not_watched(why)} if why else {}),
-                **simulation.processes,
+                **({"processes": processes} if simulation.comm.size > 1 else {}),
                 "threads": simulation.threads,
                 "precision": hub.settings.precision,
                 **({"units": str(hub.output.units)} if hub.output.units else {}),

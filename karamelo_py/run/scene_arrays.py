@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 
 from karamelo_py.compiler import fields
@@ -20,10 +16,8 @@ from karamelo_py.kernels.sweep import Visit, sweep, sweep_nodes
 from karamelo_py.kernels.table import SUMS
 from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.further import without_rate
-from karamelo_py.run.access.nodes_by_number import ByNumber
-from karamelo_py.run.access.points_by_id import ById
+from karamelo_py.run.access import ById, ByNumber
 from karamelo_py.run.checkpoint import arrays as checkpoint
-from karamelo_py.run.checkpoint import part_state
 from karamelo_py.run.lower.build import State, lower, thread_count, warms_by_friction
 from karamelo_py.run.lower.check_plugins import try_parts
 from karamelo_py.run.lower.memory import check_room, no_room
@@ -82,40 +76,26 @@ class SceneArrays(ById, ByNumber):
         self.subdomain = Subdomain(self) if comm.size > 1 else None
         self.control = self.setup.control
         self.version = 0  # grows when fields change without a step
-        self._measured = -1  # the version whose fastest point is known
-        self._watched = -1  # the version whose balance of energy is followed
+        self.measured = False  # whether the rate of the fastest point is that of the present state
+        self.followed = False  # whether the clock knows the balance of energy up to it
+        self.told_of_growth = False  # since the balance of energy is followed
         self.mapped = False  # whether the nodes show a state of this simulation
 
-    @property
-    def contact(self) -> Any:
-        """Return how solids touch."""
-        return self.setup.contact
-
     def fits(self, hub: Hub) -> bool:
-        """Tell whether the arrays are still those of the scene."""
         return self.key == scene_key(hub)
 
     @property
     def dt(self) -> float:
-        """Length of the next step."""
         return float(self.control.values[DT])
 
     @property
     def time(self) -> float:
-        """Present time."""
         return float(self.control.values[TIME])
 
     @property
     def step(self) -> int:
         """Number of steps taken in the whole script."""
         return int(self.control.values[TIMESTEP])
-
-    @property
-    def point_fields(self) -> tuple[type, ...]:
-        """Declared fields of the points, of all blocks."""
-        return tuple(
-            dict.fromkeys(type(one) for block in self.setup.blocks for one in block.points.fields)
-        )
 
     def state(self) -> State:
         """All that a new lowering takes over."""
@@ -128,7 +108,8 @@ class SceneArrays(ById, ByNumber):
             for ids, own in self.rows().of_all([(block.points.id, state)]):
                 rows[:, ids] = own
             laws[without_rate(law_kind(block.laws))] = rows
-        kept = [kind for kind in self.point_fields if fields.is_kept(kind)]
+        found = (type(one) for block in self.setup.blocks for one in block.points.fields)
+        kept = [kind for kind in dict.fromkeys(found) if fields.is_kept(kind)]
         nodes = self.setup.nodes.fields
         return State(
             self.count,
@@ -171,32 +152,17 @@ class SceneArrays(ById, ByNumber):
         )
         self.setup = self.setup._replace(blocks=blocks)
         self.control.clock[0].drift = np.inf
-        self.version += 1
+        self.changed()
         # The rate of the last step stays: the same whether or not a run begins here.
-        self._measured = self.version
+        self.measured = True
 
-    @property
-    def measured(self) -> bool:
-        """Tell whether the rate of the fastest point is that of the present state."""
-        return self._measured == self.version
-
-    @measured.setter
-    def measured(self, known: bool) -> None:
+    def changed(self) -> None:
+        """Take note that fields have changed without a step."""
         self.version += 1
-        self._measured = self.version if known else -1
-
-    @property
-    def followed(self) -> bool:
-        """Tell whether the clock knows the balance of energy up to the present state."""
-        return self._watched == self.version
-
-    @followed.setter
-    def followed(self, known: bool) -> None:
-        self._watched = self.version if known else -1
+        self.measured = self.followed = False
 
     @property
     def bounces(self) -> int:
-        """Number of times that points were reflected at the edge of the domain."""
         return int(self.total("bounces"))
 
     def clear_forces(self) -> None:
@@ -220,12 +186,8 @@ class SceneArrays(ById, ByNumber):
 
     def show_on_nodes(self) -> None:
         """See that the nodes show the present state when no step has been taken yet."""
-        if not self.mapped:
-            self.map_to_nodes()
-            self.mapped = True
-
-    def map_to_nodes(self) -> None:
-        """Let the nodes show the present state."""
+        if self.mapped:
+            return
         self.sort_if_due()
         s = self.setup
         dt = step_size(s)
@@ -234,61 +196,13 @@ class SceneArrays(ById, ByNumber):
         all_well(s)
         sweep_nodes(self.mode, SumsToVelocity(), s.kin, s.nodes, s.ranges, dt)
         show_heat(s.heat, s, self.mode)
+        self.mapped = True
 
     def snapshot(self, before: dict[str, np.ndarray] | None = None) -> dict[str, np.ndarray]:
-        """Copy every array that a step changes, and the published values.
-
-        The copies of the snapshot `before`, which is lost, are used again where they fit.
-        """
+        """Copy every array that a step changes, and the published values; see `copied`."""
         if self.subdomain is not None:
             self.subdomain.share_kept()
-        found = checkpoint.copied(self, before or {})
-        return found if self.subdomain is None else found | {"owner": self.tiles.owner}
+        return checkpoint.copied(self, before or {})
 
     def restore(self, snapshot: dict[str, np.ndarray]) -> None:
-        """Return to a snapshot."""
-        if self.subdomain is not None:
-            self.tiles.owner = snapshot["owner"]
         checkpoint.restore(self, snapshot)
-        self.version += 1
-
-    def stored(self) -> Iterator[checkpoint.Stored]:
-        """Yield what a file to go on from holds, array by array."""
-        if self.subdomain is None:
-            return checkpoint.stored(self)
-        self.subdomain.share_kept()
-        return part_state.stored(self)
-
-    def stored_snapshot(self, snapshot: dict[str, np.ndarray]) -> Iterator[checkpoint.Stored]:
-        """Yield what such a file holds of a snapshot."""
-        if self.subdomain is None:
-            return checkpoint.in_file(snapshot)
-        return part_state.stored(self, snapshot)
-
-    def take_snapshot(self, path: Path) -> dict[str, np.ndarray]:
-        """Read the snapshot that a file holds; each process reads its own share."""
-        with checkpoint.opened(path, "good") as found:
-            if self.subdomain is not None:
-                return part_state.own_share(self, found)
-            # In the order in which copies are made, and written.
-            names = [*(name for name, _ in checkpoint.changing(self)), "values", *found]
-            return {name: found[name][()] for name in dict.fromkeys(names)}
-
-    def take_stored(self, path: Path) -> None:
-        """Take the state that a file to go on from holds; each process reads its own share."""
-        with checkpoint.opened(path) as state, self.comm.joint():
-            shared = self.subdomain is not None
-            # Nothing of the arrays changes where the file is of another scene.
-            for k, block in enumerate(self.setup.blocks):
-                checkpoint.check_points(block.points, state, f"points/{k}/")
-            self.restore(part_state.own_share(self, state) if shared else state)
-            checkpoint.take_known(self, state)
-            (part_state if shared else checkpoint).take_nodes(self, state)
-
-    def wrong_points(self) -> Iterator[tuple[Any, int]]:
-        """Block and index of points at hand that the last sweep found wrong, one a tile at most."""
-        for block in self.setup.blocks:
-            tiling = block.tiling
-            for t in range(max(int(tiling.count[0]), 1)):
-                if tiling.report[t, 2] > 0:
-                    yield block, int(tiling.report[t, 2]) - 1

@@ -16,20 +16,11 @@ from karamelo_py.kernels.hooks import POINT_STAGES
 from karamelo_py.kernels.step import DONE, SORT, Fused, Staged, advance, measure, run_steps
 from karamelo_py.kernels.totals import agree_on_heat
 from karamelo_py.kernels.watch import COARSE, ROUND_OFF, begin_to_look, measure_heat, sum_energies
-from karamelo_py.run.body_motion import BodyMotion, motions
+from karamelo_py.run import timestep
 from karamelo_py.run.diagnosis.energy import unknown_heat, unknown_work
-from karamelo_py.run.lower.python_hooks import PythonHooks, sets_initial_state, views_of
+from karamelo_py.run.lower.hooks import PythonHooks, sets_initial_state, views_of
 from karamelo_py.run.mpi.whole import PointsMoved, Whole
 from karamelo_py.run.scene_arrays import SceneArrays
-from karamelo_py.run.tiles.tiles import DIRECT_UP_TO, in_tiles
-from karamelo_py.run.timestep import (
-    common_velocity,
-    moves_already,
-    ruling_limit,
-    share_of_heat,
-    step_of_waves,
-    weight_of_drift,
-)
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
@@ -40,23 +31,14 @@ class Simulation(SceneArrays):
     def __init__(self, hub: Hub, previous: Simulation | None = None):
         super().__init__(hub, previous)
         # Fixes of the first step that have acted: not again when the scene is lowered anew.
-        self._begun: set[Any] = set(previous._begun) if previous else set()
-        self.staged = False
+        self.begun: set[Any] = set(previous.begun) if previous else set()
+        self.visits: Staged | Fused = Fused()
         self.hooks: Hooks | NoHooks = NoHooks()
         self._first: PythonHooks | None = None
         self._first_fixes: list = []
         self.beginning: list = []  # fixes of the first step that act in this run
-        self.told_of_growth = False  # since the balance of energy is followed
 
     taken_up = False  # a step goes on whose first moment has been, with other arrays
-
-    @property
-    def processes(self) -> dict[str, str]:
-        """Words of a banner for the processes that share the scene."""
-        if self.comm.size == 1:
-            return {}
-        alone = f", one has all points: up to {DIRECT_UP_TO} are not shared out"
-        return {"processes": f"{self.comm.size}{alone if self.tiles.direct else ''}"}
 
     @cached_property
     def _whole(self) -> Whole:
@@ -69,22 +51,6 @@ class Simulation(SceneArrays):
         else:
             self._whole.act(function)
 
-    @property
-    def begun(self) -> list[str]:
-        """IDs of the fixes of the first step that have acted."""
-        return [ID for ID, fix in self.hub.fixes.items() if fix in self._begun]
-
-    @begun.setter
-    def begun(self, IDs: list[str]) -> None:
-        self._begun = {self.hub.fixes[ID] for ID in IDs if ID in self.hub.fixes}
-
-    @property
-    def acting_from_python(self) -> list[str]:
-        """Words for the fixes that act in Python in each step, on the whole scene."""
-        acting = (fix for pairs in self._python.by_stage.values() for fix, _ in pairs)
-        whole = (fix for fix in dict.fromkeys(acting) if not fix.point_by_point)
-        return [f"fix {fix.style} '{fix.id}'" for fix in whole]
-
     def begin(self, end_time: float) -> None:
         """Start of a run: choose the first dt; the run ends at `end_time` at the latest."""
         update = self.hub.update
@@ -94,11 +60,13 @@ class Simulation(SceneArrays):
         clock.over_limit = 0
         # Twice: initial values may be formulas of dt, and dt follows the fastest point.
         self._choose_dt()
-        begun_before = len(self._begun)
+        begun_before = len(self.begun)
         self._make_ready()
-        if self.step == 0 and moves_already(self):
-            clock.path = np.inf
-            self._ask_for_steps(0)
+        if self.step == 0:
+            in_hundred_steps = 100 * self.fastest() * clock.courant * clock.dt_factor
+            if in_hundred_steps > STILL * clock.rate:
+                clock.path = np.inf
+                self._ask_for_steps(0)
         self._choose_dt()
         if not np.isfinite(self.dt):
             raise ScriptError(
@@ -112,10 +80,7 @@ class Simulation(SceneArrays):
         self._watch_energy(begun_before)
 
     def go_on(self, end_time: float, halvings: int) -> None:
-        """In place of `begin`: go on with a run whose state was put into the arrays.
-
-        Steps, and the end of the run, may be others than in the run that wrote the state.
-        """
+        """In place of `begin`: go on, to this end, with a state that was put into the arrays."""
         clock = self.control.clock[0]
         self._make_ready()
         other_end, clock.end_time = clock.end_time != end_time, end_time
@@ -136,45 +101,52 @@ class Simulation(SceneArrays):
     def _ask_for_steps(self, halvings: int) -> bool:
         """Tell the clock which steps are asked for; whether these are others than before."""
         clock = self.control.clock[0]
-        names = "fixed_dt", "heat_factor", "dt_factor", "dt_factor_moving"
-        courants = "courant", "courant_moving"
-        before = [clock[name] for name in (*courants, *names)]
-        now, moving = (step_of_waves(self.hub, still=s) for s in (clock.path <= STILL, False))
-        fixed = self.hub.update.fixed_dt or float(self.implicit)  # load steps of 1
-        asked = fixed, share_of_heat(self.hub), now[1], moving[1]
-        numbers = [now[0], moving[0], *(number / 2**halvings for number in asked)]
-        for name, number in zip((*courants, *names), numbers, strict=True):
+        now, moving = (
+            timestep.step_of_waves(self.hub, still=s) for s in (clock.path <= STILL, False)
+        )
+        update, share = self.hub.update, 1 / 2**halvings
+        numbers = {
+            "courant": now[0],
+            "courant_moving": moving[0],
+            "fixed_dt": (update.fixed_dt or float(self.implicit)) * share,  # load steps of 1
+            "heat_factor": (update.dt_factor or timestep.USUAL) * share,
+            "dt_factor": now[1] * share,
+            "dt_factor_moving": moving[1] * share,
+        }
+        before = {name: clock[name] for name in numbers}
+        for name, number in numbers.items():
             clock[name] = number
-        weight = weight_of_drift(self.hub)
+        # Steps that a script may ask for are shares of h/(c + |v|).
+        own = update.dt_factor is None and update.fixed_dt is None
+        weight = timestep.own_weight_of_drift(self.hub) if own else 1.0
         if weight != clock.weight:
-            clock.weight, self._measured = weight, -1
+            clock.weight, self.measured = weight, False
         return numbers != before
 
     def _choose_dt(self) -> None:
-        if self._measured != self.version:
+        if not self.measured:
             # Otherwise the last step has measured, and a run in pieces takes the steps of a whole.
             clock = self.control.clock[0]
-            clock.common[:] = common_velocity(self, float(clock.weight))
-            self.measure()
+            clock.common[:] = timestep.common_velocity(self, float(clock.weight))
+            self._measure()
             clock.wave = clock.speed = 0.0
             if clock.weight != 1:
                 clock.wave = clock.rate - self.fastest(clock.common[0])
                 clock.speed = self.fastest() / clock.spacing
-            self._measured = self.version
+            self.measured = True
         choose_dt(self.control)
 
     def rate_with(self, weight: float) -> float:
         """Measure the rate of the fastest point, if the common drift of all had this weight."""
         clock = self.control.clock[0]
         common, rate = clock.common.copy(), float(clock.rate)
-        clock.common[:] = common_velocity(self, weight)
-        self.measure()
+        clock.common[:] = timestep.common_velocity(self, weight)
+        self._measure()
         found = float(clock.rate)
         clock.common[:], clock.rate = common, rate
         return found
 
-    def measure(self) -> None:
-        """Measure the rate of the fastest point."""
+    def _measure(self) -> None:
         measure(self.setup)
         clock = self.control.clock[0]
         clock.rate = self.comm.allreduce_max(np.array([clock.rate]))[0]
@@ -187,10 +159,6 @@ class Simulation(SceneArrays):
         own = max((max(a.max() - c, c - a.min()) for a, c in components), default=0.0)
         return float(self.comm.allreduce_max(np.array([own], float))[0])
 
-    def motions(self) -> list[BodyMotion]:
-        """Measure how the solids lie and move."""
-        return motions(self)
-
     @property
     def limit(self) -> float:
         """Stable step of the present state."""
@@ -198,8 +166,7 @@ class Simulation(SceneArrays):
 
     @property
     def ruling_limit(self) -> str:
-        """Name of what limits the step now."""
-        return ruling_limit(self)
+        return timestep.ruling_limit(self)
 
     @property
     def limit_moving(self) -> float:
@@ -209,7 +176,6 @@ class Simulation(SceneArrays):
         return float(min(waves, clock.heat_limit))
 
     def above_limit(self) -> bool:
-        """Tell whether the step is above the stable limit."""
         return self.control.values[DT] > self.limit * (1 + 1e-12)
 
     def _watch_limit(self) -> None:
@@ -222,7 +188,7 @@ class Simulation(SceneArrays):
         """Begin to watch the balance of energy, or go on where nothing was set since."""
         clock = self.control.clock[0]
         clock.watch_energy = int(not unknown_work(self.hub) and not self.implicit)
-        set_anew = len(self._begun) > begun_before or bool(self._first_fixes)
+        set_anew = len(self.begun) > begun_before or bool(self._first_fixes)
         anew = not self.followed or set_anew
         self.followed = True
         if anew:
@@ -230,16 +196,16 @@ class Simulation(SceneArrays):
         if clock.watch_energy:
             # Velocities belong to half a step before, stresses to the share strained before.
             level = 0.25 + 0.5 * getattr(self.hub.update.scheme, "strained_before", 0.0)
-            self.begin_to_look(level, anew)
+            self._begin_to_look(level, anew)
         clock.watch_heat = int(self.hub.update.thermal and not unknown_heat(self.hub))
         if clock.watch_heat and anew:
-            self.measure_heat()
+            measure_heat(self.setup)
+            agree_on_heat(self.control.ranks, self.control)
             clock.coldest, clock.hottest = clock.T_low, clock.T_high
 
-    def begin_to_look(self, level: float, anew: bool) -> None:
+    def _begin_to_look(self, level: float, anew: bool) -> None:
         """Measure the energies of all points, which the watch over them starts from."""
-        s = self.setup
-        clock = s.control.clock[0]
+        s, clock = self.setup, self.control.clock[0]
         strain = COARSE * float(np.finfo(s.nodes.sums.dtype).eps)
         clock.energy_floor = max(ROUND_OFF, strain**2) * self.total("mass") * float(clock.rate) ** 2
         clock.born_with = self.total("born with")
@@ -251,38 +217,28 @@ class Simulation(SceneArrays):
 
     def _outside_tiles(self) -> int:
         """Count the blocks that have points which were not sorted yet."""
-        blocks = self.setup.blocks
-        own = sum(in_tiles(block.tiling) != block.points.mass.size for block in blocks)
+        own = 0
+        for points, tiling in ((block.points, block.tiling) for block in self.setup.blocks):
+            own += tiling.range[: tiling.count[0], 1].max(initial=0) != points.mass.size
         return int(self.comm.allreduce(np.array([own]))[0])
 
     def energy(self) -> float:
         """Kinetic, stored and dissipated energy less the work; NaN where nobody watches it."""
-        s = self.setup
-        clock = s.control.clock
+        clock = self.control.clock
         if self._outside_tiles() or not clock[0].watch_energy:
             return np.nan
         present = clock.copy()
-        sum_energies(s, self.mode)
+        sum_energies(self.setup, self.mode)
         energy = float(clock[0].kinetic + clock[0].stored - clock[0].work)
         clock[:] = present
         return energy
 
-    def measure_heat(self) -> None:
-        """Measure the lowest and highest temperatures of all points."""
-        s = self.setup
-        measure_heat(s)
-        agree_on_heat(s.control.ranks, s.control)
-
     def advance(self, count: int) -> int:
-        """Take up to `count` steps (to the end time at most); DONE, or why it stopped.
-
-        Points that are due to be sorted are sorted before the next step, so that the nodes keep
-        showing the last one.
-        """
+        """Take up to `count` steps (to the end time at most); DONE, or why it stopped."""
         with self.comm.joint():
             if self.subdomain is None:
                 return self._advance_to(self.step + count)
-            from_python = bool(self._python.by_stage or self._first is not None)
+            from_python = bool(self.python.by_stage or self._first is not None)
             self.subdomain.begin(self.hooks, from_python=from_python)
             status = self._advance_to(self.step + count)
             self.subdomain.end()
@@ -291,38 +247,33 @@ class Simulation(SceneArrays):
     def _advance_to(self, target: int) -> int:
         control = self.control
         while True:
-            self.sort_if_due()
-            status = self._take_steps(target)
-            self.mapped = True
-            ended = self.step >= target or control.values[TIME] >= control.clock[0].end_time
-            if status != SORT:
-                return status
-            if ended:
-                return DONE
-
-    def _take_steps(self, target: int) -> int:
-        while True:
+            self.sort_if_due()  # not behind the last step, which the nodes keep showing
             try:
-                return self._advance(target - self.step)
+                status = self._advance(target - self.step)
             except PointsMoved:
                 self.taken_up = True
+                continue
+            self.mapped = True
+            if status != SORT:
+                return status
+            if self.step >= target or control.values[TIME] >= control.clock[0].end_time:
+                return DONE
 
     def _advance(self, count: int) -> int:
         scheme = self.hub.update.scheme
         if self._first is not None:
             status = self._run_steps(self._first, 1)
             if status in (DONE, SORT):
-                self._begun |= set(self._first_fixes)
+                self.begun |= set(self._first_fixes)
                 self._first = None
                 self.clear_forces()  # the steps to come may have no hook that does it
                 return SORT  # there is more to do, unless that was all
             return status
-        if self._python.by_stage:
-            return self._run_steps(self._python, count)
+        if self.python.by_stage:
+            return self._run_steps(self.python, count)
         if self.implicit:
             return self._run_steps(self.hooks, count)
-        visits = Staged() if self.staged else Fused()
-        return advance(scheme, visits, self.mode, self.setup, self.hooks, count)
+        return advance(scheme, self.visits, self.mode, self.setup, self.hooks, count)
 
     def _run_steps(self, hooks: Any, count: int) -> int:
         """Take steps row by row, with hooks between them; or load steps."""
@@ -338,53 +289,44 @@ class Simulation(SceneArrays):
 
     @cached_property
     def load_steps(self) -> Any:
+        """What takes the steps of an implicit scheme."""
         from karamelo_py.run.implicit.load_steps import LoadSteps
 
         return LoadSteps(self)
 
-    def waits(self) -> np.ndarray:
-        """Seconds that each process has waited for others in steps so far."""
-        return np.array(self.comm.allgather(self.comm.waited))
-
     def compile(self) -> None:
-        """Have the loop over the steps compiled now: nobody waits for it in the midst of a log.
-
-        The first process does that, and the others find it on disk.
-        """
-        if config.DISABLE_JIT or self._python.by_stage or self.implicit:
+        """Have the loop over the steps compiled now: nobody waits for it amid a log."""
+        if config.DISABLE_JIT or self.python.by_stage or self.implicit:
             return
-        visits = Staged() if self.staged else Fused()
-        arguments = self.hub.update.scheme, visits, self.mode, self.setup, self.hooks, 1
+        arguments = self.hub.update.scheme, self.visits, self.mode, self.setup, self.hooks, 1
         self.comm.in_turn(lambda: advance.compile(*arguments))
 
     def _make_ready(self) -> None:
         """Prepare threads, the hooks of the fixes, and contact for a run."""
         if self.threads > 1:
             set_threads(self.threads)
-        self._prepare_hooks()
-        self.hub.update.method.begin(self.hub, self.contact)
-
-    def _prepare_hooks(self) -> None:
-        """Sort the fixes by how they act: once before the first step, in it, in every step."""
+        # Fixes act once before the first step, in it, or in every step.
         fixes = sorted(self.hub.fixes.values(), key=lambda fix: fix.acts_last)
         lasting = [fix for fix in fixes if not fix.first_step_only]
-        new = [fix for fix in fixes if fix.first_step_only and fix not in self._begun]
-        self._python = PythonHooks(self, lasting)
-        self.hooks = self._python.compiled
-        self.staged = bool(self._python.by_stage) or any(
+        new = [fix for fix in fixes if fix.first_step_only and fix not in self.begun]
+        self.python = PythonHooks(self, lasting)
+        self.hooks = self.python.compiled
+        staged = self.python.by_stage or any(
             name in POINT_STAGES for fix in lasting for name in fix.hooks()
         )
+        self.visits = Staged() if staged else Fused()
         at_once = [fix for fix in new if sets_initial_state(fix)]
         for fix in at_once:
             # Nothing happens in a step before this hook: the state shows it from the start.
             self.set_initial(fix.id)
-        self._begun |= set(at_once)
+        self.begun |= set(at_once)
         self.beginning = new
         self._first_fixes = [fix for fix in new if fix not in at_once]
         self._first = None
         if self._first_fixes:
             together = [fix for fix in fixes if fix in lasting or fix in self._first_fixes]
             self._first = PythonHooks(self, together)
+        self.hub.update.method.begin(self.hub, self.setup.contact)
 
     def set_initial(self, ID: str) -> None:
         """Let the fix `ID` set the state that a run begins with."""
@@ -401,4 +343,4 @@ class Simulation(SceneArrays):
         else:
             self.sort_if_due()  # tiles are gathered, too
             self.act(act, self.setup)
-        self.version += 1
+        self.changed()

@@ -18,6 +18,7 @@ from karamelo_py.points.laws import (
 from karamelo_py.points.laws.eos import taken_heat
 from karamelo_py.points.laws.strengths import shear_modulus
 from karamelo_py.points.transfers import Moment
+from karamelo_py.run.body_motion import motions
 from karamelo_py.scene.hub import Hub
 
 USUAL = 0.9
@@ -57,13 +58,18 @@ def keeping_share(hub: Hub) -> float:
     return max(share, DAMPED) if sparse(hub) else USUAL
 
 
+def keeps_moments(hub: Hub) -> bool:
+    """Tell whether points keep moments or gradients of their velocity."""
+    return Moment in getattr(hub.update.transfer, "point_fields", ())
+
+
 def _keeps_velocities(hub: Hub) -> bool:
     """Tell whether points of FLIP and its kin move through the grid, without moments and usl."""
     update = hub.update
     return (
         update.method.frame.moves
         and getattr(update.transfer, "alpha", 0.0) > 0.9
-        and Moment not in getattr(update.transfer, "point_fields", ())
+        and not keeps_moments(hub)
         and min(getattr(update.scheme, "courant", (1.0,))) >= 1
     )
 
@@ -81,12 +87,6 @@ def _flows(law: Any) -> bool:
     )
 
 
-def one_body(hub: Hub) -> bool:
-    """Tell whether all that deforms is one solid, of an elastic law or a metal."""
-    laws = _deforming(hub)
-    return len(laws) == 1 and not any(map(_flows, laws))
-
-
 def lone_point(hub: Hub) -> float:
     """The stable step over h/c of a point that has its nodes for itself and keeps a moment.
 
@@ -96,7 +96,7 @@ def lone_point(hub: Hub) -> float:
     those of a gas keep no moments then (`kernels.loss.in_company`).
     """
     update = hub.update
-    keeps = Moment in getattr(update.transfer, "point_fields", ()) and update.method.frame.moves
+    keeps = keeps_moments(hub) and update.method.frame.moves
     stiff = getattr(update.method.basis, "lone", None)
     flowing = any(_flows(law) and not can(law, taken_heat) for law in _deforming(hub))
     if not (keeps and stiff and flowing):
@@ -113,9 +113,11 @@ def bears_drift(hub: Hub) -> bool:
     that meet tear sooner by these steps.
     """
     basis, scheme = hub.update.method.basis, hub.update.scheme
+    laws = _deforming(hub)
     return (
         _keeps_velocities(hub)
-        and one_body(hub)
+        and len(laws) == 1  # one solid, of an elastic law or a metal
+        and not _flows(laws[0])
         and not getattr(basis, "gradient_jumps", False)
         and (getattr(basis, "bears_drift", False) or getattr(scheme, "bears_drift", False))
         and keeping_share(hub) == USUAL
@@ -137,21 +139,15 @@ def own_weight_of_drift(hub: Hub) -> float:
     return BOXES if fed and hub.update.transfer.alpha > 0.99 and not sparse(hub) else 1.0
 
 
-def weight_of_drift(hub: Hub) -> float:
-    """The same where the script may ask for steps, which are shares of h/(c + |v|)."""
-    own = hub.update.dt_factor is None and hub.update.fixed_dt is None
-    return own_weight_of_drift(hub) if own else 1.0
-
-
 def common_velocity(simulation: Any, weight: float) -> np.ndarray:
     """(3,) The velocity that speeds are measured from so that the common drift has this weight."""
     if weight == 1:
         return np.zeros(3)
-    motions = simulation.motions()
-    mass = sum(one.mass for one in motions)
+    bodies = motions(simulation)
+    mass = sum(one.mass for one in bodies)
     common = np.zeros(3)
     if mass > 0:
-        common[: simulation.kin.dimension] = sum(one.mass * one.velocity for one in motions) / mass
+        common[: simulation.kin.dimension] = sum(one.mass * one.velocity for one in bodies) / mass
     return (1 - weight) * common
 
 
@@ -181,7 +177,7 @@ def own_step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
     """
     method, share = hub.update.method, keeping_share(hub)
     # Transfers of moments bear 1.3 h/c with quadratic splines, 1.5 with cubic ones.
-    still &= method.frame.moves and Moment not in getattr(hub.update.transfer, "point_fields", ())
+    still &= method.frame.moves and not keeps_moments(hub)
     if still:
         # A lone point of linear functions is stable up to 0.8 h/c in space.
         share = max(share, DAMPED if sparse(hub) and hub.domain.dimension == 3 else USUAL)
@@ -195,17 +191,6 @@ def step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
     if update.dt_factor is None and update.fixed_dt is None:
         return own_step_of_waves(hub, still=still)
     return courant_number(hub, longer=False), update.dt_factor or keeping_share(hub)
-
-
-def share_of_heat(hub: Hub) -> float:
-    """The share of the stable step of conduction."""
-    return USUAL if hub.update.dt_factor is None else hub.update.dt_factor
-
-
-def moves_already(simulation: Any) -> bool:
-    """Tell whether points are so fast that they are not at rest for a hundred steps."""
-    clock = simulation.control.clock[0]
-    return 100 * simulation.fastest() * clock.courant * clock.dt_factor > STILL * clock.rate
 
 
 def own_step(hub: Hub, simulation: Any, *, still: bool = False) -> float:
@@ -262,6 +247,11 @@ def own_step_instead(hub: Hub, command: str = "") -> str:
     return f"dt_factor({share:.3g}) or less, or leave dt_factor out"
 
 
+def step_by_script(fixed_dt: float | None, dt_factor: float | None) -> str:
+    """Name the step that a script asks for, by which it is known that it has been told."""
+    return f"set_dt {fixed_dt}" if fixed_dt else f"dt_factor {dt_factor}"
+
+
 def words_of_share(hub: Hub) -> str:
     """Say what share of the stable step is taken, and what it means."""
     asked, keeping = hub.update.dt_factor, keeping_share(hub)
@@ -269,12 +259,13 @@ def words_of_share(hub: Hub) -> str:
         share = hub.update.fixed_dt / hub.simulation.limit
         words = f"{share:.3g} of the stable step"
     elif asked is None:
-        clock, conduction = hub.simulation.control.clock[0], "conduction"
-        keeping = USUAL if ruling_limit(hub.simulation) == conduction else float(clock.dt_factor)
-        words = f"{keeping:g} of the stable step, the program's own"
+        clock = hub.simulation.control.clock[0]
+        of_heat = ruling_limit(hub.simulation) == "conduction"
+        words = f"{USUAL if of_heat else float(clock.dt_factor):g} of the stable step, "
+        words += "the program's own"
         after = clock.dt_factor_moving * clock.courant_moving / (clock.dt_factor * clock.courant)
-        far = "once points have gone a quarter of a cell"
-        return words if after == 1 else f"{words}; {after:.2g} of that {far}"
+        far = f"; {after:.2g} of that once points have gone a quarter of a cell"
+        return words if after == 1 else words + far
     else:
         share = asked
         words = f"{share:g} of the stable step, by dt_factor"
@@ -307,18 +298,14 @@ def ruling_limit(simulation: Any) -> str:
     speed = simulation.fastest(clock.common[0])
     if speed > 0.5 * clock.rate:
         return "speed"
-    without = _speed_without_viscosity(simulation)
-    if 0 < without < (clock.rate - speed) / 1.2:
+    undeformed = [elastic_speed(simulation, solid) for solid in simulation.hub.solids.values()]
+    without = max(wave for wave, _ in undeformed)
+    slowed = any(viscous for _, viscous in undeformed)
+    if slowed and 0 < without < (clock.rate - speed) / 1.2:
         return "viscosity"
     if clock.courant < 1:
         return "lone_points" if clock.courant == lone_point(simulation.hub) else "light_nodes"
     return "waves"
-
-
-def _speed_without_viscosity(simulation: Any) -> float:
-    """Fastest wave in the undeformed materials without viscosity; 0 where none is viscous."""
-    found = [elastic_speed(simulation, solid) for solid in simulation.hub.solids.values()]
-    return max(speed for speed, _ in found) if any(viscous for _, viscous in found) else 0.0
 
 
 def fastest_wave(simulation: Any) -> float:

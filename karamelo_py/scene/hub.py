@@ -205,7 +205,7 @@ class Hub:
         self.functions: dict[str, Any] = {}  # in Python, that a program has given
         self.running: Any = None  # the run in progress
         self.runs: list[dict[str, float]] = []  # published values at the end of each so far
-        self.later: list[Any] = []  # `run.advice.large_steps`, of runs that a rehearsal came to
+        self.later: list[Any] = []  # `known_failures.Step` of runs that a rehearsal came to
         self._simulation: Any = None
         self._lattices: tuple[tuple, list[Lattice]] | None = None
 

@@ -422,7 +422,7 @@ class PieceView(PointsView):
     """
 
     def __init__(self, simulation: Any, parts: list[tuple], then: bool, *, in_steps: bool):
-        parts = parts or [(simulation.blocks[0], np.empty(0, np.int64))]
+        parts = parts or [(simulation.setup.blocks[0], np.empty(0, np.int64))]
         ids = [block.points.id[rows] for block, rows in parts]
         super().__init__(simulation, np.concatenate(ids), then)
         own = pairwise(np.cumsum([0, *map(len, ids)]).tolist())

@@ -22,7 +22,7 @@ from karamelo_py.kernels.step import DONE, Fused, begin, step
 from karamelo_py.kernels.sweep import sum_buffers, sweep_nodes, sweep_points
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
-from karamelo_py.run.lower.sizes import node_fields, nodes_in_use, point_fields
+from karamelo_py.run.lower.memory import node_fields, nodes_in_use, point_fields
 from karamelo_py.run.mpi.comm import MpiComm
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.hub import Hub
@@ -243,12 +243,17 @@ def repeated(
     found = []
     for _ in range(REPETITIONS):
         simulation.restore(start)
-        before, begun = simulation.waits(), time.perf_counter()
+        before, begun = _waits(simulation), time.perf_counter()
         timed_steps(simulation, count)
-        after = simulation.waits()  # all have finished then
+        after = _waits(simulation)  # all have finished then
         found.append((time.perf_counter() - begun, after - before))
     simulation.restore(start)
     return count, found
+
+
+def _waits(simulation: Simulation) -> np.ndarray:
+    """Seconds that each process has waited for others in steps so far."""
+    return np.array(simulation.comm.allgather(simulation.comm.waited))
 
 
 def timed_steps(simulation: Simulation, count: int) -> float:

@@ -9,11 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.language import registry, rules
-from karamelo_py.output.point_table import PointTable
-from karamelo_py.points.transfers import Moment
 from karamelo_py.run import timestep
-from karamelo_py.run.advice.noise import Noise, drift_of, turn_of
-from karamelo_py.run.body_motion import BodyMotion
+from karamelo_py.run.body_motion import BodyMotion, Noise, drift_of, motions, turn_of
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.plugins import attributed, foreign_parts
 
@@ -28,49 +25,31 @@ class Vibration(NamedTuple):
 
 
 class SceneFacts:
-    """Facts of a scene before a run of `duration`.
-
-    Attributes
-    ----------
-    hub, simulation
-        The scene, and what steps it.
-    duration
-        Of the run; that of some hundred steps where a condition ends it.
-    d, corners
-        Number of dimensions, and of the corners of a cell.
-    method, basis, transfer, scheme
-        Its parts.
-    basis_name, transfer_name
-        Words of the script for two of them.
-    moves, moments, vanishing
-        Whether points move through the grid; with moments or gradients of their velocity; through
-        places at which D of the affine transfers vanishes.
-    kept
-        The share of FLIP, of transfers that keep velocities alone.
-    linear
-        Whether gradients jump at the faces of cells, with nodes at their corners alone.
-    elastic
-        The solids of laws that store all work, and bear tension.
-    single, sparse
-        IDs of the solids with about one point a cell and direction, and whether there are some.
-    """
+    """Facts of a scene before a run of `duration`: its parts, and how they move."""
 
     def __init__(self, hub: Hub, simulation: Any, duration: float):
         self.hub, self.simulation = hub, simulation
+        # That of some hundred steps where a condition ends the run.
         self.duration = duration if isfinite(duration) else 300 * simulation.dt
         self.method, self.scheme = hub.update.method, hub.update.scheme
         self.transfer, self.basis = hub.update.transfer, self.method.basis
-        self.basis_name = self.method.basis_name
+        self.basis_name = self.method.basis_name  # words of the script
         self.transfer_name = registry.name_of("transfer", type(self.transfer))
-        self.d, self.moves = hub.domain.dimension, self.method.frame.moves
-        self.corners, keeps = 2**self.d, Moment in getattr(self.transfer, "point_fields", ())
-        self.moments = self.moves and keeps
+        self.d, self.corners = hub.domain.dimension, 2**hub.domain.dimension  # of a cell
+        self.moves = self.method.frame.moves  # points move through the grid
+        keeps = timestep.keeps_moments(hub)
+        self.moments = self.moves and keeps  # and keep moments or gradients of their velocity
+        # They move through places at which D of the affine transfers vanishes.
         self.vanishing = self.moves and not self.basis.steady_moment
+        # The share of FLIP, of transfers that keep velocities alone.
         self.kept = 0.0 if keeps else getattr(self.transfer, "alpha", 0.0)
+        # Gradients jump at the faces of cells, with nodes at their corners alone.
         jumps = getattr(self.basis, "gradient_jumps", False)
         self.linear = jumps and self.basis.nodes_per_cell == 1
         solids = hub.solids.values()
+        # Of laws that store all work, and bear tension.
         self.elastic = [s for s in solids if getattr(s.material.law, "rebounds", False)]
+        # About one point a cell and direction.
         self.single = [s.id for s in solids if timestep.one_a_cell(s)]
         self.sparse = bool(self.single)
 
@@ -96,8 +75,7 @@ class SceneFacts:
 
     @cached_property
     def motions(self) -> list[BodyMotion]:
-        """Motions of the solids."""
-        return self.simulation.motions()
+        return motions(self.simulation)
 
     @cached_property
     def drift(self) -> Noise | None:
@@ -142,10 +120,9 @@ class SceneFacts:
         """Half of the largest difference of velocities over the speed of waves."""
         if not (self.motions and self.waves > 0):
             return 0.0
-        fast, slow = (
-            np.array([getattr(m, name) for m in self.motions]) for name in ("fast", "slow")
-        )
-        return float((fast.max(axis=0) - slow.min(axis=0)).max()) / 2 / self.waves
+        fast = np.max([one.fast for one in self.motions], axis=0)
+        slow = np.min([one.slow for one in self.motions], axis=0)
+        return float((fast - slow).max()) / 2 / self.waves
 
     @cached_property
     def vibration(self) -> Vibration:
@@ -179,15 +156,15 @@ class SceneFacts:
     @cached_property
     def shear_stress(self) -> float:
         """The largest equivalent stress of a point."""
-        return self.simulation.largest(_equivalent_stress)[0]
+        return self.simulation.largest(lambda points: points.particle("seq"))[0]
 
 
-def _equivalent_stress(points: PointTable) -> np.ndarray:
-    return points.particle("seq")
+def is_zero(formula: Any) -> bool:
+    """Tell whether a formula is not given, or always 0."""
+    return formula is None or (getattr(formula, "is_constant", False) and formula.constant == 0)
 
 
 def law_parts(law: Any) -> Iterator[Any]:
-    """Give a law and its parts."""
     yield law
     for part in law:
         if isinstance(part, tuple):

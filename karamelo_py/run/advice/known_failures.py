@@ -6,30 +6,158 @@ run before its first step, once.
 """
 
 from collections.abc import Iterator
-from math import isfinite
+from math import fsum, inf, isfinite
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from karamelo_py.kernels.watch import BORNE
 from karamelo_py.language.rules import Advice
+from karamelo_py.output.point_table import COMPONENTS, PointTable
 from karamelo_py.output.units import DENSITY, STRESS, VELOCITY
-from karamelo_py.points.laws import law_kind, specific_volume
-from karamelo_py.run.advice.facts import SceneFacts
-from karamelo_py.run.advice.large_steps import duration_of_later, warn_about_steps
-from karamelo_py.run.advice.resting import UNITS, warn_about_rest
+from karamelo_py.points.laws import can, constrained_velocity, law_kind, specific_volume
+from karamelo_py.run.advice.facts import SceneFacts, is_zero
 from karamelo_py.run.diagnosis.explain import no_number
 from karamelo_py.run.simulation import Simulation
-from karamelo_py.run.timestep import blows_up, elastic_speed
+from karamelo_py.run.timestep import (
+    blows_up,
+    elastic_speed,
+    fastest_wave,
+    own_step_instead,
+    ruling_limit,
+    step_by_script,
+    what_follows,
+)
 from karamelo_py.scene.group import NOTHING_THERE, NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
+LOOK = 100  # steps: shorter runs look at a scene
+ENDLESS = 1e8  # steps
+MIXED = 300  # times the stable step, from where on units are likelier wrong than a guess
 DENSITIES = 10.0, 1e5  # kg/m^3, of all but gases: foams to beyond osmium
 IMPOSSIBLE = 30.0  # times the speed of waves: mm/s in the place of m/s make 1000 of 1
 SPEEDS = 1.0, 5e4  # m/s, of waves: jelly to beyond diamond
+REST = "a scene at rest"
+UNITS = (
+    "in m, kg, s water has the density 1000, steel the modulus 2e11; in mm, t, s 1e-9 and 2e5 (MPa)"
+)
+
+
+def warn_about_rest(hub: Hub, simulation: Any, duration: float) -> None:
+    """Say so, once, where nothing can move in a run of `duration`."""
+    if duration >= LOOK * simulation.dt and _rests(hub, simulation) and hub.update.first_time(REST):
+        hub.warn(
+            "nothing moves in this run: no point has a velocity or a stress, and no fix a load",
+            hint="fix(ID, initial_velocity_particles, ...), fix(ID, body_force, ...) or another "
+            "load, in front of it",
+        )
+
+
+def _rests(hub: Hub, simulation: Any) -> bool:
+    """Tell whether nothing can move, by the parts of this program: others may do anything."""
+    laws = [solid.material.law for solid in hub.solids.values()]
+    update = hub.update
+    parts = [type(p) for p in (update.method, update.method.basis, update.transfer, update.scheme)]
+    parts += [kind for law in laws for kind in law_kind(law)]
+    own = all(kind.__module__.startswith("karamelo_py.") for kind in parts)
+    for fix in hub.fixes.values():
+        formulas = getattr(fix, "formulas", ())
+        holds_at_zero = formulas and all(map(is_zero, formulas))  # walls, loads that are none
+        if fix.for_method or (fix.hooks() and not holds_at_zero):
+            return False
+    if not own or update.thermal or any(can(law, constrained_velocity) for law in laws):
+        return False
+
+    def stress(points: PointTable) -> np.ndarray:
+        return np.max([np.abs(points.particle("s" + c)) for c in COMPONENTS], axis=0)
+
+    return simulation.fastest() == 0 and simulation.largest(stress)[0] == 0
+
+
+def warn_about_length(hub: Hub, simulation: Any, end_time: float) -> None:
+    """Say so where a run to `end_time` takes more steps than anybody waits for."""
+    span = end_time - simulation.time
+    if not (isfinite(span) and span > ENDLESS * simulation.dt > 0):
+        return
+    about = f"about {span / simulation.dt:.2g} steps of {simulation.dt:.3g} from here to time"
+    why, hint = mixed_units(hub, simulation), UNITS
+    if hub.update.fixed_dt is not None:
+        why, hint = "", "a larger step with set_dt, or an earlier end"
+    elif ruling_limit(simulation) == "conduction":
+        why = (
+            f"heat goes through cells of {hub.domain.h:g} that fast. The units of conductivities, "
+            "heat capacities, lengths and times may be mixed"
+        )
+        hint = "an earlier end, or larger cells; in m, kg, s, K copper has kappa = 401, cp = 385"
+    hub.warn(f"{about} {end_time:.6g}" + (f": {why}" if why else ""), hint=hint)
+
+
+def mixed_units(hub: Hub, simulation: Any) -> str:
+    """Doubt the units where a step does not fit the numbers of a scene by any means."""
+    return (
+        f"waves move at {fastest_wave(simulation):.3g} through cells of {hub.domain.h:g}. The "
+        "units of densities, moduli, lengths and times may be mixed"
+    )
+
+
+class Step(NamedTuple):
+    """The step that a run has, where the script asks for it, and what its stable limit depends on.
+
+    `span` says how long the run is, in time or in steps; infinite where a condition ends it.
+    """
+
+    place: Any
+    fixed_dt: float | None
+    dt_factor: float | None
+    halves: bool
+    scene: tuple
+    span: tuple[float, float] = (inf, inf)
+
+
+def step_of(hub: Hub, halves: bool, span: tuple[float, float] = (inf, inf)) -> Step:
+    """The step that a run asks for here, which goes back and halves it in trouble or not."""
+    update = hub.update
+    method, scheme, transfer = update.method, update.scheme, update.transfer
+    scene = (
+        *(hub.domain.h, *hub.solids.values(), method, update.thermal),
+        *(type(scheme), scheme, type(transfer), transfer),
+    )
+    return Step(update.dt_place, update.fixed_dt, update.dt_factor, halves, scene, span)
+
+
+def warn_about_steps(
+    hub: Hub, simulation: Simulation, halves: bool, *, again: bool = False
+) -> None:
+    """Say so once (or `again`) where this or a later step is above the stable limit."""
+    present, limit = step_of(hub, halves), simulation.limit_moving
+    of_heat = float(simulation.control.clock[0].heat_limit)
+    for step in (present, *hub.later[len(hub.runs) :]):
+        asked = step.fixed_dt or (step.dt_factor or 0) * limit
+        if step.scene != present.scene or not asked > limit * (1 + 1e-12):
+            continue
+        name = step_by_script(step.fixed_dt, step.dt_factor)
+        command = name.split()[0]
+        words, hint = f"the step {asked:.4g} of {command} is ", own_step_instead(hub, command)
+        if asked > BORNE * of_heat and not step.halves:
+            words += f"{asked / of_heat:.3g} times the stable one of conduction: "
+            words += "temperatures would swing"
+            if step is present:
+                raise ScriptError(words, place=step.place, hint=hint)
+        elif limit == of_heat:
+            words += f"above the stable limit {limit:.4g} of conduction; "
+            words += f"beyond {BORNE:g} times that temperatures swing"
+        else:
+            words += f"above the stable limit {limit:.4g}{what_follows(hub, simulation, asked)}"
+            if step.fixed_dt and asked > MIXED * limit:
+                words += f"; {mixed_units(hub, simulation)}"
+                hint = f"{UNITS}. If they are as they should be, {hint}"
+        if hub.update.first_time(name) or (again and step is present):
+            hub.warn(words, place=step.place, hint=hint)
+    hub.later.clear()
 
 
 def _impossible_speeds(s: SceneFacts) -> Iterator[Advice]:
-    """Look for speeds that no solid bears."""
     laws = [solid.material.law for solid in s.hub.solids.values()]
     solid = any(not any(getattr(k, "any_speed", False) for k in law_kind(law)) for law in laws)
     if solid and s.speed > IMPOSSIBLE:
@@ -67,18 +195,11 @@ def _other_units(s: SceneFacts) -> Iterator[Advice]:
 
 
 def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> None:
-    """Tell what will go wrong in a run of `duration`, and the next; each failure once in a script.
-
-    Raises
-    ------
-    ScriptError
-        If temperatures would swing, in a run that does not halve its step then, or if points have
-        velocities that are no numbers.
-    """
+    """Tell what will go wrong in a run of `duration` and the next; each failure once."""
     _warn_about_groups(hub)
     refuse_endless_speeds(hub, simulation)
     scene = SceneFacts(hub, simulation, duration)
-    scene.duration += _gone(hub, simulation) + duration_of_later(hub, simulation)
+    scene.duration += _gone(hub, simulation) + _duration_of_later(hub, simulation)
     if scene.waves > 0 and blows_up(hub, simulation):
         scene.duration = 0.0  # it never comes so far
     warn_about_steps(hub, simulation, halves)
@@ -91,21 +212,20 @@ def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> Non
 
 
 def refuse_endless_speeds(hub: Hub, simulation: Simulation) -> None:
-    """Refuse velocities of points that are no numbers, with the formula that they come from.
-
-    Raises
-    ------
-    ScriptError
-        If there are some.
-    """
+    """Refuse velocities of points that are no numbers, with the formula that they come from."""
     if not isfinite(simulation.fastest()):
-        found = no_number(
-            hub,
-            simulation,
-            f"points have a velocity that is not a number at time {simulation.time:.6g}",
-            "look for a formula that gives NaN or infinity, such as a division by zero",
-        )
+        what = f"points have a velocity that is not a number at time {simulation.time:.6g}"
+        hint = "look for a formula that gives NaN or infinity, such as a division by zero"
+        found = no_number(hub, simulation, what, hint)
         raise ScriptError(found.message, place=found.place, hint=found.hint)
+
+
+def _duration_of_later(hub: Hub, simulation: Simulation) -> float:
+    """Duration of the runs behind the next one that have the same scene, as far as is known."""
+    present = step_of(hub, False).scene
+    later = [step for step in hub.later[len(hub.runs) :] if step.scene == present]
+    spans = [min(s.span[0], s.span[1] * (s.fixed_dt or simulation.dt)) for s in later]
+    return fsum(span for span in spans if isfinite(span))
 
 
 def _gone(hub: Hub, simulation: Simulation) -> float:

@@ -3,16 +3,14 @@
 from math import inf
 from typing import Any
 
-import numpy as np
-
-from karamelo_py.kernels.step import Fused, Staged, rows_of
+from karamelo_py.kernels.step import Staged, rows_of
 from karamelo_py.kernels.table import says
 from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.further import without_rate
 from karamelo_py.run.advice.known_failures import refuse_endless_speeds
 from karamelo_py.run.advice.suggestions import suggestions
 from karamelo_py.run.diagnosis.energy import not_watched, unknown_work
-from karamelo_py.run.lower.sizes import memory_of, node_fields, nodes_in_use, point_fields
+from karamelo_py.run.lower.memory import memory_of, node_fields, nodes_in_use, point_fields
 from karamelo_py.run.mpi.plan import report_lines
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.timestep import ruling_limit, words_of_share
@@ -69,7 +67,7 @@ def report(hub: Hub, end_time: float = inf) -> None:
         for line in report_lines(simulation, hub.settings.ranks):
             say(line)
     say("")
-    say(f"stages of a step, {'one by one' if simulation.staged else 'fused'}")
+    say(f"stages of a step, {'one by one' if isinstance(simulation.visits, Staged) else 'fused'}")
     for stage in stages(hub, simulation):
         say(f"  {stage}")
     found = suggestions(hub, simulation)
@@ -82,39 +80,25 @@ def report(hub: Hub, end_time: float = inf) -> None:
 
 
 def _size(count: float) -> str:
-    """So many bytes, in words."""
     mib = count / 2**20
     return f"{mib:.0f} MiB" if mib > 100 else f"{mib:.3g} MiB"
-
-
-def bytes_per_point(simulation: Simulation) -> int:
-    """Bytes of all fields of a point, the mean over the points of all kinds."""
-    counts = simulation.counts()
-    of_one = [sum(size for *_, size in point_fields(block)) for block in simulation.blocks]
-    return round(np.dot(counts, of_one) / max(1, sum(counts)))
 
 
 def materials(hub: Hub, block: Any) -> list[Material]:
     """The materials of the points of this block: those in use whose laws are of its kind."""
     used = dict.fromkeys(solid.material for solid in hub.solids.values())
-    return [
-        material
-        for material in used
-        if law_kind(material.law) == without_rate(law_kind(block.laws))
-    ]
+    kind = without_rate(law_kind(block.laws))
+    return [material for material in used if law_kind(material.law) == kind]
 
 
 def stages(hub: Hub, simulation: Simulation) -> list[str]:
     """The stages of a step with the fixes that act in them."""
-    visits = Staged if simulation.staged else Fused
     acting: dict[str, list[str]] = {}
     for fix in hub.fixes.values():
         for name in fix.hooks():
             once = " (first step only)" if fix.first_step_only else ""
             acting.setdefault(name, []).append(fix.id + once)
     lines = [f"{name}: {', '.join(ids)}" for name, ids in acting.items()]
-    rows = rows_of(type(hub.update.scheme), visits)
+    rows = rows_of(type(hub.update.scheme), type(simulation.visits))
     first = [text for row in rows if (text := says(row, simulation.setup)) is not None]
-    if not lines:
-        lines = ["no fix acts between them"]
-    return [*first, *lines]
+    return [*first, *(lines or ["no fix acts between them"])]

@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.language.rules import Advice
-from karamelo_py.run.advice.facts import SceneFacts
+from karamelo_py.run.advice.facts import SceneFacts, is_zero
 from karamelo_py.run.timestep import own_step
 from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
+
+Words = Iterator[tuple[str, str]]  # the cost, and what to write instead
 
 AXES = "xyz"
 SMALL_STEP = 0.4  # of the stable one; scripts with moderate reserve are left alone
@@ -22,22 +24,18 @@ MANY_POINTS = 4  # a cell and direction
 def suggestions(hub: Hub, simulation: Any) -> list[Advice]:
     """Find all that is known to be paid for without need, before anything has run."""
     rules = (_step, _unread, _unused, _of_parts, _averaging, _flat, _round, _points)
-    return [suggestion for rule in rules for suggestion in rule(hub, simulation)]
+    return [Advice("", *words) for rule in rules for words in rule(hub, simulation)]
 
 
-def _of_parts(hub: Hub, simulation: Any) -> Iterator[Advice]:
-    """Ask the rules of the parts."""
-    return SceneFacts(hub, simulation, inf).advice("suggestion")
-
-
-def _suggestion(cost: str, instead: str) -> Advice:
-    return Advice("", cost, instead)
+def _of_parts(hub: Hub, simulation: Any) -> Words:
+    said = SceneFacts(hub, simulation, inf).advice("suggestion")
+    return ((one.reason, one.cure) for one in said)
 
 
 # --- the step ------------------------------------------------------------------------------------
 
 
-def _step(hub: Hub, simulation: Any) -> Iterator[Advice]:
+def _step(hub: Hub, simulation: Any) -> Words:
     share, limit = hub.update.dt_factor, simulation.limit
     if hub.update.fixed_dt is not None:
         dt = simulation.dt
@@ -50,17 +48,15 @@ def _step(hub: Hub, simulation: Any) -> Iterator[Advice]:
         return
     times = f"{best / dt:.3g} times as many steps as the program's own step asks for"
     if hub.update.fixed_dt is not None:
-        yield _suggestion(f"set_dt({dt:g}): {times}", f"leave set_dt out, or set_dt({best:.3g})")
+        yield f"set_dt({dt:g}): {times}", f"leave set_dt out, or set_dt({best:.3g})"
     else:
-        yield _suggestion(
-            f"dt_factor({hub.update.dt_factor:g}): {times}", f"dt_factor({best / limit:.3g})"
-        )
+        yield f"dt_factor({hub.update.dt_factor:g}): {times}", f"dt_factor({best / limit:.3g})"
 
 
 # --- what nobody reads ---------------------------------------------------------------------------
 
 
-def _unread(hub: Hub, simulation: Any) -> Iterator[Advice]:
+def _unread(hub: Hub, simulation: Any) -> Words:
     text = _script(hub)
     for kind, catalogue in (("compute", hub.computes), ("fix", hub.fixes)):
         for ID, item in catalogue.items():
@@ -70,13 +66,15 @@ def _unread(hub: Hub, simulation: Any) -> Iterator[Advice]:
             defined = rf"\b{kind}\s*\(\s*{re.escape(ID)}\s*,"
             uses = len(re.findall(rf"\b{re.escape(ID)}(?:_\w+)?\b", text))
             if 0 < uses <= len(re.findall(defined, text)):
-                yield _suggestion(
+                suffix = item.published[0]
+                name = f"{ID}_{suffix}" if suffix else ID
+                yield (
                     f"{kind} {ID} ({item.style}) is measured at each output and shown nowhere",
-                    f"leave it out, or name {_published(ID, item)} in log_modify",
+                    f"leave it out, or name {name} in log_modify",
                 )
 
 
-def _unused(hub: Hub, simulation: Any) -> Iterator[Advice]:
+def _unused(hub: Hub, simulation: Any) -> Words:
     """Groups whose names stand nowhere but where they are made."""
     text = _script(hub)
     if re.search(r"\binclude\s*\(", text):
@@ -84,12 +82,7 @@ def _unused(hub: Hub, simulation: Any) -> Iterator[Advice]:
     for ID in hub.groups:
         made = len(re.findall(rf"\bgroup\s*\(\s*{re.escape(ID)}\s*,", text))
         if 0 < len(re.findall(rf"(?<!\w){re.escape(ID)}(?!\w)", text)) <= made:
-            yield _suggestion(f"group {ID} is used by nothing", "leave it out, or name it in a fix")
-
-
-def _published(ID: str, item: Any) -> str:
-    suffix = item.published[0]
-    return f"{ID}_{suffix}" if suffix else ID
+            yield f"group {ID} is used by nothing", "leave it out, or name it in a fix"
 
 
 def _script(hub: Hub) -> str:
@@ -99,7 +92,7 @@ def _script(hub: Hub) -> str:
     return "\n".join(line.partition("#")[0] for line in lines)
 
 
-def _averaging(hub: Hub, simulation: Any) -> Iterator[Advice]:
+def _averaging(hub: Hub, simulation: Any) -> Words:
     if not hub.update.anti_locking:
         return
     for solid in hub.solids.values():
@@ -107,7 +100,7 @@ def _averaging(hub: Hub, simulation: Any) -> Iterator[Advice]:
         moduli = (getattr(law, "lam", None), getattr(law, "G", None))
         if None in moduli or moduli[0] / (2 * sum(moduli)) >= NEARLY_INCOMPRESSIBLE:
             return
-    yield _suggestion(
+    yield (
         "anti_volumetric_locking(true): a visit of the points more, and nothing is nearly "
         "incompressible or flows",
         "leave it out",
@@ -118,17 +111,12 @@ def _averaging(hub: Hub, simulation: Any) -> Iterator[Advice]:
 
 
 def _acting(hub: Hub) -> list[Any]:
-    """The fixes that do something in a run."""
     return [fix for fix in hub.fixes.values() if fix.hooks() or fix.for_method]
 
 
 def _given(fix: Any) -> tuple:
     """Its formulas by direction; of fixes without, that they may do anything."""
     return tuple(fix.formulas) or (np.nan,) * 3
-
-
-def _is_zero(formula: Any) -> bool:
-    return formula is None or (getattr(formula, "is_constant", False) and formula.constant == 0)
 
 
 def _depends(formula: Any, axes: str) -> bool:
@@ -140,10 +128,7 @@ def _depends(formula: Any, axes: str) -> bool:
 
 
 def _alike(hub: Hub, fix: Any, key: Callable[[np.ndarray], np.ndarray]) -> bool:
-    """Tell whether all points (or nodes) of a grid with one key are in the group, or none.
-
-    `key` makes one or two numbers of each of positions (n, 3).
-    """
+    """Tell whether all points (or nodes) at places of one `key` are in the group, or none."""
     group = fix.group
     if group is None or group.all:
         return group is not None
@@ -163,7 +148,7 @@ def _alike(hub: Hub, fix: Any, key: Callable[[np.ndarray], np.ndarray]) -> bool:
     return True
 
 
-def _flat(hub: Hub, simulation: Any) -> Iterator[Advice]:
+def _flat(hub: Hub, simulation: Any) -> Words:
     """Solids that are the same all along a direction in which nothing moves."""
     domain = hub.domain
     d = domain.dimension
@@ -176,7 +161,7 @@ def _flat(hub: Hub, simulation: Any) -> Iterator[Advice]:
             given = [f"{domain.lo[axis]:g}, {domain.hi[axis]:g}" for axis in rest]
             kept = " and ".join(AXES[axis] for axis in rest)
             named = "" if k == d - 1 else f", with {kept} called {' and '.join(AXES[: d - 1])}"
-            yield _suggestion(
+            yield (
                 f"all solids are the same along {AXES[k]}, in which nothing moves: {layers} times "
                 f"the points of {'plane strain' if d == 3 else 'a line'}",
                 f"dimension({d - 1}, {', '.join(given)}, {domain.h:g}){named}",
@@ -188,7 +173,7 @@ def _moves_nothing(hub: Hub, k: int, rest: list[int]) -> bool:
     """Tell whether fixes say nothing that is not 0 along direction k, nor depends on it."""
     for fix in _acting(hub):
         given = _given(fix)
-        if len(given) <= len(rest) or not _is_zero(given[k]):
+        if len(given) <= len(rest) or not is_zero(given[k]):
             return False
         if any(_depends(act, AXES[k]) for act in (*(given[j] for j in rest), fix.wall_friction)):
             return False
@@ -205,10 +190,7 @@ def _acts_alike(hub: Hub, rest: list[int]) -> bool:
 
 
 def _layers(hub: Hub, k: int, rest: list[int]) -> int:
-    """In how many equal layers across direction k the points lie, between faces that are held.
-
-    0 where layers differ, where solids do not begin and end together, or a face is free.
-    """
+    """Count the equal layers of solids across direction k, between faces that are held; or 0."""
     most, ends = 0, set()
     for solid in hub.solids.values():
         if not solid.count:
@@ -232,7 +214,7 @@ def _faces_held(hub: Hub, k: int, low: float, high: float) -> bool:
     held = np.zeros(lattice.shape, np.bool_)
     for fix in hub.fixes.values():
         if fix.prescribes_velocity and len(fix.formulas) > k and fix.formulas[k] is not None:
-            held.ravel()[fix.nodes - lattice.first] = _is_zero(fix.formulas[k])
+            held.ravel()[fix.nodes - lattice.first] = is_zero(fix.formulas[k])
     if held.all():
         return True
     planes = [(end * lattice.h - lattice.lo[k]) / lattice.spacing for end in (low, high)]
@@ -243,7 +225,7 @@ def _faces_held(hub: Hub, k: int, low: float, high: float) -> bool:
     return inside and bool(held.take(numbers, axis=k).all())
 
 
-def _round(hub: Hub, simulation: Any) -> Iterator[Advice]:
+def _round(hub: Hub, simulation: Any) -> Words:
     """Cylinders about one axis, along which all acts."""
     if hub.domain.dimension != 3:
         return
@@ -262,7 +244,7 @@ def _round(hub: Hub, simulation: Any) -> Iterator[Advice]:
 
     for fix in _acting(hub):
         act = _given(fix)
-        if len(act) < 3 or not all(_is_zero(act[axis]) for axis in across):
+        if len(act) < 3 or not all(is_zero(act[axis]) for axis in across):
             return
         if _depends(act[along], "".join(AXES[axis] for axis in across)):
             return
@@ -271,7 +253,7 @@ def _round(hub: Hub, simulation: Any) -> Iterator[Advice]:
     radius = max(region.radius for region in regions)
     lo, hi = hub.domain.lo[along], hub.domain.hi[along]
     h = hub.domain.h
-    yield _suggestion(
+    yield (
         "cylinders about one axis, and nothing acts around it: about "
         f"{np.pi * radius / h:.3g} times the points of the plane of radius and axis",
         f"dimension(2, 0, {max(hub.domain.hi[axis] for axis in across):g}, {lo:g}, {hi:g}, {h:g}) "
@@ -279,12 +261,12 @@ def _round(hub: Hub, simulation: Any) -> Iterator[Advice]:
     )
 
 
-def _points(hub: Hub, simulation: Any) -> Iterator[Advice]:
+def _points(hub: Hub, simulation: Any) -> Words:
     for solid in hub.solids.values():
         ppc = getattr(solid, "ppc", 0)
         if ppc >= MANY_POINTS:
             each = ppc**hub.domain.dimension
-            yield _suggestion(
+            yield (
                 f"solid {solid.id} has {each} points a cell; more than two a direction gain little "
                 "once points have moved",
                 f"2 or 3 points a direction, and finer cells for what {each} cost",

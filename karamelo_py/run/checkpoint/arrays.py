@@ -1,21 +1,26 @@
 """The state of a simulation as arrays by name: to return to, to write, to read."""
 
-from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from karamelo_py.compiler.fields import as_rows_of_points, is_kept, name_of
+from karamelo_py.compiler.fields import as_rows_of_points, is_kept, name_of, rows_of_points
 from karamelo_py.kernels.arrays import Nodes, Points, Tiling, arrays_of
 from karamelo_py.kernels.totals import WORK, carry
-from karamelo_py.run.tiles.boxes import numbers, used
-from karamelo_py.run.tiles.tiles import in_use
+from karamelo_py.output.fields import PIECE
+from karamelo_py.run.boxes import between, numbers, used
+from karamelo_py.run.mpi.partition import by_tile, join_tilings, share_of_tiling, stripped, work_of
+from karamelo_py.run.tiles import SHARES, Tiles, in_use
 from karamelo_py.script.errors import ScriptError
 
-# What else a simulation knows of its state; `measured` comes before what depends on its version.
+# What else a simulation knows of its state.
 SHOWN = ("measured", "mapped", "followed", "told_of_growth")
+
+ALL_HAVE, EACH_HAS = ("clock", "work", "values"), ("touched/", "kept/")
 
 # Name and shape of an array, where in it something belongs, and that.
 Stored = tuple[str, tuple[int, ...], Any, np.ndarray]
@@ -24,8 +29,11 @@ Stored = tuple[str, tuple[int, ...], Any, np.ndarray]
 def changing(simulation: Any) -> Iterator[tuple[str, np.ndarray]]:
     """Yield every array that a step changes and the next one needs, as far as it is in use."""
     s = simulation.setup
-    for name, array, rows in simulation.tiles.in_use(s):
-        yield name, array[:rows]
+    for k, block in enumerate(s.blocks):
+        for name, rows in in_use(block.tiling):
+            yield f"tiling/{k}/{name}", getattr(block.tiling, name)[:rows]
+    if simulation.subdomain is not None:
+        yield "owner", simulation.tiles.owner
     yield "clock", s.control.clock
     yield "work", s.control.totals[WORK]
     for name, array in kept_at_nodes(s):
@@ -38,12 +46,9 @@ def changing(simulation: Any) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def copied(simulation: Any, before: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Copy the state of a simulation, and the published values.
-
-    Copies of the state `before`, which is lost, are used again. One array after another: where
-    points have come or gone none is there twice.
-    """
+    """Copy the state of a simulation, and published values, into copies of a state that is lost."""
     found = {}
+    # One array after another: where points have come or gone none is there twice.
     for name, array in (*changing(simulation), ("values", simulation.setup.control.values)):
         copy = before.pop(name, None)
         if copy is None or copy.shape != array.shape or copy.dtype != array.dtype:
@@ -67,13 +72,26 @@ def touched(simulation: Any) -> dict[str, np.ndarray]:
     return {"touched/nodes": numbers(spans)[there], "touched/rows": rows[there]}
 
 
-def stored(simulation: Any) -> Iterator[Stored]:
-    """Yield what a file to go on from holds: the state, what is known of it, nodes as they are."""
-    yield from in_file(dict(changing(simulation)) | touched(simulation))
-    s = simulation.setup
-    nodes = numbers(s.spans)
-    # Of zeros without a sign: which nodes beside a body are visited depends on who has its tiles.
-    yield from wholes(known(simulation) | {name: array[nodes] + 0 for name, array in of_nodes(s)})
+def stored(simulation: Any, kept: dict[str, np.ndarray] | None = None) -> Iterator[Stored]:
+    """Yield what a file to go on from holds of the present state, or of the one that is `kept`.
+
+    All processes go through this together; the first gets the arrays, with the bits and in the
+    order of one process.
+    """
+    s, comm, tiles = simulation.setup, simulation.comm, simulation.tiles
+    if not kept and simulation.subdomain is not None:
+        simulation.subdomain.share_kept()
+    state = kept or dict(changing(simulation)) | touched(simulation)
+    yield from in_file(state) if comm.size == 1 else _joined(simulation, state)
+    if kept:
+        return
+    yield from wholes(known(simulation))
+    reached = comm.gather(tiles.reached_by(s))
+    spans = comm.bcast(reached and tiles.spans_of_all(reached))
+    total = int(np.diff(spans).sum())
+    for own, nodes in _pieces(spans):
+        for name, array in (rows_at(simulation, nodes, comm.gather) or {}).items():
+            yield name, (total, *array.shape[1:]), own, array + 0
 
 
 def in_file(state: dict[str, np.ndarray]) -> Iterator[Stored]:
@@ -84,13 +102,11 @@ def in_file(state: dict[str, np.ndarray]) -> Iterator[Stored]:
 
 
 def wholes(arrays: Mapping[str, np.ndarray]) -> Iterator[Stored]:
-    """Yield arrays that are written at once."""
     for name, array in arrays.items():
         yield name, array.shape, ..., array
 
 
 def known(simulation: Any) -> dict[str, np.ndarray]:
-    """Return what all processes know."""
     shown = np.array([getattr(simulation, name) for name in SHOWN])
     return {"present": simulation.present, "shown": shown}
 
@@ -119,16 +135,18 @@ def opened(path: Path, group: str = "state") -> Iterator[dict[str, InFile]]:
     """The arrays in a file to go on from, by name; they are read when they are looked at."""
     import h5py
 
-    with ExitStack() as until_end:
-        found: dict[str, InFile] = {}
+    found: dict[str, InFile] = {}
+
+    def note(name: str, item: Any) -> None:
+        if hasattr(item, "shape"):
+            found[name] = InFile(item)
+
+    with reading():
+        root = h5py.File(path, "r", locking=False)
+    with root:
         with reading():
-            root = until_end.enter_context(h5py.File(path, "r", locking=False))
             try:
-                root[group].visititems(
-                    lambda name, item: (
-                        found.update({name: InFile(item)}) if hasattr(item, "shape") else None
-                    )
-                )
+                root[group].visititems(note)
             except (RuntimeError, KeyError, ValueError) as error:
                 raise OSError(str(error)) from error
         yield found
@@ -136,10 +154,7 @@ def opened(path: Path, group: str = "state") -> Iterator[dict[str, InFile]]:
 
 @contextmanager
 def reading() -> Iterator[None]:
-    """Within this, what HDF5 cannot read is told of as a file that is damaged.
-
-    Only what reads belongs there: what else fails for the system is not the fault of the file.
-    """
+    """Within this, what HDF5 cannot read is a damaged file; only what reads belongs there."""
     try:
         yield
     except OSError as error:
@@ -150,23 +165,8 @@ def reading() -> Iterator[None]:
 
 
 def restore(simulation: Any, state: Mapping[str, Any]) -> None:
-    """Put the arrays of a simulation into a state.
-
-    Parameters
-    ----------
-    simulation
-        With a setup, tiles and a hub; also the own part of one of several processes.
-    state
-        As `copied` or a file has it; without published values these stay.
-
-    Raises
-    ------
-    ScriptError
-        If arrays are missing, or of another kind than those of this scene.
-    """
+    """Put the arrays of a simulation into a state, as `copied` or a file has it."""
     s = simulation.setup
-    for k, block in enumerate(s.blocks):
-        check_points(block.points, state, f"points/{k}/")
     # Nodes that were not in use then have to be empty, as they were.
     simulation.tiles.empty_nodes(s)
     blocks = []
@@ -191,24 +191,50 @@ def restore(simulation: Any, state: Mapping[str, Any]) -> None:
         memory[memory != 0] = 0
         if "touched/nodes" in state:  # a process that has no points has no nodes in use, either
             memory[state["touched/nodes"][()]] = state["touched/rows"]
+    simulation.changed()
 
 
-def take_known(simulation: Any, state: Mapping[str, Any]) -> None:
-    """Take what all processes know."""
-    simulation.present[:] = _checked(state, "present", simulation.present)
-    for name, known in zip(SHOWN, _checked(state, "shown", np.ones(len(SHOWN), bool)), strict=True):
-        setattr(simulation, name, bool(known))
+def take_snapshot(simulation: Any, path: Path) -> dict[str, np.ndarray]:
+    """Read the snapshot that a file holds; each process reads its own share."""
+    with opened(path, "good") as found:
+        if simulation.subdomain is not None:
+            return own_share(simulation, found)
+        # In the order in which copies are made, and written.
+        names = [*(name for name, _ in changing(simulation)), "values", *found]
+        return {name: found[name][()] for name in dict.fromkeys(names)}
 
 
-def take_nodes(simulation: Any, state: Mapping[str, Any]) -> None:
-    """Let the nodes in use show what they did."""
-    nodes = numbers(simulation.setup.spans)
-    for name, array in of_nodes(simulation.setup):
-        array[nodes] = _checked(state, name, array[nodes])
+def take_stored(simulation: Any, path: Path) -> None:
+    """Take the state that a file to go on from holds; each process reads its own share."""
+    with opened(path) as state, simulation.comm.joint():
+        # Nothing of the arrays changes where the file is of another scene.
+        for k, block in enumerate(simulation.setup.blocks):
+            check_points(block.points, state, f"points/{k}/")
+        shared = simulation.subdomain is not None
+        restore(simulation, own_share(simulation, state) if shared else state)
+        simulation.present[:] = _checked(state, "present", simulation.present)
+        for name, of in zip(
+            SHOWN, _checked(state, "shown", np.ones(len(SHOWN), bool)), strict=True
+        ):
+            setattr(simulation, name, bool(of))
+        _take_nodes(simulation, state)
+
+
+def _take_nodes(simulation: Any, state: Mapping[str, Any]) -> None:
+    """Let the nodes in use here show what they did; all processes come to it."""
+    s, tiles = simulation.setup, simulation.tiles
+    spans = tiles.spans_of_all(simulation.comm.allgather(tiles.reached_by(s)))
+    total, used = int(np.diff(spans).sum()), np.zeros(simulation.hub.fields.node_count, np.bool_)
+    used[numbers(s.spans)] = True
+    for name, array in of_nodes(s):
+        like = np.broadcast_to(array[:1], (total, *array.shape[1:]))
+        _checked(state, name, like, read=False)
+        for own, nodes in _pieces(spans):
+            here = used[nodes]
+            array[nodes[here]] = state[name][own][here]
 
 
 def of_nodes(s: Any) -> Iterator[tuple[str, np.ndarray]]:
-    """Every array of nodes, with its name."""
     for kind, nodes in (("nodes", s.nodes), ("heat", getattr(s.heat, "nodes", None))):
         if nodes is None:
             continue
@@ -223,15 +249,28 @@ def kept_at_nodes(s: Any) -> list[tuple[str, np.ndarray]]:
     return [(name_of(type(one)), one.array) for one in s.nodes.fields if is_kept(type(one))]
 
 
+def rows_at(simulation: Any, nodes: np.ndarray, gather: Callable) -> dict[str, np.ndarray] | None:
+    """Gather rows of all arrays of nodes, of ascending numbers, zero where not in use; or None."""
+    counted, kinds = simulation.counted(), dict(of_nodes(simulation.setup))
+    limits = (nodes[0], nodes[-1] + 1) if len(nodes) else (0, 0)
+    here = counted[slice(*np.searchsorted(counted, limits))]
+    found = gather((here, [array[here] for array in kinds.values()]))
+    if found is None:
+        return None
+    rows = {name: np.zeros((len(nodes), *a.shape[1:]), a.dtype) for name, a in kinds.items()}
+    for there, some in found:
+        for array, of in zip(rows.values(), some, strict=True):
+            array[np.searchsorted(nodes, there)] = of
+    return rows
+
+
 def take_tiling(tiling: Tiling, found: Mapping[str, np.ndarray], stem: str) -> Tiling:
-    """Put what `in_use` has given into a tiling."""
     for name, _ in in_use(tiling):
         _fill(getattr(tiling, name), found, stem + name)
     return tiling
 
 
 def _fill(array: np.ndarray, found: Mapping[str, np.ndarray], name: str) -> None:
-    """The first rows of `array` become those of the file."""
     if name not in found or len(found[name]) > len(array):
         raise _misfit(name)
     array[: len(found[name])] = found[name]
@@ -272,11 +311,11 @@ def remembered_at(simulation: Any, spans: np.ndarray) -> list[np.ndarray]:
     return method.remembered(simulation.setup.contact, spans)
 
 
-def _checked(found: Mapping[str, Any], name: str, like: np.ndarray) -> np.ndarray:
+def _checked(found: Mapping[str, Any], name: str, like: np.ndarray, *, read: bool = True) -> Any:
     there = found.get(name)
     if there is None or there.shape != like.shape or there.dtype != like.dtype:
         raise _misfit(name)
-    return there[()]
+    return there[()] if read else None
 
 
 def _misfit(what: str) -> ScriptError:
@@ -284,3 +323,126 @@ def _misfit(what: str) -> ScriptError:
         f"its state is not one of this scene: {what}",
         expected="a file that the same scene has written: the same solids, materials and method",
     )
+
+
+# --- of several processes -------------------------------------------------------------------------
+
+
+def _joined(simulation: Any, own: dict[str, np.ndarray]) -> Iterator[Stored]:
+    """Yield a state of which each process has its `own` part, so many points at a time."""
+    s, comm = simulation.setup, simulation.comm
+    parts = comm.gather(
+        {
+            "tiling": [stripped(own, f"tiling/{k}/") for k in range(len(s.blocks))],
+            "work": own["work"].copy(),
+            "touched": stripped(own, "touched/"),
+        }
+    )
+    # Tiles as of one process.
+    tilings, rows = [Tiles.empty_tiling(simulation.tiles) for _ in s.blocks], {}
+    for k, tiling in enumerate(tilings if parts is not None else ()):
+        tiling.count[1] = 1 if simulation.tiles.direct else SHARES
+        join_tilings(tiling, [part["tiling"][k] for part in parts])
+        rows |= {f"tiling/{k}/{name}": getattr(tiling, name)[:n] for name, n in in_use(tiling)}
+    if parts is not None:
+        work = sum(part["work"] for part in parts)
+        at_nodes = {name: array for name, array in own.items() if name.startswith("kept/")}
+        yield from in_file(rows | {"clock": own["clock"], "work": work} | at_nodes)
+    for k, tiling in enumerate(tilings):
+        yield from _points(simulation, k, tiling, own)
+    if "values" in own:
+        yield from wholes({"values": own["values"]})
+    if found := [part["touched"] for part in parts or () if part["touched"]]:
+        nodes, first = np.unique(np.concatenate([of["nodes"] for of in found]), True)
+        rows = np.concatenate([of["rows"] for of in found])[first]
+        yield from wholes({"touched/nodes": nodes, "touched/rows": rows})
+
+
+def points_of_tiles(
+    tiling: dict[str, np.ndarray], arrays: list[np.ndarray], first: int, end: int
+) -> dict[str, Any]:
+    """Own points in tiles with numbers from `first` to before `end`, and how they lie in them."""
+    own = slice(*np.searchsorted(tiling["number"], (first, end)))
+    ranges = tiling["range"][own]
+    points = slice(ranges[0, 0], ranges[-1, 1]) if len(ranges) else slice(0, 0)
+    return {
+        "number": tiling["number"][own], "range": ranges, "count": [len(ranges)],
+        "points": [array[..., points] for array in arrays],
+    }  # fmt: skip
+
+
+def _points(
+    simulation: Any, k: int, tiling: Tiling, own: dict[str, np.ndarray]
+) -> Iterator[Stored]:
+    """Yield the points of a block, tile after tile."""
+    comm = simulation.comm
+    number, ends = (array[: tiling.count[0]] for array in (tiling.number, tiling.range[:, 1]))
+    total = int(ends[-1]) if len(ends) else 0
+    limits = [
+        (int(number[first]), int(number[end - 1]) + 1) if total else None
+        for first, end in _cuts(ends)
+    ]
+    names = [name for name, _ in arrays_of(simulation.setup.blocks[k].points)]
+    arrays = [own[f"points/{k}/{name}"] for name in names]
+    begin = 0
+    for of_piece in comm.bcast(limits):
+        if of_piece is not None:
+            found = comm.gather(points_of_tiles(stripped(own, f"tiling/{k}/"), arrays, *of_piece))
+        else:  # not sorted yet: each has those of an equal share of the ids
+            found = comm.gather({"points": arrays})
+        if found is None:
+            continue
+        total = total or sum(part["points"][0].shape[-1] for part in found)
+        order = np.arange(total) if of_piece is None else by_tile(found)
+        for name, *same in zip(names, *(part["points"] for part in found), strict=True):
+            array = np.take(np.concatenate(same, axis=-1), order, axis=-1)
+            where = ..., slice(begin, begin + len(order))
+            yield f"points/{k}/{name}", (*array.shape[:-1], total), where, array
+        begin += len(order)
+
+
+def _cuts(ends: np.ndarray) -> Iterator[tuple[int, int]]:
+    """From where to where what ends there has some `PIECE` rows."""
+    total = int(ends[-1]) if len(ends) else 0
+    cuts = np.searchsorted(ends, np.arange(PIECE, total, PIECE), side="right")
+    return pairwise([*np.unique([0, *cuts]).tolist(), len(ends)])
+
+
+def _pieces(spans: np.ndarray) -> Iterator[tuple[slice, np.ndarray]]:
+    """Nodes in spans, so many at a time: which of all, and their numbers."""
+    begin = 0
+    for first, end in _cuts(np.cumsum(spans[:, 1] - spans[:, 0])):
+        nodes = between(*spans[first:end].T)
+        yield slice(begin, begin + len(nodes)), nodes
+        begin += len(nodes)
+
+
+def own_share(simulation: Any, state: Mapping) -> dict[str, np.ndarray]:
+    """Read the state in a file as far as it is of this process, of tiles that are cut for it."""
+    blocks, comm, tiles = simulation.setup.blocks, simulation.comm, simulation.tiles
+    tilings = [take_tiling(tiles.empty_tiling(), state, f"tiling/{k}/") for k in range(len(blocks))]
+    whole = [b._replace(tiling=of) for b, of in zip(blocks, tilings, strict=True)]
+    before = tiles.owner
+    tiles.share_out(work_of(tiles.loads(whole), simulation.subdomain.load.costs))
+    owner, tiles.owner = tiles.owner, before
+    found = {n: state[n][()] for n in state if n in ALL_HAVE or n.startswith(EACH_HAS)}
+    if not comm.leads:
+        found["work"] = np.zeros_like(found["work"])
+    for k, tiling in enumerate(tilings):
+        points, of_tiles = share_of_tiling(k, tiling, owner == comm.rank)
+        if not tiling.count[0]:  # not sorted yet: an equal share
+            count = state[f"points/{k}/id"].size
+            points = np.arange(count * comm.rank // comm.size, count * (comm.rank + 1) // comm.size)
+        names = [f"points/{k}/{name}" for name, _ in arrays_of(blocks[k].points)]
+        found |= of_tiles | {name: _chosen(state[name], points) for name in names}
+    return found | {"owner": owner}
+
+
+def _chosen(array: Any, points: np.ndarray) -> np.ndarray:
+    """Some points (ascending) of an array in a file, of which so many are read at a time."""
+    found = rows_of_points((*array.shape[:-1], len(points)), array.dtype)
+    for begin in range(0, array.shape[-1], PIECE):
+        own = slice(*np.searchsorted(points, (begin, begin + PIECE)))
+        if own.start < own.stop:
+            found[..., own] = array[..., begin : begin + PIECE][..., points[own] - begin]
+    return found

@@ -17,10 +17,13 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from karamelo_py.kernels.step import DONE
 from karamelo_py.language.faults import fault
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
@@ -51,11 +54,7 @@ class PartStates(NamedTuple):
         return cls(parts, arrays, {name: hub.values.get(name) for name in names})
 
     def give(self, hub: Hub, *, cut: bool = False, anew: bool = False) -> None:
-        """Let all parts remember that.
-
-        With `cut` outputs go on from there in their files. Those that begin them `anew` get what
-        they carry into other files.
-        """
+        """Let all parts remember that; with `cut` outputs go on in their files, or `anew`."""
         for name, value in self.values.items():
             if name in hub.values:
                 hub.values.set(name, value)
@@ -98,10 +97,7 @@ def _all_parts(hub: Hub) -> Iterator[tuple[Key, Any]]:
 
 
 def state_of(part: Any, arrays: list[np.ndarray], *, grows: bool = False) -> dict[str, Any]:
-    """Return what a part remembers as JSON knows it; arrays are copied and numbered.
-
-    Where lists are only ever added to (`grows`), nothing of them is copied before a file takes it.
-    """
+    """Return what a part remembers as JSON knows it; arrays are copied and numbered."""
     found: dict[str, Any] = {}
     for name in named(part):
         value = getattr(part, name)
@@ -120,7 +116,6 @@ def state_of(part: Any, arrays: list[np.ndarray], *, grows: bool = False) -> dic
 
 
 def give_state(part: Any, state: dict[str, Any], arrays: list[np.ndarray]) -> None:
-    """Give a part back what it remembered."""
     for name in named(part):
         kept, there = state.get(name, part), getattr(part, name)
         if isinstance(kept, dict) and "part" in kept:
@@ -130,39 +125,33 @@ def give_state(part: Any, state: dict[str, Any], arrays: list[np.ndarray]) -> No
             setattr(part, name, value_of(kept, arrays))
 
 
+@dataclass
 class Grown:
     """A list that is only ever added to, and how long it was."""
 
-    def __init__(self, items: list, length: int, arrays: list[np.ndarray]):
-        self.items, self.length, self.arrays = items, length, arrays
+    items: list
+    length: int
+    arrays: list[np.ndarray]
 
     def value(self) -> list:
-        """Return the items of then."""
         return self.items[: self.length]
 
     def plain(self) -> Any:
-        """Return them as JSON knows it."""
         return plain(self.value(), self.arrays)
 
 
+@dataclass
 class Unwritable:
     """A copy of what a function in Python keeps and no file takes, and what is said of it."""
 
-    def __init__(self, kept: Any, fault: ScriptError):
-        self.kept, self.fault = kept, fault
+    kept: Any
+    fault: ScriptError
 
     def value(self) -> Any:
-        """Return a copy of it."""
         return _copied(self.kept)
 
     def plain(self) -> Any:
-        """Refuse to write it."""
         raise self.fault
-
-
-def for_json(late: Grown | Unwritable) -> Any:
-    """Return what JSON knows of a value that is turned into that in a file alone."""
-    return late.plain()
 
 
 def _copied(value: Any) -> Any:
@@ -203,13 +192,7 @@ MADE = {kind.__name__: make for kind, (_, make) in KINDS.items()}
 
 
 def plain(value: Any, arrays: list[np.ndarray]) -> Any:
-    """Return a value as JSON knows it; arrays are copied into `arrays` and numbered.
-
-    Raises
-    ------
-    TypeError
-        If no file takes it.
-    """
+    """Return a value as JSON knows it; arrays are copied into `arrays` and numbered."""
     kind = np.generic if isinstance(value, np.generic) else type(value)
     if value is None or (isinstance(value, (bool, int, float, str)) and kind is not np.generic):
         return value
@@ -233,3 +216,68 @@ def value_of(kept: Any, arrays: list[np.ndarray]) -> Any:
         return kept
     ((kind, content),) = kept.items()
     return arrays[content].copy() if kind == "array" else MADE[kind](*value_of(content, arrays))
+
+
+class RollbackPoint:
+    """The last good state of a run, and the states of parts there and at later steps."""
+
+    def __init__(self, hub: Hub) -> None:
+        self.hub = hub
+        self.arrays: dict[str, np.ndarray] = {}
+        self.step = -1
+        self._parts: dict[int, PartStates] = {}
+
+    @property
+    def parts(self) -> PartStates:
+        return self._parts[self.step]
+
+    def keep(self, simulation: Any) -> None:
+        """Let the present state be the last good one; others are forgotten."""
+        self.arrays, self.step = simulation.snapshot(self.arrays), simulation.step
+        self.forget_later()
+
+    def move(self, simulation: Any) -> None:
+        """Let the present state be the last good one; what later ones were is known still."""
+        self.arrays, self.step = simulation.snapshot(self.arrays), simulation.step
+        self.note(always=True)
+
+    def forget_later(self) -> None:
+        """Forget what parts remembered at other states: nobody goes to them any more."""
+        self._parts = {self.step: PartStates.of(self.hub)}
+
+    def take(self, arrays: dict[str, np.ndarray], step: int, parts: PartStates) -> None:
+        self.arrays, self.step, self._parts = arrays, step, {step: parts}
+
+    def note(self, *, always: bool) -> None:
+        """Note what parts remember now, `always` or if something has been written of it."""
+        step = self.hub.update.step
+        outputs = (part for key, part in parts_of(self.hub) if key[0] in OUTPUTS)
+        if always or any(part.last_step == step for part in outputs):
+            self._parts[step] = PartStates.of(self.hub)
+
+    def return_to(self, simulation: Any, *, cut: bool = False) -> None:
+        """Go back there; with `cut` outputs go on from there in their files."""
+        simulation.restore(self.arrays)
+        self.parts.give(self.hub, cut=cut)
+
+    @contextmanager
+    def remembered(self) -> Iterator[None]:
+        """Within this, parts remember what they did there."""
+        now = PartStates.of(self.hub)
+        self.parts.give(self.hub)
+        try:
+            yield
+        finally:
+            now.give(self.hub)
+
+    def again(self, advance: Callable[[int], int], end: int) -> int:
+        """Take the steps up to `end` once more, parts remembering it; how that ended."""
+        update = self.hub.update
+        while update.step < end:
+            noted = min((step for step in self._parts if update.step < step < end), default=end)
+            status = advance(noted - update.step)
+            if status != DONE:
+                return status
+            if update.step in self._parts:
+                self._parts[update.step].give(self.hub)
+        return DONE

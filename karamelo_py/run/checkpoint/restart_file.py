@@ -18,9 +18,8 @@ from karamelo_py import __version__
 from karamelo_py.language.replay import Record, Replay
 from karamelo_py.output.files import whole
 from karamelo_py.output.rhythm import ByTime, Rhythmic
-from karamelo_py.run.checkpoint.arrays import Stored, reading
-from karamelo_py.run.checkpoint.parts import PartStates, for_json, parts_of
-from karamelo_py.run.checkpoint.rollback import RollbackPoint
+from karamelo_py.run.checkpoint.arrays import Stored, reading, stored, take_snapshot, take_stored
+from karamelo_py.run.checkpoint.parts import PartStates, parts_of
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
@@ -34,16 +33,7 @@ FLAT = {"track_times": False}
 
 
 class Restarts(Rhythmic):
-    """Writes a file to go on from, again and again while the scene runs.
-
-    Parameters
-    ----------
-    every
-        How often.
-    file
-        File name. The first ``*`` becomes the step number; without ``*`` each file takes the place
-        of the one before.
-    """
+    """Writes a file, again and again; a first ``*`` in its name becomes the step number."""
 
     place: Any = None
     style = ""
@@ -56,50 +46,42 @@ class Restarts(Rhythmic):
         self.last_step = hub.update.step
 
     def write(self) -> None:
-        """Write the present state."""
         self.last_step = self.hub.update.step  # goes into the file
         write(self.hub, self.file, within=True)
 
 
 def path_of(hub: Hub, file: Path) -> Path:
-    """Name the file of the present state."""
     return hub.folder / str(file).replace("*", str(hub.update.step), 1)
 
 
 def write(hub: Hub, file: Path, *, within: bool) -> Path:
-    """Write the present state of a scene; `within` a run or between two.
-
-    The file appears under its name when all of it is written.
-    """
+    """Write the present state of a scene, `within` a run or between two, and return the name."""
     path, comm, simulation = path_of(hub, file), hub.settings.comm, hub.simulation
+    run = hub.running and hub.running.rollback
+    # The last good state, where the run in progress may go back to it.
+    point = run.point if run and run.halve and run.point.arrays else None
+    groups = {"state": stored(simulation)}
+    if point:
+        groups["good"] = stored(simulation, point.arrays)
     if comm.leads:
-        _write(hub, path, within)
+        _write(hub, path, within, run, groups)
     else:
-        for _ in simulation.stored():
-            pass
-        if point := _good(hub):
-            for _ in simulation.stored_snapshot(point.arrays):
+        for found in groups.values():
+            for _ in found:
                 pass
     comm.barrier()
     return path
 
 
-def _good(hub: Hub) -> RollbackPoint | None:
-    """Find the last good state, where the run in progress may go back to it."""
-    run = hub.running and hub.running.rollback
-    return run.point if run and run.halve and run.point.arrays else None
-
-
-def _write(hub: Hub, path: Path, within: bool) -> None:
+def _write(hub: Hub, path: Path, within: bool, run: Any, groups: dict[str, Iterator]) -> None:
     import h5py
 
     for _, part in parts_of(hub):
         if hasattr(part, "filed"):
             part.filed()
     interpreter, states = hub.interpreter, {"parts": PartStates.of(hub)}
-    run, point = hub.running and hub.running.rollback, _good(hub)
-    if point:
-        states["good parts"] = point.parts
+    if "good" in groups:
+        states["good parts"] = run.point.parts
     content = {
         "within": within,
         "statements": interpreter.record.statements,
@@ -109,22 +91,21 @@ def _write(hub: Hub, path: Path, within: bool) -> None:
         "runs": hub.runs,
         "scene": described(hub),
         "values": {name: hub.values.get(name) for name in hub.values.names()},
-        "begun": hub.simulation.begun,
-        "run": run and [run.halvings, run.returns, point and point.step],
+        "begun": [ID for ID, fix in hub.fixes.items() if fix in hub.simulation.begun],
+        "run": run and [run.halvings, run.returns, run.point.step if "good" in groups else None],
         **{name: [[*key, of] for key, of in one.parts.items()] for name, one in states.items()},
     }
     with whole(path) as out, h5py.File(out, "w") as root:
         root.attrs["format"], root.attrs["version"] = FORMAT, VERSION
         root.attrs["program"] = __version__
         root.attrs["step"], root.attrs["time"] = hub.update.step, hub.update.time
-        text = np.frombuffer(json.dumps(content, default=for_json).encode(), np.uint8)
-        root.create_dataset("content", data=text, **FLAT)
+        text = json.dumps(content, default=lambda late: late.plain()).encode()
+        root.create_dataset("content", data=np.frombuffer(text, np.uint8), **FLAT)
         for name, one in states.items():
             for k, array in enumerate(one.arrays):
                 root.create_dataset(f"{name}/{k}", data=array, **FLAT)
-        _put(root.create_group("state"), hub.simulation.stored())
-        if point:
-            _put(root.create_group("good"), hub.simulation.stored_snapshot(point.arrays))
+        for name, found in groups.items():
+            _put(root.create_group(name), found)
 
 
 def _put(group: Any, found: Iterator[Stored]) -> None:
@@ -151,18 +132,7 @@ def is_restart(path: Path) -> bool:
 
 
 class Restart:
-    """The content of a file.
-
-    Parameters
-    ----------
-    path
-        Its name. With a ``*`` it is the one with the largest number in that place.
-
-    Raises
-    ------
-    ScriptError
-        If there is none, or it is no file to go on from.
-    """
+    """The content of a file; of those that a ``*`` stands for, of the largest number."""
 
     def __init__(self, path: Path):
         import h5py
@@ -192,19 +162,8 @@ class Restart:
             why = "" if "signature" in str(error) else f": {error}"
             raise ScriptError(f"{what}{why}", argument="file", expected=OURS) from None
 
-    @property
-    def runs(self) -> list[dict[str, float]]:
-        """Values at the end of each run that was over."""
-        return self.content["runs"]
-
     def presets(self, given: dict[str, str]) -> dict[str, str]:
-        """Return the variables of the command line that wrote the file; `given` ones are those.
-
-        Raises
-        ------
-        ScriptError
-            If one that is given is another.
-        """
+        """Return the variables of the command line that wrote the file; `given` ones are those."""
         before = self.content["presets"]
         for name, text in given.items():
             if before.get(name) != text:
@@ -224,29 +183,25 @@ class Restart:
         return Replay(record, self.content["within"], str(self.path))
 
     def take(self, hub: Hub, *, outputs: bool) -> None:
-        """Put the scene into the state of the file; with `outputs` they go on in their files.
-
-        Raises
-        ------
-        ScriptError
-            If the file was written by another scene.
-        """
+        """Put the scene into the state of the file; with `outputs` they go on in their files."""
         check(hub, self)
         simulation, content = hub.simulation, self.content
         try:
-            simulation.take_stored(self.path)
+            take_stored(simulation, self.path)
             states = self._parts("parts", content["values"])
         except ScriptError as error:
             error.message = f"{self.path}: {error.message}"
             raise
-        simulation.begun = content["begun"]
+        simulation.begun = {fix for ID, fix in hub.fixes.items() if ID in content["begun"]}
         states.give(hub, cut=outputs, anew=not outputs)
         if hub.running is None or content["run"] is None:
             return
         run = hub.running.rollback
         run.halvings, run.returns, good = content["run"]
         if run.halve and good is not None:
-            run.point.take(simulation.take_snapshot(self.path), good, self._parts("good parts", {}))
+            run.point.take(
+                take_snapshot(simulation, self.path), good, self._parts("good parts", {})
+            )
 
     def _parts(self, name: str, values: dict[str, float]) -> PartStates:
         import h5py
@@ -299,17 +254,11 @@ def described(hub: Hub) -> dict[str, str]:
         where = 0
         for _, x in solid.pieces():
             where = zlib.crc32(np.ascontiguousarray(x).tobytes(), where)
-        kind = "-".join(type(part).__name__ for part in _parts_of(solid.material.law))
+        law = solid.material.law
+        parts = [part for part in law if isinstance(part, tuple) and hasattr(part, "_fields")]
+        kind = "-".join(type(part).__name__ for part in (law, *parts))
         words[f"solid '{solid.id}'"] = f"{solid.count} points of {kind}, {where:08x}"
     return words
-
-
-def _parts_of(law: Any) -> Iterator[Any]:
-    yield law
-    if isinstance(law, tuple):
-        for part in law:
-            if isinstance(part, tuple) and hasattr(part, "_fields"):
-                yield part
 
 
 def check(hub: Hub, restart: Restart) -> None:

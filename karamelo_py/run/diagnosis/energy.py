@@ -20,7 +20,6 @@ WHOLE = "more points a cell, a finer grid, cpgimp or ulcpdi, or method tlmpm"
 
 
 def not_watched(why: str) -> str:
-    """Say that energy is not watched."""
     return f"is not watched: nobody adds up the work of {why}"
 
 
@@ -67,7 +66,10 @@ def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
             "leave set_dt and dt_factor out, or make them smaller",
         )
     courant, _ = timestep.own_step_of_waves(hub, still=False)
-    borne = courant * _time_across(simulation)
+    # Of waves in bodies that nothing has deformed: later they may be softer.
+    fastest = timestep.fastest_wave(simulation)
+    across = float(simulation.control.clock[0].spacing) / fastest if fastest > 0 else np.inf
+    borne = courant * across
     if update.fixed_dt is not None and simulation.dt > borne * (1 + 1e-9):
         alone = " of a point that has its nodes for itself" * (courant == timestep.lone_point(hub))
         return (
@@ -90,10 +92,7 @@ def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
             f"{_step_of(hub, simulation, keeping)}, scheme(usavg), or {smooth}",
         )
     if moves and simulation.largest(swelling)[0] > 1.5:  # what a cell cannot hold
-        return (
-            "points that are further apart than a cell (numerical fracture)",
-            WHOLE,
-        )
+        return "points that are further apart than a cell (numerical fracture)", WHOLE
     said = SceneFacts(hub, simulation, simulation.time).advice("gain")
     fed = max(said, key=lambda one: one.share, default=None)
     if fed is not None and fed.share > 0:
@@ -105,17 +104,7 @@ def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
     return "no cause that is known to do that", "another basis, transfer or scheme to compare with"
 
 
-def _time_across(simulation: Any) -> float:
-    """Time of waves across a cell in bodies that nothing has deformed: later they may be softer.
-
-    Infinite where all are rigid.
-    """
-    fastest = timestep.fastest_wave(simulation)
-    return float(simulation.control.clock[0].spacing) / fastest if fastest > 0 else np.inf
-
-
 def _step_of(hub: Hub, simulation: Any, share: float) -> str:
-    """The words that make the step this share of the stable one."""
     if hub.update.fixed_dt is not None:
         return f"set_dt({share * simulation.limit:.3g})"
     return f"dt_factor({share:g})"
@@ -137,13 +126,11 @@ def words_of_growth(hub: Hub, simulation: Any) -> tuple[str, str] | None:
     clock = simulation.control.clock[0]
     if not has_grown(simulation):
         return None
-    fast = clock.windows >= TOLD
     cause, cure = cause_of_gain(hub, simulation)
-    much = (
-        f"{100 * clock.growth:.2g} % of the largest so far in the last hundred steps"
-        if fast
-        else f"{100 * clock.grown:.2g} % of the largest so far since the start"
-    )
+    if clock.windows >= TOLD:
+        much = f"{100 * clock.growth:.2g} % of the largest so far in the last hundred steps"
+    else:
+        much = f"{100 * clock.grown:.2g} % of the largest so far since the start"
     message = (
         f"step {simulation.step}, time {simulation.time:.6g}: energy comes from nowhere, "
         f"{much} (kinetic + stored + dissipated - work). Known to do that here: {cause}"

@@ -1,46 +1,25 @@
-"""Troubles of a run: found, explained, and the last good state written."""
+"""Troubles of a run: found and explained, with the formula that gives no number."""
 
-import os
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
-from pathlib import Path
-from typing import NamedTuple, NoReturn
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from karamelo_py.compiler.tuples import record
-from karamelo_py.kernels.step import ABOVE_LIMIT, DONE, GAINED, HEATED, SHRUNK, STOPPED
-from karamelo_py.kernels.watch import GROWTH, LOOK, WITHIN, unit_of
+from karamelo_py.kernels.step import ABOVE_LIMIT, GAINED, HEATED, SHRUNK
 from karamelo_py.output.point_table import PointTable
 from karamelo_py.points.basis import carried, extent
-from karamelo_py.run.advice.large_steps import step_was_told
-from karamelo_py.run.checkpoint import restart_file
-from karamelo_py.run.checkpoint.parts import OUTPUTS, PartStates
-from karamelo_py.run.checkpoint.rollback import RollbackPoint
 from karamelo_py.run.diagnosis import energy
-from karamelo_py.run.diagnosis.nonfinite import culprit
 from karamelo_py.run.simulation import Simulation
-from karamelo_py.run.timestep import own_step_instead
+from karamelo_py.run.timestep import own_step_instead, step_by_script
+from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import named, solid_with
-from karamelo_py.script.errors import Place, ScriptError
+from karamelo_py.script.errors import Place
+from karamelo_py.script.expressions import POINT_SEEDS, Expression
 
-LAST_GOOD = "last_good.*.h5"
-GOES_ON = (
-    "karamelo-py SCRIPT -restart {} goes on from there, with a smaller step (set_dt, dt_factor): "
-    "as it is, it would end here again"
-)
-FAR = 100  # steps, more of which are not taken once more for the last rows of log and dumps
 LOOSE = 1.5  # cells: points of an unstrained solid are at most one apart
 APART = "no other point of it within a cell"
-
-
-class Stopped(ScriptError):
-    """A run has ended at a fault; all processes know, and its last good state is written."""
-
-
-class OthersWait(Exception):
-    """This process cannot write a file, and others go on to give it what belongs there."""
 
 
 class Trouble(NamedTuple):
@@ -49,13 +28,6 @@ class Trouble(NamedTuple):
     message: str
     hint: str
     place: Place | None = None
-
-
-class StepTooLarge(NamedTuple):
-    """A step above the stable limit of the start of a run: nothing behind that is a good state."""
-
-    smaller: str  # what to write instead, by that limit
-    at_hand: bool  # whether the last good state is that of the start
 
 
 def trouble(hub: Hub, simulation: Simulation, status: int) -> Trouble:
@@ -77,134 +49,16 @@ def trouble(hub: Hub, simulation: Simulation, status: int) -> Trouble:
     return Trouble(message, hint, place)
 
 
-def stop(
-    hub: Hub,
-    simulation: Simulation,
-    status: int,
-    good: RollbackPoint,
-    start: StepTooLarge | None,
-    place: Place | None,
-) -> NoReturn:
-    """Return to the last good state, write it, and raise what the user should know.
-
-    Where energy has grown before, that is the last state in which it had not; log and dumps end
-    with the last state that has no trouble of its own. Where the step was too large from the
-    `start` on it is the state of the start.
-    """
-    message, hint, at_fault = trouble(hub, simulation, status)
-    kind = ScriptError
-    with suppress(OthersWait):
-        if start is None:
-            hint += _keep_good(hub, simulation, status, good)
-        else:
-            hint += _keep_start(hub, simulation, status, good, start)
-        kind = Stopped
-    error = kind(message, place=at_fault or place, hint=hint)
-    error.complete = at_fault is not None
-    raise error
-
-
-def _keep_start(
-    hub: Hub, simulation: Simulation, status: int, good: RollbackPoint, start: StepTooLarge
-) -> str:
-    """Write the state that the run began with, end the outputs, and say how to begin anew."""
-    step, path = simulation.step, None
-    simulation.restore(good.arrays)
-    if start.at_hand:
-        with good.remembered():
-            path = _write_last_good(hub)
-    back = step - simulation.step - (status in (GAINED, HEATED))
-    if back <= FAR:
-        if back > 0:
-            simulation.advance(back)
-        _end_outputs(hub)
-    words = f". Begin anew with {start.smaller}"
-    if path is None:
-        return words
-    name = os.path.relpath(path)
-    return (
-        f"{words}. The state before the first step of this run is in {name}; karamelo-py SCRIPT "
-        f"-restart {name} goes on from there, with such a step"
-    )
-
-
-def _keep_good(hub: Hub, simulation: Simulation, status: int, good: RollbackPoint) -> str:
-    """Return to the last good state, write it, end the outputs, and say how to go on from it."""
-    step, present = simulation.step, PartStates.of(hub, OUTPUTS)
-    grown = not energy.grown_little(simulation)
-    if grown:
-        _return_before_growth(simulation, good, step)
-    else:
-        good.return_to(simulation)
-        if status not in (GAINED, HEATED, STOPPED):
-            # What nodes have depends on how many steps ran at once: here always on as many.
-            good.again(simulation.advance, step)
-    path = _write_last_good(hub) if grown else None
-    if status not in (GAINED, HEATED) and step > simulation.step:
-        before = simulation.energy()
-        good.again(simulation.advance, step)
-        if path is None and energy.growth_since(simulation, before) > WITHIN:
-            # The watch looks at means of a hundred steps, and has not seen it yet.
-            grown = True
-            _return_before_growth(simulation, good, step)
-            path = _write_last_good(hub)
-            good.again(simulation.advance, step)
-    path = path or _write_last_good(hub)
-    if simulation.step < step:
-        present.give(hub)  # their files stay as they are, with later rows
-    _end_outputs(hub)
-    if path is None:
-        return ""
-    name = os.path.relpath(path)
-    which = "The state from before energy grew" if grown else "The last good state"
-    return f". {which} is in {name}; {GOES_ON.format(name)}"
-
-
-def _return_before_growth(simulation: Simulation, good: RollbackPoint, end: int) -> None:
-    """Return to the last state before step `end` whose energy has not grown since the good one.
-
-    These steps are taken once more, from one look at the energy to the next.
-    """
-    good.return_to(simulation)
-    clock = simulation.control.clock[0]
-    before = float(clock.balance)
-    while clock.watch_energy and simulation.step + LOOK < end:
-        look = simulation.step + LOOK - (simulation.step - 1) % LOOK
-        healthy = good.again(simulation.advance, look) == DONE
-        if not (healthy and energy.grown_little(simulation)):
-            break
-        if clock.balance - before < GROWTH * unit_of(clock):
-            good.move(simulation)
-    good.return_to(simulation)
-
-
-def only_leave(hub: Hub, simulation: Simulation, snapshot: dict) -> bool:
-    """Tell whether a step went wrong since points leave the domain, at no more energy.
-
-    No smaller step keeps these. Where nobody watches energy, who knows.
-    """
-    moves = hub.update.method.frame.moves
-    if not (moves and len(simulation.leaving()) and energy.grown_little(simulation)):
-        return False
-    step = simulation.step
-    simulation.restore(snapshot)
-    before, steps = simulation.energy(), step - simulation.step
-    if steps:
-        simulation.advance(steps)
-    kept = energy.growth_since(simulation, before) <= WITHIN
-    healthy = kept and not simulation.above_limit()
-    simulation.advance(1)  # which goes wrong again, for others to look at
-    return healthy
+def _when(simulation: Simulation) -> str:
+    return f"step {simulation.step}, time {simulation.time:.6g}"
 
 
 def _above_limit(hub: Hub, simulation: Simulation) -> tuple[str, str]:
-    limit = simulation.limit
-    message = (
-        f"step {simulation.step}, time {simulation.time:.6g}: the step {simulation.dt:g} is above "
-        f"the stable limit, which has fallen to {limit:.4g}"
-    )
     speed, fastest = simulation.largest(_speeds)
-    message += f" ({named(hub, fastest)} moves at {speed:.4g})"
+    message = (
+        f"{_when(simulation)}: the step {simulation.dt:g} is above the stable limit, which has "
+        f"fallen to {simulation.limit:.4g} ({named(hub, fastest)} moves at {speed:.4g})"
+    )
     return message, own_step_instead(hub)
 
 
@@ -212,26 +66,20 @@ def _speeds(points: PointTable) -> np.ndarray:
     return np.abs(points.velocity).max(axis=1, initial=0.0)
 
 
-def _no_number(points: PointTable) -> np.ndarray:
-    return 1.0 * ~np.isfinite(points.particle("ienergy"))
-
-
 def _gained(hub: Hub, simulation: Simulation) -> tuple[str, str]:
-    clock = simulation.control.clock[0]
+    clock, when = simulation.control.clock[0], _when(simulation)
     if not np.isfinite(clock.balance):
-        _, first = simulation.largest(_no_number)
-        message = (
-            f"step {simulation.step}, time {simulation.time:.6g}: energy is no number any more; "
-            f"the first point whose state is none is {named(hub, first)}"
-        )
+        _, first = simulation.largest(lambda points: 1.0 * ~np.isfinite(points.particle("ienergy")))
+        message = f"{when}: energy is no number any more; "
+        message += f"the first point whose state is none is {named(hub, first)}"
         return message, "look at the parameters of its material, and at what acts on it from Python"
     given = abs(clock.first_balance) + clock.supplied
     cause, cure = energy.cause_of_gain(hub, simulation)
     times = (clock.balance - clock.first_balance) / given if given > 0 else np.inf
     message = (
-        f"step {simulation.step}, time {simulation.time:.6g}: {times:.3g} times the energy that "
-        "there was at the start and that loads have brought has come from nowhere "
-        f"(kinetic + stored + dissipated - work). Known to do that here: {cause}"
+        f"{when}: {times:.3g} times the energy that there was at the start and that loads have "
+        "brought has come from nowhere (kinetic + stored + dissipated - work). Known to do that "
+        f"here: {cause}"
     )
     return message, cure
 
@@ -239,7 +87,7 @@ def _gained(hub: Hub, simulation: Simulation) -> tuple[str, str]:
 def _heated(hub: Hub, simulation: Simulation) -> tuple[str, str]:
     clock = simulation.control.clock[0]
     share = clock.last_dt / clock.heat_limit
-    message = f"step {simulation.step}, time {simulation.time:.6g}: "
+    message = f"{_when(simulation)}: "
     if share > 1:
         message += f"the step is {share:.3g} times the stable one of conduction, and "
     message += (
@@ -253,80 +101,50 @@ def _heated(hub: Hub, simulation: Simulation) -> tuple[str, str]:
 def _shrunk(hub: Hub, simulation: Simulation) -> tuple[str, str]:
     (speed, fastest), (volume, widest) = map(simulation.largest, (_speeds, energy.swelling))
     message = (
-        f"step {simulation.step}, time {simulation.time:.6g}: the stable step has fallen to "
-        f"{simulation.limit:.3g}, less than a millionth of the first "
-        f"({named(hub, fastest)} moves at {speed:.3g}, "
-        f"{named(hub, widest)} has {volume:.3g} times its volume)"
+        f"{_when(simulation)}: the stable step has fallen to {simulation.limit:.3g}, less than a "
+        f"millionth of the first ({named(hub, fastest)} moves at {speed:.3g}, {named(hub, widest)} "
+        f"has {volume:.3g} times its volume)"
     )
     smaller = _smaller_step(hub, simulation)
     return message, f"something went wrong before: look at the dumps; {smaller}"
 
 
-def no_number(hub: Hub, simulation: Simulation, message: str, hint: str) -> Trouble:
-    """The trouble with what is NaN, and the formula that it comes from, where that is found."""
-    found = culprit(hub, simulation)
-    if found is None:
-        return Trouble(message, hint)
-    what = "NaN" if np.isnan(found.value) else f"{found.value:g}"
-    where = "" if found.x is None else f" at {_place(found.x[: hub.domain.dimension])}"
-    return Trouble(
-        f"{message}: fix {found.fix.id} gets {what}{where} from {found.formula.text}",
-        "a formula that is a number at all times and places of the run, such as by max(a, b) or "
-        "if(condition, a, b)",
-        found.fix.place,
-    )
-
-
-class Wrong(NamedTuple):
-    """A point that went wrong in a step."""
-
-    number: int
-    old: np.ndarray  # its position before the step and after it, with corners that it carries
-    new: np.ndarray
-    v: np.ndarray
-    grid: int
-
-
-def _first_wrong(simulation: Simulation) -> Wrong | None:
-    """The first of the points at hand that went wrong."""
-    wrong = [(int(block.points.id[p]), block.points, p) for block, p in simulation.wrong_points()]
+def _first_wrong(simulation: Simulation) -> tuple | None:
+    """The first point that went wrong: number, positions before and after, velocity, grid."""
+    wrong = []
+    for block in simulation.setup.blocks:
+        tiling = block.tiling
+        # The last sweep has found one a tile at most.
+        at = tiling.report[: max(int(tiling.count[0]), 1), 2]
+        wrong += [(int(block.points.id[p]), block.points, p) for p in (at[at > 0] - 1).astype(int)]
     if not wrong:
         return None
     number, points, p = min(wrong, key=lambda item: item[0])
     old, new = (points.x[k][:, p].astype(float) for k in (simulation.now, 1 - simulation.now))
-    return Wrong(number, old, new, points.v[:, p], int(points.grid[p]))
+    return number, old, new, points.v[:, p], int(points.grid[p])
 
 
 def _wrong_point(hub: Hub, simulation: Simulation) -> tuple:
     """Find what is wrong with the first point that went wrong, and what can be done."""
     wrong = [one for one in simulation.seen(_first_wrong) if one is not None]
     if not wrong and hub.update.thermal:
-        return no_number(
-            hub,
-            simulation,
-            "the temperature of a point is not a number",
-            "look at the fixes that act on heat: a formula that gives NaN, or heat without bounds",
+        hint = (
+            "look at the fixes that act on heat: a formula that gives NaN, or heat without bounds"
         )
+        return no_number(hub, simulation, "the temperature of a point is not a number", hint)
     if not wrong:
         return "a point went wrong", "use a smaller step"
-    number, old, place, v, grid = min(wrong, key=lambda one: one.number)
+    number, old, place, v, grid = min(wrong, key=lambda one: one[0])
     d, h, name = hub.domain.dimension, hub.lattices[grid].h, named(hub, number)
     old, new = old[:d], place[:d]
     smaller = _smaller_step(hub, simulation)
     if not np.isfinite(old).all():
-        return no_number(
-            hub,
-            simulation,
-            f"{name} has no position (NaN)",
-            f"look for a formula that gives NaN; {smaller}",
-        )
+        hint = f"look for a formula that gives NaN; {smaller}"
+        return no_number(hub, simulation, f"{name} has no position (NaN)", hint)
     if not np.isfinite(new).all() or not np.isfinite(v).all():
-        return no_number(
-            hub,
-            simulation,
-            f"{name} at {_place(old)} gets a velocity that is not a number",
-            f"look for a formula that gives NaN, such as a division by zero; else {smaller}",
-        )
+        what = f"{name} at {_place(old)} gets a velocity that is not a number"
+        hint = f"look for a formula that gives NaN, such as a division by zero; else {smaller}"
+        return no_number(hub, simulation, what, hint)
     lo, hi = hub.domain.lo[:d], hub.domain.hi[:d]
     if hub.update.method.frame.moves and ((new < lo).any() or (new > hi).any()):
         side = next(k for k in range(d) if new[k] < lo[k] or new[k] > hi[k])
@@ -343,10 +161,8 @@ def _wrong_point(hub: Hub, simulation: Simulation) -> tuple:
         )
     move = float(np.abs(new - old).max()) / h
     if move > 1:
-        return (
-            f"{name} at {_place(old)} moves by {move:.3g} cells in one step",
-            f"the run is unstable: {smaller}",
-        )
+        what = f"{name} at {_place(old)} moves by {move:.3g} cells in one step"
+        return what, f"the run is unstable: {smaller}"
     if any(simulation.seen(_is_tangled, place, grid)):
         tangled, plain = type(hub.update.method.basis).__name__, "R4" if d == 2 else "R8"
         instead = f", {plain} in the place of {tangled}" if tangled in ("Q4", "H8") else ""
@@ -363,18 +179,18 @@ def _wrong_point(hub: Hub, simulation: Simulation) -> tuple:
 
 def _loose(simulation: Simulation, number: int, x: np.ndarray, reach: float) -> bool:
     """Tell whether a point has a solid of others, none of which is near."""
-    others, near = np.sum(simulation.seen(_others, number, x, reach), axis=0)
-    return others > 0 and near == 0
+    solid = solid_with(simulation.hub, number)
 
+    def others(simulation: Simulation) -> tuple[int, int]:
+        found, near = 0, 0
+        for some in simulation.some(None):
+            own = (some.solid == solid.index) & (some.ids != number)
+            apart = np.abs(some.position[own] - x).max(axis=1, initial=0.0)
+            found, near = found + len(apart), near + int(np.sum(~(apart > reach)))
+        return found, near
 
-def _others(simulation: Simulation, number: int, x: np.ndarray, reach: float) -> tuple[int, int]:
-    """Count the other points of the solid of a point, at hand and near it."""
-    solid, others, near = solid_with(simulation.hub, number), 0, 0
-    for some in simulation.some(None):
-        own = (some.solid == solid.index) & (some.ids != number)
-        apart = np.abs(some.position[own] - x).max(axis=1, initial=0.0)
-        others, near = others + len(apart), near + int(np.sum(~(apart > reach)))
-    return others, near
+    found, near = np.sum(simulation.seen(others), axis=0)
+    return found > 0 and near == 0
 
 
 def _is_tangled(simulation: Simulation, place: np.ndarray, grid: int) -> bool:
@@ -385,15 +201,17 @@ def _is_tangled(simulation: Simulation, place: np.ndarray, grid: int) -> bool:
     return not np.isfinite(extent(s.basis, s.kin, record(s.grids, grid), tuple(place.tolist())))
 
 
-def _smaller_step(hub: Hub, simulation: Simulation) -> str:
-    """Say how to take a smaller step, and that the present one is too large where it is.
+def _step_was_told(hub: Hub) -> bool:
+    update = hub.update
+    return step_by_script(update.fixed_dt, update.dt_factor) in update.warned_of
 
-    One that was so from the start on has ruined the state, and its limit with it.
-    """
+
+def _smaller_step(hub: Hub, simulation: Simulation) -> str:
+    """Say how to take a smaller step, and that the present one is too large where it is."""
     if not simulation.control.clock[0].watch_limit:
-        return "the step is too large" + ", as the warning says" * step_was_told(hub)
+        return "the step is too large" + ", as the warning says" * _step_was_told(hub)
     if simulation.above_limit():
-        if step_was_told(hub):
+        if _step_was_told(hub):
             return f"the step is too large, as the warning says; {own_step_instead(hub)}"
         return (
             f"the step {simulation.dt:.4g} is above the stable limit {simulation.limit:.4g}: "
@@ -403,36 +221,73 @@ def _smaller_step(hub: Hub, simulation: Simulation) -> str:
     return "use a smaller step (set_dt)" if fixed else "use a smaller dt_factor"
 
 
+def _first_bad(simulation: Simulation) -> tuple | None:
+    """The first such fix by numbers, at hand: (fix, formula, place), value, position."""
+    hub, values = simulation.hub, simulation.hub.values
+    for which, fix in enumerate(hub.fixes.values()):
+        over = simulation.step > 0 and fix in simulation.begun
+        if over or not fix.hooks():
+            continue
+        for k, formula in enumerate(_formulas(tuple(vars(fix).values()))):
+            # What reads a NaN shows the damage, and not where it comes from.
+            read = formula.names.difference(POINT_SEEDS)
+            readable = all(n in values and np.isfinite(values.get(n)) for n in read)
+            if formula.is_constant or not readable:
+                continue
+            bad = []
+            for numbers, x, x0 in _places(simulation, fix.group, formula):
+                given = formula.evaluate_points(values, x, x0)
+                rows = np.flatnonzero(~np.isfinite(given))
+                if len(rows):
+                    p = rows[np.argmin(numbers[rows])]
+                    key = which, k, int(numbers[p])
+                    bad.append((key, float(given[p]), x[p] if x.size else None))
+            if bad:
+                return min(bad, key=lambda one: one[0])
+    return None
+
+
+def _formulas(value: Any) -> Iterator[Expression]:
+    """The formulas among the attributes of a fix, and in tuples and lists of these."""
+    if isinstance(value, Expression):
+        yield value
+    elif isinstance(value, (tuple, list)):
+        for one in value:
+            yield from _formulas(one)
+
+
+def _places(simulation: Simulation, group: Any, formula: Expression) -> Iterator[tuple]:
+    """Numbers of places at hand at which a fix evaluates a formula; now (n, d), and at first."""
+    if not formula.names.intersection(POINT_SEEDS):
+        yield np.zeros(1, np.int64), np.empty((1, 0)), None
+    elif isinstance(group, NodeGroup):
+        nodes = simulation.nodes_with_mass()
+        nodes = nodes if group.all else np.intersect1d(nodes, group.nodes, assume_unique=True)
+        x = simulation.places_of(nodes)
+        yield nodes, x, x
+    else:
+        for some in simulation.some(group):
+            there = np.isfinite(some.position).all(axis=1)
+            yield some.ids[there], some.position[there], some.reference_position[there]
+
+
+def no_number(hub: Hub, simulation: Simulation, message: str, hint: str) -> Trouble:
+    """The trouble with what is NaN, and the first fix whose formula gives NaN or infinity."""
+    found = [one for one in simulation.seen(_first_bad) if one is not None]
+    if not found:
+        return Trouble(message, hint)
+    (which, k, _), value, x = min(found, key=lambda one: one[0])
+    fix = list(hub.fixes.values())[which]
+    formula = list(_formulas(tuple(vars(fix).values())))[k]
+    what = "NaN" if np.isnan(value) else f"{value:g}"
+    where = "" if x is None else f" at {_place(x[: hub.domain.dimension])}"
+    return Trouble(
+        f"{message}: fix {fix.id} gets {what}{where} from {formula.text}",
+        "a formula that is a number at all times and places of the run, such as by max(a, b) or "
+        "if(condition, a, b)",
+        fix.place,
+    )
+
+
 def _place(x: np.ndarray) -> str:
     return "(" + ", ".join(f"{value:.6g}" for value in x) + ")"
-
-
-def _write_last_good(hub: Hub) -> Path | None:
-    """Write the present state to a file to go on from; a file of somebody else is left alone."""
-    written: list[Path] = []
-    path = restart_file.path_of(hub, Path(LAST_GOOD))
-    may_be = hub.settings.comm.bcast(not path.exists() or restart_file.is_restart(path))
-    if hub.output.takes_part and may_be:
-        with _as_warnings(hub):
-            written.append(restart_file.write(hub, Path(LAST_GOOD), within=True))
-            # The files of restart(...) would hold the same once more.
-            for item in hub.output.last:
-                item.last_step = hub.update.step
-    return written[0] if written else None
-
-
-def _end_outputs(hub: Hub) -> None:
-    with _as_warnings(hub):
-        hub.output.write(last=True)
-
-
-@contextmanager
-def _as_warnings(hub: Hub) -> Iterator[None]:
-    """Warn of what prevents writing: another error is on its way."""
-    try:
-        yield
-    except ScriptError as error:
-        hub.warn(error.message, hint=error.hint, place=error.place)
-        if hub.settings.comm.size > 1:
-            hub.settings.comm.failed_within = True
-            raise OthersWait from None

@@ -13,17 +13,7 @@ import numpy as np
 
 from karamelo_py.compiler import fields
 from karamelo_py.compiler.tuples import flat
-from karamelo_py.kernels.arrays import (
-    SUMS_WIDTH,
-    UPDATE_WIDTH,
-    VELOCITY_WIDTH,
-    Block,
-    Nodes,
-    Points,
-    Setup,
-    new_control,
-    some_of,
-)
+from karamelo_py.kernels import arrays
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.laws import elastic_law, law_in, law_on, law_table
 from karamelo_py.kernels.loss import EnergyLoss, FrictionalHeat
@@ -47,12 +37,12 @@ from karamelo_py.points.laws import (
 from karamelo_py.points.laws.eos import taken_heat
 from karamelo_py.points.laws.further import with_rate, without_rate
 from karamelo_py.points.laws.temperatures import initial_heat
-from karamelo_py.points.transfers import Moment, lost_shares
+from karamelo_py.points.transfers import lost_shares
+from karamelo_py.run.boxes import no_nodes
 from karamelo_py.run.implicit import check as implicit
 from karamelo_py.run.mpi.partition import SharedTiles
-from karamelo_py.run.tiles.buffers import no_nodes
-from karamelo_py.run.tiles.tiles import Tiles
-from karamelo_py.run.timestep import sparse
+from karamelo_py.run.tiles import Tiles
+from karamelo_py.run.timestep import keeps_moments, sparse
 from karamelo_py.scene import boundary
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.hub import Hub
@@ -82,36 +72,36 @@ class State(NamedTuple):
 
 def check_scene(hub: Hub) -> None:
     """A scene without domain, method or solids cannot run: say what is missing."""
-    if hub.domain is None:
-        raise ScriptError(
-            "no domain is defined", hint="put dimension(2, xmin, xmax, ymin, ymax, h) before run"
-        )
-    if hub.update.method is None:
-        raise ScriptError(
-            "no method is defined", hint="put method(ulmpm, FLIP, linear, 0.99) before run"
-        )
-    if not hub.solids:
-        raise ScriptError(
+    missing = (
+        (hub.domain, "no domain is defined", "dimension(2, xmin, xmax, ymin, ymax, h)"),
+        (hub.update.method, "no method is defined", "method(ulmpm, FLIP, linear, 0.99)"),
+        (
+            hub.solids or None,
             "there is no solid to move",
-            hint="put solid(ID, region, regionID, points per cell, material, h, T0) before run",
-        )
+            "solid(ID, region, regionID, points per cell, material, h, T0)",
+        ),
+    )
+    for part, message, command in missing:
+        if part is None:
+            raise ScriptError(message, hint=f"put {command} before run")
     method = hub.update.method
     try:
         method.check(hub)
-        check_heat(hub)
+        warm = any(can(solid.material.law, initial_heat) for solid in hub.solids.values())
+        if hub.update.thermal and not warm:
+            raise ScriptError(
+                "the method is thermo-mechanical, and no solid has a temperature",
+                hint="give a material one: material(ID, linear, rho, E, nu, cp, kappa), or "
+                "temperature(...) with eos-strength",
+            )
     except ScriptError as error:
         if error.place is None:
             error.place, error.command = method.place, "method"
         raise
     boundary.check(hub)
-    check_rigid(hub)
     if getattr(hub.update.scheme, "implicit", False):
         implicit.check(hub)
-
-
-def check_rigid(hub: Hub) -> None:
-    """Refuse rigid bodies whose points would have domains that deform."""
-    method = hub.update.method
+    # Points of rigid bodies would have domains that deform.
     basis = type(method.basis)
     if not method.frame.moves or not (deformed.defined(basis) or carried.defined(basis)):
         return
@@ -160,25 +150,13 @@ def stable_conduction(hub: Hub) -> float:
     return min(limits)
 
 
-def check_heat(hub: Hub) -> None:
-    """Heat needs a body that it can flow in."""
-    if hub.update.thermal and not any(
-        can(solid.material.law, initial_heat) for solid in hub.solids.values()
-    ):
-        raise ScriptError(
-            "the method is thermo-mechanical, and no solid has a temperature",
-            hint="give a material one: material(ID, linear, rho, E, nu, cp, kappa), or "
-            "temperature(...) with eos-strength",
-        )
-
-
 def lower(
     hub: Hub,
     previous: State | None = None,
     *,
     ids: tuple[int, int] | None = None,
     comm: SerialComm | None = None,
-) -> tuple[Setup, Tiles]:
+) -> tuple[arrays.Setup, Tiles]:
     """Make the arrays of a run from the scene, taking over the state of points that exist.
 
     With `ids`, from and to before, only with those points; tiles are those of a process of `comm`.
@@ -201,7 +179,7 @@ def lower(
     if previous is not None:
         method.resume(contact, previous.contact)
     firsts = [solid.first_id for solid in hub.solids.values()]
-    control = new_control(hub.values.array, firsts, kin.dimension)
+    control = arrays.new_control(hub.values.array, firsts, kin.dimension)
     clock = control.clock[0]
     clock.last_dt, clock.path = (previous.last_dt, previous.path) if previous else (0.0, 0.0)
     clock.spacing = min(lattice.h for lattice in lattices)
@@ -230,7 +208,17 @@ def lower(
     at_nodes = lower_nodes(kinds, kin, count, real)
     if previous is not None:
         resume_nodes(at_nodes, grids, previous)
-    setup = Setup(
+    # One block for each kind of law, in the order in which the solids use them.
+    alike: dict[tuple, list] = {}
+    for solid in hub.solids.values():
+        part = solid if ids is None else part_of(solid, *ids)
+        alike.setdefault(law_kind(solid.material.law), []).append(part)
+    of_points = fields.declared(owners, "point_fields")
+    blocks = (
+        arrays.Block(*lower_points(hub, solids, kin, of_points, real), tiles.empty_tiling())
+        for solids in alike.values()
+    )
+    setup = arrays.Setup(
         frame=method.frame,
         kin=kin,
         basis=basis,
@@ -241,15 +229,7 @@ def lower(
         grids=grids,
         nodes=at_nodes,
         buffers=tiles.empty_buffers(at_nodes, len(hub.solids)),
-        blocks=lower_blocks(
-            hub,
-            [solid if ids is None else part_of(solid, *ids) for solid in hub.solids.values()],
-            kin,
-            fields.declared(owners, "point_fields"),
-            tiles,
-            real,
-            previous,
-        ),
+        blocks=tuple(blocks if previous is None else (resumed(one, previous) for one in blocks)),
         **no_nodes(),
         control=control,
     )
@@ -263,9 +243,7 @@ def returns_loss(hub: Hub) -> bool:
     XPIC has its own way (`kernels.loss.reflect`).
     """
     transfer = hub.update.transfer
-    keeps_all = getattr(transfer, "alpha", 0) == 1 and Moment not in getattr(
-        transfer, "point_fields", ()
-    )
+    keeps_all = getattr(transfer, "alpha", 0) == 1 and not keeps_moments(hub)
     if not lost_shares.defined(type(transfer)) or keeps_all:
         return False
     return any(can(solid.material.law, taken_heat) for solid in hub.solids.values())
@@ -280,18 +258,18 @@ def warms_by_friction(hub: Hub) -> bool:
     return rubs and any(heat_capacity(s.material.law, 1.0) > 0 for s in hub.solids.values())
 
 
-def lower_nodes(kinds: Iterable[type], kin: NamedTuple, count: int, real: type) -> Nodes:
+def lower_nodes(kinds: Iterable[type], kin: NamedTuple, count: int, real: type) -> arrays.Nodes:
     """Fields of `count` nodes, zero."""
     d = kin.dimension
-    return Nodes(
-        sums=fields.records(count, SUMS_WIDTH[d], real),
-        update=fields.records(count, UPDATE_WIDTH[d], real),
-        velocity=fields.records(count, VELOCITY_WIDTH[d], real),
+    return arrays.Nodes(
+        sums=fields.records(count, arrays.SUMS_WIDTH[d], real),
+        update=fields.records(count, arrays.UPDATE_WIDTH[d], real),
+        velocity=fields.records(count, arrays.VELOCITY_WIDTH[d], real),
         fields=tuple(fields.at_nodes(kind, kin, count, real) for kind in kinds),
     )
 
 
-def resume_nodes(nodes: Nodes, grids: NamedTuple, previous: State) -> None:
+def resume_nodes(nodes: arrays.Nodes, grids: NamedTuple, previous: State) -> None:
     """Take over kept fields of the nodes where they were there before, with the same numbers."""
     same = zip(grids, previous.grids, strict=True)
     if all(np.array_equal(now[: len(before)], before) for now, before in same):
@@ -312,48 +290,14 @@ def part_of(solid: Solid, first: int, end: int) -> Solid:
     return other
 
 
-def lower_blocks(
-    hub, solids: Iterable[Solid], kin, kinds: tuple, tiles: Tiles, real: type,
-    previous: State | None,
-) -> tuple:  # fmt: skip
-    """One block for each kind of law, in the order in which the solids use them."""
-    alike: dict[tuple, list] = {}
-    for solid in solids:
-        alike.setdefault(law_kind(solid.material.law), []).append(solid)
-    return tuple(
-        lower_block(hub, members, kin, kinds, tiles, real, previous) for members in alike.values()
-    )
-
-
-def start(law, T0: float | None, kin, real: type) -> np.ndarray:
-    """The state (s,) of a point at rest."""
-    state = initial_state(law, kin, real(1))
-    state = state if T0 is None else with_temperature(law, kin, state, real(T0))
-    return np.array(flat(state), real)
-
-
 def point_kinds(hub: Hub) -> tuple[type, ...]:
     """The declared fields of the points, as far as no array of nodes has to be made for that."""
     return fields.declared(owners_of_fields(hub), "point_fields")
 
 
-def lower_block(
-    hub: Scene,
-    solids: list,
-    kin: NamedTuple,
-    kinds: tuple[type, ...],
-    tiles: Tiles,
-    real: type,
-    previous: State | None,
-) -> Block:
-    """The points of all solids whose law is of one kind."""
-    block = Block(*lower_points(hub, solids, kin, kinds, real), tiles.empty_tiling())
-    return block if previous is None else resumed(block, previous)
-
-
 def lower_points(
     hub: Scene, solids: list, kin: NamedTuple, kinds: tuple[type, ...], real: type
-) -> tuple[Points, NamedTuple]:
+) -> tuple[arrays.Points, NamedTuple]:
     """The points of solids whose laws are of one kind, and these laws."""
     method = hub.update.method
     known = [law_on(s.material.law, s.h, s.T0) for s in solids]
@@ -376,19 +320,25 @@ def lower_points(
             array[..., end - s.count : end] = value
         return array
 
-    states = (start(law_in(k, real), s.T0, kin, real) for s, k in zip(solids, known, strict=True))
+    def at_rest(solid: Solid, law: NamedTuple) -> np.ndarray:
+        state = initial_state(law, kin, real(1))
+        if solid.T0 is not None:
+            state = with_temperature(law, kin, state, real(solid.T0))
+        return np.array(flat(state), real)[:, None]
+
+    states = (at_rest(s, law_in(k, real)) for s, k in zip(solids, known, strict=True))
     places = joined((method.places(kin, s, real).T for s in solids), real)
     here = places if method.frame.moves else places[: kin.dimension]
     x = fields.rows_of_points((2, *here.shape), real)
     x[:] = here
     elastic = elastic_law(laws)
     own = [kind for kind in kinds if getattr(kind, "needed", lambda law: True)(elastic)]
-    points = Points(
+    points = arrays.Points(
         x=x,
         home=None if method.frame.moves else places,
         v=joined((np.zeros((kin.dimension, 1)) for _ in solids), real),
         mass=joined((s.mass for s in solids), real),
-        state=joined((state[:, None] for state in states), real),
+        state=joined(states, real),
         material=joined((laws_of_solids.index(law) for law in known), np.int32),
         grid=joined((method.lattice_of(hub, s) for s in solids), np.int32),
         id=joined((np.arange(s.first_id, s.first_id + s.count) for s in solids), np.int64),
@@ -397,7 +347,7 @@ def lower_points(
     return points, laws
 
 
-def resumed(block: Block, previous: State) -> Block:
+def resumed(block: arrays.Block, previous: State) -> arrays.Block:
     """The block with what its points had before, as far as they were there."""
     points = block.points
     old = points.id < previous.count
@@ -415,4 +365,4 @@ def resumed(block: Block, previous: State) -> Block:
         take(one.array, previous.fields.get(type(one)))
     present = np.ones(len(points.id), np.bool_)
     present[old] = previous.present[ids]
-    return block if present.all() else some_of(block, np.flatnonzero(present))
+    return block if present.all() else arrays.some_of(block, np.flatnonzero(present))

@@ -3,7 +3,7 @@
 What is missing, or of the wrong length, so ends in a message about the part, not about a loop.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -26,24 +26,22 @@ NUMBERS = (laws.jacobian, laws.wave_speed_squared, laws.energy_density)
 
 
 def try_parts(hub: Hub, setup: Any) -> None:
-    """Try the laws, the basis and the transfer of a scene that plug-ins brought.
-
-    Raises
-    ------
-    ScriptError
-        Naming the part, its package and its place in the script.
-    """
+    """Try the laws, the basis and the transfer of a scene that plug-ins brought."""
     for solid in hub.solids.values():
         if any(is_foreign(kind) for kind in laws.law_kind(solid.material.law)):
             _try_law(hub, setup, solid)
-    basis, transfer = setup.basis, setup.transfer
-    if is_foreign(type(basis)):
+    if is_foreign(type(setup.basis)):
         _try_basis(hub, setup)
-    if is_foreign(type(transfer)):
-        part = next(part for part in foreign_parts(hub) if part.kind is type(transfer))
+    if is_foreign(type(setup.transfer)):
+        part = _part_of(hub, [type(setup.transfer)])
         v = vector(setup.kin, (_one(setup),) * setup.kin.dimension)
         with _trial(hub, part):
-            _expect(part, updated_velocity, updated_velocity(transfer, v, v, v), len(v))
+            _expect(part, updated_velocity, updated_velocity(setup.transfer, v, v, v), len(v))
+
+
+def _part_of(hub: Hub, kinds: Iterable[type]) -> PartInUse | None:
+    """Find the part of a plug-in that is of one of these classes."""
+    return next((part for part in foreign_parts(hub) if part.kind in kinds), None)
 
 
 def _one(setup: Any) -> Any:
@@ -73,7 +71,7 @@ def _expect(part: PartInUse, function: Any, given: Any, count: int) -> None:
 def _try_law(hub: Hub, setup: Any, solid: Any) -> None:
     material, kinds = solid.material, laws.law_kind(solid.material.law)
     usual = PartInUse(f"material {material.style}", kinds[0], material.place)
-    part = next((part for part in foreign_parts(hub) if part.kind in kinds), usual)
+    part = _part_of(hub, kinds) or usual
     kin, one = setup.kin, _one(setup)
     law = law_in(law_on(solid.material.law, solid.h, solid.T0), type(one))
     size = len(kin.Symmetric.places)
@@ -83,11 +81,8 @@ def _try_law(hub: Hub, setup: Any, solid: Any) -> None:
             state = laws.initial_state(law, kin, one)
             after = laws.advance(law, kin, state, tensor(kin, dl), one)
             if len(flat(after)) != len(flat(state)):
-                what = (
-                    f"what a point remembers is {len(flat(state))} numbers at first and "
-                    f"{len(flat(after))} "
-                    "after a step: their number must not change"
-                )
+                what = f"what a point remembers is {len(flat(state))} numbers at first and "
+                what += f"{len(flat(after))} after a step: their number must not change"
                 raise fault(part.name, what, part.place)
             for function in TENSORS:
                 found = function(law, kin, after)
@@ -104,7 +99,7 @@ def _try_basis(hub: Hub, setup: Any) -> None:
     basis, kin, points = setup.basis, setup.kin, setup.blocks[0].points
     if not len(points.id):
         return
-    part = next(part for part in foreign_parts(hub) if part.kind is type(basis))
+    part = _part_of(hub, [type(basis)])
     grid = record(setup.grids, points.grid[0])
     with _trial(hub, part):
         where = points.x[0] if points.home is None else points.home

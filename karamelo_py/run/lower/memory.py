@@ -1,40 +1,116 @@
-"""Scenes that no memory of the machine holds are refused before their arrays are made.
+"""Memory that a scene, or the share of a process, takes; scenes that no memory holds are refused.
 
 What is compared is the least that a run has to hold: of what would run nothing is refused.
 """
 
 import gc
 from math import ceil
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.kernels.arrays import SUMS_WIDTH, UPDATE_WIDTH, VELOCITY_WIDTH, Block
+from karamelo_py.kernels import arrays
+from karamelo_py.run.boxes import used
+from karamelo_py.run.checkpoint.arrays import of_nodes
 from karamelo_py.run.lower.build import PRECISIONS, check_scene, lower_points, part_of, point_kinds
-from karamelo_py.run.lower.sizes import point_fields
+from karamelo_py.run.mpi.partition import occupied
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.machine_memory import machine_memory
 from karamelo_py.scene.solid import Solid, own_grids
 from karamelo_py.script.errors import ScriptError, plural
+
+LARGE, PAGE = 1 << 22, 1 << 21  # bytes from which on NumPy asks for large pages, and of these
+THERE = 1  # bytes of each point of the whole scene, for those that were deleted
+
+
+class MemoryTaken(NamedTuple):
+    """Bytes that a scene takes in steps."""
+
+    touched: int
+    copied: int  # of the last good state, with places of the present alone
+    known: int  # to each process, of the whole scene
+
+
+def memory_of(simulation: Any, s: arrays.Setup, boxes: int) -> MemoryTaken:
+    """Count what points in the tiles of `s`, nodes in use, and boxes of so many bytes take."""
+    counts = [int(occupied(block.tiling)[1].sum()) for block in s.blocks]
+    of_point = [{name: size for name, _, size in point_fields(block)} for block in s.blocks]
+    points = sum(sum(of.values()) * n for of, n in zip(of_point, counts, strict=True))
+    moved = sum(of["x moved"] * n for of, n in zip(of_point, counts, strict=True))
+    nodes = sum(bytes_in(used(s.spans)[1:], array) for _, array in node_fields(simulation.setup))
+    hooks = sum(getattr(simulation.hooks, name, np.empty(0)).nbytes for name in ("x0", "members"))
+    whole = known(simulation.hub) + hooks
+    return MemoryTaken(points + nodes + boxes, points - moved, whole)
+
+
+def known(hub: Hub) -> int:
+    """Count the bytes of what each process knows of the whole scene, such as solids and groups."""
+    seen = {id(hub)}
+    parts = (part for all in (hub.solids, hub.regions, hub.groups) for part in all.values())
+    there = THERE * sum(solid.count for solid in hub.solids.values())
+    return there + sum(_held(part, seen) for part in parts)
+
+
+def _held(thing: Any, seen: set[int]) -> int:
+    """Count the bytes of the arrays that a thing and its parts hold, each once."""
+    if isinstance(thing, np.ndarray) and isinstance(thing.base, np.ndarray):
+        thing = thing.base
+    if id(thing) in seen:
+        return 0
+    seen.add(id(thing))
+    if isinstance(thing, np.ndarray):
+        return thing.nbytes
+    ours = type(thing).__module__.startswith("karamelo_py.") and hasattr(thing, "__dict__")
+    parts = thing if isinstance(thing, (list, tuple)) else vars(thing).values() if ours else ()
+    return sum(_held(part, seen) for part in parts)
+
+
+def bytes_in(spans: np.ndarray, array: np.ndarray) -> int:
+    """Count what rows of an array take, from each of ascending spans (k, 2) to before its end.
+
+    Of large arrays Linux gives pages of 2 MiB: what lies between the nodes in use is there, too.
+    """
+    row = array.nbytes // max(len(array), 1)
+    page = PAGE if array.nbytes >= LARGE else row
+    first, end = spans[:, 0] * row // page, -(-spans[:, 1] * row // page)
+    before = np.append(0, np.maximum.accumulate(end)[:-1])
+    return int(np.maximum(end - np.maximum(first, before), 0).sum()) * page
+
+
+def nodes_in_use(s: arrays.Setup) -> int:
+    """Count the nodes that points may give to before they are sorted again."""
+    return int(np.diff(used(s.spans)[1:]).sum())
+
+
+def node_fields(s: Any) -> list[tuple[str, np.ndarray]]:
+    """List the arrays of the nodes, and of those that heat flows through, with their names."""
+    parts = ((name.partition("/"), array) for name, array in of_nodes(s))
+    return [(name + " (heat)" * (kind == "heat"), array) for (kind, _, name), array in parts]
+
+
+def point_fields(block: Any) -> list[tuple[str, str, int]]:
+    """List name, shape and bytes of each field that a point of this block carries."""
+    found = [("x", block.points.x[0]), ("x moved", block.points.x[1])]
+    found += [(name, array) for name, array in arrays.arrays_of(block.points) if name != "x"]
+    sizes = [(name, len(array) if array.ndim > 1 else 1, array) for name, array in found]
+    return [(name, str(size), size * array.itemsize) for name, size, array in sizes]
+
+
+def bytes_per_point(simulation: Any) -> int:
+    """Bytes of all fields of a point, the mean over the points of all kinds."""
+    blocks = simulation.setup.blocks
+    own = np.array([len(block.points.id) for block in blocks])
+    counts = simulation.comm.allreduce(own).tolist()
+    of_one = [sum(size for *_, size in point_fields(block)) for block in blocks]
+    return round(np.dot(counts, of_one) / max(1, sum(counts)))
+
 
 GIB = 2**30
 FEW = 100_000  # points; so many have room everywhere
 
 
 def check_room(hub: Hub, *, copied: bool) -> None:
-    """Refuse a scene that needs more memory than this machine has, and warn of what is not free.
-
-    Parameters
-    ----------
-    hub
-        The scene.
-    copied
-        Whether there will be a copy of the last good state, as in a run.
-
-    Raises
-    ------
-    ScriptError
-        At the line of the largest solid.
-    """
+    """Refuse a scene that memory does not hold, perhaps with a copy; warn of what is not free."""
     comm = hub.settings.comm
     count = sum(solid.count for solid in hub.solids.values())
     if count <= FEW or (there := machine_memory(comm.on_machine)) is None:
@@ -65,7 +141,6 @@ def check_room(hub: Hub, *, copied: bool) -> None:
 
 
 def in_words(count: float) -> str:
-    """Write a number of bytes."""
     size = count / GIB
     return f"{size:.0f} GiB" if size >= 100 else f"{size:.3g} GiB"
 
@@ -83,10 +158,7 @@ def _ways(hub: Hub, need: float, there: float, copied: bool) -> str:
 
 
 def least_bytes(hub: Hub, real: type, copied: bool) -> float:
-    """Count the bytes that points, their copy, and the nodes of the cells that they fill take.
-
-    It is the least: boxes of tiles, groups and what the program itself takes come on top.
-    """
+    """Count the least bytes of points, their copy, and the nodes of the cells that they fill."""
     kin = hub.update.method.kinematics(hub)
     kinds = point_kinds(hub)
     points, cells = 0, [0.0]
@@ -94,26 +166,22 @@ def least_bytes(hub: Hub, real: type, copied: bool) -> float:
         if not solid.count:
             continue
         one = part_of(solid, solid.first_id, solid.first_id + 1)
-        block = Block(*lower_points(hub, [one], kin, kinds, real), None)
+        block = arrays.Block(*lower_points(hub, [one], kin, kinds, real), None)
         sizes = {name: size for name, _, size in point_fields(block)}
         of_one = sum(sizes.values())
         points += solid.count * (of_one + (of_one - sizes["x moved"] if copied else 0))
-        cells.append(_cells(solid))
+        ppc = getattr(solid, "ppc", 0)  # else nothing is known of the cells that it fills
+        cells.append(solid.count / ppc**solid.domain.dimension if ppc else 0.0)
     d, per_cell = kin.dimension, hub.update.method.basis.nodes_per_cell**kin.dimension
-    of_node = np.dtype(real).itemsize * (SUMS_WIDTH[d] + UPDATE_WIDTH[d] + VELOCITY_WIDTH[d])
+    of_node = np.dtype(real).itemsize * (
+        arrays.SUMS_WIDTH[d] + arrays.UPDATE_WIDTH[d] + arrays.VELOCITY_WIDTH[d]
+    )
     nodes = sum(cells) if own_grids(hub) else max(cells)
     return points + nodes * per_cell * of_node
 
 
 def _largest(hub: Hub) -> Solid:
-    """Find the solid with most points."""
     return max(hub.solids.values(), key=lambda solid: solid.count)
-
-
-def _cells(solid: Solid) -> float:
-    """Count the cells that a solid fills at least."""
-    ppc = getattr(solid, "ppc", 0)
-    return solid.count / ppc**solid.domain.dimension if ppc else 0.0
 
 
 def no_room(hub: Hub, error: MemoryError) -> ScriptError:

@@ -65,20 +65,7 @@ def launched() -> tuple[int, int]:
 class MpiComm(SerialComm):
     """All processes of a run, in the order of their ranks. The first writes.
 
-    Parameters
-    ----------
-    ends
-        Ends all of them because of an error, of which it tells.
-
-    Attributes
-    ----------
-    parted
-        Whether the processes do not go on together: one has failed, or has another script.
-
-    Raises
-    ------
-    ScriptError
-        If mpi4py is not there, or finds no MPI.
+    `ends` ends all of them because of an error, of which it tells.
     """
 
     parted = False
@@ -108,19 +95,12 @@ class MpiComm(SerialComm):
         near.Free()
 
     def barrier(self) -> None:
-        """Wait for all processes.
-
-        Raises
-        ------
-        Quit
-            If one of them has failed, which tells of it.
-        """
+        """Wait for all processes; quit if one of them has failed, which tells of it."""
         if (self.agree(HERE) == FAILED).any():
             self.parted = True
             raise Quit
 
     def agree(self, word: int, patience: float = inf) -> np.ndarray | None:
-        """Gather a word of each process (size,), or None if one has not come in time."""
         own, found = np.array([word], np.int64), np.empty(self.size, np.int64)
         request = self._aside.Iallgather(own, found)
         end = time.monotonic() + patience
@@ -131,27 +111,21 @@ class MpiComm(SerialComm):
         return found
 
     def bcast(self, thing: Any = None) -> Any:
-        """Hand what the first process has to all."""
         return self.world.bcast(thing)
 
     def gather(self, thing: Any) -> list | None:
-        """Gather what each process has at the first; None at the others."""
         return self.world.gather(thing)
 
     def allgather(self, thing: Any) -> list:
-        """Gather what each process has at all of them."""
         return self.world.allgather(thing)
 
     def gather_rows(self, own: np.ndarray, out: np.ndarray | None, counts: Sequence[int]) -> None:
-        """Put the numbers of all processes, one after another, into `out` of the first."""
         self.world.Gatherv(own, (out, counts) if self.leads else None)
 
     def scatter(self, things: Sequence | None) -> Any:
-        """Hand out what the first process has for each."""
         return self.world.scatter(things)
 
     def exchange(self, things: dict[int, Any]) -> dict[int, Any]:
-        """Swap things with some other processes, by rank; both sides name each other."""
         sent = [self.world.isend(thing, rank) for rank, thing in things.items()]
         found = {rank: self.world.recv(source=rank) for rank in things}
         for one in sent:
@@ -159,27 +133,23 @@ class MpiComm(SerialComm):
         return found
 
     def alltoall(self, numbers: np.ndarray) -> np.ndarray:
-        """Swap a number (size,) with each process."""
         out = np.empty_like(numbers)
         self.world.Alltoall(numbers, out)
         return out
 
     def allreduce(self, array: np.ndarray) -> np.ndarray:
-        """Add up whole numbers over all processes: for such, order does not matter."""
         out, begun = np.empty_like(array), time.perf_counter()
         self.world.Allreduce(array, out)
         self.waited += time.perf_counter() - begun
         return out
 
     def allreduce_max(self, array: np.ndarray) -> np.ndarray:
-        """Take the largest of each number over all processes, in place."""
         begun = time.perf_counter()
         self.world.Allreduce(self.mpi.IN_PLACE, array, self.mpi.MAX)
         self.waited += time.perf_counter() - begun
         return array
 
     def in_turn(self, act: Callable[[], None]) -> None:
-        """Let the first process act, and then all others: they find what it has made."""
         if self.leads:
             act()
         self.barrier()
@@ -202,7 +172,6 @@ class MpiComm(SerialComm):
         self.waited += time.perf_counter() - begun
 
     def disconnect(self, link: Any) -> None:
-        """Free requests."""
         for request in link:
             request.Free()
 
@@ -215,20 +184,11 @@ class MpiComm(SerialComm):
         self.abort()
 
     def abort(self, status: int = 1) -> None:
-        """End all processes at once."""
         self.world.Abort(status)
 
 
 def check_same_run(hub: Scene) -> None:
-    """See that all processes are about to do the same run.
-
-    Raises
-    ------
-    Quit
-        If another process tells what is wrong.
-    ScriptError
-        If the scripts are not the same.
-    """
+    """See that all processes are about to do the same run; one tells, the others quit."""
     comm = hub.settings.comm
     if comm.size == 1:
         return

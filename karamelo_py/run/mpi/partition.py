@@ -9,20 +9,62 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.fields import length_of_rows, rows_of_points
+from karamelo_py.compiler.fields import length_of_rows, rows_of_points, some_points
 from karamelo_py.kernels.arrays import Block, Points, Setup, Tiling, arrays_of, made_of
-from karamelo_py.run.mpi.bisection import bisected
-from karamelo_py.run.tiles.boxes import Boxes, Reached, between, extents, ragged, rows_of, steps_of
-from karamelo_py.run.tiles.buffers import buffers_of, chosen_of, give_up
-from karamelo_py.run.tiles.tiles import SHARES, Tiles, one_after_another, shares_of
-from karamelo_py.run.tiles.unique import unique
+from karamelo_py.run.boxes import (
+    Boxes,
+    Reached,
+    between,
+    buffers_of,
+    chosen_of,
+    extents,
+    give_up,
+    ragged,
+    rows_of,
+    steps_of,
+    unique,
+)
+from karamelo_py.run.tiles import SHARES, Tiles, one_after_another, shares_of
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.lattice import Lattice
+
+
+def bisected(places: np.ndarray, work: np.ndarray, parts: int, rows: float = 1) -> np.ndarray:
+    """Cut tiles into parts: halves across the longest direction, and halves of these.
+
+    After Berger, M. J. and Bokhari, S. H. (1987), "A partitioning strategy for nonuniform problems
+    on multiprocessors", IEEE Transactions on Computers C-36, 570-580. Where the work of a layer of
+    tiles has to be shared, it is cut across the next longest direction. `places` (T, d) are lower
+    corners, `work` (T,) whole numbers; tiles without work fill the parts. The last direction is to
+    be `rows` times as long as the others where it is cut.
+    """
+    d = places.shape[1]
+    least = np.append(np.ones(d - 1), rows)
+    part = np.zeros(len(work), np.int64)
+    left = [(np.arange(len(work)), 0, parts)]
+    while left:
+        tiles, first, count = left.pop()
+        if count == 1:
+            part[tiles] = first
+            continue
+        busy = places[tiles[work[tiles] > 0]]
+        lengths = np.ptp(busy, axis=0) if len(busy) else np.ones(d)
+        # The longest last; of equal ones that whose neighbours are furthest apart in memory.
+        long = np.argsort(-lengths / least, kind="stable")[::-1]
+        tiles = tiles[np.lexsort([places[tiles, k] for k in long])]
+        ends = np.cumsum(work[tiles])
+        half = count // 2
+        # A tile is of the one that has its middle.
+        cut = np.searchsorted(ends - 0.5 * work[tiles], ends[-1:].sum() * (half / count))
+        left += [(tiles[:cut], first, half), (tiles[cut:], first + half, count - half)]
+    return part
+
 
 IMBALANCE = 1.1  # largest share of the work over that after a new cut: above it tiles are cut anew
 # Times longer than across, from which on bodies are cut along long tiles: to go through rows of
 # nodes with gaps between them takes twice as long, and longer than to pass on more nodes.
 ROWS = 4
+OF_TILES = ("number", "range", "grid", "box", "rows")  # what a tiling has a row of for each tile
 FINE = 1000  # parts of the unit of costs, in which work is added up as whole numbers
 
 
@@ -42,15 +84,7 @@ class Needs(NamedTuple):
 
 
 class SharedTiles(Tiles):
-    """Tiles of a process among others.
-
-    Parameters
-    ----------
-    comm
-        The processes.
-    one_place
-        Whether a node has others at its place, in grids that are alike: bodies in contact.
-    """
+    """Tiles of a process among others."""
 
     def __init__(
         self,
@@ -64,7 +98,7 @@ class SharedTiles(Tiles):
     ):
         super().__init__(lattices, basis, points, sparse)
         self.comm = comm
-        self.one_place = one_place
+        self.one_place = one_place  # a node has others there: of bodies in contact
         self._places = np.concatenate(
             [
                 one.lo[: self.dimension] + one.h * self.size * np.argwhere(np.ones(shape, bool))
@@ -81,8 +115,6 @@ class SharedTiles(Tiles):
         self._taken: dict[int, slice] = {}
         self._links: dict[tuple[int, int], tuple[list, Any]] = {}  # by number of buffers, arrays
         self._from = np.empty(0, np.int64)  # whose the boxes of others are
-
-    # --- points -----------------------------------------------------------------------------------
 
     def share_out(self, work: np.ndarray) -> None:
         """Cut the tiles into parts of nearly as much work each."""
@@ -147,12 +179,9 @@ class SharedTiles(Tiles):
     def _with(
         self, k: int, points: Points, stay: np.ndarray, come: list[list[np.ndarray]]
     ) -> Points:
-        """Join those of the points of block `k` that stay, and what has come.
-
-        They take the place of what was there at the sort before: fresh memory for all of them would
-        cost more than all else that a sort does.
-        """
+        """Join the points that stay and those that have come, in the memory of the sort before."""
         count = len(stay) + sum(parts[0].shape[-1] for parts in come)
+        # Fresh memory for all of them would cost more than all else that a sort does.
         arrays = []
         for i, (name, old) in enumerate(arrays_of(points)):
             new = [parts[i] for parts in come]
@@ -176,8 +205,6 @@ class SharedTiles(Tiles):
 
     def _reach(self, s: Setup, block: Block, x: np.ndarray) -> float:
         return float(self.comm.allreduce_max(np.array([super()._reach(s, block, x)]))[0])
-
-    # --- nodes ------------------------------------------------------------------------------------
 
     def _boxes(self, s: Setup) -> Boxes:
         own = self.own_boxes(s)
@@ -316,16 +343,12 @@ class SharedTiles(Tiles):
         self.foreign[self._marked] = 1
 
     def reached_by(self, s: Setup) -> tuple[np.ndarray, ...]:
-        """Of the nodes in use here what `spans_of_all` asks for."""
-        return (s.spans[1 : 1 + s.spans[0, 0]],) if self.direct else self.reached
+        return super().reached_by(s) if self.direct else self.reached
 
     def spans_of_all(self, reached: Iterable[tuple[np.ndarray, ...]]) -> np.ndarray:
-        """(k, 2) spans of the nodes in use, from what all processes reach.
-
-        Where points give straight to the nodes one process has them all.
-        """
-        found = [np.concatenate(of) for of in zip(*reached, strict=True)]
-        return found[0] if self.direct else self.spans_of(*found)
+        if self.direct:
+            return super().spans_of_all(reached)
+        return self.spans_of(*(np.concatenate(of) for of in zip(*reached, strict=True)))
 
     def give(self, s: Setup, number: int, what: int) -> None:
         """Begin to pass on what the own tiles give to nodes of others, and theirs to own ones."""
@@ -340,7 +363,6 @@ class SharedTiles(Tiles):
         self.comm.start(self._under_way)
 
     def take(self) -> None:
-        """Wait for what others give."""
         self.comm.finish(self._under_way)
 
     def _link(self, arrays: list[np.ndarray]) -> tuple[list, Any]:
@@ -412,3 +434,59 @@ def _rows(lo: np.ndarray, hi: np.ndarray, first: np.ndarray, steps: np.ndarray) 
     inner = steps_of(shape)[box]
     places = lo[box] + left[:, None] // inner % shape[box]
     return first[box] + (places * steps[box]).sum(axis=1)
+
+
+def share_of(s: Setup, own: np.ndarray) -> dict[str, np.ndarray]:
+    """Pack the points and tiles of `s` in tiles of which `own` says so, by name."""
+    found = {}
+    for k, block in enumerate(s.blocks):
+        points, tiles = share_of_tiling(k, block.tiling, own)
+        arrays = arrays_of(block.points)
+        found |= tiles | {f"points/{k}/{name}": some_points(of, points) for name, of in arrays}
+    return found
+
+
+def share_of_tiling(
+    k: int, tiling: Tiling, own: np.ndarray
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Find the points in tiles of which `own` says so, and pack these tiles."""
+    which = np.flatnonzero(own[occupied(tiling)[0]])
+    ranges = tiling.range[which]
+    points = between(*ranges.T)
+    rows = {name: getattr(tiling, name)[which] for name in OF_TILES}
+    rows["range"] = one_after_another(ranges)
+    rows["count"] = np.array([len(which), *tiling.count[1:]])
+    rows["share"] = shares_of(rows["range"], int(tiling.count[1]), len(tiling.share))
+    return points, {f"tiling/{k}/{name}": array for name, array in rows.items()}
+
+
+def stripped(found: dict[str, np.ndarray], stem: str) -> dict[str, np.ndarray]:
+    """Choose the arrays whose names begin so, and name them without that."""
+    return {n.removeprefix(stem): array for n, array in found.items() if n.startswith(stem)}
+
+
+def _joint(tilings: list[dict[str, np.ndarray]], name: str) -> np.ndarray:
+    """Join rows of the tiles of all processes, one process after another."""
+    return np.concatenate([part[name][: part["count"][0]] for part in tilings])
+
+
+def by_tile(tilings: list[dict[str, np.ndarray]]) -> np.ndarray:
+    """Find the order of tiles for points that stand one process after another."""
+    ranges = one_after_another(_joint(tilings, "range"))
+    return between(*ranges[np.argsort(_joint(tilings, "number"))].T)
+
+
+def join_tilings(tiling: Tiling, tilings: list[dict[str, np.ndarray]]) -> None:
+    """Join the tiles of all processes, in the order of their numbers."""
+    order = np.argsort(_joint(tilings, "number"))
+    tiling.count[0] = len(order)
+    names = [name for name in (*OF_TILES, "report") if name in tilings[0]]
+    rows = {name: _joint(tilings, name)[order] for name in names}
+    ranges = one_after_another(rows["range"])
+    if "report" in rows:
+        # Points that went wrong keep their place in their tile.
+        wrong = rows["report"][:, 2] > 0
+        rows["report"][wrong, 2] += (ranges - rows["range"])[wrong, 0]
+    for name, array in (rows | {"range": ranges}).items():
+        getattr(tiling, name)[: len(order)] = array
+    tiling.share[:] = shares_of(ranges, int(tiling.count[1]), len(tiling.share))

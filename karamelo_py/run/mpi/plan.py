@@ -6,14 +6,13 @@ import numpy as np
 
 from karamelo_py.kernels.arrays import NoHooks, Setup, Tiling, arrays_of
 from karamelo_py.kernels.p2g import given
-from karamelo_py.kernels.step import Fused, Staged, step
+from karamelo_py.kernels.step import step
 from karamelo_py.kernels.sweep import sum_buffers, sweep_nodes, sweep_points
-from karamelo_py.run.lower.sizes import memory_of
+from karamelo_py.run.boxes import Boxes, chosen_of, no_nodes
+from karamelo_py.run.lower.memory import memory_of, nodes_in_use
 from karamelo_py.run.mpi.partition import SharedTiles, occupied
 from karamelo_py.run.simulation import Simulation
-from karamelo_py.run.tiles.boxes import Boxes, numbers
-from karamelo_py.run.tiles.buffers import buffers_of, chosen_of, no_nodes, summed
-from karamelo_py.run.tiles.tiles import SHARES
+from karamelo_py.run.tiles import SHARES
 from karamelo_py.run.timestep import sparse
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.styles.fixes.pairs import SENT
@@ -22,28 +21,15 @@ MAY_CHANGE = 1.25  # largest share of the points over the mean that is no waste 
 
 
 class ProcessShare(NamedTuple):
-    """Share of one process.
-
-    Attributes
-    ----------
-    points, tiles, nodes
-        Points, occupied tiles of them, nodes in use.
-    others
-        Processes that it passes something on to.
-    given
-        Bytes that it passes on in a step.
-    memory, known
-        Bytes that it touches in steps, and of a copy of its last good state; those of them of what
-        each process knows of the whole scene.
-    """
+    """Share of one process."""
 
     points: int
-    tiles: int
-    nodes: int
-    others: int
-    given: int
-    memory: int
-    known: int
+    tiles: int  # of points, that are occupied
+    nodes: int  # in use
+    others: int  # that it passes something on to
+    given: int  # bytes that it passes on in a step
+    memory: int  # bytes that it touches in steps, and of a copy of its last good state
+    known: int  # of these, of what each process knows of the whole scene
 
 
 class _Sums(NamedTuple):
@@ -88,8 +74,7 @@ def bytes_of_node(simulation: Simulation) -> int:
     s, sums = simulation.setup, _Sums([])
     control = s.control
     kept = control.values.copy(), control.clock.copy(), control.totals.copy()
-    visits = Staged() if simulation.staged else Fused()
-    step(simulation.hub.update.scheme, visits, sums, s, NoHooks(), True)
+    step(simulation.hub.update.scheme, simulation.visits, sums, s, NoHooks(), True)
     control.values[:], control.clock[:], control.totals[:] = kept
     total = 0
     for what, nodes in sums.found:
@@ -99,22 +84,19 @@ def bytes_of_node(simulation: Simulation) -> int:
 
 def plan(simulation: Simulation, ranks: int) -> list[ProcessShare]:
     """Plan the shares of so many processes in a scene whose points are sorted."""
-    s, hub = simulation.setup, simulation.hub
-    method = hub.update.method
-    lattices, one_place = method.lattices(hub), method.fields_per_solid
-    per_node = bytes_of_node(simulation)
-
-    def tiles_of(comm: SerialComm) -> SharedTiles:
-        return SharedTiles(
-            comm, lattices, s.basis, simulation.count, sparse(simulation.hub), one_place=one_place
-        )
-
-    of_all = [tiles_of(_PretendedComm(rank, ranks)) for rank in range(ranks)]
+    s, method = simulation.setup, simulation.hub.update.method
+    lattices, one_place = method.lattices(simulation.hub), method.fields_per_solid
+    few = simulation.count, sparse(simulation.hub)
+    of_all = [
+        SharedTiles(_PretendedComm(rank, ranks), lattices, s.basis, *few, one_place=one_place)
+        for rank in range(ranks)
+    ]
     of_all[0].share_out(of_all[0].loads(s.blocks)[:-1].sum(axis=0))
     parts = [_part(s, of_all[0].owner == rank) for rank in range(ranks)]
     boxes = [(tiles, tiles.own_boxes(part)) for tiles, part in zip(of_all, parts, strict=True)]
     for tiles in of_all:
         tiles.comm.others = boxes
+    per_node = bytes_of_node(simulation)
     return [
         _share(simulation, part, tiles, per_node) for part, tiles in zip(parts, of_all, strict=True)
     ]
@@ -125,31 +107,27 @@ def _share(simulation: Simulation, s: Setup, tiles: SharedTiles, per_node: int) 
         sums=s.nodes.sums[:, :0], velocity=s.nodes.velocity[:, :0], fields=()
     )  # boxes of nothing: only their places matter
     tiles.lay_out(s._replace(buffers=tiles.empty_buffers(none, len(s.blocks))))
-    given = [array for one in buffers_of(simulation.setup) for array in summed(one.nodes)]
-    row = sum(array.itemsize * array.shape[1] for array in given)
-    boxes = 0 if tiles.direct else row * tiles.rows
     tilings = [block.tiling for block in s.blocks]
-    points = sum(int(occupied(one)[1].sum()) for one in tilings)
-    rows = sum(map(len, tiles.given.values()))
-    count = sum(int(one.count[0]) for one in tilings)
-    nodes = len(numbers(s.spans))
-    memory = memory_of(simulation, s, boxes)
-    given = rows * per_node
-    return ProcessShare(points, count, nodes, len(tiles.given), given, sum(memory), memory.known)
+    memory = memory_of(simulation, s, tiles.box_bytes(simulation.setup))
+    return ProcessShare(
+        points=sum(int(occupied(one)[1].sum()) for one in tilings),
+        tiles=sum(int(one.count[0]) for one in tilings),
+        nodes=nodes_in_use(s),
+        others=len(tiles.given),
+        given=per_node * sum(map(len, tiles.given.values())),
+        memory=sum(memory),
+        known=memory.known,
+    )
 
 
 def _part(s: Setup, own: np.ndarray) -> Setup:
-    """Choose the tiles of which `own` says so."""
     blocks = []
     for block in s.blocks:
-        tiling = block.tiling
-        which = np.flatnonzero(own[occupied(tiling)[0]])
-        rows = {name: getattr(tiling, name)[which] for name in Tiling._fields[2:]}
-        rows |= {
-            "count": np.array([len(which), *tiling.count[1:]]),
-            "share": np.zeros(2 * SHARES + 1, np.int64),
-        }
-        blocks.append(block._replace(tiling=tiling._replace(**rows)))
+        which = np.flatnonzero(own[occupied(block.tiling)[0]])
+        rows = {name: getattr(block.tiling, name)[which] for name in Tiling._fields[2:]}
+        rows["count"] = np.array([len(which), *block.tiling.count[1:]])
+        rows["share"] = np.zeros(2 * SHARES + 1, np.int64)
+        blocks.append(block._replace(tiling=block.tiling._replace(**rows)))
     return s._replace(blocks=tuple(blocks), **no_nodes(), heat=None)
 
 
@@ -174,12 +152,13 @@ def report_lines(simulation: Simulation, ranks: int) -> list[str]:
         lines.append("  so few points are not shared out: the first process has them all")
     elif over > MAY_CHANGE:
         lines.append("  tiles are not cut: fewer processes would wait less for the largest share")
-    if acting := simulation.acting_from_python:
+    acting = (fix for pairs in simulation.python.by_stage.values() for fix, _ in pairs)
+    if fix := next((fix for fix in acting if not fix.point_by_point), None):
         blocks = simulation.setup.blocks
         moved = sum(array.nbytes for block in blocks for _, array in arrays_of(block.points))
         lines.append(
-            f"  {acting[0]} acts on the whole scene: in each step the first process takes in and "
-            f"gives back {moved >> 20} MiB, and has the memory of a single one"
+            f"  fix {fix.style} '{fix.id}' acts on the whole scene: in each step the first "
+            f"process takes in and gives back {moved >> 20} MiB, and has the memory of a single one"
         )
     for fix in simulation.hub.fixes.values():
         if hasattr(fix, "sent"):

@@ -1,43 +1,81 @@
-"""The share of one of several processes in a scene: its work, and points on their way to others."""
+"""The share of one of several processes in a scene: its points, and its work, which is measured."""
 
+import time
 from typing import Any
 
 import numpy as np
 
-from karamelo_py.kernels.arrays import TIMESTEP, Block, Setup
+from karamelo_py.compiler.formula import GLOBAL, UNIFORM
+from karamelo_py.compiler.loops import address_of_python
+from karamelo_py.kernels import ranks
+from karamelo_py.kernels.arrays import DT, TIMESTEP, Block, Setup
 from karamelo_py.kernels.ranks import Linked
+from karamelo_py.kernels.totals import WORK, rounded
+from karamelo_py.run.boxes import numbers
 from karamelo_py.run.checkpoint.arrays import kept_at_nodes, remembered_at, take_points, take_tiling
-from karamelo_py.run.mpi.callbacks import Callbacks, reads_totals
-from karamelo_py.run.mpi.load import Load
-from karamelo_py.run.mpi.pack import by_tile, join_tilings, share_of, stripped
-from karamelo_py.run.mpi.partition import SharedTiles, nodes_of, occupied, work_of
-from karamelo_py.run.tiles.boxes import numbers
+from karamelo_py.run.mpi import partition
+from karamelo_py.scene.comm import SerialComm
 
 LEARN_EVERY = 100  # steps from output to output, after which it is seen how work is shared
 
 
-class Subdomain:
-    """Keep the share of this process in balance with those of others.
+class Load:
+    """Time in sweeps over the points of each block, and in all else that is no waiting."""
 
-    Attributes
-    ----------
-    load
-        Measured cost of points and nodes.
-    callbacks
-        Functions that kernels call.
+    def __init__(self, blocks: int):
+        # Of a point of each block in a step, and of a node that the points of a tile may reach.
+        self.costs = np.append(np.ones(blocks), 0.0)
+        self._spent = np.zeros((2, blocks + 1), np.int64)  # nanoseconds, and points times steps
+        self._rest = self._at = blocks
+        self._since: int | None = None
+
+    def pause(self) -> None:
+        """Do not count the time until the next sweep."""
+        self._since = None
+
+    def note(self) -> None:
+        """Count the time since the last `resume`."""
+        if self._since is not None:
+            self._spent[0, self._at] += time.perf_counter_ns() - self._since
+
+    def resume(self, block: int | None = None) -> None:
+        """Begin to count the time of a sweep over the points of a block, or of something else."""
+        self._at = self._rest if block is None else block
+        self._since = time.perf_counter_ns()
+
+    def next_block(self) -> None:
+        """Go on with the next block, from the last with the first."""
+        self.resume((self._at + 1) % self._rest)
+
+    def done(self, counts: list[int], steps: int) -> None:
+        """Take note of so many steps with these numbers of points, and of nodes."""
+        self._spent[1] += np.array(counts) * steps
+
+    def learn(self, comm: SerialComm) -> None:
+        """Find the costs from what all have spent; later times count more."""
+        seconds, done = comm.allreduce(self._spent)
+        self._spent //= 2
+        if (seconds[:-1] > 0).all() and (done > 0).all():
+            self.costs = seconds / done
+
+
+class Subdomain:
+    """Keeps the share of this process in balance with those of others, and answers kernels.
+
+    Kernels call `answer` where they need other processes (:mod:`karamelo_py.kernels.ranks`).
     """
 
     def __init__(self, simulation: Any):
         self.simulation, self.comm = simulation, simulation.comm
-        self.tiles: SharedTiles = simulation.tiles
+        self.tiles: partition.SharedTiles = simulation.tiles
         s = simulation.setup
         self.load = Load(len(s.blocks))
-        self.callbacks = Callbacks(simulation, self.load)
-        linked = Linked(self.callbacks.address, self.tiles.foreign)
+        self.control = s.control
+        self.at_once = False  # whether what fixes publish is added up in each step
+        self.due: set[int] = set()  # else which of these values are, when the last is over
+        linked = Linked(address_of_python(self.answer, ranks.CALL), self.tiles.foreign)
         simulation.setup = s._replace(control=s.control._replace(ranks=linked))
         self._counted_at = self._learned_at = int(s.control.values[TIMESTEP])
-
-    # --- points -----------------------------------------------------------------------------------
 
     def migrate(self, s: Setup) -> Setup:
         """Hand over the points that have left the own tiles; they are to be sorted then."""
@@ -94,11 +132,9 @@ class Subdomain:
         nodes = numbers(self.simulation.setup.spans)
         return nodes[self.tiles.foreign[nodes] == 0]
 
-    # --- work -------------------------------------------------------------------------------------
-
     def begin(self, hooks: Any, *, from_python: bool) -> None:
         """Make ready for steps whose work is measured."""
-        self.callbacks.at_once = from_python or reads_totals(hooks)
+        self.at_once = from_python or reads_totals(hooks)
         self.rebalance()
         self._counted_at = self.simulation.step
         self.load.pause()
@@ -106,19 +142,18 @@ class Subdomain:
     def end(self) -> None:
         """Account for the last steps, and publish what their fixes have added up."""
         self.account()
-        self.callbacks.publish()
+        self._publish()
 
     def account(self) -> None:
         """Take note of the steps so far; what comes before the next is not counted."""
         blocks, step = self.simulation.setup.blocks, self.simulation.step
         counts = [block.points.mass.size for block in blocks]
-        counts.append(sum(int(nodes_of(block.tiling).sum()) for block in blocks))
+        counts.append(sum(int(partition.nodes_of(block.tiling).sum()) for block in blocks))
         self.load.done(counts, step - self._counted_at)
         self._counted_at = step
         self.load.pause()
 
     def learn(self) -> np.ndarray:
-        """Find what points and nodes cost."""
         self._learned_at = self.simulation.step
         self.load.learn(self.comm)
         return self.load.costs
@@ -131,27 +166,82 @@ class Subdomain:
         sorted_next = clock.drift > clock.drift_limit  # and cut anew then
         due = abs(simulation.step - self._learned_at) >= LEARN_EVERY
         due = due and not (tiles.direct or sorted_next)
-        if not due or not tiles.balance(work_of(tiles.loads(s.blocks), self.learn())):
+        if not due or not tiles.balance(partition.work_of(tiles.loads(s.blocks), self.learn())):
             return
         self.share_memory()
-        own = [tiles.owner[occupied(block.tiling)[0]] for block in s.blocks]
+        own = [tiles.owner[partition.occupied(block.tiling)[0]] for block in s.blocks]
         others = tiles.partners(np.bincount(np.concatenate(own), minlength=self.comm.size))
-        given = {rank: share_of(s, tiles.owner == rank) for rank in others}
-        mine = share_of(s, tiles.owner == self.comm.rank)
+        given = {rank: partition.share_of(s, tiles.owner == rank) for rank in others}
+        mine = partition.share_of(s, tiles.owner == self.comm.rank)
         shares = [mine, *self.comm.exchange(given).values()]
         tiles.empty_nodes(s)
         blocks = []
         for k, block in enumerate(s.blocks):
-            tilings = [stripped(share, f"tiling/{k}/") for share in shares]
-            points = [stripped(share, f"points/{k}/") for share in shares]
-            order = by_tile(tilings)
+            tilings = [partition.stripped(share, f"tiling/{k}/") for share in shares]
+            points = [partition.stripped(share, f"points/{k}/") for share in shares]
+            order = partition.by_tile(tilings)
             arrays = {
                 name: np.take(
                     np.concatenate([one[name] for one in points], axis=-1), order, axis=-1
                 )
                 for name in points[0]
             }
-            join_tilings(block.tiling, tilings)
+            partition.join_tilings(block.tiling, tilings)
             blocks.append(block._replace(points=take_points(block.points, arrays, "")))
         simulation.setup = s._replace(blocks=tuple(blocks))
         tiles.lay_out(simulation.setup)
+
+    def answer(self, what: int, a: int, b: int) -> int:
+        try:
+            self.load.note()
+            found = self._answer(what, a, b)
+            if what == ranks.NEXT:
+                self.load.next_block()
+            else:
+                self.load.resume(0 if what in {ranks.SWEEP, ranks.GIVE} else None)
+            return found
+        except BaseException as error:
+            # Nothing can be raised through a kernel, and the others wait.
+            self.comm.fail(error)
+            raise
+
+    def _answer(self, what: int, a: int, b: int) -> int:
+        if what == ranks.GIVE:
+            self.tiles.give(self.simulation.setup, a, b)
+        elif what == ranks.TAKE:
+            self.tiles.take()
+        elif what == ranks.TOTALS:
+            self._totals(a, b)
+        elif what == ranks.LARGEST:
+            self.comm.allreduce_max(self.control.answer[:a])
+        elif what == ranks.NUMBER:
+            return int(self.comm.allreduce(np.array([a]))[0])
+        return 0  # for the others the time is taken alone
+
+    def _totals(self, first: int, count: int) -> None:
+        rows = slice(first, first + count)
+        if WORK < first < len(self.control.values) and not self.at_once:
+            self.due.update(range(first, first + count))
+            self.control.answer[:count] = self.control.values[rows]
+            return
+        of_all = self.comm.allreduce(self.control.totals[rows])
+        for k in range(count):
+            self.control.answer[k] = rounded(of_all[k])
+
+    def _publish(self) -> None:
+        """Add up the values of the last step over all: their totals are kept until the next."""
+        rows, values = sorted(self.due), self.control.values
+        self.due.clear()
+        if rows:
+            for row, total in zip(
+                rows, self.comm.allreduce(self.control.totals[rows]), strict=True
+            ):
+                values[row] = rounded(total)
+            for of, to in getattr(self.simulation.setup.contact, "copies", ()):
+                values[to : to + 3] = values[of : of + 3]
+
+
+def reads_totals(hooks: Any) -> bool:
+    """Tell whether formulas read within steps what fixes publish."""
+    code = getattr(hooks, "code", np.empty((0, 2), np.int64))
+    return bool(((code[:, 0] % UNIFORM == GLOBAL) & (code[:, 1] > DT)).any())

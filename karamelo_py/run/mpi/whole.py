@@ -10,12 +10,11 @@ import numpy as np
 
 from karamelo_py.kernels.arrays import Setup, arrays_of
 from karamelo_py.kernels.totals import WORK
+from karamelo_py.run.boxes import numbers
 from karamelo_py.run.checkpoint.arrays import of_nodes
 from karamelo_py.run.lower.build import lower
-from karamelo_py.run.mpi.pack import by_tile, join_tilings, share_of, tilings_in_use
-from karamelo_py.run.mpi.partition import sized, work_of
-from karamelo_py.run.tiles.boxes import numbers
-from karamelo_py.run.tiles.tiles import SHARES
+from karamelo_py.run.mpi.partition import by_tile, join_tilings, share_of, sized, work_of
+from karamelo_py.run.tiles import SHARES, in_use
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.script.errors import Quit
 
@@ -38,12 +37,8 @@ class Whole:
     def act(self, function: Callable[[Setup], None]) -> None:
         """Let the first process call a function of the whole; all take over what it has done.
 
-        Raises
-        ------
-        PointsMoved
-            If points were moved and sorted anew, so that the step has to be begun anew.
-        Quit
-            On the other processes if the function fails: the first tells of it.
+        Where points were moved the step has to be begun anew (`PointsMoved`). If the function fails
+        the first process tells of it, and the others quit.
         """
         simulation, comm = self.simulation, self.simulation.comm
         self.gather()
@@ -83,13 +78,8 @@ class Whole:
             self.setup = simulation.setup
             simulation.setup, simulation.tiles, simulation.comm, simulation.subdomain = own
 
-    # --- gathering --------------------------------------------------------------------------------
-
     def gather(self) -> None:
-        """Gather the points of all at the first process, tile after tile, and the nodes.
-
-        Points come component by component, so that nothing of that size is there twice.
-        """
+        """Gather the points of all, component by component and tile after tile, and the nodes."""
         simulation, comm = self.simulation, self.simulation.comm
         totals = simulation.control.totals
         parts = comm.gather(self._own() | {"work": totals[WORK].copy()})
@@ -119,8 +109,9 @@ class Whole:
         return {
             "counts": [block.points.mass.size for block in s.blocks],
             "tiling": [
-                tiling | {"report": block.tiling.report[: block.tiling.count[0]]}
-                for tiling, block in zip(tilings_in_use(s), s.blocks, strict=True)
+                {name: getattr(tiling, name)[:rows] for name, rows in in_use(tiling)}
+                | {"report": tiling.report[: tiling.count[0]]}
+                for tiling in (block.tiling for block in s.blocks)
             ],
             "nodes": own,
             "at nodes": [array[own] for _, array in of_nodes(s)],
@@ -145,8 +136,6 @@ class Whole:
             for array, rows in zip(memory, part["memory"], strict=True):
                 array[part["nodes"]] = rows
 
-    # --- handing out ------------------------------------------------------------------------------
-
     def _nodes(self, moved: bool) -> tuple:
         """Find what all are to know: who has which tile, where points were moved, and of nodes."""
         subdomain, tiles = self.simulation.subdomain, self.simulation.tiles
@@ -157,7 +146,6 @@ class Whole:
         return tiles.owner, nodes, [one[nodes] for one in subdomain.memory()]
 
     def _shares(self) -> list[dict[str, np.ndarray]] | None:
-        """Pack what each process has of the whole."""
         comm, owner = self.simulation.comm, self.simulation.tiles.owner
         if not comm.leads:
             return None

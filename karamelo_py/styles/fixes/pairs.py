@@ -85,7 +85,7 @@ class PairContact(Fix):
     def sent(self, simulation: Any) -> int:
         """Count the points that may touch others now: one process looks at all of them."""
         corners = self._where_both_are(simulation)
-        blocks = simulation.blocks if corners is not None else ()
+        blocks = simulation.setup.blocks if corners is not None else ()
         return sum(len(self._picked(simulation, block, *corners)) for block in blocks)
 
     def _where_both_are(self, simulation: Any) -> tuple[np.ndarray, np.ndarray] | None:
@@ -98,7 +98,7 @@ class PairContact(Fix):
         for block in s.blocks:
             x = block.points.x[simulation.now]
             pairs.extend(s.kin, x, block.points, block.laws, *self._ranges, extents)
-        extents = simulation.most(extents)
+        extents = simulation.comm.allreduce_max(extents)
         width = min(extents[:, 6].sum(), self._reach)
         low, high = -extents[:, :d].min(axis=0) - width, extents[:, 3 : 3 + d].min(axis=0) + width
         return (low, high) if (low <= high).all() else None

@@ -1,8 +1,13 @@
-"""Boxes of nodes, and ranges of their numbers."""
+"""Boxes of nodes, ranges of their numbers, and the buffers that hold what points give to them."""
 
 from typing import NamedTuple
 
 import numpy as np
+
+from karamelo_py.compiler.argument_buffer import forget
+from karamelo_py.compiler.fields import records
+from karamelo_py.kernels.arrays import Buffers, Nodes, Setup
+from karamelo_py.kernels.heat import Conducting
 
 SPAN = 256  # nodes of a span at most
 
@@ -107,3 +112,49 @@ def steps_of(shapes: np.ndarray) -> np.ndarray:
     """Steps (k, d) from a number to that of the neighbour in boxes of these shapes (k, d)."""
     after = np.concatenate([shapes[:, 1:], np.ones((len(shapes), 1), np.int64)], axis=1)
     return np.cumprod(after[:, ::-1], axis=1)[:, ::-1]
+
+
+def unique(numbers: np.ndarray) -> np.ndarray:
+    """Do as ``np.unique(numbers)``, which imports numpy.ma unless asked for more: some 0.03 s."""
+    return np.unique(numbers, return_counts=True)[0]
+
+
+def no_nodes() -> dict[str, np.ndarray]:
+    """Room for the nodes in use of a setup, where none are yet."""
+    return {name: np.zeros((1, 2), np.int64) for name in ("spans", "ranges")}
+
+
+def buffers_of(s: Setup) -> list[Buffers]:
+    return [s.buffers] + ([s.heat.buffers] if isinstance(s.heat, Conducting) else [])
+
+
+def chosen_of(nodes: Nodes, what: int) -> list[np.ndarray]:
+    """The arrays that points give to, of the kinds that `what` names (kernels.p2g.given)."""
+    sums, velocity, *rest = summed(nodes)
+    return [sums] * (what & 1) + [velocity] * (what >> 1 & 1) + rest * (what >> 2 & 1)
+
+
+def summed(nodes: Nodes) -> list[np.ndarray]:
+    """The arrays that points give to."""
+    own = [one.array for one in nodes.fields if getattr(type(one), "summed", False)]
+    return [nodes.sums, nodes.velocity, *own]
+
+
+def room_of(rows: int, like: np.ndarray) -> np.ndarray:
+    """So many rows as the array has, zero; with none it can grow."""
+    width, kind = like.shape[1], like.dtype
+    return records(rows, width, kind) if rows else np.zeros((0, width), kind)
+
+
+def give_up(array: np.ndarray) -> None:
+    """Let an array, which is of no use any more, have no memory."""
+    if array.flags.owndata:
+        forget(array)
+        array.resize((0,) * array.ndim, refcheck=False)
+
+
+def grow(array: np.ndarray, rows: int) -> None:
+    """See that an array has so many rows; in place, since setups hold it."""
+    if len(array) < rows:
+        forget(array)
+        array.resize((rows + rows // 8, *array.shape[1:]), refcheck=False)

@@ -1,14 +1,86 @@
-"""A point of a material that goes along a load path, increment by increment."""
+"""One point of a material under prescribed strains and stresses (commands load_path, element).
 
-from collections.abc import Callable
+The law's own point functions are called from plain Python: nothing is compiled.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from karamelo_py.language.signature import Argument
+from karamelo_py.output.files import savefig, whole
+from karamelo_py.output.plots import blank_figure, tidy
 from karamelo_py.points import laws
+from karamelo_py.points import laws as materials
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space, tensor
-from karamelo_py.run.element.load_path import COMPONENTS, LoadPath
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.region import look_up
+from karamelo_py.script.errors import ScriptError
+
+# Components of symmetric tensors, in the order of the point functions.
+COMPONENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
+NORMAL = COMPONENTS[:3]
+
+
+@dataclass
+class LoadPath:
+    """Targets at the end of a piece of path; every strain that is not named stays as it is."""
+
+    increments: int  # number of equal ones
+    duration: float
+    strain: Mapping[str, float]  # targets by component
+    stress: Mapping[str, float]
+    shear: Sequence[str] = ()  # components of `strain` that are simple shear, not pure
+    volumetric: float | None = None  # sum of normal strains, reached by those that are not named
+    turn: float = 0.0  # angle about z by which the point turns meanwhile
+
+    id: str = ""
+    place: Any = None
+
+    @classmethod
+    def from_script(cls, hub: Hub, argument: Argument) -> LoadPath:
+        return look_up(hub.load_paths, argument)
+
+    def __post_init__(self) -> None:
+        for name in self.stress:
+            if name in self.strain:
+                raise ScriptError(
+                    f"strain and stress of the component {name} are both prescribed",
+                    argument=f"s{name}",
+                    expected=f"s{name}, or the strain of that component",
+                )
+        if self.volumetric is None:
+            return
+        normal = [name for name in NORMAL if name in self.stress]
+        if normal:
+            raise ScriptError(
+                f"the volume is prescribed, and s{normal[0]} needs it free",
+                argument="volumetric",
+                expected="normal strains beside volumetric, no normal stresses",
+            )
+        if set(NORMAL) <= set(self.strain):
+            raise ScriptError(
+                "all normal strains are prescribed: the volume follows from them",
+                argument="volumetric",
+                expected="two normal strains at most beside volumetric",
+            )
+
+    def strain_at_end(self, strain: np.ndarray, free: Sequence[str]) -> np.ndarray:
+        """(6,) strain at the end, from that at the start and the components that are `free`."""
+        end = strain.copy()
+        for name, value in self.strain.items():
+            end[COMPONENTS.index(name)] = value
+        if self.volumetric is not None:
+            rest = [k for k, name in enumerate(NORMAL) if name in free and name not in self.strain]
+            end[rest] += (self.volumetric - end[:3].sum()) / len(rest)
+        return end
+
 
 # Where the components of the velocity gradient lie in the flat tuples of each kinematics.
 _PLANE = ((0, 0), (0, 1), (1, 0), (1, 1))
@@ -50,37 +122,21 @@ class Loading(NamedTuple):
 
 
 class Point:
-    """A point of a material, and where it has come to.
-
-    Attributes
-    ----------
-    law, kin
-        The law's NamedTuple and the kinematics' tag.
-    state
-        State of the law.
-    strain : ndarray (6,)
-        Sum of the strain increments, the symmetric parts of dt grad v.
-    time
-        Time.
-    work
-        Work of the stress per reference volume.
-    """
+    """A point of a material, and where it has come to."""
 
     def __init__(self, law: NamedTuple, kin: NamedTuple):
         self.law, self.kin = law, kin
         self.state = laws.initial_state(law, kin, 1.0)
-        self.strain = np.zeros(6)
+        self.strain = np.zeros(6)  # sum of the strain increments, symmetric parts of dt grad v
         self.time = 0.0
-        self.work = 0.0
+        self.work = 0.0  # of the stress, per reference volume
 
     @property
     def free(self) -> tuple[str, ...]:
-        """Components of strain that the kinematics has."""
         return FREE[type(self.kin)]
 
     @property
     def stress(self) -> np.ndarray:
-        """(6,) Cauchy stress."""
         return self._stress(self.state)
 
     def _stress(self, state: tuple) -> np.ndarray:
@@ -88,13 +144,7 @@ class Point:
         return np.pad(found, (0, 6 - len(found)))
 
     def follow(self, path: LoadPath, observe: Callable[[], None]) -> None:
-        """Go along a path; `observe` is called after every increment.
-
-        Raises
-        ------
-        Unreachable
-            With what went wrong and in which increment.
-        """
+        """Go along a path; `observe` is called after every increment."""
         prescribed = np.array([k for k, name in enumerate(COMPONENTS) if name in path.stress], int)
         motion = Loading(
             strain=path.strain_at_end(self.strain, self.free) - self.strain,
@@ -117,13 +167,7 @@ class Point:
             observe()
 
     def _go(
-        self,
-        motion: Loading,
-        duration: float,
-        a: float,
-        b: float,
-        rate: np.ndarray,
-        divisions: int,
+        self, motion: Loading, duration: float, a: float, b: float, rate: np.ndarray, divisions: int
     ) -> np.ndarray:
         """Go from the part `a` of a motion to the part `b`, in halves where it must be."""
         try:
@@ -144,44 +188,39 @@ class Point:
         increment = (b - a) * motion.strain
         rigid = self._turned((b - a) * motion.turn, dt)
 
-        def state_after(unknown: np.ndarray) -> tuple:
+        def after(unknown: np.ndarray) -> tuple[tuple, np.ndarray] | None:
+            """The state and its stress; None where there is none."""
             increment[prescribed] = unknown
             dl = self._flat(self._strained(increment, motion) + rigid)
-            return laws.advance(self.law, self.kin, self.state, dl, dt)
-
-        def misfit(unknown: np.ndarray) -> np.ndarray:
             try:
-                state = state_after(unknown)
+                state = laws.advance(self.law, self.kin, self.state, dl, dt)
                 if laws.jacobian(self.law, self.kin, state) > 0:
-                    return self._stress(state)[prescribed] - target
+                    return state, self._stress(state)
             except (ArithmeticError, ValueError):
                 pass  # a logarithm of what is turned inside out, an overflow
-            return np.full(len(prescribed), np.inf)
+            return None
+
+        def misfit(unknown: np.ndarray) -> np.ndarray:
+            found = after(unknown)
+            return (
+                np.full(len(prescribed), np.inf) if found is None else found[1][prescribed] - target
+            )
 
         unknown = self._newton(misfit, rate * (b - a), increment, target)
-        try:
-            new = state_after(unknown)
-            sound = (
-                laws.jacobian(self.law, self.kin, new) > 0 and np.isfinite(self._stress(new)).all()
-            )
-        except (ArithmeticError, ValueError):
-            sound = False
-        if not sound:
+        found = after(unknown)
+        if found is None or not np.isfinite(found[1]).all():
             raise Unreachable("the point is turned inside out (det F <= 0) or has no stress")
-        self._accept(new, increment)
+        self._accept(found[0], increment)
         return unknown
 
     def _newton(
-        self,
-        misfit: Callable[[np.ndarray], np.ndarray],
-        guess: np.ndarray,
-        increment: np.ndarray,
-        target: np.ndarray,
+        self, misfit: Callable, guess: np.ndarray, increment: np.ndarray, target: np.ndarray
     ) -> np.ndarray:
         """The strains at which `misfit` vanishes, by a tangent from finite differences."""
         if not len(guess):
             return guess
-        modulus = self._modulus()
+        volume = laws.specific_volume(self.law) * laws.jacobian(self.law, self.kin, self.state)
+        modulus = laws.wave_speed_squared(self.law, self.kin, self.state) / volume
         unknown, found = guess, misfit(guess)
         if not np.isfinite(found).all():
             unknown = np.zeros(len(guess))
@@ -211,11 +250,6 @@ class Point:
                 break
             unknown, found = trial, there
         raise Unreachable("the law does not reach the prescribed stress")
-
-    def _modulus(self) -> float:
-        """Density times the square of the speed of waves."""
-        volume = laws.specific_volume(self.law) * laws.jacobian(self.law, self.kin, self.state)
-        return laws.wave_speed_squared(self.law, self.kin, self.state) / volume
 
     def _strained(self, increment: np.ndarray, motion: Loading) -> np.ndarray:
         """(3, 3) dt grad v of a strain increment: pure, or simple where the motion says so."""
@@ -250,7 +284,6 @@ class Point:
         return min(forms, key=stored)
 
     def _flat(self, gradient: np.ndarray) -> tuple:
-        """A (3, 3) tensor as the kinematics has it."""
         return tensor(self.kin, [float(gradient[place]) for place in GRADIENT[type(self.kin)]])
 
     def _accept(self, state: tuple, increment: np.ndarray) -> None:
@@ -261,3 +294,85 @@ class Point:
         after = laws.jacobian(self.law, self.kin, self.state) * self.stress
         self.work += float(weights * (before + after) / 2 @ increment)
         self.strain = self.strain + increment
+
+
+WIDTH = 17  # as many as a number of ten digits, its sign and its exponent take, and a blank
+
+
+def von_mises_stress(point: Point) -> float:
+    """sqrt(3/2 s:s), s the deviatoric stress."""
+    xx, yy, zz, *shear = point.stress
+    normal = (xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2
+    return float(np.sqrt(normal / 2 + 3 * np.sum(np.square(shear))))
+
+
+def columns(point: Point) -> dict[str, Callable[[], float]]:
+    """Return the columns that are written of a point, by name."""
+    law, kin = point.law, point.kin
+    count = len(kin.symmetric_names)
+    found: dict[str, Callable[[], float]] = {"time": lambda: point.time}
+    for k, name in enumerate(COMPONENTS[:count]):
+        found[f"e{name}"] = lambda k=k: point.strain[k]
+    for k, name in enumerate(COMPONENTS[:count]):
+        found[f"s{name}"] = lambda k=k: point.stress[k]
+    found["p"] = lambda: -float(point.stress[:3].sum()) / 3
+    found["q"] = lambda: von_mises_stress(point)
+    found["J"] = lambda: materials.jacobian(law, kin, point.state)
+    found["stored"] = lambda: materials.energy_density(law, kin, point.state)
+    found["work"] = lambda: point.work
+    for name, what in materials.columns_of(law).items():
+        found[name] = lambda what=what: materials.shown(what, law, kin, point.state)
+    return found
+
+
+class Response:
+    """The answer of a point so far, a row for each increment."""
+
+    def __init__(self, point: Point):
+        self._columns = columns(point)
+        self.names = list(self._columns)
+        self.rows: list[list[float]] = []
+        self.observe()
+
+    def observe(self) -> None:
+        # A zero is added so that none is negative.
+        self.rows.append([float(value()) + 0.0 for value in self._columns.values()])
+
+    def last(self) -> dict[str, float]:
+        return dict(zip(self.names, self.rows[-1], strict=True))
+
+    def write(self, path: Path) -> None:
+        """Write the table, in the form of the log: a line of names, a line for each row."""
+        formats = [f"%-{WIDTH}.10g"] * (len(self.names) - 1) + ["%.10g"]
+        header = "".join(name.ljust(WIDTH) for name in self.names).rstrip()
+        with whole(path) as file:
+            np.savetxt(file, self.rows, fmt=formats, delimiter="", header=header, comments="")
+
+    def draw(self, path: Path, title: str) -> None:
+        """Draw the stresses over the strain that changes most, and q over p."""
+        table = dict(zip(self.names, np.transpose(self.rows), strict=True))
+        strains = [name for name in self.names if name.startswith("e") and name[1:] in COMPONENTS]
+        driven = max(strains, key=lambda name: np.ptp(table[name]))
+        stresses = [f"s{name[1:]}" for name in strains]
+        largest = max(float(np.abs(table[name]).max()) for name in stresses)
+        figure = blank_figure(9.6, 4.0)
+        left, right = figure.subplots(1, 2)
+        # Dashes let a curve show that lies under another.
+        for name, dashes in zip(stresses, ("-", "--", ":") * 2, strict=False):
+            if np.abs(table[name]).max() > 1e-6 * largest:
+                left.plot(table[driven], table[name], dashes, label=name, linewidth=1.4)
+        left.set_xlabel(driven)
+        left.set_ylabel("Cauchy stress")
+        right.plot(table["p"], table["q"], linewidth=1.4)
+        right.plot(table["p"][:1], table["q"][:1], "o", color="0.3", label="start")
+        right.set_xlabel("pressure p")
+        right.set_ylabel("von Mises stress q")
+        for axes in (left, right):
+            tidy(axes)
+            # Room for labels such as 0.0025 side by side, and powers of ten for longer ones.
+            axes.locator_params(axis="x", nbins=6)
+            axes.ticklabel_format(scilimits=(-3, 4))
+            if axes.get_legend_handles_labels()[0]:
+                axes.legend(frameon=False)
+        figure.suptitle(title)
+        savefig(figure, path)

@@ -1,18 +1,21 @@
-"""Points in the order of their ids: all of a scene, or a piece of them."""
+"""Points by their ids and nodes by their numbers: all of a scene, or so many at a time."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import cached_property
 from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.kernels.arrays import Block, Control, Setup, arrays_of, some_of
+from karamelo_py.kernels.arrays import MASS, Block, Control, Setup, arrays_of, some_of
 from karamelo_py.kernels.totals import LIMBS, add_all, add_rows, rounded
 from karamelo_py.output.fields import PIECE, SUMMED
+from karamelo_py.output.node_columns import NodeRows, brought, loaded, places_of
 from karamelo_py.output.point_table import Part, PointTable, Rows, places_before
+from karamelo_py.run.boxes import numbers
+from karamelo_py.run.checkpoint.arrays import kept_at_nodes, of_nodes, rows_at
 from karamelo_py.run.mpi.partition import joined
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.hub import Hub
@@ -22,30 +25,17 @@ LAST = 2**62  # behind all numbers of points
 
 
 class ById:
-    """The points of a simulation: by their ids (from 0), in pieces, and sums over them.
-
-    Attributes
-    ----------
-    setup : Setup
-        Arrays with the points at hand, in any order.
-    count : int
-        Number of points there have ever been.
-    present : ndarray (count,)
-        False for points that were deleted.
-    comm
-        The processes that share them.
-    """
+    """The points of a simulation: by their ids (from 0), in pieces, and sums over them."""
 
     hub: Hub
     comm = SerialComm()
     setup: Setup
     control: Control
-    count: int
-    present: np.ndarray
+    count: int  # of the points there have ever been
+    present: np.ndarray  # (count,) False for points that were deleted
 
     @property
     def kin(self) -> NamedTuple:
-        """The kinematics."""
         return self.setup.kin
 
     @property
@@ -53,14 +43,9 @@ class ById:
         """The number of the present of the two position arrays."""
         return int(self.control.clock[0].now)
 
-    @property
-    def blocks(self) -> tuple[Block, ...]:
-        """The kinds of points, with those that are at hand."""
-        return self.setup.blocks
-
     def rows(self) -> Rows:
         """Return all points, in the order of their ids, for a table."""
-        parts = [Part(block, None, block.points.id) for block in self.blocks]
+        parts = [Part(block, None, block.points.id) for block in self.setup.blocks]
         comm = self.comm if self.comm.size > 1 else None
         return Rows(self.setup, parts, np.arange(self.count), self.present, comm)
 
@@ -79,7 +64,6 @@ class ById:
 
     @property
     def x(self) -> np.ndarray:
-        """(N, d) present positions."""
         return PointTable(self.hub, self.rows()).position
 
     def total(self, name: str, group: Any = None) -> float:
@@ -108,7 +92,7 @@ class ById:
         """Yield the points of a group that are at hand, so many at a time, and at last none."""
         for block, rows in self.rows_of(group):
             yield self._some(block, rows)
-        yield self._some(self.blocks[0], np.empty(0, np.int64))
+        yield self._some(self.setup.blocks[0], np.empty(0, np.int64))
 
     def _some(self, block: Block, rows: np.ndarray) -> PointTable:
         parts, ids = [Part(block, rows, slice(None))], block.points.id[rows]
@@ -117,8 +101,8 @@ class ById:
     def added_up(self, part: Any, name: str, *arguments: Any) -> np.ndarray:
         """Sums over the points of a part's group of what its method `name` says; no rounding.
 
-        The method is called with tables of some of the points, and the `arguments`. It returns
-        rows of terms (k, n), or the number of sums, to which of them (n,) a term goes, and terms.
+        Called with tables of some of the points, and the `arguments`, it returns rows of terms
+        (k, n), or the number of sums, to which of them (n,) a term goes, and terms.
         """
         limbs = np.empty((0, LIMBS), np.int64)
         for some in self.some(part.group):
@@ -144,13 +128,9 @@ class ById:
 
     def each(self, part: Any, name: str, *arguments: Any) -> list:
         """Collect the answers of a part's method for some points of its group after others."""
-        own = list(self._said(part, name, *arguments))
+        found = (getattr(part, name)(some, *arguments) for some in self.some(part.group))
+        own = [one for one in found if one is not None]
         return [one for of_rank in self.comm.allgather(own) for one in of_rank]
-
-    def _said(self, part: Any, name: str, *arguments: Any) -> Iterator[Any]:
-        say = getattr(part, name)
-        found = (say(some, *arguments) for some in self.some(part.group))
-        return (one for one in found if one is not None)
 
     def seen(self, say: Callable, *arguments: Any) -> list:
         """Gather a function's answer for the points of each process."""
@@ -158,17 +138,21 @@ class ById:
 
     def largest(self, of: Callable[[PointTable], np.ndarray]) -> tuple[float, int]:
         """The largest number that a function says of all points, and the first point with it."""
-        value, number = max(self.seen(_largest, of))
+
+        def own(points: ById) -> tuple[float, int]:
+            found = -inf, 0
+            for some in points.some(None):
+                values = of(some)
+                value = np.fmax.reduce(values, initial=-inf)
+                first = some.ids[values == value].min(initial=LAST)
+                found = max(found, (float(value), -int(first)))
+            return found
+
+        value, number = max(self.seen(own))
         return value, -number
 
     def everyone(self, what: str, thing: Any) -> list:
-        """Gather the things of all processes, which have to ask for the same (in words).
-
-        Raises
-        ------
-        ScriptError
-            If a function in Python asks on one process for what it does not on another.
-        """
+        """Gather the things of all processes, which have to ask for the same (in words)."""
         asked, found = zip(*self.comm.allgather((what, thing)), strict=True)
         if other := next((one for one in asked if one != asked[0]), None):
             raise ScriptError(
@@ -184,39 +168,25 @@ class ById:
         found = self.comm.gather(thing)
         return self.comm.scatter(None if found is None else make(found))
 
-    def counts(self) -> list[int]:
-        """Count the points of each block."""
-        own = [len(block.points.id) for block in self.setup.blocks]
-        return self.comm.allreduce(np.array(own)).tolist()
-
-    def of_all(self, numbers: np.ndarray) -> np.ndarray:
-        """Sums over all processes that have some of the points."""
-        return self.comm.allreduce(numbers)
-
-    def most(self, numbers: np.ndarray) -> np.ndarray:
-        """The largest of each number of all processes."""
-        return self.comm.allreduce_max(numbers)
-
     @cached_property
     def x0(self) -> np.ndarray:
-        """(N, d) positions before the first step."""
-        return places_before(self.hub, np.arange(self.count))
+        return self.x0_of(np.arange(self.count))
 
     def x0_of(self, ids: np.ndarray) -> np.ndarray:
         """Return (n, d) positions of some points before the first step."""
         return places_before(self.hub, ids)
 
-    def ranges(self) -> Iterator[tuple[int, int]]:
-        """The ids of pieces, from and to, one after another."""
-        for first in range(0, self.count, PIECE):
-            yield first, min(first + PIECE, self.count)
-
     def pieces(self, *, to_first: bool = False) -> Iterator[PointTable]:
         """Yield all points, so many at a time; `to_first`, to the first of several processes."""
-        s, ordered = self.setup, list(map(Ordered, self.setup.blocks))
+        s = self.setup
+        orders = [np.argsort(block.points.id) for block in s.blocks]
+        known = [block.points.id[order] for block, order in zip(s.blocks, orders, strict=True)]
         gather = self.comm.gather if to_first else self.comm.allgather
-        for first, end in self.ranges():
-            blocks = [one.between(first, end) for one in ordered]
+        for first, end in _ranges(self.count):
+            blocks = [
+                some_of(block, order[slice(*np.searchsorted(ids, (first, end)))])
+                for block, order, ids in zip(s.blocks, orders, known, strict=True)
+            ]
             if self.comm.size > 1:
                 own = [[array for _, array in arrays_of(block.points)] for block in blocks]
                 found = gather(own)
@@ -231,25 +201,71 @@ class ById:
             yield PointTable(self.hub, Rows(s, parts, ids, self.present[first:end]))
 
 
-def _largest(points: ById, of: Callable[[PointTable], np.ndarray]) -> tuple[float, int]:
-    """As `largest` of the points at hand: (value, -number), -infinity without a number."""
-    found = -inf, 0
-    for some in points.some(None):
-        values = of(some)
-        value = np.fmax.reduce(values, initial=-inf)
-        first = some.ids[values == value].min(initial=LAST)
-        found = max(found, (float(value), -int(first)))
-    return found
+def _ranges(count: int) -> Iterator[tuple[int, int]]:
+    """The numbers of pieces of so many, from and to before, one after another."""
+    return ((first, min(first + PIECE, count)) for first in range(0, count, PIECE))
 
 
-class Ordered:
-    """The points of a block, to be had by id."""
+class ByNumber:
+    """The nodes of a scene."""
 
-    def __init__(self, block: Block):
-        self.block = block
-        self._order = np.argsort(block.points.id)
-        self._ids = block.points.id[self._order]
+    setup: Setup
 
-    def between(self, first: int, end: int) -> Block:
-        """The points with ids from `first` to before `end`, in a block."""
-        return some_of(self.block, self._order[slice(*np.searchsorted(self._ids, (first, end)))])
+    def node_pieces(self, names: Iterable[str], *, to_first: bool = False) -> Iterator[NodeRows]:
+        """All nodes, so many at a time, with the sums over points of these names; see `pieces`."""
+        self.show_on_nodes()
+        sums = {name: brought(self, name) for name in names}
+        weights = loaded(self.hub, self) if sums else {}
+        kept = kept_at_nodes(self.setup)
+        if self.subdomain is not None:
+            self.subdomain.share_kept()
+        gather = self.comm.gather if to_first else self.comm.allgather
+        for first, end in _ranges(self.hub.fields.node_count):
+            if self.comm.size == 1:
+                arrays = {name: array[first:end] for name, array in of_nodes(self.setup)}
+                own = {name: of[first:end] for name, of in sums.items()}
+            else:
+                arrays = rows_at(self, np.arange(first, end), gather)
+                own = self._sums_between(first, end, sums, gather)
+                if arrays is None:
+                    continue
+                arrays |= {f"nodes/{name}": array[first:end] for name, array in kept}
+            own = {name: of.sum(axis=1) for name, of in own.items()}
+            yield NodeRows(first, end, self.kin, arrays, own, weights)
+
+    def _sums_between(self, first: int, end: int, sums: dict, gather: Callable) -> dict:
+        """Sums over the points of all processes at the nodes from `first` to before `end`."""
+        nodes = numbers(self.setup.spans)
+        used = nodes[slice(*np.searchsorted(nodes, (first, end)))]
+        own = {name: np.zeros((end - first, 2)) for name in sums}
+        for there, given in gather((used, [of[used] for of in sums.values()])) or ():
+            for total, of in zip(own.values(), given, strict=True):
+                total[there - first] += of
+        return own
+
+    def counted(self) -> np.ndarray:
+        """The numbers of the nodes in use, of each at one process."""
+        if self.subdomain is not None:
+            return self.subdomain.counted()
+        return numbers(self.setup.spans)
+
+    def nodes_with_mass(self) -> np.ndarray:
+        nodes = self.counted()
+        return nodes[self.setup.nodes.sums[nodes, MASS] > 0]
+
+    def mass_at_nodes(self, ID: str) -> np.ndarray:
+        """(4,) the mass of the nodes of a group, and this times x, y and z; rounded once."""
+        nodes = np.intersect1d(
+            self.nodes_with_mass(), self.hub.groups[ID].members, assume_unique=True
+        )
+        mass = self.setup.nodes.sums[nodes, MASS].astype(float)
+        ones = np.ones(len(nodes))
+        return self.summed(mass[:, None] * np.column_stack([ones, places_of(self.hub, nodes)]))
+
+    def occupied_nodes(self) -> tuple[int, int]:
+        """Count the nodes that have mass, and find the last of them."""
+        there = self.nodes_with_mass()
+        count = self.comm.allreduce(np.array([len(there)]))
+        return int(count[0]), int(
+            self.comm.allreduce_max(np.array([there.max(initial=-1)], float))[0]
+        )

@@ -1,6 +1,6 @@
 """The grids cut into tiles: which points lie in which, which nodes they give to or are in use."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from math import inf
 from typing import Any
 
@@ -9,6 +9,7 @@ import numpy as np
 from karamelo_py.compiler.fields import addresses_of_rows
 from karamelo_py.compiler.lanes import lanes_for
 from karamelo_py.compiler.threads import Serial, Threaded
+from karamelo_py.kernels import sorting
 from karamelo_py.kernels.arrays import (
     ADD,
     CLEAR,
@@ -22,32 +23,26 @@ from karamelo_py.kernels.arrays import (
     arrays_of,
 )
 from karamelo_py.kernels.heat import Conducting
-from karamelo_py.kernels.sorting import (
-    Neighbourhood,
-    SortedOrder,
-    TileGrid,
-    find_rows,
-    find_tiles,
-    sort_points,
-    widest,
-)
 from karamelo_py.kernels.sweep import ROUNDING
 from karamelo_py.points.basis import first_node, shape_size
 from karamelo_py.points.kinematics import planar
-from karamelo_py.run.tiles.boxes import (
+from karamelo_py.run.boxes import (
     Boxes,
     Reached,
+    buffers_of,
     extents,
+    grow,
     joined_spans,
     numbered,
     ragged,
     ranges_of_shares,
+    room_of,
     rows_of,
     steps_of,
+    summed,
     used,
     without,
 )
-from karamelo_py.run.tiles.buffers import buffers_of, grow, room_of, summed
 from karamelo_py.scene.lattice import MAX_NODES, Lattice
 
 # By dimension: cells of a tile of points per direction, and nodes of a tile of nodes. Small boxes
@@ -72,32 +67,15 @@ DIRECT_DRIFT, DIRECT_STEPS = 4.0, 1000
 
 
 class Tiles:
-    """Sorts the points of a setup by tile; says what nodes the points of a tile may reach.
+    """Sorts the points of a setup by tile; says what nodes the points of a tile may reach."""
 
-    Attributes
-    ----------
-    size
-        (d,) cells of a tile.
-    count
-        Number of tiles, of all grids.
-    occupied
-        How many of them hold points.
-    direct
-        Whether points give straight to the nodes, tile after tile: scenes of few points.
-    sorts
-        How often points were sorted.
-    rows
-        How many rows of the buffers the boxes of all tiles take.
-    threads, mode
-        How many sum at nodes and sort, and how.
-    """
-
-    threads = 1
+    threads = 1  # that sum at nodes and sort
     mode: Serial | Threaded = Serial()
 
     def __init__(self, lattices: Sequence[Lattice], basis: Any, points: int, sparse: bool):
-        self.direct = points <= DIRECT_UP_TO
+        self.direct = points <= DIRECT_UP_TO  # points give straight to the nodes, tile after tile
         self.dimension = d = lattices[0].dimension
+        # Cells of a tile of points, nodes of one of nodes, by direction.
         self.size, self.node_size = np.full(d, TILES[d]), np.full(d, NODES[d])
         self.long = sparse and d == 3
         if self.long:
@@ -106,8 +84,9 @@ class Tiles:
         self.per_cell = type(basis).nodes_per_cell
         self.least_nodes = type(basis).least_nodes
         self.beyond = type(basis).cells // 2  # nodes that points see beyond those of their cell
-        self.sorts = self.sets = self.rows = 0
-        self.occupied = 0
+        self.sorts = self.sets = 0  # how often points were sorted; sets of buffers
+        self.rows = 0  # of the buffers, that the boxes of all tiles take
+        self.occupied = 0  # tiles that hold points
         # By grid and direction: nodes, cells, and so on.
         self._nodes = np.array([x.shape[:d] for x in lattices], np.int64)
         self._cells = np.array([x.cells[:d] for x in lattices], np.int64)
@@ -121,25 +100,19 @@ class Tiles:
         shaped = shape_size(type(basis), d) > 0
         self._most_rows = inf if shaped else most
         rows = np.prod(widest[:, :-1], axis=1, dtype=np.int64).max()
-        self._most_in_box = int(rows) if self._by_rows(shaped) else 0  # rows of a box, at most
-        self.count = int(self.first[-1])
-        self._cut = TileGrid(self.size, self.shapes, self.first)
+        # What points may reach is known of each row of a box where rows of nodes are tiles: of the
+        # boxes around a bar that has spread at one end they reach little at the other.
+        by_rows = self.long and not shaped and not self.direct
+        self._most_in_box = int(rows) if by_rows else 0  # rows of a box, at most
+        self.count = int(self.first[-1])  # of tiles, of all grids
+        self._cut = sorting.TileGrid(self.size, self.shapes, self.first)
         tiles = -(-self._nodes // self.node_size)
         self._tile_steps = steps_of(tiles)
         self._first_of_nodes = numbered(tiles)
         # Of all buffers of a scene: count, first and parts.
         self._layout = np.zeros(2, np.int64), np.zeros(1, np.int64), np.zeros((0, 10), np.int64)
 
-    def _by_rows(self, shaped: bool) -> bool:
-        """Check that the part that points may reach is known of each row of a box.
-
-        Rows of nodes are tiles of nodes then. Of the boxes around a bar that has spread at one end
-        points reach little at the other.
-        """
-        return self.long and not shaped and not self.direct
-
     def empty_tiling(self) -> Tiling:
-        """Room for the tiles of a block."""
         return Tiling(
             count=np.array([0, 1, 0]),
             share=np.zeros(SHARES + 1, np.int64),
@@ -166,17 +139,6 @@ class Tiles:
             )
         self.sets += 1
         return Buffers(of, *self._layout, self.sets - 1)
-
-    def in_use(self, s: Setup) -> list[tuple[str, np.ndarray, int]]:
-        """The arrays that a sort changes beside the points, and how many rows of them are in use.
-
-        All others follow from them (`lay_out`).
-        """
-        return [
-            (f"tiling/{k}/{name}", getattr(block.tiling, name), rows)
-            for k, block in enumerate(s.blocks)
-            for name, rows in in_use(block.tiling)
-        ]
 
     def empty_nodes(self, s: Setup) -> None:
         """Set the sums of points at the nodes in use to zero."""
@@ -207,7 +169,7 @@ class Tiles:
         """Bound the distance of points' contributions from their present positions, in cells."""
         far = 0.0
         if len(x) > self.dimension:
-            far = widest(s.kin, s.basis, s.grids, x, block.points.grid)
+            far = sorting.widest(s.kin, s.basis, s.grids, x, block.points.grid)
         cells = float(self._cells.max())
         rounding = ROUNDING + 4 * np.finfo(x.dtype).eps * cells
         drift = s.control.clock[0].drift_limit + rounding if s.frame.moves else 0.0
@@ -222,7 +184,7 @@ class Tiles:
         x, ends = self._where(s, points), np.empty((self.threads, self.count), np.int64)
         tile = np.empty(x.shape[1], np.int64)
         kin, of = planar(s.kin), points.grid
-        find_tiles(self.mode, len(ends), kin, s.grids, self._cut, x, of, ends, tile)
+        sorting.find_tiles(self.mode, len(ends), kin, s.grids, self._cut, x, of, ends, tile)
         return tile
 
     def _sort_block(self, s: Setup, block: Block) -> np.ndarray:
@@ -232,13 +194,14 @@ class Tiles:
         reach = self._reach(s, block, x)
         # Some parts for each thread: tiles are not of like size, and others may need a core. Of few
         # points, or fewer than tiles, one thread has sorted all before several have met.
-        parts = min(4 * self.threads, x.shape[1] // PART, 4 * x.shape[1] // self.count)
+        parts, mode = (
+            min(4 * self.threads, x.shape[1] // PART, 4 * x.shape[1] // self.count),
+            self.mode,
+        )
         if self.threads == 1 or parts < 2:
             parts, mode = 1, Serial()
-        else:
-            mode = self.mode
         scratch = np.empty((4, x.shape[1]), np.int64)
-        found = SortedOrder(
+        found = sorting.SortedOrder(
             lanes_for(8 * x.itemsize).width,
             np.empty((parts, self.count), np.int64),
             np.empty(parts + 1, np.int64),
@@ -249,10 +212,10 @@ class Tiles:
         )
         top, least = self._nodes - 1, self.least_nodes - 1
         offset = first_node(s.basis, s.grids.h[0])
-        sight = Neighbourhood(top, self.per_cell, self.beyond, least, reach, offset)
+        sight = sorting.Neighbourhood(top, self.per_cell, self.beyond, least, reach, offset)
         kin, of, ids = planar(s.kin), points.grid, points.id
         rows = addresses_of_rows(array for _, array in arrays_of(points))
-        sort_points(mode, kin, s.grids, sight, self._cut, x, of, ids, found, rows)
+        sorting.sort_points(mode, kin, s.grids, sight, self._cut, x, of, ids, found, rows)
         ends = found.ends[-1]
         begins = np.append(0, ends[:-1])
         occupied = np.flatnonzero(ends > begins)
@@ -266,21 +229,17 @@ class Tiles:
         tiling.grid[:count] = grid
         tiling.box[:count] = np.concatenate(found.boxes[:, occupied], axis=1)
         if self._most_in_box:
-            find_rows(mode, parts, s.kin, s.grids, sight, x, tiling, parts)
+            sorting.find_rows(mode, parts, s.kin, s.grids, sight, x, tiling, parts)
         return occupied
 
     def box_bytes(self, s: Setup) -> int:
-        """Bytes of the boxes of all tiles."""
         if self.direct:
             return 0
         given = [array for one in buffers_of(s) for array in summed(one.nodes)]
         return self.rows * sum(array.itemsize * array.shape[1] for array in given)
 
     def lay_out(self, s: Setup) -> None:
-        """Lay the boxes of all blocks one after another; find the tiles of nodes that they reach.
-
-        Everything follows from the boxes of the tiles.
-        """
+        """Lay boxes of all blocks one after another; find the tiles of nodes that they reach."""
         spans, *found = self._rows_to_clear(s) if self.direct else self._parts_to_sum(s)
         s.buffers.count[:] = len(found[1]) - 1, self.direct
         spans = np.concatenate([[[len(spans), 0]], spans])
@@ -290,10 +249,7 @@ class Tiles:
             room[: len(rows)] = rows
 
     def _rows_to_clear(self, s: Setup) -> tuple[np.ndarray, ...]:
-        """The same as `_parts_to_sum` where points are few: one share, a part for each span.
-
-        Boxes have the numbers of the grids.
-        """
+        """As `_parts_to_sum` where points are few: one share, a part for each span."""
         boxes = Tiles._boxes(self, s)
         steps = self._steps[boxes.grid]
         self._tell_buffers(s, 0, 0, self._first_node[boxes.grid], steps)
@@ -301,12 +257,8 @@ class Tiles:
         parts = np.ones((len(spans), 10), np.int64)
         parts[:, 0], parts[:, 4] = spans[:, 0], spans[:, 1] - spans[:, 0]
         parts[:, 9] = CLEAR
-        return (
-            spans,
-            ranges_of_shares(spans, np.zeros(len(spans), np.int64), 1),
-            [0, len(spans)],
-            parts,
-        )
+        ranges = ranges_of_shares(spans, np.zeros(len(spans), np.int64), 1)
+        return spans, ranges, [0, len(spans)], parts
 
     def _parts_to_sum(self, s: Setup) -> tuple[np.ndarray, ...]:
         """Spans and ranges of the nodes in tiles that boxes reach; first of each share, and parts.
@@ -340,12 +292,8 @@ class Tiles:
         firsts = np.append(starts + np.cumsum(more) - more, len(parts))
         rows = np.stack(rows_of(own), axis=1)
         ranges = ranges_of_shares(rows, np.repeat(owner, own[:, 2] * own[:, 3]), SHARES)
-        return (
-            joined_spans(own),
-            ranges,
-            firsts[np.searchsorted(owner, np.arange(SHARES + 1))],
-            parts,
-        )
+        firsts = firsts[np.searchsorted(owner, np.arange(SHARES + 1))]
+        return joined_spans(own), ranges, firsts, parts
 
     def _beside(self, tile: np.ndarray, grid: np.ndarray) -> np.ndarray:
         """The first of the tiles of nodes (n,) that are of one share with each.
@@ -359,6 +307,14 @@ class Tiles:
             return tile
         first, along = self._first_of_nodes[grid], self._tile_steps[grid, -2]
         return tile - (tile - first) % along
+
+    def reached_by(self, s: Setup) -> tuple[np.ndarray, ...]:
+        """Of the nodes in use here what `spans_of_all` asks for."""
+        return (used(s.spans)[1:],)
+
+    def spans_of_all(self, reached: Iterable[tuple[np.ndarray, ...]]) -> np.ndarray:
+        """(k, 2) spans of the nodes in use, from what all processes reach: one has them all."""
+        return np.concatenate([spans for (spans,) in reached])
 
     def spans_of(self, tile: np.ndarray, begin: np.ndarray, end: np.ndarray) -> np.ndarray:
         """(k, 2) spans of nodes in use, from boxes of them (n, d) in tiles of nodes (n,)."""
@@ -379,7 +335,6 @@ class Tiles:
         return np.concatenate(found)
 
     def _boxes(self, s: Setup) -> Boxes:
-        """The boxes of the tiles of all blocks."""
         d, tilings = self.dimension, [block.tiling for block in s.blocks]
         grid = np.concatenate([one.grid[: one.count[0]] for one in tilings])
         box = np.concatenate([one.box[: one.count[0]] for one in tilings])
@@ -387,7 +342,6 @@ class Tiles:
         return Boxes(np.arange(len(box)), grid, box[:, :d], box[:, d:], rows)
 
     def _reached(self, boxes: Boxes) -> tuple[Boxes, Reached]:
-        """Find the tiles of nodes that the boxes reach."""
         size = self.node_size
         low = boxes.lo // size
         across = boxes.hi // size - low + 1
@@ -414,7 +368,12 @@ class Tiles:
         begins = np.concatenate([[0], ends])[:-1]
         first = begins - (boxes.lo * steps).sum(axis=1)
         self._tell_buffers(s, begins, ends, first, steps)
-        self._make_room(s, int(ends[-1]) if len(ends) else 0)
+        self.rows = int(ends[-1]) if len(ends) else 0
+        if self.rows > MAX_NODES:
+            raise MemoryError(f"tiles of points would need {self.rows} records of nodes")
+        for one in buffers_of(s):
+            for array in summed(one.nodes):
+                grow(array, self.rows)
         return first, steps
 
     def _tell_buffers(self, s: Setup, begins, ends, first, steps) -> None:
@@ -427,15 +386,6 @@ class Tiles:
             count = block.tiling.count[0]
             block.tiling.buffer[:count] = columns[done : done + count]
             done += count
-
-    def _make_room(self, s: Setup, rows: int) -> None:
-        """Make the buffers as large as the boxes of all tiles need."""
-        if rows > MAX_NODES:
-            raise MemoryError(f"tiles of points would need {rows} records of nodes")
-        self.rows = rows
-        for one in buffers_of(s):
-            for array in summed(one.nodes):
-                grow(array, rows)
 
     def _see_nodes(
         self, tiles: np.ndarray, grid: np.ndarray, begin: np.ndarray, end: np.ndarray
@@ -503,8 +453,3 @@ def one_after_another(ranges: np.ndarray) -> np.ndarray:
     """Ranges (k, 2) as long as these, each from the end of the one before."""
     ends = np.cumsum(ranges[:, 1] - ranges[:, 0])
     return np.stack([np.append(0, ends)[:-1], ends], axis=1)
-
-
-def in_tiles(tiling: Tiling) -> int:
-    """Number of the points in the tiles."""
-    return int(tiling.range[: tiling.count[0], 1].max(initial=0))

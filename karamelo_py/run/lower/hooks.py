@@ -1,0 +1,268 @@
+"""Hooks of the fixes of a scene: compiled ones as tables that kernels read, and those in Python."""
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.compiler.formula import BLOCK, EVALUATE, ROWS, STACK, evaluate_in_table
+from karamelo_py.compiler.loops import address_of
+from karamelo_py.compiler.threads import Serial
+from karamelo_py.kernels import arrays
+from karamelo_py.kernels.arrays import INITIAL_INTEGRATE, ON_VELOCITY, SUPPLY_HEAT, Setup
+from karamelo_py.kernels.heat import at_heat_nodes, at_heated_points
+from karamelo_py.kernels.hook_loop import at_nodes, at_points
+from karamelo_py.kernels.hooks import STAGES, CompiledHook
+from karamelo_py.kernels.totals import LIMBS
+from karamelo_py.kernels.walls import FRICTION
+from karamelo_py.language.faults import as_script_error
+from karamelo_py.run.boxes import unique
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.views import NodesView, PieceView, PointsView
+from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.expressions import FIRST, POINT_SEEDS
+
+NO_PROGRAM = (-1, -1, -1, -1)
+
+
+def lower_hooks(
+    hub: Hub, fixes: list, mode: Any = None, threads: int = 1
+) -> arrays.Hooks | arrays.NoHooks:
+    """Make the tables of the compiled hooks of fixes, in their order; by one thread, or several."""
+    dimension = hub.domain.dimension
+    count = sum(s.count for s in hub.solids.values())
+    builder = _Builder(hub, count)
+    for fix in fixes:
+        for name, hook in fix.hooks().items():
+            if isinstance(hook, CompiledHook):
+                builder.add(fix, name, hook)
+    if not builder.rows:
+        return arrays.NoHooks()
+    solids = hub.solids.values() if builder.uses_first else ()
+    own, values = threads if threads > 1 else 0, len(hub.values.array)
+    return arrays.Hooks(
+        evaluate=address_of(evaluate_in_table, EVALUATE),
+        table=np.array(builder.rows, arrays.HOOK).view(np.recarray),
+        programs=np.array(builder.programs, arrays.PROGRAM).view(np.recarray),
+        members=np.concatenate([np.empty(0, np.int64), *builder.members]),
+        code=np.concatenate([np.empty((0, 2), np.int64), *builder.code]),
+        constants=np.concatenate([np.empty(0), *builder.constants]),
+        x0=np.concatenate([np.empty((0, dimension)), *(s.x0 for s in solids)]),
+        chosen=np.zeros(BLOCK, np.int64),
+        scratch=np.zeros((STACK + ROWS, BLOCK)),
+        held=np.zeros((builder.shared_nodes(), dimension), arrays.HELD).view(np.recarray),
+        loads=np.zeros((builder.loaded_nodes, dimension)),
+        mode=mode or Serial(),
+        # What threads have of their own, with space between the values of two.
+        apart=arrays.Apart(
+            chosen=np.zeros((own, BLOCK), np.int64),
+            scratch=np.zeros((own, STACK + ROWS, BLOCK)),
+            values=np.zeros((own, values + 16)),
+            totals=np.zeros((own, values, LIMBS), np.int64),
+            clock=np.zeros((own, 1), arrays.CLOCK).view(np.recarray),
+        ),
+    )
+
+
+class _Builder:
+    """Collects rows, members and programs."""
+
+    def __init__(self, hub: Hub, points: int):
+        self.hub = hub
+        self.points = points
+        self.uses_first = False  # places of points before the first step
+        self.rows: list[tuple] = []
+        self.programs: list[list[tuple]] = []
+        self.members: list[np.ndarray] = []
+        self.code: list[np.ndarray] = []
+        self.constants: list[np.ndarray] = []
+        self.holding: list[Any] = []
+        self.loaded_nodes = 0  # the number of nodes, where hooks bring forces
+
+    def add(self, fix: Any, moment: str, hook: CompiledHook) -> None:
+        begin, end = self._members(fix, hook)
+        slot = -1
+        if hook.publishes and fix.published:
+            # Components lie one after another, from x on; a total without direction stands alone.
+            first = "x" if "x" in fix.published else fix.published[0]
+            slot = self.hub.values.slot(f"{fix.id}_{first}")
+        with as_script_error(f"fix {fix.style}", moment, hook.function, fix.place):
+            address = address_of(hook.function, hook.signature)
+        formulas = [f for f in (*fix.formulas, fix.wall_friction) if f is not None]
+        holds = hook.holds and (slot >= 0 or not hook.on_nodes)
+        uses_place = any(f.names & set(POINT_SEEDS) for f in formulas)
+        uses = map(int, (hook.uses_before, hook.uses_share, holds, uses_place))
+        self.rows.append((address, STAGES[moment], begin, end, slot, *uses))
+        programs = [self._program(formula) for formula in fix.formulas]
+        programs += [NO_PROGRAM] * (FRICTION - len(programs))
+        self.programs.append([*programs, self._program(fix.wall_friction)])
+        self.uses_first |= not hook.on_nodes and any(f.names & FIRST for f in formulas)
+        if hook.holds and hook.on_nodes:
+            self.holding.append(fix)
+        if STAGES[moment] == arrays.POST_PARTICLES_TO_GRID:
+            self.loaded_nodes = fix.group.total()
+
+    def shared_nodes(self) -> int:
+        """Count the nodes, where hooks hold some of them in common; else 0."""
+        fixes = self.holding
+        if len(fixes) < 2:
+            return 0
+        if not any(fix.group.all for fix in fixes):
+            nodes = np.concatenate([fix.nodes for fix in fixes])
+            if len(unique(nodes)) == len(nodes):
+                return 0
+        return fixes[0].group.total()
+
+    def _members(self, fix: Any, hook: CompiledHook) -> tuple[int, int]:
+        if fix.group.all:
+            return -1, -1
+        if hook.on_nodes:
+            return _put(self.members, unique(fix.nodes))
+        members = fix.group.bits(self.points).view("<i8").astype(np.int64, copy=False)
+        return _put(self.members, members)
+
+    def _program(self, formula: Any) -> tuple:
+        if formula is None:
+            return NO_PROGRAM
+        if formula.is_constant:  # without code: the number
+            return 0, 0, *_put(self.constants, np.array([formula.constant]))
+        program = formula.program(self.hub.values)
+        return *_put(self.code, program.code), *_put(self.constants, program.constants)
+
+
+def _put(pieces: list[np.ndarray], piece: np.ndarray) -> tuple[int, int]:
+    """Append a piece, and return where it begins and ends."""
+    begin = sum(map(len, pieces))
+    pieces.append(piece)
+    return begin, begin + len(piece)
+
+
+def sets_initial_state(fix: Any) -> bool:
+    """Tell whether all a fix does is a hook in Python before the first step."""
+    hooks = fix.hooks()
+    return set(hooks) == {"initial_integrate"} and not isinstance(
+        hooks["initial_integrate"], CompiledHook
+    )
+
+
+class PythonHooks:
+    """Hooks of a step when some fixes act from Python: theirs, and the compiled ones."""
+
+    def __init__(self, simulation: Any, fixes: list):
+        self.simulation = simulation
+        self.compiled = lower_hooks(simulation.hub, fixes, simulation.mode, simulation.threads)
+        self.by_stage: dict[int, list[tuple[Any, Callable]]] = {}
+        for fix in fixes:
+            for name, hook in fix.hooks().items():
+                if not isinstance(hook, CompiledHook):
+                    self.by_stage.setdefault(STAGES[name], []).append((fix, hook))
+
+    def act(self, function: Callable, s: Setup, stage: int, *arguments: Any) -> None:
+        """Call what acts from Python on a setup: the own one where that is enough for all."""
+        if all(fix.point_by_point for fix, _ in self.by_stage[stage]):
+            function(self, s, stage, *arguments)
+        else:
+            self.simulation.act(lambda whole: function(self, whole, stage, *arguments), s)
+
+
+def _call(simulation: Any, fix: Any, hook: Callable, view: Any) -> None:
+    """Call a hook; of one that each process calls for its own, see that all agree.
+
+    All have to have asked for the same, else one would wait for the others for ever, and to have
+    published the same, else the values would be those of a part.
+    """
+    try:
+        hook(view)
+        if fix.point_by_point:
+            _agree(simulation, fix)
+    except ScriptError as error:
+        error.place = error.place or fix.place
+        raise
+
+
+def _agree(simulation: Any, fix: Any) -> None:
+    values = simulation.hub.values
+    names = (f"{fix.id}_{name}" if name else fix.id for name in fix.published)
+    own = {name: values.get(name) for name in names if name in values}
+    first, *others = simulation.everyone("its end", own)
+    for other in others:
+        name = next((name for name in first if repr(first[name]) != repr(other[name])), None)
+        if name is not None:
+            raise ScriptError(
+                f"fix {fix.style}: {name} is {first[name]:.6g} on one process and "
+                f"{other[name]:.6g} on another",
+                hint=f"tell the author of {fix.style}: point_by_point, each has a part of the "
+                "points; points.total(terms) and nodes.total(terms) are sums over all",
+            )
+
+
+def _on_nodes(hooks: PythonHooks, s: Setup, stage: int, target: int) -> None:
+    for fix, hook in hooks.by_stage[stage]:
+        before = target == ON_VELOCITY
+        view = NodesView(hooks.simulation, s, fix.group, stage, before_update=before)
+        _call(hooks.simulation, fix, hook, view)
+
+
+def _on_heat_nodes(hooks: PythonHooks, s: Setup, stage: int, target: int) -> None:
+    # A temperature is to a capacity what a velocity is to a mass: the same view shows it.
+    nodes = s.heat.nodes._replace(fields=s.nodes.fields)
+    _on_nodes(hooks, s._replace(nodes=nodes), stage, target)
+
+
+def _on_points(hooks: PythonHooks, s: Setup, stage: int, then: int) -> None:
+    for fix, hook in hooks.by_stage[stage]:
+        view = view_of(hooks.simulation, fix, then=bool(then))
+        _call(hooks.simulation, fix, hook, view)
+        if view.moved and stage == INITIAL_INTEGRATE:
+            hooks.simulation.sort()
+        elif view.moved:
+            s.control.clock[0].drift = np.inf
+
+
+@at_nodes.on(PythonHooks)
+def _at_nodes_python_hooks(hooks, stage, target, s):
+    at_nodes(hooks.compiled, stage, target, s)
+    if stage in hooks.by_stage:
+        hooks.act(_on_nodes, s, stage, target)
+
+
+@at_points.on(PythonHooks)
+def _at_points_python_hooks(hooks, stage, then, s):
+    if stage == INITIAL_INTEGRATE and hooks.simulation.taken_up:
+        hooks.simulation.taken_up = False
+        return
+    at_points(hooks.compiled, stage, then, s)
+    if stage == INITIAL_INTEGRATE:
+        hooks.simulation.clear_forces()
+    if stage in hooks.by_stage:
+        hooks.act(_on_points, s, stage, then)
+
+
+@at_heat_nodes.on(PythonHooks)
+def _at_heat_nodes_python_hooks(hooks, stage, target, s):
+    at_heat_nodes(hooks.compiled, stage, target, s)
+    if stage in hooks.by_stage:
+        hooks.act(_on_heat_nodes, s, stage, target)
+
+
+@at_heated_points.on(PythonHooks)
+def _at_heated_points_python_hooks(hooks, s):
+    at_heated_points(hooks.compiled, s)
+    if SUPPLY_HEAT in hooks.by_stage:
+        hooks.act(_on_points, s, SUPPLY_HEAT, 0)
+
+
+def view_of(simulation: Any, fix: Any, *, then: bool) -> PointsView:
+    """Show the points of a fix, or those of them that are at hand."""
+    if fix.point_by_point:
+        return PieceView(simulation, list(simulation.rows_of(fix.group)), then, in_steps=True)
+    return PointsView(simulation, simulation.members(fix.group), then)
+
+
+def views_of(simulation: Any, fix: Any) -> Iterator[PointsView]:
+    """Yield the points of a fix before a step, in pieces where it looks at each on its own."""
+    if not fix.point_by_point:
+        yield view_of(simulation, fix, then=False)
+        return
+    for part in simulation.rows_of(fix.group):
+        yield PieceView(simulation, [part], False, in_steps=False)
