@@ -347,6 +347,12 @@ class Runner:
     def _banner(self, simulation: Simulation, going_on: bool) -> None:
         hub, why = self.hub, energy.unknown_work(self.hub)
         own = words_of_own_step(hub, simulation)
+        of_waves = {
+            "stable dt": simulation.limit,
+            **({"own dt": own} if own else {}),
+            "limited by": f"{ruling_limit(simulation)}; {words_of_share(hub)}",
+            **({"energy": energy.not_watched(why)} if why else {}),
+        }
         alone = f", one has all points: up to {DIRECT_UP_TO} are not shared out"
         processes = f"{simulation.comm.size}{alone if simulation.tiles.direct else ''}"
         hub.console.banner(
@@ -357,10 +363,7 @@ class Runner:
                 "nodes": hub.fields.node_count,
                 "bytes per particle": bytes_per_point(simulation),
                 "dt": simulation.dt,
-                "stable dt": simulation.limit,
-                **({"own dt": own} if own else {}),
-                "limited by": f"{ruling_limit(simulation)}; {words_of_share(hub)}",
-                **({"energy": energy.not_watched(why)} if why else {}),
+                **({} if simulation.implicit else of_waves),
                 **({"processes": processes} if simulation.comm.size > 1 else {}),
                 "threads": simulation.threads,
                 "precision": hub.settings.precision,
