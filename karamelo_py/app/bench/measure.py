@@ -166,11 +166,11 @@ def _name(*tags: Any) -> str:
 
 
 @sweep_points.on(Timed)
-def _sweep_points_timed(mode, visit, s, block, *others):
+def _sweep_points_timed(mode, visit, s, block):
     nothing = block._replace(tiling=block.tiling._replace(count=np.zeros(3, np.int64)))
     for swept in (block, nothing):
         with _noted(mode.of_points, _name(*visit.tasks, *visit.quantities)):
-            sweep_points(mode.mode, visit, s, swept, *others)
+            sweep_points(mode.mode, visit, s, swept)
 
 
 @sweep_nodes.on(Timed)
@@ -312,7 +312,7 @@ class _Recorder(NamedTuple):
 
 
 @sweep_points.on(_Recorder)
-def _sweep_points_recorder(mode, visit, s, block, then, gathers, scatters, dt):
+def _sweep_points_recorder(mode, visit, s, block):
     reads = {name for tag in (*visit.tasks, *visit.quantities) for name in tag.reads}
     writes = {name for tag in visit.tasks for name in tag.writes}
     mode.points.extend((*reads, *writes))

@@ -7,6 +7,7 @@ import numpy as np
 
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.step import ABOVE_LIMIT, GAINED, HEATED, SHRUNK
+from karamelo_py.output.node_columns import places_of
 from karamelo_py.output.point_table import PointTable
 from karamelo_py.points.basis import carried, extent
 from karamelo_py.run.diagnosis import energy
@@ -263,7 +264,7 @@ def _places(simulation: Simulation, group: Any, formula: Expression) -> Iterator
     elif isinstance(group, NodeGroup):
         nodes = simulation.nodes_with_mass()
         nodes = nodes if group.all else np.intersect1d(nodes, group.nodes, assume_unique=True)
-        x = simulation.places_of(nodes)
+        x = places_of(simulation.hub, nodes)
         yield nodes, x, x
     else:
         for some in simulation.some(group):
