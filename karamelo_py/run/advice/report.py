@@ -1,10 +1,12 @@
 """karamelo-py check: what a scene needs, before it runs."""
 
+from collections.abc import Callable
 from math import inf
 from typing import Any
 
 from karamelo_py.kernels.step import Staged, rows_of
-from karamelo_py.kernels.table import says
+from karamelo_py.kernels.table import one_by_one, says
+from karamelo_py.points.basis import support
 from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.further import without_rate
 from karamelo_py.run.advice.known_failures import refuse_endless_speeds
@@ -38,10 +40,14 @@ def report(hub: Hub, end_time: float = inf) -> None:
     tiles = simulation.tiles
     nodes = nodes_in_use(s)
     say(f"tiles          {tiles.occupied} of {tiles.count} hold points, {nodes} nodes are in use")
-    say(f"first dt       {simulation.dt:.6g} (stable limit {simulation.limit:.6g})")
-    say(f"               {words_of_share(hub)}")
-    say(f"limited by     {ruling_limit(simulation)}")
-    say(f"energy         {'is watched' if not (why := unknown_work(hub)) else not_watched(why)}")
+    if simulation.implicit:
+        _say_of_equations(say, simulation, nodes)
+    else:
+        say(f"first dt       {simulation.dt:.6g} (stable limit {simulation.limit:.6g})")
+        say(f"               {words_of_share(hub)}")
+        say(f"limited by     {ruling_limit(simulation)}")
+        why = unknown_work(hub)
+        say(f"energy         {not_watched(why) if why else 'is watched'}")
     say(f"threads        {simulation.threads}")
     say("")
     say(f"{'':<34}numbers     bytes")
@@ -67,7 +73,8 @@ def report(hub: Hub, end_time: float = inf) -> None:
         for line in report_lines(simulation, hub.settings.ranks):
             say(line)
     say("")
-    say(f"stages of a step, {'one by one' if isinstance(simulation.visits, Staged) else 'fused'}")
+    staged = simulation.implicit or isinstance(simulation.visits, Staged)
+    say(f"stages of a step, {'one by one' if staged else 'fused'}")
     for stage in stages(hub, simulation):
         say(f"  {stage}")
     found = suggestions(hub, simulation)
@@ -91,6 +98,18 @@ def materials(hub: Hub, block: Any) -> list[Material]:
     return [material for material in used if law_kind(material.law) == kind]
 
 
+def _say_of_equations(say: Callable, simulation: Simulation, nodes: int) -> None:
+    """Say how many equations an implicit step solves, at most, and what memory their matrix takes.
+
+    Nodes couple with those that a point of theirs sees, so far in each direction.
+    """
+    s = simulation.setup
+    d, beside = s.kin.dimension, round(support(s.basis, s.kin) ** (1 / s.kin.dimension)) - 1
+    size = nodes * (2 * beside + 1) ** d * d * d * 8
+    say(f"dt             {simulation.dt:.6g}")
+    say(f"unknowns       {nodes * d} at most, and {size / 2**20:.3g} MiB of stiffness")
+
+
 def stages(hub: Hub, simulation: Simulation) -> list[str]:
     """The stages of a step with the fixes that act in them."""
     acting: dict[str, list[str]] = {}
@@ -99,6 +118,12 @@ def stages(hub: Hub, simulation: Simulation) -> list[str]:
             once = " (first step only)" if fix.first_step_only else ""
             acting.setdefault(name, []).append(fix.id + once)
     lines = [f"{name}: {', '.join(ids)}" for name, ids in acting.items()]
-    rows = rows_of(type(hub.update.scheme), type(simulation.visits))
+    scheme = hub.update.scheme
+    if simulation.implicit:
+        parts = one_by_one(scheme.begin), one_by_one(scheme.close)
+        words = [[t for row in rows if (t := says(row, simulation.setup))] for rows in parts]
+        newton = "Newton's method: stress, tangent and linear equations, until forces balance"
+        return [*words[0], newton, *words[1], *(lines or ["no fix acts between them"])]
+    rows = rows_of(type(scheme), type(simulation.visits))
     first = [text for row in rows if (text := says(row, simulation.setup)) is not None]
     return [*first, *(lines or ["no fix acts between them"])]
