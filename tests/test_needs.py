@@ -125,14 +125,13 @@ def test_only_what_averages_has_a_nodal_mean(lowered):
 
 
 IN_KERNEL = {
-    # what the scene has: kinematics, method, law, scheme
-    "PlaneStrain", "Grid", "Linear", "FLIP", "Updated", "Serial",
+    # what the scene has: grid, basis, transfer, threads
+    "Grid", "Linear", "FLIP", "Serial",
     # that it has no more: heat, contact, fixes at every step, other processes
     "Insulated", "NoContact", "NoHooks", "FixedFrame", "Alone",
-    # what is done at points and nodes in the two visits of musl: four points at once, or eight
-    "OldWeights", "PresentWeights", "Strain", "Move", "MassMomentum", "MomentumAgain",
-    "InternalForce", "NodalUpdate", "MomentumToVelocity", "EightLanes", "FourLanes",
-    "PointByPoint", "Stencil",
+    # what is done at points and nodes in the two visits of musl
+    "Strain", "Move", "MassMomentum", "MomentumAgain", "InternalForce", "NodalUpdate",
+    "MomentumToVelocity", "Stencil",
 }  # fmt: skip
 
 

@@ -30,7 +30,7 @@ from karamelo_py.points.laws import advance, initial_state, kirchhoff_stress, sp
 
 
 class Seen(NamedTuple):
-    """What the points of a block see of the grid: the k-th node of each."""
+    """Nodes that the points of a block see: the k-th of each."""
 
     nodes: np.ndarray  # (n, s) int64: numbers among the unknown nodes
     offsets: np.ndarray  # (n, s) int64: places in the grid, by which pairs of nodes are found
@@ -39,7 +39,7 @@ class Seen(NamedTuple):
 
 
 class Response(NamedTuple):
-    """What points answer to trial displacements; t components of a tensor."""
+    """Stress and tangent of points after trial displacements; t components of a tensor."""
 
     increment: np.ndarray  # (t, n) H
     stress: np.ndarray  # (t, n) V0 P

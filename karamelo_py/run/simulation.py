@@ -289,7 +289,7 @@ class Simulation(SceneArrays):
 
     @cached_property
     def load_steps(self) -> Any:
-        """What takes the steps of an implicit scheme."""
+        """Take the steps of an implicit scheme."""
         from karamelo_py.run.implicit.load_steps import LoadSteps
 
         return LoadSteps(self)

@@ -1,4 +1,4 @@
-"""What implicit steps cannot do, said before the run."""
+"""Refuse scenes that implicit steps cannot do, before the run."""
 
 import importlib.util
 from collections.abc import Iterator
@@ -18,7 +18,7 @@ _EXPLICIT = "an explicit scheme, scheme(musl)"
 
 
 def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
-    """What cannot be done in a scene, what to write instead, and where it stands."""
+    """List what cannot be done in a scene, what to write instead, and its place."""
     update = hub.update
     method, transfer = update.method, update.transfer
     name = registry.name_of("transfer", type(transfer))
