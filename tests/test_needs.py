@@ -129,10 +129,9 @@ IN_KERNEL = {
     "PlaneStrain", "Grid", "Linear", "FLIP", "Updated", "Serial",
     # that it has no more: heat, contact, fixes at every step, other processes
     "Insulated", "NoContact", "NoHooks", "FixedFrame", "Alone",
-    # what is done at points and nodes in the two visits of musl: four points at once, or eight
-    "OldWeights", "PresentWeights", "Strain", "Move", "MassMomentum", "MomentumAgain",
-    "InternalForce", "NodalUpdate", "MomentumToVelocity", "EightLanes", "FourLanes",
-    "PointByPoint", "Stencil",
+    # what is done at points and nodes in the two visits of musl
+    "Strain", "Move", "MassMomentum", "MomentumAgain", "InternalForce", "NodalUpdate",
+    "MomentumToVelocity", "Stencil",
 }  # fmt: skip
 
 
