@@ -189,7 +189,15 @@ def flowing(method: str) -> str:
     return "\n".join(lines)
 
 
+IMPLICIT = (
+    "region(floor, block, -INF, INF, -INF, 0.301)", "group(floor, nodes, region, floor, all)",
+    "fix(hold, velocity_nodes, floor, 0, 0)", "fix(g, body_force, all, time, -time)",
+    "set_dt(0.5)", "set_output(1)", "log_modify(custom, step, iterations, residual, hold_y)",
+    "run(6)",
+)  # fmt: skip
 SCENES = {
+    "load steps": block(2, "scheme(quasi-static)", *IMPLICIT),
+    "large steps": block(2, "scheme(newmark)", *IMPLICIT),
     "loads": block(2, *LOADS),
     "loads in the total frame": block(2, *LOADS).replace("ulmpm", "tlmpm"),
     "wall that rubs": rubbed().replace("run_time(0.2)", "run(6)"),

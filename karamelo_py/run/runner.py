@@ -244,7 +244,7 @@ class Runner:
         hub.restart = hub.interpreter.replay = None
         watched = simulation.control.clock[0].watch_limit
         simulation.go_on(self.end_time, self.rollback.halvings)
-        if not self.rollback.halvings:  # else the step is not that of the script
+        if not (self.rollback.halvings or simulation.implicit):  # else it is not the script's
             known_failures.warn_about_steps(hub, simulation, self.rollback.halve, again=True)
         # It may hold the end of this run already, or what comes behind it.
         step, time, last_step = simulation.step, simulation.time, self.last_step
