@@ -77,6 +77,9 @@ class Dual(namedtuple("Dual", "value slopes")):
         return self.chain(quotient, -quotient / self.value)
 
     def __pow__(self, other):
+        if type(other) is int and 1 <= other <= 4:  # of numbers below 0, too
+            square = self * self
+            return (self, square, square * self, square * square)[other - 1]
         return _power(self, other)
 
     def __rpow__(self, other):

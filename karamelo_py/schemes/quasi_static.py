@@ -59,6 +59,7 @@ class QuasiStatic(NamedTuple):
     """
 
     implicit = True
+    inertia = False
     begin = BEGIN
     hold = HOLD
     close = CLOSE

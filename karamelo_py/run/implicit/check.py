@@ -12,8 +12,9 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
 from karamelo_py.script.errors import Place, ScriptError
 
-# Where fixes move points by what they are, not by forces.
-_MOVING = "post_grid_to_point", "post_advance_particles"
+# Moments of fixes that implicit steps have; those of plug-ins may be called more than once a step.
+_MOMENTS = "initial_integrate", "post_particles_to_grid", "post_update_grid_state"
+_OF_PLUGINS = _MOMENTS[1:]
 _EXPLICIT = "an explicit scheme, scheme(musl)"
 
 
@@ -34,7 +35,7 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
         yield "knows no averaged volumes", f"no anti_volumetric_locking, or {_EXPLICIT}", None
     if update.thermal:
         yield "knows no heat that flows", f"mechanical, or {_EXPLICIT}", method.place
-    if update.boundary != "none" and update.boundary == "reflect":
+    if update.boundary == "reflect":
         yield "knows no walls that points bounce from", "fix velocity_nodes", None
     if hub.settings.precision != "double":
         yield "needs double precision", "no precision(single)", None
@@ -44,18 +45,24 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
         if can(solid.material.law, constrained_velocity):
             yield f"knows no rigid solid such as '{solid.id}'", "fix velocity_nodes", solid.place
     for fix in hub.fixes.values():
-        if any(hook in _MOVING for hook in fix.hooks()):
-            yield (
-                f"knows no fix {fix.style}, which moves points",
-                "fix velocity_nodes, or loads: force_particles, edge_traction",
-                fix.place,
-            )
-        elif "post_update_grid_state" in fix.hooks() and not _only_prescribes(fix):
+        own = registry.origin("fix", fix.style).startswith("karamelo-py ") and fix.style != "python"
+        other = [hook for hook in fix.hooks() if hook not in (_MOMENTS if own else _OF_PLUGINS)]
+        if fix.prescribes_velocity or fix.first_step_only:
+            other = [hook for hook in other if hook != "post_velocities_to_grid"]
+        if "post_update_grid_state" in fix.hooks() and not _only_prescribes(fix):
             yield (
                 f"knows no fix {fix.style} that changes velocities by what they are",
                 f"fix velocity_nodes without leq, geq and friction, or {_EXPLICIT}",
                 fix.place,
             )
+        elif other:
+            yield (
+                f"knows no fix {fix.style}, which acts in {other[0]}",
+                "fix velocity_nodes, or loads: force_particles, edge_traction",
+                fix.place,
+            )
+        elif not update.scheme.inertia and fix.style.startswith("initial_velocity"):
+            yield f"knows no velocities for fix {fix.style}", "scheme(newmark)", fix.place
         elif len(fix.solids) > 1 or fix.friction is not None:
             yield f"knows no contact by fix {fix.style}", _EXPLICIT, fix.place
 
@@ -87,7 +94,7 @@ def check(hub: Hub) -> None:
         )
     for reason, instead, place in _reasons(hub):
         raise ScriptError(f"{name} {reason}", place=place or update.scheme_place, expected=instead)
-    if hasattr(update.scheme, "beta") and not update.fixed_dt:
+    if update.scheme.inertia and not update.fixed_dt:
         raise ScriptError(
             f"{name} has no step of its own",
             place=update.scheme_place,

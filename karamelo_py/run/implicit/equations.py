@@ -36,18 +36,23 @@ class Equations:
     Attributes
     ----------
     nodes
-        (m,) numbers of the nodes that have mass.
+        (m,) numbers of the nodes that points give something to.
+    mass
+        (m,) their masses; 0 where there are gradients only.
     places
         (m, d) places of these in the grid, in cells.
     """
 
     def __init__(self, s: Setup):
         self.s, self.d = s, s.kin.dimension
-        first, last = 1, 1 + int(s.spans[0, 0])
-        used = np.concatenate([np.arange(a, b) for a, b in s.spans[first:last]])
-        self.nodes = np.unique(used[s.nodes.sums[used, MASS] > 0])
-        self.places = self._places()
         self.parts = [self._seen(block) for block in s.blocks]
+        # Gradients of points on a line between cells reach nodes where they have no weight.
+        counts = [seen.nodes[self._counts(seen)] for seen, _ in self.parts]
+        self.nodes = np.unique(np.concatenate(counts))
+        self.mass = s.nodes.sums[self.nodes, MASS].astype(float)
+        self.places = self._places()
+        for seen, _ in self.parts:
+            self._number(seen)
         self.reach = 1 + max((self._spread(seen) for seen, _ in self.parts), default=0)
         self.row = 2 * self.reach + 1
         weights = self.row ** np.arange(self.d)[::-1]
@@ -72,14 +77,17 @@ class Equations:
         seen, response = nothing_seen(s, block)
         now = int(s.control.clock[0].now)
         see(s.frame, s.kin, s.basis, s.grids, block.points, block.laws, now, seen)
-        # Nodes without mass stay where they are: no point has weight there.
-        number = self.number_of(seen.nodes)
-        lost = number < 0
-        first = number[np.arange(len(number)), (~lost).argmax(1)]
-        seen.nodes[:] = np.where(lost, first[:, None], number)
-        seen.weights[lost] = 0
-        seen.gradients[lost] = 0
         return seen, response
+
+    def _counts(self, seen: Seen) -> np.ndarray:
+        """Tell which nodes (n, s) of points have something of them."""
+        return (seen.weights != 0) | (seen.gradients != 0).any(2)
+
+    def _number(self, seen: Seen) -> None:
+        """Put numbers of nodes among the unknown ones in the place of those in the grid."""
+        number, counts = self.number_of(seen.nodes), self._counts(seen)
+        first = number[np.arange(len(number)), counts.argmax(1)]
+        seen.nodes[:] = np.where(counts, number, first[:, None])
 
     def _spread(self, seen: Seen) -> int:
         if not len(seen.nodes):
@@ -100,7 +108,7 @@ class Equations:
         )
 
     def number_of(self, nodes: np.ndarray) -> np.ndarray:
-        """Find the numbers of nodes among those with mass; -1 of others."""
+        """Find the numbers of nodes among the unknown ones; -1 of others."""
         at = np.minimum(np.searchsorted(self.nodes, nodes), len(self.nodes) - 1)
         return np.where(self.nodes[at] == nodes, at, -1)
 
@@ -198,7 +206,7 @@ class Equations:
                 total, volume = total + own * float(one), volume + own
         return total / volume if volume else 0.0
 
-    def ghost(self, order: int, spacing: float) -> sp.csr_matrix:
+    def ghost(self, order: int) -> sp.csr_matrix:
         """Make the matrix (m, m) that penalises what jumps at the border of bodies.
 
         Functions of `order` p have jumps in their p-th derivatives, which are differences of order
@@ -215,7 +223,7 @@ class Equations:
         around = [np.roll(padded, k, 1 + i) for i in range(d) for k in (1, -1)]
         border = cells & ~np.logical_and.reduce(around)[:, *(slice(1, -1),) * d]
         weights = differences(order)
-        rows = []
+        rows, sizes = [], []
         for i in range(d):
             beyond = np.roll(cells, 1, 1 + i), np.roll(border, 1, 1 + i)
             across = border if order == 2 else cells & beyond[0] & (border | beyond[1])
@@ -223,8 +231,10 @@ class Equations:
             for side in np.ndindex(*(2,) * (d - 1)):
                 corner = np.stack(at, 1) + np.insert(np.array(side, int), i, 0)
                 rows.append(self._line(g, corner, i, np.arange(order + 2) - (order + 1) // 2))
+                sizes.append(self.s.grids.spacing[g])
         lines = np.concatenate(rows)
-        lines = lines[(lines >= 0).all(1)]
+        whole = (lines >= 0).all(1)
+        lines, size = lines[whole], np.concatenate(sizes)[whole]
         n = len(lines)
         values = np.tile(weights, n)
         D = sp.csr_matrix(
@@ -232,7 +242,7 @@ class Equations:
         )
         # The same size as for linear functions, whose square has the sum 6.
         share = 2 / (weights @ weights) / 2 ** (d - 1)
-        return (share * spacing**d * (D.T @ D)).tocsr()
+        return (share * (D.T @ sp.diags(size**d) @ D)).tocsr()
 
     def _line(self, g: np.ndarray, corner: np.ndarray, axis: int, shifts: np.ndarray) -> np.ndarray:
         """Find the numbers (rows, shifts) of neighbours of nodes along an axis (-1: not used)."""

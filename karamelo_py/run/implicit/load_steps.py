@@ -4,18 +4,23 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.kernels.arrays import DT, MASS, TIME, TIMESTEP, Hooks, of_change, of_force
+from karamelo_py.kernels.arrays import DT, TIME, TIMESTEP, Hooks, of_change, of_force
 from karamelo_py.kernels.clock import finish
-from karamelo_py.kernels.step import DONE, SORT, take_rows
-from karamelo_py.points.kinematics import free_from
+from karamelo_py.kernels.step import DONE, SORT, STOPPED, take_rows
+from karamelo_py.points.kinematics import Axisymmetric, free_from
 from karamelo_py.run.implicit.equations import Equations
 from karamelo_py.run.implicit.inertia import Motion, Rest
 from karamelo_py.run.implicit.newton import Failed, Newton
+from karamelo_py.run.implicit.solvers import rigid_motions
 from karamelo_py.schemes.quasi_static import PUBLISHED
 from karamelo_py.script.errors import ScriptError
 
 HALVINGS = 10  # of a load step, at most
 SHOWN = 1e20  # a velocity that nobody prescribes
+
+
+class PointsWrong(Exception):
+    """A point has left the domain, or has gone wrong."""
 
 
 class LoadSteps:
@@ -24,7 +29,7 @@ class LoadSteps:
     def __init__(self, simulation: Any):
         self.simulation = simulation
         self.scheme = simulation.hub.update.scheme
-        self.dynamic = hasattr(self.scheme, "beta")
+        self.dynamic = self.scheme.inertia
         self.modulus = 0.0
 
     def advance(self, hooks: Any, count: int) -> int:
@@ -34,17 +39,21 @@ class LoadSteps:
         for _ in range(count):
             if control.values[TIME] >= clock.end_time:
                 break
-            status = self._step(hooks)
-            if status != DONE:
-                return status
+            try:
+                self._step(hooks)
+            except PointsWrong:
+                return STOPPED
             if clock.drift > clock.drift_limit:
                 return SORT
         return DONE
 
-    def _step(self, hooks: Any) -> int:
+    def _step(self, hooks: Any) -> None:
         """Take a load step, in parts where it has to be."""
         control = self.simulation.setup.control
         whole, step = float(control.values[DT]), control.values[TIMESTEP]
+        end = float(control.values[TIME]) + whole
+        if abs(end - control.clock[0].end_time) <= 1e-9 * whole:
+            end = float(control.clock[0].end_time)
         left, part, parts, iterations = 1.0, 1.0, 0, 0
         while left > 0:
             part = min(part, left)
@@ -56,6 +65,7 @@ class LoadSteps:
                 part /= 2
                 continue
             left -= part
+            control.values[TIMESTEP] = step
             parts, iterations = parts + 1, iterations + taken
             if left > 0:
                 part *= 2 if taken <= self.scheme.iterations // 2 else 1
@@ -63,8 +73,7 @@ class LoadSteps:
                     self.simulation.sort_if_due()
         for name, value in zip(PUBLISHED, (iterations, residual, parts), strict=True):
             self.simulation.hub.values.set(name, float(value))
-        control.values[TIMESTEP] = step + 1
-        return DONE
+        control.values[TIME], control.values[TIMESTEP] = end, step + 1
 
     def _part(self, hooks: Any, dt: float) -> tuple[int, float]:
         """Take a part of a step: find its equilibrium, and let the points follow.
@@ -76,6 +85,8 @@ class LoadSteps:
         ------
         Failed
             If there is no equilibrium to be found; the points have not moved then.
+        PointsWrong
+            If a point leaves the domain.
         """
         simulation = self.simulation
         s, control = simulation.setup, simulation.setup.control
@@ -89,13 +100,13 @@ class LoadSteps:
             found = self._equilibrium(hooks, dt, before, after)
             self._publish(found, hooks, dt)
             if not take_rows(self.scheme.close, s, simulation.mode, hooks):
-                raise Failed("a point has gone wrong")
+                raise PointsWrong
         except Failed:
             control.totals[:] = totals
             raise
         finally:
             control.values[TIME] = time
-        found.inertia.end(found.u, found.given, found.prescribed)
+        found.inertia.end(found.u)
         finish(control)
         return found.iterations, found.residual
 
@@ -107,7 +118,7 @@ class LoadSteps:
         if isinstance(simulation.hooks, Hooks):
             simulation.hooks.loads[:] = 0
         if not take_rows(self.scheme.begin, s, simulation.mode, hooks):
-            raise Failed("a point has left the domain")
+            raise PointsWrong
         force = of_force(s.kin)
         return s.nodes.sums[:, force : force + s.kin.dimension]
 
@@ -130,13 +141,11 @@ class LoadSteps:
         if before is None:
             inertia: Rest | Motion = Rest(equations)
         else:
-            first = s.control.values[TIMESTEP] == 0
-            inertia = Motion(equations, self.scheme, dt, before[nodes], first)
+            inertia = Motion(equations, self.scheme, dt, before[nodes], given, prescribed)
         newton = Newton(self.scheme, equations, inertia, external, dt)
         if not self.modulus:
             self.modulus = equations.modulus()
-        newton.stabilise(self.scheme.stabilisation * self.modulus)
-        newton.floor = 1e-9 * self.modulus * newton.spacing ** (equations.d - 1)
+        newton.scale(self.modulus, self.scheme.stabilisation)
         u, iterations, residual = newton.solve(np.where(given, prescribed * dt, 0.0))
         reaction = newton.reaction(u)
         return Equilibrium(equations, inertia, u, given, prescribed, reaction, iterations, residual)
@@ -172,7 +181,7 @@ class LoadSteps:
         """
         simulation, s = self.simulation, found.equations.s
         d, nodes, update = found.equations.d, found.equations.nodes, s.nodes.update
-        mass = s.nodes.sums[nodes, MASS, None]
+        mass = np.where(found.given, found.equations.mass[:, None], 1.0)
         v = found.u / dt
         without = np.where(found.given, -found.reaction * dt / mass, 0.0)
         change = of_change(s.kin)
@@ -202,21 +211,22 @@ class LoadSteps:
         """
         s = equations.s
         bodies = equations.bodies()
+        motions = rigid_motions(equations.positions(), isinstance(s.kin, Axisymmetric))
         for body in range(bodies.max() + 1):
-            held = given[bodies == body].any(0)
-            first = free_from(s.kin)
+            own = bodies == body
+            held = motions[own][given[own]]
+            if np.linalg.matrix_rank(held) == motions.shape[2]:
+                continue
+            free = free_from(s.kin)
             loose = [
-                x for x, is_held in zip("xyz"[first:], held[first:], strict=False) if not is_held
+                x for x, h in zip("xyz"[free:], given[own].any(0)[free:], strict=False) if not h
             ]
-            if loose:
-                ID = self._solid_at(equations, bodies == body)
-                how = (
-                    f"is not held along {loose[0]}" if held[first:].any() else "is held by nothing"
-                )
-                raise self._error(
-                    f"solid '{ID}' {how}, and there is no inertia",
-                    "fix velocity_nodes, or scheme(newmark) for bodies that move",
-                )
+            how = f"is not held along {loose[0]}" if loose else "can turn"
+            how = how if len(held) else "is held by nothing"
+            raise self._error(
+                f"solid '{self._solid_at(equations, own)}' {how}, and there is no inertia",
+                "fix velocity_nodes, or scheme(newmark) for bodies that move",
+            )
 
     def _solid_at(self, equations: Equations, chosen: np.ndarray) -> str:
         """Name the solid of a point that sees some of the chosen nodes (m,)."""

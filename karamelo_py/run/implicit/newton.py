@@ -10,7 +10,7 @@ from karamelo_py.points.kinematics import Axisymmetric
 from karamelo_py.run.implicit.equations import Equations
 from karamelo_py.run.implicit.solvers import Singular, rigid_motions, solve
 
-FAR = 0.5  # cells that points may go at once: weights are those of the beginning
+FAR = 0.5  # cells that points may go at once, where weights follow them; else less than one
 
 
 class Failed(Exception):
@@ -46,19 +46,20 @@ class Newton:
         self.external, self.dt = external, dt
         s = equations.s
         self.free = equations.free
-        self.spacing = float(s.grids.spacing[0])
-        self.mass = s.nodes.sums[equations.nodes, 0].astype(float)
+        self.spacing = float(np.min(s.grids.spacing))
+        self.mass = equations.mass
         self.ghost: sp.csr_matrix | None = None
         self.floor = 0.0
         motions = rigid_motions(equations.positions(), isinstance(s.kin, Axisymmetric))
         self.rigid = motions[self.free]
         self.inner = equations.respond(np.zeros_like(external), dt)
 
-    def stabilise(self, stiffness: float) -> None:
-        """Penalise jumps at the border of bodies, by a `stiffness` per area."""
-        if stiffness:
+    def scale(self, modulus: float, stabilisation: float) -> None:
+        """Tell the stiffness of the bodies; a share of it penalises jumps at their border."""
+        self.floor = 1e-9 * modulus * self.spacing ** (self.equations.d - 1)
+        if stabilisation * modulus:
             degree = getattr(type(self.equations.s.basis), "degree", 1)
-            self.ghost = stiffness * self.equations.ghost(degree, self.spacing)
+            self.ghost = stabilisation * modulus * self.equations.ghost(degree)
 
     def solve(self, jump: np.ndarray) -> tuple[np.ndarray, int, float]:
         """Find displacements (m, d); `jump` (m, d) are those of the components that are given.
@@ -76,7 +77,7 @@ class Newton:
         for iteration in range(scheme.iterations + 1):
             balance = self.balance(u)
             residual = float(np.linalg.norm(balance[free]) / self._size(u))
-            done = residual <= scheme.tolerance or settled
+            done = residual <= scheme.tolerance or (settled and residual <= 1e-6)
             if done and not (iteration == 0 and np.any(jump)):
                 return u, iteration, residual
             if iteration < scheme.iterations:
@@ -111,12 +112,12 @@ class Newton:
         equations, inertia, free = self.equations, self.inertia, self.free
         change = jump.copy()
         equations.linearise()
-        A = inertia.share * equations.matrix
-        b = balance[free] - inertia.share * equations.of_prescribed(jump)
+        A = equations.matrix
+        b = balance[free] - equations.of_prescribed(jump)
         if self.ghost is not None:
-            of_all = inertia.share * equations.for_all_components(self.ghost)
+            of_all = equations.for_all_components(self.ghost)
             A = A + of_all[free.ravel()][:, free.ravel()]
-            b -= inertia.share * (self.ghost @ jump)[free]
+            b -= (self.ghost @ jump)[free]
         if inertia.diagonal:
             mass = np.broadcast_to(self.mass[:, None], free.shape)[free]
             A = A + sp.diags(inertia.diagonal * mass)
@@ -136,5 +137,5 @@ class Newton:
             raise Failed("a point turns inside out")
         kin = equations.s.kin
         far = max(furthest(kin, seen, u) for seen, _ in equations.parts) / self.spacing
-        if not far <= FAR:
+        if not far <= (FAR if equations.s.frame.moves else 0.95):
             raise Failed(f"points would go {far:.3g} cells at once")
