@@ -276,6 +276,18 @@ def test_steps_that_are_too_large_are_done_in_parts(run_script):
     assert np.all(np.diff(log_of["pull_x"]) > 0)
 
 
+def test_multigrid_solves_as_a_direct_solver(run_script):
+    """The same forces, and the same bits each time."""
+    logs = [
+        run_script(
+            patch().replace("quasi-static", f"quasi-static, solver={solver}"), folder=f"{k}{solver}"
+        ).log
+        for k, solver in enumerate(("amg", "amg", "direct"))
+    ]
+    assert np.allclose(logs[0]["pull_x"], logs[2]["pull_x"], rtol=1e-8)
+    assert np.all(logs[0]["residual"] == logs[1]["residual"])
+
+
 @pytest.mark.parametrize("scheme", ["quasi-static", "newmark"])
 def test_restarts_have_the_same_bytes(run_script, scheme):
     """A run in two pieces writes the rows that a whole one writes."""
