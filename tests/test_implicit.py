@@ -296,3 +296,14 @@ def test_restarts_have_the_same_bytes(run_script, scheme):
     rest = run_script(text, "-restart", str(whole.folder / "r.2.h5"), folder="again")
     assert whole.log["pull_x"][-1] == rest.log["pull_x"][-1]
     assert whole.log["residual"][-1] == rest.log["residual"][-1]
+
+
+def test_a_file_of_load_steps_begins_a_run_in_time(run_script):
+    """Stress in the ground by load steps, then motion: another scheme reads the state."""
+    weight = "fix(hold, velocity_nodes, left, 0, 0)\n    fix(g, body_force, all, 0, -0.1)"
+    first = patch(weight).replace(", pull_x", ", hold_y")
+    whole = run_script(first + "    write_restart(state.h5)\n")
+    then = first.replace("quasi-static", "newmark").replace("run(4)", "set_dt(0.01)\n    run(4)")
+    then = then.replace("    run(4)", f"    read_restart({whole.folder / 'state.h5'})\n    run(4)")
+    log_of = run_script(then, folder="then").log
+    assert np.allclose(log_of["hold_y"], whole.log["hold_y"][-1], rtol=1e-4)

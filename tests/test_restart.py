@@ -356,7 +356,7 @@ def test_colours_go_into_another_script(run_interpreted):
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ("method(ulmpm", "method(tlmpm", "FLIP (alpha 1) linear musl; here it is tlmpm"),
+        ("method(ulmpm", "method(tlmpm", "FLIP (alpha 1) linear; here it is tlmpm"),
         ("box, 2, rubber", "box, 1, rubber", "solid 'body' 8 points of LinearElastic"),
         ("0, 1.2, 0.1)", "0, 1.3, 0.1)", "domain 2"),
         ("block, 0.3, 0.5,", "block, 0.35, 0.55,", "other points in solid 'body'"),

@@ -128,13 +128,19 @@ class Update:
     @property
     def words(self) -> str:
         """Method, transfer, basis and scheme, as a script calls them."""
+        scheme = _with_numbers(registry.name_of("scheme", type(self.scheme)), self.scheme)
+        heat = ["thermo-mechanical"] if self.thermal else []
+        return " ".join([self.words_of_state, scheme, *heat])
+
+    @property
+    def words_of_state(self) -> str:
+        """Method, transfer and basis: a state that another scheme has left fits them."""
         words = [
             registry.name_of("method", type(self.method)),
             _with_numbers(registry.name_of("transfer", type(self.transfer)), self.transfer),
             _with_numbers(self.method.basis_name, self.method.basis),
-            _with_numbers(registry.name_of("scheme", type(self.scheme)), self.scheme),
         ]
-        return " ".join([*words, *(["thermo-mechanical"] if self.thermal else [])])
+        return " ".join(words)
 
     @property
     def step(self) -> int:

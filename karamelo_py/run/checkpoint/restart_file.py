@@ -243,7 +243,7 @@ def described(hub: Hub) -> dict[str, str]:
     update, domain = hub.update, hub.domain
     box = zip(domain.lo, domain.hi, strict=True)
     words = {
-        "method": update.words,
+        "method": update.words_of_state + " thermo-mechanical" * update.thermal,
         "domain": f"{domain.dimension}, {', '.join(f'{a!r}, {b!r}' for a, b in box)}, {domain.h!r}",
         "axisymmetric": str(domain.axisymmetric),
         "precision": hub.settings.precision,
