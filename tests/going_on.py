@@ -195,9 +195,11 @@ IMPLICIT = (
     "set_dt(0.5)", "set_output(1)", "log_modify(custom, step, iterations, residual, hold_y)",
     "run(6)",
 )  # fmt: skip
-SCENES = {
+SERIAL = {  # scenes that one process takes
     "load steps": block(2, "scheme(quasi-static)", *IMPLICIT),
     "large steps": block(2, "scheme(newmark)", *IMPLICIT),
+}
+SCENES = {
     "loads": block(2, *LOADS),
     "loads in the total frame": block(2, *LOADS).replace("ulmpm", "tlmpm"),
     "wall that rubs": rubbed().replace("run_time(0.2)", "run(6)"),

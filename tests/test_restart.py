@@ -17,7 +17,7 @@ import h5py
 import numpy as np
 import pytest
 from combinations import BASES, MESHED, SCHEMES, TRANSFERS, fits, refused, scene, write_mesh
-from going_on import CURVE, FLY, OUTPUTS, SCENES, arrays, goes_on, same_files, with_files
+from going_on import CURVE, FLY, OUTPUTS, SCENES, SERIAL, arrays, goes_on, same_files, with_files
 from scenes import block
 
 from karamelo_py.language import registry
@@ -52,11 +52,11 @@ def test_every_way(run_interpreted, tmp_path, way):
     goes_on(run_interpreted, with_files(scene(*way, mesh=mesh, steps=4)))
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", [*SCENES, *SERIAL])
 def test_every_part(run_interpreted, tmp_path, name):
-    """Contact, heat, damage, edges, tools, computes that look back."""
+    """Contact, heat, damage, edges, tools, computes that look back; implicit steps."""
     (tmp_path / "curve.csv").write_text(CURVE, encoding="utf-8")
-    goes_on(run_interpreted, with_files(SCENES[name]))
+    goes_on(run_interpreted, with_files((SCENES | SERIAL)[name]))
 
 
 CHANGING = {
@@ -73,7 +73,7 @@ def test_every_style_is_in_some_scene(family):
     """What the program registers, and a step may change, goes on above."""
     meshes = ["m.vtk" if way[3] in MESHED else None for way in ways()]
     scenes = [scene(*way, mesh=mesh) for way, mesh in zip(ways(), meshes, strict=True)]
-    text = "\n".join([*SCENES.values(), OUTPUTS, *scenes])
+    text = "\n".join([*SCENES.values(), *SERIAL.values(), OUTPUTS, *scenes])
     begin = CHANGING[family].format(family=family)
     found = {
         style
@@ -438,7 +438,7 @@ def test_what_cannot_be_written_is_told(run_interpreted):
 WATCH = """
 from pathlib import Path
 import numpy as np
-from going_on import CURVE, OUTPUTS, SCENES, block
+from going_on import CURVE, OUTPUTS, SCENES, SERIAL, block
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.run.checkpoint.parts import named
