@@ -40,7 +40,7 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
     if hub.settings.precision != "double":
         yield "needs double precision", "no precision(single)", None
     if hub.settings.comm.size > 1:
-        yield "runs in one process", "no --ranks: threads serve it", None
+        yield "runs in one process", "no --ranks", None
     for solid in hub.solids.values():
         if can(solid.material.law, constrained_velocity):
             yield f"knows no rigid solid such as '{solid.id}'", "fix velocity_nodes", solid.place

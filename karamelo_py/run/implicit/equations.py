@@ -1,5 +1,6 @@
 """The equations of an implicit step: unknown nodes, the sparse matrix, and ghost stabilisation."""
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,9 @@ from karamelo_py.kernels.implicit import (
     strain,
     stress_and_tangent,
 )
+from karamelo_py.points.kinematics import Axisymmetric
 from karamelo_py.points.laws import initial_state, specific_volume
+from karamelo_py.run.implicit.solvers import rigid_motions
 
 
 class Equations:
@@ -66,11 +69,15 @@ class Equations:
     def _places(self) -> np.ndarray:
         """Count the places of the nodes along each direction of their grid."""
         grids = self.s.grids
-        g = np.searchsorted(grids.first, self.nodes, side="right") - 1
+        self.grid = g = np.searchsorted(grids.first, self.nodes, side="right") - 1
+        self.steps = self._steps(g)
         local, x, y = self.nodes - grids.first[g], grids.step_x[g], grids.step_y[g]
-        self.steps = np.stack([x, y, np.ones_like(x)], 1)[:, : self.d]
-        self.grid = g
         return np.stack([local // x, local % x // y, local % y], 1)[:, : self.d]
+
+    def _steps(self, g: np.ndarray) -> np.ndarray:
+        """Find the steps (n, d) from the number of a node to its neighbours, in grids `g`."""
+        x, y = self.s.grids.step_x[g], self.s.grids.step_y[g]
+        return np.stack([x, y, np.ones_like(x)], 1)[:, : self.d]
 
     def _seen(self, block: Any) -> tuple[Seen, Response]:
         s = self.s
@@ -125,7 +132,7 @@ class Equations:
         rows, offsets, columns = self.pairs
         number = np.full(free.shape, -1)
         number[free] = np.arange(np.count_nonzero(free))
-        self.free, self.number = free, number
+        self.free = free
         shape = (len(rows), d, d)
         i = np.broadcast_to(number[rows][:, :, None], shape).ravel()
         j = np.broadcast_to(number[columns][:, None, :], shape).ravel()
@@ -164,11 +171,13 @@ class Equations:
             add_forces(s.kin, seen, response.stress, f)
         return f
 
-    def positions(self) -> np.ndarray:
-        """Find the positions (m, d) of the nodes."""
+    @cached_property
+    def rigid_motions(self) -> np.ndarray:
+        """Rigid motions (m, d, k) of the nodes."""
         grids, g = self.s.grids, self.grid
         origin = np.stack([grids.x0[g], grids.y0[g], grids.z0[g]], 1)[:, : self.d]
-        return origin + grids.spacing[g][:, None] * self.places
+        positions = origin + grids.spacing[g][:, None] * self.places
+        return rigid_motions(positions, isinstance(self.s.kin, Axisymmetric))
 
     def for_all_components(self, matrix: sp.csr_matrix) -> sp.csr_matrix:
         """Make of a matrix (m, m) that of all components (m d, m d), each by itself."""
@@ -206,12 +215,12 @@ class Equations:
                 total, volume = total + own * float(one), volume + own
         return total / volume if volume else 0.0
 
-    def ghost(self, order: int) -> sp.csr_matrix:
-        """Make the matrix (m, m) that penalises what jumps at the border of bodies.
+    def ghost(self) -> sp.csr_matrix:
+        """Make the matrix (m, m) that penalises jumps of the gradient at the border of bodies.
 
-        Functions of `order` p have jumps in their p-th derivatives, which are differences of order
-        p + 1 of neighbours: across faces between cells of which one lies at the border (Coombs
-        2023, for linear functions), or for p = 2, whose knots lie within cells, across these.
+        Linear functions have them across faces between cells, of which one lies at the border
+        (Coombs 2023): second differences of the nodes on both sides. Splines have no such jumps;
+        the differences hold their nodes at the border all the same.
         """
         d, places = self.d, self.places
         shape = (int(self.grid.max()) + 1, *(places.max(0) + 2))
@@ -222,41 +231,28 @@ class Equations:
         padded = np.pad(cells, [(0, 0), *[(1, 1)] * d])
         around = [np.roll(padded, k, 1 + i) for i in range(d) for k in (1, -1)]
         border = cells & ~np.logical_and.reduce(around)[:, *(slice(1, -1),) * d]
-        weights = differences(order)
         rows, sizes = [], []
         for i in range(d):
             beyond = np.roll(cells, 1, 1 + i), np.roll(border, 1, 1 + i)
-            across = border if order == 2 else cells & beyond[0] & (border | beyond[1])
-            g, *at = np.nonzero(across)
+            g, *at = np.nonzero(cells & beyond[0] & (border | beyond[1]))
             for side in np.ndindex(*(2,) * (d - 1)):
                 corner = np.stack(at, 1) + np.insert(np.array(side, int), i, 0)
-                rows.append(self._line(g, corner, i, np.arange(order + 2) - (order + 1) // 2))
+                rows.append(self._line(g, corner, i))
                 sizes.append(self.s.grids.spacing[g])
         lines = np.concatenate(rows)
         whole = (lines >= 0).all(1)
         lines, size = lines[whole], np.concatenate(sizes)[whole]
         n = len(lines)
-        values = np.tile(weights, n)
-        D = sp.csr_matrix(
-            (values, (np.repeat(np.arange(n), order + 2), lines.ravel())), (n, len(self.nodes))
-        )
-        # The same size as for linear functions, whose square has the sum 6.
-        share = 2 / (weights @ weights) / 2 ** (d - 1)
+        at_nodes = np.repeat(np.arange(n), 3), lines.ravel()
+        D = sp.csr_matrix((np.tile((1.0, -2.0, 1.0), n), at_nodes), (n, len(self.nodes)))
+        share = 1 / 3 / 2 ** (d - 1)
         return (share * (D.T @ sp.diags(size**d) @ D)).tocsr()
 
-    def _line(self, g: np.ndarray, corner: np.ndarray, axis: int, shifts: np.ndarray) -> np.ndarray:
-        """Find the numbers (rows, shifts) of neighbours of nodes along an axis (-1: not used)."""
-        grids = self.s.grids
-        steps = np.stack([grids.step_x, grids.step_y, np.ones_like(grids.step_x)], 1)[g, : self.d]
-        first = grids.first[g] + (corner * steps).sum(1)
+    def _line(self, g: np.ndarray, corner: np.ndarray, axis: int) -> np.ndarray:
+        """Number nodes and their neighbours along an axis (rows, 3); -1 where one is not used."""
+        shifts = np.array([-1, 0, 1])
+        steps = self._steps(g)
+        first = self.s.grids.first[g] + (corner * steps).sum(1)
         along = corner[:, axis, None] + shifts
         found = self.number_of(first[:, None] + shifts * steps[:, axis, None])
         return np.where(along >= 0, found, -1)
-
-
-def differences(order: int) -> np.ndarray:
-    """Give the weights of a difference of `order` + 1: 1, -2, 1 for order 1."""
-    weights = np.array([1.0])
-    for _ in range(order + 1):
-        weights = np.convolve(weights, (1.0, -1.0))
-    return weights

@@ -7,11 +7,10 @@ import numpy as np
 from karamelo_py.kernels.arrays import DT, TIME, TIMESTEP, Hooks, of_change, of_force
 from karamelo_py.kernels.clock import finish
 from karamelo_py.kernels.step import DONE, SORT, STOPPED, take_rows
-from karamelo_py.points.kinematics import Axisymmetric, free_from
+from karamelo_py.points.kinematics import free_from
 from karamelo_py.run.implicit.equations import Equations
 from karamelo_py.run.implicit.inertia import Motion, Rest
 from karamelo_py.run.implicit.newton import Failed, Newton
-from karamelo_py.run.implicit.solvers import rigid_motions
 from karamelo_py.schemes.quasi_static import PUBLISHED
 from karamelo_py.script.errors import ScriptError
 
@@ -148,7 +147,7 @@ class LoadSteps:
         newton.scale(self.modulus, self.scheme.stabilisation)
         u, iterations, residual = newton.solve(np.where(given, prescribed * dt, 0.0))
         reaction = newton.reaction(u)
-        return Equilibrium(equations, inertia, u, given, prescribed, reaction, iterations, residual)
+        return Equilibrium(equations, inertia, u, given, reaction, iterations, residual)
 
     def _prescribed(self, equations: Equations, hooks: Any) -> tuple[np.ndarray, np.ndarray]:
         """Find which components of the nodes are held, and the velocities that they get.
@@ -211,7 +210,7 @@ class LoadSteps:
         """
         s = equations.s
         bodies = equations.bodies()
-        motions = rigid_motions(equations.positions(), isinstance(s.kin, Axisymmetric))
+        motions = equations.rigid_motions
         for body in range(bodies.max() + 1):
             own = bodies == body
             held = motions[own][given[own]]
@@ -246,7 +245,6 @@ class Equilibrium(NamedTuple):
     inertia: Rest | Motion
     u: np.ndarray
     given: np.ndarray  # which components are held
-    prescribed: np.ndarray  # their velocities
     reaction: np.ndarray
     iterations: int
     residual: float

@@ -6,9 +6,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from karamelo_py.kernels.implicit import furthest
-from karamelo_py.points.kinematics import Axisymmetric
 from karamelo_py.run.implicit.equations import Equations
-from karamelo_py.run.implicit.solvers import Singular, rigid_motions, solve
+from karamelo_py.run.implicit.solvers import Singular, solve
 
 FAR = 0.5  # cells that points may go at once, where weights follow them; else less than one
 
@@ -44,22 +43,20 @@ class Newton:
     ):
         self.scheme, self.equations, self.inertia = scheme, equations, inertia
         self.external, self.dt = external, dt
-        s = equations.s
         self.free = equations.free
-        self.spacing = float(np.min(s.grids.spacing))
-        self.mass = equations.mass
+        self.spacing = float(np.min(equations.s.grids.spacing))
         self.ghost: sp.csr_matrix | None = None
+        self.ghost_of_free: sp.csr_matrix | None = None
         self.floor = 0.0
-        motions = rigid_motions(equations.positions(), isinstance(s.kin, Axisymmetric))
-        self.rigid = motions[self.free]
         self.inner = equations.respond(np.zeros_like(external), dt)
 
     def scale(self, modulus: float, stabilisation: float) -> None:
         """Tell the stiffness of the bodies; a share of it penalises jumps at their border."""
         self.floor = 1e-9 * modulus * self.spacing ** (self.equations.d - 1)
         if stabilisation * modulus:
-            degree = getattr(type(self.equations.s.basis), "degree", 1)
-            self.ghost = stabilisation * modulus * self.equations.ghost(degree)
+            self.ghost = stabilisation * modulus * self.equations.ghost()
+            free = self.free.ravel()
+            self.ghost_of_free = self.equations.for_all_components(self.ghost)[free][:, free]
 
     def solve(self, jump: np.ndarray) -> tuple[np.ndarray, int, float]:
         """Find displacements (m, d); `jump` (m, d) are those of the components that are given.
@@ -115,16 +112,17 @@ class Newton:
         A = equations.matrix
         b = balance[free] - equations.of_prescribed(jump)
         if self.ghost is not None:
-            of_all = equations.for_all_components(self.ghost)
-            A = A + of_all[free.ravel()][:, free.ravel()]
+            A = A + self.ghost_of_free
             b -= (self.ghost @ jump)[free]
         if inertia.diagonal:
-            mass = np.broadcast_to(self.mass[:, None], free.shape)[free]
+            mass = np.broadcast_to(equations.mass[:, None], free.shape)[free]
             A = A + sp.diags(inertia.diagonal * mass)
         if len(b):
             try:
                 accuracy = max(1e-10, min(1e-4, 0.1 * residual))
-                change[free] = solve(self.scheme.solver, A, b, self.rigid, accuracy)
+                change[free] = solve(
+                    self.scheme.solver, A, b, equations.rigid_motions[free], accuracy
+                )
             except Singular:
                 raise Failed("the equations are singular") from None
         return change
