@@ -24,7 +24,7 @@ BLOCK = f"""
     compute(Es, strain_energy, block)
     E = (Ek + Es)/2000 + {G}*x_y
     log_modify(custom, step, time, T, x_x, E)
-    dt_factor(0.1)
+    dt_factor({{factor}})
     run_time({TIME})
 """
 BASE = f"""region(base, block, 0, 8, 0, 1)
@@ -43,15 +43,17 @@ WALL = f"""region(low, block, INF, INF, INF, 1.1)
         ("ulmpm", WALL),
     ],
 )
-def test_heat_is_the_work_of_friction(run_script, method, ground):
+@pytest.mark.parametrize(("factor", "rel"), [(0.1, 0.012), (0.8, 0.05)])
+def test_heat_is_the_work_of_friction(run_script, method, ground, factor, rel):
     """A block slides: m cp (T - T0) is what its energy lacks (exact), and mu m g s (Coulomb).
 
-    What differs from the first is of the order of the step: 3 and 5 % at four times this one. The
-    block is dropped on the ground with its weight and bounces: the second holds on average.
+    With any step: taken with the speed that internal forces lead the surface to, the heat is 20 %
+    and more too large at 0.8 of the stable step. What differs from the first there is what the
+    bouncing block gains. It is dropped on the ground with its weight: the second holds on average.
     """
-    log = run_script(BLOCK.format(method=method, ground=ground)).log
+    log = run_script(BLOCK.format(method=method, ground=ground, factor=factor)).log
     heat = 500 * (log.T - 300)
-    assert heat[-1] == pytest.approx(log.E[0] - log.E[-1], rel=0.012)
+    assert heat[-1] == pytest.approx(log.E[0] - log.E[-1], rel=rel)
     assert heat[-1] == pytest.approx(MU * G * (log.x_x[-1] - log.x_x[0]), rel=0.08)
 
 

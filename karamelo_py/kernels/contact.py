@@ -282,6 +282,12 @@ def _take(contact, control, a, i, n, k, impulse, per_mass, x):
         add_to(control.totals, slot - 1 + k, -force)
 
 
+@shared
+def _before(kin, nodes, n, per_mass):
+    """Return the velocity of a node at the beginning of the step."""
+    return per_mass * vector_at(kin, nodes.sums, n, of_momentum(kin), zero_vector(kin, 0.0))
+
+
 @noinline
 def _touch_pair(contact, kin, nodes, control, i, j, place, share, where):
     """`share` of the impulse between the `i`-th and the `j`-th of the fields that meet."""
@@ -306,10 +312,12 @@ def _touch_pair(contact, kin, nodes, control, i, j, place, share, where):
     step = int(control.values[TIMESTEP]) + 1
     contact.touched[n, b] = -step if sticks else step
     if rub > 0:
-        # The energy that friction dissipates: impulse times the mean of the sliding speeds.
+        # The energy that friction dissipates: impulse times the mean of the sliding speeds at the
+        # beginning and the end of the step. What forces within the bodies do in between they undo.
         heat = 0.0
-        for speed, yielding in zip(slide, pair.yielding, strict=True):
-            heat += rub * speed * speed * (1.0 - 0.5 * rub * yielding)
+        before = _before(kin, nodes, n, pair.per_n) - _before(kin, nodes, m, pair.per_m)
+        for speed, first, yielding in zip(slide, before, pair.yielding, strict=True):
+            heat += rub * speed * 0.5 * (first + speed * (1.0 - rub * yielding))
         warmth = contact.warmth[a, b]
         warm_node(field(nodes.fields, FrictionalHeat), n, warmth * heat * pair.per_n)
         warm_node(field(nodes.fields, FrictionalHeat), m, (1.0 - warmth) * heat * pair.per_m)

@@ -50,15 +50,18 @@ def rub(kin, nodes, programs, held, n, mu, dt, kept, control, slot):
         return
     speed = sqrt(along)
     stop = min(max(mu, 0.0) * sqrt(across), speed)
-    # The work of friction, with the mean of the speeds before and after; a wall takes no heat.
-    warm_node(field(nodes.fields, FrictionalHeat), n, stop * (speed - 0.5 * stop))
+    work = 0.0
     for c in range(d):
         if _is_free(held, programs, n, c):
             taken = nodes.update[n, c] * (stop / speed)
+            first = nodes.sums[n, of_momentum(kin) + c] / mass
+            work += taken * 0.5 * (first + nodes.update[n, c] - taken)
             nodes.update[n, c] -= taken
             nodes.update[n, of_change(kin) + c] -= taken
             if counts(control.ranks, n):
                 add_to(control.totals, slot + c, -mass * taken / dt)
+    # With the mean of the speeds at the beginning and the end of the step; a wall takes no heat.
+    warm_node(field(nodes.fields, FrictionalHeat), n, work)
 
 
 @noinline
