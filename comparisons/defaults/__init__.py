@@ -1,0 +1,70 @@
+"""What the defaults do: scenes with exact answers, run with the program's own choices.
+
+Each case is a module here with a `CASE`, and a script `inputs/defaults/in.NAME`. The script chooses
+nothing that the program would choose: no step, no scheme, no averaging, no weights. It has the
+variables `refine` (cells are h / refine) and `f` (the step is f times the program's own).
+"""
+
+import subprocess
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from pkgutil import iter_modules
+from typing import Any, NamedTuple
+
+from comparisons.results import Result
+
+INPUTS = Path(__file__).parent.parent.parent / "inputs" / "defaults"
+
+
+class Case(NamedTuple):
+    """A scene with an exact answer.
+
+    `measure` finds the number of a finished run that should be `exact`; `source` says whose that
+    is. `within` is the error that is allowed in silence, as a share of `scale` (else of `exact`).
+    The scene is run with each of `refine`, coarsest first, the last of which is judged; and that
+    one with half the step. `advice` names what the scene should be told where it errs by more: a
+    part of a warning.
+    """
+
+    quantity: str
+    exact: float
+    measure: Callable[[Result], float]
+    source: str
+    refine: tuple[float, ...] = (1, 2)
+    within: float = 0.05
+    scale: float = 0.0
+    advice: str = ""
+    half_step: bool = True
+
+    def error(self, computed: float) -> float:
+        """The error as a share of the exact number, or of `scale`."""
+        return (computed - self.exact) / (self.scale or abs(self.exact))
+
+
+def names() -> list[str]:
+    """Names of the cases."""
+    return sorted(module.name for module in iter_modules(__path__) if module.name != "__main__")
+
+
+def case(name: str) -> Case:
+    """The case of a name."""
+    return import_module(f"comparisons.defaults.{name}").CASE
+
+
+def run(name: str, folder: Path, **variables: Any) -> Result:
+    """Run the script of a case in a folder of its own."""
+    place = folder / "_".join([name, *(f"{k}={v:g}" for k, v in variables.items())])
+    place.mkdir(parents=True)
+    options = [part for k, v in variables.items() for part in ("-var", k, f"{v:g}")]
+    command = [sys.executable, "-m", "karamelo_py.app.cli", str(INPUTS / f"in.{name}"), *options]
+    done = subprocess.run(command, cwd=place, capture_output=True, text=True, check=False)
+    return Result(done.returncode, done.stdout, done.stderr, place)
+
+
+def said(result: Result) -> list[str]:
+    """Warnings and errors of a run, one line each."""
+    lines = [*result.out.splitlines(), *result.err.splitlines()]
+    found = [line.partition("warning: ")[2] for line in lines if "warning: " in line]
+    return found + [line.partition("error: ")[2] for line in lines if "error: " in line]
