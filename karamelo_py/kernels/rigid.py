@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.tuples import record
@@ -95,6 +96,19 @@ def _sum_forces(basis, kin, grids, places, points, led, forces, torques, totals)
 def _touch_rigid_bodies(contact, s):
     led = field(s.nodes.fields, RigidSums)
     _lead(s.kin, s.nodes, led, s.spans, kick(s), s.control.clock[0].kept)
+    _publish_forces(contact, s)
+
+
+def put_forces(contact, s, nodes, forces):
+    """Publish forces (n, d) that nodes put on rigid bodies, with their torques."""
+    led, first = field(s.nodes.fields, RigidSums), of_force(s.kin)
+    led[nodes, first : first + dimension(s.kin)] = forces
+    _publish_forces(contact, s)
+
+
+@shared
+def _publish_forces(contact, s):
+    led = field(s.nodes.fields, RigidSums)
     for slot in contact.slots:
         s.control.totals[slot : slot + 3] = 0
     for block in s.blocks:

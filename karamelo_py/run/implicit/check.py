@@ -8,6 +8,7 @@ from karamelo_py.kernels.visit import PointByPoint
 from karamelo_py.language import registry
 from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.points.transfers import Moment
+from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
 from karamelo_py.script.errors import Place, ScriptError
@@ -41,14 +42,13 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
         yield "needs double precision", "no precision(single)", None
     if hub.settings.comm.size > 1:
         yield "runs in one process", "no --ranks", None
-    for solid in hub.solids.values():
-        if can(solid.material.law, constrained_velocity):
-            yield f"knows no rigid solid such as '{solid.id}'", "fix velocity_nodes", solid.place
     for fix in hub.fixes.values():
         own = registry.origin("fix", fix.style).startswith("karamelo-py ") and fix.style != "python"
         other = [hook for hook in fix.hooks() if hook not in (_MOMENTS if own else _OF_PLUGINS)]
         if fix.prescribes_velocity or fix.first_step_only:
             other = [hook for hook in other if hook != "post_velocities_to_grid"]
+        if _of_rigid_points(hub, fix):
+            other = [hook for hook in other if hook != "post_advance_particles"]
         if "post_update_grid_state" in fix.hooks() and not _only_prescribes(fix):
             yield (
                 f"knows no fix {fix.style} that changes velocities by what they are",
@@ -58,13 +58,26 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
         elif other:
             yield (
                 f"knows no fix {fix.style}, which acts in {other[0]}",
-                "fix velocity_nodes, or loads: force_particles, edge_traction",
+                "fix velocity_nodes, or loads: force_particles, edge_traction; velocity_particles "
+                "for rigid solids",
                 fix.place,
             )
-        elif not update.scheme.inertia and fix.style.startswith("initial_velocity"):
+        elif (
+            not update.scheme.inertia
+            and fix.style.startswith("initial_velocity")
+            and not _of_rigid_points(hub, fix)
+        ):
             yield f"knows no velocities for fix {fix.style}", "scheme(newmark)", fix.place
         elif len(fix.solids) > 1 or fix.friction is not None:
             yield f"knows no contact by fix {fix.style}", _EXPLICIT, fix.place
+
+
+def _of_rigid_points(hub: Hub, fix: Fix) -> bool:
+    """Tell whether the group of a fix has points of rigid solids, and no others."""
+    if not isinstance(fix.group, ParticleGroup):
+        return False
+    soft = (s for s in hub.solids.values() if not can(s.material.law, constrained_velocity))
+    return not any(fix.group.touches(solid) for solid in soft)
 
 
 def _only_prescribes(fix: Fix) -> bool:

@@ -19,12 +19,14 @@ from karamelo_py.kernels.implicit import (
     mark_pairs,
     nothing_seen,
     respond,
+    scatter,
     see,
     strain,
     stress_and_tangent,
 )
 from karamelo_py.points.kinematics import Axisymmetric
 from karamelo_py.points.laws import initial_state, specific_volume
+from karamelo_py.points.laws.rigid import Rigid
 from karamelo_py.run.implicit.solvers import rigid_motions
 
 
@@ -38,24 +40,38 @@ class Equations:
 
     Attributes
     ----------
+    blocks, parts
+        Those points that deform, and what they see.
     nodes
         (m,) numbers of the nodes that points give something to.
     mass
         (m,) their masses; 0 where there are gradients only.
     places
         (m, d) places of these in the grid, in cells.
+    deforming
+        (m,) which of them deforming points give something to.
+    led, velocity_of_rigid
+        (m,) which of them see rigid points, and the velocities (m, d) that they have from these.
     """
 
     def __init__(self, s: Setup):
         self.s, self.d = s, s.kin.dimension
-        self.parts = [self._seen(block) for block in s.blocks]
+        self.blocks = [block for block in s.blocks if not isinstance(block.laws, Rigid)]
+        self.parts = [self._seen(block) for block in self.blocks]
         # Gradients of points on a line between cells reach nodes where they have no weight.
         counts = [seen.nodes[self._counts(seen)] for seen, _ in self.parts]
+        soft = np.unique(np.concatenate(counts)) if counts else np.zeros(0, np.int64)
+        tools = [(b, self._seen(b)[0]) for b in s.blocks if isinstance(b.laws, Rigid)]
+        counts += [seen.nodes[seen.weights > 0] for _, seen in tools]
         self.nodes = np.unique(np.concatenate(counts))
         self.mass = s.nodes.sums[self.nodes, MASS].astype(float)
         self.places = self._places()
         for seen, _ in self.parts:
-            self._number(seen)
+            self._number(seen, self._counts(seen))
+        for _, seen in tools:
+            self._number(seen, seen.weights > 0)
+        self.deforming = np.isin(self.nodes, soft)
+        self.led, self.velocity_of_rigid = self._led(tools)
         self.reach = 1 + max((self._spread(seen) for seen, _ in self.parts), default=0)
         self.row = 2 * self.reach + 1
         weights = self.row ** np.arange(self.d)[::-1]
@@ -90,9 +106,21 @@ class Equations:
         """Tell which nodes (n, s) of points have something of them."""
         return (seen.weights != 0) | (seen.gradients != 0).any(2)
 
-    def _number(self, seen: Seen) -> None:
-        """Put numbers of nodes among the unknown ones in the place of those in the grid."""
-        number, counts = self.number_of(seen.nodes), self._counts(seen)
+    def _led(self, tools: list[tuple[Any, Seen]]) -> tuple[np.ndarray, np.ndarray]:
+        """Find the nodes (m,) that see rigid points, and the velocities (m, d) these have there."""
+        mass, momentum = np.zeros((len(self.nodes), 1)), np.zeros((len(self.nodes), self.d))
+        for block, seen in tools:
+            scatter(seen, block.points.mass, np.ones((1, len(seen.nodes))), mass)
+            scatter(seen, block.points.mass, block.points.v, momentum)
+        led = mass[:, 0] > 0
+        return led, np.divide(momentum, mass, out=momentum, where=led[:, None])
+
+    def _number(self, seen: Seen, counts: np.ndarray) -> None:
+        """Put numbers of nodes among the unknown ones in the place of those in the grid.
+
+        `counts` (n, s) tells which of them points have something of.
+        """
+        number = self.number_of(seen.nodes)
         first = number[np.arange(len(number)), counts.argmax(1)]
         seen.nodes[:] = np.where(counts, number, first[:, None])
 
@@ -156,7 +184,7 @@ class Equations:
         """Find the nodal forces (m, d) of displacements (m, d); not finite where a point fails."""
         s = self.s
         f = np.zeros((len(self.nodes), self.d))
-        for block, (seen, response) in zip(s.blocks, self.parts, strict=True):
+        for block, (seen, response) in zip(self.blocks, self.parts, strict=True):
             strain(s.kin, seen, u, response.increment)
             respond(s.kin, block.points, block.laws, dt, response)
             add_forces(s.kin, seen, response.stress, f)
@@ -166,7 +194,7 @@ class Equations:
         """Find the nodal forces (m, d) of the present stress."""
         s = self.s
         f = np.zeros((len(self.nodes), self.d))
-        for block, (seen, response) in zip(s.blocks, self.parts, strict=True):
+        for block, (seen, response) in zip(self.blocks, self.parts, strict=True):
             keep_stress(s.kin, block.points, block.laws, response.stress)
             add_forces(s.kin, seen, response.stress, f)
         return f
@@ -203,7 +231,7 @@ class Equations:
         kin = self.s.kin
         places = kin.Tensor.places
         total = volume = 0.0
-        for block in self.s.blocks:
+        for block in self.blocks:
             points = block.points
             for k in np.unique(points.material):
                 law = record(block.laws, k)
@@ -225,7 +253,8 @@ class Equations:
         d, places = self.d, self.places
         shape = (int(self.grid.max()) + 1, *(places.max(0) + 2))
         touched = np.zeros(shape, bool)
-        touched[self.grid, *places.T] = True
+        soft = self.deforming
+        touched[self.grid[soft], *places[soft].T] = True
         corners = [tuple(slice(c, c - 1 or None) for c in at) for at in np.ndindex(*(2,) * d)]
         cells = np.logical_and.reduce([touched[:, *corner] for corner in corners])
         padded = np.pad(cells, [(0, 0), *[(1, 1)] * d])

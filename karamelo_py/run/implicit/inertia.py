@@ -14,7 +14,7 @@ class Rest:
     diagonal = 0.0  # of the stiffness, in units of a nodal mass
 
     def __init__(self, equations: Equations):
-        self.blocks = equations.s.blocks
+        self.blocks = equations.blocks
 
     def balance(self, u: np.ndarray, forces: np.ndarray) -> np.ndarray:
         """Add inertia to what forces leave (m, d), after displacements (m, d)."""
@@ -58,7 +58,6 @@ class Motion:
     ):
         self.equations, self.scheme, self.dt = equations, scheme, dt
         self.given, self.prescribed = given, prescribed
-        s = equations.s
         self.mass = equations.mass[:, None]
         self.inverse = np.divide(1, self.mass, out=np.zeros_like(self.mass), where=self.mass > 0)
         self.v = self._velocities()
@@ -68,13 +67,13 @@ class Motion:
         else:
             self.beta, self.gamma, self.rest = scheme.beta, scheme.gamma, 0.5 / scheme.beta - 1
         self.diagonal = 1 / (self.beta * dt * dt)
-        self.old = [block.points.v.copy() for block in s.blocks]
+        self.old = [block.points.v.copy() for block in equations.blocks]
 
     def _velocities(self) -> np.ndarray:
         """Average the velocities of the points at the nodes (m, d), by mass."""
         equations = self.equations
         total = np.zeros((len(equations.nodes), equations.d))
-        for block, (seen, _) in zip(equations.s.blocks, equations.parts, strict=True):
+        for block, (seen, _) in zip(equations.blocks, equations.parts, strict=True):
             scatter(seen, block.points.mass, block.points.v, total)
         return total * self.inverse
 
@@ -97,7 +96,7 @@ class Motion:
         free = self.v + dt * ((1 - gamma) * self.a + gamma * self.acceleration(u))
         new = np.where(self.given, self.prescribed, free)
         kept = getattr(self.equations.s.transfer, "alpha", 0.0)
-        parts = zip(self.equations.s.blocks, self.equations.parts, self.old, strict=True)
+        parts = zip(self.equations.blocks, self.equations.parts, self.old, strict=True)
         for block, (seen, _), old in parts:
             block.points.v[:] = kept * old
             gather(seen, new - kept * self.v, block.points.v)

@@ -6,6 +6,7 @@ import numpy as np
 
 from karamelo_py.kernels.arrays import DT, TIME, TIMESTEP, Hooks, of_change, of_force
 from karamelo_py.kernels.clock import finish
+from karamelo_py.kernels.rigid import RigidBodies, put_forces
 from karamelo_py.kernels.step import DONE, SORT, STOPPED, take_rows
 from karamelo_py.points.kinematics import free_from
 from karamelo_py.run.implicit.equations import Equations
@@ -116,8 +117,12 @@ class LoadSteps:
         simulation.clear_forces()
         if isinstance(simulation.hooks, Hooks):
             simulation.hooks.loads[:] = 0
+        clock = s.control.clock[0]
+        # Points that are led start with the velocity of one step earlier. Here it is that of now.
+        dt, clock.last_dt = float(clock.last_dt), 0.0
         if not take_rows(self.scheme.begin, s, simulation.mode, hooks):
             raise PointsWrong
+        clock.last_dt = dt
         force = of_force(s.kin)
         return s.nodes.sums[:, force : force + s.kin.dimension]
 
@@ -133,7 +138,10 @@ class LoadSteps:
         equations = Equations(s)
         nodes = equations.nodes
         external = after[nodes] + equations.present_forces()
-        given, prescribed = self._prescribed(equations, hooks)
+        fixed, prescribed = self._prescribed(equations, hooks)
+        led = equations.led[:, None]
+        given = fixed | led
+        prescribed = np.where(led, equations.velocity_of_rigid, prescribed)
         if not self.dynamic:
             self._check_held(equations, given)
         equations.unknowns(~given)
@@ -147,7 +155,7 @@ class LoadSteps:
         newton.scale(self.modulus, self.scheme.stabilisation)
         u, iterations, residual = newton.solve(np.where(given, prescribed * dt, 0.0))
         reaction = newton.reaction(u)
-        return Equilibrium(equations, inertia, u, given, reaction, iterations, residual)
+        return Equilibrium(equations, inertia, u, fixed, reaction, iterations, residual)
 
     def _prescribed(self, equations: Equations, hooks: Any) -> tuple[np.ndarray, np.ndarray]:
         """Find which components of the nodes are held, and the velocities that they get.
@@ -176,19 +184,28 @@ class LoadSteps:
     def _publish(self, found: "Equilibrium", hooks: Any, dt: float) -> None:
         """Let those that hold nodes publish the forces that they do it with; velocities at nodes.
 
-        They are shown the velocity that a node would have without them.
+        Fixes are shown the velocity that a node would have without them. Rigid solids take the
+        forces that are left.
         """
         simulation, s = self.simulation, found.equations.s
         d, nodes, update = found.equations.d, found.equations.nodes, s.nodes.update
-        mass = np.where(found.given, found.equations.mass[:, None], 1.0)
+        mass = found.equations.mass[:, None]
         v = found.u / dt
-        without = np.where(found.given, -found.reaction * dt / mass, 0.0)
+        held = found.fixed & (mass > 0)
+        without = np.where(held, -found.reaction * dt / np.where(held, mass, 1.0), 0.0)
         change = of_change(s.kin)
         update[nodes, :d] = v + without
         update[nodes, change : change + d] = without
+        clock = s.control.clock[0]
+        kept, clock.kept = float(clock.kept), 0.0  # reactions have all that velocities change by
         take_rows(self.scheme.hold, s, simulation.mode, hooks)
+        clock.kept = kept
         update[nodes, :d] = s.nodes.velocity[nodes, :d] = v
         update[nodes, change : change + d] = 0
+        if isinstance(s.contact, RigidBodies):
+            forces = np.where(found.fixed, 0.0, -found.reaction)
+            led = found.equations.led
+            put_forces(s.contact, s, nodes[led], forces[led])
 
     def _explained(self, reason: Failed, part: float) -> ScriptError:
         """Make of a failure what the user should know."""
@@ -214,6 +231,8 @@ class LoadSteps:
         for body in range(bodies.max() + 1):
             own = bodies == body
             held = motions[own][given[own]]
+            if given[own].all():
+                continue
             if np.linalg.matrix_rank(held) == motions.shape[2]:
                 continue
             free = free_from(s.kin)
@@ -230,7 +249,7 @@ class LoadSteps:
     def _solid_at(self, equations: Equations, chosen: np.ndarray) -> str:
         """Name the solid of a point that sees some of the chosen nodes (m,)."""
         hub, firsts = self.simulation.hub, equations.s.control.firsts
-        for block, (seen, _) in zip(equations.s.blocks, equations.parts, strict=True):
+        for block, (seen, _) in zip(equations.blocks, equations.parts, strict=True):
             points = np.flatnonzero(chosen[seen.nodes].any(1))
             if len(points):
                 number = np.searchsorted(firsts, block.points.id[points[0]], side="right") - 1
@@ -244,7 +263,7 @@ class Equilibrium(NamedTuple):
     equations: Equations
     inertia: Rest | Motion
     u: np.ndarray
-    given: np.ndarray  # which components are held
+    fixed: np.ndarray  # which components fixes hold
     reaction: np.ndarray
     iterations: int
     residual: float
