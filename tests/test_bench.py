@@ -154,7 +154,7 @@ def fake(speeds=(1e6, 3e6, 2e6), place=0.1, of_points=8e-4, of_nodes=1e-4, waits
 )
 def test_what_limits_a_workload(measured, word):
     assert measured.limit == word
-    swept = sum((measured.of_points | measured.of_nodes).values()) - measured.waits
+    swept = sum((measured.sweeps_of_points | measured.sweeps_of_nodes).values()) - measured.waits
     assert measured.rest == pytest.approx(max(0, 1 - swept / 1e-3))
 
 
@@ -256,9 +256,10 @@ def test_the_process_of_a_workload_ends_with_bench():
     """Also where that is killed, and can tell nobody."""
     part = apart.Measurement("disks-320", 1, {}, 600.0, 1e9, False)
     with subprocess.Popen(
-        apart.COMMAND, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE
-    ) as process:
-        assert process.communicate(json.dumps(part).encode() + b"\n") == (b"", b"")
+        [*apart.COMMAND, json.dumps(part)],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    ) as process:  # fmt: skip
+        assert process.communicate() == (b"", b"")
     assert process.returncode == 0
 
 
@@ -274,20 +275,18 @@ def test_a_process_that_somebody_ends(capfd, monkeypatch):
 
 def test_an_interrupt_ends_the_process_of_a_workload(capfd, monkeypatch):
     """Ctrl-C comes to the one process that waits."""
-    begun = []
+    begun, waited = [], []
 
     class Interrupted(subprocess.Popen):
         def __init__(self, *arguments, **options):
             super().__init__(*arguments, **options)
             begun.append(self)
-            self.stdout.close()
-            self.stdout = self
 
-        def read(self):
-            raise KeyboardInterrupt
-
-        def close(self):
-            pass
+        def wait(self, timeout=None):
+            if self not in waited:
+                waited.append(self)
+                raise KeyboardInterrupt
+            return super().wait(timeout)
 
     monkeypatch.setattr(measure, "bandwidth", lambda threads, size=1: 2e10)
     monkeypatch.setattr(apart, "COMMAND", (sys.executable, "-c", "import time; time.sleep(600)"))

@@ -2,8 +2,8 @@
 
 What workloads before it leave in memory has no part in the speed of one then. This module is the
 program of such a process, too: ``python -m karamelo_py.app.bench.apart``. It takes a `Measurement`
-in JSON from its input, gives what it finds to its output, and ends with the process that has
-started it. One of several takes it as its argument, and the first writes what they find to a file.
+in JSON as its argument, writes what it finds to a file, and ends with the process that has started
+it, which closes its input then.
 """
 
 import json
@@ -15,7 +15,6 @@ import sys
 import tempfile
 import threading
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -23,7 +22,7 @@ import numpy as np
 
 from karamelo_py.app.bench import measure
 from karamelo_py.app.bench.measure import WORKLOADS, Measured
-from karamelo_py.app.launch import Outcome, keep_to_oneself, launch, outcome_of, together
+from karamelo_py.app.launch import ERROR, keep_to_oneself, launch, outcome_of, together
 from karamelo_py.run.mpi.comm import MpiComm
 from karamelo_py.script.errors import ScriptError
 
@@ -48,7 +47,8 @@ class Measurement(NamedTuple):
     triad: float = 0.0  # bandwidth of the memory (bytes/s)
     debug: bool = False
     ranks: int = 1
-    file: str = ""  # for what several processes find
+    scaling: bool = False  # what is asked for is a `Scaled`
+    file: str = ""  # for what is found
 
 
 # ---- one process --------------------------------------------------------------------------------
@@ -61,28 +61,38 @@ def measured(part: Measurement) -> Measured:
     return measure.measured(simulation, part.seconds, part.triad, workload.lead)
 
 
-def measured_apart(part: Measurement) -> Measured | Outcome:
-    """Measure a workload in a process of its own; how that has ended where it went wrong."""
-    # A session of its own: Ctrl-C comes to this process alone.
-    process = subprocess.Popen(
-        COMMAND, bufsize=0, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
-    )
-    try:
-        with suppress(BrokenPipeError):  # of one that has ended before it was told what to do
-            process.stdin.write(json.dumps(part).encode() + b"\n")
-        answer = process.stdout.read()
-    except BaseException:
-        process.kill()
-        raise
-    finally:
-        process.stdin.close()
-        process.stdout.close()
-        status = process.wait()
-    if not answer:
-        by = f"with the status {status}" if status >= 0 else f"by {_SIGNALS.get(-status, -status)}"
-        raise ScriptError(f"{part.workload} could not be measured: its process was ended {by}")
-    found = json.loads(answer)
-    return Measured(**found["measured"]) if "measured" in found else Outcome(**found)
+def measured_apart(part: Measurement) -> Measured | int:
+    """Measure a workload in a process of its own; its status where it went wrong and said why."""
+    status, found = _found_apart(part)
+    if found:
+        return Measured(**found)
+    if status == ERROR:
+        return status
+    by = f"with the status {status}" if status >= 0 else f"by {_SIGNALS.get(-status, -status)}"
+    raise ScriptError(f"{part.workload} could not be measured: its process was ended {by}")
+
+
+def _found_apart(part: Measurement) -> tuple[int, dict[str, Any]]:
+    """Measure with processes of their own; their exit status, and what they have found."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "found.json"
+        words = [json.dumps(part._replace(file=str(file)))]
+        if part.ranks > 1:
+            status = launch(part.ranks, words, module=MODULE)
+        else:
+            # A session of its own: Ctrl-C comes to this process alone.
+            process = subprocess.Popen(
+                [*COMMAND, *words], bufsize=0, stdin=subprocess.PIPE, start_new_session=True
+            )
+            try:
+                status = process.wait()
+            except BaseException:
+                process.kill()
+                raise
+            finally:
+                process.stdin.close()
+                process.wait()
+        return status, json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
 
 
 # ---- several processes --------------------------------------------------------------------------
@@ -124,39 +134,29 @@ def grown(script: str, presets: Mapping[str, str], times: int) -> dict[str, str]
 
 def measured_with_ranks(part: Measurement, *, weak: bool = False) -> Scaled:
     """Measure a workload with so many processes, which are started as those of a run."""
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "found.json"
-        words = [json.dumps(part._replace(file=str(file)))]
-        if part.ranks > 1:
-            status = launch(part.ranks, words, module=MODULE)
-        else:
-            status = subprocess.run([*COMMAND, *words], check=False).returncode
-        if status or not file.exists():
-            why = f"ended by signal {abs(status) % 128}" if not 0 <= status < 128 else "see above"
-            raise ScriptError(
-                f"{part.workload} could not be measured with {part.ranks} x {part.threads}: {why}"
-            )
-        found = json.loads(file.read_text(encoding="utf-8"))
+    status, found = _found_apart(part._replace(scaling=True))
+    if not found:
+        why = f"ended by signal {abs(status) % 128}" if not 0 <= status < 128 else "see above"
+        raise ScriptError(
+            f"{part.workload} could not be measured with {part.ranks} x {part.threads}: {why}"
+        )
     return Scaled(part.ranks, part.threads, weak, **found)
 
 
-def _measure_share(part: Measurement, comm: MpiComm | None = None) -> int:
-    """Measure as one of the processes; the first writes what is found."""
+def _share(part: Measurement, comm: MpiComm | None = None) -> dict[str, Any]:
+    """Measure as one of the processes of a `Scaled`."""
     workload = WORKLOADS[part.workload]
     simulation = measure.build(workload, part.threads, part.presets, comm)
     simulation.compile()
     count, found = measure.repeated(simulation, part.seconds, workload.lead)
     taken, waits = min(found, key=lambda one: one[0])
-    if simulation.comm.leads:
-        least = float(np.min(waits))
-        file = {
-            "points": simulation.count,
-            "best": simulation.count * count / taken,
-            "exchange": least / taken,
-            "imbalance": (float(np.mean(waits)) - least) / taken,
-        }
-        Path(part.file).write_text(json.dumps(file), encoding="utf-8")
-    return 0
+    least = float(np.min(waits))
+    return {
+        "points": simulation.count,
+        "best": simulation.count * count / taken,
+        "exchange": least / taken,
+        "imbalance": (float(np.mean(waits)) - least) / taken,
+    }
 
 
 def line(row: Scaled, one: Scaled) -> str:
@@ -173,27 +173,29 @@ def line(row: Scaled, one: Scaled) -> str:
 
 
 def main() -> int:
-    """Measure what the argument or the input says."""
-    if len(sys.argv) > 1:
-        part = Measurement(*json.loads(sys.argv[1]))
-        keep_to_oneself()
-        if part.ranks > 1:
-            return together(part.ranks, lambda comm: _measure_share(part, comm))
-        return _measure_share(part)
-    answers, sys.stdout = sys.stdout, sys.stderr
-    part = Measurement(*json.loads(sys.stdin.readline()))
+    """Measure what the argument says."""
+    part = Measurement(*json.loads(sys.argv[1]))
+    keep_to_oneself()
+    if part.ranks > 1:
+        return together(part.ranks, lambda comm: _measure(part, comm))
     threading.Thread(target=_end_with_the_other, daemon=True).start()
-    found: dict[str, Any] = {}
+    status, text = outcome_of(lambda: _measure(part), debugging=part.debug)
+    if text:
+        print(text, file=sys.stderr, flush=True)
+    return status
 
-    def act() -> int:
+
+def _measure(part: Measurement, comm: MpiComm | None = None) -> int:
+    """Measure, and write what is found, if this is the first process."""
+    if part.scaling:
+        found = _share(part, comm)
+    else:
         from karamelo_py.compiler.threads import set_threads
 
         set_threads(part.threads)
-        found["measured"] = measured(part)._asdict()
-        return 0
-
-    outcome = outcome_of(act, debugging=part.debug)
-    print(json.dumps(found or outcome._asdict()), file=answers, flush=True)
+        found = measured(part)._asdict()
+    if comm is None or comm.leads:
+        Path(part.file).write_text(json.dumps(found), encoding="utf-8")
     return 0
 
 

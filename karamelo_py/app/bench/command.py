@@ -7,7 +7,6 @@ this command, since machines are shared and their clocks change.
 import json
 import re
 import subprocess
-import sys
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Mapping
 from math import inf
@@ -17,7 +16,6 @@ from typing import Any
 import karamelo_py
 from karamelo_py.app.bench import apart, measure
 from karamelo_py.app.bench.measure import WORKLOADS
-from karamelo_py.app.launch import Outcome
 from karamelo_py.app.options import above_zero, add_variables, threads_option
 from karamelo_py.app.plot import read_text
 from karamelo_py.app.studies.records import surroundings
@@ -58,7 +56,6 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--against", type=Path, metavar="FILE", help="compare with what -o has written before"
     )
-    parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
 
 
 def run(options: Namespace) -> int:
@@ -94,10 +91,8 @@ def run(options: Namespace) -> int:
         else:
             act = apart.measured_apart if len(chosen) > 1 else apart.measured
             measured = act(part)
-            if isinstance(measured, Outcome):
-                sys.stdout.flush()
-                print(measured.text, file=sys.stderr, flush=True)
-                return measured.status
+            if isinstance(measured, int):
+                return measured
             _print(name, measured, published=not presets)
             one = measured.record()
         title = WORKLOADS[name].title
@@ -137,10 +132,10 @@ def _print(name: str, one: measure.Measured, *, published: bool) -> None:
         print(f"  {'of Karamelo in C++':<34} {workload.karamelo:8.2f} million ({ELSEWHERE})")
         print(f"  {'ratio of the two':<34} {best / 1e6 / workload.karamelo:8.1f}")
     print(f"  {'bytes per particle':<34} {one.bytes_per_particle:8d}")
-    print(f"  {'bytes moved per particle-step':<34} {one.bytes_per_step:8.0f}")
+    print(f"  {'bytes moved per particle-step':<34} {one.bytes_per_particle_step:8.0f}")
     print(f"  {'share of the memory roofline':<34} {100 * one.roofline:8.1f} %")
     print(f"  {'share of that of its own size':<34} {100 * one.roofline_in_place:8.1f} %")
-    stages = one.of_points | one.of_nodes if one.told_apart else {}
+    stages = one.sweeps_of_points | one.sweeps_of_nodes if one.told_apart else {}
     for stage, per in stages.items():
         print(f"    {stage:<38} {1e9 * per / one.points:8.2f} ns")
     print(f"    {'together, in one compiled loop':<38} {1e9 / best:8.2f} ns")

@@ -84,12 +84,12 @@ class Measured(NamedTuple):
     points: int
     speeds: list[float]  # particle-steps per second of each repetition
     bytes_per_particle: int
-    bytes_per_step: float  # that move in a particle-step if no cache keeps them
+    bytes_per_particle_step: float  # that move in a particle-step if no cache keeps them
     roofline: float  # share of the memory's bandwidth that these take at the best speed
     roofline_in_place: float  # the same, of arrays as large as the scene, which caches may keep
     # Seconds per step in sweeps over points and over nodes, without the way there.
-    of_points: dict[str, float]
-    of_nodes: dict[str, float]
+    sweeps_of_points: dict[str, float]
+    sweeps_of_nodes: dict[str, float]
     waits: float  # seconds per step of these in which threads begin and wait for each other
     precision: str
 
@@ -104,7 +104,7 @@ class Measured(NamedTuple):
     @property
     def swept(self) -> float:
         """Sweeps one by one, as a share of a step in one compiled loop."""
-        swept = sum(self.of_points.values()) + sum(self.of_nodes.values())
+        swept = sum(self.sweeps_of_points.values()) + sum(self.sweeps_of_nodes.values())
         return (swept - self.waits) * self.best / self.points
 
     @property
@@ -120,8 +120,8 @@ class Measured(NamedTuple):
     @property
     def nodes(self) -> float:
         """The share of sweeps over nodes in the time of all sweeps."""
-        nodes = sum(self.of_nodes.values())
-        swept = nodes + sum(self.of_points.values())
+        nodes = sum(self.sweeps_of_nodes.values())
+        swept = nodes + sum(self.sweeps_of_points.values())
         return nodes / swept if swept else 0.0
 
     @property
@@ -143,22 +143,8 @@ class Measured(NamedTuple):
 
     def record(self) -> dict[str, Any]:
         """Write what is kept in a file; speeds in particle-steps/s, times in seconds."""
-        return {
-            "points": self.points,
-            "precision": self.precision,
-            "best": self.best,
-            "median": self.median,
-            "speeds": self.speeds,
-            "bytes_per_particle": self.bytes_per_particle,
-            "bytes_per_particle_step": self.bytes_per_step,
-            "roofline": self.roofline,
-            "roofline_in_place": self.roofline_in_place,
-            "limited_by": self.limit,
-            "share_of_nodes": self.nodes,
-            "share_of_rest": self.rest,
-            "sweeps_of_points": self.of_points,
-            "sweeps_of_nodes": self.of_nodes,
-        }
+        speeds = {"best": self.best, "median": self.median, "limited_by": self.limit}
+        return speeds | {"share_of_nodes": self.nodes, "share_of_rest": self.rest} | self._asdict()
 
 
 def _name(*tags: Any) -> str:
