@@ -46,6 +46,21 @@ log_modify(custom, time, one, two, most, share, right, two_history, two_max)
     assert log.two_max == pytest.approx(log.two[0], rel=1e-9)
 
 
+def test_exact_values_that_vanish_divide_by_the_largest_so_far(run_interpreted):
+    """3 against 3 cos(5 pi t) of the velocity: 1 off where that is 0, by the 3 there were before."""
+    lines = """
+compute(swing, error, all, vx, 3*cos(5*PI*time), relative)
+compute(never, error, all, vx, 0, relative)
+set_output(10)
+log_modify(custom, time, swing, swing_max, never)
+"""
+    log = fly(run_interpreted, lines).log
+    assert log.Time == pytest.approx([0, 0.1, 0.2])
+    assert log.swing == pytest.approx([0, 1, 2], abs=1e-9)
+    assert log.swing_max == pytest.approx([0, 1, 2], abs=1e-9)
+    assert np.isinf(log.never).all()
+
+
 @pytest.mark.parametrize("every", [1, 20])
 def test_a_history_weighs_time_and_not_outputs(run_interpreted, every):
     """Error 1 in the first half of the time and 0 in the second: sqrt(1/2), whatever the rhythm."""

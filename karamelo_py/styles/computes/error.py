@@ -24,6 +24,7 @@ from karamelo_py.script.terms import number_of
 VECTORS = {"displacement": "u", "velocity": "v"}
 TENSORS = {"stress": "s", "strain": "e"}
 DISPLACEMENTS = ("ux", "uy", "uz")
+VANISHED = 1e-9  # of the largest norm of the exact values so far: the present one is round-off
 
 
 def column(points: PointTable, name: str) -> np.ndarray:
@@ -68,7 +69,7 @@ class Norm:
     depend on how often it is looked at.
     """
 
-    remembers = ("_sums", "_duration", "_time", "history", "largest")
+    remembers = ("_sums", "_duration", "_time", "history", "largest", "_exact")
 
     def __init__(self, words: tuple[str, ...] = ()):
         kinds = [word for word in words if word in ("L1", "L2", "max")]
@@ -86,6 +87,7 @@ class Norm:
         self._time: float | None = None
         self.history = 0.0
         self.largest = 0.0
+        self._exact = 0.0  # the largest norm of the exact values
 
     def terms(self, sizes: np.ndarray, weight: np.ndarray) -> np.ndarray:
         """Return the terms of a norm from the sizes (2, n) of differences and exact values."""
@@ -100,7 +102,9 @@ class Norm:
 
     def follow(self, time: float, moment: np.ndarray) -> float:
         """As `scaled`; `history` and `largest` take the moment in, once."""
-        now = self.scaled(*moment)
+        difference, exact = moment
+        self._exact = max(self._exact, exact)
+        now = self.scaled(difference, exact if exact > VANISHED * self._exact else self._exact)
         if self._time is not None and time <= self._time:
             return now
         if self.kind == "max":
@@ -179,7 +183,8 @@ class Error(Compared, Compute):
     -----
     With e the length of the difference at a point (of a tensor: sqrt(e_ij e_ij)) and V0 the volume
     of the point at first: L1 = sum V0 e / sum V0, L2 = sqrt(sum V0 e^2 / sum V0), max = max e.
-    ``relative`` divides by the same norm of the exact values; where they vanish, the result is inf.
+    ``relative`` divides by the same norm of the exact values; while they vanish, by the largest so
+    far, and before there was any, the result is inf.
 
     Publishes ID, the error now; ID_max, the largest of the outputs so far; and ID_history, the same
     norm over points and over all time so far (relative: of the whole history, so that moments at
