@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from karamelo_py.output.files import picture_format
-from karamelo_py.output.plots import Plots, PlottedCurve
+from karamelo_py.output.plots import PlottedCurve, draw
 from karamelo_py.script.errors import ScriptError, nearest_few
 from karamelo_py.script.terms import number_of
 
@@ -80,7 +80,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "-o", "--output", type=Path, default=Path("log.png"), metavar="FILE",
         help="ending in .png, .pdf or .svg (default: log.png)",
     )  # fmt: skip
-    parser.add_argument("--debug", action="store_true", help=argparse.SUPPRESS)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -105,9 +104,7 @@ def run(options: argparse.Namespace) -> int:
                 expected="one of " + " ".join(known),
                 hint=f"did you mean {close}?" if close else None,
             )
-    no_units = SimpleNamespace(units=None)
-    plots = Plots(SimpleNamespace(output=no_units, fixes={}, computes={}, folder=Path()))
-    scale = "log" if options.log_scale else "linear"
+    curves, scale = [], "log" if options.log_scale else "linear"
     for side, names in (("left", options.columns), ("right", options.right)):
         for name in names:
             curve = PlottedCurve(
@@ -116,8 +113,7 @@ def run(options: argparse.Namespace) -> int:
             curve.points = [
                 (row[options.x], row[name]) for row in rows if name in row and options.x in row
             ]
-            plots.add(name, curve)
-    plots.file = options.output
-    plots.finish()
+            curves.append(curve)
+    draw(curves, options.output)
     print(options.output)
     return 0

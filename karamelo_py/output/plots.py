@@ -1,5 +1,6 @@
 """Plots of logged quantities, drawn with Matplotlib when a run ends, and the look of all plots."""
 
+from collections.abc import Callable
 from math import floor, log10
 from pathlib import Path
 from typing import Any
@@ -58,48 +59,55 @@ class Plots(dict[str, PlottedCurve]):
 
     def finish(self) -> None:
         """Draw every curve that has points to the file; without file or points do nothing."""
-        by_x: dict[str, list[PlottedCurve]] = {}
-        for curve in self.values():
-            if curve.points:
-                by_x.setdefault(curve.x.name, []).append(curve)
-        if self.file is None or not by_x:
-            return
-        figure = blank_figure(6.4, 3.8 * len(by_x))
-        all_axes = figure.subplots(len(by_x), 1, squeeze=False)[:, 0]
-        for axes, (x_name, curves) in zip(all_axes, by_x.items(), strict=True):
-            axes.set_xlabel(self._labelled(x_name))
-            lines = []
-            for side in ("left", "right"):
-                chosen = [curve for curve in curves if curve.side == side]
-                # Colours go on from one side to the other.
-                lines += self._draw(axes, side, chosen, first=len(lines)) if chosen else []
-            # Above the curves, where it hides none.
-            above = {"loc": "lower left", "bbox_to_anchor": (0, 1), "ncols": 4}
-            axes.legend(handles=lines, **above, frameon=False, fontsize="small")
-        savefig(figure, self.hub.folder / self.file)
-
-    def _draw(self, axes: Any, side: str, curves: list[PlottedCurve], first: int) -> list:
-        """Draw curves over one axis of y; return their lines."""
-        tidy(axes)
-        if side == "right":
-            axes = axes.twinx()
-            axes.spines[["top", "left"]].set_visible(False)
-        lines = []
-        for k, curve in enumerate(curves, first):
-            x, y = zip(*curve.points, strict=True)
-            marker = "o" if len(x) < 3 else None
-            label = f"{curve.id} (right)" if side == "right" else curve.id
-            lines += axes.plot(x, y, color=f"C{k}", label=label, linewidth=1.4, marker=marker)
-        axes.set_ylabel(", ".join(dict.fromkeys(self._labelled(curve.y.name) for curve in curves)))
-        axes.margins(x=0.01)
-        if any(curve.scale == "log" for curve in curves):
-            axes.set_yscale("log", nonpositive="mask")
-        return lines
+        curves = [curve for curve in self.values() if curve.points]
+        if self.file is not None and curves:
+            draw(curves, self.hub.folder / self.file, self._labelled)
 
     def _labelled(self, name: str) -> str:
         units = self.hub.output.units
         parts = {**self.hub.fixes, **self.hub.computes}
         return labelled(name, units.of_value(name, parts)) if units else name
+
+
+def draw(curves: list[PlottedCurve], path: Path, labelled: Callable[[str], str] = str) -> None:
+    """Draw curves, each of which has points; `labelled` adds units to the names of quantities."""
+    by_x: dict[str, list[PlottedCurve]] = {}
+    for curve in curves:
+        by_x.setdefault(curve.x.name, []).append(curve)
+    figure = blank_figure(6.4, 3.8 * len(by_x))
+    all_axes = figure.subplots(len(by_x), 1, squeeze=False)[:, 0]
+    for axes, (x_name, over_x) in zip(all_axes, by_x.items(), strict=True):
+        axes.set_xlabel(labelled(x_name))
+        tidy(axes)
+        lines = []
+        for side in ("left", "right"):
+            chosen = [curve for curve in over_x if curve.side == side]
+            # Colours go on from one side to the other.
+            lines += _over_one_axis(axes, side, chosen, len(lines), labelled) if chosen else []
+        # Above the curves, where it hides none.
+        above = {"loc": "lower left", "bbox_to_anchor": (0, 1), "ncols": 4}
+        axes.legend(handles=lines, **above, frameon=False, fontsize="small")
+    savefig(figure, path)
+
+
+def _over_one_axis(
+    axes: Any, side: str, curves: list[PlottedCurve], first: int, labelled: Callable[[str], str]
+) -> list:
+    """Draw curves over one axis of y; return their lines."""
+    if side == "right":
+        axes = axes.twinx()
+        axes.spines[["top", "left"]].set_visible(False)
+    lines = []
+    for k, curve in enumerate(curves, first):
+        x, y = zip(*curve.points, strict=True)
+        marker = "o" if len(x) < 3 else None
+        label = f"{curve.id} (right)" if side == "right" else curve.id
+        lines += axes.plot(x, y, color=f"C{k}", label=label, linewidth=1.4, marker=marker)
+    axes.set_ylabel(", ".join(dict.fromkeys(labelled(curve.y.name) for curve in curves)))
+    axes.margins(x=0.01)
+    if any(curve.scale == "log" for curve in curves):
+        axes.set_yscale("log", nonpositive="mask")
+    return lines
 
 
 # ---- the look that all plots share --------------------------------------------------------------
