@@ -5,6 +5,7 @@ import json
 import re
 import shutil
 import subprocess
+import sys
 from itertools import combinations
 
 import numpy as np
@@ -137,6 +138,29 @@ def test_pictures_are_written(table, suffix):
     assert main(["chart", "sweep.csv", "-accuracy", "err", "-o", name]) == 0
     magic = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}[suffix]
     assert (table / name).read_bytes().startswith(magic)
+
+
+def test_a_closed_pipe_leaves_the_picture(table):
+    """Who reads the first lines of the table alone (head -1) wants the picture all the same."""
+    words = ["chart", "sweep.csv", "-accuracy", "err", "-o", "chart.png"]
+    command = [sys.executable, "-m", "karamelo_py.app.cli", *words]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        process.stdout.close()
+        assert b"Traceback" not in process.stderr.read()
+    assert (table / "chart.png").exists()
+
+
+@pytest.mark.parametrize(("first", "scale"), [(0, "linear"), (5, "log")])
+def test_a_variable_that_is_zero_has_a_place(table, monkeypatch, first, scale):
+    drawn = []
+    monkeypatch.setattr(pictures, "savefig", lambda figure, path: drawn.append(figure))
+    text = (table / "sweep.csv").read_text(encoding="utf-8").replace('"10"', f'"{first}"')
+    (table / "sweep.csv").write_text(text, encoding="utf-8")
+    assert main(["chart", "sweep.csv", "-accuracy", "err", "-x", "N", "-o", "chart.png"]) == 0
+    (axes,) = drawn[0].axes
+    assert axes.get_xscale() == scale and axes.get_yscale() == "log"
+    whole = [line for line in axes.lines if len(line.get_xdata()) == 4]
+    assert len(whole) == 2 and all(line.get_xdata()[0] == first for line in whole)
 
 
 def test_words_along_the_axes(table, capsys):

@@ -11,6 +11,7 @@ from selection import covering, parameters
 from karamelo_py.app.cli import main
 from karamelo_py.app.plot import read_log
 from karamelo_py.app.studies import stability, variables
+from karamelo_py.app.studies.case import Launch
 from karamelo_py.app.studies.stability import explore, unseen
 from karamelo_py.script.errors import ScriptError
 
@@ -82,6 +83,26 @@ def test_a_mistake_of_the_script_is_no_failure(folder, capsys):
     )
     assert "this is the script with factor = " in captured.err
     assert not captured.out and not (folder / "map.png").exists()
+
+
+def test_an_interrupted_map_is_drawn_and_goes_on(folder, monkeypatch, capsys):
+    words = ["-var", "factor=1,3", "-var", "push=0", "-jobs", "1", "-o", "map.svg"]
+    run = Launch.run
+
+    def interrupted(launch, case, place):
+        if case["factor"] == "3":
+            raise KeyboardInterrupt
+        return run(launch, case, place)
+
+    monkeypatch.setattr(Launch, "run", interrupted)
+    assert main(["stability", "in.bar", *words]) == 130
+    assert "1 of at most 2 runs are kept; the same command goes on" in capsys.readouterr().err
+    assert list(pandas.read_csv(folder / "map.csv")["class"]) == ["stable"]
+    assert (folder / "map.svg").exists()
+    monkeypatch.setattr(Launch, "run", run)
+    assert main(["stability", "in.bar", *words]) == 0
+    assert "run 1 of at most 2: factor=3" in capsys.readouterr().out
+    assert list(pandas.read_csv(folder / "map.csv")["class"]) == ["stable", "failed"]
 
 
 def test_steps_beyond_those_that_conduction_bears_have_failed(folder):

@@ -217,7 +217,7 @@ def _parser(command: str) -> tuple[CommandLine, Any]:
     parser.add_argument("--version", action="version", version=f"karamelo-py {__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", prog="karamelo-py")
 
-    def add(name: str, act: Callable[[Any], int], summary: str, text: str = "") -> CommandLine:
+    def add(name: str, act: Callable | None, summary: str, text: str = "") -> CommandLine:
         added = commands.add_parser(name, help=summary, description=f"{summary}\n{text}".strip())
         added.add_argument("--debug", action="store_true", help="show the traceback of an error")
         added.set_defaults(act=act)
@@ -264,11 +264,10 @@ def _parser(command: str) -> tuple[CommandLine, Any]:
     explain = add("help", lambda given: _catalogue().print_help(given.words), summary, HELP)
     explain.add_argument("words", metavar="WORD", nargs="*")
     for name, (module, summary) in ELSEWHERE.items():
-        added = commands.add_parser(name, help=summary)
-        if name == command:
-            found = import_module(module)
+        found = import_module(module) if name == command else None
+        added = add(name, found and found.run, summary)
+        if found:
             added.description = found.DESCRIPTION
-            added.set_defaults(act=found.run)
             found.add_options(added)
     return parser, commands
 

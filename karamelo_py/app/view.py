@@ -41,7 +41,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--azimuth", type=float, default=-60.0, help="in 3D, degrees from x")
     parser.add_argument("--elevation", type=float, default=30.0, help="in 3D, degrees")
     parser.add_argument("--fps", type=float, default=25.0, help="frames a second of a movie")
-    parser.add_argument("--debug", action="store_true", help=argparse.SUPPRESS)
 
 
 def run(options: argparse.Namespace) -> int:

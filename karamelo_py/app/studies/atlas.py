@@ -116,7 +116,6 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "-page", type=Path, help="write this page, its pictures to _static/atlas beside it"
     )
-    parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
 
 
 def run(options: Any) -> int:

@@ -17,7 +17,7 @@ from karamelo_py.app.studies import keeping, look, pictures, records
 from karamelo_py.app.studies.case import options_of, worded
 from karamelo_py.app.studies.curves import Family, Table, column, order, require
 from karamelo_py.app.studies.study import plain_table, shown, terminal
-from karamelo_py.app.studies.variables import add_axes, along, holds, names, out_file, split
+from karamelo_py.app.studies.variables import add_axes, along, holds, names, out_file
 from karamelo_py.script.errors import ScriptError
 
 DESCRIPTION = """\
@@ -65,7 +65,6 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument("-where", action="append", default=[], help="rows that fulfil a condition")
     parser.add_argument("-title", help="heads the chart (the name of the script)")
     parser.add_argument("-o", type=Path, help="the picture or page: " + ", ".join(SUFFIXES))
-    parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
 
 
 def run(options: Any) -> int:
@@ -99,10 +98,10 @@ def run(options: Any) -> int:
         raise ScriptError(f"no run has a value of '{options.cost}' above 0")
     first = family.along if options.x else look.label(family.cost)
     words = along(options, *(axes or (first, family.error_label)))
-    tell(family, costs=costs)
+    # First the picture: who reads the table may close the pipe.
     if out is None:
-        return 0
-    if out.suffix.lower() == ".html":
+        pass
+    elif out.suffix.lower() == ".html":
         if axes:
             raise ScriptError("-heat is a picture", expected="-o heat.png, .svg or .pdf")
         write_page(family, out, words, title or "runs")
@@ -110,7 +109,9 @@ def run(options: Any) -> int:
         pictures.heat(family, *axes, out, words, title)
     else:
         pictures.lines(family, out, words, title)
-    print(f"drawn: {out}")
+    tell(family, costs=costs)
+    if out is not None:
+        print(f"drawn: {out}")
     return 0
 
 
@@ -145,13 +146,14 @@ def side_by_side(options: Any) -> int:
             raise ScriptError(f"{path}: {options.versus} is {', '.join(values)}", expected=expected)
         known = values
         found += some
-    pictures.tell_pairs(found, known, options.accuracy, options.cost)
     if out is not None:
         cost = look.label(options.cost).removesuffix(" (s)")
         words = along(
             options, look.label(options.accuracy), f"{cost},\n{known[1]} over {known[0]} (1)"
         )
         pictures.draw_pairs(found, known, out, words, options.accuracy, options.title or "")
+    pictures.tell_pairs(found, known, options.accuracy, options.cost)
+    if out is not None:
         print(f"drawn: {out}")
     return 0
 
@@ -161,10 +163,9 @@ def curves(options: Any, table: Table, by: list[str]) -> int:
     out = out_file(options.o or Path("curves.png"), *SUFFIXES[:-1])
     differing = [name for name in by if len({row[name] for row in table.rows}) > 1]
     over = options.x or "Time"
-    called = [name for name in split(options.names) if name]
 
     def read(column: str) -> list[pictures.History]:
-        return pictures.histories(table, differing, options.log, over, column, called)
+        return pictures.histories(table, differing, options.log, over, column, names(options.names))
 
     exact = None
     if options.exact:
@@ -187,13 +188,14 @@ def keeps(options: Any, table: Table, by: list[str]) -> int:
     what = options.x or "Time", options.keeps, keeping.WITHIN, table.made.get("computes", ())
     kept = [keeping.look_at(row, table.path.parent, *what) for row in table.rows]
     text, silent = keeping.verdicts(table, kept, by)
+    if out:
+        out.write_text(text, encoding="utf-8")
     print(text)
     for word in dict.fromkeys(one.word for one in kept):
         print(f"{word}: {sum(one.word == word for one in kept)} of {len(kept)}")
     for line in silent:
         print(f"nothing says why: {line}")
     if out:
-        out.write_text(text, encoding="utf-8")
         print(f"written: {out}")
     return 0
 
@@ -275,16 +277,16 @@ def write_page(family: Family, path: Path, words: tuple[str, str], title: str) -
             marker={"symbol": look.PLOTLY_MARKERS[marker], "size": 10},
         )  # fmt: skip
     usual = {
-        "type": "log", "showgrid": True, "gridcolor": "#e6e6e6", "exponentformat": "power",
+        "showgrid": True, "gridcolor": "#e6e6e6", "exponentformat": "power",
         "linecolor": "#444", "ticks": "outside",
     }  # fmt: skip
     figure.update_layout(
         template="plotly_white", margin={"l": 70, "r": 20, "t": 20, "b": 60}, hovermode="closest",
-        xaxis={**usual, "title": words[0]},
-        yaxis={**usual, "title": words[1]},
+        xaxis={**usual, "title": words[0], "type": "linear" if family.linear else "log"},
+        yaxis={**usual, "title": words[1], "type": "log"},
         legend={"orientation": "h", "y": -0.15},
     )  # fmt: skip
-    for axis, numbers in (("xaxis", "across"), ("yaxis", "error")):
+    for axis, numbers in (("xaxis", "across"), ("yaxis", "error"))[family.linear :]:
         drawn = np.concatenate([getattr(line, numbers)[line.shown] for line in family.lines])
         ticks = look.log_ticks(*(drawn.min(), drawn.max()) if len(drawn) else (1.0, 10.0))
         if 2 <= len(ticks) <= 14:

@@ -73,33 +73,25 @@ class GroupedRuns:
     cost: np.ndarray
     error: np.ndarray
     across: np.ndarray  # one of the first two: what errors are drawn over
+    linear: bool = False  # along an axis that shows zero and what is below
 
     @property
     def label(self) -> str:
         """Write the choice in words."""
-        return label(self.choice)
+        return label(self.choice) or "all"
 
     @property
     def shown(self) -> np.ndarray:
         """Choose the members that have a place in a diagram of errors."""
         good = np.isfinite(self.error) & (self.error > 0)
-        return good & np.isfinite(self.across) & (self.across > 0)
+        return good & np.isfinite(self.across) & (self.linear | (self.across > 0))
 
 
 def label(choice: Mapping[str, str]) -> str:
     """Write a choice in words; what says nothing alone says what it is the value of."""
     choice = {n: v for n, v in choice.items() if v != NONE} or choice
-    parts = [v if _tells(v) else f"{n} = {v}" for n, v in choice.items()]
-    return ", ".join(parts) or "all"
-
-
-def told(choice: Mapping[str, str]) -> list[str]:
-    """Write values of variables: words alone, numbers with what they are the value of."""
-    return [v if number_of(v) is None else f"{name} = {v}" for name, v in choice.items()]
-
-
-def _tells(value: str) -> bool:
-    return number_of(value) is None and value not in ("true", "false", NONE)
+    words = {v for v in choice.values() if number_of(v) is None} - {"true", "false", NONE}
+    return ", ".join(v if v in words else f"{n} = {v}" for n, v in choice.items())
 
 
 class Family:
@@ -129,6 +121,8 @@ class Family:
         ]  # fmt: skip
         self.along = along or max(numbers, key=lambda name: len(values[name]), default=None)
         self.by = [*by, *(n for n in differing if n not in by and n != self.along)]
+        # A logarithmic axis has no place for zero.
+        self.linear = self.convergence and bool((column(rows, self.along) <= 0).any())
         groups: dict[tuple[str, ...], list[Mapping[str, str]]] = {}
         for row in rows:
             groups.setdefault(tuple(row[name] for name in self.by), []).append(row)
@@ -144,7 +138,8 @@ class Family:
             rows.sort(key=lambda row: number_of(row[self.along]))
             x = column(rows, self.along)
         cost, error = column(rows, self.cost), column(rows, self.accuracy)
-        return GroupedRuns(choice, rows, x, cost, error, x if self.convergence else cost)
+        across = x if self.convergence else cost
+        return GroupedRuns(choice, rows, x, cost, error, across, self.linear)
 
     @property
     def error_label(self) -> str:

@@ -41,11 +41,6 @@ class Kept(NamedTuple):
         return self.word in WRONG and not self.warned
 
 
-def grown(first: float, later: float) -> float:
-    """Growth from one mean to a later one, as a share of the first; NaN from nothing."""
-    return growth(first, later, first) if first else np.nan
-
-
 def judge(x: np.ndarray, y: np.ndarray, within: float = WITHIN) -> tuple[str, float]:
     """Find the word for a column `y` over `x`, and its mean over the last part over that at first.
 
@@ -53,8 +48,9 @@ def judge(x: np.ndarray, y: np.ndarray, within: float = WITHIN) -> tuple[str, fl
     """
     span = SHARE * (x[-1] - x[0])
     first, last = float(y[x <= x[0] + span].mean()), float(y[x >= x[-1] - span].mean())
-    share = grown(first, last)
-    ratio = last / first if first else np.nan
+    if first == 0:
+        return "gains", np.nan
+    share, ratio = growth(first, last, first), last / first
     if not share <= within:  # nor for NaN
         return "gains", ratio
     return ("damps" if share < -within else "keeps"), ratio

@@ -9,7 +9,7 @@ import numpy as np
 
 from karamelo_py.app.plot import read_log
 from karamelo_py.app.studies import look
-from karamelo_py.app.studies.curves import Family, Table, column, label, require, told, usable
+from karamelo_py.app.studies.curves import Family, Table, column, label, require, usable
 from karamelo_py.app.studies.records import value
 from karamelo_py.app.studies.study import plain_table, shown, terminal
 from karamelo_py.output.files import savefig
@@ -28,10 +28,10 @@ def lines(family: Family, path: Path, words: tuple[str, str], title: str = "") -
     styles = look.styles([line.choice for line in family.lines])
     xs = np.concatenate([line.across[line.shown] for line in family.lines])
     ys = np.concatenate([line.error[line.shown] for line in family.lines])
-    failed = [line.across[~line.shown & (line.across > 0) & convergence] for line in family.lines]
-    look.log_axis(
-        axes.xaxis, *_ends(np.concatenate([xs, *failed])), list(xs) if convergence else None
-    )
+    failed = [line.across[~line.shown & convergence] for line in family.lines]
+    if not family.linear:
+        ends = _ends(np.concatenate([xs, *failed]))
+        look.log_axis(axes.xaxis, *ends, list(xs) if convergence else None)
     look.log_axis(axes.yaxis, *_ends(ys))
     if not convergence:
         _front(axes, family)
@@ -133,7 +133,7 @@ def heat(
         axes.set_xticks(np.arange(len(across)) + 0.5, across)
         axes.set_yticks(np.arange(len(up)) + 0.5, up)
         axes.set_facecolor("0.93")
-        axes.set_title(", ".join(told(dict(zip(others, key, strict=True)))), fontsize=9)
+        axes.set_title(label(dict(zip(others, key, strict=True))), fontsize=9)
     for axes in all_axes[len(panels) :]:
         axes.set_visible(False)
     figure.supxlabel(words[0], fontsize=10)
@@ -178,7 +178,7 @@ def histories(
         for name in (over, curve):
             if name not in columns:
                 raise unknown(f"{log} has no column '{name}'", name, columns)
-        called = names[k] if k < len(names) else label({name: row[name] for name in by})
+        called = names[k] if k < len(names) else label({name: row[name] for name in by}) or "all"
         stopped = row.get("status", "done") != "done"
         kept = forward(columns["Time"], stopped) if "Time" in columns else slice(None)
         found.append(History(columns[over][kept], columns[curve][kept], called, stopped))
@@ -278,12 +278,12 @@ def pairs(table: Table, name: str, accuracy: str, cost: str) -> tuple[list[Pair]
         if len(two) < 2:
             continue
         said = dict(zip(others, case, strict=True))
-        parts = told({name: said[name] for name in differing})
+        parts = filter(None, [scene, label({name: said[name] for name in differing})])
         numbers = [
             tuple(_number(two[word], column) for word in values)
             for column in (accuracy, cost, "bytes_per_particle")
         ]
-        found.append(Pair(", ".join([scene, *parts]), *numbers))
+        found.append(Pair(", ".join(parts), *numbers))
     return found, values
 
 

@@ -6,7 +6,8 @@ import json
 import os
 import platform
 import re
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
+from contextlib import suppress
 from datetime import datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -53,26 +54,20 @@ class Reduction:
             incomplete = f"-record {word}: '{reduction}:{column}' is not complete"
             raise ScriptError(incomplete, expected=_WORDS)
 
-    def of(self, log: Mapping[str, np.ndarray]) -> float | None:
-        """Take the number, if the log has it."""
-        values = log.get(self.column)
-        if values is None or not len(values):
-            return None
+    def of(self, log: Mapping[str, np.ndarray]) -> float:
+        """Take the number; an error says why the log has none."""
+        values = log.get(self.column, ())
+        if not len(values):
+            raise ScriptError(f"the log has no column '{self.column}'")
         if self.level is None:
             return float(REDUCTIONS[self.reduction](values))
         # Between the first row beyond the level and the one before it.
         above = values >= self.level if values[0] < self.level else values <= self.level
         if not above.any() or "Time" not in log:
-            return None
+            raise ScriptError(f"{self.column} does not reach {self.level:g}")
         k = max(int(np.argmax(above)), 1)
         share = (self.level - values[k - 1]) / (values[k] - values[k - 1])
         return float(log["Time"][k - 1] + share * (log["Time"][k] - log["Time"][k - 1]))
-
-    def missing(self, log: Mapping[str, np.ndarray]) -> str:
-        """Tell why there is no such number."""
-        if self.column not in log:
-            return f"the log has no column '{self.column}'"
-        return f"{self.column} does not reach {self.level:g}"
 
 
 class Recorded:
@@ -109,27 +104,21 @@ class Recorded:
         """List the log columns that it names, but for `variables` of the study."""
         return [part.column for name, part in self.parts.items() if name not in variables]
 
-    def of(self, log: Mapping[str, np.ndarray], case: Mapping[str, Any]) -> float | None:
-        """Take the number, if the log has what it takes."""
+    def of(self, log: Mapping[str, np.ndarray], case: Mapping[str, Any]) -> float:
+        """Take the number; an error says why there is none."""
         found = {
             name: number_of(case[name]) if name in case else part.of(log)
             for name, part in self.parts.items()
         }
         if self.raw is None:
             return found[""]
-        if None in found.values():
-            return None
-        try:
-            value = evaluate(self.node, self.raw, NamesOfCase("-record", found))
-        except ScriptError:  # such as a division by zero, in this run
-            return None
-        return value if isinstance(value, float) else None
-
-    def missing(self, log: Mapping[str, np.ndarray]) -> str:
-        """Tell why there is no number."""
-        lacking = (part for part in self.parts.values() if part.of(log) is None)
-        part = next(lacking, None)
-        return part.missing(log) if part else f"'{self.text}' has no value"
+        value = None
+        if None not in found.values():
+            with suppress(ScriptError):  # such as a division by zero, in this run
+                value = evaluate(self.node, self.raw, NamesOfCase("-record", found))
+        if not isinstance(value, float):
+            raise ScriptError(f"'{self.text}' has no value")
+        return value
 
 
 def recorded(
@@ -165,20 +154,30 @@ def _apart(text: str) -> list[str]:
 
 
 def row(
-    case: Mapping[str, str], outcome: CaseOutcome, items: Iterable[Recorded], folder: Path
+    case: Mapping[str, str], outcome: CaseOutcome, items: Sequence[Recorded], folder: Path
 ) -> dict[str, Any]:
     """Make the row of a run; what is not known of it is left empty.
 
-    A run that did not end well has no recorded values: those of its last moments say nothing.
+    A run that did not end well has no recorded values: those of its last moments say nothing. The
+    reason of one that is done is that of the first value that it lacks.
     """
-    log = read_log(outcome.folder) if outcome.status == "done" else {}
-    place = os.path.relpath(outcome.folder, folder).replace(os.sep, "/")
+    numbers: dict[str, float | None] = dict.fromkeys(item.word for item in items)
+    reasons = [outcome.reason]
+    if outcome.status == "done":
+        log = read_log(outcome.folder)
+        for item in items:
+            try:
+                numbers[item.word] = item.of(log, case)
+            except ScriptError as error:
+                reasons.append(error.message)
     return {
         **case,
-        **{item.word: item.of(log, case) for item in items},
+        **numbers,
         **{name: outcome.facts.get(name) for name in COLUMNS},
-        "status": outcome.status, "reason": outcome.reason, "folder": place,
-    }  # fmt: skip
+        "status": outcome.status,
+        "reason": next(filter(None, reasons), ""),
+        "folder": os.path.relpath(outcome.folder, folder).replace(os.sep, "/"),
+    }
 
 
 def write(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:

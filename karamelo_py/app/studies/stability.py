@@ -16,8 +16,8 @@ from karamelo_py.app.options import above_zero, positive
 from karamelo_py.app.plot import read_log
 from karamelo_py.app.studies import records, variables
 from karamelo_py.app.studies.case import said_in
-from karamelo_py.app.studies.keeping import grown
 from karamelo_py.app.studies.study import Study
+from karamelo_py.kernels import watch
 from karamelo_py.output.files import savefig
 from karamelo_py.output.plots import blank_figure
 from karamelo_py.script.errors import ScriptError, nearest, plural
@@ -92,13 +92,15 @@ def run(options: Any) -> int:
     )
     study.describe(variables=values, energy=energy, bound=options.bound)
     chart = Map(study, values, axes, energy, options.bound)
-    known, inferred = explore(chart.shape, chart.classify, options.stride)
-    chart.classes = {**known, **inferred}
-    records.write(table, chart.rows())
-    chart.draw(out, options.script.name, words)
+    try:
+        _, chart.inferred = explore(chart.shape, chart.classify, options.stride)
+    finally:
+        if chart.found:  # also of a study that is interrupted
+            records.write(table, chart.rows())
+            chart.draw(out, options.script.name, words)
     chart.tell()
     width = unseen(chart.shape, options.stride)
-    if inferred and width:
+    if chart.inferred and width:
         wide = plural(width, "cell")
         print(f"islands and strips up to {wide} wide between runs are not seen (-stride)")
     print(f"drawn: {out}; the table is {table}")
@@ -135,7 +137,7 @@ def growth(energy: np.ndarray) -> float:
     first = float(means[0]) or float(np.median(np.abs(energy)))
     if first == 0:
         return inf if means.max() > 0 else 0.0
-    return 1 + grown(first, float(means.max()))
+    return 1 + watch.growth(first, float(means.max()), first)
 
 
 def in_short(row: Mapping[str, Any]) -> str:
@@ -171,7 +173,12 @@ class Map:
         self.y = more[0] if more else [0.0]
         self.shape = len(self.x), len(self.y)
         self.found: dict[Cell, dict[str, Any]] = {}  # cells that were run
-        self.classes: dict[Cell, Any] = {}  # those of all cells
+        self.inferred: dict[Cell, Any] = {}  # the classes of others
+
+    @property
+    def classes(self) -> dict[Cell, Any]:
+        """Tell the class of each cell that is known."""
+        return {cell: row["class"] for cell, row in self.found.items()} | self.inferred
 
     @property
     def failures(self) -> list[tuple[str, int]]:
@@ -186,24 +193,32 @@ class Map:
 
     def classify(self, cells: Sequence[Cell]) -> list[str]:
         """Run cells, and tell the class of each."""
-        rows = self.study.run([self.case(cell) for cell in cells])
-        for cell, row in zip(cells, rows, strict=True):
-            place = self.study.out.parent / row["folder"]
-            log = read_log(place)
-            done = row["status"] == "done"
-            if done and self.energy not in log:
-                raise ScriptError(
-                    f"the log has no column '{self.energy}'", expected=", ".join(log) or "a log"
-                )
-            factor = growth(log.get(self.energy, np.empty(0)))
-            kind, why = "stable", ""
-            if not done:
-                kind, why = "failed", in_short(row)
-            elif factor > self.bound:
-                kind, why = "growing", f"{self.energy} grows {factor:.3g} times"
-            found = {"class": kind, "why": why, "growth": factor, "limit": limited_by(place)}
-            self.found[cell] = {**row, **found}
+        cases = {cell: self.case(cell) for cell in cells}
+        try:
+            self.study.run([*cases.values()])
+        finally:
+            for cell, case in cases.items():
+                if (row := self.study.rows.get(tuple(case.values()))) is not None:
+                    self.found[cell] = self.judged(row)
         return [self.found[cell]["class"] for cell in cells]
+
+    def judged(self, row: Mapping[str, Any]) -> dict[str, Any]:
+        """Add to the row of a run its class, and why it is of that one."""
+        place = self.study.out.parent / row["folder"]
+        log = read_log(place)
+        done = row["status"] == "done"
+        if done and self.energy not in log:
+            raise ScriptError(
+                f"the log has no column '{self.energy}'", expected=", ".join(log) or "a log"
+            )
+        factor = growth(log.get(self.energy, np.empty(0)))
+        kind, why = "stable", ""
+        if not done:
+            kind, why = "failed", in_short(row)
+        elif factor > self.bound:
+            kind, why = "growing", f"{self.energy} grows {factor:.3g} times"
+        found = {"class": kind, "why": why, "growth": factor, "limit": limited_by(place)}
+        return {**row, **found}
 
     def rows(self) -> list[dict]:
         """Make the table: every cell, whether it was run, and what it showed."""
@@ -230,9 +245,9 @@ class Map:
 
     def margins(self) -> list[float]:
         """Divide the largest stable step by the program's, in each row that has an edge."""
-        found = []
+        found, classes = [], self.classes
         for j in range(self.shape[1]):
-            column = [self.classes[i, j] for i in range(self.shape[0])]
+            column = [classes[i, j] for i in range(self.shape[0])]
             edge = next((i for i, kind in enumerate(column) if kind != "stable"), None)
             row = self.found.get((edge - 1, j)) if edge else None
             if row and row.get("dt") and row.get("stable_dt"):
@@ -261,7 +276,7 @@ class Map:
         from matplotlib.patches import Patch
 
         x, y, two = self.x, self.y, len(self.axes) > 1
-        grid = np.zeros(self.shape)
+        grid = np.full(self.shape, np.nan)
         for cell, kind in self.classes.items():
             grid[cell] = CLASSES.index(kind)
         figure = blank_figure(9.0, 5.6 if two else 2.8)

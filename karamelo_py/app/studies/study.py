@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.app.options import positive
-from karamelo_py.app.plot import read_log
 from karamelo_py.app.studies import variables
 from karamelo_py.app.studies.case import CaseOutcome, Launch, Refused, folder_name
 from karamelo_py.app.studies.records import Recorded, recorded, row, surroundings, write
@@ -73,7 +72,8 @@ class Study:
     def run(self, cases: Sequence[Mapping[str, str]]) -> list[dict[str, Any]]:
         """Give the rows of these cases, in order; runs what is not known yet.
 
-        When the user interrupts, runs in progress are taken down, and finished ones are kept.
+        When the user interrupts, runs in progress are taken down, finished ones are kept, and it is
+        told how to go on.
         """
         self.names = list(cases[0])
         waiting = []
@@ -88,8 +88,15 @@ class Study:
                 waiting.append((case, place))
         self.write()
         if waiting:
-            with _Display(self, len(waiting)) as display:
-                self._run(waiting, display)
+            try:
+                with _Display(self, len(waiting)) as display:
+                    self._run(waiting, display)
+            except KeyboardInterrupt:
+                kept = f"in {self.out}" if self.writes else "kept"
+                of = f"at most {self.most}" if self.most else str(len(cases))
+                said = f"{len(self.rows)} of {of} runs are {kept}"
+                print(f"{said}; the same command goes on with the others", file=sys.stderr)
+                raise
         return [self.rows[tuple(case.values())] for case in cases]
 
     def _run(self, queue: list[tuple[Mapping[str, str], Path]], display: _Display) -> None:
@@ -129,11 +136,7 @@ class Study:
     def _put(self, case: Mapping[str, str], outcome: CaseOutcome) -> None:
         if self.strict and outcome.status == "refused":
             raise Refused(case, outcome)
-        found = row(case, outcome, self.items, self.folder.parent)
-        lacking = [item for item in self.items if found[item.word] is None]
-        if outcome.status == "done" and lacking:
-            found["reason"] = lacking[0].missing(read_log(outcome.folder))
-        self.rows[tuple(case.values())] = found
+        self.rows[tuple(case.values())] = row(case, outcome, self.items, self.folder.parent)
 
 
 class _Display:
@@ -362,15 +365,7 @@ def run(options: Any) -> int:
     study.describe(
         variables=values, record=record, computes=computes, timed=options.time, repeat=repeat
     )
-    try:
-        rows = study.run(combinations)
-    except KeyboardInterrupt:
-        print(
-            f"{len(study.rows)} of {len(combinations)} runs are in {out}; "
-            "the same command goes on with the others",
-            file=sys.stderr,
-        )
-        raise
+    rows = study.run(combinations)
     write(out, rows)
     tell(rows, values, items, study, out)
     if not any(row["status"] == "done" for row in rows):

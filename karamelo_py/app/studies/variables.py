@@ -229,7 +229,6 @@ def add_family(parser: Any) -> None:
     parser.add_argument(
         "-again", action="store_true", help="run also what is known from an earlier study"
     )
-    parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
 
 
 def add_axes(parser: Any) -> None:
@@ -257,7 +256,7 @@ def split(text: str) -> list[str]:
 
 def names(text: str) -> list[str]:
     """Part names at commas."""
-    return [name.strip() for name in text.split(",") if name.strip()]
+    return list(filter(None, split(text)))
 
 
 def add_combinations(parser: Any) -> None:
@@ -274,8 +273,8 @@ def add_combinations(parser: Any) -> None:
 
 def zipped(options: Any) -> list[list[str]]:
     """Read which variables go in step."""
-    groups = getattr(options, "zip", [])  # not every study of a family has it
-    return [[name.strip() for name in group.split(",")] for group in groups]
+    # Not every study of a family has it.
+    return [names(group) for group in getattr(options, "zip", [])]
 
 
 def family(
