@@ -47,7 +47,7 @@ log_modify(custom, time, one, two, most, share, right, two_history, two_max)
 
 
 def test_exact_values_that_vanish_divide_by_the_largest_so_far(run_interpreted):
-    """3 against 3 cos(5 pi t) of the velocity: 1 off where that is 0, by the 3 there were before."""
+    """A velocity of 3 against 3 cos(5 pi t): 3 off where that is 0, over the 3 that it was."""
     lines = """
 compute(swing, error, all, vx, 3*cos(5*PI*time), relative)
 compute(never, error, all, vx, 0, relative)
