@@ -267,15 +267,15 @@ def _velocity_moment(s: Setup, points: Points) -> np.ndarray:
 
 def places_before(hub: Scene, ids: np.ndarray) -> np.ndarray:
     """Return (n, d) positions of points before the first step, without those of others."""
-    return _before(hub, ids, lambda solid, own: solid.x0_of(own), hub.domain.dimension)
+    return from_solids(hub, ids, lambda solid, own: solid.x0_of(own), hub.domain.dimension)
 
 
 def volumes_before(hub: Scene, ids: np.ndarray) -> np.ndarray:
     """Return (n,) volumes of points before the first step."""
-    return _before(hub, ids, lambda solid, own: solid.volume0[own])
+    return from_solids(hub, ids, lambda solid, own: solid.volume0[own])
 
 
-def _before(hub: Scene, ids: np.ndarray, of: Callable, *columns: int) -> np.ndarray:
+def from_solids(hub: Scene, ids: np.ndarray, of: Callable, *columns: int) -> np.ndarray:
     """Gather what ``of(solid, numbers)`` returns of its points with these numbers."""
     found, order = np.empty((len(ids), *columns)), np.argsort(ids)
     for solid in hub.solids.values():

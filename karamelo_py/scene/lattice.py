@@ -1,5 +1,6 @@
 """Lattices: the nodes of the regular grids of a scene, and how they are numbered."""
 
+import itertools
 import math
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -93,6 +94,21 @@ class Lattice:
         for index in boxes(first, last, 1):
             number = np.ravel_multi_index(tuple(index.T), shape)
             yield number + self.first, corner + index * self.spacing
+
+    def cells_of(self, x: np.ndarray) -> np.ndarray:
+        """Cells (n, dimension), counted along each axis, that hold positions; the nearest ones."""
+        used = slice(self.dimension)
+        cell = np.floor((x - self.lo[used]) / self.h).astype(np.int64)
+        return np.clip(cell, 0, np.array(self.cells[used]) - 1)
+
+    def around(self, cells: np.ndarray, steps: Sequence[int]) -> np.ndarray:
+        """Numbers (k, n) of the nodes so many cells along each axis from the first of `cells`."""
+        shape = np.array(self.shape[: self.dimension])
+        places = (
+            np.clip((cells + np.array(step)) * self.nodes_per_cell, 0, shape - 1)
+            for step in itertools.product(steps, repeat=self.dimension)
+        )
+        return np.array([self.first + np.ravel_multi_index(tuple(p.T), shape) for p in places])
 
     def numbers(self, real: type) -> Grid:
         """The lattice as kernels read it, in the precision `real`."""

@@ -22,13 +22,42 @@ from karamelo_py.script.values import SUFFIXES
 __all__ = ["Compute", "Fix", "NodesView", "PointsView", "heat_hook", "node_hook", "point_hook"]
 
 
-class Fix:
+class Publisher:
+    """Base of fixes and computes: publishes values under its ID."""
+
+    hub: Scene
+    id: str = ""
+    style: str = ""
+    place: Place | None = None
+    # Suffixes of the values it sets: "x" for ``ID_x`` and the like, "" for ``ID``.
+    published: tuple[str, ...] = SUFFIXES
+
+    def publish(self, name: str, value: float) -> None:
+        """Publish `value` as ID_`name`, or as the plain ID when `name` is empty."""
+        if name not in self.published:
+            raise ValueError(f"'{name}' is not in {type(self).__name__}.published")
+        self.hub.values.set(f"{self.id}_{name}" if name else self.id, float(value))
+
+    def publish_components(self, vector: np.ndarray) -> None:
+        """Publish up to three components as ID_x, ID_y, ID_z, as far as `published` has them."""
+        for name, value in zip("xyz", vector, strict=False):
+            if name in self.published:
+                self.publish(name, value)
+
+    def publish_all(self, *values: float) -> None:
+        """Publish values in the order of `published`, as many as there are."""
+        for name, value in zip(self.published, values, strict=False):
+            self.publish(name, value)
+
+    def refresh(self) -> None:
+        """Bring published values up to date; called before the log or a dump is written."""
+
+
+class Fix(Publisher):
     """Base of all fixes: acts on its `group` during a run. Attributes say what else it is."""
 
     group: Any = None  # of nodes or points
     formulas: tuple = ()  # one, or None, for each component, of compiled hooks
-    # Suffixes of the values it sets: "x" for ``ID_x`` and the like, "" for ``ID``.
-    published: tuple[str, ...] = SUFFIXES
     first_step_only = False  # acts in the first step after its definition and is idle thereafter
     # Its hooks in Python look at each point or node on its own, and move none. Then they see, in
     # any order, the points that are at hand: those of one of several processes, and before the
@@ -53,9 +82,6 @@ class Fix:
     conserves = False
     friction: float | None = None  # between its two `solids`, for methods with contact on the grid
     solids: tuple = ()  # that it acts between, without a group
-    id: str = ""
-    style: str = ""
-    place: Place | None = None
 
     def __init__(self, hub: Scene, group: Any = None):
         self.hub = hub
@@ -66,21 +92,6 @@ class Fix:
     def nodes(self) -> np.ndarray:
         """Numbers of the nodes that it acts on, of fixes that act on nodes."""
         return self.group.nodes
-
-    def publish(self, name: str, value: float) -> None:
-        """Publish `value` as ID_`name`, or as the plain ID when `name` is empty."""
-        if name not in self.published:
-            raise ValueError(f"'{name}' is not in {type(self).__name__}.published")
-        self.hub.values.set(f"{self.id}_{name}" if name else self.id, float(value))
-
-    def publish_components(self, vector: np.ndarray) -> None:
-        """Publish up to three components as ID_x, ID_y, ID_z, as far as `published` has them."""
-        for name, value in zip("xyz", vector, strict=False):
-            if name in self.published:
-                self.publish(name, value)
-
-    def refresh(self) -> None:
-        """Bring published values up to date; called before the log or a dump is written."""
 
     def defined(self) -> None:
         """Called when the fix has its ID and belongs to the scene."""
@@ -105,20 +116,9 @@ class Fix:
         return call
 
 
-class Compute:
-    """Base of all computes: measures its `group` of points when the log is written."""
-
-    id: str = ""
-    style: str = ""
-    place: Place | None = None
-    published: tuple[str, ...] = SUFFIXES
+class Compute(Publisher):
+    """Base of all computes: override `refresh`, which measures a `group` of points for the log."""
 
     def __init__(self, hub: Scene, group: ParticleGroup):
         self.hub = hub
         self.group = group
-
-    publish = Fix.publish
-    publish_components = Fix.publish_components
-
-    def refresh(self) -> None:
-        """Measure and publish; override this."""

@@ -219,6 +219,8 @@ def fill(
     counted = reaches_out.any() and whole <= max(_MAX_COUNTED, 4 * inner)
     if not counted:
         first, last = inner_first, inner_last
+    open_lo = np.where(np.isinf(lo), domain.lo[used] - domain.tolerance, -np.inf)
+    open_hi = np.where(np.isinf(hi), domain.hi[used] + domain.tolerance, np.inf)
 
     places, sizes = (of_unit * h for of_unit in cell_pattern(ppc, dimension, rule))
     even = sizes.ndim == 1
@@ -236,7 +238,9 @@ def fill(
         kept = region.inside(x)
         in_domain = domain.contains(x)
         if counted:
-            outside += _beyond_closed_sides(x[kept & ~in_domain], lo, hi, domain)
+            # What lies beyond an open side is not meant to be there.
+            beyond = x[kept & ~in_domain]
+            outside += int(((beyond >= open_lo) & (beyond <= open_hi)).all(axis=1).sum())
         if rule == "cut":
             continue
         kept &= in_domain
@@ -288,18 +292,3 @@ def _cut_off(
         half_size=size / 2 * half,
         missed=pieces.missed(size),
     )
-
-
-def _beyond_closed_sides(x: np.ndarray, lo: np.ndarray, hi: np.ndarray, domain: Domain) -> int:
-    """Count positions `x` outside the domain across sides where the region is closed."""
-    beyond = np.zeros(len(x), dtype=bool)
-    within_open = np.ones(len(x), dtype=bool)
-    for axis in range(domain.dimension):
-        below = x[:, axis] < domain.lo[axis] - domain.tolerance
-        above = x[:, axis] > domain.hi[axis] + domain.tolerance
-        for out, end in ((below, lo[axis]), (above, hi[axis])):
-            if np.isfinite(end):
-                beyond |= out
-            else:
-                within_open &= ~out
-    return int(np.count_nonzero(beyond & within_open))

@@ -135,21 +135,9 @@ def check_radius(radius: float, place: Place | None) -> None:
         )
 
 
-def within(x: np.ndarray, centre: Sequence[float], axes: Sequence[int], radius: float):
-    """Test which positions are at most `radius` from `centre` along `axes` only: (n,) bool."""
-    return _square(x, centre, axes) <= radius * radius
-
-
 def below(x: np.ndarray, centre: Sequence[float], axes: Sequence[int], radius: float):
     """Return the depth of positions below the surface of a ball or cylinder: (n,)."""
-    square = _square(x, centre, axes)
-    return radius - np.sqrt(square, out=square)
-
-
-def _square(x: np.ndarray, centre: Sequence[float], axes: Sequence[int]) -> np.ndarray:
     square = np.zeros(len(x))
     for axis, middle in zip(axes, centre, strict=True):
-        distance = x[:, axis] - middle
-        distance *= distance
-        square += distance
-    return square
+        square += (x[:, axis] - middle) ** 2
+    return radius - np.sqrt(square)

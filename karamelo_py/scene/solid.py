@@ -25,9 +25,17 @@ _SAMPLE = 5000
 class Solid:
     """Base of the styles of solid: a body of points. A style calls `put` with its points.
 
-    Where all solids share a grid the cell size `h` is that of the domain; a method with the
-    attribute ``own_grids`` lays a grid for each. Without an initial temperature `T0` the material
-    says it. With the solid that it is `glued_to` it shares a velocity field in methods of several.
+    Parameters
+    ----------
+    material
+        What the points are made of.
+    h
+        Cell size. With a grid shared by all solids (ulmpm) it must be that of the domain.
+    T0
+        Initial temperature; that of the material when left out.
+    GlueToSolid
+        A solid that came before, whose velocity field this one shares, in methods where each
+        solid has its own.
     """
 
     id: str = ""
@@ -207,21 +215,13 @@ def warn_of_coinciding(hub: Scene, new: Solid, ID: str) -> None:
 
 def coinciding(a: Solid, b: Solid) -> bool:
     """Return True if points of `a` coincide with points of `b`; of many, a sample is tested."""
-    if not a.count or not b.count:
-        return False
-    lows, highs = zip(_box(a), _box(b), strict=True)
-    lo, hi = np.maximum(*lows), np.minimum(*highs)
-    if (lo > hi).any():
+    lo = np.maximum(a.lo, b.lo) - a.domain.tolerance
+    hi = np.minimum(a.hi, b.hi) + a.domain.tolerance
+    if not a.count or not b.count or (lo > hi).any():
         return False
     of_a = np.concatenate([_within(x, lo, hi) for _, x in a.pieces()])
     sample = _keys(of_a[:: max(1, len(of_a) // _SAMPLE)], a.h)
     return any(np.isin(sample, _keys(_within(x, lo, hi), a.h)).any() for _, x in b.pieces())
-
-
-def _box(solid: Solid) -> tuple[np.ndarray, np.ndarray]:
-    """Least and largest coordinates of points."""
-    lows, highs = zip(*((x.min(axis=0), x.max(axis=0)) for _, x in solid.pieces()), strict=True)
-    return np.min(lows, axis=0), np.max(highs, axis=0)
 
 
 def _within(x: np.ndarray, lo: np.ndarray, hi: np.ndarray) -> np.ndarray:

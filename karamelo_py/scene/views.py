@@ -28,10 +28,9 @@ from karamelo_py.script.errors import NoItem, nearest
 class Shown:
     """A field of a view: how it is read and, unless it is read-only, written."""
 
-    def __init__(self, read: Callable):
-        self.read = read
-        self.write: Callable | None = None
-        self.__doc__ = read.__doc__
+    def __init__(self, read: Callable, write: Callable | None = None, doc: str | None = None):
+        self.read, self.write = read, write
+        self.__doc__ = doc or read.__doc__
 
     def writer(self, write: Callable) -> Callable:
         """Decorate the function that writes the field."""
@@ -44,11 +43,7 @@ class Shown:
     def __get__(self, view: View | None, owner: type) -> Any:
         if view is None:
             return self
-        if self.name not in view._handed_out:
-            array = np.array(self.read(view))
-            array.flags.writeable = self.write is not None
-            view._handed_out[self.name] = array, array.copy() if self.write else array
-        return view._handed_out[self.name][0]
+        return view._handed(self.name, lambda: self.read(view), written=self.write is not None)
 
     def __set__(self, view: View, value: Any) -> None:
         if self.write is None:
@@ -88,6 +83,14 @@ class View:
             else:
                 self._put(key, now)
 
+    def _handed(self, key: str | type, read: Callable, *, written: bool = True) -> np.ndarray:
+        """Return the array that was handed out before, or what ``read()`` gives."""
+        if key not in self._handed_out:
+            array = np.array(read())
+            array.flags.writeable = written
+            self._handed_out[key] = array, array.copy() if written else array
+        return self._handed_out[key][0]
+
     _get: Callable[[type], np.ndarray]  # (n, components) of a declared field
     _put: Callable[[type, np.ndarray], None]
 
@@ -104,10 +107,7 @@ class View:
         """(n, components) of a field that a part declares."""
         if not isinstance(kind, type):
             raise self._no_column(kind)
-        if kind not in self._handed_out:
-            array = np.array(self._get(kind))
-            self._handed_out[kind] = array, array.copy()
-        return self._handed_out[kind][0]
+        return self._handed(kind, lambda: self._get(kind))
 
     def __setitem__(self, kind: type, value: Any) -> None:
         self[kind][...] = value
@@ -179,18 +179,18 @@ class NodesView(View):
         own = slice(None) if self._foreign is None else self._foreign[self.index] == 0
         return self._simulation.summed(terms[own])
 
-    def _vector(self, name: str, first: int = 0) -> np.ndarray:
-        """Return (n, d) components from `first` on of an array of the nodes."""
-        return getattr(self._nodes, name)[self.index, first : first + self._d]
+    def _vectors(self, name: str, first: int = 0) -> np.ndarray:
+        """Return components from `first` on of an array of all nodes, (N, d)."""
+        return getattr(self._nodes, name)[:, first : first + self._d]
 
-    def _put_vector(self, value: np.ndarray, name: str, first: int = 0) -> None:
-        getattr(self._nodes, name)[self.index, first : first + self._d] = value
+    def _declared(self, kind: type) -> np.ndarray:
+        return _declared(kind, "node")(self._nodes)[:, : kind.shape(self._kin)]
 
     def _get(self, kind: type) -> np.ndarray:
-        return _declared(kind, "node")(self._nodes)[self.index, : kind.shape(self._kin)]
+        return self._declared(kind)[self.index]
 
     def _put(self, kind: type, value: np.ndarray) -> None:
-        _declared(kind, "node")(self._nodes)[self.index, : kind.shape(self._kin)] = value
+        self._declared(kind)[self.index] = value
 
     @Shown
     def position(self) -> np.ndarray:
@@ -211,47 +211,52 @@ class NodesView(View):
     @Shown
     def force(self) -> np.ndarray:
         """(n, d) internal plus external force; set it in ``post_particles_to_grid``."""
-        return self._vector("sums", arrays.of_force(self._kin))
+        return self._vectors("sums", arrays.of_force(self._kin))[self.index]
 
     @force.writer
     def _write_force(self, value: np.ndarray) -> None:
-        self._put_vector(value, "sums", arrays.of_force(self._kin))
+        self._vectors("sums", arrays.of_force(self._kin))[self.index] = value
+
+    @property
+    def _momentum(self) -> np.ndarray:
+        return self._vectors("sums", arrays.of_momentum(self._kin))
+
+    @property
+    def _change(self) -> np.ndarray:
+        """Of the velocity by the momentum update: v* less v."""
+        return self._vectors("update", arrays.of_change(self._kin))
 
     @Shown
     def velocity(self) -> np.ndarray:
         """(n, d) velocity: v before the momentum update, or the one that deforms the points."""
         if self._on_velocity:
-            return self._vector("velocity")
+            return self._vectors("velocity")[self.index]
         if self._stage == arrays.POST_PARTICLES_TO_GRID:
-            momentum = self._vector("sums", arrays.of_momentum(self._kin))
-            return momentum / self._nodes.sums[self.index, arrays.MASS][:, None]
-        return self._vector("update") - self._vector("update", arrays.of_change(self._kin))
+            return self._momentum[self.index] / self.mass[:, None]
+        return self._vectors("update")[self.index] - self._change[self.index]
 
     @velocity.writer
     def _write_velocity(self, value: np.ndarray) -> None:
         if self._on_velocity:
-            self._put_vector(value, "velocity")
+            self._vectors("velocity")[self.index] = value
         elif self._stage in (arrays.POST_UPDATE_GRID_STATE, arrays.POST_UPDATE_GRID_HEAT):
-            change = self._vector("update") - value
-            self._put_vector(change, "update", arrays.of_change(self._kin))
+            self._change[self.index] = self._vectors("update")[self.index] - value
         else:
-            mass = self._nodes.sums[self.index, arrays.MASS][:, None]
-            self._put_vector(mass * value, "sums", arrays.of_momentum(self._kin))
+            self._momentum[self.index] = self.mass[:, None] * value
 
     @Shown
     def velocity_update(self) -> np.ndarray:
         """(n, d) v*, the velocity after the momentum update (``post_update_grid_state``)."""
-        return self._vector("velocity" if self._on_velocity else "update")
+        return self._vectors("velocity" if self._on_velocity else "update")[self.index]
 
     @velocity_update.writer
     def _write_velocity_update(self, value: np.ndarray) -> None:
         if self._on_velocity:
-            self._put_vector(value, "velocity")
+            self._vectors("velocity")[self.index] = value
             return
-        change = arrays.of_change(self._kin)
-        old = self._vector("update") - self._vector("update", change)
-        self._put_vector(value, "update")
-        self._put_vector(self._vector("update") - old, "update", change)
+        old = self._vectors("update")[self.index] - self._change[self.index]
+        self._vectors("update")[self.index] = value
+        self._change[self.index] = self._vectors("update")[self.index] - old
 
 
 class PointsView(View):
@@ -324,14 +329,33 @@ class PointsView(View):
             behind[:, rows] += np.tile(step[own].T, (corners, 1))
         self.moved = True
 
-    @Shown
-    def velocity(self) -> np.ndarray:
-        """(n, d) velocities."""
-        return self._rows.take(lambda points: points.v)
+    velocity = Shown(
+        lambda view: view._rows.take(lambda points: points.v),
+        lambda view, value: view._rows.put(lambda points: points.v, value),
+        "(n, d) velocities.",
+    )
+    mass = Shown(
+        lambda view: view._rows.take(lambda points: points.mass), doc="(n,) masses; read only."
+    )
+    force = Shown(
+        lambda view: view._get(Force),
+        lambda view, value: view._put(Force, value),
+        """(n, d) forces that fixes put on the points; add to it in ``initial_integrate``.
 
-    @velocity.writer
-    def _write_velocity(self, value: np.ndarray) -> None:
-        self._rows.put(lambda points: points.v, value)
+        Only for fixes with ``point_fields = (Force,)``. It is zero before the first of them.
+        """,
+    )
+    temperature = Shown(
+        lambda view: view._heat(Temperature), doc="(n,) temperatures, where heat flows; read only."
+    )
+    heat_supply = Shown(
+        lambda view: view._heat(Supply),
+        lambda view, value: view._put(Supply, value[:, None]),
+        "(n,) heat per time that fixes bring; add to it in ``supply_heat``.",
+    )
+
+    def _heat(self, kind: type) -> np.ndarray:
+        return self._rows.take(_declared(kind, "point", NO_HEAT))[:, 0]
 
     def set_velocity_gradient(self, component: int, gradient: Callable) -> None:
         """Let points whose transfer keeps it (APIC, TPIC ...) know how their velocity changes.
@@ -360,37 +384,6 @@ class PointsView(View):
                 export_velocity_moment(s.basis, s.kin, s.grids, grid, where, shown, given)
             kept[here, rows] = given[here]
 
-    @Shown
-    def mass(self) -> np.ndarray:
-        """(n,) masses; read only."""
-        return self._rows.take(lambda points: points.mass)
-
-    @Shown
-    def force(self) -> np.ndarray:
-        """(n, d) forces that fixes put on the points; add to it in ``initial_integrate``.
-
-        Only for fixes with ``point_fields = (Force,)``. It is zero before the first of them.
-        """
-        return self._get(Force)
-
-    @force.writer
-    def _write_force(self, value: np.ndarray) -> None:
-        self._put(Force, value)
-
-    @Shown
-    def temperature(self) -> np.ndarray:
-        """(n,) temperatures, where heat flows; read only."""
-        return self._rows.take(_declared(Temperature, "point", NO_HEAT))[:, 0]
-
-    @Shown
-    def heat_supply(self) -> np.ndarray:
-        """(n,) heat per time that fixes bring; add to it in ``supply_heat``."""
-        return self._rows.take(_declared(Supply, "point", NO_HEAT))[:, 0]
-
-    @heat_supply.writer
-    def _write_heat_supply(self, value: np.ndarray) -> None:
-        self._rows.put(_declared(Supply, "point", NO_HEAT), value[:, None])
-
     def set_stress(self, given: dict[str, np.ndarray]) -> None:
         """Set components of the Cauchy stress: ``{"11": (n,) values, ...}`` of rate-form laws."""
         s = self._simulation.setup
@@ -411,7 +404,7 @@ class PointsView(View):
     @Shown
     def reference_position(self) -> np.ndarray:
         """(n, d) positions before the first step; read only."""
-        return self._simulation.x0[self.ids]
+        return self._simulation.x0_of(self.ids)
 
 
 class PieceView(PointsView):
@@ -420,6 +413,8 @@ class PieceView(PointsView):
     For hooks that look at each point on its own (`Fix.point_by_point`). Positions are read-only.
     Before the steps (`in_steps` False) they are some of them: others come after them.
     """
+
+    position = Shown(PointsView.position.read)
 
     def __init__(self, simulation: Any, parts: list[tuple], then: bool, *, in_steps: bool):
         parts = parts or [(simulation.setup.blocks[0], np.empty(0, np.int64))]
@@ -439,13 +434,3 @@ class PieceView(PointsView):
             "points.total(terms) is known in steps alone; before the first, points come in pieces "
             "where point_by_point is True"
         )
-
-    @Shown
-    def position(self) -> np.ndarray:
-        """(n, d) positions; read only."""
-        return self._rows.take(self._place)
-
-    @Shown
-    def reference_position(self) -> np.ndarray:
-        """(n, d) positions before the first step; read only."""
-        return self._simulation.x0_of(self.ids)

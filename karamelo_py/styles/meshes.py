@@ -16,7 +16,6 @@ from karamelo_py.scene.placement import Placement
 from karamelo_py.scene.region import EXTERIOR, Region
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.styles.solids import Body
 
 
 class Enclosed(Region):
@@ -152,7 +151,7 @@ class STL(Enclosed):
         return self.surface.corners
 
 
-class MeshSolid(Body):
+class MeshSolid(Solid):
     """A body with one point in each element of a mesh.
 
     The point stands at the centroid of its element and has its volume, which is exact for every

@@ -21,25 +21,15 @@ class Primitive(region.Region):
     across: Sequence[int] = ()  # the axes along which it is round, with a centre and a radius
 
     def contains(self, x: np.ndarray) -> np.ndarray:
-        inside = np.ones(len(x), dtype=bool)
-        if self.across:
-            inside = region.within(x, self.centre, self.across, self.radius + self.tolerance)
-        for axis, lo, hi in self.slabs:
-            if lo > -np.inf:
-                inside &= x[:, axis] >= lo - self.tolerance
-            if hi < np.inf:
-                inside &= x[:, axis] <= hi + self.tolerance
-        return inside
+        return self.distance(x, np.inf) >= -self.tolerance
 
     def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
         depth = np.full(len(x), reach)
         if self.across:
             depth = region.below(x, self.centre, self.across, self.radius)
         for axis, lo, hi in self.slabs:
-            if lo > -np.inf:
-                np.minimum(depth, x[:, axis] - lo, out=depth)
-            if hi < np.inf:
-                np.minimum(depth, hi - x[:, axis], out=depth)
+            np.minimum(depth, x[:, axis] - lo, out=depth)
+            np.minimum(depth, hi - x[:, axis], out=depth)
         return depth
 
 

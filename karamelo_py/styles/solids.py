@@ -1,4 +1,4 @@
-"""Solid style region, and the base of solids."""
+"""Solid style region."""
 
 from functools import partial
 from typing import Annotated, Literal
@@ -14,24 +14,7 @@ from karamelo_py.scene.solid import Solid, own_grids
 from karamelo_py.script.errors import ScriptError
 
 
-class Body(Solid):
-    """Base of solids.
-
-    Parameters
-    ----------
-    material
-        What the points are made of.
-    h
-        Cell size. With a grid shared by all solids (ulmpm) it must be that of the domain.
-    T0
-        Initial temperature; that of the material when left out.
-    GlueToSolid
-        A solid that came before, whose velocity field this one shares, in methods where each
-        solid has its own.
-    """
-
-
-class RegionSolid(Body):
+class RegionSolid(Solid):
     """A body that fills a region, with `ppc` points per cell and direction.
 
     Points are put into the cells of the grid and kept where they lie in the region and in the

@@ -17,8 +17,7 @@ class Energy(Compute):
 
     def refresh(self) -> None:
         energy = getattr(self.hub.fields, self.measured)(self.group)
-        for suffix in self.published:
-            self.publish(suffix, energy)
+        self.publish_all(*[energy] * len(self.published))
 
 
 class KineticEnergy(Energy):
@@ -163,9 +162,8 @@ class EnergyBalance(Compute):
         parts = [energy(self.group) for energy in energies]
         work = self.work.evaluate(self.hub.values) if self.work is not None else 0.0
         total = sum(parts)
-        self.publish("", total - work)
-        self.publish("total", total)
-        self.publish("drift", self._drift(total - work, max(abs(part) for part in (*parts, work))))
+        drift = self._drift(total - work, max(abs(part) for part in (*parts, work)))
+        self.publish_all(total - work, total, drift)
 
 
 class Momentum(Compute):
@@ -179,9 +177,9 @@ class Momentum(Compute):
         self._drift = Drift()
 
     def refresh(self) -> None:
-        *total, scale = self.hub.fields.added_up(self)
-        self.publish_components(np.array(total))
-        self.publish("drift", self._drift(np.array(total), scale))
+        total = self.hub.fields.added_up(self)
+        self.publish_components(total[:-1])
+        self.publish("drift", self._drift(total[:-1], total[-1]))
 
 
 class LinearMomentum(Momentum):

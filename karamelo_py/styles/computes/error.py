@@ -54,12 +54,9 @@ class PointField:
         name = argument.words(known)
         if name not in known:
             raise unknown(f"unknown field '{name}'", name, known, place=argument.place)
-        if name in VECTORS:
-            d = require_domain(hub).dimension
-            return cls(name, tuple(VECTORS[name] + axis for axis in AXES[:d]))
-        if name in TENSORS:
-            return cls(name, tuple(TENSORS[name] + component for component in COMPONENTS))
-        return cls(name, (name,))
+        ends = AXES[: require_domain(hub).dimension] if name in VECTORS else COMPONENTS
+        letter = (VECTORS | TENSORS).get(name)
+        return cls(name, tuple(letter + end for end in ends) if letter else (name,))
 
 
 class Norm:
@@ -72,15 +69,16 @@ class Norm:
     remembers = ("_sums", "_duration", "_time", "history", "largest", "_exact")
 
     def __init__(self, words: tuple[str, ...] = ()):
-        kinds = [word for word in words if word in ("L1", "L2", "max")]
         scales = [word for word in words if word in ("absolute", "relative")]
-        if len(kinds) > 1 or len(scales) > 1:
-            one, other = kinds[:2] if len(kinds) > 1 else scales[:2]
-            raise ScriptError(
-                f"both {one} and {other}",
-                expected="one norm (L1, L2, max) and one scale (absolute, relative)",
-            )
+        kinds = [word for word in words if word not in scales]
+        for some in (kinds, scales):
+            if len(some) > 1:
+                raise ScriptError(
+                    f"both {some[0]} and {some[1]}",
+                    expected="one norm (L1, L2, max) and one scale (absolute, relative)",
+                )
         self.kind = kinds[0] if kinds else "L2"
+        self.power = 2 if self.kind == "L2" else 1
         self.relative = scales == ["relative"]
         self._sums = np.zeros(2)
         self._duration = 0.0
@@ -91,7 +89,7 @@ class Norm:
 
     def terms(self, sizes: np.ndarray, weight: np.ndarray) -> np.ndarray:
         """Return the terms of a norm from the sizes (2, n) of differences and exact values."""
-        return np.vstack([weight * sizes ** (2 if self.kind == "L2" else 1), weight])
+        return np.vstack([weight * sizes**self.power, weight])
 
     def moment(self, sums: np.ndarray, largest: list[np.ndarray]) -> np.ndarray:
         """The norms (2,) of differences and exact values from sums, and the largest of some."""
@@ -108,16 +106,14 @@ class Norm:
         if self._time is not None and time <= self._time:
             return now
         if self.kind == "max":
-            self._sums = np.maximum(self._sums, moment)
-            self.history = self.scaled(*self._sums)
+            self._sums = mean = np.maximum(self._sums, moment)
         else:
-            power = 1 if self.kind == "L1" else 2
             # The first state stands for itself until there is a second one.
             span = time - self._time if self._time is not None else 0.0
             self._duration += span
-            self._sums += span * moment**power
-            sums = self._sums / self._duration if self._duration else moment**power
-            self.history = self.scaled(*sums ** (1 / power))
+            self._sums += span * moment**self.power
+            mean = self._sums / self._duration if self._duration else moment**self.power
+        self.history = self.scaled(*mean ** (1 / self.power))
         self.largest = max(self.largest, now)
         self._time = time
         return now
@@ -222,9 +218,7 @@ class Error(Compared, Compute):
 
     def refresh(self) -> None:
         now = self.norm.follow(self.hub.update.time, self.measured()[0])
-        self.publish("", now)
-        self.publish("max", self.norm.largest)
-        self.publish("history", self.norm.history)
+        self.publish_all(now, self.norm.largest, self.norm.history)
 
     def sizes(self, points: PointTable) -> tuple[np.ndarray, np.ndarray]:
         """Sizes (2, n) of the differences and of the exact values at points, and their weights."""
@@ -364,22 +358,19 @@ class Reference(Compared, Compute):
     def refresh(self) -> None:
         if self.points:
             moment, (total, count) = self.measured()
-            now = self.norm.scaled(*moment)
-            self.publish("", now)
-            self.publish("now", now)
-            self.publish("curve", total / count if count else 0.0)
-            return
-        time = self.hub.update.time
-        within, exact = self._exact(np.array([time]))
-        if within.any():
-            difference = float(self.subject.read()) - exact[0]
-            sizes = np.abs([[difference], exact])
-            self.norm.follow(
-                time, self.norm.moment(self.norm.terms(sizes, np.ones(1))[:, 0], [sizes[:, 0]])
-            )
-            self.publish("", self.norm.history)
-            self.publish("now", difference)
-        self.publish("curve", exact[0] if within.any() else 0.0)
+            norm = now = self.norm.scaled(*moment)
+            curve = total / count if count else 0.0
+        else:
+            time = self.hub.update.time
+            within, exact = self._exact(np.array([time]))
+            if not within.any():
+                self.publish("curve", 0.0)
+                return
+            curve = exact[0]
+            now = float(self.subject.read()) - curve
+            self.norm.follow(time, np.abs([now, curve]))
+            norm = self.norm.history
+        self.publish_all(norm, now, curve)
 
     def sizes(self, points: PointTable) -> tuple[np.ndarray, ...]:
         """Sizes (2, n) of differences and of the curve at points, weights; the curve, and one."""

@@ -27,8 +27,7 @@ class Mean(Compute):
 
     def refresh(self) -> None:
         weight, *totals = self.sums()
-        for suffix, total in zip(self.published, totals, strict=False):
-            self.publish(suffix, total / weight if weight > 0 else self.empty)
+        self.publish_all(*(total / weight if weight > 0 else self.empty for total in totals))
 
 
 class AverageVelocity(Mean):
@@ -110,9 +109,7 @@ class MaxPlasticStrain(Compute):
     published = ("Epmax", "Tmax")
 
     def refresh(self) -> None:
-        found = np.max(self.hub.fields.each(self, "largest"), axis=0)
-        for published, value in zip(self.published, found, strict=True):
-            self.publish(published, float(value))
+        self.publish_all(*np.max(self.hub.fields.each(self, "largest"), axis=0))
 
     def largest(self, points: PointTable) -> list[float]:
         return [points.particle(name).max(initial=0) for name in ("ep", "T")]
@@ -215,14 +212,14 @@ class PositionQuantile(Compute):
         first, below = [0] * d, np.zeros(d)
         for shift in range(64 - BITS, -1, -BITS):
             mass = self.hub.fields.added_up(self, "masses", shift, first).reshape(d, -1)
+            if not mass.any():  # no points
+                self.publish_components(np.zeros(d))
+                return
             if shift == 64 - BITS:
                 # Shares such as 0.1 of ten equal points must not fail by rounding.
                 wanted = self.share * mass.sum(axis=1) * (1 - 1e-12)
             for axis, of_bits in enumerate(mass):
                 there = np.flatnonzero(of_bits)
-                if not len(there):  # no points
-                    self.publish_components(np.zeros(d))
-                    return
                 up_to = below[axis] + np.cumsum(of_bits[there])
                 own = there[min(np.count_nonzero(up_to < wanted[axis]), len(there) - 1)]
                 below[axis] += of_bits[:own].sum()
@@ -302,9 +299,7 @@ class Probe(Mean):
             super().refresh()
             return
         found = self.hub.fields.each(self, "nearest")
-        values = min(found)[2:] if found else [self.empty] * len(self.columns)
-        for end, value in zip(self.published, values, strict=True):
-            self.publish(end, value)
+        self.publish_all(*(min(found)[2:] if found else [self.empty] * len(self.columns)))
 
     def terms(self, points: PointTable) -> list[np.ndarray]:
         volume = points.particle("volume")

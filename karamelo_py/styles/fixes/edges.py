@@ -6,6 +6,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from karamelo_py.output.point_table import from_solids, places_before
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import PointsView
@@ -37,13 +38,9 @@ def faces_on(hub: Hub, region: Region, ids: np.ndarray) -> Faces:
     Points are boxes; a face counts where a box of the same size beyond it would have its centre
     outside.
     """
-    solids = list(hub.solids.values())
     d = hub.domain.dimension
-    x0, half = np.empty((len(ids), d)), np.empty((len(ids), d))
-    for solid in solids:
-        rows = np.flatnonzero((ids >= solid.first_id) & (ids < solid.first_id + solid.count))
-        own = ids[rows] - solid.first_id
-        x0[rows], half[rows] = solid.x0_of(own), solid.half_size[own]
+    x0 = places_before(hub, ids)
+    half = from_solids(hub, ids, lambda solid, own: solid.half_size[own], d)
     found = []
     inside = region.inside(x0)
     for axis in range(d):

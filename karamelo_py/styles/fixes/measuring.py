@@ -86,12 +86,10 @@ class CheckSolution(Fix):
         self.publish("s", np.sqrt(now / volume))
         if self._step == self.hub.update.step:
             return
-        self._step = self.hub.update.step
-        values, dt = self.hub.values, self.hub.update.dt
-        self.publish("x", values.get(f"{self.id}_x") + dt * now)
-        self.publish("y", values.get(f"{self.id}_y") + dt * size)
-        total = values.get(f"{self.id}_y")
-        self.publish("z", np.sqrt(values.get(f"{self.id}_x") / total) if total > 0 else 0.0)
+        self._step, dt = self.hub.update.step, self.hub.update.dt
+        error, total = (self.hub.values.get(f"{self.id}_{axis}") for axis in "xy")
+        error, total = error + dt * now, total + dt * size
+        self.publish_all(error, total, np.sqrt(error / total) if total > 0 else 0.0)
 
     def terms(self, points: PointTable) -> np.ndarray:
         """Squares of the error and of the displacement at points times their volume, and this."""

@@ -1,12 +1,13 @@
-"""Fixes that put forces on points: walls and tractions, and the base of"""
+"""Fixes of walls and rigid tools: planes, balls, a wedge, a turning cylinder; forces on faces."""
 
 from collections.abc import Sequence
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
 from karamelo_py.kernels.laws import elastic_law
-from karamelo_py.language.signature import NonNegative
+from karamelo_py.language.signature import Argument, NonNegative
+from karamelo_py.language.unknown import words_of
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import Solid
@@ -33,30 +34,35 @@ class ToolFix(PointForces):
                 expected="a group of points of elastic materials",
             )
 
-    def now(self, formulas: Sequence[Expression]) -> np.ndarray:
-        """The present numbers (d,) of formulas of time, one for each direction."""
+    def now(self, *formulas: Expression) -> np.ndarray:
+        """The present numbers (n,) of formulas of time."""
         return np.array([formula.evaluate(self.hub.values) for formula in formulas])
 
+    def from_place(self, points: PointsView, place: Sequence[Expression]) -> np.ndarray:
+        """Vectors (n, d) from a place to the points."""
+        return points.position.astype(float) - self.now(*place)
 
-def side_of(hub: Hub, points: PointsView) -> np.ndarray:
-    """Edges (n,) of the cubes that points are taken for."""
-    return (points.column("volume") / _radius(hub, points)) ** (1 / hub.domain.dimension)
+    def side(self, points: PointsView) -> np.ndarray:
+        """Edges (n,) of the cubes that points are taken for."""
+        return (points.column("volume") / self._radius(points)) ** (1 / self.hub.domain.dimension)
+
+    def face(self, points: PointsView) -> np.ndarray:
+        """Areas (n,) of a face of these cubes, per radian around an axis."""
+        return self.side(points) ** (self.hub.domain.dimension - 1) * self._radius(points)
+
+    def _radius(self, points: PointsView) -> np.ndarray | float:
+        return points.position[:, 0].astype(float) if self.hub.domain.axisymmetric else 1.0
+
+    def stiffness(self, points: PointsView) -> np.ndarray:
+        """Shear moduli (n,) less what damage has taken of them."""
+        moduli = np.array([_shear_modulus(solid) for solid in self.hub.solids.values()])
+        return moduli[points.column("type").astype(int) - 1] * (1 - points.column("damage"))
 
 
-def face_of(hub: Hub, points: PointsView, side: np.ndarray) -> np.ndarray:
-    """Areas (n,) of a face of the cubes with these sides, per radian around an axis."""
-    return side ** (hub.domain.dimension - 1) * _radius(hub, points)
-
-
-def stiffness_of(hub: Hub, points: PointsView) -> np.ndarray:
-    """Shear moduli (n,) less what damage has taken of them."""
-    solid = points.column("type").astype(int) - 1
-    moduli = np.array([_shear_modulus(one) for one in hub.solids.values()])
-    return moduli[solid] * (1 - points.column("damage"))
-
-
-def _radius(hub: Hub, points: PointsView) -> np.ndarray | float:
-    return points.position[:, 0].astype(float) if hub.domain.axisymmetric else 1.0
+def _shear_modulus(solid: Solid) -> float:
+    """The shear modulus of a solid, 0 where it has none."""
+    law: Any = elastic_law(solid.material.law)
+    return float(getattr(law, "G", None) or getattr(getattr(law, "strength", None), "G", None) or 0)
 
 
 def unit(vector: np.ndarray) -> np.ndarray:
@@ -67,37 +73,25 @@ def unit(vector: np.ndarray) -> np.ndarray:
     return vector / length
 
 
-def apart(points: PointsView, penetration: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """Forces (n, d) that undo penetrations (n,) along `normal` within one step.
-
-    m p / dt^2, for a point that nothing else holds (de Vaucorbeil & Nguyen 2021).
-    """
-    push = points.mass.astype(float) * np.maximum(penetration, 0) / (points.dt * points.kick)
-    return push[:, None] * normal
-
-
-def rubbed(
-    points: PointsView, push: np.ndarray, normal: np.ndarray, velocity: np.ndarray, mu: float
+def penalty(
+    points: PointsView, depth: np.ndarray, normal: np.ndarray, velocity: Any, mu: float
 ) -> np.ndarray:
-    """Forces (n, d) of friction by something that moves with `velocity` and pushes with `push`.
+    """Forces (n, d) that undo penetrations of `depth` (n,) along `normal` within one step.
 
-    mu times the pressing force, along the slip, and at most what stops it within the step.
+    m p / dt^2, for a point that nothing else holds. Friction by a tool of this `velocity` is mu
+    times that, along the slip, and at most what stops it within the step (de Vaucorbeil & Nguyen
+    2021).
     """
+    mass = points.mass.astype(float)
+    push = (mass * np.maximum(depth, 0) / (points.dt * points.kick))[:, None] * normal
     slip = velocity - points.velocity.astype(float)
     slip = slip - (slip * normal).sum(axis=1, keepdims=True) * normal
     speed = np.linalg.norm(slip, axis=1)
-    stopping = points.mass.astype(float) * speed / points.kick
-    rub = np.minimum(mu * np.linalg.norm(push, axis=1), stopping)
-    return slip * np.divide(rub, speed, out=np.zeros_like(speed), where=speed > 0)[:, None]
+    rub = np.minimum(mu * np.linalg.norm(push, axis=1), mass * speed / points.kick)
+    return push + slip * np.divide(rub, speed, out=np.zeros_like(speed), where=speed > 0)[:, None]
 
 
-def _shear_modulus(solid: Solid) -> float:
-    """The shear modulus of a solid, 0 where it has none."""
-    law: Any = elastic_law(solid.material.law)
-    return float(getattr(law, "G", None) or getattr(getattr(law, "strength", None), "G", None) or 0)
-
-
-class NeumannBcMech(PointForces):
+class NeumannBcMech(ToolFix):
     """Load the surface of a body with a force per area.
 
     Parameters
@@ -131,12 +125,27 @@ class NeumannBcMech(PointForces):
         self.traction = per_direction(hub, "t", traction)
 
     def forces(self, points: PointsView) -> np.ndarray:
-        x = points.position.astype(float)
-        face = face_of(self.hub, points, side_of(self.hub, points))
-        return face[:, None] * vector(self.traction, self.hub, x, lambda: points.reference_position)
+        x, first = points.position.astype(float), lambda: points.reference_position
+        return self.face(points)[:, None] * vector(self.traction, self.hub, x, first)
 
 
-class ImpenetrableSurface(ToolFix):
+class Plane(ToolFix):
+    """Base of walls: a plane that may move, with points on the side of its normal."""
+
+    def lay(self, place: Sequence[Expression], normal: Sequence[Expression]) -> None:
+        """Check the formulas of a place in the plane, and of its normal."""
+        self.origin = per_direction(self.hub, "", place)
+        self.towards = per_direction(self.hub, "n", normal)
+        if not self.hub.rehearsing:  # which does not know all numbers
+            unit(self.now(*self.towards))
+
+    def depth(self, points: PointsView) -> tuple[np.ndarray, np.ndarray]:
+        """How far (n,) points are behind the plane now, below 0 in front of it; its normal (d,)."""
+        normal = unit(self.now(*self.towards))
+        return -(self.from_place(points, self.origin) @ normal), normal
+
+
+class ImpenetrableSurface(Plane):
     """Push points back that come behind a plane, with a force that grows with the depth.
 
     Parameters
@@ -179,20 +188,15 @@ class ImpenetrableSurface(ToolFix):
     ):
         super().__init__(hub, group)
         self.K = K
-        self.origin = per_direction(hub, "", (xs, ys, zs))
-        self.normal = per_direction(hub, "n", (nx, ny, nz))
-        if not hub.rehearsing:  # which does not know all numbers
-            unit(self.now(self.normal))
+        self.lay((xs, ys, zs), (nx, ny, nz))
 
     def forces(self, points: PointsView) -> np.ndarray:
-        (K,) = self.now((self.K,))
-        normal = unit(self.now(self.normal))
-        depth = np.maximum((self.now(self.origin) - points.position.astype(float)) @ normal, 0)
-        stiffness, side = stiffness_of(self.hub, points), side_of(self.hub, points)
-        return (K * stiffness * depth * side)[:, None] * normal
+        depth, normal = self.depth(points)
+        push = self.now(self.K) * self.stiffness(points) * np.maximum(depth, 0) * self.side(points)
+        return push[:, None] * normal
 
 
-class ContactMinimizePenetrationPlane(ToolFix):
+class ContactMinimizePenetrationPlane(Plane):
     """Let a solid touch a fixed plane, as stiffly as the step allows, with friction.
 
     Parameters
@@ -239,13 +243,305 @@ class ContactMinimizePenetrationPlane(ToolFix):
         super().__init__(hub, ParticleGroup.of(hub, solid))
         self.mu = mu
         judge_friction(hub, mu)
-        self.origin = per_direction(hub, "", (x, y, z))
-        self.normal = per_direction(hub, "n", (nx, ny, nz))
-        if not hub.rehearsing:  # which does not know all numbers
-            unit(self.now(self.normal))
+        self.lay((x, y, z), (nx, ny, nz))
 
     def forces(self, points: PointsView) -> np.ndarray:
-        normal = unit(self.now(self.normal))[None, :]
-        height = (points.position.astype(float) - self.now(self.origin)) @ normal[0]
-        push = apart(points, side_of(self.hub, points) / 2 - height, normal)
-        return push + rubbed(points, push, normal, np.zeros(len(normal[0])), self.mu)
+        depth, normal = self.depth(points)
+        return penalty(points, self.side(points) / 2 + depth, normal, 0.0, self.mu)
+
+
+class Radius(Expression):
+    """For signatures: a radius above 0, which Karamelo had behind the centre in 2020."""
+
+    script_kind = "a number or a formula above 0"
+
+    @classmethod
+    def from_script(cls, hub: Hub, argument: Argument) -> Expression:
+        radius = super().from_script(hub, argument)
+        if radius.is_constant and not radius.constant > 0:
+            ID, style, group, kind, K, *centre, R = words_of(argument.statement)
+            line = ", ".join([ID, style, group, kind, K, R, *centre])
+            raise ScriptError(
+                f"the radius is {radius.constant:g}",
+                place=argument.place,
+                expected="a number above 0",
+                hint=f"with the radius in front of the centre: fix({line})",
+            )
+        return radius
+
+
+class Indent(ToolFix):
+    """Push points out of a ball (in the plane a disk) with a force that grows as depth squared.
+
+    Parameters
+    ----------
+    kind
+        The word ``sphere``.
+    K
+        Acceleration per depth squared: a number or a formula of time.
+    R
+        Radius of the ball: a number or a formula of time.
+    x, y, z
+        Its centre: numbers or formulas of time; z is 0 in the plane.
+
+    Example
+    -------
+    fix(ball, indent, all, sphere, 1e4, 0.2, 0.5, 1.2 - 0.1*time, 0)
+
+    Notes
+    -----
+    A point at the distance r < R from the centre gets the force m K (R - r)^2 away from it, as
+    ``fix indent`` of LAMMPS has it, but per mass. Publishes the force on the points as ID_x, ID_y,
+    ID_z and the number of those that it pushes as ID_s.
+
+    See Also
+    --------
+    indent/minimize_penetration, impenetrablesurface
+    """
+
+    published = ("x", "y", "z", "s")
+
+    def __init__(
+        self,
+        hub: Hub,
+        group: ParticleGroup,
+        kind: Literal["sphere"],
+        K: Annotated[Expression, NonNegative],
+        R: Radius,
+        x: Expression,
+        y: Expression,
+        z: Expression,
+    ):
+        super().__init__(hub, group)
+        self.K, self.R = K, R
+        self.centre = per_direction(hub, "", (x, y, z))
+
+    def forces(self, points: PointsView) -> np.ndarray:
+        K, R = self.now(self.K, self.R)
+        away = self.from_place(points, self.centre)
+        r = np.linalg.norm(away, axis=1)
+        depth = np.maximum(R - r, 0)
+        self.publish("s", points.total(depth > 0))
+        push = points.mass.astype(float) * K * depth**2
+        size = np.divide(push, r, out=np.zeros_like(r), where=r > 0)
+        return size[:, None] * away
+
+
+class IndentMinimizePenetration(ToolFix):
+    """Press a rigid ball (in the plane a disk) into points, as stiffly as the step allows.
+
+    Parameters
+    ----------
+    kind
+        The word ``sphere``.
+    R
+        Radius of the ball: a number or a formula of time.
+    x, y, z
+        Its centre: numbers or formulas of time; z is 0 in the plane.
+    vx, vy, vz
+        Its velocity, which friction needs: the centre does not follow from it.
+    mu
+        Coefficient of friction (Coulomb).
+
+    Example
+    -------
+    fix(ball, indent/minimize_penetration, all, sphere, 0.2, 0.5, 1.2 - time, 0, 0, -1, 0, 0.1)
+
+    Notes
+    -----
+    Points are balls, too, with the radius rp of half the side of a cube of their present volume.
+    Where one reaches p = R + rp - r into the ball, r from its centre, it gets the force m p / dt^2,
+    which takes a free point out within one step. Friction is mu times that, along the slip, and at
+    most what stops the slip (de Vaucorbeil & Nguyen 2021).
+
+    Publishes the force on the points as ID_x, ID_y, ID_z and the area of contact, one face of the
+    cube for each point that touches, as ID_s.
+
+    See Also
+    --------
+    indent, contact/minimize_penetration/plane, contact/minimize_penetration
+    """
+
+    published = ("x", "y", "z", "s")
+
+    def __init__(
+        self,
+        hub: Hub,
+        group: ParticleGroup,
+        kind: Literal["sphere"],
+        R: Annotated[Expression, NonNegative],
+        x: Expression,
+        y: Expression,
+        z: Expression,
+        vx: Expression,
+        vy: Expression,
+        vz: Expression,
+        mu: Annotated[float, NonNegative],
+    ):
+        super().__init__(hub, group)
+        self.R, self.mu = R, mu
+        judge_friction(hub, mu)
+        self.centre = per_direction(hub, "", (x, y, z))
+        self.velocity = per_direction(hub, "v", (vx, vy, vz))
+
+    def forces(self, points: PointsView) -> np.ndarray:
+        away = self.from_place(points, self.centre)
+        r = np.linalg.norm(away, axis=1, keepdims=True)
+        normal = np.divide(away, r, out=np.zeros_like(away), where=r > 0)
+        depth = self.now(self.R) + self.side(points) / 2 - r[:, 0]
+        self.publish("s", points.total(self.face(points) * (depth > 0)))
+        return penalty(points, depth, normal, self.now(*self.velocity), self.mu)
+
+
+class CuttingTool(ToolFix):
+    """Push points out of the tip of a rigid tool, in the plane.
+
+    Parameters
+    ----------
+    K
+        Stiffness of the tool in shear moduli of the point: a number or a formula of time.
+    x_tip, y_tip, z_tip
+        The tip: numbers or formulas of time; z is 0.
+    vx, vy, vz
+        Its velocity, which scripts of Karamelo give; there is no friction that would need it.
+    xA, yA, xB, yB
+        A point on each of the two faces that meet in the tip: numbers or formulas of time.
+
+    Example
+    -------
+    fix(tool, cuttingtool, all, 1, 1 - time, 0.5, 0, -1, 0, 0, 1.1 - time, 0.9, 1.4 - time, 0.55)
+
+    Notes
+    -----
+    The tool is what lies between the two faces. A point in it, at the depth p from the nearer face,
+    gets the force K G (1 - D) p out of that face, with the shear modulus G and the damage D of its
+    material (de Vaucorbeil & Nguyen 2021). Publishes the force on the points as ID_x, ID_y, ID_z.
+
+    See Also
+    --------
+    impenetrablesurface, meldtool
+    """
+
+    needs_stiffness = True
+
+    def __init__(
+        self,
+        hub: Hub,
+        group: ParticleGroup,
+        K: Annotated[Expression, NonNegative],
+        x_tip: Expression,
+        y_tip: Expression,
+        z_tip: Expression,
+        vx: Expression,
+        vy: Expression,
+        vz: Expression,
+        xA: Expression,
+        yA: Expression,
+        xB: Expression,
+        yB: Expression,
+    ):
+        super().__init__(hub, group)
+        if hub.domain.dimension != 2:
+            raise ScriptError("the tool is one in the plane", expected="a domain in 2D")
+        self.K = K
+        self.tip = per_direction(hub, "", (x_tip, y_tip, z_tip))
+        self.ends = (xA, yA), (xB, yB)
+        if not hub.rehearsing:  # which does not know all numbers
+            self._faces()
+
+    def _faces(self) -> tuple[np.ndarray, np.ndarray]:
+        """Unit normals (2, 2) out of the tool, of the faces to A and to B, and the tip."""
+        tip = self.now(*self.tip)
+        a, b = (self.now(*end) - tip for end in self.ends)
+        turn = a[0] * b[1] - a[1] * b[0]
+        if not abs(turn) > 0:
+            raise ScriptError("tip, A and B lie in one line", expected="two faces with an angle")
+        # Turned away from the other face.
+        normals = np.array([[a[1], -a[0]], [-b[1], b[0]]]) * np.sign(turn)
+        return normals / np.linalg.norm(normals, axis=1, keepdims=True), tip
+
+    def forces(self, points: PointsView) -> np.ndarray:
+        normals, tip = self._faces()
+        depths = (tip - points.position.astype(float)) @ normals.T
+        nearer = depths.argmin(axis=1)
+        depth = np.maximum(depths.min(axis=1), 0)
+        return (self.now(self.K) * self.stiffness(points) * depth)[:, None] * normals[nearer]
+
+
+class MeldTool(ToolFix):
+    """Push points out of the tool of additive friction stir deposition, in space.
+
+    Parameters
+    ----------
+    K
+        Stiffness of the tool in shear moduli of the point, times a length: a number or a formula of
+        time, as are all that follow.
+    axis
+        The word x, y or z: the direction of the axis.
+    half_width
+        Half the width of the square channel along the axis.
+    c1, c2
+        The axis in the other two directions, in the order x, y, z.
+    theta
+        Angle by which the tool has turned, from the first of these directions to the second.
+    lo, hi
+        Ends of the tool along the axis; points are pushed out at the lower one.
+    Rmax
+        Radius of the tool.
+
+    Example
+    -------
+    fix(tool, meldtool, all, 1, y, 0.1, 0.5, 0.5, 10*time, 0.6, 1, 0.3)
+
+    Notes
+    -----
+    The tool is a cylinder without its channel. A point in it gets the force K G (1 - D) times the
+    shortest way out: into the channel, out of the cylinder, or below its end; G is the shear
+    modulus and D the damage. Publishes the force on the points as ID_x, ID_y, ID_z.
+
+    See Also
+    --------
+    cuttingtool, impenetrablesurface
+    """
+
+    needs_stiffness = True
+
+    def __init__(
+        self,
+        hub: Hub,
+        group: ParticleGroup,
+        K: Annotated[Expression, NonNegative],
+        axis: Literal["x", "y", "z"],
+        half_width: Annotated[Expression, NonNegative],
+        c1: Expression,
+        c2: Expression,
+        theta: Expression,
+        lo: Expression,
+        hi: Expression,
+        Rmax: Annotated[Expression, NonNegative],
+    ):
+        super().__init__(hub, group)
+        if hub.domain.dimension != 3:
+            raise ScriptError("the tool is one in space", expected="a domain in 3D")
+        self.numbers = (K, half_width, c1, c2, theta, lo, hi, Rmax)
+        self.along = "xyz".index(axis)
+        self.across = [k for k in range(3) if k != self.along]
+
+    def forces(self, points: PointsView) -> np.ndarray:
+        K, w, c1, c2, theta, lo, hi, Rmax = self.now(*self.numbers)
+        x = points.position.astype(float)
+        height, q = x[:, self.along] - lo, x[:, self.across] - np.array([c1, c2])
+        r = np.linalg.norm(q, axis=1)
+        turn = np.array([[np.cos(theta), np.sin(theta)], [-np.sin(theta), np.cos(theta)]])
+        own = q @ turn.T
+        inward = (np.clip(own, -w, w) - own) @ turn
+        outward = q * np.divide(Rmax - r, r, out=np.zeros_like(r), where=r > 0)[:, None]
+        # The ways out (n, 3): into the channel, radially, below; and how long they are.
+        ways = np.zeros((3, len(r), 3))
+        ways[0][:, self.across] = inward
+        ways[1][:, self.across] = outward
+        ways[2][:, self.along] = -height
+        shortest = np.linalg.norm(ways, axis=2).argmin(axis=0)
+        inside = (height >= 0) & (height <= hi - lo) & (r <= Rmax)
+        way = ways[shortest, np.arange(len(r))] * inside[:, None]
+        return (K * self.stiffness(points))[:, None] * way

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
-from karamelo_py.language.signature import Argument
+from karamelo_py.language.signature import Argument, NonNegative
 from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Compute, Fix, NodesView, node_hook
@@ -53,9 +53,14 @@ def prescribe_mapped_at_least(mass, v, v_star, force, value, before, dt, share):
     return allowed, allowed, force, 0.0
 
 
-BOUNDS = {
-    "leq": (prescribe_at_most, prescribe_mapped_at_most),
-    "geq": (prescribe_at_least, prescribe_mapped_at_least),
+# By the bound: what is done after the momentum update, and with velocities mapped again.
+HOOKS = {
+    bound: (node_hook(update, uses_before=True, holds=True), node_hook(mapped, publishes=False))
+    for bound, update, mapped in (
+        ("", prescribe, prescribe_mapped),
+        ("leq", prescribe_at_most, prescribe_mapped_at_most),
+        ("geq", prescribe_at_least, prescribe_mapped_at_least),
+    )
 }
 
 
@@ -115,21 +120,16 @@ class VelocityNodes(Fix):
     published = ("x", "y", "z")
     prescribes_velocity = True
 
-    post_update_grid_state = node_hook(prescribe, uses_before=True, holds=True)
-    post_velocities_to_grid = node_hook(prescribe_mapped, publishes=False)
-
     def __init__(
-        self, hub: Hub, group: NodeGroup, *velocity: Velocity | None, mu: Expression | None = None
+        self,
+        hub: Hub,
+        group: NodeGroup,
+        *velocity: Velocity | None,
+        mu: Annotated[Expression, NonNegative] | None = None,
     ):
         super().__init__(hub, group)
         self.formulas: tuple[Any, ...] = per_direction(hub, "v", velocity)
         self.wall_friction = mu
-        if mu is not None and mu.is_constant and not mu.constant >= 0:
-            raise ScriptError(
-                f"the coefficient of friction is {mu.constant:g}",
-                argument="mu",
-                expected="a number of at least 0",
-            )
         if mu is not None and mu.is_constant:
             judge_friction(hub, mu.constant)
         if mu is not None and None not in self.formulas:
@@ -139,12 +139,9 @@ class VelocityNodes(Fix):
                 expected="NULL for the directions along the wall, or no mu",
             )
         self.bound = self._one_bound()
-        if self.bound:
-            # Contact may move these nodes: they are held only as far as they come.
-            self.prescribes_velocity = False
-            update, mapped = BOUNDS[self.bound]
-            self.post_update_grid_state = node_hook(update, uses_before=True, holds=True)
-            self.post_velocities_to_grid = node_hook(mapped, publishes=False)
+        self.post_update_grid_state, self.post_velocities_to_grid = HOOKS[self.bound]
+        # Contact may move nodes that are held only as far as they come.
+        self.prescribes_velocity = not self.bound
 
     @property
     def nodes(self) -> np.ndarray:
@@ -154,20 +151,18 @@ class VelocityNodes(Fix):
 
     def _one_bound(self) -> str:
         """The bound that all components have: a fix has one function for all of them."""
-        bounds = [velocity.bound for velocity in self.formulas if velocity is not None]
-        if len(set(bounds)) > 1:
-            shown = [
-                ["NULL" if v is None or v.bound != bound else bound + v.text for v in self.formulas]
-                for bound in dict.fromkeys(bounds)
-            ]
-            lines = [f"velocity_nodes, {self.group.id}, {', '.join(row)}" for row in shown]
+        bounds = dict.fromkeys(v.bound for v in self.formulas if v is not None)
+        if len(bounds) > 1:
+            lines = []
+            for k, one in enumerate(bounds, 1):
+                own = (one + v.text if v and v.bound == one else "NULL" for v in self.formulas)
+                lines.append(f"fix(ID{k}, velocity_nodes, {self.group.id}, {', '.join(own)})")
             raise ScriptError(
                 "a fix has bounds of one kind: leq, geq, or none",
                 argument="velocity",
-                hint="fixes with IDs of their own: "
-                + " and ".join(f"fix(ID{k}, {line})" for k, line in enumerate(lines, 1)),
+                hint="fixes with IDs of their own: " + " and ".join(lines),
             )
-        return bounds[0] if bounds else ""
+        return next(iter(bounds), "")
 
     def defined(self) -> None:
         """Warn where another fix gives the same nodes another velocity."""

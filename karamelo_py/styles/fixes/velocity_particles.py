@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from functools import partial
-from itertools import product
 from typing import Any
 
 import numpy as np
@@ -194,8 +193,7 @@ def _differ(simulation: Any, other: Any, fix: Any, axis: int, ids: np.ndarray) -
 
 def _within(simulation: Any, held: Any, driven: Any) -> np.ndarray:
     """Ids of the driven points in cells all of whose corners are held."""
-    hub = simulation.hub
-    method, d = hub.update.method, hub.domain.dimension
+    hub, method = simulation.hub, simulation.hub.update.method
     still = np.zeros(held.group.total(), np.bool_)
     still[held.nodes] = True
     ids = simulation.members(driven.group)
@@ -204,14 +202,7 @@ def _within(simulation: Any, held: Any, driven: Any) -> np.ndarray:
     for solid in hub.solids.values():
         lattice = hub.lattices[method.lattice_of(hub, solid)]
         own = np.flatnonzero(hub.fields.solid[ids] == solid.index)
-        per_cell = lattice.nodes_per_cell
-        cell = np.floor((x[own] - lattice.lo[:d]) / lattice.h).astype(np.int64)
-        cell = np.clip(cell, 0, np.array(lattice.cells[:d]) - 1) * per_cell
-        corners = [
-            lattice.first + np.ravel_multi_index(tuple((cell + corner).T), lattice.shape[:d])
-            for corner in product((0, per_cell), repeat=d)
-        ]
-        caught[own] = still[np.array(corners)].all(axis=0)
+        caught[own] = still[lattice.around(lattice.cells_of(x[own]), (0, 1))].all(axis=0)
     return ids[caught]
 
 

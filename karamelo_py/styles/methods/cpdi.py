@@ -16,11 +16,6 @@ from karamelo_py.styles.methods.ulmpm import TLMPM, ULMPM
 VARIANTS = {"R4": R4, "Q4": Q4, "T3": T3, "R8": R8, "H8": H8, "Tet4": Tet4}
 
 
-def _kind(basis: type) -> str | None:
-    """The kind of element that domains are made of in a mesh."""
-    return basis.element.kind if basis.element else None
-
-
 class Convected(Method):
     """A method whose points have domains that deform with them (CPDI).
 
@@ -33,15 +28,12 @@ class Convected(Method):
     variants: ClassVar[dict[str, type]] = VARIANTS
 
     def shapes(self, kin: Any, solid: Solid) -> np.ndarray:
-        self._check_domain(kin.dimension)
-        self._check_solid(solid)
+        self._check_elements(kin.dimension, solid)
         return super().shapes(kin, solid)
 
     def check(self, hub: Hub) -> None:
         super().check(hub)
-        self._check_domain(hub.domain.dimension)
-        for solid in hub.solids.values():
-            self._check_solid(solid)
+        self._check_elements(hub.domain.dimension, *hub.solids.values())
         moves_corners = self.frame.moves and carried(self.basis, self.kinematics(hub)) > 0
         if moves_corners and isinstance(hub.update.transfer, ASFLIP):
             raise ScriptError(
@@ -51,43 +43,36 @@ class Convected(Method):
                 + ("R4" if hub.domain.dimension == 2 else "R8"),
             )
 
-    def _check_domain(self, d: int) -> None:
+    def _check_elements(self, d: int, *solids: Solid) -> None:
+        """Refuse elements of a mesh, or boxes around points, that the basis does not work on."""
         basis = type(self.basis)
-        if d == basis.dimension:
-            return
-        fit = [name for name, other in VARIANTS.items() if other.dimension == d]
-        raise ScriptError(
-            f"domains of the shape {basis.__name__} are for {basis.dimension} dimensions, and "
-            f"this scene has {d}",
-            hint=f"one of {', '.join(fit)} in its place" if fit
-            else "method ulmpm with the basis cpgimp: in one dimension that is the same thing",
-        )  # fmt: skip
-
-    def _check_solid(self, solid: Solid) -> None:
-        """The element of a mesh, or the box around a point, must be what the basis works on."""
-        basis = type(self.basis)
-        wanted = basis.__name__
-        has = solid.shape
-        boxes = [n for n, v in VARIANTS.items() if v.element is None or v.element.box]
-        if has == "box":
-            if wanted in boxes:
-                return
-            hint = "a mesh of triangles or tetrahedra, or one of the shapes " + ", ".join(
-                name for name in boxes if VARIANTS[name].dimension == basis.dimension
-            )
-            has = "boxes"
-        else:
-            if _kind(basis) == has:
-                return
-            fit = [name for name, other in VARIANTS.items() if _kind(other) == has]
-            hint = f"{fit[0]} in the place of {wanted}" if fit else "a mesh of linear elements"
-            has = f"elements of the kind {has}"
-        raise ScriptError(
-            f"points of solid '{solid.id}' have {has} around them, and {wanted} domains "
-            f"cannot be made of those",
-            place=solid.place,
-            hint=hint,
-        )
+        name, element = basis.__name__, basis.element
+        if d != basis.dimension:
+            fit = [name for name, other in VARIANTS.items() if other.dimension == d]
+            raise ScriptError(
+                f"domains of the shape {name} are for {basis.dimension} dimensions, and "
+                f"this scene has {d}",
+                hint=f"one of {', '.join(fit)} in its place" if fit
+                else "method ulmpm with the basis cpgimp: in one dimension that is the same thing",
+            )  # fmt: skip
+        own = {n: v.element for n, v in VARIANTS.items() if v.dimension == d}
+        boxes = [n for n, other in own.items() if other is None or other.box]
+        for solid in solids:
+            has = f"elements of the kind {solid.shape}"
+            if solid.shape == "box":
+                fits, has = name in boxes, "boxes"
+                hint = f"a mesh of triangles or tetrahedra, or one of the shapes {', '.join(boxes)}"
+            else:
+                fits = element is not None and element.kind == solid.shape
+                fit = [n for n, other in own.items() if other and other.kind == solid.shape]
+                hint = f"{fit[0]} in the place of {name}" if fit else "a mesh of linear elements"
+            if not fits:
+                raise ScriptError(
+                    f"points of solid '{solid.id}' have {has} around them, and {name} domains "
+                    f"cannot be made of those",
+                    place=solid.place,
+                    hint=hint,
+                )
 
 
 class ULCPDI(Convected, ULMPM):

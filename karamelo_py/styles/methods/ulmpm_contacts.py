@@ -1,7 +1,6 @@
 """method ulmpm/contacts: a velocity field for each solid, and contact on the grid."""
 
 from collections.abc import Iterator, Sequence
-from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -45,17 +44,6 @@ def heat_shares(laws: Sequence[NamedTuple], *, conducting: bool) -> np.ndarray:
         takes = np.sqrt(root)
     total = takes[:, None] + takes[None, :]
     return np.where(total > 0, takes[:, None] / np.where(total > 0, total, 1), 0.5)
-
-
-def _around(lattice: Lattice, cells: np.ndarray, steps: range) -> np.ndarray:
-    """Numbers of the nodes that lie so many steps from the first corners of cells (n, d)."""
-    top = np.array(lattice.shape[: lattice.dimension]) - 1
-    found = []
-    for step in product(steps, repeat=lattice.dimension):
-        place = np.clip(cells + np.array(step), 0, top).T
-        shape = lattice.shape[: lattice.dimension]
-        found.append(np.unique(np.ravel_multi_index(tuple(place), shape)))
-    return lattice.first + np.unique(np.concatenate(found))
 
 
 class ULMPMContacts(Method):
@@ -134,11 +122,9 @@ class ULMPMContacts(Method):
         found = nodes
         for k, lattice in enumerate(hub.lattices[: max(of, default=-1) + 1]):
             places = np.concatenate([solids[i].x0 for i in np.flatnonzero(of == k)])
-            cells = np.unique(
-                ((places - lattice.lo[: lattice.dimension]) / lattice.h).astype(int), axis=0
-            )
-            if np.isin(_around(lattice, cells, range(2)), nodes).all():
-                found = np.union1d(found, _around(lattice, cells, range(-1, 3)))
+            cells = np.unique(lattice.cells_of(places), axis=0)
+            if np.isin(lattice.around(cells, range(2)), nodes).all():
+                found = np.union1d(found, lattice.around(cells, range(-1, 3)))
         return found
 
     def contact_between(self, hub: Hub, lattices: Sequence[Lattice]) -> NamedTuple:
