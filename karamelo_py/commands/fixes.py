@@ -7,7 +7,7 @@ from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument
 from karamelo_py.language.unknown import MEANINGS
 from karamelo_py.scene.domain import require_domain
-from karamelo_py.scene.group import AnyGroup, Group, ParticleGroup
+from karamelo_py.scene.group import AnyGroup, ParticleGroup
 from karamelo_py.scene.hub import Catalogue, Hub
 from karamelo_py.scene.plugins import check_fix
 from karamelo_py.script.errors import ScriptError, instead
@@ -267,7 +267,7 @@ def external_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expressio
     return _component(hub, total.minus(inner), direction)
 
 
-def _total(hub: Hub, name: str, group: Group, direction: str) -> Expression:
+def _total(hub: Hub, name: str, group: AnyGroup, direction: str) -> Expression:
     """The value of the fix that measures it, which is made when first asked for."""
     ID = f"{name}({group.id})"
     if ID not in hub.fixes:

@@ -152,6 +152,19 @@ def with_gap(arguments: Sequence[Argument]) -> Argument | None:
     return next((argument for argument in arguments if _GAP.search(argument.text)), None)
 
 
+class Named:
+    """Base of parts of a scene that a script names by an ID: for signatures, too."""
+
+    id: str = ""
+    place: Place | None = None
+    catalogue = ""  # attribute of the scene
+
+    @classmethod
+    def from_script(cls, hub: Any, argument: Argument) -> Any:
+        """Find the part that `argument` names."""
+        return look_up(getattr(hub, cls.catalogue), argument)
+
+
 def look_up(catalogue: Any, argument: Argument):
     """Find the part of the scene that `argument` names."""
     word = argument.word()

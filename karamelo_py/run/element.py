@@ -9,18 +9,16 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.language.signature import Argument
+from karamelo_py.language.arguments import Named
 from karamelo_py.output.files import savefig, whole
 from karamelo_py.output.plots import blank_figure, tidy
 from karamelo_py.points import laws
 from karamelo_py.points import laws as materials
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space, tensor
-from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.region import look_up
 from karamelo_py.script.errors import ScriptError
 
 # Components of symmetric tensors, in the order of the point functions.
@@ -29,7 +27,7 @@ NORMAL = COMPONENTS[:3]
 
 
 @dataclass
-class LoadPath:
+class LoadPath(Named):
     """Targets at the end of a piece of path; every strain that is not named stays as it is."""
 
     increments: int  # number of equal ones
@@ -40,12 +38,7 @@ class LoadPath:
     volumetric: float | None = None  # sum of normal strains, reached by those that are not named
     turn: float = 0.0  # angle about z by which the point turns meanwhile
 
-    id: str = ""
-    place: Any = None
-
-    @classmethod
-    def from_script(cls, hub: Hub, argument: Argument) -> LoadPath:
-        return look_up(hub.load_paths, argument)
+    catalogue = "load_paths"
 
     def __post_init__(self) -> None:
         for name in self.stress:

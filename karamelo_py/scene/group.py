@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
+from karamelo_py.language.arguments import Named
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
 from karamelo_py.scene.domain import require_grid
 from karamelo_py.scene.lattice import CHUNK, Lattice
-from karamelo_py.scene.region import Region, look_up
+from karamelo_py.scene.region import Region
 from karamelo_py.scene.solid import Solid
-from karamelo_py.script.errors import Place, ScriptError
+from karamelo_py.script.errors import ScriptError
 
 ALL = "all"
 NOTHING_THERE = "what acts on this group does nothing there"
 
 
-class Group:
-    """Base of point groups and node groups. That of `all` also takes in what is made later.
+class AnyGroup(Named):
+    """A group of points or of nodes, in signatures; that of `all` takes in what is made later.
 
     Both have ``total()``, the number of points or nodes that there are; ``chosen()``, the members
     of others than the group of all; and ``add(region, solids)``, which adds what lies in a region
@@ -28,8 +30,8 @@ class Group:
     """
 
     kind = ""
-    id: str = ""
-    place: Place | None = None
+    script_kind = "a group of points or of nodes, or all"
+    catalogue = "groups"
 
     def __init__(self, hub: Scene, *, everything: bool = False):
         self.hub = hub
@@ -50,11 +52,11 @@ class Group:
     add: Callable[[Region, Sequence[Solid] | None], int]
 
     @classmethod
-    def from_script(cls, hub: Scene, argument: Argument) -> Group:
-        """The group that `argument` names; the word ``all`` is the group of everything."""
+    def from_script(cls, hub: Scene, argument: Argument) -> Any:
+        """Find the group that `argument` names; ``all`` is everything, or all points."""
         if ALL in (argument.text, argument.word()):
-            return cls(hub, everything=True)
-        group = look_up(hub.groups, argument)
+            return (ParticleGroup if cls is AnyGroup else cls)(hub, everything=True)
+        group = super().from_script(hub, argument)
         if not isinstance(group, cls):
             raise ScriptError(
                 f"group '{group.id}' is a group of {group.kind}",
@@ -64,7 +66,7 @@ class Group:
         return group
 
 
-class ParticleGroup(Group):
+class ParticleGroup(AnyGroup):
     """A set of points, by their reference positions. Members are decided when they are added."""
 
     kind = "particles"
@@ -83,7 +85,7 @@ class ParticleGroup(Group):
     def __len__(self) -> int:
         return sum(map(len, self.pieces()))
 
-    ids = Group.members  # id - 1 of the points
+    ids = AnyGroup.members  # id - 1 of the points
 
     def total(self) -> int:
         """Number of points of all solids."""
@@ -120,7 +122,7 @@ class ParticleGroup(Group):
         return found
 
     def add(self, region: Region, solids: Sequence[Solid] | None) -> int:
-        """Add what lies in a region, see `Group`."""
+        """Add what lies in a region, see `AnyGroup`."""
         return self._take(self._found(region, solids))
 
     def _take(self, pieces: Iterable[np.ndarray]) -> int:
@@ -153,7 +155,7 @@ def _numbers_of(solid: Solid) -> Iterator[np.ndarray]:
         yield np.arange(first, min(first + CHUNK, end))
 
 
-class NodeGroup(Group):
+class NodeGroup(AnyGroup):
     """A set of nodes, by their positions. Methods decide whether solids share them.
 
     The group is what was said of it, not a list of numbers: solids and methods that come later may
@@ -169,7 +171,7 @@ class NodeGroup(Group):
         self._parts: tuple[tuple[Region, Sequence[Solid] | None], ...] = ()
         self._found: tuple[list[Lattice], np.ndarray] | None = None
 
-    nodes = Group.members
+    nodes = AnyGroup.members
 
     def total(self) -> int:
         """Number of nodes of all grids."""
@@ -187,7 +189,7 @@ class NodeGroup(Group):
         return self._found[1]
 
     def add(self, region: Region, solids: Sequence[Solid] | None) -> int:
-        """Add what lies in a region, see `Group`."""
+        """Add what lies in a region, see `AnyGroup`."""
         self._parts = (*self._parts, (region, solids))
         self._found = None
         return len(self._find(region, solids))
@@ -208,17 +210,4 @@ class NodeGroup(Group):
         return np.concatenate(found)
 
 
-class AnyGroup:
-    """For signatures: a group of points or of nodes. The word ``all`` means all points here."""
-
-    script_kind = "a group of points or of nodes, or all"
-
-    @classmethod
-    def from_script(cls, hub: Scene, argument: Argument) -> ParticleGroup | NodeGroup:
-        """The group that `argument` names."""
-        if ALL in (argument.text, argument.word()):
-            return ParticleGroup(hub, everything=True)
-        return look_up(hub.groups, argument)
-
-
-KINDS: dict[str, type[Group]] = {kind.kind: kind for kind in (ParticleGroup, NodeGroup)}
+KINDS: dict[str, type[AnyGroup]] = {kind.kind: kind for kind in (ParticleGroup, NodeGroup)}

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from karamelo_py.language import registry
-from karamelo_py.language.arguments import Argument, look_up
-from karamelo_py.language.scene import Scene
+from karamelo_py.language.arguments import Named
 
 
-class MaterialPart:
+class MaterialPart(Named):
     """A part of a law, or a whole one, under a name: of a `kind`, such as ``eos``, and a `style`.
 
     `made` is what the style returned: the law, or `laws` by kind where it brings others with it.
     """
-
-    id: str = ""
-    place: Any = None
 
     def __init__(self, kind: str, style: str, made: NamedTuple | dict[str, NamedTuple]):
         self.kind = kind
@@ -33,11 +29,7 @@ class Material(MaterialPart):
     """A material."""
 
     script_kind = "the ID of a material"
-
-    @classmethod
-    def from_script(cls, hub: Scene, argument: Argument) -> Material:
-        """The material that `argument` names."""
-        return look_up(hub.materials, argument)
+    catalogue = "materials"
 
     @property
     def words(self) -> str:

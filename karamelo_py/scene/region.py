@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from karamelo_py.language.arguments import look_up
+from karamelo_py.language.arguments import Named
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
 from karamelo_py.scene.domain import require_domain
@@ -17,7 +17,7 @@ EXTERIOR = "exterior"
 HALVINGS = 12  # of the way on which a surface is looked for
 
 
-class Region:
+class Region(Named):
     """Base of the region styles: override `contains`.
 
     `lo` and `hi` are corners of a box around the shape, one number per dimension, infinite where it
@@ -27,8 +27,7 @@ class Region:
     # Direction (0, 1, 2) and centre of the axis that a region in space is round about at the same
     # `radius` all along.
     axis: tuple | None = None
-    id: str = ""
-    place: Place | None = None
+    catalogue = "regions"
 
     def __init__(
         self,
@@ -103,11 +102,6 @@ class Region:
         """Return the depth of positions in the region, see `distance`: (n,)."""
         depth = self.distance(x, reach)
         return -depth if self.exterior else depth
-
-    @classmethod
-    def from_script(cls, hub: Scene, argument: Argument) -> Region:
-        """The region that `argument` names."""
-        return look_up(hub.regions, argument)
 
 
 def split_exterior(arguments: Sequence[Argument]) -> tuple[Sequence[Argument], bool]:

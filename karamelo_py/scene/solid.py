@@ -7,22 +7,21 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from karamelo_py.language.arguments import Named
 from karamelo_py.language.by_dimension import finite
 from karamelo_py.language.scene import Scene
-from karamelo_py.language.signature import Argument
 from karamelo_py.points.laws import can, law_kind, specific_volume
 from karamelo_py.points.laws.temperatures import initial_heat
 from karamelo_py.scene.domain import Domain, require_domain
 from karamelo_py.scene.lattice import CHUNK
 from karamelo_py.scene.material import Material
 from karamelo_py.scene.placement import MAX_POINTS, Placement
-from karamelo_py.scene.region import look_up
-from karamelo_py.script.errors import Place, ScriptError, plural
+from karamelo_py.script.errors import ScriptError, plural
 
 _SAMPLE = 5000
 
 
-class Solid:
+class Solid(Named):
     """Base of the styles of solid: a body of points. A style calls `put` with its points.
 
     Parameters
@@ -38,8 +37,7 @@ class Solid:
         solid has its own.
     """
 
-    id: str = ""
-    place: Place | None = None
+    catalogue = "solids"
     source = "region"  # the argument that says where the points are, for messages
 
     def __init__(
@@ -163,11 +161,6 @@ class Solid:
         """Reference positions, so many at a time, with the number of the first of them."""
         for first in range(0, self.count, CHUNK):
             yield first, self.places[first : first + CHUNK]
-
-    @classmethod
-    def from_script(cls, hub: Scene, argument: Argument) -> Solid:
-        """The solid that `argument` names."""
-        return look_up(hub.solids, argument)
 
 
 def solid_with(hub: Scene, number: int) -> Solid:

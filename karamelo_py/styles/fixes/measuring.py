@@ -3,7 +3,7 @@
 import numpy as np
 
 from karamelo_py.output.point_table import PointTable
-from karamelo_py.scene.group import Group, ParticleGroup
+from karamelo_py.scene.group import AnyGroup, ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix, node_hook, point_hook
 from karamelo_py.script.expressions import Expression
@@ -36,7 +36,7 @@ class Measuring(Fix):
 
     published = ("x", "y", "z")
 
-    def __init__(self, hub: Hub, group: Group, name: str):
+    def __init__(self, hub: Hub, group: AnyGroup, name: str):
         super().__init__(hub, group)
         self.name = name
         if name in HOOKS:

@@ -70,10 +70,9 @@ class PairContact(Fix):
     def initial_integrate(self, points: PointsView) -> None:
         """Find the pairs that touch and give the points their forces."""
         simulation, total = self.hub.simulation, np.zeros(3)
-        kin, corners = simulation.kin, self._where_both_are(simulation)
-        if corners is not None:
-            blocks = simulation.setup.blocks
-            rows = [self._picked(simulation, block, *corners) for block in blocks]
+        kin, blocks = simulation.kin, simulation.setup.blocks
+        rows = self._near(simulation)
+        if rows is not None:
             own = [self._known(simulation, *one) for one in zip(blocks, rows, strict=True)]
             push = partial(self._push, kin, points.dt, points.kick)
             force, total = simulation.at_first(push, np.concatenate(own))
@@ -84,12 +83,10 @@ class PairContact(Fix):
 
     def sent(self, simulation: Any) -> int:
         """Count the points that may touch others now: one process looks at all of them."""
-        corners = self._where_both_are(simulation)
-        blocks = simulation.setup.blocks if corners is not None else ()
-        return sum(len(self._picked(simulation, block, *corners)) for block in blocks)
+        return sum(map(len, self._near(simulation) or ()))
 
-    def _where_both_are(self, simulation: Any) -> tuple[np.ndarray, np.ndarray] | None:
-        """The corners of the place where points of both solids may touch; None where that is none.
+    def _near(self, simulation: Any) -> list[np.ndarray] | None:
+        """Rows of the points of each block that may touch others; None where no solids do.
 
         Each solid is in a box, and reaches beyond it as far as two points touch.
         """
@@ -101,13 +98,14 @@ class PairContact(Fix):
         extents = simulation.comm.allreduce_max(extents)
         width = min(extents[:, 6].sum(), self._reach)
         low, high = -extents[:, :d].min(axis=0) - width, extents[:, 3 : 3 + d].min(axis=0) + width
-        return (low, high) if (low <= high).all() else None
-
-    def _picked(self, simulation: Any, block: Block, *corners: np.ndarray) -> np.ndarray:
-        """Rows of the points of a block that lie between two corners."""
-        points, rows = block.points, np.empty(block.points.id.size, np.int64)
-        x = points.x[simulation.now]
-        return rows[: pairs.pick(simulation.kin, x, points, *self._ranges, *corners, rows)].copy()
+        if (low > high).any():
+            return None
+        found = []
+        for block in s.blocks:
+            x, rows = block.points.x[simulation.now], np.empty(block.points.id.size, np.int64)
+            count = pairs.pick(s.kin, x, block.points, *self._ranges, low, high, rows)
+            found.append(rows[:count].copy())
+        return found
 
     @staticmethod
     def _known(simulation: Any, block: Block, rows: np.ndarray) -> np.ndarray:

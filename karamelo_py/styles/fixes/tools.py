@@ -140,7 +140,7 @@ class Plane(ToolFix):
             unit(self.now(*self.towards))
 
     def depth(self, points: PointsView) -> tuple[np.ndarray, np.ndarray]:
-        """How far (n,) points are behind the plane now, below 0 in front of it; its normal (d,)."""
+        """Measure how far (n,) points are behind the plane now, and find its normal (d,)."""
         normal = unit(self.now(*self.towards))
         return -(self.from_place(points, self.origin) @ normal), normal
 
