@@ -132,6 +132,17 @@ def test_no_text_hides_another(table, monkeypatch, words):
         assert {"0.1", "2.4e-08", "×\nfailed", *ORDERS} <= said
 
 
+def test_words_side_by_side(table, monkeypatch, capsys):
+    drawn = []
+    monkeypatch.setattr(pictures, "savefig", lambda figure, path: drawn.append(figure))
+    assert main(["chart", "sweep.csv", "-accuracy", "err", "-x", "basis", "-o", "chart.png"]) == 0
+    (axes,) = drawn[0].axes
+    assert [tick.get_text() for tick in axes.get_xticklabels()] == [*ORDERS]
+    assert sum(list(line.get_xdata()) == [0, 1, 2] for line in axes.lines) == 3  # N = 10, 20, 40
+    out = capsys.readouterr().out
+    assert re.search(r"20 +quadratic-spline +0.0025", out) and "by basis" not in out
+
+
 @pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
 def test_pictures_are_written(table, suffix):
     name = f"chart.{suffix}"

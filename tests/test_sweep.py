@@ -1,5 +1,6 @@
 """Sweeps: every combination, run and put into one table, whatever becomes of single runs."""
 
+import contextlib
 import io
 import json
 import os
@@ -237,6 +238,28 @@ def test_variables_that_are_0_in_some_runs_have_a_time_as_well():
     assert guess({"cure": "0", "n": "2"}) > 3 * guess({"cure": "1", "n": "1"})
 
 
+@pytest.mark.skipif(os.name != "posix", reason="terminals of POSIX")
+def test_a_terminal_shows_what_runs(folder):
+    """A line for each run that has ended, and below a bar with what goes on."""
+    import pty
+
+    read, write = pty.openpty()
+    (folder / "in.flight").write_text(SCRIPT.replace("steps = 4", "steps = 4000"), "utf-8")
+    words = ["sweep", "in.flight", "-var", "speed=1e-5,2e-5", "-jobs", "1"]
+    command = [sys.executable, "-m", "karamelo_py.app.cli", *words]
+    environment = {**os.environ, "TERM": "xterm", "COLUMNS": "120"}
+    with subprocess.Popen(command, stdout=write, stderr=write, env=environment) as process:
+        os.close(write)
+        said = b""
+        with contextlib.suppress(OSError):  # which is how a terminal ends
+            while piece := os.read(read, 1 << 16):
+                said += piece
+    os.close(read)
+    assert process.returncode == 0
+    assert b"1/2  speed=1e-5, " in said and b"0 of 2 runs, " in said and b"1 of 2 runs, " in said
+    assert b"speed=2e-5: running, " in said and b"left" in said
+
+
 @pytest.mark.parametrize("width", [60, 80, 200])
 def test_a_narrow_table_cuts_no_value_off(width):
     from rich.console import Console
@@ -248,9 +271,9 @@ def test_a_narrow_table_cuts_no_value_off(width):
     console = Console(width=width, record=True, file=io.StringIO())
     items = [records.Recorded("max:growth")]
     row = {**at, **facts, **end}
-    console.print(study.results_table([row], names, items, "in.long", width, [(at, "running")]))
+    console.print(study.results_table([row], names, items, "in.long", width))
     text = console.export_text()
-    for word in (*names, *values, "max:growth", "1.500e+10", "failed:", "inside", "running"):
+    for word in (*names, *values, "max:growth", "1.500e+10", "failed:", "inside"):
         assert word in text, (word, text)
     assert ("987654" in text) == (width == 200)
 

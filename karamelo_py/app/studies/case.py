@@ -24,7 +24,7 @@ WAIT4 = hasattr(os, "wait4")
 PROGRAM = [sys.executable, "-m", "karamelo_py.app.cli"]
 # Facts are indented by 2, the parts of the time by 4.
 _FACT = re.compile(r"^( {2}| {4})(\S.*?) {2,}(\S.*)$")
-_ERROR = re.compile(r"(?:^|: )error: (.*)")
+_MESSAGE = re.compile(r"(?:^|: )(warning|error): (.*)")
 _NOT_ITS_OWN = re.compile(r"internal error|another run is writing")
 # Before the first step as well, and no mistake of a script: larger scenes, longer steps.
 _TOO_MUCH = re.compile(r"memory|times the stable one")
@@ -89,7 +89,7 @@ class Refused(ScriptError):
     def __init__(self, case: Mapping[str, str], outcome: CaseOutcome):
         super().__init__(outcome.reason)
         lines = outcome.complaint.rstrip().splitlines()
-        first = next((k for k, line in enumerate(lines) if _ERROR.search(line)), 0)
+        first = next((k for k, line in enumerate(lines) if errors_in(line)), 0)
         self._whole = "\n".join([*lines[first:], f"this is the script with {worded(case)}"])
 
     def render(self) -> str:
@@ -256,12 +256,20 @@ def _leading_number(text: str) -> float | None:
         return None
 
 
+def messages_in(complaint: str) -> list[tuple[str, str]]:
+    """Find warnings and errors, by these words, without their places and their remedies."""
+    return [m.groups() for m in map(_MESSAGE.search, complaint.splitlines()) if m]
+
+
+def errors_in(complaint: str) -> list[str]:
+    """Find the messages of errors."""
+    return [text for kind, text in messages_in(complaint) if kind == "error"]
+
+
 def reason_in(complaint: str) -> str:
-    """Find the message of an error, without its place and its remedy."""
-    lines = [line for line in complaint.splitlines() if line.strip()]
-    if match := next(filter(None, map(_ERROR.search, lines)), None):
-        return match[1].strip()
-    return lines[-1].strip() if lines else "ended without a message"
+    """Find the message of an error, or what was said last."""
+    last = complaint.rstrip().splitlines()[-1:]
+    return [*errors_in(complaint), *last, "ended without a message"][0].strip()
 
 
 def folder_name(case: Mapping[str, Any]) -> str:

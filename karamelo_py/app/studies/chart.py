@@ -215,19 +215,23 @@ def tell(family: Family, *, costs: bool) -> None:
         end = "front" if id(row) in front else ""
         if np.isnan(line.error[k]):
             end = (row.get("status", "") + ": " + row.get("reason", ""))[:70]
-        numbers = (shown(float(getattr(line, column)[k])) for column in columns)
-        table.add_row(*line.choice.values(), *numbers, end)
+        numbers = {column: shown(float(getattr(line, column)[k])) for column in columns}
+        if family.words:
+            numbers["x"] = row[family.along]
+        table.add_row(*line.choice.values(), *numbers.values(), end)
     console = terminal()
     console.print(table)
+    fitted = {*columns} - ({"x"} if family.words else set())
     pairs = {
         f"{columns[y]} by {columns[x]}": (x, y)
-        for x, y in (("cost", "error"), ("x", "error"), ("x", "cost")) if {x, y} <= {*columns}
+        for x, y in (("cost", "error"), ("x", "error"), ("x", "cost")) if {x, y} <= fitted
     }  # fmt: skip
-    orders = plain_table([""], list(pairs), "\norders, of all and between neighbours")
-    for line in family.lines:
-        fits = (order(getattr(line, x), getattr(line, y)) for x, y in pairs.values())
-        orders.add_row(line.label, *map(str, fits))
-    console.print(orders)
+    if pairs:
+        orders = plain_table([""], list(pairs), "\norders, of all and between neighbours")
+        for line in family.lines:
+            fits = (order(getattr(line, x), getattr(line, y)) for x, y in pairs.values())
+            orders.add_row(line.label, *map(str, fits))
+        console.print(orders)
     if costs and family.cost == "seconds" and family.table.made.get("timed") is False:
         print(
             "note: these runs went side by side, their times disturb each other; "
@@ -292,6 +296,8 @@ def write_page(family: Family, path: Path, words: tuple[str, str], title: str) -
         if 2 <= len(ticks) <= 14:
             figure.layout[axis].tickvals = ticks
             figure.layout[axis].ticktext = [f"{tick:g}" for tick in ticks]
+    if family.words:
+        figure.update_xaxes(tickvals=[*range(len(family.words))], ticktext=family.words)
     runs = [_about(row, family, family.table.path.parent, k) for k, row in enumerate(rows)]
     text = json.dumps(runs).replace("</", "<\\/")
     first = number_of[id(front[-1])] if front else 0

@@ -121,8 +121,10 @@ class Family:
         ]  # fmt: skip
         self.along = along or max(numbers, key=lambda name: len(values[name]), default=None)
         self.by = [*by, *(n for n in differing if n not in by and n != self.along)]
+        ends = values[self.along] if self.along else []
+        self.words = ends if any(number_of(v) is None for v in ends) else []  # side by side
         # A logarithmic axis has no place for zero.
-        self.linear = self.convergence and bool((column(rows, self.along) <= 0).any())
+        self.linear = bool(along) and (bool(self.words) or min(map(number_of, ends)) <= 0)
         groups: dict[tuple[str, ...], list[Mapping[str, str]]] = {}
         for row in rows:
             groups.setdefault(tuple(row[name] for name in self.by), []).append(row)
@@ -135,11 +137,16 @@ class Family:
     def _line(self, choice: dict[str, str], rows: list[Mapping[str, str]]) -> GroupedRuns:
         x = np.zeros(len(rows))
         if self.along:
-            rows.sort(key=lambda row: number_of(row[self.along]))
-            x = column(rows, self.along)
+            rows.sort(key=self.place)
+            x = np.array([self.place(row) for row in rows], float)
         cost, error = column(rows, self.cost), column(rows, self.accuracy)
         across = x if self.convergence else cost
         return GroupedRuns(choice, rows, x, cost, error, across, self.linear)
+
+    def place(self, row: Mapping[str, str]) -> float:
+        """Find the place of a run along its line: the number, or which of the words it is."""
+        end = row[self.along]
+        return self.words.index(end) if self.words else number_of(end)
 
     @property
     def error_label(self) -> str:

@@ -8,15 +8,13 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.app.plot import read_log
-from karamelo_py.app.studies.case import said_in, worded
+from karamelo_py.app.studies.case import messages_in, said_in, worded
 from karamelo_py.app.studies.curves import Table, missing
 from karamelo_py.kernels.watch import WITHIN, growth
 
 SHARE = 0.2  # of the run: means over its first and its last part are compared
 WRONG = ("gains", "breaks")
 OF_PARTS = {"gains": "grows", "damps": "falls"}
-_SAID = re.compile(r"(?:^|: )(?:warning|error): (.*)")
-_WARNED = re.compile(r"(?:^|: )warning: ")
 _CAUSE = re.compile(r"Known to do that here: (.*)|(numerical fracture)")
 _OWN = re.compile(r"^(\w+: )?step \d+, time [^:]*: | at \([^)]*\)| \(through[^)]*\)")
 _POINT = re.compile(r"point \d+ of solid '[^']*'")
@@ -62,25 +60,24 @@ def look_at(
 ) -> Kept:  # fmt: skip
     """Judge a column in a run; a value of one of the computes `parts` is no whole."""
     place = folder / row["folder"]
-    lines = said_in(place / "err.txt").splitlines()
-    said = [match[1] for line in lines if (match := _SAID.search(line))]
-    causes = [_general(text) for text in said]
-    warned = any(_WARNED.search(line) for line in lines)
+    said = messages_in(said_in(place / "err.txt"))
+    causes = tuple(dict.fromkeys(_general(text) for _, text in said))
+    warned = any(kind == "warning" for kind, _ in said)
     log = read_log(place)
     if not log or row["status"] in ("too long", "killed"):
         word = "refused" if row["status"] in ("refused", "failed") else "unknown"
-        return Kept(word, np.nan, tuple(dict.fromkeys(causes)), warned)
+        return Kept(word, np.nan, causes, warned)
     for name in (over, column):
         if name not in log:
             raise missing("-keeps" if name == column else "-x", name, list(log), "the log")
     if row["status"] == "failed":
         word, number = "breaks", float(log[over][-1])
-        warned = warned or any(_CAUSE.search(text) for text in said)
+        warned = warned or any(_CAUSE.search(text) for _, text in said)
     else:
         word, number = judge(log[over], log[column], within)
         if column in parts or column.rpartition("_")[0] in parts:
             word = OF_PARTS.get(word, word)
-    return Kept(word, number, tuple(dict.fromkeys(causes)), warned)
+    return Kept(word, number, causes, warned)
 
 
 def _general(text: str) -> str:

@@ -32,6 +32,8 @@ def lines(family: Family, path: Path, words: tuple[str, str], title: str = "") -
     if not family.linear:
         ends = _ends(np.concatenate([xs, *failed]))
         look.log_axis(axes.xaxis, *ends, list(xs) if convergence else None)
+    elif family.words:
+        axes.set_xticks(range(len(family.words)), family.words)
     look.log_axis(axes.yaxis, *_ends(ys))
     if not convergence:
         _front(axes, family)

@@ -89,7 +89,8 @@ class Study:
         self.write()
         if waiting:
             try:
-                with _Display(self, len(waiting)) as display:
+                display = _Display(self, len(waiting))
+                with display.bar:
                     self._run(waiting, display)
             except KeyboardInterrupt:
                 kept = f"in {self.out}" if self.writes else "kept"
@@ -140,60 +141,39 @@ class Study:
 
 
 class _Display:
-    """The table of a study on the terminal while it runs; plain lines where nobody looks."""
+    """A line for each run that ends; on a terminal also a bar, and what runs."""
 
     def __init__(self, study: Study, count: int):
+        from rich.progress import BarColumn, Progress, TextColumn
+
         self.study, self.count = study, count
         self.finished = 0
         self.started: dict[tuple[str, ...], float] = {}
-        self.live: Any = None
-
-    def __enter__(self) -> _Display:
-        if sys.stdout.isatty() and os.environ.get("TERM") != "dumb":
-            from rich.live import Live
-
-            self.live = Live(refresh_per_second=4, transient=True)
-            self.live.start()
-        return self
-
-    def __exit__(self, *_: Any) -> None:
-        if self.live is not None:
-            self.live.stop()
+        seen = sys.stdout.isatty() and os.environ.get("TERM") != "dumb"
+        columns = BarColumn(bar_width=30), TextColumn("{task.description}")
+        self.bar = Progress(*columns, transient=True, disable=not seen)
+        self.task = self.bar.add_task(study.title)
 
     def finish(self, case: Mapping[str, str], found: Mapping[str, Any]) -> None:
         self.finished += 1
-        if self.live is None:
-            said = " ".join(f"{name}={value}" for name, value in case.items())
-            numbers = [f"{i.word} {shown(found[i.word])}" for i in self.study.items]
-            done, of = self.progress
-            number = f"run {done} of at most {of}:" if self.study.most else f"{done}/{of} "
-            line = ", ".join([said, *numbers, f"{shown(found['seconds'])} s", ended(found)])
-            print(f"{number} {line}", flush=True)
+        numbers = [f"{i.word} {shown(found[i.word])}" for i in self.study.items]
+        done, of = self.progress
+        number = f"run {done} of at most {of}:" if self.study.most else f"{done}/{of} "
+        line = ", ".join([_said(case), *numbers, f"{shown(found['seconds'])} s", ended(found)])
+        print(f"{number} {line}", flush=True)
 
     def tick(self, queue: Sequence[Mapping], running: Sequence[Mapping]) -> None:
-        if self.live is None:
+        if self.bar.disable:
             return
-        from rich.console import Group
-        from rich.progress_bar import ProgressBar
-        from rich.table import Table
-        from rich.text import Text
-
-        rows = list(self.study.rows.values())
-        room = max(4, self.live.console.height - 8 - len(running))
-        waiting = [(case, f"running, {duration(self.since(case))}") for case in running]
-        table = results_table(
-            rows[-room:], self.study.names, self.study.items, self.study.title,
-            self.live.console.width, waiting,
-        )  # fmt: skip
         # Nobody knows how many more a study by and by asks for.
         left = None if self.study.most else self.left(queue, running)
         done, of = self.progress
         said = f"{done} of {'at most ' if self.study.most else ''}{of} runs"
         said += f", {duration(time.perf_counter() - self.study.begun)}"
         said += f", about {duration(left)} left" if left is not None else ""
-        line = Table.grid(padding=(0, 1))
-        line.add_row(ProgressBar(total=of, completed=done, width=30), Text(said))
-        self.live.update(Group(table, line))
+        for case in running:
+            said += f"\n{_said(case)}: running, {duration(self.since(case))}"
+        self.bar.update(self.task, total=of, completed=done, description=said)
 
     @property
     def progress(self) -> tuple[int, int]:
@@ -215,6 +195,10 @@ class _Display:
         rest = sum(predict(case) for case in queue)
         rest += sum(max(predict(case) - self.since(case), 0.0) for case in running)
         return rest / min(self.study.jobs, max(len(queue) + len(running), 1))
+
+
+def _said(case: Mapping[str, str]) -> str:
+    return " ".join(f"{name}={value}" for name, value in case.items())
 
 
 def kind_of(case: Mapping[str, str]) -> tuple[str, ...]:
@@ -288,9 +272,8 @@ def results_table(
     items: Sequence[Recorded],
     title: str,
     width: int,
-    running: Sequence[tuple[Mapping[str, str], str]] = (),
 ) -> Any:
-    """Make a table of runs for a terminal of `width` characters, and below them those that run.
+    """Make a table of runs for a terminal of `width` characters.
 
     No value is cut off: where there is little room some facts are left out, and the last column
     takes more lines.
@@ -300,8 +283,6 @@ def results_table(
 
     words = [item.word for item in items]
     values = {name: [shown(each[name]) for each in rows] for name in (*names, *words, *_FACTS)}
-    for name in names:
-        values[name] += [case[name] for case, _ in running]
     widths = {name: max(map(len, (name, *cells))) for name, cells in values.items()}
     facts = list(_FACTS)
     while facts and sum(widths[n] + 2 for n in (*names, *words, *facts)) + _STATUS > width:
@@ -318,8 +299,6 @@ def results_table(
         style = {"done": "green", "failed": "red", "refused": "red"}.get(each["status"], "yellow")
         cells = [Text(values[name][k]) for name in (*names, *columns)]
         table.add_row(*cells, Text(end if len(end) < 60 else end[:59] + "…", style=style))
-    for case, state in running:
-        table.add_row(*case.values(), *[""] * len(columns), state, style="dim")
     return table
 
 
