@@ -10,10 +10,9 @@ from selection import covering, parameters
 
 from karamelo_py.app.cli import main
 from karamelo_py.app.plot import read_log
-from karamelo_py.app.studies import stability, variables
+from karamelo_py.app.studies import stability
 from karamelo_py.app.studies.case import Launch
 from karamelo_py.app.studies.stability import explore, unseen
-from karamelo_py.script.errors import ScriptError
 
 # An elastic bar on a Lagrangian grid of equal cells, a point in the middle of each. A wave of
 # number k has the frequency 2 c/h sin(k h/2) on the nodes, and going from the points to the nodes
@@ -139,11 +138,25 @@ def test_energy_that_grows_is_told_from_failure(folder):
         "log_mod", "Etot = 1 + push*step(time - 5)\nlog_mod"
     )
     (folder / "in.bar").write_text(text, encoding="utf-8")
-    words = ["-var", "push=1e-3,1,2", "-var", "factor=0.5", "-bound", "2.5", "-o", "map.pdf"]
+    words = ["-var", "push=1e-3,1,2", "-var", "factor=0.5", "-o", "map.pdf"]
+    words += ["-energy", "Etot", "-bound", "2.5"]
     assert main(["stability", "in.bar", *words]) == 0
     table = pandas.read_csv(folder / "map.csv")
     assert list(table["class"]) == ["stable", "stable", "growing"]
     assert table["reason"][2] == "Etot grows 3 times"
+
+
+def test_loads_that_do_work_make_nothing_unstable(folder, capsys):
+    """A bar is pulled from rest: its energy grows from 0 at any step, by the work of the pull."""
+    text = SCRIPT.replace("set_dt(", "fix(pull, body_force, all, 0.01)\nset_dt(")
+    (folder / "in.bar").write_text(text, encoding="utf-8")
+    words = ["-var", "factor=0.5,1,3", "-var", "push=0", "-o", "map.svg"]
+    assert main(["stability", "in.bar", *words]) == 0
+    table = pandas.read_csv(folder / "map.csv")
+    assert list(table["class"]) == ["stable", "stable", "failed"]
+    assert table["growth"][0] < 1.1 and "watched" not in capsys.readouterr().out
+    assert main(["stability", "in.bar", *words, "-energy", "Ek+Es"]) == 0
+    assert list(pandas.read_csv(folder / "map.csv")["class"])[:2] == ["growing", "growing"]
 
 
 # Edges over the unit square, and how many runs of 400 they may cost. The first two are those of a
@@ -207,17 +220,6 @@ def test_growth():
     assert stability.growth(np.zeros(4)) == 0
     # A single row shows what is not there: a mean of five has (4 + 3) / 5.
     assert stability.growth(np.r_[np.ones(30), 3, np.ones(19)]) == pytest.approx(1.4)
-
-
-def test_energies_by_name(tmp_path):
-    def column(asked: str | None, logged: str) -> str:
-        (tmp_path / "in.script").write_text(f"log_modify(custom, step, {logged})\n")
-        return stability.energy_column(asked, variables.ScriptFiles(tmp_path / "in.script"))
-
-    assert column(None, "Ek, Ek + Es") == "Ek+Es"
-    assert column("Ek", "Ek") == "Ek"
-    with pytest.raises(ScriptError, match="logs no energy"):
-        column(None, "v_x")
 
 
 @pytest.mark.parametrize(

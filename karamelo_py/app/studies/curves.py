@@ -121,10 +121,10 @@ class Family:
         ]  # fmt: skip
         self.along = along or max(numbers, key=lambda name: len(values[name]), default=None)
         self.by = [*by, *(n for n in differing if n not in by and n != self.along)]
-        ends = values[self.along] if self.along else []
+        ends = values[along] if along else []
         self.words = ends if any(number_of(v) is None for v in ends) else []  # side by side
         # A logarithmic axis has no place for zero.
-        self.linear = bool(along) and (bool(self.words) or min(map(number_of, ends)) <= 0)
+        self.linear = bool(self.words or any(number_of(v) <= 0 for v in ends))
         groups: dict[tuple[str, ...], list[Mapping[str, str]]] = {}
         for row in rows:
             groups.setdefault(tuple(row[name] for name in self.by), []).append(row)

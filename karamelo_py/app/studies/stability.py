@@ -20,22 +20,21 @@ from karamelo_py.app.studies.study import Study
 from karamelo_py.kernels import watch
 from karamelo_py.output.files import savefig
 from karamelo_py.output.plots import blank_figure
-from karamelo_py.script.errors import ScriptError, nearest, plural
+from karamelo_py.script.errors import ScriptError, plural
 from karamelo_py.script.terms import number_of
 
 DESCRIPTION = """\
-Maps where a script is stable over one or two of its variables: stable, growing (its energy exceeds
-a bound), or failed, with the reason. A mistake of the script ends the study. Edges are searched by
-halves, from coarse to fine: cells between like ones are not run, and "run 7 of at most 400" is one
-of about 100. The table is written beside the picture (map.csv), and says which cells were run; -var
-with one value is passed on.
+Maps where a script is stable over one or two of its variables: stable, growing (energy comes from
+nowhere, as the program itself finds by kinetic + stored + dissipated energy less the work of loads,
+or a log column exceeds a bound), or failed, with the reason. A mistake of the script ends the
+study. Edges are searched by halves, from coarse to fine: cells between like ones are not run, and
+"run 7 of at most 400" is one of about 100. The table is written beside the picture (map.csv), and
+says which cells were run; -var with one value is passed on.
 
-  karamelo-py stability in.file -var dt_factor=0.1:2:20 -var xi=0:1:20 -o map.png
-
-The script logs an energy that should stay about the same, such as Ek + Es."""
+  karamelo-py stability in.file -var dt_factor=0.1:2:20 -var xi=0:1:20 -o map.png"""
 Cell = tuple[int, int]
 UNKNOWN = -1
-ENERGIES = ("Etot", "E_total", "Ek+Es", "Ek_s+Es_s", "Ek+Es+Ed", "Ek", "Ek_s")
+FROM_NOWHERE = "energy comes from nowhere"  # what the program says of growth
 CLASSES = ("stable", "growing", "failed")
 FIRST = 0.1  # of the rows of a log: energies are means over so many
 FEW = 9  # values of a variable that stand at the axis one by one
@@ -57,10 +56,12 @@ REASONS = {
 def add_options(parser: ArgumentParser) -> None:
     """Add what the subcommand takes."""
     variables.add_family(parser)
-    parser.add_argument("-energy", metavar="COLUMN", help="log column that should not grow")
+    parser.add_argument(
+        "-energy", metavar="COLUMN", help="judge by a log column that should not grow"
+    )
     parser.add_argument(
         "-bound", type=above_zero, default=2.0,
-        help="growing: energy above this times that of the first tenth of the log, in the mean (2)",
+        help="of -energy: growing is above this times the first tenth of the log, in the mean (2)",
     )  # fmt: skip
     parser.add_argument("-stride", type=positive, default=6, help="cells between first runs (6)")
     variables.add_axes(parser)
@@ -82,14 +83,17 @@ def run(options: Any) -> int:
         )
     for name in axes:
         values[name].sort(key=float)
-    energy = energy_column(options.energy, script)
+    energy = ""
+    if options.energy:
+        energy = records.recorded(options.energy, script, option="-energy")[0].columns()[0]
     words = variables.along(options, axes[0], axes[1] if len(axes) > 1 else "")
     table = out.with_suffix(".csv")
-    items = [records.Recorded(f"max:{energy}")]
+    items = [records.Recorded(f"max:{energy}")] if energy else []
     most = prod(len(values[name]) for name in axes)
     study = Study(
-        launch, table, items, jobs, again=options.again, strict=True, most=most, writes=False
-    )
+        launch, table, list(values), items, jobs, options.again, strict=True, most=most,
+        writes=False,
+    )  # fmt: skip
     study.describe(variables=values, energy=energy, bound=options.bound)
     chart = Map(study, values, axes, energy, options.bound)
     try:
@@ -105,22 +109,6 @@ def run(options: Any) -> int:
         print(f"islands and strips up to {wide} wide between runs are not seen (-stride)")
     print(f"drawn: {out}; the table is {table}")
     return 0
-
-
-def energy_column(asked: str | None, script: variables.ScriptFiles) -> str:
-    """Choose the log column to watch."""
-    if asked is not None:
-        return records.recorded(asked, script, option="-energy")[0].columns()[0]
-    headings = script.logged()
-    for name in ENERGIES:
-        if headings is None or name in headings:
-            return name
-    close = nearest("Ek+Es", headings or [])
-    raise ScriptError(
-        f"{script.path} logs no energy under a usual name",
-        expected="-energy COLUMN, or log_modify(custom, step, dt, time, Ek + Es) in the script",
-        hint=f"-energy {close}" if close else None,
-    )
 
 
 def growth(energy: np.ndarray) -> float:
@@ -151,17 +139,11 @@ def in_short(row: Mapping[str, Any]) -> str:
     return textwrap.shorten(cause, 60, placeholder=" …")
 
 
-def limited_by(folder: Path) -> str:
-    """Read by name what limits the first step of a run; nothing where the script says the step."""
-    match = re.search(r"^  limited by +(\w+);", said_in(folder / "out.txt"), re.M)
-    return match[1] if match and match[1] not in ("set_dt", "end") else ""
-
-
 class Map:
     """The plane of a stability map.
 
-    Of all variables in `values` the one or two `axes` vary. The log column `energy` may grow by the
-    factor `bound`.
+    Of all variables in `values` the one or two `axes` vary. Growth is that of the log column
+    `energy` by more than the factor `bound`, or, where none is named, what the program finds.
     """
 
     def __init__(
@@ -205,19 +187,30 @@ class Map:
     def judged(self, row: Mapping[str, Any]) -> dict[str, Any]:
         """Add to the row of a run its class, and why it is of that one."""
         place = self.study.out.parent / row["folder"]
-        log = read_log(place)
+        said = said_in(place / "out.txt")
+        limit = re.search(r"^  limited by +(\w+);", said, re.M)
+        found = {"class": "stable", "why": "", "growth": None, "limit": "", "unwatched": ""}
+        if limit and limit[1] not in ("set_dt", "end"):  # where the script says the step
+            found["limit"] = limit[1]
         done = row["status"] == "done"
-        if done and self.energy not in log:
-            raise ScriptError(
-                f"the log has no column '{self.energy}'", expected=", ".join(log) or "a log"
-            )
-        factor = growth(log.get(self.energy, np.empty(0)))
-        kind, why = "stable", ""
+        if self.energy:
+            log = read_log(place)
+            if done and self.energy not in log:
+                raise ScriptError(
+                    f"the log has no column '{self.energy}'", expected=", ".join(log) or "a log"
+                )
+            found["growth"] = factor = growth(log.get(self.energy, np.empty(0)))
+            grows = f"{self.energy} grows {factor:.3g} times" if factor > self.bound else ""
+        else:
+            changes = map(float, re.findall(r"^  energy +([-+][.\d]+) %", said, re.M))
+            found["growth"] = max((1 + change / 100 for change in changes), default=None)
+            if unwatched := re.search(r"^  energy +is (not watched: .*)", said, re.M):
+                found["unwatched"] = unwatched[1]
+            grows = FROM_NOWHERE if FROM_NOWHERE in said_in(place / "err.txt") else ""
         if not done:
-            kind, why = "failed", in_short(row)
-        elif factor > self.bound:
-            kind, why = "growing", f"{self.energy} grows {factor:.3g} times"
-        found = {"class": kind, "why": why, "growth": factor, "limit": limited_by(place)}
+            found |= {"class": "failed", "why": in_short(row)}
+        elif grows:
+            found |= {"class": "growing", "why": grows}
         return {**row, **found}
 
     def rows(self) -> list[dict]:
@@ -263,6 +256,9 @@ class Map:
                 print(f"  {kind:<8} {plural(count[kind], 'cell')}")
         for reason, times in self.failures:
             print(f"    {reason}: {plural(times, 'run')}")
+        if unwatched := Counter(filter(None, (row["unwatched"] for row in self.found.values()))):
+            (why, times), *_ = unwatched.most_common()
+            print(f"energy is {why} ({plural(times, 'run')}); -energy COLUMN judges by the log")
         margins = self.margins()
         if margins:
             low, high = min(margins), max(margins)
