@@ -271,7 +271,7 @@ def test_a_narrow_table_cuts_no_value_off(width):
     console = Console(width=width, record=True, file=io.StringIO())
     items = [records.Recorded("max:growth")]
     row = {**at, **facts, **end}
-    console.print(study.results_table([row], names, items, "in.long", width))
+    console.print(study.results_table([row], names, items, "in.long", console))
     text = console.export_text()
     for word in (*names, *values, "max:growth", "1.500e+10", "failed:", "inside"):
         assert word in text, (word, text)

@@ -1,15 +1,14 @@
 """karamelo-py styles and karamelo-py help: what a script can say, and what each word means."""
 
 import inspect
-import sys
 import textwrap
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from io import TextIOWrapper
 
 from karamelo_py.language import registry
 from karamelo_py.language.help import Help, describe
 from karamelo_py.language.signature import Parameter
+from karamelo_py.output.console import Console
 from karamelo_py.script.errors import ScriptError, meant
 
 COMMAND = "command"
@@ -68,8 +67,8 @@ def print_styles(given: Sequence[str]) -> int:
     page = _Page()
     for index, family in enumerate([_family(given[0])] if given else families()):
         if index:
-            page.line()
-        page.line(_plural(family), "bold")
+            page.say()
+        page.say(_plural(family), "bold")
         names = registry.names(family)
         origins = [registry.origin(family, name) for name in names]
         widths = [max(map(len, column), default=0) for column in (names, origins)]
@@ -140,26 +139,26 @@ def _summary(family: str, name: str) -> tuple[str, bool]:
 def _explain(family: str, name: str) -> int:
     help_ = help_of(family, name)
     page = _Page()
-    page.line(help_.name, "bold")
-    page.line(f"from {registry.origin(family, name)}")
-    page.line()
-    page.line(f"  {help_.syntax}")
+    page.say(help_.name, "bold")
+    page.say(f"from {registry.origin(family, name)}")
+    page.say()
+    page.say(f"  {help_.syntax}")
     for text in filter(None, (help_.summary, help_.text)):
-        page.line()
+        page.say()
         page.paragraph(text)
     if help_.parameters:
         page.heading("Parameters")
         for parameter in help_.parameters:
-            page.line(f"  {parameter.name}")
+            page.say(f"  {parameter.name}")
             page.paragraph(describe_parameter(parameter), indent=6)
             page.paragraph(parameter.description, indent=6)
             if parameter.kind.family:
-                page.line(f"      karamelo-py help {parameter.kind.family} NAME explains one.")
+                page.say(f"      karamelo-py help {parameter.kind.family} NAME explains one.")
     for title, content in help_.sections.items():
         page.heading(title)
         if title == "Example":
             for line in content.splitlines():
-                page.line(f"  {line}")
+                page.say(f"  {line}")
         else:
             page.paragraph(content, indent=2)
     return 0
@@ -183,58 +182,45 @@ def _explain_argument(word: str, found: dict[str, Parameter]) -> int:
     """Explain an argument where most is said of it, and list where else there is one."""
     page = _Page()
     owner, parameter = max(found.items(), key=lambda item: len(item[1].description))
-    page.line(word, "bold")
-    page.line()
+    page.say(word, "bold")
+    page.say()
     of = f"{parameter.name}, an argument of " if word != parameter.name else "an argument of "
     page.paragraph(of + ", ".join(found))
-    page.line()
+    page.say()
     page.paragraph(describe_parameter(parameter), indent=6)
     page.paragraph(parameter.description, indent=6)
-    page.line()
-    page.line(f"karamelo-py help {owner} explains the rest.")
+    page.say()
+    page.say(f"karamelo-py help {owner} explains the rest.")
     return 0
 
 
 # ---- how it looks -------------------------------------------------------------------------------
 
 
-class _Page:
+class _Page(Console):
     """Lines on standard output: bold and coloured on a terminal, plain elsewhere."""
-
-    def __init__(self) -> None:
-        from rich.console import Console
-
-        if isinstance(sys.stdout, TextIOWrapper):  # older encodings get escapes
-            sys.stdout.reconfigure(errors="backslashreplace")
-        self._rich = Console(highlight=False, markup=False, emoji=False)
-        self._terminal = self._rich.is_terminal and not self._rich.is_dumb_terminal
-        self._width = min(self._rich.width if self._terminal else _WIDEST, _WIDEST)
-
-    def line(self, text: str = "", style: str = "") -> None:
-        """Write a line as it is."""
-        self._rich.print(text, style=style if self._terminal else "", soft_wrap=True)
 
     def heading(self, text: str) -> None:
         """Write a part of a page."""
-        self.line()
-        self.line(text, "bold")
+        self.say()
+        self.say(text, "bold")
 
     def paragraph(self, text: str, indent: int = 0) -> None:
         """Running text, broken into lines; empty lines part paragraphs."""
-        margin = " " * indent
+        width = min(self._rich.width if self.terminal else _WIDEST, _WIDEST) - indent
         for index, part in enumerate(text.replace("``", "").split("\n\n") if text else ()):
             if index:
-                self.line()
-            for line in textwrap.wrap(" ".join(part.split()), self._width - indent):
-                self.line(margin + line)
+                self.say()
+            for line in textwrap.wrap(" ".join(part.split()), width):
+                self.say(" " * indent + line)
 
     def row(self, name: str, origin: str, summary: str, broken: bool) -> None:
         """Write a line of a list; cut where a terminal ends."""
+        if not self.terminal:
+            self.say(f"  {name}  {origin}  {summary}")
+            return
         from rich.text import Text
 
         text = Text.assemble("  ", (name, "cyan"), "  ", (origin, "dim"), "  ")
         text.append(summary, style="red" if broken else None)
-        if broken or not self._terminal:
-            self._rich.print(text, soft_wrap=True)
-        else:
-            self._rich.print(text, no_wrap=True, overflow="ellipsis")
+        self._rich.print(text, soft_wrap=broken, no_wrap=not broken, overflow="ellipsis")

@@ -245,8 +245,7 @@ def run(options: Any) -> int:
     combined = variables.cases(others, together, options.where) if others else [{}]
     choices = [ChoiceRuns(case) for case in combined]
     most = len(choices) * len(values[name])
-    study = Study(launch, out, items, jobs, again=options.again, strict=True, most=most)
-    study.names = list(values)
+    study = Study(launch, out, list(values), items, jobs, options.again, strict=True, most=most)
     study.describe(variables=values, record=[items[0].text], timed=timed, repeat=1)
     ordered = coarse_first(options.script, name, values[name], choices[0].values)
     adviser = Adviser(study, (name, ordered), choices, items[0].word, options.cost, options.target)

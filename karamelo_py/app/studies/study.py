@@ -7,7 +7,7 @@ import os
 import sys
 import time
 from argparse import ArgumentParser
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -33,7 +33,7 @@ that fails is recorded with its reason and stops nothing; where none is done, th
 An interrupted sweep goes on where it stopped when the same command is given again. Processor,
 threads and versions are written beside the table (sweep.json)."""
 _FACTS = ("seconds", "points", "steps")
-_STATUS = 24  # characters at least, for what became of a run
+_STATUS = 24  # characters at least, for what became of a run, while there are facts
 
 
 @dataclass
@@ -42,6 +42,7 @@ class Study:
 
     launch: Launch
     out: Path  # the table or picture: runs have their folders in one of that name
+    names: list[str]  # the variables
     items: Sequence[Recorded]  # what is recorded of the logs
     jobs: int  # runs at once
     again: bool = False  # run also what has been run before
@@ -49,7 +50,6 @@ class Study:
     strict: bool = False  # a variant that is refused ends the study
     most: int = 0  # cases of a study that asks for them by and by; 0: `run` gets all
     writes: bool = True  # the table, after each run
-    names: list[str] = field(default_factory=list)  # the variables
     # Of finished runs, by the values of the case.
     rows: dict[tuple[str, ...], dict[str, Any]] = field(default_factory=dict)
     ran: int = 0  # not taken from an earlier study
@@ -75,7 +75,6 @@ class Study:
         When the user interrupts, runs in progress are taken down, finished ones are kept, and it is
         told how to go on.
         """
-        self.names = list(cases[0])
         waiting = []
         for case in cases:
             if tuple(case.values()) in self.rows:
@@ -104,11 +103,11 @@ class Study:
         pool = ThreadPoolExecutor(self.jobs)
         running: dict[Future, Mapping[str, str]] = {}
         started: set[tuple] = set()
-        compiled = {kind_of(dict(zip(self.names, key, strict=True))) for key in self.rows}
+        compiled = {kind_of(key) for key in self.rows}
 
         def ready() -> Any:
             """Choose a case to run; the first of a kind goes ahead: only it has to compile."""
-            kinds = (((case, place), kind_of(case)) for case, place in queue)
+            kinds = (((case, place), kind_of(case.values())) for case, place in queue)
             return next((i for i, kind in kinds if kind in compiled or kind not in started), None)
 
         try:
@@ -116,14 +115,14 @@ class Study:
                 while len(running) < self.jobs and (item := ready()):
                     queue.remove(item)
                     case, place = item
-                    started.add(kind_of(case))
+                    started.add(kind_of(case.values()))
                     running[pool.submit(self.launch.run, case, place)] = case
                     display.started[tuple(case.values())] = time.perf_counter()
                 done, _ = wait(running, timeout=0.25, return_when=FIRST_COMPLETED)
                 for future in done:
                     case = running.pop(future)
                     self.ran += 1
-                    compiled.add(kind_of(case))
+                    compiled.add(kind_of(case.values()))
                     self._put(case, future.result())
                     display.finish(case, self.rows[tuple(case.values())])
                     self.write()
@@ -201,9 +200,9 @@ def _said(case: Mapping[str, str]) -> str:
     return " ".join(f"{name}={value}" for name, value in case.items())
 
 
-def kind_of(case: Mapping[str, str]) -> tuple[str, ...]:
+def kind_of(values: Iterable[str]) -> tuple[str, ...]:
     """Pick what the loops of a case are compiled for, as far as variables tell: its words."""
-    return tuple(value for value in case.values() if number_of(value) is None)
+    return tuple(value for value in values if number_of(value) is None)
 
 
 def guessed_time(
@@ -271,35 +270,30 @@ def results_table(
     names: Sequence[str],
     items: Sequence[Recorded],
     title: str,
-    width: int,
+    console: Any,
 ) -> Any:
-    """Make a table of runs for a terminal of `width` characters.
+    """Make a table of runs.
 
     No value is cut off: where there is little room some facts are left out, and the last column
     takes more lines.
     """
-    from rich.table import Table
     from rich.text import Text
 
-    words = [item.word for item in items]
-    values = {name: [shown(each[name]) for each in rows] for name in (*names, *words, *_FACTS)}
-    widths = {name: max(map(len, (name, *cells))) for name, cells in values.items()}
-    facts = list(_FACTS)
-    while facts and sum(widths[n] + 2 for n in (*names, *words, *facts)) + _STATUS > width:
+    words, facts = [item.word for item in items], list(_FACTS)
+    while True:
+        columns = [*words, *facts]
+        table = plain_table(names, columns, title or None)
+        table.add_column("status", overflow="fold", min_width=_STATUS if facts else 6)
+        for each in rows:
+            end = ended(each)
+            style = {"done": "green", "failed": "red", "refused": "red"}.get(each["status"])
+            cells = [shown(each[name]) for name in (*names, *columns)]
+            said = Text(end if len(end) < 60 else end[:59] + "…", style=style or "yellow")
+            table.add_row(*map(Text, cells), said)
+        wanted = console.measure(table, options=console.options.update(max_width=1000))
+        if not facts or wanted.minimum <= console.width:
+            return table
         facts.pop()
-    columns = [*words, *facts]
-    table = Table(title=title or None, title_justify="left", box=None, pad_edge=False)
-    for name in names:
-        table.add_column(name, style="cyan", min_width=widths[name])
-    for name in columns:
-        table.add_column(name, justify="right", min_width=widths[name])
-    table.add_column("status", overflow="fold", min_width=6)
-    for k, each in enumerate(rows):
-        end = ended(each)
-        style = {"done": "green", "failed": "red", "refused": "red"}.get(each["status"], "yellow")
-        cells = [Text(values[name][k]) for name in (*names, *columns)]
-        table.add_row(*cells, Text(end if len(end) < 60 else end[:59] + "…", style=style))
-    return table
 
 
 def terminal() -> Any:
@@ -336,7 +330,7 @@ def run(options: Any) -> int:
     values, script, launch, jobs = variables.family(options, timed=options.time, repeat=repeat)
     combinations = variables.cases(values, variables.zipped(options), options.where)
     items = recorded(options.record, script, values)
-    study = Study(launch, out, items, jobs, again=options.again, title=str(options.script))
+    study = Study(launch, out, list(values), items, jobs, options.again, str(options.script))
     if study.folder.exists() and not study.folder.is_dir():
         expected = "a free name for the folder of the runs"
         raise ScriptError(f"{study.folder} is a file", expected=expected)
@@ -358,7 +352,7 @@ def run(options: Any) -> int:
 def tell(rows: list, values: dict, items: list, study: Study, out: Path) -> None:
     """Show the whole table and what became of the runs."""
     console = terminal()
-    console.print(results_table(rows, list(values), items, study.title, console.width))
+    console.print(results_table(rows, study.names, items, study.title, console))
     done = sum(row["status"] == "done" for row in rows)
     left, old = len(rows) - done, len(rows) - study.ran
     said = f"{done} of {plural(len(rows), 'run')} {'is' if done == 1 else 'are'} done"
