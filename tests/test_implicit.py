@@ -288,6 +288,15 @@ def test_multigrid_solves_as_a_direct_solver(run_script):
     assert np.all(logs[0]["residual"] == logs[1]["residual"])
 
 
+def test_threads_have_the_same_bits(run_script):
+    """Each node sums what points give it in one order."""
+    logs = [
+        run_script(patch(), "--threads", str(n), folder=f"threads{n}").log for n in (1, 2)
+    ]  # fmt: skip
+    assert np.all(logs[0]["pull_x"] == logs[1]["pull_x"])
+    assert np.all(logs[0]["residual"] == logs[1]["residual"])
+
+
 @pytest.mark.parametrize("scheme", ["quasi-static", "newmark"])
 def test_restarts_have_the_same_bytes(run_script, scheme):
     """A run in two pieces writes the rows that a whole one writes."""

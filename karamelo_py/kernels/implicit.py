@@ -17,25 +17,48 @@ from karamelo_py.compiler.algebra import on_numbers
 from karamelo_py.compiler.compile import index, shared
 from karamelo_py.compiler.fields import load, rows_of_points, store
 from karamelo_py.compiler.held import at_hand
-from karamelo_py.compiler.loops import kernel
+from karamelo_py.compiler.loops import kernel, noinline
 from karamelo_py.compiler.slopes import seeded, slopes_of
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Block, Setup
 from karamelo_py.kernels.lanes import lanes_with, points_from
-from karamelo_py.kernels.sweep import places_of
+from karamelo_py.kernels.sweep import by_threads, places_of
 from karamelo_py.kernels.visit import deformation_of, place_at
 from karamelo_py.points.basis import entry, locate, support
-from karamelo_py.points.kinematics import I, gradient, inv, outer, total, unit, vector, zero
+from karamelo_py.points.kinematics import (
+    I,
+    gradient,
+    inv,
+    outer,
+    total,
+    unit,
+    vector,
+    zero,
+    zero_vector,
+)
 from karamelo_py.points.laws import advance, initial_state, kirchhoff_stress, specific_volume
+
+PARTS = 64  # of a loop that threads share out; points of whole groups of lanes each
+GROUP = 8
 
 
 class Seen(NamedTuple):
     """Nodes that the points of a block see: the k-th of each."""
 
     nodes: np.ndarray  # (n, s) int64: numbers among the unknown nodes
-    offsets: np.ndarray  # (n, s) int64: places in the grid, by which pairs of nodes are found
     weights: np.ndarray  # (n, s)
     gradients: np.ndarray  # (n, s, c) in the places before the step
+    starts: np.ndarray  # (m + 1,) int64: where what sees each node begins in `entries`
+    entries: np.ndarray  # (n s,) int64: p s + k, of the points that see a node, in their order
+
+
+class Pairs(NamedTuple):
+    """Pairs of nodes that a point sees both of: the entries of K, row after row."""
+
+    codes: np.ndarray  # (m,) int64: places of the nodes in the grid; differences tell pairs apart
+    middle: int  # the difference 0 among the columns of `rank`
+    rank: np.ndarray  # (m, r) int32: number of the other node in the row of a node; -1: no pair
+    first: np.ndarray  # (m + 1,) int64: where the pairs of a node begin
 
 
 class Response(NamedTuple):
@@ -44,28 +67,38 @@ class Response(NamedTuple):
     increment: np.ndarray  # (t, n) H
     stress: np.ndarray  # (t, n) V0 P
     tangent: np.ndarray  # (t t, n) V0 dP/dH, a row of P after another
+    furthest: np.ndarray  # (PARTS,) the largest component of a displacement in each part
 
 
 def nothing_seen(s: Setup, block: Block) -> tuple[Seen, Response]:
     """Make the arrays of the points of a block."""
     n, t = block.points.mass.size, s.kin.tensor_size
     count, width = support(s.basis, s.kin), len(s.kin.Gradient._fields)
+    none = np.zeros(0, np.int64)
     seen = Seen(
-        np.zeros((n, count), np.int64),
         np.zeros((n, count), np.int64),
         np.zeros((n, count)),
         np.zeros((n, count, width)),
+        none,
+        none,
     )
     rows = (rows_of_points((k, n), np.float64) for k in (t, t, t * t))
-    return seen, Response(*rows)
+    return seen, Response(*rows, np.zeros(PARTS))
 
 
-@kernel
-def see(frame, kin, basis, grids, points, laws, now, seen):
+@shared
+def points_of(count, k):
+    """Find the first of `count` points in the k-th part of them."""
+    groups = (count + GROUP - 1) // GROUP
+    return min(GROUP * (groups * k // PARTS), count)
+
+
+@noinline
+def _see(frame, kin, basis, grids, points, laws, now, seen, part):
     """Find the nodes that points see, with weights and gradients in the present places."""
-    points, laws = at_hand(points), at_hand(laws)
+    points, laws, seen = at_hand(points), at_hand(laws), at_hand(seen)
     where = places_of(frame, points, now, 1 - now).where
-    for p in range(points.mass.size):
+    for p in range(points_of(points.mass.size, part), points_of(points.mass.size, part + 1)):
         grid = record(grids, points.grid[p])
         stencil = locate(basis, kin, grid, place_at(basis, kin, where, p))
         for k in range(support(basis, kin)):
@@ -93,16 +126,23 @@ def gradient_at(kin, seen, p, k):
     return gradient(kin, [seen.gradients[p, k, j] for j in range(len(kin.Gradient._fields))])
 
 
-@kernel
-def strain(kin, seen, u, increment):
-    """H of each point, from displacements (nodes, d)."""
-    for p in range(seen.nodes.shape[0]):
-        total = zero(kin, u[0, 0])
+@noinline
+def _strain(kin, seen, u, response, part):
+    """H of each point, from displacements (m, d)."""
+    seen, response = at_hand(seen), at_hand(response)
+    count = seen.nodes.shape[0]
+    most = 0.0
+    for p in range(points_of(count, part), points_of(count, part + 1)):
+        H = zero(kin, u[0, 0])
+        own = zero_vector(kin, u[0, 0])
         for k in range(seen.nodes.shape[1]):
             node = seen.nodes[p, k]
             moved = vector(kin, [u[node, i] for i in range(kin.dimension)])
-            total = total + outer(moved, gradient_at(kin, seen, p, k))
-        store(increment, p, total)
+            H = H + outer(moved, gradient_at(kin, seen, p, k))
+            own = own + seen.weights[p, k] * moved
+        store(response.increment, p, H)
+        most = max(most, own.largest())
+    response.furthest[part] = most
 
 
 @shared
@@ -123,14 +163,14 @@ if config.DISABLE_JIT:  # type: ignore[attr-defined]
     stress_and_tangent = on_numbers(stress_and_tangent)
 
 
-@kernel
-def respond(kin, points, laws, dt, response):
+@noinline
+def _respond(kin, points, laws, dt, response, part):
     """Stress and tangent of each point after its increment."""
-    points, laws = at_hand(points), at_hand(laws)
+    points, laws, response = at_hand(points), at_hand(laws), at_hand(response)
     lanes = lanes_with((), laws, points.mass)
-    count = points.mass.size
-    for q in range(0, count, lanes.width):
-        p = points_from(lanes, q, count)
+    end = points_of(points.mass.size, part + 1)
+    for q in range(points_of(points.mass.size, part), end, lanes.width):
+        p = points_from(lanes, q, end)
         law = record(laws, index(points.material[p]))
         mass = points.mass[p]
         state = load(points.state, p, initial_state(law, kin, mass))
@@ -153,15 +193,54 @@ def keep_stress(kin, points, laws, stress):
         store(stress, p, mass * specific_volume(law) * tau.nominal(unit(kin)))
 
 
+# --- at the nodes -----------------------------------------------------------------------------
+# A node sums what the points that see it give, in their order: threads share out nodes.
+
+
 @kernel
-def add_forces(kin, seen, stress, f):
-    """Add what stresses (t, n) make of forces (nodes, d): V0 P grad N."""
-    for p in range(seen.nodes.shape[0]):
-        P = load(stress, p, zero(kin, f[0, 0]))
-        for k in range(seen.nodes.shape[1]):
+def list_points(seen):
+    """List for each node who sees it (`Seen.starts` and `Seen.entries`)."""
+    starts, entries = seen.starts, seen.entries
+    m, count, width = starts.size - 1, seen.nodes.shape[0], seen.nodes.shape[1]
+    for p in range(count):
+        for k in range(width):
+            starts[seen.nodes[p, k] + 1] += 1
+    for a in range(m):
+        starts[a + 1] += starts[a]
+    for p in range(count):
+        for k in range(width):
             node = seen.nodes[p, k]
-            for i, force in enumerate(P.dot(gradient_at(kin, seen, p, k))):
-                f[node, i] += force
+            entries[starts[node]] = p * width + k
+            starts[node] += 1
+    for a in range(m, 0, -1):
+        starts[a] = starts[a - 1]
+    starts[0] = 0
+
+
+@noinline
+def _mark_pairs(seen, pairs, part):
+    """Mark the pairs of nodes that there are, by 0 in `Pairs.rank`."""
+    seen, pairs = at_hand(seen), at_hand(pairs)
+    m, width = pairs.codes.size, seen.nodes.shape[1]
+    for a in range(m * part // PARTS, m * (part + 1) // PARTS):
+        for e in range(seen.starts[a], seen.starts[a + 1]):
+            p = seen.entries[e] // width
+            for k in range(width):
+                pairs.rank[a, pairs.middle + pairs.codes[seen.nodes[p, k]] - pairs.codes[a]] = 0
+
+
+@noinline
+def _add_forces(kin, seen, stress, f, part):
+    """Add what stresses (t, n) make of forces (m, d): V0 P grad N."""
+    seen = at_hand(seen)
+    m, width = f.shape[0], seen.nodes.shape[1]
+    for a in range(m * part // PARTS, m * (part + 1) // PARTS):
+        total = vector(kin, [f[a, i] for i in range(kin.dimension)])
+        for e in range(seen.starts[a], seen.starts[a + 1]):
+            p, k = seen.entries[e] // width, seen.entries[e] % width
+            total = total + load(stress, p, zero(kin, f[0, 0])).dot(gradient_at(kin, seen, p, k))
+        for i, force in enumerate(total):
+            f[a, i] = force
 
 
 @shared
@@ -171,81 +250,62 @@ def along(kin, row):
 
 
 @shared
-def by_displacement(kin, C, g):
-    """dP/du (t d) of a node with gradient g, from dP/dH (t t)."""
+def by_gradient(kin, h, C):
+    """df/dH (d t) of a node with gradient h, from dP/dH (t t)."""
     d, places = kin.dimension, kin.Tensor.places
     t = len(places)
     return tuple(
         [
-            total(
-                [C[c * t + b] * g[places[b][1]] for b in range(t) if along(kin, places[b][0]) == j]
-            )
-            for c in range(t)
-            for j in range(d)
+            total([h[column] * C[c * t + b] for c, (row, column) in enumerate(places)
+                   if along(kin, row) == i])
+            for i in range(d)
+            for b in range(t)
         ]
-    )
+    )  # fmt: skip
 
 
 @shared
-def of_force(kin, h, T):
-    """df/du (d d) of a node with gradient h, from dP/du of another."""
+def by_displacement(kin, D, g):
+    """df/du (d d) by the displacement of a node with gradient g, from df/dH (d t) of another."""
     d, places = kin.dimension, kin.Tensor.places
+    t = len(places)
     return tuple(
         [
-            total(
-                [
-                    h[column] * T[c * d + j]
-                    for c, (row, column) in enumerate(places)
-                    if along(kin, row) == i
-                ]
-            )
+            total([D[i * t + b] * g[column] for b, (row, column) in enumerate(places)
+                   if along(kin, row) == j])
             for i in range(d)
             for j in range(d)
         ]
-    )
+    )  # fmt: skip
 
 
-@kernel
-def add_stiffness(kin, seen, tangent, middle, K):
-    """Add derivatives of the forces of points to K[node, place of the other, i d + j].
-
-    `middle` is the place of a node beside itself: that of a pair is the difference of the offsets.
-    """
-    t = kin.tensor_size
-    for p in range(seen.nodes.shape[0]):
-        C = tuple([tangent[c, p] for c in range(t * t)])
-        for m in range(seen.nodes.shape[1]):
-            T = by_displacement(kin, C, gradient_at(kin, seen, p, m))
-            for k in range(seen.nodes.shape[1]):
-                node = seen.nodes[p, k]
-                place = middle + seen.offsets[p, m] - seen.offsets[p, k]
-                for c, x in enumerate(of_force(kin, gradient_at(kin, seen, p, k), T)):
-                    K[node, place, c] += x
-
-
-@kernel
-def mark_pairs(seen, middle, used):
-    """Mark which places of K get something."""
-    for p in range(seen.nodes.shape[0]):
-        for k in range(seen.nodes.shape[1]):
-            for m in range(seen.nodes.shape[1]):
-                place = middle + seen.offsets[p, m] - seen.offsets[p, k]
-                used[seen.nodes[p, k], place] = 1
+@noinline
+def _add_stiffness(kin, seen, tangent, pairs, K, part):
+    """Add derivatives of the forces of points to K, the rows of components one after another."""
+    seen, pairs = at_hand(seen), at_hand(pairs)
+    d, t = kin.dimension, kin.tensor_size
+    m, width = pairs.codes.size, seen.nodes.shape[1]
+    for a in range(m * part // PARTS, m * (part + 1) // PARTS):
+        row = d * (pairs.first[a + 1] - pairs.first[a])
+        begin = d * d * pairs.first[a]
+        for e in range(seen.starts[a], seen.starts[a + 1]):
+            p, k = seen.entries[e] // width, seen.entries[e] % width
+            C = tuple([tangent[c, p] for c in range(t * t)])
+            D = by_gradient(kin, gradient_at(kin, seen, p, k), C)
+            for other in range(width):
+                code = pairs.codes[seen.nodes[p, other]] - pairs.codes[a]
+                at = begin + d * pairs.rank[a, pairs.middle + code]
+                made = by_displacement(kin, D, gradient_at(kin, seen, p, other))
+                for c, x in enumerate(made):
+                    K[at + c // d * row + c % d] += x
 
 
-@kernel
-def furthest(kin, seen, u):
-    """The largest component of the displacement of any point."""
-    most = 0.0
-    for p in range(seen.nodes.shape[0]):
-        total = vector(kin, [0.0 for _ in range(kin.dimension)])
-        for k in range(seen.nodes.shape[1]):
-            node = seen.nodes[p, k]
-            total = total + seen.weights[p, k] * vector(
-                kin, [u[node, i] for i in range(kin.dimension)]
-            )
-        most = max(most, total.largest())
-    return most
+see = by_threads(_see)
+strain = by_threads(_strain)
+respond = by_threads(_respond)
+mark_pairs = by_threads(_mark_pairs)
+add_forces = by_threads(_add_forces)
+add_stiffness = by_threads(_add_stiffness)
 
 
 @kernel

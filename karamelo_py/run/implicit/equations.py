@@ -9,13 +9,16 @@ from scipy.sparse.csgraph import connected_components
 
 from karamelo_py.compiler.algebra import on_numbers
 from karamelo_py.compiler.tuples import record
-from karamelo_py.kernels.arrays import MASS, Setup
+from karamelo_py.kernels.arrays import MASS, Setup, known_to_laws
 from karamelo_py.kernels.implicit import (
+    PARTS,
+    Pairs,
     Response,
     Seen,
     add_forces,
     add_stiffness,
     keep_stress,
+    list_points,
     mark_pairs,
     nothing_seen,
     respond,
@@ -37,6 +40,8 @@ class Equations:
     ----------
     s
         The arrays of the scene, with the masses of the step at the nodes.
+    mode
+        One thread, or several.
 
     Attributes
     ----------
@@ -54,8 +59,8 @@ class Equations:
         (m,) which of them see rigid points, and the velocities (m, d) that they have from these.
     """
 
-    def __init__(self, s: Setup):
-        self.s, self.d = s, s.kin.dimension
+    def __init__(self, s: Setup, mode: Any):
+        self.s, self.mode, self.d = s, mode, s.kin.dimension
         self.blocks = [block for block in s.blocks if not isinstance(block.laws, Rigid)]
         self.parts = [self._seen(block) for block in self.blocks]
         # Gradients of points on a line between cells reach nodes where they have no weight.
@@ -66,21 +71,13 @@ class Equations:
         self.nodes = np.unique(np.concatenate(counts))
         self.mass = s.nodes.sums[self.nodes, MASS].astype(float)
         self.places = self._places()
-        for seen, _ in self.parts:
-            self._number(seen, self._counts(seen))
-        for _, seen in tools:
-            self._number(seen, seen.weights > 0)
+        self.parts = [
+            (self._numbered(seen, self._counts(seen)), response) for seen, response in self.parts
+        ]
+        tools = [(block, self._numbered(seen, seen.weights > 0)) for block, seen in tools]
         self.deforming = np.isin(self.nodes, soft)
         self.led, self.velocity_of_rigid = self._led(tools)
-        self.reach = 1 + max((self._spread(seen) for seen, _ in self.parts), default=0)
-        self.row = 2 * self.reach + 1
-        weights = self.row ** np.arange(self.d)[::-1]
-        codes = self.places @ weights
-        for seen, _ in self.parts:
-            seen.offsets[:] = codes[seen.nodes]
-        self.middle = int(self.reach * weights.sum())
-        self.K = np.zeros((len(self.nodes), self.row**self.d, self.d**2))
-        self._pattern()
+        self._find_pairs()
 
     def _places(self) -> np.ndarray:
         """Count the places of the nodes along each direction of their grid."""
@@ -99,7 +96,7 @@ class Equations:
         s = self.s
         seen, response = nothing_seen(s, block)
         now = int(s.control.clock[0].now)
-        see(s.frame, s.kin, s.basis, s.grids, block.points, block.laws, now, seen)
+        see(self.mode, PARTS, s.frame, s.kin, s.basis, s.grids, block.points, block.laws, now, seen)
         return seen, response
 
     def _counts(self, seen: Seen) -> np.ndarray:
@@ -115,7 +112,7 @@ class Equations:
         led = mass[:, 0] > 0
         return led, np.divide(momentum, mass, out=momentum, where=led[:, None])
 
-    def _number(self, seen: Seen, counts: np.ndarray) -> None:
+    def _numbered(self, seen: Seen, counts: np.ndarray) -> Seen:
         """Put numbers of nodes among the unknown ones in the place of those in the grid.
 
         `counts` (n, s) tells which of them points have something of.
@@ -123,24 +120,44 @@ class Equations:
         number = self.number_of(seen.nodes)
         first = number[np.arange(len(number)), counts.argmax(1)]
         seen.nodes[:] = np.where(counts, number, first[:, None])
+        starts = np.zeros(len(self.nodes) + 1, np.int64)
+        seen = seen._replace(starts=starts, entries=np.zeros(seen.nodes.size, np.int64))
+        list_points(seen)
+        return seen
 
     def _spread(self, seen: Seen) -> int:
         if not len(seen.nodes):
             return 0
         return int(np.ptp(self.places[seen.nodes], axis=1).max())
 
-    def _pattern(self) -> None:
-        """Find which numbers of K there are, and the pairs of nodes that they belong to."""
-        used = np.zeros(self.K.shape[:2], np.uint8)
+    def _find_pairs(self) -> None:
+        """Find the pairs of nodes that points see both of, and lay out K for all components."""
+        d, m = self.d, len(self.nodes)
+        reach = max((self._spread(seen) for seen, _ in self.parts), default=0)
+        row = 2 * reach + 1
+        weights = row ** np.arange(d)[::-1]
+        rank = np.full((m, row**d), -1, np.int32)
+        middle = int(reach * weights.sum())
+        self.layout = Pairs(self.places @ weights, middle, rank, np.zeros(m + 1, np.int64))
         for seen, _ in self.parts:
-            mark_pairs(seen, self.middle, used)
-        rows, offsets = np.nonzero(used)
-        shift = np.stack(np.unravel_index(offsets, (self.row,) * self.d), 1) - self.reach
-        self.pairs = (
-            rows,
-            offsets,
-            self.number_of(self.nodes[rows] + (shift * self.steps[rows]).sum(1)),
-        )
+            mark_pairs(self.mode, PARTS, seen, self.layout)
+        rows, offsets = np.nonzero(rank == 0)
+        counts = np.bincount(rows, minlength=m)
+        first = self.layout.first
+        np.cumsum(counts, out=first[1:])
+        own = np.arange(len(rows)) - first[rows]
+        rank[rows, offsets] = own
+        shift = np.stack(np.unravel_index(offsets, (row,) * d), 1) - reach
+        columns = self.number_of(self.nodes[rows] + (shift * self.steps[rows]).sum(1))
+        self.pairs = rows, columns
+        # A row of K has the components of all other nodes one after another.
+        starts = np.append((d * d * first[:-1, None] + d * np.outer(counts, np.arange(d))).ravel(),
+                           d * d * first[-1])  # fmt: skip
+        at = (starts.reshape(-1)[rows * d] + d * own)[:, None] + np.arange(d)
+        indices = np.empty(d * d * len(rows), np.int32)
+        for i in range(d):
+            indices[at + i * d * counts[rows][:, None]] = columns[:, None] * d + np.arange(d)
+        self.K = sp.csr_matrix((np.zeros(len(indices)), indices, starts), shape=(m * d, m * d))
 
     def number_of(self, nodes: np.ndarray) -> np.ndarray:
         """Find the numbers of nodes among the unknown ones; -1 of others."""
@@ -149,46 +166,39 @@ class Equations:
 
     def bodies(self) -> np.ndarray:
         """Number (m,) the bodies that nodes belong to: pieces that points connect."""
-        rows, _, columns = self.pairs
+        rows, columns = self.pairs
         m = len(self.nodes)
         graph = sp.csr_matrix((np.ones(len(rows), bool), (rows, columns)), (m, m))
         return connected_components(graph, directed=False)[1]
 
     def unknowns(self, free: np.ndarray) -> None:
         """Number the free components (m, d), and lay out the sparse matrix of their equations."""
-        d = self.d
-        rows, offsets, columns = self.pairs
-        number = np.full(free.shape, -1)
-        number[free] = np.arange(np.count_nonzero(free))
         self.free = free
-        shape = (len(rows), d, d)
-        i = np.broadcast_to(number[rows][:, :, None], shape).ravel()
-        j = np.broadcast_to(number[columns][:, None, :], shape).ravel()
-        at = ((rows * self.K.shape[1] + offsets)[:, None] * d * d + np.arange(d * d)).ravel()
-        kept = (i >= 0) & (j >= 0)
-        order = np.lexsort((j[kept], i[kept]))
-        self.taken = at[kept][order]
-        count = np.count_nonzero(free)
-        starts = np.concatenate([[0], np.cumsum(np.bincount(i[kept], minlength=count))])
+        chosen = free.ravel()
+        number = np.cumsum(chosen, dtype=np.int32) - np.int32(1)
+        indices, starts = self.K.indices, self.K.indptr
+        kept = np.repeat(chosen, np.diff(starts)) & chosen[indices]
+        self.taken = np.flatnonzero(kept).astype(np.int32)
+        ends = np.append(0, np.cumsum(kept, dtype=np.int32))[starts]
+        rows = np.append(0, ends[1:][chosen])
+        count = np.count_nonzero(chosen)
         data = np.zeros(len(self.taken))
-        self.matrix = sp.csr_matrix((data, j[kept][order], starts), shape=(count, count))
-        # What prescribed components do to the free ones.
-        fixed = (i >= 0) & (j < 0)
-        self.moving = (
-            at[fixed],
-            i[fixed],
-            (columns.repeat(d * d) * d + np.tile(np.arange(d), len(rows) * d))[fixed],
-        )
+        self.matrix = sp.csr_matrix((data, number[indices[self.taken]], rows), (count, count))
 
     def respond(self, u: np.ndarray, dt: float) -> np.ndarray:
         """Find the nodal forces (m, d) of displacements (m, d); not finite where a point fails."""
         s = self.s
         f = np.zeros((len(self.nodes), self.d))
         for block, (seen, response) in zip(self.blocks, self.parts, strict=True):
-            strain(s.kin, seen, u, response.increment)
-            respond(s.kin, block.points, block.laws, dt, response)
-            add_forces(s.kin, seen, response.stress, f)
+            strain(self.mode, PARTS, s.kin, seen, u, response)
+            points = known_to_laws(block.points)
+            respond(self.mode, PARTS, s.kin, points, block.laws, dt, response)
+            add_forces(self.mode, PARTS, s.kin, seen, response.stress, f)
         return f
+
+    def furthest(self) -> float:
+        """Find the largest component of a displacement of a point, at the last response."""
+        return max(float(response.furthest.max()) for _, response in self.parts)
 
     def present_forces(self) -> np.ndarray:
         """Find the nodal forces (m, d) of the present stress."""
@@ -196,7 +206,7 @@ class Equations:
         f = np.zeros((len(self.nodes), self.d))
         for block, (seen, response) in zip(self.blocks, self.parts, strict=True):
             keep_stress(s.kin, block.points, block.laws, response.stress)
-            add_forces(s.kin, seen, response.stress, f)
+            add_forces(self.mode, PARTS, s.kin, seen, response.stress, f)
         return f
 
     @cached_property
@@ -213,16 +223,16 @@ class Equations:
 
     def linearise(self) -> None:
         """Assemble the derivatives of the last forces."""
-        self.K[:] = 0
+        self.K.data[:] = 0
         for seen, response in self.parts:
-            add_stiffness(self.s.kin, seen, response.tangent, self.middle, self.K)
-        self.matrix.data[:] = self.K.reshape(-1)[self.taken]
+            add_stiffness(
+                self.mode, PARTS, self.s.kin, seen, response.tangent, self.layout, self.K.data
+            )
+        np.take(self.K.data, self.taken, out=self.matrix.data)
 
     def of_prescribed(self, change: np.ndarray) -> np.ndarray:
         """Find the forces at the free components of changes (m, d) of the others."""
-        at, row, column = self.moving
-        parts = self.K.reshape(-1)[at] * change.reshape(-1)[column]
-        return np.bincount(row, parts, minlength=self.matrix.shape[0])
+        return (self.K @ change.ravel())[self.free.ravel()]
 
     # --- ghost stabilisation ----------------------------------------------------------------------
 

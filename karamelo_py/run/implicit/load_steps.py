@@ -135,7 +135,7 @@ class LoadSteps:
         beginning and of the end; `before` is None where there is no inertia.
         """
         s = self.simulation.setup
-        equations = Equations(s)
+        equations = Equations(s, self.simulation.mode)
         nodes = equations.nodes
         external = after[nodes] + equations.present_forces()
         fixed, prescribed = self._prescribed(equations, hooks)

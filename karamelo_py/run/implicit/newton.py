@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from karamelo_py.kernels.implicit import furthest
 from karamelo_py.run.implicit.equations import Equations
 from karamelo_py.run.implicit.solvers import Singular, solve
 
@@ -120,9 +119,8 @@ class Newton:
         if len(b):
             try:
                 accuracy = max(1e-10, min(1e-4, 0.1 * residual))
-                change[free] = solve(
-                    self.scheme.solver, A, b, equations.rigid_motions[free], accuracy
-                )
+                rigid = equations.rigid_motions[free]
+                change[free] = solve(self.scheme.solver, A, b, rigid, accuracy)
             except Singular:
                 raise Failed("the equations are singular") from None
         return change
@@ -133,7 +131,6 @@ class Newton:
         self.inner = equations.respond(u, self.dt)
         if not np.all(np.isfinite(self.inner)):
             raise Failed("a point turns inside out")
-        kin = equations.s.kin
-        far = max(furthest(kin, seen, u) for seen, _ in equations.parts) / self.spacing
+        far = equations.furthest() / self.spacing
         if not far <= (FAR if equations.s.frame.moves else 0.95):
             raise Failed(f"points would go {far:.3g} cells at once")

@@ -21,7 +21,9 @@ def scaled(A: sp.csr_matrix) -> tuple[sp.csr_matrix, np.ndarray]:
     if not np.all(diagonal > 0):
         raise Singular
     s = 1 / np.sqrt(diagonal)
-    return sp.diags(s) @ A @ sp.diags(s), s
+    data = A.data * s[A.indices]
+    data *= np.repeat(s, np.diff(A.indptr))
+    return sp.csr_matrix((data, A.indices, A.indptr), A.shape), s
 
 
 def direct(A: sp.csr_matrix, b: np.ndarray, rigid: np.ndarray, accuracy: float) -> np.ndarray:
@@ -30,10 +32,11 @@ def direct(A: sp.csr_matrix, b: np.ndarray, rigid: np.ndarray, accuracy: float) 
     with warnings.catch_warnings():
         warnings.simplefilter("error", MatrixRankWarning)
         try:
-            factors = splu(B.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+            # Columns of the transposed matrix are the rows of B.
+            factors = splu(B.T, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
         except (RuntimeError, MatrixRankWarning):
             raise Singular from None
-    return s * factors.solve(s * b)
+    return s * factors.solve(s * b, trans="T")
 
 
 def amg(A: sp.csr_matrix, b: np.ndarray, rigid: np.ndarray, accuracy: float) -> np.ndarray:
@@ -51,7 +54,7 @@ def amg(A: sp.csr_matrix, b: np.ndarray, rigid: np.ndarray, accuracy: float) -> 
     with from_one_seed(), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of a limit of iterations
         solver = pyamg.smoothed_aggregation_solver(
-            B.tocsr(),
+            B,
             B=rigid / s[:, None],
             symmetry="symmetric" if symmetric else "nonsymmetric",
         )
@@ -64,8 +67,10 @@ def amg(A: sp.csr_matrix, b: np.ndarray, rigid: np.ndarray, accuracy: float) -> 
 
 
 def is_symmetric(A: sp.csr_matrix) -> bool:
-    """Tell whether a matrix is symmetric, but for rounding."""
-    return abs(A - A.T).max() < 1e-9 * abs(A).max()
+    """Tell whether a matrix is symmetric, but for rounding: whether A x = A^T x of a random x."""
+    x = np.random.default_rng(0).uniform(0.5, 1.5, A.shape[0])
+    y = A @ x
+    return bool(np.linalg.norm(y - A.T @ x) <= 1e-9 * np.linalg.norm(abs(A) @ x))
 
 
 @contextmanager
