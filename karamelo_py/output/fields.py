@@ -54,17 +54,9 @@ class Fields(PointTable):
         """Ids (0-based) of a particle group, without deleted points."""
         return self.hub.simulation.members(group)
 
-    def kinetic_energy(self, group: Any) -> float:
-        """sum m v^2 / 2 of a particle group."""
-        return self.hub.simulation.total("kinetic", group)
-
-    def strain_energy(self, group: Any) -> float:
-        """Stored energy of a particle group."""
-        return self.hub.simulation.total("stored", group)
-
-    def dissipated_energy(self, group: Any) -> float:
-        """Dissipated energy of a particle group."""
-        return self.hub.simulation.total("dissipated", group)
+    def energy(self, kind: str, group: Any) -> float:
+        """Energy of a particle group: kinetic (sum m v^2 / 2), stored or dissipated."""
+        return self.hub.simulation.total(kind, group)
 
     def added_up(self, part: Any, name: str = "terms", *arguments: Any) -> np.ndarray:
         """Sums (k,) over the points of a part's group, rounded once: of processes and of one alike.

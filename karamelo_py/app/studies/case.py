@@ -23,7 +23,9 @@ KEPT = "case.json"
 WAIT4 = hasattr(os, "wait4")
 PROGRAM = [sys.executable, "-m", "karamelo_py.app.cli"]
 # Facts are indented by 2, the parts of the time by 4.
-_FACT = re.compile(r"^( {2}| {4})(\S.*?) {2,}(\S.*)$")
+_FACT = re.compile(
+    r"^( {2}| {4})(\S.*?) {2,}([-+]?\d(?:[\d ]*\d)?(?:\.\d+)?(?:[eE][-+]?\d+)?)", re.MULTILINE
+)
 _MESSAGE = re.compile(r"(?:^|: )(warning|error): (.*)")
 _NOT_ITS_OWN = re.compile(r"internal error|another run is writing")
 # Before the first step as well, and no mistake of a script: larger scenes, longer steps.
@@ -227,13 +229,11 @@ def read_facts(said: str) -> dict[str, float]:
     """Read the numbers in what the program says at the beginning and the end of each run."""
     facts: dict[str, float] = {}
     seconds = cpu = steps = 0.0
-    for match in filter(None, map(_FACT.match, said.splitlines())):
-        name, value = match[2], _leading_number(match[3])
-        if value is None:
-            continue
+    for indent, name, number in _FACT.findall(said):
+        value = float(number.replace(" ", ""))
         if name in ("points", "nodes", "dt", "stable dt", "own dt", "bytes per particle"):
             facts.setdefault(name.replace(" ", "_"), value)
-        elif name == "steps" and len(match[1]) == 4:
+        elif name == "steps" and len(indent) == 4:
             seconds += value
         elif name == "steps":
             steps += value
@@ -246,14 +246,6 @@ def read_facts(said: str) -> dict[str, float]:
             if seconds > 0:
                 facts["particle_steps_per_s"] = facts["particle_steps"] / seconds
     return facts
-
-
-def _leading_number(text: str) -> float | None:
-    match = re.match(r"[-+]?(\d[\d ]*\d|\d)?(\.\d+)?([eE][-+]?\d+)?", text.strip())
-    try:
-        return float(match[0].replace(" ", "")) if match else None
-    except ValueError:
-        return None
 
 
 def messages_in(complaint: str) -> list[tuple[str, str]]:

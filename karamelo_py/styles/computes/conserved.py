@@ -10,13 +10,13 @@ from karamelo_py.script.expressions import Expression
 
 
 class Energy(Compute):
-    """Base of computes of an energy that the fields of the scene know by the name `measured`."""
+    """Base of computes of an energy: the one that is `measured`."""
 
     published: tuple[str, ...] = ("", "s")
     measured = ""
 
     def refresh(self) -> None:
-        energy = getattr(self.hub.fields, self.measured)(self.group)
+        energy = self.hub.fields.energy(self.measured, self.group)
         self.publish_all(*[energy] * len(self.published))
 
 
@@ -33,7 +33,7 @@ class KineticEnergy(Energy):
     strain_energy
     """
 
-    measured = "kinetic_energy"
+    measured = "kinetic"
 
 
 class FixKineticEnergy(KineticEnergy, Fix):
@@ -63,7 +63,7 @@ class StrainEnergy(Energy):
     kinetic_energy
     """
 
-    measured = "strain_energy"
+    measured = "stored"
 
 
 class FixStrainEnergy(StrainEnergy, Fix):
@@ -97,7 +97,7 @@ class DissipatedEnergy(Energy):
     """
 
     published = ("",)
-    measured = "dissipated_energy"
+    measured = "dissipated"
 
 
 class Drift:
@@ -157,9 +157,8 @@ class EnergyBalance(Compute):
         self._drift = Drift()
 
     def refresh(self) -> None:
-        fields = self.hub.fields
-        energies = fields.kinetic_energy, fields.strain_energy, fields.dissipated_energy
-        parts = [energy(self.group) for energy in energies]
+        kinds = "kinetic", "stored", "dissipated"
+        parts = [self.hub.fields.energy(kind, self.group) for kind in kinds]
         work = self.work.evaluate(self.hub.values) if self.work is not None else 0.0
         total = sum(parts)
         drift = self._drift(total - work, max(abs(part) for part in (*parts, work)))
