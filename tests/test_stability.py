@@ -159,6 +159,17 @@ def test_loads_that_do_work_make_nothing_unstable(folder, capsys):
     assert list(pandas.read_csv(folder / "map.csv")["class"])[:2] == ["growing", "growing"]
 
 
+def test_what_leaves_the_domain_tells_nothing_of_the_step(folder, capsys):
+    text = SCRIPT.replace("tlmpm", "ulmpm").replace("(1, 0, 8, 1)", "(1, -1, 9, 1)")
+    (folder / "in.bar").write_text(text, encoding="utf-8")
+    words = ["-var", "push=0,0.5", "-var", "factor=0.5", "-o", "map.svg"]
+    assert main(["stability", "in.bar", *words]) == 0
+    assert list(pandas.read_csv(folder / "map.csv")["class"]) == ["stable", "left"]
+    out = capsys.readouterr().out
+    assert "left     1 cell" in out and "largest stable first step" not in out
+    assert "left the domain" in (folder / "map.svg").read_text(encoding="utf-8")
+
+
 # Edges over the unit square, and how many runs of 400 they may cost. The first two are those of a
 # lone point under usl as first published (inputs/failures/in.isolated_point): stable below
 # sqrt(2 xi (1 - xi)) of the Courant limit.

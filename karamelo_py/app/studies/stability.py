@@ -26,19 +26,23 @@ from karamelo_py.script.terms import number_of
 DESCRIPTION = """\
 Maps where a script is stable over one or two of its variables: stable, growing (energy comes from
 nowhere, as the program itself finds by kinetic + stored + dissipated energy less the work of loads,
-or a log column exceeds a bound), or failed, with the reason. A mistake of the script ends the
-study. Edges are searched by halves, from coarse to fine: cells between like ones are not run, and
-"run 7 of at most 400" is one of about 100. The table is written beside the picture (map.csv), and
-says which cells were run; -var with one value is passed on.
+or a log column exceeds a bound), left (a point left the domain, which tells nothing of the step),
+or failed, with the reason. A mistake of the script ends the study. Edges are searched by halves,
+from coarse to fine: cells between like ones are not run, and "run 7 of at most 400" is one of about
+100. The table is written beside the picture (map.csv), and says which cells were run; -var with one
+value is passed on.
 
   karamelo-py stability in.file -var dt_factor=0.1:2:20 -var xi=0:1:20 -o map.png"""
 Cell = tuple[int, int]
 UNKNOWN = -1
 FROM_NOWHERE = "energy comes from nowhere"  # what the program says of growth
-CLASSES = ("stable", "growing", "failed")
+CLASSES = ("stable", "growing", "left", "failed")
 FIRST = 0.1  # of the rows of a log: energies are means over so many
 FEW = 9  # values of a variable that stand at the axis one by one
-COLOURS = {"stable": "#d9ecf7", "growing": "#f0a53c", "failed": "#7d2a3a"}  # light to dark
+COLOURS = {
+    "stable": "#d9ecf7", "growing": "#f0a53c", "left": "#9b9b9b", "failed": "#7d2a3a"
+}  # fmt: skip
+LEFT = re.compile("leaves the domain|left the domain")  # and was not thrown out of it
 # What the program says of failures, in short.
 REASONS = {
     r"det F": "det F <= 0",
@@ -187,7 +191,7 @@ class Map:
     def judged(self, row: Mapping[str, Any]) -> dict[str, Any]:
         """Add to the row of a run its class, and why it is of that one."""
         place = self.study.out.parent / row["folder"]
-        said = said_in(place / "out.txt")
+        said, complaint = said_in(place / "out.txt"), said_in(place / "err.txt")
         limit = re.search(r"^  limited by +(\w+);", said, re.M)
         found = {"class": "stable", "why": "", "growth": None, "limit": "", "unwatched": ""}
         if limit and limit[1] not in ("set_dt", "end"):  # where the script says the step
@@ -206,9 +210,11 @@ class Map:
             found["growth"] = max((1 + change / 100 for change in changes), default=None)
             if unwatched := re.search(r"^  energy +is (not watched: .*)", said, re.M):
                 found["unwatched"] = unwatched[1]
-            grows = FROM_NOWHERE if FROM_NOWHERE in said_in(place / "err.txt") else ""
+            grows = FROM_NOWHERE if FROM_NOWHERE in complaint else ""
         if not done:
-            found |= {"class": "failed", "why": in_short(row)}
+            # A domain that is too small tells nothing of the step.
+            left = LEFT.search(row["reason"]) and FROM_NOWHERE not in complaint
+            found |= {"class": "left" if left else "failed", "why": in_short(row)}
         elif grows:
             found |= {"class": "growing", "why": grows}
         return {**row, **found}
@@ -242,7 +248,7 @@ class Map:
         for j in range(self.shape[1]):
             column = [classes[i, j] for i in range(self.shape[0])]
             edge = next((i for i, kind in enumerate(column) if kind != "stable"), None)
-            row = self.found.get((edge - 1, j)) if edge else None
+            row = self.found.get((edge - 1, j)) if edge and column[edge] != "left" else None
             if row and row.get("dt") and row.get("stable_dt"):
                 found.append(row["dt"] / row["stable_dt"])
         return found
@@ -279,7 +285,7 @@ class Map:
         axes = figure.subplots()
         axes.pcolormesh(
             edges(x), edges(y), grid.T, cmap=ListedColormap([COLOURS[k] for k in CLASSES]),
-            vmin=-0.5, vmax=2.5,
+            vmin=-0.5, vmax=len(CLASSES) - 0.5,
         )  # fmt: skip
         number_of = {reason: str(k) for k, (reason, _) in enumerate(self.failures, 1)}
         for (i, j), row in self.found.items():
@@ -289,7 +295,7 @@ class Map:
             else:
                 axes.plot(x[i], y[j], "k.", markersize=4)
         handles = [
-            Patch(facecolor=COLOURS[k], edgecolor="0.4", label=k)
+            Patch(facecolor=COLOURS[k], edgecolor="0.4", label=k + " the domain" * (k == "left"))
             for k in CLASSES if k in self.classes.values()
         ]  # fmt: skip
         handles += [
