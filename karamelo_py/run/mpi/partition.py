@@ -207,9 +207,14 @@ class SharedTiles(Tiles):
         return float(self.comm.allreduce_max(np.array([super()._reach(s, block, x)]))[0])
 
     def _boxes(self, s: Setup) -> Boxes:
-        own = self.own_boxes(s)
-        found = self.comm.exchange(self.near(own, self.comm.allgather(self.hull(own))))
-        of_all = {self.comm.rank: own, **dict(sorted(found.items()))}
+        """List the own boxes, and behind them those of others that may have nodes of them."""
+        own, me = self.own_boxes(s), self.comm.rank
+        of_all = {me: own, **dict(enumerate(self.comm.allgather(own)))}
+        if len(own.grid):
+            low, high = own.lo.min(axis=0), own.hi.max(axis=0)
+            for rank, boxes in of_all.items():
+                near = ((boxes.lo <= high) & (boxes.hi >= low)).all(axis=1)
+                of_all[rank] = Boxes(*(array[near] for array in boxes))
         self._of = np.repeat(list(of_all), [len(boxes.grid) for boxes in of_all.values()])
         return Boxes(*(np.concatenate(same) for same in zip(*of_all.values(), strict=True)))
 
@@ -249,32 +254,6 @@ class SharedTiles(Tiles):
         """List the boxes of the own tiles, with their place in the order of one process."""
         order = [k * self.count + occupied(block.tiling)[0] for k, block in enumerate(s.blocks)]
         return super()._boxes(s)._replace(order=np.concatenate(order))
-
-    def hull(self, boxes: Boxes) -> np.ndarray:
-        """(grids, 2 d) the least of the first tiles of nodes, and of the last times -1."""
-        grid, low, high = self._around(boxes)
-        found = np.full((len(self._nodes), 2 * self.dimension), self._nodes.max() + 1)
-        np.minimum.at(found, grid, np.concatenate([low, -high], axis=1))
-        return found
-
-    def near(self, boxes: Boxes, hulls: list[np.ndarray]) -> dict[int, Boxes]:
-        """Choose own boxes that may reach tiles of nodes of others with these hulls, by rank."""
-        grid, low, high = self._around(boxes)
-        d, of_all = self.dimension, np.array(hulls)
-        own = of_all[self.comm.rank]
-        # Both or neither of two see that they meet.
-        meet = _meet(own[:, :d], -own[:, d:], of_all).any(axis=1)
-        meet[self.comm.rank] = False
-        found = {}
-        for rank in np.flatnonzero(meet).tolist():
-            chosen = _meet(low, high, of_all[rank][grid])
-            found[rank] = Boxes(*(array[chosen] for array in boxes))
-        return found
-
-    def _around(self, boxes: Boxes) -> tuple[np.ndarray, ...]:
-        """Find the grids of boxes, or one for all at a place; the first and last tiles of nodes."""
-        grid = np.zeros_like(boxes.grid) if self.one_place else boxes.grid
-        return grid, boxes.lo // self.node_size, boxes.hi // self.node_size
 
     def _place(self, tile: np.ndarray) -> np.ndarray:
         """Number the place of a tile of nodes."""
@@ -419,12 +398,6 @@ def _needs(place: np.ndarray, begin: np.ndarray, end: np.ndarray) -> Needs:
     order = np.argsort(place, kind="stable")
     starts = np.flatnonzero(np.diff(place[order], prepend=-1))
     return Needs(place[order][starts], *extents(starts, begin[order], end[order]))
-
-
-def _meet(low: np.ndarray, high: np.ndarray, hulls: np.ndarray) -> np.ndarray:
-    """(..., k) whether boxes (k, d) have something in common with hulls (..., k, 2 d)."""
-    d = low.shape[1]
-    return ((low <= -hulls[..., d:]) & (hulls[..., :d] <= high)).all(axis=-1)
 
 
 def _rows(lo: np.ndarray, hi: np.ndarray, first: np.ndarray, steps: np.ndarray) -> np.ndarray:

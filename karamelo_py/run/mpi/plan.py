@@ -57,16 +57,11 @@ def _sum_buffers_sums(mode, quantities, s, due):
 class _PretendedComm(SerialComm):
     """One of several processes that are not there."""
 
-    def __init__(self, rank: int, size: int, others: list[tuple[SharedTiles, Boxes]] | None = None):
-        self.rank, self.size, self.others = rank, size, others
+    def __init__(self, rank: int, size: int, boxes: list[Boxes]):
+        self.rank, self.size, self.boxes = rank, size, boxes
 
-    def allgather(self, hull: Any) -> list:
-        self.hulls = [tiles.hull(boxes) for tiles, boxes in self.others]
-        return self.hulls
-
-    def exchange(self, things: dict[int, Any]) -> dict[int, Any]:
-        parts = {rank: self.others[rank] for rank in things}
-        return {r: tiles.near(own, self.hulls)[self.rank] for r, (tiles, own) in parts.items()}
+    def allgather(self, thing: Any) -> list:
+        return self.boxes
 
 
 def bytes_of_node(simulation: Simulation) -> int:
@@ -87,15 +82,16 @@ def plan(simulation: Simulation, ranks: int) -> list[ProcessShare]:
     s, method = simulation.setup, simulation.hub.update.method
     lattices, one_place = method.lattices(simulation.hub), method.fields_per_solid
     few = simulation.count, sparse(simulation.hub)
+    boxes: list[Boxes] = []  # of all
     of_all = [
-        SharedTiles(_PretendedComm(rank, ranks), lattices, s.basis, *few, one_place=one_place)
+        SharedTiles(
+            _PretendedComm(rank, ranks, boxes), lattices, s.basis, *few, one_place=one_place
+        )
         for rank in range(ranks)
     ]
     of_all[0].share_out(of_all[0].loads(s.blocks)[:-1].sum(axis=0))
     parts = [_part(s, of_all[0].owner == rank) for rank in range(ranks)]
-    boxes = [(tiles, tiles.own_boxes(part)) for tiles, part in zip(of_all, parts, strict=True)]
-    for tiles in of_all:
-        tiles.comm.others = boxes
+    boxes += [tiles.own_boxes(part) for tiles, part in zip(of_all, parts, strict=True)]
     per_node = bytes_of_node(simulation)
     return [
         _share(simulation, part, tiles, per_node) for part, tiles in zip(parts, of_all, strict=True)

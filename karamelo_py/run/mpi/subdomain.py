@@ -8,11 +8,11 @@ import numpy as np
 from karamelo_py.compiler.formula import GLOBAL, UNIFORM
 from karamelo_py.compiler.loops import address_of_python
 from karamelo_py.kernels import ranks
-from karamelo_py.kernels.arrays import DT, TIMESTEP, Block, Setup
+from karamelo_py.kernels.arrays import DT, TIMESTEP, Setup
 from karamelo_py.kernels.ranks import Linked
 from karamelo_py.kernels.totals import WORK, rounded
 from karamelo_py.run.boxes import numbers
-from karamelo_py.run.checkpoint.arrays import kept_at_nodes, remembered_at, take_points, take_tiling
+from karamelo_py.run.checkpoint.arrays import kept_at_nodes, remembered_at, take_points
 from karamelo_py.run.mpi import partition
 from karamelo_py.scene.comm import SerialComm
 
@@ -83,19 +83,25 @@ class Subdomain:
         self.account()
         return self.tiles.migrate(s, self.learn())
 
-    def put(self, found: dict[str, np.ndarray]) -> None:
-        """Take these points and tiles in the place of the own ones."""
-        simulation = self.simulation
-        blocks = tuple(
-            Block(
-                take_points(block.points, found, f"points/{k}/"),
-                block.laws,
-                take_tiling(block.tiling, found, f"tiling/{k}/"),
-            )
-            for k, block in enumerate(simulation.setup.blocks)
-        )
-        simulation.setup = simulation.setup._replace(blocks=blocks)
-        self.tiles.lay_out(simulation.setup)
+    def put(self, shares: list[dict[str, np.ndarray]]) -> None:
+        """Take the points and tiles of these shares in the place of the own ones."""
+        simulation, tiles = self.simulation, self.tiles
+        s, blocks = simulation.setup, []
+        tiles.empty_nodes(s)
+        for k, block in enumerate(s.blocks):
+            tilings = [partition.stripped(share, f"tiling/{k}/") for share in shares]
+            points = [partition.stripped(share, f"points/{k}/") for share in shares]
+            order = partition.by_tile(tilings)
+            arrays = {
+                name: np.take(
+                    np.concatenate([one[name] for one in points], axis=-1), order, axis=-1
+                )
+                for name in points[0]
+            }
+            partition.join_tilings(block.tiling, tilings)
+            blocks.append(block._replace(points=take_points(block.points, arrays, "")))
+        simulation.setup = s._replace(blocks=tuple(blocks))
+        tiles.lay_out(simulation.setup)
 
     def contact_memory(self) -> list[np.ndarray]:
         """List what contact remembers of every node."""
@@ -173,23 +179,7 @@ class Subdomain:
         others = tiles.partners(np.bincount(np.concatenate(own), minlength=self.comm.size))
         given = {rank: partition.share_of(s, tiles.owner == rank) for rank in others}
         mine = partition.share_of(s, tiles.owner == self.comm.rank)
-        shares = [mine, *self.comm.exchange(given).values()]
-        tiles.empty_nodes(s)
-        blocks = []
-        for k, block in enumerate(s.blocks):
-            tilings = [partition.stripped(share, f"tiling/{k}/") for share in shares]
-            points = [partition.stripped(share, f"points/{k}/") for share in shares]
-            order = partition.by_tile(tilings)
-            arrays = {
-                name: np.take(
-                    np.concatenate([one[name] for one in points], axis=-1), order, axis=-1
-                )
-                for name in points[0]
-            }
-            partition.join_tilings(block.tiling, tilings)
-            blocks.append(block._replace(points=take_points(block.points, arrays, "")))
-        simulation.setup = s._replace(blocks=tuple(blocks))
-        tiles.lay_out(simulation.setup)
+        self.put([mine, *self.comm.exchange(given).values()])
 
     def answer(self, what: int, a: int, b: int) -> int:
         try:

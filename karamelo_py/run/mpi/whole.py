@@ -155,11 +155,9 @@ class Whole:
         """Hand out the tiles of the whole, cut anew."""
         simulation, subdomain = self.simulation, self.simulation.subdomain
         simulation.tiles.owner = owner
-        found = simulation.comm.scatter(self._shares())
-        simulation.tiles.empty_nodes(simulation.setup)
+        subdomain.put([simulation.comm.scatter(self._shares())])
         for one, rows in zip(subdomain.memory(), memory, strict=True):
             one[nodes] = rows
-        subdomain.put(found)
 
     def _hand_back(self, nodes: np.ndarray, rows: list) -> None:
         """Put what the first has changed into the arrays that a step is at work on."""
