@@ -366,7 +366,7 @@ def test_domains_go_with_points_moved_in_python(tmp_path, method, corners):
     simulation = final_hub(path).simulation
     before = simulation.state().places.T
     group = SimpleNamespace(all=False, ids=np.array([3, 5]))
-    view = PointsView(simulation, simulation.members(group), then=False)
+    view = PointsView(simulation, simulation.points.members(group), then=False)
     view.position = view.position + [0.01, -0.02]
     view.write_back()
     moved = simulation.state().places.T - before

@@ -92,8 +92,8 @@ before = value(m_x)
 populate_cylindrical_coordinates(s1, disk, 0.1, 0, 0.5, 10, 36, 0)
 """
     )
-    assert len(hub.simulation.x) == 360 + hub.solids["s2"].count
-    np.testing.assert_array_equal(hub.simulation.x[:360], hub.solids["s1"].x0)
+    assert len(hub.fields.position) == 360 + hub.solids["s2"].count
+    np.testing.assert_array_equal(hub.fields.position[:360], hub.solids["s1"].x0)
 
 
 LINE = "populate_cylindrical_coordinates(s1, disk, 0, 0, 0.5, 4, 12, 0)"

@@ -172,7 +172,7 @@ def test_few_nodes_are_visited_in_vain():
     """
     simulation = sorted_scene(side=4)
     assert simulation.count == pytest.approx(10_000, rel=0.01)
-    cells = np.floor(simulation.x / 0.1).astype(int)
+    cells = np.floor(simulation.hub.fields.position / 0.1).astype(int)
     corners = [cells + (i, j) for i in (0, 1) for j in (0, 1)]
     with_mass = len(np.unique(np.concatenate(corners), axis=0))
     used = nodes_in_use(simulation.setup)
@@ -217,7 +217,9 @@ def test_long_tiles_reach_no_more_nodes_than_their_points():
     drift = simulation.control.clock[0].drift_limit + ROUNDING
     assert 0 < drift < 1
     ends = list(product((-drift, drift), repeat=3))
-    cells = np.concatenate([np.floor(simulation.x / 0.1 + end) for end in ends]).astype(int)
+    cells = np.concatenate(
+        [np.floor(simulation.hub.fields.position / 0.1 + end) for end in ends]
+    ).astype(int)
     corners = np.concatenate([cells + corner for corner in product((0, 1), repeat=3)])
     assert nodes_in_use(simulation.setup) == len(np.unique(corners, axis=0))
     boxes = [block.tiling.box[: block.tiling.count[0]] for block in simulation.setup.blocks]

@@ -66,7 +66,7 @@ def test_no_points_compile_nothing():
     """As they are asked for to learn what a column would be of."""
     simulation = sorted_scene()
     known = set(export_state.kernel.units), set(export.kernel.units)
-    fields = next(reversed([*simulation.some(None)]))
+    fields = next(reversed([*simulation.points.some(None)]))
     for name in ("volume", "s11", "strain_energy"):
         assert fields.particle(name).shape == (0,)
     assert (set(export_state.kernel.units), set(export.kernel.units)) == known

@@ -39,11 +39,11 @@ class Fields(PointTable):
         if key != self._key:
             self._key = key
             self._cache.clear()
-        return simulation.rows()
+        return simulation.points.rows()
 
     def pieces(self, *, to_first: bool = False) -> Iterator[PointTable]:
         """The points, so many at a time, by id; with `to_first` the first process gets them all."""
-        return self.hub.simulation.pieces(to_first=to_first)
+        return self.hub.simulation.points.pieces(to_first=to_first)
 
     @property
     def node_count(self) -> int:
@@ -52,11 +52,11 @@ class Fields(PointTable):
 
     def members(self, group: Any) -> np.ndarray:
         """Ids (0-based) of a particle group, without deleted points."""
-        return self.hub.simulation.members(group)
+        return self.hub.simulation.points.members(group)
 
     def energy(self, kind: str, group: Any) -> float:
         """Energy of a particle group: kinetic (sum m v^2 / 2), stored or dissipated."""
-        return self.hub.simulation.total(kind, group)
+        return self.hub.simulation.points.total(kind, group)
 
     def added_up(self, part: Any, name: str = "terms", *arguments: Any) -> np.ndarray:
         """Sums (k,) over the points of a part's group, rounded once: of processes and of one alike.
@@ -64,14 +64,14 @@ class Fields(PointTable):
         The method `name` of the part, a compute or fix as it stands in the scene, is called with
         fields of some of the points after others, and `arguments`, and returns terms (k, n).
         """
-        return self.hub.simulation.added_up(part, name, *arguments)
+        return self.hub.simulation.points.added_up(part, name, *arguments)
 
     def each(self, part: Any, name: str, *arguments: Any) -> list:
         """List what a method of a part says of fields of some points of its group after others.
 
         Which points are together, and their order, depends on processes and steps.
         """
-        return self.hub.simulation.each(part, name, *arguments)
+        return self.hub.simulation.points.each(part, name, *arguments)
 
     def particle_names(self) -> list[str]:
         """Names that `particle` knows."""
@@ -103,19 +103,17 @@ class Fields(PointTable):
     def node_pieces(self, names: Sequence[str], *, to_first: bool = False) -> Iterator[NodeFields]:
         """Fields of all nodes, of which `names` are asked for, so many at a time, see `pieces`."""
         brought = [name for name in names if name in BROUGHT]
-        for rows in self.hub.simulation.node_pieces(brought, to_first=to_first):
+        for rows in self.hub.simulation.nodes.pieces(brought, to_first=to_first):
             yield NodeFields(self.hub, rows)
 
     def mass_at_nodes(self, group: Any) -> np.ndarray:
         """(4,) the mass of the nodes of a group, and this times x, y and z; rounded once."""
-        self.hub.simulation.show_on_nodes()
-        return self.hub.simulation.mass_at_nodes(group.id)
+        return self.hub.simulation.nodes.mass_of(group)
 
     @property
     def occupied_nodes(self) -> tuple[int, int]:
         """The number of nodes with mass, and the last of them."""
-        self.hub.simulation.show_on_nodes()
-        return self.hub.simulation.occupied_nodes()
+        return self.hub.simulation.nodes.occupied()
 
     def node(self, name: str) -> np.ndarray:
         """A field of all nodes, (n,); nodes without mass are at rest."""

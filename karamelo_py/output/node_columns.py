@@ -211,7 +211,7 @@ def loaded(hub: Scene, simulation: Any) -> dict[str, int]:
     loading = {
         ID: fix for ID, fix in hub.fixes.items() if isinstance(fix.hooks().get(LOADS), CompiledHook)
     }
-    there = simulation.nodes_with_mass()
+    there = simulation.nodes.with_mass()
     own = [
         len(there) if fix.group.all else np.count_nonzero(np.isin(there, fix.nodes))
         for fix in loading.values()

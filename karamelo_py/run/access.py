@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from functools import cached_property
 from math import inf
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from karamelo_py.kernels.arrays import MASS, Block, Control, Setup, arrays_of, some_of
+from karamelo_py.kernels.arrays import MASS, Block, Setup, arrays_of, some_of
 from karamelo_py.kernels.totals import LIMBS, add_all, add_rows, rounded
 from karamelo_py.output.fields import PIECE, SUMMED
 from karamelo_py.output.node_columns import NodeRows, brought, loaded, places_of
@@ -19,52 +19,40 @@ from karamelo_py.run.checkpoint.arrays import kept_at_nodes, of_nodes, rows_at
 from karamelo_py.run.mpi.partition import joined
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.hub import Hub
-from karamelo_py.script.errors import ScriptError
 
 LAST = 2**62  # behind all numbers of points
 
 
-class ById:
+class PointsById:
     """The points of a simulation: by their ids (from 0), in pieces, and sums over them."""
 
-    hub: Hub
-    comm = SerialComm()
-    setup: Setup
-    control: Control
-    count: int  # of the points there have ever been
-    present: np.ndarray  # (count,) False for points that were deleted
+    def __init__(self, simulation: Any):
+        self.simulation = simulation
 
     @property
-    def kin(self) -> NamedTuple:
-        return self.setup.kin
+    def hub(self) -> Hub:
+        return self.simulation.hub
 
     @property
-    def now(self) -> int:
-        """The number of the present of the two position arrays."""
-        return int(self.control.clock[0].now)
+    def setup(self) -> Setup:
+        return self.simulation.setup
+
+    @property
+    def comm(self) -> SerialComm:
+        return self.simulation.comm
 
     def rows(self) -> Rows:
         """Return all points, in the order of their ids, for a table."""
         parts = [Part(block, None, block.points.id) for block in self.setup.blocks]
         comm = self.comm if self.comm.size > 1 else None
-        return Rows(self.setup, parts, np.arange(self.count), self.present, comm)
-
-    def by_id(self, field: Callable) -> np.ndarray:
-        """Gather (..., N) a field, which `field` takes from `Points`; zero for deleted points."""
-        return self.rows().take(field).T
-
-    def declared(self, kind: type) -> np.ndarray | None:
-        """Return a declared field (N, components), None where the scene does not have it."""
-        return self.rows().declared(kind)
+        present = self.simulation.present
+        return Rows(self.setup, parts, np.arange(len(present)), present, comm)
 
     def members(self, group: Any) -> np.ndarray:
         """List the ids (0-based) of a particle group, without deleted points."""
-        ids = np.arange(self.count) if group.all else group.ids
-        return ids if self.present.all() else ids[self.present[ids]]
-
-    @property
-    def x(self) -> np.ndarray:
-        return PointTable(self.hub, self.rows()).position
+        present = self.simulation.present
+        ids = np.arange(len(present)) if group.all else group.ids
+        return ids if present.all() else ids[present[ids]]
 
     def total(self, name: str, group: Any = None) -> float:
         """Sum a quantity of `SUMMED` over all points, or those of a group; without rounding."""
@@ -123,7 +111,7 @@ class ById:
         limbs = np.zeros((len(columns), LIMBS), np.int64)
         for k, column in enumerate(columns):
             add_all(limbs, k, np.ascontiguousarray(column))
-        of_all = sum(self.everyone("a total", limbs))
+        of_all = sum(self.comm.everyone("a total", limbs))
         return np.array([rounded(of) for of in of_all]).reshape(terms.shape[1:])
 
     def each(self, part: Any, name: str, *arguments: Any) -> list:
@@ -134,47 +122,27 @@ class ById:
 
     def seen(self, say: Callable, *arguments: Any) -> list:
         """Gather a function's answer for the points of each process."""
-        return self.comm.allgather(say(self, *arguments))
+        return self.comm.allgather(say(self.simulation, *arguments))
 
     def largest(self, of: Callable[[PointTable], np.ndarray]) -> tuple[float, int]:
         """The largest number that a function says of all points, and the first point with it."""
 
-        def own(points: ById) -> tuple[float, int]:
+        def own() -> tuple[float, int]:
             found = -inf, 0
-            for some in points.some(None):
+            for some in self.some(None):
                 values = of(some)
                 value = np.fmax.reduce(values, initial=-inf)
                 first = some.ids[values == value].min(initial=LAST)
                 found = max(found, (float(value), -int(first)))
             return found
 
-        value, number = max(self.seen(own))
+        value, number = max(self.comm.allgather(own()))
         return value, -number
-
-    def everyone(self, what: str, thing: Any) -> list:
-        """Gather the things of all processes, which have to ask for the same (in words)."""
-        asked, found = zip(*self.comm.allgather((what, thing)), strict=True)
-        if other := next((one for one in asked if one != asked[0]), None):
-            raise ScriptError(
-                f"a function in Python comes to {asked[0]} on one process, and to {other} on "
-                "another",
-                hint="points.total(terms) and nodes.total(terms) have to be asked for by all "
-                "processes, those without points too",
-            )
-        return list(found)
-
-    def at_first(self, make: Callable[[list], list], thing: Any) -> Any:
-        """Gather things at the first process, make an answer for each, and scatter the answers."""
-        found = self.comm.gather(thing)
-        return self.comm.scatter(None if found is None else make(found))
 
     @cached_property
     def x0(self) -> np.ndarray:
-        return self.x0_of(np.arange(self.count))
-
-    def x0_of(self, ids: np.ndarray) -> np.ndarray:
-        """Return (n, d) positions of some points before the first step."""
-        return places_before(self.hub, ids)
+        """(n, d) positions of all points before the first step."""
+        return places_before(self.hub, np.arange(len(self.simulation.present)))
 
     def pieces(self, *, to_first: bool = False) -> Iterator[PointTable]:
         """Yield all points, so many at a time; `to_first`, to the first of several processes."""
@@ -182,7 +150,8 @@ class ById:
         orders = [np.argsort(block.points.id) for block in s.blocks]
         known = [block.points.id[order] for block, order in zip(s.blocks, orders, strict=True)]
         gather = self.comm.gather if to_first else self.comm.allgather
-        for first, end in _ranges(self.count):
+        present = self.simulation.present
+        for first, end in _ranges(len(present)):
             blocks = [
                 some_of(block, order[slice(*np.searchsorted(ids, (first, end)))])
                 for block, order, ids in zip(s.blocks, orders, known, strict=True)
@@ -198,7 +167,7 @@ class ById:
                 ]
             parts = [Part(block, None, block.points.id - first) for block in blocks]
             ids = np.arange(first, end)
-            yield PointTable(self.hub, Rows(s, parts, ids, self.present[first:end]))
+            yield PointTable(self.hub, Rows(s, parts, ids, present[first:end]))
 
 
 def _ranges(count: int) -> Iterator[tuple[int, int]]:
@@ -206,36 +175,39 @@ def _ranges(count: int) -> Iterator[tuple[int, int]]:
     return ((first, min(first + PIECE, count)) for first in range(0, count, PIECE))
 
 
-class ByNumber:
-    """The nodes of a scene."""
+class NodesByNumber:
+    """The nodes of a simulation that has `points`."""
 
-    setup: Setup
+    def __init__(self, points: PointsById):
+        self.points, self.simulation = points, points.simulation
 
-    def node_pieces(self, names: Iterable[str], *, to_first: bool = False) -> Iterator[NodeRows]:
+    def pieces(self, names: Iterable[str], *, to_first: bool = False) -> Iterator[NodeRows]:
         """All nodes, so many at a time, with the sums over points of these names; see `pieces`."""
-        self.show_on_nodes()
-        sums = {name: brought(self, name) for name in names}
-        weights = loaded(self.hub, self) if sums else {}
-        kept = kept_at_nodes(self.setup)
-        if self.subdomain is not None:
-            self.subdomain.share_kept()
-        gather = self.comm.gather if to_first else self.comm.allgather
-        for first, end in _ranges(self.hub.fields.node_count):
-            if self.comm.size == 1:
-                arrays = {name: array[first:end] for name, array in of_nodes(self.setup)}
+        simulation, hub, comm = self.simulation, self.points.hub, self.points.comm
+        simulation.show_on_nodes()
+        s = simulation.setup
+        sums = {name: brought(simulation, name) for name in names}
+        weights = loaded(hub, simulation) if sums else {}
+        kept = kept_at_nodes(s)
+        if simulation.subdomain is not None:
+            simulation.subdomain.share_kept()
+        gather = comm.gather if to_first else comm.allgather
+        for first, end in _ranges(hub.fields.node_count):
+            if comm.size == 1:
+                arrays = {name: array[first:end] for name, array in of_nodes(s)}
                 own = {name: of[first:end] for name, of in sums.items()}
             else:
-                arrays = rows_at(self, np.arange(first, end), gather)
+                arrays = rows_at(simulation, np.arange(first, end), gather)
                 own = self._sums_between(first, end, sums, gather)
                 if arrays is None:
                     continue
                 arrays |= {f"nodes/{name}": array[first:end] for name, array in kept}
             own = {name: of.sum(axis=1) for name, of in own.items()}
-            yield NodeRows(first, end, self.kin, arrays, own, weights)
+            yield NodeRows(first, end, s.kin, arrays, own, weights)
 
     def _sums_between(self, first: int, end: int, sums: dict, gather: Callable) -> dict:
         """Sums over the points of all processes at the nodes from `first` to before `end`."""
-        nodes = numbers(self.setup.spans)
+        nodes = numbers(self.simulation.setup.spans)
         used = nodes[slice(*np.searchsorted(nodes, (first, end)))]
         own = {name: np.zeros((end - first, 2)) for name in sums}
         for there, given in gather((used, [of[used] for of in sums.values()])) or ():
@@ -245,27 +217,30 @@ class ByNumber:
 
     def counted(self) -> np.ndarray:
         """The numbers of the nodes in use, of each at one process."""
-        if self.subdomain is not None:
-            return self.subdomain.counted()
-        return numbers(self.setup.spans)
+        simulation = self.simulation
+        if simulation.subdomain is not None:
+            return simulation.subdomain.counted()
+        return numbers(simulation.setup.spans)
 
-    def nodes_with_mass(self) -> np.ndarray:
+    def with_mass(self) -> np.ndarray:
+        """The numbers of those of them that have mass."""
         nodes = self.counted()
-        return nodes[self.setup.nodes.sums[nodes, MASS] > 0]
+        return nodes[self.simulation.setup.nodes.sums[nodes, MASS] > 0]
 
-    def mass_at_nodes(self, ID: str) -> np.ndarray:
+    def mass_of(self, group: Any) -> np.ndarray:
         """(4,) the mass of the nodes of a group, and this times x, y and z; rounded once."""
-        nodes = np.intersect1d(
-            self.nodes_with_mass(), self.hub.groups[ID].members, assume_unique=True
-        )
-        mass = self.setup.nodes.sums[nodes, MASS].astype(float)
-        ones = np.ones(len(nodes))
-        return self.summed(mass[:, None] * np.column_stack([ones, places_of(self.hub, nodes)]))
+        self.simulation.show_on_nodes()
+        hub = self.points.hub
+        members = hub.groups[group.id].members
+        nodes = np.intersect1d(self.with_mass(), members, assume_unique=True)
+        mass = self.simulation.setup.nodes.sums[nodes, MASS].astype(float)
+        places = np.column_stack([np.ones(len(nodes)), places_of(hub, nodes)])
+        return self.points.summed(mass[:, None] * places)
 
-    def occupied_nodes(self) -> tuple[int, int]:
+    def occupied(self) -> tuple[int, int]:
         """Count the nodes that have mass, and find the last of them."""
-        there = self.nodes_with_mass()
-        count = self.comm.allreduce(np.array([len(there)]))
-        return int(count[0]), int(
-            self.comm.allreduce_max(np.array([there.max(initial=-1)], float))[0]
-        )
+        self.simulation.show_on_nodes()
+        there, comm = self.with_mass(), self.points.comm
+        count = comm.allreduce(np.array([len(there)]))
+        last = comm.allreduce_max(np.array([there.max(initial=-1)], float))
+        return int(count[0]), int(last[0])

@@ -99,7 +99,7 @@ def motions(simulation: Any) -> list[BodyMotion]:
 def _pieces(simulation: Any, d: int) -> Iterator[tuple[int, np.ndarray, np.ndarray, np.ndarray]]:
     """Number of a solid, masses (n,), places and velocities (d, n) of some of its points."""
     firsts = [solid.first_id for solid in simulation.hub.solids.values()]
-    for block, rows in simulation.rows_of(None):
+    for block, rows in simulation.points.rows_of(None):
         points = block.points
         solid = np.searchsorted(firsts, points.id[rows], side="right") - 1
         for k in unique(solid):

@@ -217,7 +217,7 @@ class RollBack:
             if not (healthy and energy.grown_little(simulation)):
                 break
             if clock.balance - before < GROWTH * unit_of(clock):
-                good.move(simulation)
+                good.keep(simulation, forget=False)
         good.return_to(simulation)
         return self._write_last_good()
 

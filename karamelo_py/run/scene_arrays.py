@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from karamelo_py.compiler import fields
@@ -16,12 +18,13 @@ from karamelo_py.kernels.sweep import Visit, sweep, sweep_nodes
 from karamelo_py.kernels.table import SUMS
 from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.further import without_rate
-from karamelo_py.run.access import ById, ByNumber
+from karamelo_py.run.access import NodesByNumber, PointsById
 from karamelo_py.run.checkpoint import arrays as checkpoint
 from karamelo_py.run.lower.build import State, lower, thread_count, warms_by_friction
 from karamelo_py.run.lower.check_plugins import try_parts
 from karamelo_py.run.lower.memory import check_room, no_room
 from karamelo_py.run.mpi.subdomain import Subdomain
+from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.hub import Hub
 
 
@@ -49,12 +52,15 @@ def scene_key(hub: Hub) -> tuple:
     )
 
 
-class SceneArrays(ById, ByNumber):
+class SceneArrays:
     """Hold the arrays of a scene, or of the share of a process, and the threads at work on them."""
 
     def __init__(self, hub: Hub, previous: SceneArrays | None = None):
         self.hub = hub
-        self.comm = comm = hub.settings.comm
+        self.comm: SerialComm = hub.settings.comm
+        comm = self.comm
+        self.points = PointsById(self)
+        self.nodes = NodesByNumber(self.points)
         self.key = scene_key(hub)
         self.count = sum(s.count for s in hub.solids.values())
         check_room(hub, copied=previous is None and hub.running is not None)
@@ -85,6 +91,15 @@ class SceneArrays(ById, ByNumber):
         return self.key == scene_key(hub)
 
     @property
+    def kin(self) -> NamedTuple:
+        return self.setup.kin
+
+    @property
+    def now(self) -> int:
+        """The number of the present of the two position arrays."""
+        return int(self.control.clock[0].now)
+
+    @property
     def dt(self) -> float:
         return float(self.control.values[DT])
 
@@ -101,11 +116,11 @@ class SceneArrays(ById, ByNumber):
         """All that a new lowering takes over."""
         if self.subdomain is not None:
             self.subdomain.share_memory()
-        laws = {}
+        laws, all_points = {}, self.points.rows()
         for block in self.setup.blocks:
             state = block.points.state
             rows = np.zeros((len(state), self.count), state.dtype)
-            for ids, own in self.rows().of_all([(block.points.id, state)]):
+            for ids, own in all_points.of_all([(block.points.id, state)]):
                 rows[:, ids] = own
             laws[without_rate(law_kind(block.laws))] = rows
         found = (type(one) for block in self.setup.blocks for one in block.points.fields)
@@ -114,10 +129,10 @@ class SceneArrays(ById, ByNumber):
         return State(
             self.count,
             self.present,
-            self.by_id(lambda points: points.x[self.now]),
-            self.by_id(lambda points: points.v),
+            all_points.take(lambda points: points.x[self.now]).T,
+            all_points.take(lambda points: points.v).T,
             laws,
-            {kind: self.declared(kind).T for kind in kept},
+            {kind: all_points.declared(kind).T for kind in kept},
             self.setup.grids,
             {type(one): one.array for one in nodes if fields.is_kept(type(one))},
             self.setup.contact,
@@ -163,7 +178,7 @@ class SceneArrays(ById, ByNumber):
 
     @property
     def bounces(self) -> int:
-        return int(self.total("bounces"))
+        return int(self.points.total("bounces"))
 
     def clear_forces(self) -> None:
         """Points bear no force of fixes, until these say so anew."""

@@ -207,8 +207,10 @@ class Simulation(SceneArrays):
         """Measure the energies of all points, which the watch over them starts from."""
         s, clock = self.setup, self.control.clock[0]
         strain = COARSE * float(np.finfo(s.nodes.sums.dtype).eps)
-        clock.energy_floor = max(ROUND_OFF, strain**2) * self.total("mass") * float(clock.rate) ** 2
-        clock.born_with = self.total("born with")
+        clock.energy_floor = (
+            max(ROUND_OFF, strain**2) * self.points.total("mass") * float(clock.rate) ** 2
+        )
+        clock.born_with = self.points.total("born with")
         # Energies are summed by tile.
         if self._outside_tiles():
             self.sort()

@@ -1,6 +1,6 @@
 """The grids cut into tiles: which points lie in which, which nodes they give to or are in use."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from math import inf
 from typing import Any
 
@@ -307,21 +307,6 @@ class Tiles:
             return tile
         first, along = self._first_of_nodes[grid], self._tile_steps[grid, -2]
         return tile - (tile - first) % along
-
-    def reached_by(self, s: Setup) -> tuple[np.ndarray, ...]:
-        """Of the nodes in use here what `spans_of_all` asks for."""
-        return (used(s.spans)[1:],)
-
-    def spans_of_all(self, reached: Iterable[tuple[np.ndarray, ...]]) -> np.ndarray:
-        """(k, 2) spans of the nodes in use, from what all processes reach: one has them all."""
-        return np.concatenate([spans for (spans,) in reached])
-
-    def spans_of(self, tile: np.ndarray, begin: np.ndarray, end: np.ndarray) -> np.ndarray:
-        """(k, 2) spans of nodes in use, from boxes of them (n, d) in tiles of nodes (n,)."""
-        order = np.argsort(tile, kind="stable")
-        starts = np.flatnonzero(np.diff(tile[order], prepend=-1))
-        grid = np.searchsorted(self._first_of_nodes, tile[order][starts], side="right") - 1
-        return joined_spans(self._parts(grid, *extents(starts, begin[order], end[order]), 0, 0))
 
     def _shares(self, s: Setup) -> np.ndarray:
         """The share of the points of its block that each own tile is in."""

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from karamelo_py.script.errors import ScriptError
+
 
 class SerialComm:
     """One process that has the whole scene, with the methods of several.
@@ -62,6 +64,23 @@ class SerialComm:
     def allgather(self, thing: Any) -> list:
         """Gather what each process has at all of them."""
         return [thing]
+
+    def everyone(self, what: str, thing: Any) -> list:
+        """Gather the things of all processes, which have to ask for the same (in words)."""
+        asked, found = zip(*self.allgather((what, thing)), strict=True)
+        if other := next((one for one in asked if one != asked[0]), None):
+            raise ScriptError(
+                f"a function in Python comes to {asked[0]} on one process, and to {other} on "
+                "another",
+                hint="points.total(terms) and nodes.total(terms) have to be asked for by all "
+                "processes, those without points too",
+            )
+        return list(found)
+
+    def at_first(self, make: Callable[[list], list], thing: Any) -> Any:
+        """Gather things at the first process, make an answer for each, and scatter the answers."""
+        found = self.gather(thing)
+        return self.scatter(None if found is None else make(found))
 
     def gather_rows(self, own: np.ndarray, out: np.ndarray | None, counts: Sequence[int]) -> None:
         """Put the numbers of all processes, one after another, into `out` of the first."""

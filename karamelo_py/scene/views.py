@@ -19,7 +19,7 @@ from karamelo_py.kernels.heat import Supply, Temperature
 from karamelo_py.kernels.hook_loop import corners_that_move
 from karamelo_py.kernels.laws import elastic_law
 from karamelo_py.kernels.p2g import Force
-from karamelo_py.output.point_table import VECTORS, Part, PointTable, Rows
+from karamelo_py.output.point_table import VECTORS, Part, PointTable, Rows, places_before
 from karamelo_py.points.laws import can, with_stress
 from karamelo_py.points.transfers import Moment
 from karamelo_py.script.errors import NoItem, nearest
@@ -177,7 +177,7 @@ class NodesView(View):
         """The sum of terms (n,) or (n, k) over all nodes of the group, those of all processes."""
         terms = np.asarray(terms, float)
         own = slice(None) if self._foreign is None else self._foreign[self.index] == 0
-        return self._simulation.summed(terms[own])
+        return self._simulation.points.summed(terms[own])
 
     def _vectors(self, name: str, first: int = 0) -> np.ndarray:
         """Return components from `first` on of an array of all nodes, (N, d)."""
@@ -279,7 +279,7 @@ class PointsView(View):
 
         It is the same for any number of processes, which all have to ask for it.
         """
-        return self._simulation.summed(np.asarray(terms, float))
+        return self._simulation.points.summed(np.asarray(terms, float))
 
     def column(self, name: str) -> np.ndarray:
         """(n,) a column of the dumps for these points."""
@@ -404,7 +404,7 @@ class PointsView(View):
     @Shown
     def reference_position(self) -> np.ndarray:
         """(n, d) positions before the first step; read only."""
-        return self._simulation.x0_of(self.ids)
+        return places_before(self._simulation.hub, self.ids)
 
 
 class PieceView(PointsView):

@@ -156,7 +156,7 @@ class SceneFacts:
     @cached_property
     def shear_stress(self) -> float:
         """The largest equivalent stress of a point."""
-        return self.simulation.largest(lambda points: points.particle("seq"))[0]
+        return self.simulation.points.largest(lambda points: points.particle("seq"))[0]
 
 
 def is_zero(formula: Any) -> bool:

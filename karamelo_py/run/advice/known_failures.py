@@ -72,7 +72,7 @@ def _rests(hub: Hub, simulation: Any) -> bool:
     def stress(points: PointTable) -> np.ndarray:
         return np.max([np.abs(points.particle("s" + c)) for c in COMPONENTS], axis=0)
 
-    return simulation.fastest() == 0 and simulation.largest(stress)[0] == 0
+    return simulation.fastest() == 0 and simulation.points.largest(stress)[0] == 0
 
 
 def warn_about_length(hub: Hub, simulation: Any, end_time: float) -> None:

@@ -12,7 +12,7 @@ from karamelo_py.compiler.fields import as_rows_of_points, is_kept, name_of, row
 from karamelo_py.kernels.arrays import Nodes, Points, Tiling, arrays_of
 from karamelo_py.kernels.totals import WORK, carry
 from karamelo_py.output.fields import PIECE
-from karamelo_py.run.boxes import between, numbers, used
+from karamelo_py.run.boxes import numbers, used
 from karamelo_py.run.mpi.partition import by_tile, join_tilings, share_of_tiling, stripped, work_of
 from karamelo_py.run.tiles import SHARES, Tiles, in_use
 from karamelo_py.script.errors import ScriptError
@@ -78,20 +78,32 @@ def stored(simulation: Any, kept: dict[str, np.ndarray] | None = None) -> Iterat
     All processes go through this together; the first gets the arrays, with the bits and in the
     order of one process.
     """
-    s, comm, tiles = simulation.setup, simulation.comm, simulation.tiles
     if not kept and simulation.subdomain is not None:
         simulation.subdomain.share_kept()
     state = kept or dict(changing(simulation)) | touched(simulation)
-    yield from in_file(state) if comm.size == 1 else _joined(simulation, state)
+    yield from in_file(state) if simulation.comm.size == 1 else _joined(simulation, state)
     if kept:
         return
     yield from wholes(known(simulation))
-    reached = comm.gather(tiles.reached_by(s))
-    spans = comm.bcast(reached and tiles.spans_of_all(reached))
-    total = int(np.diff(spans).sum())
-    for own, nodes in _pieces(spans):
+    yield from _shown_by_nodes(simulation)
+
+
+def _shown_by_nodes(simulation: Any) -> Iterator[Stored]:
+    """Yield the nodes that show anything but zero, by number, and their rows, so many at a time."""
+    comm, own = simulation.comm, simulation.nodes.counted()
+    found = np.zeros(len(own), np.bool_)
+    for _, array in of_nodes(simulation.setup):
+        found |= array[own].any(axis=1)
+    numbers = comm.gather(own[found])
+    if numbers is not None:
+        numbers = np.sort(np.concatenate(numbers))
+        yield from wholes({"node numbers": numbers})
+    total = comm.bcast(numbers is not None and len(numbers))
+    for first in range(0, total, PIECE):
+        where = slice(first, min(first + PIECE, total))
+        nodes = comm.bcast(numbers is not None and numbers[where])
         for name, array in (rows_at(simulation, nodes, comm.gather) or {}).items():
-            yield name, (total, *array.shape[1:]), own, array + 0
+            yield name, (total, *array.shape[1:]), where, array + 0
 
 
 def in_file(state: dict[str, np.ndarray]) -> Iterator[Stored]:
@@ -221,17 +233,19 @@ def take_stored(simulation: Any, path: Path) -> None:
 
 
 def _take_nodes(simulation: Any, state: Mapping[str, Any]) -> None:
-    """Let the nodes in use here show what they did; all processes come to it."""
-    s, tiles = simulation.setup, simulation.tiles
-    spans = tiles.spans_of_all(simulation.comm.allgather(tiles.reached_by(s)))
-    total, used = int(np.diff(spans).sum()), np.zeros(simulation.hub.fields.node_count, np.bool_)
-    used[numbers(s.spans)] = True
-    for name, array in of_nodes(s):
-        like = np.broadcast_to(array[:1], (total, *array.shape[1:]))
+    """Let the nodes in use here show what they did."""
+    own = numbers(simulation.setup.spans)
+    used = np.zeros(simulation.hub.fields.node_count, np.bool_)
+    used[own] = True
+    nodes = state["node numbers"][()] if "node numbers" in state else own[:0]
+    for name, array in of_nodes(simulation.setup):
+        array[own] = 0
+        like = np.broadcast_to(array[:1], (len(nodes), *array.shape[1:]))
         _checked(state, name, like, read=False)
-        for own, nodes in _pieces(spans):
-            here = used[nodes]
-            array[nodes[here]] = state[name][own][here]
+        for first in range(0, len(nodes), PIECE):
+            some = nodes[first : first + PIECE]
+            here = used[some]
+            array[some[here]] = state[name][first : first + PIECE][here]
 
 
 def of_nodes(s: Any) -> Iterator[tuple[str, np.ndarray]]:
@@ -251,7 +265,7 @@ def kept_at_nodes(s: Any) -> list[tuple[str, np.ndarray]]:
 
 def rows_at(simulation: Any, nodes: np.ndarray, gather: Callable) -> dict[str, np.ndarray] | None:
     """Gather rows of all arrays of nodes, of ascending numbers, zero where not in use; or None."""
-    counted, kinds = simulation.counted(), dict(of_nodes(simulation.setup))
+    counted, kinds = simulation.nodes.counted(), dict(of_nodes(simulation.setup))
     limits = (nodes[0], nodes[-1] + 1) if len(nodes) else (0, 0)
     here = counted[slice(*np.searchsorted(counted, limits))]
     found = gather((here, [array[here] for array in kinds.values()]))
@@ -406,15 +420,6 @@ def _cuts(ends: np.ndarray) -> Iterator[tuple[int, int]]:
     total = int(ends[-1]) if len(ends) else 0
     cuts = np.searchsorted(ends, np.arange(PIECE, total, PIECE), side="right")
     return pairwise([*np.unique([0, *cuts]).tolist(), len(ends)])
-
-
-def _pieces(spans: np.ndarray) -> Iterator[tuple[slice, np.ndarray]]:
-    """Nodes in spans, so many at a time: which of all, and their numbers."""
-    begin = 0
-    for first, end in _cuts(np.cumsum(spans[:, 1] - spans[:, 0])):
-        nodes = between(*spans[first:end].T)
-        yield slice(begin, begin + len(nodes)), nodes
-        begin += len(nodes)
 
 
 def own_share(simulation: Any, state: Mapping) -> dict[str, np.ndarray]:

@@ -231,19 +231,15 @@ class RollbackPoint:
     def parts(self) -> PartStates:
         return self._parts[self.step]
 
-    def keep(self, simulation: Any) -> None:
-        """Let the present state be the last good one; others are forgotten."""
+    def keep(self, simulation: Any, *, forget: bool = True) -> None:
+        """Let the present state be the last good one; `forget` what parts remembered at others."""
         self.arrays, self.step = simulation.snapshot(self.arrays), simulation.step
-        self.forget_later()
-
-    def move(self, simulation: Any) -> None:
-        """Let the present state be the last good one; what later ones were is known still."""
-        self.arrays, self.step = simulation.snapshot(self.arrays), simulation.step
-        self.note(always=True)
+        others = {} if forget else self._parts
+        self._parts = others | {self.step: PartStates.of(self.hub)}
 
     def forget_later(self) -> None:
         """Forget what parts remembered at other states: nobody goes to them any more."""
-        self._parts = {self.step: PartStates.of(self.hub)}
+        self._parts = {self.step: self.parts}
 
     def take(self, arrays: dict[str, np.ndarray], step: int, parts: PartStates) -> None:
         self.arrays, self.step, self._parts = arrays, step, {step: parts}

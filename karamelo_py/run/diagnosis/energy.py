@@ -91,7 +91,7 @@ def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
             f"{share:.2g} of the stable step",
             f"{_step_of(hub, simulation, keeping)}, scheme(usavg), or {smooth}",
         )
-    if moves and simulation.largest(swelling)[0] > 1.5:  # what a cell cannot hold
+    if moves and simulation.points.largest(swelling)[0] > 1.5:  # what a cell cannot hold
         return "points that are further apart than a cell (numerical fracture)", WHOLE
     said = SceneFacts(hub, simulation, simulation.time).advice("gain")
     fed = max(said, key=lambda one: one.share, default=None)

@@ -55,7 +55,7 @@ def _when(simulation: Simulation) -> str:
 
 
 def _above_limit(hub: Hub, simulation: Simulation) -> tuple[str, str]:
-    speed, fastest = simulation.largest(_speeds)
+    speed, fastest = simulation.points.largest(_speeds)
     message = (
         f"{_when(simulation)}: the step {simulation.dt:g} is above the stable limit, which has "
         f"fallen to {simulation.limit:.4g} ({named(hub, fastest)} moves at {speed:.4g})"
@@ -70,7 +70,9 @@ def _speeds(points: PointTable) -> np.ndarray:
 def _gained(hub: Hub, simulation: Simulation) -> tuple[str, str]:
     clock, when = simulation.control.clock[0], _when(simulation)
     if not np.isfinite(clock.balance):
-        _, first = simulation.largest(lambda points: 1.0 * ~np.isfinite(points.particle("ienergy")))
+        _, first = simulation.points.largest(
+            lambda points: 1.0 * ~np.isfinite(points.particle("ienergy"))
+        )
         message = f"{when}: energy is no number any more; "
         message += f"the first point whose state is none is {named(hub, first)}"
         return message, "look at the parameters of its material, and at what acts on it from Python"
@@ -100,7 +102,7 @@ def _heated(hub: Hub, simulation: Simulation) -> tuple[str, str]:
 
 
 def _shrunk(hub: Hub, simulation: Simulation) -> tuple[str, str]:
-    (speed, fastest), (volume, widest) = map(simulation.largest, (_speeds, energy.swelling))
+    (speed, fastest), (volume, widest) = map(simulation.points.largest, (_speeds, energy.swelling))
     message = (
         f"{_when(simulation)}: the stable step has fallen to {simulation.limit:.3g}, less than a "
         f"millionth of the first ({named(hub, fastest)} moves at {speed:.3g}, {named(hub, widest)} "
@@ -127,7 +129,7 @@ def _first_wrong(simulation: Simulation) -> tuple | None:
 
 def _wrong_point(hub: Hub, simulation: Simulation) -> tuple:
     """Find what is wrong with the first point that went wrong, and what can be done."""
-    wrong = [one for one in simulation.seen(_first_wrong) if one is not None]
+    wrong = [one for one in simulation.points.seen(_first_wrong) if one is not None]
     if not wrong and hub.update.thermal:
         hint = (
             "look at the fixes that act on heat: a formula that gives NaN, or heat without bounds"
@@ -164,7 +166,7 @@ def _wrong_point(hub: Hub, simulation: Simulation) -> tuple:
     if move > 1:
         what = f"{name} at {_place(old)} moves by {move:.3g} cells in one step"
         return what, f"the run is unstable: {smaller}"
-    if any(simulation.seen(_is_tangled, place, grid)):
+    if any(simulation.points.seen(_is_tangled, place, grid)):
         tangled, plain = type(hub.update.method.basis).__name__, "R4" if d == 2 else "R8"
         instead = f", {plain} in the place of {tangled}" if tangled in ("Q4", "H8") else ""
         return (
@@ -184,13 +186,13 @@ def _loose(simulation: Simulation, number: int, x: np.ndarray, reach: float) -> 
 
     def others(simulation: Simulation) -> tuple[int, int]:
         found, near = 0, 0
-        for some in simulation.some(None):
+        for some in simulation.points.some(None):
             own = (some.solid == solid.index) & (some.ids != number)
             apart = np.abs(some.position[own] - x).max(axis=1, initial=0.0)
             found, near = found + len(apart), near + int(np.sum(~(apart > reach)))
         return found, near
 
-    found, near = np.sum(simulation.seen(others), axis=0)
+    found, near = np.sum(simulation.points.seen(others), axis=0)
     return found > 0 and near == 0
 
 
@@ -262,19 +264,19 @@ def _places(simulation: Simulation, group: Any, formula: Expression) -> Iterator
     if not formula.names.intersection(POINT_SEEDS):
         yield np.zeros(1, np.int64), np.empty((1, 0)), None
     elif isinstance(group, NodeGroup):
-        nodes = simulation.nodes_with_mass()
+        nodes = simulation.nodes.with_mass()
         nodes = nodes if group.all else np.intersect1d(nodes, group.nodes, assume_unique=True)
         x = places_of(simulation.hub, nodes)
         yield nodes, x, x
     else:
-        for some in simulation.some(group):
+        for some in simulation.points.some(group):
             there = np.isfinite(some.position).all(axis=1)
             yield some.ids[there], some.position[there], some.reference_position[there]
 
 
 def no_number(hub: Hub, simulation: Simulation, message: str, hint: str) -> Trouble:
     """The trouble with what is NaN, and the first fix whose formula gives NaN or infinity."""
-    found = [one for one in simulation.seen(_first_bad) if one is not None]
+    found = [one for one in simulation.points.seen(_first_bad) if one is not None]
     if not found:
         return Trouble(message, hint)
     (which, k, _), value, x = min(found, key=lambda one: one[0])

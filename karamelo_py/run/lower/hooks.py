@@ -184,7 +184,7 @@ def _agree(simulation: Any, fix: Any) -> None:
     values = simulation.hub.values
     names = (f"{fix.id}_{name}" if name else fix.id for name in fix.published)
     own = {name: values.get(name) for name in names if name in values}
-    first, *others = simulation.everyone("its end", own)
+    first, *others = simulation.comm.everyone("its end", own)
     for other in others:
         name = next((name for name in first if repr(first[name]) != repr(other[name])), None)
         if name is not None:
@@ -255,8 +255,10 @@ def _at_heated_points_python_hooks(hooks, s):
 def view_of(simulation: Any, fix: Any, *, then: bool) -> PointsView:
     """Show the points of a fix, or those of them that are at hand."""
     if fix.point_by_point:
-        return PieceView(simulation, list(simulation.rows_of(fix.group)), then, in_steps=True)
-    return PointsView(simulation, simulation.members(fix.group), then)
+        return PieceView(
+            simulation, list(simulation.points.rows_of(fix.group)), then, in_steps=True
+        )
+    return PointsView(simulation, simulation.points.members(fix.group), then)
 
 
 def views_of(simulation: Any, fix: Any) -> Iterator[PointsView]:
@@ -264,5 +266,5 @@ def views_of(simulation: Any, fix: Any) -> Iterator[PointsView]:
     if not fix.point_by_point:
         yield view_of(simulation, fix, then=False)
         return
-    for part in simulation.rows_of(fix.group):
+    for part in simulation.points.rows_of(fix.group):
         yield PieceView(simulation, [part], False, in_steps=False)

@@ -4,7 +4,7 @@ Each process has the points of tiles that lie beside each other. Nodes that seve
 by each of them, from the same boxes in the same order.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -310,7 +310,6 @@ class SharedTiles(Tiles):
     def _see_nodes(
         self, tiles: np.ndarray, grid: np.ndarray, begin: np.ndarray, end: np.ndarray
     ) -> None:
-        self.reached = tiles, begin, end
         # Of those that have a node in use the first counts it.
         self.foreign[self._marked] = 0
         found = [self._marked[:0]]
@@ -320,14 +319,6 @@ class SharedTiles(Tiles):
                 found.append(between(*rows_of(self._parts(grid[which], low, high, 0, 0))))
         self._marked = np.concatenate(found)
         self.foreign[self._marked] = 1
-
-    def reached_by(self, s: Setup) -> tuple[np.ndarray, ...]:
-        return super().reached_by(s) if self.direct else self.reached
-
-    def spans_of_all(self, reached: Iterable[tuple[np.ndarray, ...]]) -> np.ndarray:
-        if self.direct:
-            return super().spans_of_all(reached)
-        return self.spans_of(*(np.concatenate(of) for of in zip(*reached, strict=True)))
 
     def give(self, s: Setup, number: int, what: int) -> None:
         """Begin to pass on what the own tiles give to nodes of others, and theirs to own ones."""

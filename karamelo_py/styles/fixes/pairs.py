@@ -75,7 +75,7 @@ class PairContact(Fix):
         if rows is not None:
             own = [self._known(simulation, *one) for one in zip(blocks, rows, strict=True)]
             push = partial(self._push, kin, points.dt, points.kick)
-            force, total = simulation.at_first(push, np.concatenate(own))
+            force, total = simulation.comm.at_first(push, np.concatenate(own))
             for block, some in zip(blocks, rows, strict=True):
                 field(block.points.fields, Force)[: kin.dimension, some] += force[: len(some)].T
                 force = force[len(some) :]

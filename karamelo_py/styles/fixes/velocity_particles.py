@@ -147,7 +147,7 @@ def _conflicts(fix: Any, simulation: Any) -> Iterator[dict[str, Any]]:
     # What begins with one velocity for all and has another for some is meant so.
     for other in first[: first.index(fix)] if fix in first else first:
         axes, shared = unlike(other, fix), _shared(simulation, other, fix)
-        if axes and 0 < len(shared) == len(simulation.members(other.group)):
+        if axes and 0 < len(shared) == len(simulation.points.members(other.group)):
             axes = [k for k in axes if _differ(simulation, other, fix, k, shared)]
             if axes:
                 yield _said(other, axes, shared)
@@ -155,7 +155,7 @@ def _conflicts(fix: Any, simulation: Any) -> Iterator[dict[str, Any]]:
         axes = unlike(other, fix) if other.prescribes_velocity else []
         caught = _within(simulation, other, fix) if axes else ()
         # A tool that passes by a wall is none.
-        if 2 * len(caught) > len(simulation.members(fix.group)):
+        if 2 * len(caught) > len(simulation.points.members(fix.group)):
             yield _said(other, axes, caught)
 
 
@@ -176,15 +176,15 @@ def _said(other: Any, axes: list[int], ids: np.ndarray) -> dict[str, Any]:
 def _shared(simulation: Any, other: Any, fix: Any) -> np.ndarray:
     """Ids of the points that both act on."""
     mine = np.zeros(simulation.count, np.bool_)
-    mine[simulation.members(fix.group)] = True
-    ids = simulation.members(other.group)
+    mine[simulation.points.members(fix.group)] = True
+    ids = simulation.points.members(other.group)
     return ids[mine[ids]]
 
 
 def _differ(simulation: Any, other: Any, fix: Any, axis: int, ids: np.ndarray) -> bool:
     """Tell whether two fixes give some of the points other velocities now."""
     ids = ids[:: max(1, len(ids) // SAMPLE)]
-    x, x0 = simulation.x[ids], simulation.x0_of(ids)
+    x, x0 = simulation.hub.fields.position[ids], simulation.points.x0[ids]
     values = simulation.hub.values
     a, b = (one.formulas[axis].evaluate_points(values, x, x0) for one in (other, fix))
     small = ALIKE * max(np.abs(a).max(), np.abs(b).max(), float(simulation.control.clock[0].rate))
@@ -196,8 +196,8 @@ def _within(simulation: Any, held: Any, driven: Any) -> np.ndarray:
     hub, method = simulation.hub, simulation.hub.update.method
     still = np.zeros(held.group.total(), np.bool_)
     still[held.nodes] = True
-    ids = simulation.members(driven.group)
-    x = simulation.x[ids] if method.frame.moves else simulation.x0_of(ids)
+    ids = simulation.points.members(driven.group)
+    x = hub.fields.position[ids] if method.frame.moves else simulation.points.x0[ids]
     caught = np.zeros(len(ids), np.bool_)
     for solid in hub.solids.values():
         lattice = hub.lattices[method.lattice_of(hub, solid)]
