@@ -268,6 +268,7 @@ def rows_at(simulation: Any, nodes: np.ndarray, gather: Callable) -> dict[str, n
     counted, kinds = simulation.nodes.counted(), dict(of_nodes(simulation.setup))
     limits = (nodes[0], nodes[-1] + 1) if len(nodes) else (0, 0)
     here = counted[slice(*np.searchsorted(counted, limits))]
+    here = here[np.isin(here, nodes, assume_unique=True)]
     found = gather((here, [array[here] for array in kinds.values()]))
     if found is None:
         return None

@@ -205,7 +205,7 @@ class Python(Fix):
 
     def _agree(self, given: Any) -> None:
         own = None if given is None else np.asarray(given, float).tolist()
-        first, *others = map(repr, self.hub.settings.comm.everyone("its end", own))
+        first, *others = map(repr, self.hub.simulation.comm.everyone("its end", own))
         other = next((one for one in others if one != first), None)
         if other is not None:
             raise ScriptError(
