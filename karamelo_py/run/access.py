@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from functools import cached_property
 from math import inf
 from typing import Any
 
@@ -13,7 +12,7 @@ from karamelo_py.kernels.arrays import MASS, Block, Setup, arrays_of, some_of
 from karamelo_py.kernels.totals import LIMBS, add_all, add_rows, rounded
 from karamelo_py.output.fields import PIECE, SUMMED
 from karamelo_py.output.node_columns import NodeRows, brought, loaded, places_of
-from karamelo_py.output.point_table import Part, PointTable, Rows, places_before
+from karamelo_py.output.point_table import Part, PointTable, Rows
 from karamelo_py.run.boxes import numbers
 from karamelo_py.run.checkpoint.arrays import kept_at_nodes, of_nodes, rows_at
 from karamelo_py.run.mpi.partition import joined
@@ -138,11 +137,6 @@ class PointsById:
 
         value, number = max(self.comm.allgather(own()))
         return value, -number
-
-    @cached_property
-    def x0(self) -> np.ndarray:
-        """(n, d) positions of all points before the first step."""
-        return places_before(self.hub, np.arange(len(self.simulation.present)))
 
     def pieces(self, *, to_first: bool = False) -> Iterator[PointTable]:
         """Yield all points, so many at a time; `to_first`, to the first of several processes."""

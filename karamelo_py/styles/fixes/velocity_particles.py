@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.language.rules import known_failure
+from karamelo_py.output.point_table import places_before
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix, PointsView, point_hook
@@ -184,7 +185,7 @@ def _shared(simulation: Any, other: Any, fix: Any) -> np.ndarray:
 def _differ(simulation: Any, other: Any, fix: Any, axis: int, ids: np.ndarray) -> bool:
     """Tell whether two fixes give some of the points other velocities now."""
     ids = ids[:: max(1, len(ids) // SAMPLE)]
-    x, x0 = simulation.hub.fields.position[ids], simulation.points.x0[ids]
+    x, x0 = simulation.hub.fields.position[ids], places_before(simulation.hub, ids)
     values = simulation.hub.values
     a, b = (one.formulas[axis].evaluate_points(values, x, x0) for one in (other, fix))
     small = ALIKE * max(np.abs(a).max(), np.abs(b).max(), float(simulation.control.clock[0].rate))
@@ -197,7 +198,7 @@ def _within(simulation: Any, held: Any, driven: Any) -> np.ndarray:
     still = np.zeros(held.group.total(), np.bool_)
     still[held.nodes] = True
     ids = simulation.points.members(driven.group)
-    x = hub.fields.position[ids] if method.frame.moves else simulation.points.x0[ids]
+    x = hub.fields.position[ids] if method.frame.moves else places_before(hub, ids)
     caught = np.zeros(len(ids), np.bool_)
     for solid in hub.solids.values():
         lattice = hub.lattices[method.lattice_of(hub, solid)]
