@@ -136,7 +136,7 @@ FILES = {
         compilation.listeners.append(Compiled())
         values = []
         with warnings.catch_warnings(record=True) as told:
-            warnings.simplefilter("always")
+            warnings.simplefilter("default")
             for shape in (Disk(1.0), Square(2.0), Strip(3.0)):
                 values.append(total(shape, Pair(1.0, 2.0), 3))
         print(values)

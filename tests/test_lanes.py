@@ -83,22 +83,23 @@ WIDTHS = {np.float64: (4, FourLanes()), np.float32: (8, EightLanes())}
 @kernel
 def _numbers_alone(a, b, out, n):
     for p in range(n):
-        _number(a, b, out, p)
+        _number(a, b, out, p, n)
 
 
 @kernel
-def _number(a, b, out, p):
+def _number(a, b, out, p, n):
     x, y = a[p], b[0, p]
     out[0, p] = fma(x, y, real(2, x)) / (x * x + real(1, x))
     out[1, p] = where(x > y, min(x, real(0.5, x)), max(x, y, -y)) - abs(y)
     out[3, p] = sin(x) // real(0.3, x) + log1p(abs(y)) % real(0.25, y)
     out[2, p] = real(int(x + real(3, x)), x) + real(all_lanes(x < real(9, x)), y)
+    out[2, p] += where(n > 8, x, 2) - where(n > 8, 0.5, y)
 
 
 @kernel
 def _numbers_in_lanes(tag, width, a, b, out, n):
     for q in range(0, n, width):
-        _number(a, b, out, group(tag, q, min(width, n - q)))
+        _number(a, b, out, group(tag, q, min(width, n - q)), n)
 
 
 @pytest.mark.parametrize("real_type", WIDTHS)

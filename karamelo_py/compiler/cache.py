@@ -44,36 +44,34 @@ def folder() -> Path:
 
 # --- telling of what is wrong -------------------------------------------------------------------
 
-_tell: Callable[[str], None] | None = None
-_warned = False
+
+def _warn(text: str) -> None:
+    warnings.warn(text, RuntimeWarning, stacklevel=1)  # once for a text, wherever it comes from
+
+
+_tell: Callable[[str], None] = _warn
 
 
 def _trouble(error: OSError) -> None:
-    _say(f"compiled loops cannot be kept in {folder()}: {error.strerror or error}")
-
-
-def _say(text: str) -> None:
-    """Tell of a fault of the folder, the first time."""
-    global _warned
-    if _warned:
-        return
-    _warned = True
-    if _tell is not None:
-        _tell(text)
-    else:
-        warnings.warn(text, RuntimeWarning, stacklevel=2)
+    _tell(f"compiled loops cannot be kept in {folder()}: {error.strerror or error}")
 
 
 @contextlib.contextmanager
 def telling(tell: Callable[[str], None]) -> Iterator[None]:
     """Tell by `tell` what is wrong with the folder meanwhile, once."""
-    global _tell, _warned
-    before = _tell, _warned
-    _tell, _warned = tell, False
+    global _tell
+    before, told = _tell, []
+
+    def tell_once(text: str) -> None:
+        if not told:
+            told.append(text)
+            tell(text)
+
+    _tell = tell_once
     try:
         yield
     finally:
-        _tell, _warned = before
+        _tell = before
 
 
 # --- kernels ------------------------------------------------------------------------------------
@@ -135,7 +133,7 @@ class KernelFiles:
 
     def _tell_of_unknown(self, what: Unknown) -> None:
         # Never without a word: somebody would wait for it in every run.
-        _say(f"the loop {self._name()} is compiled in every run: {what} cannot be followed")
+        _tell(f"the loop {self._name()} is compiled in every run: {what} cannot be followed")
 
     def _name(self) -> str:
         return re.sub(r"[^\w.]", "", f"{self._function.__module__}.{self._function.__qualname__}")
@@ -156,7 +154,7 @@ class KernelFiles:
     def _files(self, key: str) -> list[Path]:
         try:
             names = [name for name in os.listdir(folder()) if name.startswith(key)]
-        except FileNotFoundError:
+        except (FileNotFoundError, NotADirectoryError):  # told of where a file is to be written
             return []
         except OSError as error:
             _trouble(error)
@@ -218,7 +216,7 @@ def _read(path: Path) -> tuple[frozenset[Choice] | None, bytes]:
 
 def _discard(path: Path) -> None:
     """Tell of a file that cannot be used, and take it away."""
-    _say(f"a file in {folder()} is damaged; the loop in it is compiled anew")
+    _tell(f"a file in {folder()} is damaged; the loop in it is compiled anew")
     with contextlib.suppress(OSError):
         path.unlink()
 

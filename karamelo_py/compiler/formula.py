@@ -7,23 +7,14 @@ carry the mark `UNIFORM`, and a `SPREAD` makes a row of the result where points 
 formula needs more than once is computed once and kept in a row behind the stack.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 from numba import types
 
-from karamelo_py.compiler.compile import implements, shared
+from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.loops import caller_of, kernel, noinline
-from karamelo_py.compiler.operations import (
-    FIRST_BINARY,
-    IN_NUMPY,
-    OPERATIONS,
-    SELECT,
-    function_of,
-    in_kernels,
-    operation_of,
-)
+from karamelo_py.compiler.operations import FIRST_BINARY, SELECT, in_kernels, of_one, of_two
 
 BLOCK = 128
 MAX_DEPTH = 32
@@ -62,48 +53,34 @@ def _fill(n, a, value):
     a[:n] = value
 
 
+@shared
 def _select(n, a, b, c):
     """Replace the first `n` numbers of `a` by those of `b`, or of `c` where they are 0."""
-    a[:n] = np.where(a[:n] != 0.0, b[:n], c[:n])
-
-
-@implements(_select)
-def _select_in_kernels(n, a, b, c):
     for i in range(n):
         a[i] = b[i] if a[i] != 0.0 else c[i]
 
 
-# What has a loop of its own in kernels; others share one, which chooses for each number.
+# What has a loop of its own; others share one, which chooses for each number.
 _UNARY_LOOPS = in_kernels("neg", "sqrt", "sin", "cos", "exp", "log", "abs")
 _BINARY_LOOPS = in_kernels("+", "-", "*", "/", "min", "max")
-_POWER = OPERATIONS["^"]
-
-
-def _unary(op, n, a):
-    """Replace the first `n` numbers of `a` by a function of them."""
-    with np.errstate(all="ignore"):
-        a[:n] = IN_NUMPY[op](a[:n])
+((_POWER, _power),) = in_kernels("^")
 
 
 @noinline
-def _unary_in_kernels(op, n, a):
+def _unary(op, n, a):
+    """Replace the first `n` numbers of `a` by a function of them."""
     for number, do in _UNARY_LOOPS:
         if op == number:
             for i in range(n):
                 a[i] = do(a[i])
             return
     for i in range(n):
-        a[i] = function_of(op, a[i])
-
-
-def _binary(op, n, a, b):
-    """Replace the first `n` numbers of `a` by what `op` makes of them and those of `b`."""
-    with np.errstate(all="ignore"):
-        a[:n] = IN_NUMPY[op](a[:n], b[:n])
+        a[i] = of_one(op, a[i])
 
 
 @noinline
-def _binary_in_kernels(op, n, a, b):
+def _binary(op, n, a, b):
+    """Replace the first `n` numbers of `a` by what `op` makes of them and those of `b`."""
     for number, do in _BINARY_LOOPS:
         if op == number:
             for i in range(n):
@@ -113,7 +90,7 @@ def _binary_in_kernels(op, n, a, b):
         _powers(n, a, b)
         return
     for i in range(n):
-        a[i] = operation_of(op, a[i], b[i])
+        a[i] = of_two(op, a[i], b[i])
 
 
 @shared
@@ -131,11 +108,7 @@ def _powers(n, a, b):
             a[i] *= a[i] * a[i]
     else:
         for i in range(n):
-            a[i] = math.pow(a[i], b[i])
-
-
-implements(_unary)(lambda op, n, a: _unary_in_kernels(op, n, a))
-implements(_binary)(lambda op, n, a, b: _binary_in_kernels(op, n, a, b))
+            a[i] = _power(a[i], b[i])
 
 
 @kernel

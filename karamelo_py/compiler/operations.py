@@ -1,11 +1,11 @@
-"""The operations of formulas: their numbers, and what they do in kernels and in NumPy."""
+"""The operations of formulas: one table of functions of numbers, for kernels and for Python."""
 
+import functools
 import math
 import operator
 from collections.abc import Callable
 
-import numpy as np
-
+from karamelo_py.compiler.choices import INTERPRETED
 from karamelo_py.compiler.compile import implements
 from karamelo_py.compiler.loops import noinline
 
@@ -61,76 +61,41 @@ def _truth(compare: Callable) -> Callable:
     return truth
 
 
-def _each(function: Callable, nan: float = math.nan) -> Callable:
-    """`function` of the standard library for arrays, NaN where it refuses."""
-
-    def safe(value):
-        try:
-            return function(value)
-        except ValueError:
-            return math.inf if value == 0.0 else nan
-        except OverflowError:
-            return math.inf
-
-    return np.vectorize(safe, otypes=[float])
-
-
-# What they do to a number in kernels, and to arrays of them in NumPy.
 UNARY = {
-    "neg": (operator.neg, np.negative),
-    "not": (_not, lambda a: (a == 0.0) * 1.0),
-    "abs": (abs, np.abs),
-    "sign": (_sign, np.sign),
-    "step": (_step, lambda a: np.where(np.isnan(a), a, (a >= 0.0) * 1.0)),
-    "sqrt": (math.sqrt, np.sqrt),
-    "cbrt": (lambda a: math.copysign(math.pow(abs(a), 1.0 / 3.0), a), np.cbrt),
-    "exp": (math.exp, np.exp),
-    "log": (math.log, np.log),
-    "log10": (math.log10, np.log10),
-    "log2": (math.log2, np.log2),
-    "sin": (math.sin, np.sin),
-    "cos": (math.cos, np.cos),
-    "tan": (math.tan, np.tan),
-    "asin": (math.asin, np.arcsin),
-    "acos": (math.acos, np.arccos),
-    "atan": (math.atan, np.arctan),
-    "sinh": (math.sinh, np.sinh),
-    "cosh": (math.cosh, np.cosh),
-    "tanh": (math.tanh, np.tanh),
-    "asinh": (math.asinh, np.arcsinh),
-    "acosh": (math.acosh, np.arccosh),
-    "atanh": (math.atanh, np.arctanh),
-    "erf": (math.erf, _each(math.erf)),
-    "erfc": (math.erfc, _each(math.erfc)),
-    "gamma": (math.gamma, _each(math.gamma)),
-    "lgamma": (math.lgamma, _each(math.lgamma, nan=math.inf)),
-    "expm1": (math.expm1, np.expm1),
-    "log1p": (math.log1p, np.log1p),
-    "floor": (lambda a: _whole(a, True, False), np.floor),
-    "ceil": (lambda a: _whole(a, False, True), np.ceil),
-    "round": (lambda a: _whole(a, False, False), np.rint),
-    "trunc": (lambda a: _whole(a, a > 0.0, a < 0.0), np.trunc),
-}
+    "neg": operator.neg,
+    "not": _not,
+    "abs": abs,
+    "sign": _sign,
+    "step": _step,
+    "cbrt": lambda a: math.copysign(math.pow(abs(a), 1.0 / 3.0), a),
+    "floor": lambda a: _whole(a, True, False),
+    "ceil": lambda a: _whole(a, False, True),
+    "round": lambda a: _whole(a, False, False),
+    "trunc": lambda a: _whole(a, a > 0.0, a < 0.0),
+    **{name: getattr(math, name) for name in (
+        "sqrt", "exp", "log", "log10", "log2", "sin", "cos", "tan", "asin", "acos", "atan", "sinh",
+        "cosh", "tanh", "asinh", "acosh", "atanh", "erf", "erfc", "gamma", "lgamma", "expm1",
+        "log1p",
+    )},
+}  # fmt: skip
 BINARY = {
-    "+": (operator.add, np.add),
-    "-": (operator.sub, np.subtract),
-    "*": (operator.mul, np.multiply),
-    "/": (operator.truediv, np.divide),
-    "^": (math.pow, np.power),
-    "%": (operator.mod, np.mod),  # the sign of the divisor, as in Python
-    "<": (_truth(operator.lt), np.less),
-    "<=": (_truth(operator.le), np.less_equal),
-    ">": (_truth(operator.gt), np.greater),
-    ">=": (_truth(operator.ge), np.greater_equal),
-    "==": (_truth(operator.eq), np.equal),
-    "!=": (_truth(operator.ne), np.not_equal),
-    "&&": (_and, lambda a, b: (a != 0.0) & (b != 0.0)),
-    "||": (_or, lambda a, b: (a != 0.0) | (b != 0.0)),
-    "min": (_min, lambda a, b: np.where(b < a, b, a)),
-    "max": (_max, lambda a, b: np.where(b > a, b, a)),
-    "atan2": (math.atan2, np.arctan2),
-    "hypot": (math.hypot, np.hypot),
-}
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "/": operator.truediv,
+    "^": math.pow,
+    "%": operator.mod,  # the sign of the divisor, as in Python
+    **{sign: _truth(compare) for sign, compare in {
+        "<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge,
+        "==": operator.eq, "!=": operator.ne,
+    }.items()},
+    "&&": _and,
+    "||": _or,
+    "min": _min,
+    "max": _max,
+    "atan2": math.atan2,
+    "hypot": math.hypot,
+}  # fmt: skip
 
 FIRST_UNARY, FIRST_BINARY, SELECT = 4, 64, 128
 OPERATIONS = (
@@ -138,27 +103,54 @@ OPERATIONS = (
     | {name: FIRST_BINARY + k for k, name in enumerate(BINARY)}
     | {"if": SELECT}
 )
-IN_NUMPY = {OPERATIONS[name]: function for name, (_, function) in (UNARY | BINARY).items()}
+
+# Where functions are infinite: Python raises an exception there.
+_POLES = {
+    "log": (0, -math.inf), "log2": (0, -math.inf), "log10": (0, -math.inf),
+    "log1p": (-1, -math.inf), "^": (0, math.inf), "gamma": (0, math.inf),
+}  # fmt: skip
+
+
+def quietly(name: str, *numbers: float) -> float:
+    """Do an operation as floating-point hardware does: inf or NaN where there is no result."""
+    a, *rest = numbers = tuple(map(float, numbers))
+    try:
+        return float((UNARY.get(name) or BINARY[name])(*numbers))
+    except ZeroDivisionError:
+        return a * math.copysign(math.inf, rest[0]) if name == "/" else math.nan
+    except OverflowError:
+        odd = name == "sinh" or (name == "^" and rest[0] % 2 == 1)
+        return math.copysign(math.inf, a) if odd else math.inf
+    except ValueError:
+        if name == "lgamma":
+            return math.inf
+        if name == "atanh" and abs(a) == 1:
+            return a * math.inf
+        pole, value = _POLES.get(name, (math.nan, math.nan))
+        return value if a == pole else math.nan
 
 
 def in_kernels(*names: str) -> tuple[tuple[int, Callable], ...]:
-    """The numbers of some operations, and what they are in kernels."""
-    return tuple((OPERATIONS[name], (UNARY | BINARY)[name][0]) for name in names)
+    """The numbers of some operations, and their functions; interpreted, none of these raises."""
+    every = UNARY | BINARY
+    return tuple(
+        (OPERATIONS[name], functools.partial(quietly, name) if INTERPRETED else every[name])
+        for name in names
+    )
 
 
-_UNARY_IN_KERNELS = in_kernels(*UNARY)
-_BINARY_IN_KERNELS = in_kernels(*BINARY)
+_UNARY_IN_KERNELS, _BINARY_IN_KERNELS = in_kernels(*UNARY), in_kernels(*BINARY)
+_NAMES = {number: name for name, number in OPERATIONS.items()}
 
 
 def of_one(op, a):
-    """The function `op` of one number; inf or NaN where there is no result."""
-    with np.errstate(all="ignore"):
-        return float(IN_NUMPY[op](a))
+    """The function `op` of one number."""
+    return quietly(_NAMES[int(op)], a)
 
 
 @implements(of_one)
 @noinline
-def function_of(op, a):
+def _function_of(op, a):
     """Any function of one number: one chain of choices, where a loop for each would be too much."""
     for number, do in _UNARY_IN_KERNELS:
         if op == number:
@@ -167,15 +159,13 @@ def function_of(op, a):
 
 
 def of_two(op, a, b):
-    """The operation `op` on two numbers likewise."""
-    with np.errstate(all="ignore"):
-        return float(IN_NUMPY[op](np.float64(a), b))
+    """The operation `op` on two numbers: comparisons and logical ones give 1.0 or 0.0."""
+    return quietly(_NAMES[int(op)], a, b)
 
 
 @implements(of_two)
 @noinline
-def operation_of(op, a, b):
-    """Any operation on two numbers: comparisons and logical ones give 1.0 or 0.0."""
+def _operation_of(op, a, b):
     for number, do in _BINARY_IN_KERNELS:
         if op == number:
             return do(a, b)

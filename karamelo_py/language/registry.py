@@ -67,12 +67,12 @@ def knows(family: str, name: str) -> bool:
 
 
 def name_of(family: str, style: type) -> str:
-    """Find the style's name of a class, or of its file; else the class's own name."""
-    for value in (f"{style.__module__}:{style.__qualname__}", f"{style.__module__}:"):
-        for name, entries in _families().get(family, {}).items():
-            if any(entry.value.startswith(value) for entry in entries):
-                return name
-    return style.__name__
+    """Find the style's name of a class; of one that a style is made of too, its own ``style``."""
+    own = f"{style.__module__}:{style.__qualname__}"
+    for name, entries in _families().get(family, {}).items():
+        if any(entry.value == own for entry in entries):
+            return name
+    return getattr(style, "style", style.__name__)
 
 
 def origin(family: str, name: str) -> str:

@@ -6,8 +6,9 @@ The same functions for many points at once are in :mod:`karamelo_py.compiler.for
 import math
 import operator
 import statistics
-from collections.abc import Callable
 from typing import NamedTuple
+
+from karamelo_py.compiler.operations import BINARY, UNARY, quietly
 
 # Pi, the golden ratio, and Euler's constant.
 CONSTANTS = {"PI": math.pi, "PHI": (1 + math.sqrt(5)) / 2, "EGAMMA": 0.57721566490153286}
@@ -20,11 +21,10 @@ TAIL = 1e-10
 
 
 class Signature(NamedTuple):
-    """The number of operands of a function, and the code that computes it."""
+    """The number of operands of a function."""
 
     least: int
     most: int
-    compute: Callable[..., float]
 
 
 def _inv_norm(a: float) -> float:
@@ -33,81 +33,46 @@ def _inv_norm(a: float) -> float:
     return statistics.NormalDist().inv_cdf(a)
 
 
-_OF_ONE = """sqrt exp expm1 log log10 log2 log1p sin cos tan asin acos atan sinh cosh tanh asinh
-    acosh atanh erf erfc gamma lgamma degrees radians"""
-_MANY = 1000
-
-FUNCTIONS: dict[str, Signature] = {
-    "abs": Signature(1, 1, abs),
-    "min": Signature(2, _MANY, min),
-    "max": Signature(2, _MANY, max),
-    "pow": Signature(2, 2, math.pow),
-    "mod": Signature(2, 2, operator.mod),
-    "remainder": Signature(2, 2, math.remainder),
-    "atan2": Signature(2, 2, math.atan2),
-    "hypot": Signature(2, 2, math.hypot),
-    "if": Signature(3, 3, lambda condition, a, b: a if condition != 0 else b),
-    "sign": Signature(1, 1, lambda a: (a > 0) - (a < 0)),
-    "step": Signature(1, 1, lambda a: 0.0 if a < 0 else 1.0),
-    "floor": Signature(1, 1, math.floor),
-    "ceil": Signature(1, 1, math.ceil),
-    "round": Signature(1, 1, round),
-    "trunc": Signature(1, 1, math.trunc),
-    "cbrt": Signature(1, 1, lambda a: math.copysign(abs(a) ** (1.0 / 3.0), a)),
-    "exp2": Signature(1, 1, lambda a: math.pow(2.0, a)),
-    "inv_norm": Signature(1, 1, _inv_norm),
-    "tgamma": Signature(1, 1, math.gamma),
-    **{name: Signature(1, 1, getattr(math, name)) for name in _OF_ONE.split()},
+_OF_TWO = {
+    "pow": math.pow,
+    "mod": operator.mod,
+    "remainder": math.remainder,
+    **{name: BINARY[name] for name in ("min", "max", "atan2", "hypot")},
 }
-
-OPERATORS: dict[str, Callable[..., float]] = {
-    "neg": operator.neg,
-    "not": operator.not_,
-    "+": operator.add,
-    "-": operator.sub,
-    "*": operator.mul,
-    "/": operator.truediv,
-    "%": operator.mod,
-    "^": math.pow,
-    "<": operator.lt,
-    "<=": operator.le,
-    ">": operator.gt,
-    ">=": operator.ge,
-    "==": operator.eq,
-    "!=": operator.ne,
-    "&&": lambda a, b: a != 0 and b != 0,
-    "||": lambda a, b: a != 0 or b != 0,
+_OF_ONE = {
+    **{name: do for name, do in UNARY.items() if name not in ("neg", "not")},
+    "floor": math.floor,
+    "ceil": math.ceil,
+    "round": round,
+    "trunc": math.trunc,
+    "exp2": lambda a: math.pow(2.0, a),
+    "inv_norm": _inv_norm,
+    "tgamma": math.gamma,
+    "degrees": math.degrees,
+    "radians": math.radians,
+}
+_COMPUTED = UNARY | BINARY | _OF_TWO | _OF_ONE
+_MANY = 1000
+FUNCTIONS: dict[str, Signature] = {
+    **dict.fromkeys(_OF_ONE, Signature(1, 1)),
+    **dict.fromkeys(_OF_TWO, Signature(2, 2)),
+    **dict.fromkeys(("min", "max"), Signature(2, _MANY)),
+    "if": Signature(3, 3),
 }
 
 
 def compute(name: str, *numbers: float) -> float:
     """Compute a function or operator of plain numbers; NaN in, NaN out, errors as in `math`."""
-    if any(math.isnan(number) for number in numbers):
+    if any(map(math.isnan, numbers)):
         return math.nan
-    result = (OPERATORS.get(name) or FUNCTIONS[name].compute)(*numbers)
-    if math.isinf(result) and not any(math.isinf(number) for number in numbers):
+    result = _COMPUTED[name](*numbers)
+    if math.isinf(result) and not any(map(math.isinf, numbers)):
         raise OverflowError(name)
     return float(result)
 
 
 def compute_quietly(name: str, *numbers: float) -> float:
-    """Compute the same as floating-point hardware does: inf or NaN where there is no result."""
+    """Compute an operation as floating-point hardware does: inf or NaN where there is no result."""
     if name == "if":
         return numbers[1] if numbers[0] != 0 else numbers[2]
-    try:
-        return compute(name, *numbers)
-    except ZeroDivisionError:
-        if name == "/" and numbers[0] != 0:
-            return math.copysign(math.inf, numbers[0]) * math.copysign(1.0, numbers[1])
-        return math.nan
-    except OverflowError:
-        odd = name in ("sinh", "expm1", "*", "+", "-", "/")
-        if odd and name in OPERATORS:
-            return OPERATORS[name](*numbers)
-        return math.copysign(math.inf, numbers[0]) if odd else math.inf
-    except ValueError:
-        zero = numbers[0] == 0
-        if name in ("log", "log2", "log10") and zero:
-            return -math.inf
-        infinite = name == "lgamma" or (zero and name in ("^", "pow", "gamma", "tgamma"))
-        return math.inf if infinite else math.nan
+    return math.nan if any(map(math.isnan, numbers)) else quietly(name, *numbers)

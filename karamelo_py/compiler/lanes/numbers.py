@@ -48,8 +48,6 @@ def select(condition, a, b):
 
 @implements(where, Lanes)
 def _where(condition, a, b):
-    if lanes_of(condition) == 0:  # the same for all
-        return a if condition else b
     if not isinstance(a, tuple):
         return select(condition, a, b)
     return rebuilt(a, [where(condition, x, y) for x, y in zip(a, b, strict=True)])

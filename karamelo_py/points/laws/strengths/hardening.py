@@ -67,6 +67,7 @@ class LinearHardening(NamedTuple):
 class Plastic(NamedTuple):
     """The same with a yield stress that stays."""
 
+    style = "plastic"
     in_lanes = True
     H = 0.0
 
