@@ -29,7 +29,7 @@ pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled"
 FILES = {
     "numbers_used.py": "HALF = 0.5\nUNUSED = 7\n",
     "helpers.py": """
-        from karamelo_py.compiler.compile import by_type, shared
+        from karamelo_py.compiler.compile import implements, shared
         import numbers_used
 
         @shared
@@ -43,7 +43,7 @@ FILES = {
         def plus_one(x):
             return x + 1.0
 
-        @by_type(plus_one)
+        @implements(plus_one, by_type=True)
         def _(x):
             return by_amount(1.0)
 
@@ -52,7 +52,7 @@ FILES = {
         """,
     "loops.py": """
         from typing import NamedTuple
-        from karamelo_py.compiler.compile import by_type, point_function
+        from karamelo_py.compiler.compile import implements, point_function
         from karamelo_py.compiler.loops import kernel
 
         class Pair(NamedTuple):
@@ -70,7 +70,7 @@ FILES = {
         def paid(shape):
             return 0.0
 
-        @by_type(paid)
+        @implements(paid, by_type=True)
         def _(shape):
             if price.defined(shape.instance_class):
                 return lambda shape: price(shape)

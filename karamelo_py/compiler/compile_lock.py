@@ -26,55 +26,45 @@ waiting = contextlib.nullcontext  # within it a process waits: to the user it is
 @contextlib.contextmanager
 def lock(path: Path) -> Iterator[None]:
     """Hold the lock on `path`, if it can be had in time; others have done their work then."""
-    file = _taken(path)
+    file = _taken(path) if fcntl else None
     try:
         yield
     finally:
         if file is not None:
             # Who waits has this very file open, and finds the kernel when it has the lock.
-            with contextlib.suppress(OSError):
-                path.unlink()
-            with contextlib.suppress(OSError):
-                fcntl.flock(file, fcntl.LOCK_UN)  # for a process that was forked meanwhile, too
+            path.unlink(missing_ok=True)
+            fcntl.flock(file, fcntl.LOCK_UN)  # for a process that was forked meanwhile, too
             os.close(file)
 
 
 def _taken(path: Path) -> int | None:
     """Open the file of a lock that is held now; None where there is none to be had."""
     global waits
-    if fcntl is None:
-        return None
-    try:
+    file = None
+    with contextlib.suppress(OSError):  # nothing can be written there, or nothing locked
         path.parent.mkdir(parents=True, exist_ok=True)
         file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
-    except OSError:  # nothing can be written there
-        return None
-    locked = False
-    try:
-        locked = _locked(file)
-        if not locked and waits:
+        if _locked(file):
+            return file
+        if waits:
             with waiting():
-                waits = locked = _locked_in_time(file)
-        return file if locked else None
-    except OSError:  # a file system without locks
-        return None
-    finally:
-        if not locked:
-            os.close(file)
+                waits = _locked_in_time(file)
+            if waits:
+                return file
+    if file is not None:
+        os.close(file)
+    return None
 
 
 def _locked(file: int) -> bool:
-    try:
+    with contextlib.suppress(BlockingIOError):
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    return True
+        return True
+    return False
 
 
 def _locked_in_time(file: int) -> bool:
     end = time.monotonic() + PATIENCE
-    while time.monotonic() < end:
+    while not (locked := _locked(file)) and time.monotonic() < end:
         time.sleep(PAUSE)
-        if _locked(file):
-            return True
-    return False
+    return locked

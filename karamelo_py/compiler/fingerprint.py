@@ -42,7 +42,7 @@ _PLAIN = (type(None), bool, int, float, complex, str, bytes, type(Ellipsis), ran
 def describe(numba_type: Any) -> str:
     """Describe a type in words that mean the same in every process; tags with their fields."""
     how = type(numba_type).__name__  # held or a value
-    if isinstance(numba_type, types.BaseNamedTuple):
+    if isinstance(numba_type, types.BaseTuple) and hasattr(numba_type, "instance_class"):
         items = zip(numba_type.fields, numba_type, strict=True)
         inner = ",".join(f"{name}={describe(item)}" for name, item in items)
         return f"{how} {class_name(numba_type.instance_class)}({inner})"
@@ -55,9 +55,8 @@ def describe(numba_type: Any) -> str:
 
 def classes_in(numba_type: Any) -> Iterable[type]:
     """Yield the classes of the tags in a type."""
-    if isinstance(numba_type, types.BaseNamedTuple):
-        yield numba_type.instance_class
     if isinstance(numba_type, types.BaseTuple):
+        yield from filter(None, [getattr(numba_type, "instance_class", None)])
         for item in numba_type:
             yield from classes_in(item)
 

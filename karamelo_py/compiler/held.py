@@ -20,22 +20,30 @@ from karamelo_py.compiler.values import HeldValue, builtin
 
 def _words(numba_type: Any) -> str:
     """Name a type, with the modules of the classes in it; Numba's names leave them out."""
-    if isinstance(numba_type, types.BaseTuple) and not isinstance(numba_type, _Held):
+    if isinstance(numba_type, types.BaseTuple) and not isinstance(numba_type, HeldTuple):
         kind = getattr(numba_type, "instance_class", tuple)
         inner = ", ".join(_words(item) for item in numba_type)
         return f"{kind.__module__}.{kind.__qualname__}({inner})"
     return str(numba_type)
 
 
-class _Held(types.BaseTuple):
-    """Type of a pointer to the items of a tuple."""
+class HeldTuple(types.BaseTuple):
+    """Type of a pointer to the items of a tuple, perhaps of a class of NamedTuples."""
 
-    def __init__(self, items: tuple, word: str):
+    def __init__(self, items: tuple, instance_class: type | None = None):
         self.types = items
         self.count = len(items)
+        word = ""
+        if instance_class is not None:
+            self.fields, self.instance_class = tuple(instance_class._fields), instance_class
+            word = f"{instance_class.__module__}.{instance_class.__qualname__}"
         text = f"{word}({', '.join(_words(item) for item in items)})"
         # Short, for it is part of the names of functions.
         super().__init__(f"Held{word}_{hashlib.sha256(text.encode()).hexdigest()[:16]}")
+
+    @property
+    def key(self):
+        return getattr(self, "instance_class", None), self.types
 
     def register_type(self) -> ir.Type:
         """LLVM's type: a pointer to a structure of the items."""
@@ -51,33 +59,9 @@ class _Held(types.BaseTuple):
         return iter(self.types)
 
 
-class HeldTuple(_Held):
-    """A held tuple without names."""
-
-    @property
-    def key(self):
-        return self.types
-
-    def __init__(self, items: tuple):
-        super().__init__(items, "")
-
-
-class HeldNamedTuple(_Held, types.BaseNamedTuple):
-    """A held NamedTuple."""
-
-    def __init__(self, items: tuple, instance_class: type):
-        self.fields = tuple(instance_class._fields)
-        self.instance_class = instance_class
-        super().__init__(items, f"{instance_class.__module__}.{instance_class.__qualname__}")
-
-    @property
-    def key(self):
-        return getattr(self, "instance_class", None), self.types
-
-
 def _has_arrays(numba_type: Any) -> bool:
     if isinstance(numba_type, types.BaseTuple):
-        return isinstance(numba_type, _Held) or any(_has_arrays(item) for item in numba_type)
+        return isinstance(numba_type, HeldTuple) or any(_has_arrays(item) for item in numba_type)
     return isinstance(numba_type, types.Array)
 
 
@@ -85,14 +69,12 @@ def held_type(numba_type: Any) -> Any:
     """Give the type of a value when it is held; its own where no tuple with arrays is in it."""
     if (
         not isinstance(numba_type, types.BaseTuple)
-        or isinstance(numba_type, _Held)
+        or isinstance(numba_type, HeldTuple)
         or not _has_arrays(numba_type)
     ):
         return numba_type
     items = tuple(held_type(item) for item in numba_type)
-    if isinstance(numba_type, types.BaseNamedTuple):
-        return HeldNamedTuple(items, numba_type.instance_class)
-    return HeldTuple(items)
+    return HeldTuple(items, getattr(numba_type, "instance_class", None))
 
 
 def hold(value: Any) -> Any:
@@ -110,7 +92,7 @@ def _hold(lowering: Any, thing: Any) -> Any:
     return thing if held == kind else held_as(lowering, thing, held)
 
 
-def held_as(lowering: Any, things: Iterable, held: _Held) -> HeldValue:
+def held_as(lowering: Any, things: Iterable, held: HeldTuple) -> HeldValue:
     """Put things into memory as a held tuple of this type."""
     builder = lowering.builder
     items = [_hold(lowering, thing) for thing in things]
@@ -121,7 +103,7 @@ def held_as(lowering: Any, things: Iterable, held: _Held) -> HeldValue:
     return HeldValue(held, place)
 
 
-def item_of(builder: Any, held: _Held, place: Any, k: int) -> Any:
+def item_of(builder: Any, held: HeldTuple, place: Any, k: int) -> Any:
     """Write what reads item `k` of a held tuple."""
     return code.get(builder, held[k], code.at(builder, place, 0, k))
 
@@ -141,7 +123,7 @@ def _at_hand(lowering: Any, held: Any) -> Any:
     return HeldValue(held._kind, _copy(lowering.builder, held._kind, held._value))
 
 
-def _copy(builder: Any, held: _Held, there: Any) -> Any:
+def _copy(builder: Any, held: HeldTuple, there: Any) -> Any:
     """Write what copies a held tuple, and those in it."""
     place = code.room(builder, there.type.pointee)
     builder.store(builder.load(there), place)
@@ -154,4 +136,4 @@ def _copy(builder: Any, held: _Held, there: Any) -> Any:
 
 def is_held(numba_type: Any) -> bool:
     """Tell whether a type is that of a held tuple."""
-    return isinstance(numba_type, _Held)
+    return isinstance(numba_type, HeldTuple)

@@ -9,7 +9,7 @@ from llvmlite import ir
 from numba import typeof, types
 
 from karamelo_py.compiler import arithmetic, code, failing, indexing
-from karamelo_py.compiler.held import _Held, item_of
+from karamelo_py.compiler.held import HeldTuple, item_of
 from karamelo_py.compiler.values import (
     BUILTINS,
     Emitted,
@@ -57,7 +57,7 @@ class Lowering:
             return None
         if isinstance(kind, types.BaseTuple) and hasattr(kind, "instance_class"):
             self.classes.add(kind.instance_class)
-        if isinstance(kind, _Held):
+        if isinstance(kind, HeldTuple):
             return HeldValue(kind, value)
         if isinstance(kind, types.BaseTuple):
             inner = [

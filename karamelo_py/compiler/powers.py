@@ -15,7 +15,7 @@ from numba import types
 
 from karamelo_py.compiler import code
 from karamelo_py.compiler.code import I32, Lanes
-from karamelo_py.compiler.compile import all_lanes, by_type, fma, implements, real, shared, where
+from karamelo_py.compiler.compile import all_lanes, fma, implements, real, shared, where
 from karamelo_py.compiler.values import OF_REALS, intrinsic
 
 
@@ -145,7 +145,7 @@ def _logarithm_near_one(x):
     return where(near, ln, logarithm(x))
 
 
-@by_type(exponential)
+@implements(exponential, by_type=True)
 def _exponential(x):
     # So far from 0 that the next number is 1 away; all targets know how to add, but not to round.
     most, far = (1000, 1.5 * 2**52) if _bits(x).mantissa == 52 else (130, 1.5 * 2**23)

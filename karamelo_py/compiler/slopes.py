@@ -8,6 +8,7 @@ to be 0, and no code is written for it.
 
 import math
 from collections import namedtuple
+from collections.abc import Callable
 from typing import Any
 
 from karamelo_py.compiler.algebra import algebra
@@ -185,22 +186,27 @@ def _sqrt(x):
     return x.chain(root, where(some, 0.5 / where(some, root, 1), 0))
 
 
-@implements(math.log, Dual)
-@implements(logarithm, Dual)
-def _logarithm(x):
-    return x.chain(logarithm(x.value), 1 / x.value)
+def elementary(function: Callable, slope: Callable, *others: Callable) -> Callable:
+    """Let a function, and `others` that are the same, know slopes: ``slope(x, f)`` at f(x)."""
+
+    def of_dual(x: Dual) -> Dual:
+        value = function(x.value)
+        return x.chain(value, slope(x.value, value))
+
+    for one in (function, *others):
+        implements(one, Dual)(of_dual)
+    return of_dual
 
 
-@implements(logarithm_near_one, Dual)
-def _logarithm_near_one(x):
-    return x.chain(logarithm_near_one(x.value), 1 / x.value)
-
-
-@implements(math.exp, Dual)
-@implements(exponential, Dual)
-def _exponential(x):
-    e = exponential(x.value)
-    return x.chain(e, e)
+elementary(logarithm, lambda x, f: 1 / x, math.log)
+elementary(logarithm_near_one, lambda x, f: 1 / x)
+elementary(exponential, lambda x, f: f, math.exp)
+elementary(math.sin, lambda x, f: math.cos(x))
+elementary(math.cos, lambda x, f: -math.sin(x))
+elementary(math.tan, lambda x, f: 1 + f * f)
+elementary(math.atan, lambda x, f: 1 / (1 + x * x))
+elementary(math.tanh, lambda x, f: 1 - f * f)
+_abs = elementary(abs, lambda x, f: where(x < 0, -1, 1))
 
 
 @implements(power, Dual)
@@ -217,38 +223,6 @@ def _power(x, y):
         where(some, made * logarithm(over), 0) if isinstance(y, Dual) else 0,
         y,
     )
-
-
-@implements(math.sin, Dual)
-def _sin(x):
-    return x.chain(math.sin(x.value), math.cos(x.value))
-
-
-@implements(math.cos, Dual)
-def _cos(x):
-    return x.chain(math.cos(x.value), -math.sin(x.value))
-
-
-@implements(math.tan, Dual)
-def _tan(x):
-    tangent = math.tan(x.value)
-    return x.chain(tangent, 1 + tangent * tangent)
-
-
-@implements(math.atan, Dual)
-def _atan(x):
-    return x.chain(math.atan(x.value), 1 / (1 + x.value * x.value))
-
-
-@implements(math.tanh, Dual)
-def _tanh(x):
-    tangent = math.tanh(x.value)
-    return x.chain(tangent, 1 - tangent * tangent)
-
-
-@implements(abs, Dual)
-def _abs(x):
-    return x.chain(abs(x.value), where(x.value < 0, -1, 1))
 
 
 @implements(real, Dual)

@@ -25,9 +25,9 @@ from llvmlite import ir
 from numba import config, types
 
 from karamelo_py.compiler import code, machine
-from karamelo_py.compiler.choices import tag_class
+from karamelo_py.compiler.choices import INTERPRETED
 from karamelo_py.compiler.code import I32, I64
-from karamelo_py.compiler.compile import by_type, implements, shared
+from karamelo_py.compiler.compile import implements, shared
 from karamelo_py.compiler.failing import note, noting
 from karamelo_py.compiler.held import HeldTuple, held_as, held_type
 from karamelo_py.compiler.loops import noinline
@@ -357,16 +357,13 @@ def _distribute(team, count, task, arguments):
 def shared_out(function: Callable) -> Callable:
     """Make ``f(mode, count, ...)``: ``function(..., k)`` for each k below `count`."""
 
+    @shared
     def loop(mode, count, *arguments):
-        for k in range(count):
-            function(*arguments, k)
-
-    def by_all(mode, count, *arguments):
-        _distribute(mode.team, count, *_task(function, arguments))
-
-    @by_type(loop)
-    def _loop_by_type(mode, *_):
-        return by_all if tag_class(mode) is Threaded else loop
+        if isinstance(mode, Threaded) and not INTERPRETED:
+            _distribute(mode.team, count, *_task(function, arguments))
+        else:
+            for k in range(count):
+                function(*arguments, k)
 
     return loop
 
@@ -377,9 +374,6 @@ def by_team(function: Callable) -> Callable:
     Its first thread does it, the others serve it.
     """
     inner = noinline(function)
-
-    def alone(mode, *arguments):
-        return inner(mode, *arguments)
 
     @shared
     def member(mode, *arguments):
@@ -392,7 +386,10 @@ def by_team(function: Callable) -> Callable:
             write(team + _RESULT, _regardless(inner, mode, *given))
             write(team + _STATE, _ENDED)
 
-    def together(mode, *arguments):
+    @shared
+    def run(mode, *arguments):
+        if INTERPRETED or not isinstance(mode, Threaded):
+            return inner(mode, *arguments)
         team = mode.team
         if team == 0:
             return inner(mode, *arguments)
@@ -400,8 +397,4 @@ def by_team(function: Callable) -> Callable:
         _in_parallel(read(team + _SIZE), *_task(member, (mode, *arguments)))
         return read(team + _RESULT)
 
-    @by_type(alone)
-    def _run_by_type(mode, *_):
-        return together if tag_class(mode) is Threaded else alone
-
-    return alone
+    return run

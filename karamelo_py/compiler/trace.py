@@ -350,16 +350,6 @@ def alone(dispatch: Callable) -> None:
     _own.add(dispatch)
 
 
-def traced(dispatch: Callable, chooser: Callable, last: bool = False) -> Callable:
-    """Let kernels run what `chooser` makes of `dispatch` for types; None if it has nothing.
-
-    It is asked before those that are known already, or as the `last`.
-    """
-    known = choosers.setdefault(dispatch, [])
-    known.insert(len(known) if last else 0, chooser)
-    return chooser
-
-
 def _call(function: Callable, arguments: tuple) -> Any:
     """Call the function that is chosen by the types of the arguments, if one is chosen."""
     if function not in choosers:

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import by_type, index, shared
+from karamelo_py.compiler.compile import implements, index, shared
 from karamelo_py.compiler.fingerprint import classes_in
 from karamelo_py.compiler.lanes import EightLanes, group, lanes_for, spread
 from karamelo_py.kernels.arrays import Index, Number, Tag
@@ -28,7 +28,7 @@ def lanes_with(parts: tuple, laws: NamedTuple, mass: np.ndarray) -> Tag:
     return OneByOne()
 
 
-@by_type(lanes_with)
+@implements(lanes_with, by_type=True)
 def _lanes_with(parts, laws, mass):
     known = (*(part.instance_class for part in parts), *classes_in(laws))
     in_lanes = all(getattr(part, "in_lanes", False) for part in known)

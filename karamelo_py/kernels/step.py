@@ -8,7 +8,7 @@ import functools
 from math import sqrt
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import by_type, real, shared
+from karamelo_py.compiler.compile import implements, real, shared
 from karamelo_py.compiler.fields import load, load_vector
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import kernel
@@ -104,7 +104,7 @@ def step(scheme: Tag, visits: Tag, mode: Tag, s: Setup, hooks: Tag, more: bool) 
     return _take_all(_step_rows(type(scheme), type(visits)), s, mode, hooks, more)
 
 
-@by_type(step)
+@implements(step, by_type=True)
 def _step(scheme, visits, mode, s, hooks, more):
     rows = rows_of(scheme.instance_class, visits.instance_class)
     return lambda scheme, visits, mode, s, hooks, more: _take_all(rows, s, mode, hooks, more)
@@ -115,7 +115,7 @@ def begin(scheme: Tag, visits: Tag, mode: Tag, s: Setup) -> bool:
     return _take_all(_begin_rows(type(scheme), type(visits)), s, mode, NoHooks(), True)
 
 
-@by_type(begin)
+@implements(begin, by_type=True)
 def _begin(scheme, visits, mode, s):
     rows = _first_rows(scheme.instance_class, visits.instance_class)
     return lambda scheme, visits, mode, s: _take_all(rows, s, mode, NoHooks(), True)

@@ -10,8 +10,8 @@ from numba import types
 from karamelo_py.compiler import code
 from karamelo_py.compiler.code import I32, I64, Lanes, lane, pack, shuffle, splat
 from karamelo_py.compiler.compile import (
+    all_same,
     beside,
-    by_type,
     implements,
     index,
     is_one,
@@ -19,8 +19,8 @@ from karamelo_py.compiler.compile import (
     of_present,
     prefetch,
     real,
+    select,
 )
-from karamelo_py.compiler.lanes.numbers import all_same, select
 from karamelo_py.compiler.values import intrinsic
 
 AHEAD = 256  # bytes by which arrays of points are asked of the memory ahead of their use
@@ -299,7 +299,7 @@ def _index_at(at: Any, k: int) -> Any:
     return tuple(at)[k] if isinstance(at, types.BaseTuple) and len(at) else at
 
 
-@by_type(operator.getitem)
+@implements(operator.getitem, by_type=True)
 def _get(array, at):
     if isinstance(array, types.Array) and isinstance(_index_at(at, -1), LaneGroup):
         return _load_points
@@ -308,7 +308,7 @@ def _get(array, at):
     return None
 
 
-@by_type(operator.setitem)
+@implements(operator.setitem, by_type=True)
 def _set(array, at, value):
     if isinstance(array, types.Array) and isinstance(_index_at(at, -1), LaneGroup):
         return _store_points

@@ -11,7 +11,6 @@ from karamelo_py.compiler.code import I32, I64, Lanes, lane, pack, shuffle, spla
 from karamelo_py.compiler.compile import (
     Weighted,
     accumulate,
-    by_type,
     implements,
     lanes_of,
     prefetch_records,
@@ -143,7 +142,7 @@ def _prefetch_records(array, nodes):
     return types.void(array, nodes), codegen
 
 
-@by_type(row)
+@implements(row, by_type=True)
 def _row(array, i, first, like):
     if isinstance(i, Lanes | Beside):
         return _gather_row
@@ -218,7 +217,7 @@ def _records(builder: Any, parts: list) -> list:
     return [shuffle(builder, parts[0], parts[0], [k]) for k in range(4)]
 
 
-@by_type(accumulate)
+@implements(accumulate, by_type=True)
 def _accumulate(array, i, first, values):
     if tag_class(i) is Weighted and lanes_of(i):
         return lambda array, i, first, values: _accumulate_affine(
