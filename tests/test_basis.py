@@ -348,7 +348,7 @@ def test_single_precision_stays_single(basis):
         found = compiled(basis(), kin, single, small)
         assert found == pytest.approx(numbers_along(basis(), kin, double, place), abs=3e-5)
     if compiled is not numbers_along:
-        assert "float64" not in str([unit.result for unit in compiled.kernel.units.values()])
+        assert "float64" not in str([unit.result for unit in compiled.units.values()])
 
 
 # --- domains that deform ----------------------------------------------------------------------
@@ -434,7 +434,7 @@ def test_boxes_stay_single(basis, kin):
     found = compiled(basis(), kin, grid, place, dl)
     assert found == pytest.approx(after_box(basis(), kin, grid, place, dl), rel=1e-5)
     if compiled is not after_box:
-        assert "float64" not in str([unit.result for unit in compiled.kernel.units.values()])
+        assert "float64" not in str([unit.result for unit in compiled.units.values()])
 
 
 def after_box(basis, kin, grid, place, dl):

@@ -161,11 +161,11 @@ def test_an_array_in_the_place_of_another():
     argument_buffer._arrays[id(other)] = argument_buffer._arrays[id(one)]  # as if nobody had told
     _of_python(mixed, 2, other)
     assert (one[6], other[6]) == (1, 2)
-    known = len(_of_python.kernel.units)
+    known = len(_of_python.units)
     other.shape = (8, 1)
     _of_python(mixed, 3, other)
     assert other[6] == 3
-    assert len(_of_python.kernel.units) == known + 1  # a table is no row of numbers
+    assert len(_of_python.units) == known + 1  # a table is no row of numbers
 
 
 @pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")

@@ -400,7 +400,7 @@ def test_single_precision_stays_single(kin):
     s, a = single(kin.Symmetric, range(6)), single(kin.Vector, range(3))
     arguments = kin, f, dl, s, a, single(kin.Gradient, (0.1, 0.2, 0.3))
     results = all_tensors(*arguments)
-    (unit,) = [u for k, u in all_tensors.kernel.units.items() if k[0] == typeof(kin)]
+    (unit,) = [u for k, u in all_tensors.units.items() if k[0] == typeof(kin)]
     assert "float64" not in str(unit.result)
     for found, exact in zip(results, inspect.unwrap(all_tensors)(*arguments), strict=True):
         assert all(type(a) in (np.float32, int) for a in exact)

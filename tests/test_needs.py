@@ -145,7 +145,7 @@ def test_a_kernel_has_the_code_of_what_is_there_and_no_other(run_script):
     text = (INPUTS / "in.two_disks").read_text(encoding="utf-8")
     run_script(text.replace("run_time(3.5)", "run(2)"))
     found = []
-    for types, unit in advance.kernel.units.items():
+    for types, unit in advance.units.items():
         classes = {one.__name__ for held in types for one in classes_in(held)}
         kinds = {name for c in unit.choices for name in c.classes}
         words = {name.rpartition(":")[2] for name in kinds if name}

@@ -134,7 +134,7 @@ def test_numbers_keep_their_precision():
     made = kernel(caller)
     single = made(Square(0.1), np.float32(3))
     assert np.float32(single) == np.float32(np.float32(0.1) * np.float32(3)) * np.float32(3)
-    (unit,) = made.kernel.units.values()
+    (unit,) = made.units.values()
     assert unit.result.bitwidth == 32
 
 
@@ -364,7 +364,7 @@ def test_choices_of_tags_without_numbers_are_followed(tmp_path, monkeypatch):
 
     made = kernel(caller)
     assert made(2.0) == 6
-    (unit,) = made.kernel.units.values()
+    (unit,) = made.units.values()
     chosen = unit.choices
     assert choices.Choice(f"{__name__}:size_of", (f"{__name__}:Empty",)) in chosen
 

@@ -46,10 +46,10 @@ def sorted_scene(method="ulmpm, FLIP, linear, 1", law="linear", heat="", round="
 def test_one_kernel_sorts_points_of_all_kinds():
     """In a dimension and a precision, whatever laws, bases and fields there are."""
     sorted_scene()
-    known = set(sort_points.kernel.units)
+    known = set(sort_points.units)
     for words in SCENES.values():
         assert sorted_scene(**words).count > 400
-    assert set(sort_points.kernel.units) == known
+    assert set(sort_points.units) == known
 
 
 def test_laws_see_the_same_of_points_in_all_methods():
@@ -65,11 +65,11 @@ def test_laws_see_the_same_of_points_in_all_methods():
 def test_no_points_compile_nothing():
     """As they are asked for to learn what a column would be of."""
     simulation = sorted_scene()
-    known = set(export_state.kernel.units), set(export.kernel.units)
+    known = set(export_state.units), set(export.units)
     fields = next(reversed([*simulation.points.some(None)]))
     for name in ("volume", "s11", "strain_energy"):
         assert fields.particle(name).shape == (0,)
-    assert (set(export_state.kernel.units), set(export.kernel.units)) == known
+    assert (set(export_state.units), set(export.units)) == known
 
 
 @pytest.mark.parametrize("kind", [np.float32, np.float64, np.int64])

@@ -25,7 +25,7 @@ import numpy as np
 import platformdirs
 
 from karamelo_py.compiler import compile_lock, machine
-from karamelo_py.compiler.choices import WHOLE, Choice, Unknown, name_of
+from karamelo_py.compiler.choices import WHOLE, Unknown, name_of
 from karamelo_py.compiler.fingerprint import describe, fingerprint
 
 VARIANTS = 4  # of a kernel for the same types: as many states of the sources are kept
@@ -101,16 +101,27 @@ class KernelFiles:
         return found
 
     def _found(self, kinds: tuple, key: str) -> Any:
-        """Read the kernel in a file."""
+        """Read the kernel in a file; one that is not whole is told of, and taken away."""
         for path in self._files(key):
-            choices, data = _read(path)
-            if choices is None or self._stamp(kinds, choices) != path.stem.rpartition("-")[2]:
-                continue
             try:
-                unit = pickle.loads(data)
+                data = path.read_bytes()
+                if hashlib.sha256(data[32:]).digest() != data[:32]:
+                    raise ValueError("not what was written")
+                choices, code = pickle.loads(data[32:])
+                stamp = fingerprint([self._function], kinds, frozenset(choices))
+                if stamp[:24] != path.stem.rpartition("-")[2]:
+                    continue
+                unit = pickle.loads(code)
                 self._load(unit)
+            except (FileNotFoundError, Unknown):  # taken away, or of what is no longer there
+                continue
+            except OSError as error:
+                _trouble(error)
+                continue
             except Exception:
-                _discard(path)
+                _tell(f"a file in {folder()} is damaged; the loop in it is compiled anew")
+                with contextlib.suppress(OSError):
+                    path.unlink()
                 continue
             with contextlib.suppress(OSError):
                 os.utime(path)
@@ -144,12 +155,6 @@ class KernelFiles:
         words += [describe(result) if result is not None else "", repr(machine.describe())]
         digest = hashlib.sha256("|".join([*words, _SETTING]).encode()).hexdigest()
         return f"{self._name()}-{digest[:24]}"
-
-    def _stamp(self, kinds: tuple, choices: frozenset[Choice]) -> str | None:
-        try:
-            return fingerprint([self._function], kinds, choices)[:24]
-        except Unknown:
-            return None
 
     def _files(self, key: str) -> list[Path]:
         try:
@@ -196,29 +201,6 @@ def write(path: Path, content: bytes) -> None:
     except BaseException:
         Path(name).unlink(missing_ok=True)
         raise
-
-
-def _read(path: Path) -> tuple[frozenset[Choice] | None, bytes]:
-    """Read the choices and the code in a file; None where it is not whole."""
-    try:
-        data = path.read_bytes()
-    except FileNotFoundError:
-        return None, b""
-    except OSError as error:
-        _trouble(error)
-        return None, b""
-    if hashlib.sha256(data[32:]).digest() != data[:32]:
-        _discard(path)
-        return None, b""
-    choices, code = pickle.loads(data[32:])
-    return frozenset(choices), code
-
-
-def _discard(path: Path) -> None:
-    """Tell of a file that cannot be used, and take it away."""
-    _tell(f"a file in {folder()} is damaged; the loop in it is compiled anew")
-    with contextlib.suppress(OSError):
-        path.unlink()
 
 
 # --- how long it took ---------------------------------------------------------------------------

@@ -1,6 +1,7 @@
 """Choices by type that compiled code has made: the key of a kernel has these, and no others."""
 
 import functools
+import itertools
 import sys
 import types as python
 from collections.abc import Callable, Iterable, Iterator
@@ -104,6 +105,12 @@ def contents(parts: Iterable[Part]) -> tuple[frozenset[Choice], frozenset[python
 
 def _choice(dispatch: Callable, classes: tuple) -> Choice:
     return Choice(name_of(dispatch), tuple(class_name(c) for c in classes))
+
+
+def codes_in(code: python.CodeType) -> list[python.CodeType]:
+    """List code, and that of all functions written in it."""
+    inner = (codes_in(c) for c in code.co_consts if isinstance(c, python.CodeType))
+    return [code, *itertools.chain.from_iterable(inner)]
 
 
 def is_opaque(thing: Any) -> bool:

@@ -24,6 +24,7 @@ from karamelo_py.compiler.choices import (
     Unknown,
     choosers,
     class_name,
+    codes_in,
     found_by_name,
     is_opaque,
     name_of,
@@ -99,7 +100,7 @@ def fingerprint(
         order[id(thing)] = len(order)
         alive.append(thing)
         if codes and isinstance(thing, python.FunctionType):
-            codes -= _codes(thing.__code__)
+            codes -= {*codes_in(thing.__code__)}
         words, parts = _look(thing)
         digest.update(f"{words} {len(parts)};".encode())
         ahead.extend(reversed(parts))
@@ -205,12 +206,6 @@ def _code(code: python.CodeType) -> tuple[str, tuple[str, ...]]:
     shape = (code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars)
     digest.update(repr((shape, code.co_argcount, code.co_kwonlyargcount, code.co_flags)).encode())
     return digest.hexdigest(), tuple(dict.fromkeys(names))
-
-
-def _codes(code: python.CodeType) -> set[python.CodeType]:
-    """A function's code, and that of all functions written in it."""
-    inner = (c for c in code.co_consts if isinstance(c, python.CodeType))
-    return {code}.union(*map(_codes, inner))
 
 
 def _class(one: type) -> tuple[str, list]:

@@ -14,7 +14,7 @@ from numba import types
 
 from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.loops import caller_of, kernel, noinline
-from karamelo_py.compiler.operations import FIRST_BINARY, SELECT, in_kernels, of_one, of_two
+from karamelo_py.compiler.operations import FIRST_BINARY, SELECT, numbered, of_one, of_two
 
 BLOCK = 128
 MAX_DEPTH = 32
@@ -61,9 +61,9 @@ def _select(n, a, b, c):
 
 
 # What has a loop of its own; others share one, which chooses for each number.
-_UNARY_LOOPS = in_kernels("neg", "sqrt", "sin", "cos", "exp", "log", "abs")
-_BINARY_LOOPS = in_kernels("+", "-", "*", "/", "min", "max")
-((_POWER, _power),) = in_kernels("^")
+_UNARY_LOOPS = numbered("neg", "sqrt", "sin", "cos", "exp", "log", "abs")
+_BINARY_LOOPS = numbered("+", "-", "*", "/", "min", "max")
+((_POWER, _power),) = numbered("^")
 
 
 @noinline

@@ -156,13 +156,20 @@ def _write_entry(module: ir.Module, main: ir.Function, kinds: tuple, result: typ
 
 
 class Kernel:
-    """Compile a function for the types of its arguments, and keep it on disk."""
+    """Call a function from Python and from other kernels, compiled for types and kept on disk.
+
+    It takes its tuples by reference.
+    """
 
     def __init__(self, function: Callable):
+        functools.update_wrapper(self, function)
         self.function = function
         self.files = cache.KernelFiles(function, load)
         self.units: dict[tuple, Unit] = {}
         self._plans: dict[tuple, tuple] = {}
+        builtin(self)(self.in_kernel)
+        if function not in choosers:
+            shared(function)
 
     @property
     def made_of(self) -> tuple:
@@ -196,30 +203,13 @@ class Kernel:
         """Have it compiled for arguments of these types."""
         load(self.unit(plan_for(arguments).types))
 
-
-def kernel(function: Callable) -> Callable:
-    """Make a kernel for Python and for other kernels, which takes its tuples by reference.
-
-    No fast mathematics: where products and sums contract would depend on what a loop is inlined
-    into. `fma` says where.
-    """
-    if INTERPRETED:
-        return function
-    made = Kernel(shared(function))
-
-    @functools.wraps(function)
-    def enter(*arguments: Any) -> Any:
-        return made(*arguments)
-
-    enter.kernel, enter.compile = made, made.compile
-
-    @builtin(enter)
-    def call(lowering: Any, *arguments: Any) -> Any:
+    def in_kernel(self, lowering: Any, *arguments: Any) -> Any:
+        """Write a call from another kernel."""
         held = [lowering.call(hold, (argument,)) for argument in arguments]
         kinds = tuple(types.unliteral(lowering.kind_of(one)) for one in held)
-        unit = made.unit(kinds)
+        unit = self.unit(kinds)
         note(unit.choices)
-        note([function.__code__])
+        note([self.function.__code__])
         if lowering.builder is None:
             return lowering.wrapped(unit.result, None)
         module = lowering.builder.module
@@ -230,7 +220,14 @@ def kernel(function: Callable) -> Callable:
             called.raises = True
         return lowering.call_function(called, kinds, unit.result, held)
 
-    return enter
+
+def kernel(function: Callable) -> Callable:
+    """Make a kernel; interpreted, the function itself is one.
+
+    No fast mathematics: where products and sums contract would depend on what a loop is inlined
+    into. `fma` says where.
+    """
+    return function if INTERPRETED else Kernel(function)
 
 
 def noinline(function: Callable) -> Callable:
@@ -258,8 +255,6 @@ def address_of(function: Callable, signature: types.Type) -> int:
         if INTERPRETED:
             _addresses[function] = address_of_python(function, signature)
         else:
-            if function not in choosers:
-                shared(function)
             unit = Kernel(function).unit(signature.args, signature.return_type)
             _addresses[function] = load(unit)[0]
     return _addresses[function]

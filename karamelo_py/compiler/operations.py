@@ -130,7 +130,7 @@ def quietly(name: str, *numbers: float) -> float:
         return value if a == pole else math.nan
 
 
-def in_kernels(*names: str) -> tuple[tuple[int, Callable], ...]:
+def numbered(*names: str) -> tuple[tuple[int, Callable], ...]:
     """The numbers of some operations, and their functions; interpreted, none of these raises."""
     every = UNARY | BINARY
     return tuple(
@@ -139,7 +139,7 @@ def in_kernels(*names: str) -> tuple[tuple[int, Callable], ...]:
     )
 
 
-_UNARY_IN_KERNELS, _BINARY_IN_KERNELS = in_kernels(*UNARY), in_kernels(*BINARY)
+_NUMBERED_UNARY, _NUMBERED_BINARY = numbered(*UNARY), numbered(*BINARY)
 _NAMES = {number: name for name, number in OPERATIONS.items()}
 
 
@@ -152,7 +152,7 @@ def of_one(op, a):
 @noinline
 def _function_of(op, a):
     """Any function of one number: one chain of choices, where a loop for each would be too much."""
-    for number, do in _UNARY_IN_KERNELS:
+    for number, do in _NUMBERED_UNARY:
         if op == number:
             return do(a)
     return a
@@ -166,7 +166,7 @@ def of_two(op, a, b):
 @implements(of_two)
 @noinline
 def _operation_of(op, a, b):
-    for number, do in _BINARY_IN_KERNELS:
+    for number, do in _NUMBERED_BINARY:
         if op == number:
             return do(a, b)
     return a

@@ -14,7 +14,7 @@ from typing import Any
 from karamelo_py.compiler.algebra import algebra
 from karamelo_py.compiler.compile import fma, implements, real, round_off, where
 from karamelo_py.compiler.powers import exponential, logarithm, logarithm_near_one, power
-from karamelo_py.compiler.values import is_literal
+from karamelo_py.compiler.values import is_literal, rebuilt
 
 
 @algebra
@@ -120,8 +120,7 @@ def value_of(x: Any) -> Any:
     if isinstance(x, Dual):
         return x.value
     if isinstance(x, tuple):
-        items = [value_of(item) for item in x]
-        return x._make(items) if hasattr(x, "_fields") else tuple(items)
+        return rebuilt(x, [value_of(item) for item in x])
     return x
 
 
@@ -136,7 +135,7 @@ def seeded(numbers: tuple) -> Any:
     made = [
         Dual(x, tuple([1 if i == k else 0 for i in n])) for k, x in zip(n, numbers, strict=True)
     ]
-    return numbers._make(made) if hasattr(numbers, "_make") else tuple(made)
+    return rebuilt(numbers, made)
 
 
 def is_zero(slope: Any) -> bool:
@@ -246,8 +245,7 @@ def _fma(a, b, c):
 @implements(where, Dual)
 def _where(condition, a, b):
     if is_tensor(a):
-        items = [where(condition, x, y) for x, y in zip(a, b, strict=True)]
-        return a._make(items) if hasattr(a, "_fields") else tuple(items)
+        return rebuilt(a, [where(condition, x, y) for x, y in zip(a, b, strict=True)])
     n = size_of(a, b)
     if n == 0:
         return where(condition, a, b)

@@ -14,6 +14,7 @@ come by another way than a global name or a closure, as methods do, are refused.
 import dis
 import functools
 import inspect
+import itertools
 import types as python
 from collections import namedtuple
 from collections.abc import Callable, Hashable, Iterable, Iterator
@@ -24,7 +25,7 @@ import numpy as np
 from numba import types
 
 from karamelo_py.compiler.arithmetic import OPERATIONS
-from karamelo_py.compiler.choices import choosers, note, parts_noted, tag_class
+from karamelo_py.compiler.choices import choosers, codes_in, note, parts_noted, tag_class
 from karamelo_py.compiler.flow import Flow
 from karamelo_py.compiler.lowering import Lowering, name_of, numbers_of
 from karamelo_py.compiler.statements import AstFunction, place_in_text
@@ -220,15 +221,11 @@ def _methods_of(one: type) -> frozenset[str]:
     return frozenset(name for name in own.keys() - _GENERATED if isinstance(own[name], _METHODS))
 
 
-def _names_in(code: python.CodeType) -> set[str]:
-    inner = (c for c in code.co_consts if isinstance(c, python.CodeType))
-    return set(code.co_names).union(*map(_names_in, inner))
-
-
 def _refuse_methods(codes: Iterable[python.CodeType], classes: set[type]) -> None:
     """Refuse methods of tuples: they would run as they are, and nothing would follow them."""
     functions = frozenset().union(*map(_methods_of, classes))
-    named = functions & set().union(*map(_names_in, codes))
+    inner = itertools.chain.from_iterable(map(codes_in, codes))
+    named = functions & {name for code in inner for name in code.co_names}
     for name in sorted(name for name in functions if name.startswith("__") or name in named):
         raise Untraceable(
             f"'{name}' is a method of a class of tuples, which kernels cannot call: "

@@ -22,13 +22,14 @@ class Presets(dict[str, str]):
     def __init__(self, script: Any, given: Mapping[str, str]):
         super().__init__(given)
         self._script = script
-        again = isinstance(given, Presets)
         # Those that may have to be numbers, and of these what a mistake was put down to.
-        self._texts: dict[str, str] = given._texts if again else {}
-        self.blamed: set[str] = given.blamed if again else set()
+        self._texts: dict[str, str] = {}
+        self.blamed: set[str] = set()
         # Which of them a variable is made of, by its name.
-        itself = {name: {name: None} for name in given}
-        self._made_of: dict[str, dict[str, None]] = dict(given._made_of) if again else itself
+        self._made_of: dict[str, dict[str, None]] = {name: {name: None} for name in given}
+        if isinstance(given, Presets):  # of a script that this one is a copy of
+            vars(self).update(vars(given), _script=script, _made_of=dict(given._made_of))
+            return
         expected = "letters, digits and _, as in -var h 0.05"
         for name in given:
             if not name.isidentifier():
