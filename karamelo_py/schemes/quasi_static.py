@@ -11,11 +11,26 @@ from karamelo_py.kernels.arrays import (
     POST_UPDATE_GRID_STATE,
 )
 from karamelo_py.kernels.g2p import Strain
-from karamelo_py.kernels.table import AXIS, MOVE, SUMS, WORK_OF_LOADS, AtNodes, AtPoints, Gather
+from karamelo_py.kernels.table import (
+    AVERAGED,
+    AXIS,
+    MOVE,
+    SUMS,
+    WORK_OF_LOADS,
+    AtNodes,
+    AtPoints,
+    Gather,
+)
 from karamelo_py.language.signature import NonNegative, Positive
 
 # What acts on the nodes in a step, by present stress; who holds them; and how points follow.
-BEGIN = (AtPoints(INITIAL_INTEGRATE, 0), SUMS, AtNodes(POST_PARTICLES_TO_GRID, ON_SUMS), AXIS)
+BEGIN = (
+    AtPoints(INITIAL_INTEGRATE, 0),
+    SUMS,
+    AVERAGED,
+    AtNodes(POST_PARTICLES_TO_GRID, ON_SUMS),
+    AXIS,
+)
 HOLD = (AtNodes(POST_UPDATE_GRID_STATE, ON_UPDATE), AXIS)
 CLOSE = (WORK_OF_LOADS, *MOVE, Gather(Strain()), AtPoints(FINAL_INTEGRATE, 1))
 # Of the last step: corrections, the share of forces that was left, and parts it was done in.

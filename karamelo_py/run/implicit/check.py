@@ -4,7 +4,6 @@ import importlib.util
 from collections.abc import Iterator
 
 from karamelo_py.compiler.fields import declared
-from karamelo_py.kernels.visit import PointByPoint
 from karamelo_py.language import registry
 from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.points.transfers import Moment
@@ -32,8 +31,6 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
             "FLIP in its place",
             method.place,
         )
-    if not isinstance(method.averaging(hub), PointByPoint):
-        yield "knows no averaged volumes", f"no anti_volumetric_locking, or {_EXPLICIT}", None
     if update.thermal:
         yield "knows no heat that flows", f"mechanical, or {_EXPLICIT}", method.place
     if update.boundary == "reflect":

@@ -27,9 +27,11 @@ from karamelo_py.kernels.implicit import (
     strain,
     stress_and_tangent,
 )
+from karamelo_py.kernels.visit import FBar
 from karamelo_py.points.kinematics import Axisymmetric
 from karamelo_py.points.laws import initial_state, specific_volume
 from karamelo_py.points.laws.rigid import Rigid
+from karamelo_py.run.implicit.averaging import AveragedVolumes
 from karamelo_py.run.implicit.solvers import rigid_motions
 
 
@@ -78,6 +80,7 @@ class Equations:
         self.deforming = np.isin(self.nodes, soft)
         self.led, self.velocity_of_rigid = self._led(tools)
         self._find_pairs()
+        self.averaged = AveragedVolumes(self) if isinstance(s.averaging, FBar) else None
 
     def _places(self) -> np.ndarray:
         """Count the places of the nodes along each direction of their grid."""
@@ -188,12 +191,21 @@ class Equations:
     def respond(self, u: np.ndarray, dt: float) -> np.ndarray:
         """Find the nodal forces (m, d) of displacements (m, d); not finite where a point fails."""
         s = self.s
-        f = np.zeros((len(self.nodes), self.d))
-        for block, (seen, response) in zip(self.blocks, self.parts, strict=True):
+        for seen, response in self.parts:
             strain(self.mode, PARTS, s.kin, seen, u, response)
-            points = known_to_laws(block.points)
-            respond(self.mode, PARTS, s.kin, points, block.laws, dt, response)
-            add_forces(self.mode, PARTS, s.kin, seen, response.stress, f)
+        if self.averaged is not None:
+            self.averaged.respond(dt)
+        else:
+            for block, (_, response) in zip(self.blocks, self.parts, strict=True):
+                points = known_to_laws(block.points)
+                respond(self.mode, PARTS, s.kin, points, block.laws, dt, response)
+        return self._forces()
+
+    def _forces(self) -> np.ndarray:
+        """Sum the forces (m, d) of the stresses of the points."""
+        f = np.zeros((len(self.nodes), self.d))
+        for seen, response in self.parts:
+            add_forces(self.mode, PARTS, self.s.kin, seen, response.stress, f)
         return f
 
     def furthest(self) -> float:
@@ -202,12 +214,12 @@ class Equations:
 
     def present_forces(self) -> np.ndarray:
         """Find the nodal forces (m, d) of the present stress."""
-        s = self.s
-        f = np.zeros((len(self.nodes), self.d))
-        for block, (seen, response) in zip(self.blocks, self.parts, strict=True):
-            keep_stress(s.kin, block.points, block.laws, response.stress)
-            add_forces(self.mode, PARTS, s.kin, seen, response.stress, f)
-        return f
+        if self.averaged is not None:
+            self.averaged.keep_stress()
+        else:
+            for block, (_, response) in zip(self.blocks, self.parts, strict=True):
+                keep_stress(self.s.kin, block.points, block.laws, response.stress)
+        return self._forces()
 
     @cached_property
     def rigid_motions(self) -> np.ndarray:
@@ -228,11 +240,17 @@ class Equations:
             add_stiffness(
                 self.mode, PARTS, self.s.kin, seen, response.tangent, self.layout, self.K.data
             )
-        np.take(self.K.data, self.taken, out=self.matrix.data)
+        self.whole = self.K
+        if self.averaged is None:
+            np.take(self.K.data, self.taken, out=self.matrix.data)
+        else:
+            self.whole = self.K + self.averaged.stiffness()
+            free = self.free.ravel()
+            self.matrix = self.whole[free][:, free]
 
     def of_prescribed(self, change: np.ndarray) -> np.ndarray:
         """Find the forces at the free components of changes (m, d) of the others."""
-        return (self.K @ change.ravel())[self.free.ravel()]
+        return (self.whole @ change.ravel())[self.free.ravel()]
 
     # --- ghost stabilisation ----------------------------------------------------------------------
 

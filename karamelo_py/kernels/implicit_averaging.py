@@ -1,0 +1,223 @@
+"""Averaged volumes (F-bar) in implicit steps, and their derivatives, which reach further.
+
+With A = I + H and J = det A, the law sees s A, s = (r / J)^(1/k) in k directions, of which r is
+
+    r_p = sum_i N_ip R_i,    R_i = sum_q N_iq V_q J_q / sum_q N_iq V_q.
+
+Of the energy e(A, r) of a point P = de/dA = V0 (tau - p I) A^-T and q = de/dr = V0 p / r, with the
+mean p of the stresses tau along these directions. Nodal forces are the derivatives by
+displacements: P grad N, and V J A^-T grad N times the average of q that belongs to that of r.
+Their derivatives, with S = dR/du,
+
+    K + X^T S + S^T Y + S^T Z S,
+
+are those of each point, and products of matrices of the nodes that it sees: X of dP/dr, Y of dq/dA
+and Z of dq/dr.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from karamelo_py.compiler.compile import index, shared
+from karamelo_py.compiler.fields import load, rows_of_points, store
+from karamelo_py.compiler.held import at_hand
+from karamelo_py.compiler.loops import kernel, noinline
+from karamelo_py.compiler.slopes import seeded, slopes_of, value_of
+from karamelo_py.compiler.tuples import record
+from karamelo_py.kernels.arrays import Block
+from karamelo_py.kernels.implicit import PARTS, gradient_at, points_of
+from karamelo_py.kernels.lanes import lanes_with, points_from
+from karamelo_py.kernels.sweep import by_threads
+from karamelo_py.points.frames import Updated, scaled_increment
+from karamelo_py.points.kinematics import I, det, inv, tensor, vector, zero
+from karamelo_py.points.laws import (
+    advance,
+    initial_state,
+    jacobian,
+    kirchhoff_stress,
+    specific_volume,
+)
+
+
+class Averages(NamedTuple):
+    """What averaging needs of the n points of a block; t components of a tensor."""
+
+    volume: np.ndarray  # (1, n) V
+    grown: np.ndarray  # (1, n) V J
+    cofactors: np.ndarray  # (t, n) V J A^-T
+    ratio: np.ndarray  # (1, n) r
+    pressure: np.ndarray  # (1, n) q
+    mean: np.ndarray  # (1, n) the average of q
+    by_ratio: np.ndarray  # (t, n) dP/dr
+    of_pressure: np.ndarray  # (t, n) dq/dA
+    stiffness: np.ndarray  # (1, n) dq/dr
+
+
+def nothing_averaged(kin: Any, block: Block) -> Averages:
+    """Make the arrays of the points of a block."""
+    n, t = block.points.mass.size, kin.tensor_size
+    return Averages(*(rows_of_points((k, n), np.float64) for k in (1, 1, t, 1, 1, 1, t, t, 1)))
+
+
+@shared
+def cofactors(A):
+    """J A^-T, the derivatives of J."""
+    return det(A) * inv(A).transposed()
+
+
+@noinline
+def _grow(kin, points, laws, response, averages, part):
+    """Volume of each point before and after its increment, and its derivatives."""
+    points, laws = at_hand(points), at_hand(laws)
+    response, averages = at_hand(response), at_hand(averages)
+    for p in range(points_of(points.mass.size, part), points_of(points.mass.size, part + 1)):
+        law = record(laws, index(points.material[p]))
+        mass = points.mass[p]
+        state = load(points.state, p, initial_state(law, kin, mass))
+        A = I + load(response.increment, p, zero(kin, mass))
+        volume = mass * specific_volume(law) * jacobian(law, kin, state)
+        averages.volume[0, p] = volume
+        averages.grown[0, p] = volume * det(A)
+        store(averages.cofactors, p, volume * cofactors(A))
+
+
+@shared
+def averaged_stress(law, kin, state, H, ratio, dt):
+    """P and q per reference volume, after the increment H and a ratio of volumes."""
+    A = I + H
+    dl = scaled_increment(Updated(), kin, H, (), ratio / det(A))
+    tau = kirchhoff_stress(law, kin, advance(law, kin, state, dl, dt))
+    p = tau.mean_of_stretching()
+    return (tau - p * I).nominal(A), p / ratio
+
+
+@noinline
+def _respond(kin, points, laws, dt, response, averages, part):
+    """P and q of each point, and their derivatives."""
+    points, laws = at_hand(points), at_hand(laws)
+    response, averages = at_hand(response), at_hand(averages)
+    lanes = lanes_with((), laws, points.mass)
+    end = points_of(points.mass.size, part + 1)
+    t = kin.tensor_size
+    for q in range(points_of(points.mass.size, part), end, lanes.width):
+        p = points_from(lanes, q, end)
+        law = record(laws, index(points.material[p]))
+        mass = points.mass[p]
+        state = load(points.state, p, initial_state(law, kin, mass))
+        H = load(response.increment, p, zero(kin, mass))
+        (ratio,) = load(averages.ratio, p, (mass,))
+        *by_H, by_ratio = seeded((*H, ratio))
+        P, pressure = averaged_stress(law, kin, state, tensor(kin, by_H), by_ratio, dt)
+        volume = mass * specific_volume(law)
+        slopes = [slopes_of(x, t + 1) for x in P]
+        store(response.stress, p, volume * value_of(P))
+        store(response.tangent, p, tuple([volume * s for row in slopes for s in row[:t]]))
+        store(averages.by_ratio, p, tuple([volume * row[t] for row in slopes]))
+        of_pressure = slopes_of(pressure, t + 1)
+        store(averages.pressure, p, (volume * value_of(pressure),))
+        store(averages.of_pressure, p, tuple([volume * s for s in of_pressure[:t]]))
+        store(averages.stiffness, p, (volume * of_pressure[t],))
+
+
+@kernel
+def keep_averaged_stress(kin, points, laws, response, averages):
+    """P and q of the present state: no place has changed yet."""
+    points, laws = at_hand(points), at_hand(laws)
+    for p in range(points.mass.size):
+        law = record(laws, index(points.material[p]))
+        mass = points.mass[p]
+        state = load(points.state, p, initial_state(law, kin, mass))
+        tau = kirchhoff_stress(law, kin, state)
+        mean = tau.mean_of_stretching()
+        volume = mass * specific_volume(law)
+        none = zero(kin, mass)
+        store(response.increment, p, none)
+        store(response.stress, p, volume * (tau - mean * I).nominal(I + none))
+        averages.pressure[0, p] = volume * mean
+
+
+@noinline
+def _bring_mean(kin, response, averages, part):
+    """Add to P and its derivatives what the average of q makes of them."""
+    response, averages = at_hand(response), at_hand(averages)
+    count = averages.mean.shape[1]
+    for p in range(points_of(count, part), points_of(count, part + 1)):
+        q = averages.mean[0, p]
+        H = load(response.increment, p, zero(kin, q))
+        made = cofactors(I + seeded(H))
+        scale = q * averages.volume[0, p]
+        t = kin.tensor_size
+        for c, x in enumerate(made):
+            response.stress[c, p] += scale * value_of(x)
+            for b, slope in enumerate(slopes_of(x, t)):
+                response.tangent[c * t + b, p] += scale * slope
+
+
+# --- at the nodes -----------------------------------------------------------------------------
+
+
+@noinline
+def _sum_at_nodes(seen, values, sums, part):
+    """Add values (1, n) of points to nodes (m,), by weights."""
+    seen = at_hand(seen)
+    m, width = sums.size, seen.nodes.shape[1]
+    for a in range(m * part // PARTS, m * (part + 1) // PARTS):
+        for e in range(seen.starts[a], seen.starts[a + 1]):
+            p, k = seen.entries[e] // width, seen.entries[e] % width
+            sums[a] += seen.weights[p, k] * values[0, p]
+
+
+@noinline
+def _average(seen, nodes, values, part):
+    """Find the average (1, n) that points have of the values of nodes (m,)."""
+    seen = at_hand(seen)
+    count = seen.nodes.shape[0]
+    for p in range(points_of(count, part), points_of(count, part + 1)):
+        sum_of = 0.0
+        for k in range(seen.nodes.shape[1]):
+            sum_of += seen.weights[p, k] * nodes[seen.nodes[p, k]]
+        values[0, p] = sum_of
+
+
+@noinline
+def _add_slopes(kin, seen, tensors, pairs, out, part):
+    """Add N_a T grad N_b of tensors T (t, n) of points to pairs of nodes, d numbers each."""
+    seen, pairs = at_hand(seen), at_hand(pairs)
+    d = kin.dimension
+    m, width = pairs.codes.size, seen.nodes.shape[1]
+    for a in range(m * part // PARTS, m * (part + 1) // PARTS):
+        for e in range(seen.starts[a], seen.starts[a + 1]):
+            p, k = seen.entries[e] // width, seen.entries[e] % width
+            weight = seen.weights[p, k]
+            T = load(tensors, p, zero(kin, weight))
+            for other in range(width):
+                code = pairs.codes[seen.nodes[p, other]] - pairs.codes[a]
+                at = d * (pairs.first[a] + pairs.rank[a, pairs.middle + code])
+                made = vector(kin, T.dot(gradient_at(kin, seen, p, other)))
+                for j, x in enumerate(made):
+                    out[at + j] += weight * x
+
+
+@noinline
+def _add_products(seen, values, pairs, out, part):
+    """Add N_a N_b times values (1, n) of points to pairs of nodes."""
+    seen, pairs = at_hand(seen), at_hand(pairs)
+    m, width = pairs.codes.size, seen.nodes.shape[1]
+    for a in range(m * part // PARTS, m * (part + 1) // PARTS):
+        for e in range(seen.starts[a], seen.starts[a + 1]):
+            p, k = seen.entries[e] // width, seen.entries[e] % width
+            scale = seen.weights[p, k] * values[0, p]
+            for other in range(width):
+                code = pairs.codes[seen.nodes[p, other]] - pairs.codes[a]
+                at = pairs.first[a] + pairs.rank[a, pairs.middle + code]
+                out[at] += scale * seen.weights[p, other]
+
+
+grow = by_threads(_grow)
+respond_averaged = by_threads(_respond)
+bring_mean = by_threads(_bring_mean)
+sum_at_nodes = by_threads(_sum_at_nodes)
+average = by_threads(_average)
+add_slopes = by_threads(_add_slopes)
+add_products = by_threads(_add_products)
