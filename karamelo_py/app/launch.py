@@ -26,15 +26,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple, TextIO
 
 from karamelo_py.app.leaving import INTERRUPTED, SIGNALLED
-from karamelo_py.run.mpi.comm import (
-    ENDING,
-    FAILED,
-    INSTALL,
-    WELL,
-    MpiComm,
-    handled_signals,
-    launched,
-)
+from karamelo_py.run.mpi import comm as mpi
 from karamelo_py.script.errors import FAILURES, ScriptError, render_message
 
 if TYPE_CHECKING:
@@ -78,17 +70,21 @@ def outcome_of(act: Callable[[], int], *, debugging: bool = False) -> Outcome:
     """Run something and tell how it ends."""
     try:
         return Outcome(act())
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, *FAILURES) as error:
+        return _ended_by(error, debugging=debugging)
+
+
+def _ended_by(error: BaseException, *, debugging: bool) -> Outcome:
+    if isinstance(error, KeyboardInterrupt):
         return Outcome(INTERRUPTED, render_message("error", "interrupted"))
-    except FAILURES as error:
-        # Rich makes a SystemExit of it.
-        if isinstance(error, BrokenPipeError) or isinstance(error.__context__, BrokenPipeError):
-            # Whoever read our output has gone; what was written stays.
-            sys.stderr.close()
-            return Outcome(ERROR)
-        if debugging:
-            traceback.print_exc()
-        return Outcome(ERROR, _rendered(error))
+    # Rich makes a SystemExit of it.
+    if isinstance(error, BrokenPipeError) or isinstance(error.__context__, BrokenPipeError):
+        # Whoever read our output has gone; what was written stays.
+        sys.stderr.close()
+        return Outcome(ERROR)
+    if debugging:
+        traceback.print_exception(error)
+    return Outcome(ERROR, _rendered(error))
 
 
 def _rendered(error: BaseException) -> str:
@@ -123,11 +119,11 @@ def launch(ranks: int, arguments: Sequence[str], module: str = "karamelo_py.app.
             hint=f"mpiexec -n {ranks} karamelo-py SCRIPT",
         )
     if mpiexec is None:
-        raise ScriptError(f"--ranks {ranks}: there is no mpiexec here", hint=INSTALL)
+        raise ScriptError(f"--ranks {ranks}: there is no mpiexec here", hint=mpi.INSTALL)
     try:
         import mpi4py  # noqa: F401
     except ImportError:
-        raise ScriptError(f"--ranks {ranks} needs mpi4py", hint=INSTALL) from None
+        raise ScriptError(f"--ranks {ranks} needs mpi4py", hint=mpi.INSTALL) from None
     command = [mpiexec, "-n", str(ranks), sys.executable, "-m", module, *arguments]
     place = tempfile.gettempdir() if len(tempfile.gettempdir()) < LONGEST_FOLDER else "/tmp"
     with (
@@ -154,7 +150,7 @@ class Launcher:
 
     def run(self) -> int:
         """Start them and see them end; returns the exit status."""
-        with socket.socket(socket.AF_UNIX) as self.door, handled_signals(self._pass_on):
+        with socket.socket(socket.AF_UNIX) as self.door, mpi.handled_signals(self._pass_on):
             self.door.bind(self.name)
             self.door.listen(self.ranks)
             environment = {**OPEN_MPI, **PAGES, **os.environ, SOCKET: self.name}
@@ -280,7 +276,8 @@ class Launcher:
         who = f"process {one['rank'] + 1} of {self.ranks} (pid {one['pid']}) was ended{by}"
         if self.over:
             return render_message("error", f"{who} when the runs were over: all files are complete")
-        hint = "the system does that to who takes too much memory" if sent not in ENDING else None
+        told = sent in mpi.ENDING
+        hint = None if told else "the system does that to who takes too much memory"
         who += ", and the run with it: files are complete up to there"
         return render_message("error", who, hint=hint)
 
@@ -313,7 +310,7 @@ _link: socket.socket | None = None  # to the launcher, where that has started th
 
 def keep_to_oneself() -> None:
     """All processes but the first are silent, and the first reports to its launcher."""
-    size, rank = launched()
+    size, rank = mpi.launched()
     if size > 1:
         _report_to_launcher(rank)
         if rank > 0:
@@ -371,10 +368,10 @@ def has_terminal() -> bool | None:
     return False if "OMPI_COMM_WORLD_SIZE" in os.environ and _link is None else None
 
 
-def together(asked: int | None, run: Callable[[MpiComm], int], *, debugging: bool = False) -> int:
+def together(asked: int | None, run: Callable[[Any], int], *, debugging: bool = False) -> int:
     """Carry out `run` as one of all processes, as many as were `asked` for; returns the status."""
-    size, rank = launched()
-    comm: MpiComm | None = None
+    size, rank = mpi.launched()
+    comm: mpi.MpiComm | None = None
 
     def act() -> int:
         nonlocal comm
@@ -382,10 +379,7 @@ def together(asked: int | None, run: Callable[[MpiComm], int], *, debugging: boo
         return run(comm)
 
     def fail(error: BaseException) -> None:
-        def again() -> int:
-            raise error
-
-        end(*outcome_of(again, debugging=debugging), tells=True, stays=False)
+        end(*_ended_by(error, debugging=debugging), tells=True, stays=False)
 
     def end(status: int, text: str, *, tells: bool, stays: bool) -> int:
         if text and tells:
@@ -414,7 +408,7 @@ def together(asked: int | None, run: Callable[[MpiComm], int], *, debugging: boo
             patience = 0.0
         if comm.at_end:
             patience = inf
-    words = comm.agree(FAILED if status else WELL, patience)
+    words = comm.agree(mpi.FAILED if status else mpi.WELL, patience)
     alone = words is None
     return end(status, text, tells=alone or rank == int(words.argmin()), stays=not alone)
 
@@ -431,15 +425,15 @@ def _signed(text: str, rank: int, size: int) -> str:
     return f"{text}\nin process {rank + 1} of {size}" if text else ""
 
 
-def _join(asked: int | None, ends: Callable[[BaseException], None]) -> MpiComm:
+def _join(asked: int | None, ends: Callable[[BaseException], None]) -> mpi.MpiComm:
     """Join the processes that mpiexec has started; `ends` as of `MpiComm`."""
-    size, _ = launched()
+    size, _ = mpi.launched()
     if asked is not None and asked != size:
         raise ScriptError(
             f"--ranks {asked}: mpiexec has started {size} processes",
             expected="one of the two: mpiexec -n N, or --ranks N",
         )
-    comm = MpiComm(ends)
+    comm = mpi.MpiComm(ends)
     if comm.size != size:
         raise ScriptError(
             f"{size} processes were started, and mpi4py sees {comm.size} of them",
@@ -448,7 +442,7 @@ def _join(asked: int | None, ends: Callable[[BaseException], None]) -> MpiComm:
     return comm
 
 
-def share(hub: Hub, comm: MpiComm) -> None:
+def share(hub: Hub, comm: mpi.MpiComm) -> None:
     """Let all processes step a scene together, of which the first writes. One needs no other."""
     if comm.size > 1:
         hub.settings.comm = comm

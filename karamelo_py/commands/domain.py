@@ -4,10 +4,10 @@ import copy
 from collections.abc import Sequence
 from typing import Literal
 
-from karamelo_py.language import registry, signature
+from karamelo_py.language import registry
 from karamelo_py.language.by_dimension import Forms, number
 from karamelo_py.language.kinds import StyleOf
-from karamelo_py.language.signature import Argument
+from karamelo_py.language.signature import Argument, style_of
 from karamelo_py.language.unknown import SHAPES, filled, in_own_words
 from karamelo_py.scene.domain import Domain, require_domain
 from karamelo_py.scene.group import ALL, KINDS, NOTHING_THERE
@@ -215,8 +215,7 @@ def region(hub: Hub, ID: str, style: StyleOf("region"), *arguments: Argument) ->
     dimension, group, solid
     """
     require_domain(hub)
-    target = registry.called("region", ID, style)
-    hub.regions.add(ID, signature.call(target, hub, list(arguments), f"region {style}"))
+    hub.regions.add(ID, style_of(hub, "region", ID, style, arguments))
 
 
 def _refuse_second(hub: Hub) -> None:
@@ -320,8 +319,7 @@ def solid(hub: Hub, ID: str, kind: StyleOf("solid"), *arguments: Argument) -> No
                 expected="one of " + ", ".join(registry.names("solid")),
                 hint=hint,
             )
-    target = registry.called("solid", ID, kind)
-    new = signature.call(target, hub, list(arguments), f"solid {kind}")
+    new = style_of(hub, "solid", ID, kind, arguments)
     warn_of_coinciding(hub, new, ID)
     hub.solids.add(ID, new)
     hub.update.method.welcome(hub, new)

@@ -4,9 +4,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Literal
 
-from karamelo_py.language import registry, signature
+from karamelo_py.language import registry
 from karamelo_py.language.kinds import StyleOf
-from karamelo_py.language.signature import Argument, Positive
+from karamelo_py.language.signature import Argument, Positive, style_of
 from karamelo_py.language.unknown import longer
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
 from karamelo_py.run.element import COMPONENTS, NORMAL, LoadPath, Point, Response, Unreachable
@@ -108,9 +108,8 @@ temperature = _part(
 def define(hub: Hub, catalogue: Catalogue, ID: str, style: str, arguments: Sequence[Argument]):
     """File under `ID` what the style makes of the arguments; an ID in use is an error first."""
     kind = catalogue.kind
-    target = registry.called(kind, ID, style)
     catalogue.refuse(ID)
-    made = signature.call(target, hub, list(arguments), f"{kind} {style}")
+    made = style_of(hub, kind, ID, style, arguments)
     entry = (Material if kind == "material" else MaterialPart)(kind, style, made)
     check_columns(hub, f"{kind} {style}", entry.law)
     catalogue.add(ID, entry)

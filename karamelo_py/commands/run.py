@@ -11,7 +11,7 @@ from karamelo_py.run.checkpoint import restart_file
 from karamelo_py.run.runner import carry_out
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.script.expressions import Expression
+from karamelo_py.script.expressions import POINT_SEEDS, Expression
 
 OnTrouble = Literal["stop", "halve"]
 
@@ -140,7 +140,7 @@ def run_until(hub: Hub, condition: Expression, *, on_trouble: OnTrouble = "stop"
     --------
     run, run_time, run_while
     """
-    _refuse_constant("run_until", condition)
+    _check("run_until", condition)
     carry_out(hub, condition=condition, until=True, halve=on_trouble == "halve")
 
 
@@ -162,12 +162,18 @@ def run_while(hub: Hub, condition: Expression, *, on_trouble: OnTrouble = "stop"
     --------
     run, run_time, run_until
     """
-    _refuse_constant("run_while", condition)
+    _check("run_while", condition)
     carry_out(hub, condition=condition, until=False, halve=on_trouble == "halve")
 
 
-def _refuse_constant(command: str, condition: Expression) -> None:
-    """A condition that is one number for ever ends the run at once or never."""
+def _check(command: str, condition: Expression) -> None:
+    """Refuse a condition that never changes, or differs from point to point."""
+    if per_point := condition.names & set(POINT_SEEDS):
+        raise ScriptError(
+            f"the condition depends on {min(per_point)}, which differs from point to point",
+            argument="condition",
+            expected="a formula of time, timestep, dt and values of fixes and computes",
+        )
     if condition.is_constant:
         compare = ">=" if command == "run_until" else "<"
         number = 1.0 if isnan(condition.constant) else condition.constant

@@ -159,6 +159,11 @@ def call(target: Callable, hub: Any, arguments: Sequence[Argument], name: str) -
         raise
 
 
+def style_of(hub: Any, family: str, ID: str, style: str, arguments: Sequence[Argument]) -> Any:
+    """Make what a style of a family, called `ID` by the script, makes of its arguments."""
+    return call(registry.called(family, ID, style), hub, arguments, f"{family} {style}")
+
+
 def make(target: Callable, hub: Any, name: str, *values: Any, **named: Any) -> Any:
     """Call a command or make a style with values; a fault of its author is told as such."""
     place = getattr(hub, "place", None)

@@ -17,7 +17,6 @@ from karamelo_py.language.arguments import Named
 from karamelo_py.output.files import savefig, whole
 from karamelo_py.output.plots import blank_figure, tidy
 from karamelo_py.points import laws
-from karamelo_py.points import laws as materials
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space, tensor
 from karamelo_py.script.errors import ScriptError
 
@@ -310,11 +309,11 @@ def columns(point: Point) -> dict[str, Callable[[], float]]:
         found[f"s{name}"] = lambda k=k: point.stress[k]
     found["p"] = lambda: -float(point.stress[:3].sum()) / 3
     found["q"] = lambda: von_mises_stress(point)
-    found["J"] = lambda: materials.jacobian(law, kin, point.state)
-    found["stored"] = lambda: materials.energy_density(law, kin, point.state)
+    found["J"] = lambda: laws.jacobian(law, kin, point.state)
+    found["stored"] = lambda: laws.energy_density(law, kin, point.state)
     found["work"] = lambda: point.work
-    for name, what in materials.columns_of(law).items():
-        found[name] = lambda what=what: materials.shown(what, law, kin, point.state)
+    for name, what in laws.columns_of(law).items():
+        found[name] = lambda what=what: laws.shown(what, law, kin, point.state)
     return found
 
 

@@ -119,7 +119,6 @@ def carry_out(hub: Hub, **length: Any) -> None:
     """
     runner = Runner(hub, **length)
     check_scene(hub)
-    runner.check_condition()
     if hub.rehearsing:
         span = runner.end_time - hub.update.time, inf if runner.steps is None else runner.steps
         if not getattr(hub.update.scheme, "implicit", False):
@@ -187,16 +186,6 @@ class Runner:
         duration = min(self.end_time - simulation.time, steps)
         known_failures.warn(self.hub, simulation, duration, self.rollback.halve)
         known_failures.warn_about_length(self.hub, simulation, self.end_time)
-
-    def check_condition(self) -> None:
-        """Refuse a condition that differs from point to point."""
-        names = self.condition.names if self.condition is not None else frozenset()
-        if per_point := names & {"x", "y", "z", "x0", "y0", "z0"}:
-            raise ScriptError(
-                f"the condition depends on {min(per_point)}, which differs from point to point",
-                argument="condition",
-                expected="a formula of time, timestep, dt and values of fixes and computes",
-            )
 
     def _run(self, simulation: Simulation) -> None:
         hub = self.hub

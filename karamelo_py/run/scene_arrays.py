@@ -20,7 +20,7 @@ from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.further import without_rate
 from karamelo_py.run.access import NodesByNumber, PointsById
 from karamelo_py.run.checkpoint import arrays as checkpoint
-from karamelo_py.run.lower.build import State, lower, thread_count, warms_by_friction
+from karamelo_py.run.lower.build import State, check_scene, lower, thread_count, warms_by_friction
 from karamelo_py.run.lower.check_plugins import try_parts
 from karamelo_py.run.lower.memory import check_room, no_room
 from karamelo_py.run.mpi.subdomain import Subdomain
@@ -63,6 +63,7 @@ class SceneArrays:
         self.nodes = NodesByNumber(self.points)
         self.key = scene_key(hub)
         self.count = sum(s.count for s in hub.solids.values())
+        check_scene(hub)
         check_room(hub, copied=previous is None and hub.running is not None)
         # Processes begin with equal shares of the ids: to sort them hands them over by tiles.
         ends = (self.count * comm.rank // comm.size, self.count * (comm.rank + 1) // comm.size)

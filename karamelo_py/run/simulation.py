@@ -262,27 +262,22 @@ class Simulation(SceneArrays):
                 return DONE
 
     def _advance(self, count: int) -> int:
-        scheme = self.hub.update.scheme
-        if self._first is not None:
-            status = self._run_steps(self._first, 1)
-            if status in (DONE, SORT):
-                self.begun |= set(self._first_fixes)
-                self._first = None
-                self.clear_forces()  # the steps to come may have no hook that does it
-                return SORT  # there is more to do, unless that was all
+        """Take compiled steps; row by row where Python acts between these; or load steps."""
+        scheme, first = self.hub.update.scheme, self._first
+        hooks = first or (self.python if self.python.by_stage else self.hooks)
+        count = count if first is None else 1
+        if self.implicit:
+            status = self.load_steps.advance(hooks, count)
+        elif isinstance(hooks, PythonHooks):
+            status = run_steps(scheme, Staged(), self.mode, self.setup, hooks, count)
+        else:
+            status = advance(scheme, self.visits, self.mode, self.setup, hooks, count)
+        if first is None or status not in (DONE, SORT):
             return status
-        if self.python.by_stage:
-            return self._run_steps(self.python, count)
-        if self.implicit:
-            return self._run_steps(self.hooks, count)
-        return advance(scheme, self.visits, self.mode, self.setup, self.hooks, count)
-
-    def _run_steps(self, hooks: Any, count: int) -> int:
-        """Take steps row by row, with hooks between them; or load steps."""
-        if self.implicit:
-            return self.load_steps.advance(hooks, count)
-        scheme = self.hub.update.scheme
-        return run_steps(scheme, Staged(), self.mode, self.setup, hooks, count)
+        self.begun |= set(self._first_fixes)
+        self._first = None
+        self.clear_forces()  # the steps to come may have no hook that does it
+        return SORT  # there is more to do, unless that was all
 
     @property
     def implicit(self) -> bool:

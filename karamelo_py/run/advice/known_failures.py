@@ -16,18 +16,10 @@ from karamelo_py.language.rules import Advice
 from karamelo_py.output.point_table import COMPONENTS, PointTable
 from karamelo_py.output.units import DENSITY, STRESS, VELOCITY
 from karamelo_py.points.laws import can, constrained_velocity, law_kind, specific_volume
+from karamelo_py.run import timestep
 from karamelo_py.run.advice.facts import SceneFacts, is_zero
 from karamelo_py.run.diagnosis.explain import no_number
 from karamelo_py.run.simulation import Simulation
-from karamelo_py.run.timestep import (
-    blows_up,
-    elastic_speed,
-    fastest_wave,
-    own_step_instead,
-    ruling_limit,
-    step_by_script,
-    what_follows,
-)
 from karamelo_py.scene.group import NOTHING_THERE, NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
@@ -84,7 +76,7 @@ def warn_about_length(hub: Hub, simulation: Any, end_time: float) -> None:
     why, hint = mixed_units(hub, simulation), UNITS
     if hub.update.fixed_dt is not None:
         why, hint = "", "a larger step with set_dt, or an earlier end"
-    elif ruling_limit(simulation) == "conduction":
+    elif timestep.ruling_limit(simulation) == "conduction":
         why = (
             f"heat goes through cells of {hub.domain.h:g} that fast. The units of conductivities, "
             "heat capacities, lengths and times may be mixed"
@@ -95,9 +87,10 @@ def warn_about_length(hub: Hub, simulation: Any, end_time: float) -> None:
 
 def mixed_units(hub: Hub, simulation: Any) -> str:
     """Doubt the units where a step does not fit the numbers of a scene by any means."""
+    speed = timestep.fastest_wave(simulation)
     return (
-        f"waves move at {fastest_wave(simulation):.3g} through cells of {hub.domain.h:g}. The "
-        "units of densities, moduli, lengths and times may be mixed"
+        f"waves move at {speed:.3g} through cells of {hub.domain.h:g}. The units of densities, "
+        "moduli, lengths and times may be mixed"
     )
 
 
@@ -136,9 +129,10 @@ def warn_about_steps(
         asked = step.fixed_dt or (step.dt_factor or 0) * limit
         if step.scene != present.scene or not asked > limit * (1 + 1e-12):
             continue
-        name = step_by_script(step.fixed_dt, step.dt_factor)
+        name = timestep.step_by_script(step.fixed_dt, step.dt_factor)
         command = name.split()[0]
-        words, hint = f"the step {asked:.4g} of {command} is ", own_step_instead(hub, command)
+        words = f"the step {asked:.4g} of {command} is "
+        hint = timestep.own_step_instead(hub, command)
         if asked > BORNE * of_heat and not step.halves:
             words += f"{asked / of_heat:.3g} times the stable one of conduction: "
             words += "temperatures would swing"
@@ -148,7 +142,8 @@ def warn_about_steps(
             words += f"above the stable limit {limit:.4g} of conduction; "
             words += f"beyond {BORNE:g} times that temperatures swing"
         else:
-            words += f"above the stable limit {limit:.4g}{what_follows(hub, simulation, asked)}"
+            words += f"above the stable limit {limit:.4g}"
+            words += timestep.what_follows(hub, simulation, asked)
             if step.fixed_dt and asked > MIXED * limit:
                 words += f"; {mixed_units(hub, simulation)}"
                 hint = f"{UNITS}. If they are as they should be, {hint}"
@@ -176,7 +171,7 @@ def _other_units(s: SceneFacts) -> Iterator[Advice]:
     for solid in s.hub.solids.values() if units else ():
         law = solid.material.law
         density = units.si(DENSITY) / float(specific_volume(law))
-        speed = units.si(VELOCITY) * elastic_speed(s.simulation, solid)[0]
+        speed = units.si(VELOCITY) * timestep.elastic_speed(s.simulation, solid)[0]
         least = min(getattr(kind, "least_density", DENSITIES[0]) for kind in law_kind(law))
         odd = []
         if not least <= density <= DENSITIES[1]:
@@ -200,7 +195,7 @@ def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> Non
     refuse_endless_speeds(hub, simulation)
     scene = SceneFacts(hub, simulation, duration)
     scene.duration += _gone(hub, simulation) + _duration_of_later(hub, simulation)
-    if scene.waves > 0 and blows_up(hub, simulation):
+    if scene.waves > 0 and timestep.blows_up(hub, simulation):
         scene.duration = 0.0  # it never comes so far
     warn_about_steps(hub, simulation, halves)
     _warn_about_precision(scene)

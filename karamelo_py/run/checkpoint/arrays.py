@@ -281,14 +281,11 @@ def rows_at(simulation: Any, nodes: np.ndarray, gather: Callable) -> dict[str, n
 
 def take_tiling(tiling: Tiling, found: Mapping[str, np.ndarray], stem: str) -> Tiling:
     for name, _ in in_use(tiling):
-        _fill(getattr(tiling, name), found, stem + name)
+        array, there = getattr(tiling, name), found.get(stem + name)
+        if there is None or len(there) > len(array):
+            raise _misfit(stem + name)
+        array[: len(there)] = there
     return tiling
-
-
-def _fill(array: np.ndarray, found: Mapping[str, np.ndarray], name: str) -> None:
-    if name not in found or len(found[name]) > len(array):
-        raise _misfit(name)
-    array[: len(found[name])] = found[name]
 
 
 def take_points(points: Points, found: Mapping[str, Any], stem: str) -> Points:

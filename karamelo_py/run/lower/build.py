@@ -21,19 +21,10 @@ from karamelo_py.kernels.table import Insulated
 from karamelo_py.kernels.visit import NodalMean
 from karamelo_py.language.scene import Scene
 from karamelo_py.output.point_table import owners_of_fields
+from karamelo_py.points import laws
 from karamelo_py.points.basis import carried, deformed
 from karamelo_py.points.grid import ReflectingGrid
 from karamelo_py.points.kinematics import Line
-from karamelo_py.points.laws import (
-    can,
-    conductivity,
-    constrained_velocity,
-    heat_capacity,
-    initial_state,
-    law_kind,
-    specific_volume,
-    with_temperature,
-)
 from karamelo_py.points.laws.eos import taken_heat
 from karamelo_py.points.laws.further import with_rate, without_rate
 from karamelo_py.points.laws.temperatures import initial_heat
@@ -87,7 +78,7 @@ def check_scene(hub: Hub) -> None:
     method = hub.update.method
     try:
         method.check(hub)
-        warm = any(can(solid.material.law, initial_heat) for solid in hub.solids.values())
+        warm = any(laws.can(solid.material.law, initial_heat) for solid in hub.solids.values())
         if hub.update.thermal and not warm:
             raise ScriptError(
                 "the method is thermo-mechanical, and no solid has a temperature",
@@ -106,7 +97,7 @@ def check_scene(hub: Hub) -> None:
     if not method.frame.moves or not (deformed.defined(basis) or carried.defined(basis)):
         return
     for solid in hub.solids.values():
-        if can(solid.material.law, constrained_velocity):
+        if laws.can(solid.material.law, laws.constrained_velocity):
             raise ScriptError(
                 f"solid '{solid.id}' is rigid, and the domains of its points would deform",
                 place=solid.place,
@@ -143,9 +134,9 @@ def stable_conduction(hub: Hub) -> float:
     per_cell = hub.update.method.basis.nodes_per_cell
     for solid in hub.solids.values():
         law = solid.material.law
-        kappa = conductivity(law, 1.0)
+        kappa = laws.conductivity(law, 1.0)
         if kappa > 0:
-            capacity = heat_capacity(law, 1.0) / specific_volume(law)
+            capacity = laws.heat_capacity(law, 1.0) / laws.specific_volume(law)
             limits.append((solid.h / per_cell) ** 2 / (4 * hub.domain.dimension) * capacity / kappa)
     return min(limits)
 
@@ -162,7 +153,6 @@ def lower(
     With `ids`, from and to before, only with those points; tiles are those of a process of `comm`.
     """
     comm = comm or hub.settings.comm
-    check_scene(hub)
     method = hub.update.method
     real = PRECISIONS[hub.settings.precision]
     kin = method.kinematics(hub)
@@ -212,7 +202,7 @@ def lower(
     alike: dict[tuple, list] = {}
     for solid in hub.solids.values():
         part = solid if ids is None else part_of(solid, *ids)
-        alike.setdefault(law_kind(solid.material.law), []).append(part)
+        alike.setdefault(laws.law_kind(solid.material.law), []).append(part)
     of_points = fields.declared(owners, "point_fields")
     blocks = (
         arrays.Block(*lower_points(hub, solids, kin, of_points, real), tiles.empty_tiling())
@@ -246,7 +236,7 @@ def returns_loss(hub: Hub) -> bool:
     keeps_all = getattr(transfer, "alpha", 0) == 1 and not keeps_moments(hub)
     if not lost_shares.defined(type(transfer)) or keeps_all:
         return False
-    return any(can(solid.material.law, taken_heat) for solid in hub.solids.values())
+    return any(laws.can(solid.material.law, taken_heat) for solid in hub.solids.values())
 
 
 def warms_by_friction(hub: Hub) -> bool:
@@ -255,7 +245,7 @@ def warms_by_friction(hub: Hub) -> bool:
     rubs = any(
         fix.wall_friction is not None or (on_grid and fix.friction) for fix in hub.fixes.values()
     )
-    return rubs and any(heat_capacity(s.material.law, 1.0) > 0 for s in hub.solids.values())
+    return rubs and any(laws.heat_capacity(s.material.law, 1.0) > 0 for s in hub.solids.values())
 
 
 def lower_nodes(kinds: Iterable[type], kin: NamedTuple, count: int, real: type) -> arrays.Nodes:
@@ -304,7 +294,7 @@ def lower_points(
     if hub.fields.rate_is_asked_for():
         known = [with_rate(law, kin, s.h) for law, s in zip(known, solids, strict=True)]
     laws_of_solids = list(dict.fromkeys(known))
-    laws = law_table(laws_of_solids, real)
+    used = law_table(laws_of_solids, real)
     ends = np.cumsum([s.count for s in solids])
     count = int(ends[-1])
 
@@ -321,9 +311,9 @@ def lower_points(
         return array
 
     def at_rest(solid: Solid, law: NamedTuple) -> np.ndarray:
-        state = initial_state(law, kin, real(1))
+        state = laws.initial_state(law, kin, real(1))
         if solid.T0 is not None:
-            state = with_temperature(law, kin, state, real(solid.T0))
+            state = laws.with_temperature(law, kin, state, real(solid.T0))
         return np.array(flat(state), real)[:, None]
 
     states = (at_rest(s, law_in(k, real)) for s, k in zip(solids, known, strict=True))
@@ -331,7 +321,7 @@ def lower_points(
     here = places if method.frame.moves else places[: kin.dimension]
     x = fields.rows_of_points((2, *here.shape), real)
     x[:] = here
-    elastic = elastic_law(laws)
+    elastic = elastic_law(used)
     own = [kind for kind in kinds if getattr(kind, "needed", lambda law: True)(elastic)]
     points = arrays.Points(
         x=x,
@@ -344,7 +334,7 @@ def lower_points(
         id=joined((np.arange(s.first_id, s.first_id + s.count) for s in solids), np.int64),
         fields=tuple(fields.at_points(kind, kin, count, real) for kind in own),
     )
-    return points, laws
+    return points, used
 
 
 def resumed(block: arrays.Block, previous: State) -> arrays.Block:
@@ -360,7 +350,7 @@ def resumed(block: arrays.Block, previous: State) -> arrays.Block:
 
     take(points.x, previous.places)
     take(points.v, previous.v)
-    take(points.state, previous.laws.get(without_rate(law_kind(block.laws))))
+    take(points.state, previous.laws.get(without_rate(laws.law_kind(block.laws))))
     for one in points.fields:
         take(one.array, previous.fields.get(type(one)))
     present = np.ones(len(points.id), np.bool_)

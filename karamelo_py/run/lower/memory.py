@@ -12,7 +12,7 @@ import numpy as np
 from karamelo_py.kernels import arrays
 from karamelo_py.run.boxes import used
 from karamelo_py.run.checkpoint.arrays import of_nodes
-from karamelo_py.run.lower.build import PRECISIONS, check_scene, lower_points, part_of, point_kinds
+from karamelo_py.run.lower.build import PRECISIONS, lower_points, part_of, point_kinds
 from karamelo_py.run.mpi.partition import occupied
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.machine_memory import machine_memory
@@ -115,7 +115,6 @@ def check_room(hub: Hub, *, copied: bool) -> None:
     count = sum(solid.count for solid in hub.solids.values())
     if count <= FEW or (there := machine_memory(comm.on_machine)) is None:
         return
-    check_scene(hub)
     need = comm.share_here * least_bytes(hub, PRECISIONS[hub.settings.precision], copied)
     if need > there.free:
         # Scenes of before, which point to themselves, stay until someone looks.
