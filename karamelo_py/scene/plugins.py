@@ -91,14 +91,14 @@ def _wrong_hooks(fix: Fix) -> Iterator[str]:
             continue
         if not callable(hook):
             yield f"{moment} is neither a method nor a compiled hook"
-        elif not _takes(hook, 1):
+        elif misfit(hook, 1):
             yield f"{moment} has to take one argument, the view of the group"
     for moment, hook in compiled.items():
         own = ACTS_ON[moment]
         if hook.where != own:
             yield f"{moment} is a moment of {own}, and its hook was made for {hook.where}"
         function, takes = hook.function, len(hook.signature.args)
-        if not _takes(function, takes):
+        if misfit(function, takes):
             given = ", ".join(inspect.signature(function).parameters)
             yield (
                 f"{moment}: {function.__name__} has to take the {takes} arguments of a hook on "
@@ -121,15 +121,15 @@ def _wrong_hooks(fix: Fix) -> Iterator[str]:
         yield "it has more formulas than there are directions, three"
 
 
-def _takes(function: Callable, count: int) -> bool:
-    """Tell if a function can be called with so many arguments."""
+def misfit(function: Callable, count: int) -> str:
+    """Say why a function cannot be called with so many arguments, if that is so."""
     try:
         inspect.signature(getattr(function, "py_func", function)).bind(*range(count))
-    except TypeError:
-        return False
+    except TypeError as error:
+        return str(error)
     except ValueError:  # it has no signature
-        return True
-    return True
+        pass
+    return ""
 
 
 def check_part(hub: Scene, name: str, part: Any) -> None:
@@ -235,12 +235,10 @@ def foreign_parts(hub: Scene) -> list[PartInUse]:
     """List the parts of a scene that plug-ins brought."""
     update, method = hub.update, hub.update.method
     parts = [
-        PartInUse(f"{family} {item.style}", type(item), item.place)
-        for family, items in (("fix", hub.fixes), ("compute", hub.computes), ("dump", hub.dumps))
-        for item in items.values()
+        PartInUse(f"{of.kind} {item.style}", type(getattr(item, "law", item)), item.place)
+        for of in (hub.fixes, hub.computes, hub.dumps, hub.materials, *hub.parts.values())
+        for item in of.values()
     ]
-    for named in (hub.materials, *hub.parts.values()):
-        parts += [PartInUse(f"{p.kind} {p.style}", type(p.law), p.place) for p in named.values()]
     tags = [("scheme", update.scheme, update.scheme_place)]
     if method is not None:
         own = {"transfer": update.transfer, "basis": method.basis, "method": method}

@@ -66,6 +66,8 @@ class EdgeFix(PointForces):
         ID of a region: that of a solid, or one that ends where the solid does.
     """
 
+    side: int | None = None  # of `SIDES`, or all of them
+
     def __init__(self, hub: Hub, group: ParticleGroup, region: Region):
         super().__init__(hub, group)
         self.region = region
@@ -86,10 +88,6 @@ class EdgeFix(PointForces):
                 self.hub.warn(
                     f"no point of the group lies at this edge of region '{self.region.id}'"
                 )
-
-    def chosen(self, faces: Faces) -> np.ndarray:
-        """Tell of each face if it is loaded: (m,) bool."""
-        raise NotImplementedError
 
     def loads(self, faces: Faces) -> np.ndarray:
         """The force (m, d) on each face."""
@@ -118,7 +116,10 @@ class EdgeFix(PointForces):
 
     def _find(self, ids: np.ndarray) -> Faces:
         found = faces_on(self.hub, self.region, ids)
-        return found.some(self.chosen(found))
+        loaded = found.area > 0  # not the axis
+        if self.side is not None:
+            loaded &= 2 * found.axis + (found.sign > 0) == self.side
+        return found.some(loaded)
 
 
 class EdgeTraction(EdgeFix):
@@ -162,11 +163,8 @@ class EdgeTraction(EdgeFix):
         *traction: Expression | None,
     ):
         super().__init__(hub, group, region)
-        self.axis, self.sign = SIDES.index(side) // 2, 1 if side.endswith("hi") else -1
+        self.side = SIDES.index(side)
         self.traction = per_direction(hub, "t", traction)
-
-    def chosen(self, faces: Faces) -> np.ndarray:
-        return (faces.axis == self.axis) & (faces.sign == self.sign)
 
     def loads(self, faces: Faces) -> np.ndarray:
         x = faces.middle
@@ -203,9 +201,6 @@ class EdgePressure(EdgeFix):
     def __init__(self, hub: Hub, group: ParticleGroup, region: Region, p: Expression):
         super().__init__(hub, group, region)
         self.p = p
-
-    def chosen(self, faces: Faces) -> np.ndarray:
-        return faces.area > 0  # not the axis
 
     def loads(self, faces: Faces) -> np.ndarray:
         force = np.zeros(faces.middle.shape)

@@ -17,6 +17,7 @@ from karamelo_py.language.signature import Argument
 from karamelo_py.scene.group import AnyGroup, NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
+from karamelo_py.scene.plugins import misfit
 from karamelo_py.script.errors import FAILURES, ScriptError, nearest
 
 MOMENTS = tuple(STAGES)
@@ -147,7 +148,12 @@ class Python(Fix):
                 argument="moment",
                 expected=f"one of {', '.join(fit)}",
             )
-        _check_arguments(function)
+        if wrong := misfit(function, 1):
+            raise ScriptError(
+                f"{_name(function)} cannot be called with one argument: {wrong}",
+                argument="function",
+                expected="a function of one argument, the points or nodes of the group",
+            )
         super().__init__(hub, group)
         self.function = function
         self.keeper = Keeper(function)
@@ -272,17 +278,3 @@ def _sum_of(value: Any) -> int:
 
 def _name(function: Any) -> str:
     return getattr(function, "__name__", type(function).__name__)
-
-
-def _check_arguments(function: Any) -> None:
-    """Refuse a function that cannot be called with the view alone."""
-    try:
-        inspect.signature(function).bind(None)
-    except TypeError as error:
-        raise ScriptError(
-            f"{_name(function)} cannot be called with one argument: {error}",
-            argument="function",
-            expected="a function of one argument, the points or nodes of the group",
-        ) from None
-    except ValueError:  # nobody knows what it takes
-        pass
