@@ -48,11 +48,10 @@ class Catalogue(dict):
             )
 
     def __missing__(self, ID: str) -> Any:
-        always = ["all"] if self.kind == "group" else []
-        known = ", ".join([*always, *self])
+        known = [*["all"] * (self.kind == "group"), *self]
         other = next((c.kind for c in self.hub.catalogues if ID in c and c.kind != self.kind), None)
         below = line_below(self.hub.interpreter, self.kind, ID)
-        hint = meant(ID, [*always, *self])
+        hint = meant(ID, known)
         if self.kind == "group" and other in ("region", "solid"):
             who = f"{ID}, all" if other == "region" else f"regionID, solid, {ID}"
             hint = f"group({ID}, particles, region, {who}) makes a group of a {other}"
@@ -60,7 +59,7 @@ class Catalogue(dict):
             hint = f"{self.kind} '{ID}' stands further down: move line {below} up"
         raise ScriptError(
             f"unknown {self.kind} '{ID}'" + (f"; '{ID}' is a {other}" if other else ""),
-            expected=f"one of {known}" if known else f"no {self.kind} is defined yet",
+            expected=f"one of {', '.join(known)}" if known else f"no {self.kind} is defined yet",
             hint=hint,
         )
 
@@ -129,18 +128,14 @@ class Update:
     def words(self) -> str:
         """Method, transfer, basis and scheme, as a script calls them."""
         scheme = _with_numbers(registry.name_of("scheme", type(self.scheme)), self.scheme)
-        heat = ["thermo-mechanical"] if self.thermal else []
-        return " ".join([self.words_of_state, scheme, *heat])
+        return f"{self.words_of_state} {scheme}" + " thermo-mechanical" * self.thermal
 
     @property
     def words_of_state(self) -> str:
         """Method, transfer and basis: a state that another scheme has left fits them."""
-        words = [
-            registry.name_of("method", type(self.method)),
-            _with_numbers(registry.name_of("transfer", type(self.transfer)), self.transfer),
-            _with_numbers(self.method.basis_name, self.method.basis),
-        ]
-        return " ".join(words)
+        method = registry.name_of("method", type(self.method))
+        transfer = _with_numbers(registry.name_of("transfer", type(self.transfer)), self.transfer)
+        return f"{method} {transfer} {_with_numbers(self.method.basis_name, self.method.basis)}"
 
     @property
     def step(self) -> int:

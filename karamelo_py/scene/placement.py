@@ -233,8 +233,8 @@ def fill(
         x = x0.candidates(begin, end)
         if rule == "cut":
             left.append(clip(region, x, h / ppc, begin * len(places)))
-        if rule == "cut" and not counted:
-            continue
+            if not counted:
+                continue
         kept = region.inside(x)
         in_domain = domain.contains(x)
         if counted:

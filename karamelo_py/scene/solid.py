@@ -149,12 +149,11 @@ class Solid(Named):
         return self.places[:]
 
     def x0_of(self, numbers: np.ndarray) -> np.ndarray:
-        """(n, d) reference positions of some points, in any order, without those of the others."""
-        found, order = np.empty((len(numbers), self.domain.dimension)), np.argsort(numbers)
-        for begin in range(0, len(order), CHUNK):
-            rows = order[begin : begin + CHUNK]
-            first, last = numbers[rows[0]], numbers[rows[-1]]
-            found[rows] = self.places[first : last + 1][numbers[rows] - first]
+        """(n, d) reference positions of some points, ascending, without those of the others."""
+        found = np.empty((len(numbers), self.domain.dimension))
+        for begin in range(0, len(numbers), CHUNK):
+            some = numbers[begin : begin + CHUNK]
+            found[begin : begin + CHUNK] = self.places[some[0] : some[-1] + 1][some - some[0]]
         return found
 
     def pieces(self) -> Iterator[tuple[int, np.ndarray]]:

@@ -176,10 +176,8 @@ def _said(other: Any, axes: list[int], ids: np.ndarray) -> dict[str, Any]:
 
 def _shared(simulation: Any, other: Any, fix: Any) -> np.ndarray:
     """Ids of the points that both act on."""
-    mine = np.zeros(simulation.count, np.bool_)
-    mine[simulation.points.members(fix.group)] = True
     ids = simulation.points.members(other.group)
-    return ids[mine[ids]]
+    return ids[fix.group.has(ids)]
 
 
 def _differ(simulation: Any, other: Any, fix: Any, axis: int, ids: np.ndarray) -> bool:

@@ -19,6 +19,11 @@ VARIANTS = {"R4": R4, "Q4": Q4, "T3": T3, "R8": R8, "H8": H8, "Tet4": Tet4}
 class Convected(Method):
     """A method whose points have domains that deform with them (CPDI).
 
+    Parameters
+    ----------
+    variant
+        The shape of the domains.
+
     Attributes
     ----------
     variants
@@ -88,11 +93,6 @@ class ULCPDI(Convected, ULMPM):
     ``T3`` and ``Tet4``
         the triangles and tetrahedra of a mesh, whose corners move with the grid.
 
-    Parameters
-    ----------
-    variant
-        The shape of the domains.
-
     Example
     -------
     method(ulcpdi, FLIP, linear, 1, R4)
@@ -105,11 +105,6 @@ class TLCPDI(Convected, TLMPM):
 
     Domains keep their initial shape, so that none tangles; weights never change. Solids do not see
     each other on the grid. The variants are those of ulcpdi.
-
-    Parameters
-    ----------
-    variant
-        The shape of the domains.
 
     Example
     -------
