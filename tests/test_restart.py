@@ -21,7 +21,10 @@ from going_on import CURVE, FLY, OUTPUTS, SCENES, SERIAL, arrays, goes_on, same_
 from scenes import block
 
 from karamelo_py.language import registry
+from karamelo_py.run.checkpoint.arrays import opened
 from karamelo_py.run.checkpoint.parts import give_state, state_of
+from karamelo_py.run.checkpoint.restart_file import Restart
+from karamelo_py.script.errors import ScriptError
 
 # --- every way to compute -----------------------------------------------------------------------
 
@@ -399,6 +402,48 @@ def test_no_file_to_go_on_from(run_interpreted, content):
     assert says.get(content, "is no file that this program can go on") in result.err
     assert result.err.count("error:") == 1
     assert (folder / "log.mpm").read_text().count("\n") == 6  # nothing was begun anew
+
+
+def test_what_has_been_altered_is_refused(tmp_path, run_interpreted):
+    """Wherever a bit of a file is turned: nothing is read, or what was written."""
+    path = run_interpreted(with_files(FLY)).folder / "r.2.h5"
+    written, content = path.read_bytes(), read(path)
+    altered, refused, places = tmp_path / "altered.h5", 0, range(5, len(written), 997)
+    for place in places:
+        bits = bytearray(written)
+        bits[place] ^= 1 << place % 8
+        altered.write_bytes(bits)
+        try:
+            found = read(altered)
+        except ScriptError:
+            refused += 1
+            continue
+        assert found.keys() == content.keys(), place
+        for name, array in content.items():
+            np.testing.assert_array_equal(found[name], array, f"{name} {place}")
+    # What is free in a file may change.
+    assert refused > len(places) / 4
+
+
+def read(path: Path) -> dict[str, np.ndarray]:
+    """All of a file to go on from, as the program reads it."""
+    restart = Restart(path)
+    with opened(path) as state:
+        found = {name: array[()] for name, array in state.items()}
+    return found | {"content": np.array(json.dumps(restart.content))}
+
+
+@pytest.mark.parametrize(
+    ("name", "number"), [("material", 1_000_000), ("grid", -1), ("id", 999), ("grid", 7)]
+)
+def test_numbers_that_the_scene_does_not_have(run_interpreted, name, number):
+    """Somebody has changed an array with a tool for HDF5, whose checksum is right."""
+    folder = run_interpreted(with_files(FLY)).folder
+    with h5py.File(folder / "r.2.h5", "r+") as file:
+        file[f"state/points/0/{name}"][3] = number
+    result = run_interpreted(FLY, "-restart", "r.2.h5", status=1)
+    assert f"its state is not one of this scene: points/0/{name} has" in result.err
+    assert str(number) in result.err
 
 
 def test_a_file_in_a_folder_below_is_shown(run_interpreted):

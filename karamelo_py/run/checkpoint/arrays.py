@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.compiler.fields import as_rows_of_points, is_kept, name_of, rows_of_points
+from karamelo_py.compiler.tuples import flat
 from karamelo_py.kernels.arrays import Nodes, Points, Tiling, arrays_of
 from karamelo_py.kernels.totals import WORK, carry
 from karamelo_py.output.fields import PIECE
@@ -209,6 +210,7 @@ def restore(simulation: Any, state: Mapping[str, Any]) -> None:
 def take_snapshot(simulation: Any, path: Path) -> dict[str, np.ndarray]:
     """Read the snapshot that a file holds; each process reads its own share."""
     with opened(path, "good") as found:
+        check_numbers(simulation, found)
         if simulation.subdomain is not None:
             return own_share(simulation, found)
         # In the order in which copies are made, and written.
@@ -222,6 +224,7 @@ def take_stored(simulation: Any, path: Path) -> None:
         # Nothing of the arrays changes where the file is of another scene.
         for k, block in enumerate(simulation.setup.blocks):
             check_points(block.points, state, f"points/{k}/")
+        check_numbers(simulation, state)
         shared = simulation.subdomain is not None
         restore(simulation, own_share(simulation, state) if shared else state)
         simulation.present[:] = _checked(state, "present", simulation.present)
@@ -315,6 +318,26 @@ def check_points(points: Points, found: Mapping[str, Any], stem: str) -> None:
         like = like[0] if name == "x" and len(array.shape) == 2 else like
         if array.dtype != like.dtype or array.shape != (*like.shape[:-1], there["id"].size):
             raise _misfit(f"{name} of points")
+
+
+def check_numbers(simulation: Any, found: Mapping[str, Any]) -> None:
+    """Refuse numbers of points, materials, grids and nodes that the scene does not have."""
+    s, count = simulation.setup, simulation.hub.fields.node_count
+    ends = {"node numbers": count, "touched/nodes": count}
+    for k, block in enumerate(s.blocks):
+        points, tiling = f"points/{k}/", f"tiling/{k}/"
+        ends[points + "material"] = len(flat(block.laws)[0])
+        ends[points + "id"] = simulation.count
+        ends[points + "grid"] = ends[tiling + "grid"] = len(s.grids.x0)
+        ends[tiling + "range"] = found[points + "id"].size + 1
+    for name in ends.keys() & found.keys():
+        array, end = found[name], ends[name]
+        for first in range(0, len(array), PIECE):
+            some = array[first : first + PIECE]
+            if some.min() < 0 or some.max() >= end:
+                raise _misfit(
+                    f"{name} has {some.min()} to {some.max()}, and is from 0 to {end - 1}"
+                )
 
 
 def remembered_at(simulation: Any, spans: np.ndarray) -> list[np.ndarray]:

@@ -18,18 +18,26 @@ from karamelo_py import __version__
 from karamelo_py.language.replay import Record, Replay
 from karamelo_py.output.files import whole
 from karamelo_py.output.rhythm import ByTime, Rhythmic
-from karamelo_py.run.checkpoint.arrays import Stored, reading, stored, take_snapshot, take_stored
+from karamelo_py.run.checkpoint.arrays import (
+    Stored,
+    reading,
+    stored,
+    take_snapshot,
+    take_stored,
+    wholes,
+)
 from karamelo_py.run.checkpoint.parts import PartStates, parts_of
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
-FORMAT, VERSION = "karamelo-py restart", 8
+FORMAT, VERSION = "karamelo-py restart", 9
 OURS = "a file that restart or write_restart of karamelo-py has written"
 CONTENT = (
     "within", "statements", "values of statements", "presets", "variables", "runs", "scene",
     "values", "begun", "parts", "run",
 )  # fmt: skip
-FLAT = {"track_times": False}
+# From this version on, HDF5 keeps a checksum of how a file is laid out.
+CHECKED = "v110"
 
 
 class Restarts(Rhythmic):
@@ -95,15 +103,15 @@ def _write(hub: Hub, path: Path, within: bool, run: Any, groups: dict[str, Itera
         "run": run and [run.halvings, run.returns, run.point.step if "good" in groups else None],
         **{name: [[*key, of] for key, of in one.parts.items()] for name, one in states.items()},
     }
-    with whole(path) as out, h5py.File(out, "w") as root:
+    with whole(path) as out, h5py.File(out, "w", libver=CHECKED) as root:
         root.attrs["format"], root.attrs["version"] = FORMAT, VERSION
         root.attrs["program"] = __version__
         root.attrs["step"], root.attrs["time"] = hub.update.step, hub.update.time
         text = json.dumps(content, default=lambda late: late.plain()).encode()
-        root.create_dataset("content", data=np.frombuffer(text, np.uint8), **FLAT)
+        _put(root, wholes({"content": np.frombuffer(text, np.uint8)}))
         for name, one in states.items():
-            for k, array in enumerate(one.arrays):
-                root.create_dataset(f"{name}/{k}", data=array, **FLAT)
+            if one.arrays:
+                _put(root.create_group(name), wholes({str(k): a for k, a in enumerate(one.arrays)}))
         for name, found in groups.items():
             _put(root.create_group(name), found)
 
@@ -111,11 +119,12 @@ def _write(hub: Hub, path: Path, within: bool, run: Any, groups: dict[str, Itera
 def _put(group: Any, found: Iterator[Stored]) -> None:
     begun: dict[str, Any] = {}
     for name, shape, where, array in found:
+        how = {"track_times": False, "fletcher32": 0 not in shape and shape != ()}
         if array.shape == shape and array.size and name not in begun:
-            group.create_dataset(name, data=array, **FLAT)  # in half the time
+            group.create_dataset(name, data=array, **how)  # in half the time
             continue
         if name not in begun:
-            begun[name] = group.create_dataset(name, shape, array.dtype, **FLAT)
+            begun[name] = group.create_dataset(name, shape, array.dtype, **how)
         if array.size:
             begun[name][where] = array
 
