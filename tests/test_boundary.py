@@ -209,8 +209,9 @@ def test_groups_and_computes_go_on_without_the_deleted(run_interpreted):
             "delete",
             "compute(v, average_velocity, all)",
             "compute(far, max_position, all)",
+            "compute(near, min_position, all)",
             "compute(Ek, kinetic_energy, all)",
-            "log_modify(custom, step, v_x, far_x, Ek)",
+            "log_modify(custom, step, v_x, far_x, near_x, Ek)",
             "set_output(10)",
             "run(28)",
         )
@@ -218,6 +219,7 @@ def test_groups_and_computes_go_on_without_the_deleted(run_interpreted):
     log, last = read_log(result.folder / "log.mpm"), result.dump("d.28.LAMMPS")
     assert log.v_x[-1] == pytest.approx(last.vx.mean(), rel=1e-8)
     assert log.far_x[-1] == pytest.approx(last.x.max(), rel=1e-8)
+    assert log.near_x[-1] == pytest.approx(last.x.min(), rel=1e-8)
     energy = 0.5 * last.mass @ (last.vx**2 + last.vy**2)
     assert log.Ek[-1] == pytest.approx(energy, rel=1e-8)
     assert len(read_dump(result.folder / "d.28.LAMMPS")) == 1

@@ -110,6 +110,60 @@ def test_commands_as_methods(interpreted, run_interpreted, tmp_path):
         assert (tmp_path / "files" / name).read_bytes() == content
 
 
+def test_what_is_assigned_is_done_or_refused(interpreted, tmp_path):
+    """Variables and columns of points; nothing is passed over in silence."""
+    interpreted("""
+        import numpy as np
+        import pytest
+        sim = Simulation(SCENE.replace("fix(v", "#"), N=3)
+        sim.variables["q"] = 0
+        sim.variables["w"] = "2*x"
+        assert sim.variables["q"] == 0 and sim.evaluate("q + 1") == 1
+        assert sim.variables == {"N": 3, "q": 0, "w": "2*x"}
+        with pytest.raises(SimulationError, match="has given 'N'"):
+            sim.variables["N"] = 4
+        with pytest.raises(SimulationError, match="'sin x'|name"):
+            sim.variables["sin x"] = 4
+        with pytest.raises(SimulationError, match="stays"):
+            del sim.variables["q"]
+
+        x = sim.points["x"]
+        with pytest.raises(ValueError, match="read-only"):
+            x[:] = 0
+        with pytest.raises(ValueError, match="read-only"):
+            sim.points["x"][3] += 1
+        sim.points["vx"] = np.sin(9 * x)
+        sim.points["vy"] = 0.1
+        assert (sim.points["vx"] == np.sin(9 * x)).all() and (sim.points["vy"] == 0.1).all()
+        # As by the fix of the same formula.
+        other = Simulation(SCENE)
+        sim.run(3), other.run(3)
+        assert sim.log["Step"].size == 4
+        np.testing.assert_allclose(sim.points["s11"], other.points["s11"], rtol=1e-9, atol=1e-12)
+        sim.points["x"] = sim.points["x"] + 0.2
+        assert np.ptp(sim.points["x"] - other.points["x"]) < 1e-12
+        sim.run(3), other.run(3)
+        np.testing.assert_allclose(sim.points["x"], other.points["x"] + 0.2, rtol=1e-9)
+        np.testing.assert_allclose(sim.points["s11"], other.points["s11"], rtol=1e-6, atol=1e-9)
+        for name, values, says in (
+            ("x", 9, "'x' is from 0 to 1.2"),
+            ("vx", np.nan, "'vx' has numbers that are not finite"),
+            ("vx", [1, 2], r"one for each of 24 points, not an array of the shape \\(2,\\)"),
+            ("seq", 0, "'seq' cannot be set: it follows from other columns"),
+            ("z", 0, "'z' cannot be set"),
+            ("s11", 0, "'s11' follows from the deformation"),
+        ):
+            with pytest.raises(SimulationError, match=says):
+                sim.points[name] = values
+        linear = Simulation(SCENE.replace("neo-hookean", "linear").replace("fix(v", "#"))
+        linear.points["s12"] = 3 * x
+        np.testing.assert_allclose(linear.points["s12"], 3 * x)
+        assert (linear.points["s11"] == 0).all()
+        linear.show("s12", file="shown.png")
+    """)
+    assert (tmp_path / "shown.png").read_bytes()[1:4] == b"PNG"
+
+
 def test_functions_in_python(interpreted):
     """A force of the weight is the weight; a velocity that nodes are given is kept."""
     interpreted("""

@@ -10,7 +10,7 @@ import re
 import sys
 import warnings
 from argparse import ArgumentTypeError
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, MutableMapping
 from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
@@ -26,6 +26,7 @@ from karamelo_py.output.console import Console
 from karamelo_py.run.mpi.comm import launched
 from karamelo_py.run.runner import Interrupted
 from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.views import set_columns
 from karamelo_py.script.errors import NoItem, Pause, Quit, ScriptError, nearest, nearest_few
 from karamelo_py.script.expressions import Expression, shown
 from karamelo_py.script.parser import parse, parse_text
@@ -62,7 +63,7 @@ class Quiet(Console):
 
 
 class Columns(Mapping):
-    """Columns by name: arrays of numbers."""
+    """Columns by name: arrays of numbers, which cannot be written to."""
 
     def __init__(self, names: Callable[[], list[str]], column: Callable[[str], np.ndarray]):
         self._names = names
@@ -75,7 +76,11 @@ class Columns(Mapping):
             hint = f"did you mean {' or '.join(map(repr, close))}? " if close else ""
             raise NoItem(f"there is no '{name}'; {hint}there are {', '.join(names) or 'none'}")
         with _as_simulation_error():
-            return self._column(name)
+            found = self._column(name)
+        if isinstance(found, np.ndarray):
+            found = found.view()
+            found.flags.writeable = False
+        return found
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._names())
@@ -91,6 +96,62 @@ class Columns(Mapping):
         import pandas
 
         return pandas.DataFrame(dict(self))
+
+
+class PointColumns(Columns):
+    """Columns of the points: ``points["vx"] = values`` sets one between two runs.
+
+    x, y, z, velocities, stresses (of materials in rate form) and fields of parts can be set, to a
+    number or to one for each point (n,); others follow from these.
+    """
+
+    def __init__(self, hub: Hub):
+        super().__init__(hub.fields.particle_names, hub.fields.particle)
+        self._hub = hub
+
+    def __setitem__(self, name: str, values: Any) -> None:
+        with _as_simulation_error():
+            if self._hub.running is not None:
+                raise ScriptError(
+                    f"points['{name}'] cannot be set within a run",
+                    hint="between two runs, or by the argument of the function of fix python",
+                )
+            set_columns(self._hub.simulation, {name: values})
+
+
+class Variables(MutableMapping):
+    """The variables of a script: numbers, texts of formulas; ``variables["q"] = 0`` is q = 0."""
+
+    def __init__(self, sim: Simulation):
+        self._sim = sim
+
+    def _held(self) -> dict[str, Any]:
+        return self._sim._interpreter.variables
+
+    def __getitem__(self, name: str) -> Any:
+        value = self._held()[name]
+        return value if isinstance(value, (float, str)) else shown(value)
+
+    def __setitem__(self, name: str, value: Any) -> None:
+        if name in self._sim._interpreter.presets:
+            raise SimulationError(
+                f"Simulation(..., {name}=...) has given '{name}', which takes the place of what is "
+                "assigned later",
+                hint="another simulation with another value",
+            )
+        self._sim._do(f"{name} = {_as_script_text(value)}", "Simulation.variables")
+
+    def __delitem__(self, name: str) -> None:
+        raise SimulationError(f"'{name}' stays: a script forgets no variable")
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._held())
+
+    def __len__(self) -> int:
+        return len(self._held())
+
+    def __repr__(self) -> str:
+        return repr(dict(self))
 
 
 class ShownPicture:
@@ -318,9 +379,12 @@ class Simulation:
     # -- what there is to see ---------------------------------------------------------------------
 
     @property
-    def points(self) -> Columns:
-        """Columns of the points by name (x, vy, s11, seq ...): arrays (n,) in the order of ids."""
-        return Columns(self.hub.fields.particle_names, self.hub.fields.particle)
+    def points(self) -> PointColumns:
+        """Columns of the points by name (x, vy, s11, seq ...): arrays (n,) in the order of ids.
+
+        ``sim.points["vx"] = values`` sets one between two runs.
+        """
+        return PointColumns(self.hub)
 
     @property
     def nodes(self) -> Columns:
@@ -350,12 +414,19 @@ class Simulation:
         return Columns(self.hub.values.names, read)
 
     @property
-    def variables(self) -> dict[str, Any]:
-        """The variables of the script: numbers, and texts of formulas."""
-        found = self._interpreter.variables
-        return {n: v if isinstance(v, (float, str)) else shown(v) for n, v in found.items()}
+    def variables(self) -> Variables:
+        """The variables of the script; ``sim.variables["q"] = 0`` is the line q = 0."""
+        return Variables(self)
 
-    def show(self, field: str | None = None, width: float = 6, height: float = 4.5, **look: Any):
+    def show(
+        self,
+        field: str | None = None,
+        width: float = 6,
+        height: float = 4.5,
+        *,
+        file: str | PathLike | None = None,
+        **look: Any,
+    ) -> ShownPicture:
         """Draw a picture of the points, coloured by a column (or by solid), which a notebook shows.
 
         Parameters
@@ -364,6 +435,8 @@ class Simulation:
             Column of the points, such as seq.
         width, height
             Size in inches.
+        file
+            Write it there, too (PNG).
         look
             As dump pyplot: vmin, vmax, cmap, azimuth, elevation, axes, title.
         """
@@ -375,9 +448,12 @@ class Simulation:
             (call,) = parse(f"show({words})", "Simulation.show")
             arguments = [signature.Argument(raw, self._interpreter) for raw in call.arguments]
             dump = signature.call(PyPlot, self.hub, arguments, "dump pyplot")
-            file = io.BytesIO()
-            dump.draw(file)
-        return ShownPicture(file.getvalue())
+            drawn = io.BytesIO()
+            dump.draw(drawn)
+        picture = ShownPicture(drawn.getvalue())
+        if file is not None:
+            picture.save(file)
+        return picture
 
     def close(self) -> None:
         """Close its files; a further run would begin the log anew."""

@@ -6,7 +6,7 @@ by assignment or in place, is written back when it returns; what cannot be chang
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from itertools import pairwise
 from typing import Any
 
@@ -19,10 +19,18 @@ from karamelo_py.kernels.heat import Supply, Temperature
 from karamelo_py.kernels.hook_loop import corners_that_move
 from karamelo_py.kernels.laws import elastic_law
 from karamelo_py.kernels.p2g import Force
-from karamelo_py.output.point_table import VECTORS, Part, PointTable, Rows, places_before
+from karamelo_py.output.point_table import (
+    AXES,
+    VECTORS,
+    Part,
+    PointTable,
+    Rows,
+    declared_columns,
+    places_before,
+)
 from karamelo_py.points.laws import can, with_stress
 from karamelo_py.points.transfers import Moment
-from karamelo_py.script.errors import NoItem, nearest
+from karamelo_py.script.errors import NoItem, ScriptError, nearest
 
 
 class Shown:
@@ -401,10 +409,63 @@ class PointsView(View):
                 stress[rows] = values[own]
                 impose_stress(s.kin, like, points, block.laws, chosen, flags, stress)
 
+    def set_column(self, name: str, values: np.ndarray) -> None:
+        """Set a column of dumps to `values` (n,): a place, velocity, stress, or field of a part."""
+        d, hub = self._simulation.kin.dimension, self._simulation.hub
+        attribute, k = VECTORS.get(name, ("", 0))
+        kind, column = declared_columns(hub, "point_fields").get(name, (None, 0))
+        if attribute in ("position", "velocity") and k < d:
+            lo, hi = hub.domain.lo[k], hub.domain.hi[k]
+            if attribute == "position" and ((values < lo) | (values > hi)).any():
+                raise ScriptError(f"'{name}' is from {lo:g} to {hi:g}, the edges of the domain")
+            getattr(self, attribute)[:, k] = values
+        elif kind is not None:
+            self[kind][:, column] = values
+        elif name[0] == "s" and name[1:] in self._simulation.kin.symmetric_names:
+            if not all(can(elastic_law(part.block.laws), with_stress) for part in self._rows.parts):
+                raise ScriptError(
+                    f"'{name}' follows from the deformation of a material of this scene",
+                    expected="materials in rate form, such as linear or eos-strength",
+                )
+            self.set_stress({name[1:]: values})
+        else:
+            raise ScriptError(
+                f"'{name}' cannot be set: it follows from other columns",
+                expected=f"{', '.join(AXES[:d])}, v{', v'.join(AXES[:d])}, s11 and the like, or a "
+                "column of a field of a part",
+            )
+        self.write_back()
+
     @Shown
     def reference_position(self) -> np.ndarray:
         """(n, d) positions before the first step; read only."""
         return places_before(self._simulation.hub, self.ids)
+
+
+def set_columns(simulation: Any, given: Mapping[str, Any], ids: np.ndarray | None = None) -> None:
+    """Set columns of points (of these ids from 0, or all of the scene) between two steps.
+
+    Values are numbers, or one for each point.
+
+    Raises
+    ------
+    ScriptError
+        For a column that follows from others, values of another shape, or that are not finite.
+    """
+    present = simulation.present
+    ids = np.arange(len(present)) if ids is None else ids
+    view = PointsView(simulation, ids[present[ids]], then=False)
+    for name, values in given.items():
+        array = np.asarray(values, float)
+        if array.shape not in ((), ids.shape):
+            raise ScriptError(f"'{name}' is a number, or one for each of {len(ids)} points, not an "
+                              f"array of the shape {array.shape}")  # fmt: skip
+        if not np.isfinite(array).all():
+            raise ScriptError(f"'{name}' has numbers that are not finite")
+        view.set_column(name, np.broadcast_to(array, ids.shape)[present[ids]])
+    if view.moved:
+        simulation.control.clock[0].drift = np.inf
+    simulation.changed()
 
 
 class PieceView(PointsView):

@@ -218,14 +218,14 @@ class Intersection(Union):
 
 
 class Difference(region.Region):
-    """All that lies in the first region and not in the second.
+    """All that lies in the first region and in none of the others.
 
     Parameters
     ----------
     first
         ID of the region to cut from.
-    second
-        ID of the region that is cut off, its surface included.
+    second, more
+        IDs of the regions that are cut off, their surfaces included.
 
     Example
     -------
@@ -238,14 +238,14 @@ class Difference(region.Region):
     union, intersection
     """
 
-    def __init__(self, hub: Hub, first: region.Region, second: region.Region):
-        used = slice(0, require_domain(hub).dimension)
-        super().__init__(hub, first.box_lo[used], first.box_hi[used], parts=(first, second))
+    def __init__(self, hub: Hub, first: region.Region, second: region.Region, *more: region.Region):
+        used, parts = slice(0, require_domain(hub).dimension), (first, second, *more)
+        super().__init__(hub, first.box_lo[used], first.box_hi[used], parts=parts)
 
     def contains(self, x: np.ndarray) -> np.ndarray:
-        first, second = self.parts
-        return first.inside(x) & ~second.inside(x)
+        first, *others = self.parts
+        return first.inside(x) & ~np.logical_or.reduce([part.inside(x) for part in others])
 
     def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
-        first, second = (part.depth(x, reach) for part in self.parts)
-        return np.minimum(first, -second)
+        first, *others = (part.depth(x, reach) for part in self.parts)
+        return np.minimum(first, -np.maximum.reduce(others))

@@ -158,17 +158,38 @@ class MaxPosition(Compute):
     -------
     compute(front, max_position, water)
     log_modify(custom, time, front_x)
+
+    See Also
+    --------
+    min_position, position_quantile
     """
 
     published = ("x", "y", "z")
+    extreme = staticmethod(np.max)
 
     def refresh(self) -> None:
-        found = self.hub.fields.each(self, "largest")
+        found = self.hub.fields.each(self, "furthest")
         # Without points, 0, as the sums of other computes.
-        self.publish_components(np.max(found, axis=0) if found else np.zeros(3))
+        self.publish_components(self.extreme(found, axis=0) if found else np.zeros(3))
 
-    def largest(self, points: PointTable) -> np.ndarray | None:
-        return points.position.max(axis=0) if points.count else None
+    def furthest(self, points: PointTable) -> np.ndarray | None:
+        return self.extreme(points.position, axis=0) if points.count else None
+
+
+class MinPosition(MaxPosition):
+    """Measure the least coordinates among points, each on its own; published as ID_x, ID_y, ID_z.
+
+    Example
+    -------
+    compute(back, min_position, water)
+    log_modify(custom, time, back_x)
+
+    See Also
+    --------
+    max_position, position_quantile
+    """
+
+    extreme = staticmethod(np.min)
 
 
 BITS = 8  # of a coordinate that are looked at together
@@ -197,7 +218,7 @@ class PositionQuantile(Compute):
 
     See Also
     --------
-    max_position, center_of_mass
+    min_position, max_position, center_of_mass
     """
 
     published = ("x", "y", "z")
