@@ -21,7 +21,7 @@ from karamelo_py.compiler.choices import (
     of_numbers,
     tag_class,
 )
-from karamelo_py.compiler.code import I64, Lanes, lane, scalar_of, splat
+from karamelo_py.compiler.code import I64, Lanes, lane, scalar_of
 from karamelo_py.compiler.trace import INSTEAD, Undefined, forget, run_for_kernel
 from karamelo_py.compiler.values import (
     OF_REALS,
@@ -152,16 +152,15 @@ def lanes_of(numba_type: Any) -> int:
 INSTEAD[lanes_of] = lambda thing: lanes_of(now().kind_of(thing))
 
 
-@implements(real, by_type=True)
-def _real(value, like):
-    number = types.float32 if like is types.float32 else types.float64
-    return lambda value, like: number(value)
+def _of_width(width: int, scalar: types.Type) -> types.Type:
+    return Lanes(scalar, width) if width else scalar
 
 
-@implements(real, Lanes)
+@implements(real)
 @intrinsic
-def _real_lanes(value, like):
-    made = Lanes(scalar_of(like), (value if isinstance(value, Lanes) else like).width)
+def _real(value, like):
+    scalar = scalar_of(like) if isinstance(like, Lanes | types.Float) else types.float64
+    made = _of_width(lanes_of((value, like)), scalar)
     return made(value, like), lambda builder, given, _: code.cast(builder, given, value, made)
 
 
@@ -179,22 +178,17 @@ def round_off(like: Any) -> Any:
     return type(like)(2.0**-23 if type(like).__name__ == "float32" else 2.0**-52)
 
 
-@implements(round_off, by_type=True)
-def _round_off(like):
-    if like is types.float32:
-        return lambda like: types.float32(2.0**-23)
-    return lambda like: types.float64(2.0**-52)
-
-
-@implements(round_off, Lanes)
+@implements(round_off)
 @intrinsic
-def _round_off_lanes(like):
-    error = 2.0**-23 if like.scalar == types.float32 else 2.0**-52
+def _round_off(like):
+    scalar = types.float32 if scalar_of(like) == types.float32 else types.float64
+    made = _of_width(lanes_of(like), scalar)
 
     def codegen(builder, _):
-        return splat(builder, code.constant(builder, like.scalar, error), like)
+        error = code.constant(builder, scalar, 2.0**-23 if scalar == types.float32 else 2.0**-52)
+        return code.cast(builder, error, scalar, made)
 
-    return like(like), codegen
+    return made(like), codegen
 
 
 def index(i: int) -> int:

@@ -294,6 +294,7 @@ def _row_in_kernels(address, like, count):
     return row(types.int64, like, types.int64), codegen
 
 
+@shared
 def pick_items(
     address: int, like: Any, order: np.ndarray, room: np.ndarray, c: int, begin: int, end: int
 ) -> None:
@@ -301,23 +302,14 @@ def pick_items(
 
     The row has whole numbers of the type of `like`.
     """
-    room[c, begin:end] = _row(address, like, order.size)[order[begin:end]]
-
-
-@implements(pick_items)
-def _pick(address, like, order, room, c, begin, end):
     row = _row(address, like, order.size)
     for p in range(begin, end):
         room[c, p] = row[index(order[p])]
 
 
+@shared
 def put_items(address: int, like: Any, room: np.ndarray, c: int, begin: int, end: int) -> None:
     """Item p of such a row becomes ``room[c, p]``, from `begin` to `end`."""
-    _row(address, like, end)[begin:end] = room[c, begin:end]
-
-
-@implements(put_items)
-def _put(address, like, room, c, begin, end):
     row = _row(address, like, end)
     for p in range(begin, end):
         row[index(p)] = room[c, p]
