@@ -94,7 +94,9 @@ def _shown_by_nodes(simulation: Any) -> Iterator[Stored]:
     comm, own = simulation.comm, simulation.nodes.counted()
     found = np.zeros(len(own), np.bool_)
     for _, array in of_nodes(simulation.setup):
-        found |= array[own].any(axis=1)
+        for first in range(0, len(own), PIECE):  # no copy of all of them
+            some = slice(first, first + PIECE)
+            found[some] |= array[own[some]].any(axis=1)
     numbers = comm.gather(own[found])
     if numbers is not None:
         numbers = np.sort(np.concatenate(numbers))
