@@ -291,44 +291,37 @@ class Point:
 WIDTH = 17  # as many as a number of ten digits, its sign and its exponent take, and a blank
 
 
-def von_mises_stress(point: Point) -> float:
-    """sqrt(3/2 s:s), s the deviatoric stress."""
-    xx, yy, zz, *shear = point.stress
+def shown(point: Point) -> dict[str, float]:
+    """Return what is written of a point, by column; q is the von Mises stress, sqrt(3/2 s:s)."""
+    law, kin, state, stress = point.law, point.kin, point.state, point.stress
+    names = COMPONENTS[: len(kin.symmetric_names)]
+    xx, yy, zz, *shear = stress
     normal = (xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2
-    return float(np.sqrt(normal / 2 + 3 * np.sum(np.square(shear))))
-
-
-def columns(point: Point) -> dict[str, Callable[[], float]]:
-    """Return the columns that are written of a point, by name."""
-    law, kin = point.law, point.kin
-    count = len(kin.symmetric_names)
-    found: dict[str, Callable[[], float]] = {"time": lambda: point.time}
-    for k, name in enumerate(COMPONENTS[:count]):
-        found[f"e{name}"] = lambda k=k: point.strain[k]
-    for k, name in enumerate(COMPONENTS[:count]):
-        found[f"s{name}"] = lambda k=k: point.stress[k]
-    found["p"] = lambda: -float(point.stress[:3].sum()) / 3
-    found["q"] = lambda: von_mises_stress(point)
-    found["J"] = lambda: laws.jacobian(law, kin, point.state)
-    found["stored"] = lambda: laws.energy_density(law, kin, point.state)
-    found["work"] = lambda: point.work
-    for name, what in laws.columns_of(law).items():
-        found[name] = lambda what=what: laws.shown(what, law, kin, point.state)
-    return found
+    return {
+        "time": point.time,
+        **{f"e{name}": point.strain[k] for k, name in enumerate(names)},
+        **{f"s{name}": stress[k] for k, name in enumerate(names)},
+        "p": -float(stress[:3].sum()) / 3,
+        "q": float(np.sqrt(normal / 2 + 3 * np.sum(np.square(shear)))),
+        "J": laws.jacobian(law, kin, state),
+        "stored": laws.energy_density(law, kin, state),
+        "work": point.work,
+        **{name: laws.shown(of, law, kin, state) for name, of in laws.columns_of(law).items()},
+    }
 
 
 class Response:
     """The answer of a point so far, a row for each increment."""
 
     def __init__(self, point: Point):
-        self._columns = columns(point)
-        self.names = list(self._columns)
+        self.point = point
+        self.names = list(shown(point))
         self.rows: list[list[float]] = []
         self.observe()
 
     def observe(self) -> None:
         # A zero is added so that none is negative.
-        self.rows.append([float(value()) + 0.0 for value in self._columns.values()])
+        self.rows.append([float(value) + 0.0 for value in shown(self.point).values()])
 
     def last(self) -> dict[str, float]:
         return dict(zip(self.names, self.rows[-1], strict=True))
