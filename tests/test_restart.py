@@ -335,6 +335,17 @@ def test_the_state_alone(run_interpreted):
             assert array.tobytes() == other[name].tobytes(), name
 
 
+def test_a_file_from_before_the_first_step(run_interpreted):
+    """No node shows anything yet."""
+    set_up, _, _ = FLY.partition("run(4)")
+    script = set_up + "write_restart(w.h5)\nrun(2)\nwrite_restart(end.h5)\n"
+    whole = run_interpreted(script, folder="a")
+    before = (whole.folder / "end.h5").read_bytes()
+    again = run_interpreted(script, "-restart", "w.h5", folder="a")
+    assert again.log.Step.tolist() == [0, 1, 2]
+    assert (again.folder / "end.h5").read_bytes() == before
+
+
 def test_colours_go_into_another_script(run_interpreted):
     """Pictures of the same field have the range of those before; of another one, their own."""
     picture = "dump(p, all, pyplot, 2, p.*.png, 1, 1, vx)\n"

@@ -315,7 +315,7 @@ class Simulation(SceneArrays):
         at_once = [fix for fix in new if sets_initial_state(fix)]
         for fix in at_once:
             # Nothing happens in a step before this hook: the state shows it from the start.
-            self.set_initial(fix.id)
+            self._set_initial(fix)
         self.begun |= set(at_once)
         self.beginning = new
         self._first_fixes = [fix for fix in new if fix not in at_once]
@@ -325,9 +325,8 @@ class Simulation(SceneArrays):
             self._first = PythonHooks(self, together)
         self.hub.update.method.begin(self.hub, self.setup.contact)
 
-    def set_initial(self, ID: str) -> None:
-        """Let the fix `ID` set the state that a run begins with."""
-        fix = self.hub.fixes[ID]
+    def _set_initial(self, fix: Any) -> None:
+        """Let a fix set the state that a run begins with."""
 
         def act(_: Setup) -> None:
             for view in views_of(self, fix):

@@ -246,7 +246,8 @@ def _take_nodes(simulation: Any, state: Mapping[str, Any]) -> None:
     for name, array in of_nodes(simulation.setup):
         array[own] = 0
         like = np.broadcast_to(array[:1], (len(nodes), *array.shape[1:]))
-        _checked(state, name, like, read=False)
+        if len(nodes):
+            _checked(state, name, like, read=False)
         for first in range(0, len(nodes), PIECE):
             some = nodes[first : first + PIECE]
             here = used[some]
