@@ -19,7 +19,7 @@ def test_script_is_whole(run_interpreted, name):
 def test_default_is_right_or_told(tmp_path, name):
     """The error of the finest run is within its share, or a warning has the word of the case."""
     case = defaults.case(name)
-    result = defaults.run(name, tmp_path, refine=case.refine[-1])
+    result = defaults.run(name, tmp_path, case.refine[-1])
     assert result.status == 0 or case.advice
     told = case.advice and any(case.advice in line for line in defaults.said(result))
     assert told or abs(case.error(case.measure(result))) <= case.within

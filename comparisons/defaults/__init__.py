@@ -2,16 +2,17 @@
 
 Each case is a module here with a `CASE`, and a script `inputs/defaults/in.NAME`. The script chooses
 nothing that the program would choose: no step, no scheme, no averaging, no weights. It has the
-variables `refine` (cells are h / refine) and `f` (the step is f times the program's own).
+variable `refine`: cells are h / refine.
 """
 
+import re
 import subprocess
 import sys
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from pkgutil import iter_modules
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from comparisons.results import Result
 
@@ -53,14 +54,26 @@ def case(name: str) -> Case:
     return import_module(f"comparisons.defaults.{name}").CASE
 
 
-def run(name: str, folder: Path, **variables: Any) -> Result:
-    """Run the script of a case in a folder of its own."""
-    place = folder / "_".join([name, *(f"{k}={v:g}" for k, v in variables.items())])
+def run(name: str, folder: Path, refine: float, dt: float | None = None) -> Result:
+    """Run the script of a case in a folder of its own, with its own step or another."""
+    place = folder / f"{name}_{refine:g}_{dt or 0:g}"
     place.mkdir(parents=True)
-    options = [part for k, v in variables.items() for part in ("-var", k, f"{v:g}")]
-    command = [sys.executable, "-m", "karamelo_py.app.cli", str(INPUTS / f"in.{name}"), *options]
+    text = (INPUTS / f"in.{name}").read_text(encoding="utf-8")
+    if dt is not None:
+        head, line, tail = text.rpartition("\nrun")
+        text = f"{head}\nset_dt({dt!r}){line}{tail}"
+    script = place / f"in.{name}"
+    script.write_text(text, encoding="utf-8")
+    command = [sys.executable, "-m", "karamelo_py.app.cli", str(script)]
+    command += ["-var", "refine", f"{refine:g}"]
     done = subprocess.run(command, cwd=place, capture_output=True, text=True, check=False)
     return Result(done.returncode, done.stdout, done.stderr, place)
+
+
+def step_of(result: Result) -> float:
+    """The step that a run has begun with, from its banner."""
+    (dt,) = re.findall(r"^  dt +(\S+)$", result.out, re.M)[:1]
+    return float(dt)
 
 
 def said(result: Result) -> list[str]:

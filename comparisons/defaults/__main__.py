@@ -45,11 +45,12 @@ def number(case: defaults.Case, result) -> float:
 def row(name: str, folder: Path) -> tuple[str, bool]:
     """The row of a case, and whether it is right or told."""
     case = defaults.case(name)
-    results = [defaults.run(name, folder, refine=refine) for refine in case.refine]
+    results = [defaults.run(name, folder, refine) for refine in case.refine]
     found = [number(case, result) for result in results]
     half = ""
     if case.half_step:
-        halved = defaults.run(name, folder, refine=case.refine[-1], f=0.5)
+        dt = defaults.step_of(results[-1]) / 2
+        halved = defaults.run(name, folder, case.refine[-1], dt)
         half = f"{100 * case.error(number(case, halved)):+.2f} %"
     said = defaults.said(results[-1])
     error = case.error(found[-1])

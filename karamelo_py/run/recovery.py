@@ -92,6 +92,10 @@ class RollBack:
                 return False
             hub.warn(found[0], hint=found[1])
             simulation.told_of_growth = True
+        lost = None if simulation.told_of_loss else energy.words_of_loss(hub, simulation)
+        if lost is not None:
+            hub.warn(lost[0], hint=lost[1])
+            simulation.told_of_loss = True
         return True
 
     def _keep(self) -> None:

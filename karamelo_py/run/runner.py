@@ -371,7 +371,7 @@ class Runner:
                 "wall time": f"{wall:.3g} s",
                 "steps": steps,
                 "time": simulation.time,
-                **energy.change_of_energy(simulation),
+                **energy.change_of_energy(self.hub, simulation),
                 "particle-steps/s": f"{rate:.3g}",
                 "processor time": f"{worked:.3g} s in steps, of all threads",
                 **boundary.counted(self.hub, simulation),

@@ -86,6 +86,7 @@ class SceneArrays:
         self.measured = False  # whether the rate of the fastest point is that of the present state
         self.followed = False  # whether the clock knows the balance of energy up to it
         self.told_of_growth = False  # since the balance of energy is followed
+        self.told_of_loss = False
         self.mapped = False  # whether the nodes show a state of this simulation
 
     def fits(self, hub: Hub) -> bool:

@@ -192,7 +192,7 @@ class Simulation(SceneArrays):
         anew = not self.followed or set_anew
         self.followed = True
         if anew:
-            self.told_of_growth = False
+            self.told_of_growth = self.told_of_loss = False
         if clock.watch_energy:
             # Velocities belong to half a step before, stresses to the share strained before.
             level = 0.25 + 0.5 * getattr(self.hub.update.scheme, "strained_before", 0.0)

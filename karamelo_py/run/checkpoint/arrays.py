@@ -19,7 +19,7 @@ from karamelo_py.run.tiles import SHARES, Tiles, in_use
 from karamelo_py.script.errors import ScriptError
 
 # What else a simulation knows of its state.
-SHOWN = ("measured", "mapped", "followed", "told_of_growth")
+SHOWN = ("measured", "mapped", "followed", "told_of_growth", "told_of_loss")
 
 ALL_HAVE, EACH_HAS = ("clock", "work", "values"), ("touched/", "kept/")
 

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.kernels.hooks import HEAT_STAGES, CompiledHook
-from karamelo_py.kernels.watch import BORNE, FEW, WITHIN, growth, keeps, unit_of
+from karamelo_py.kernels.watch import BORNE, FEW, LOOKS, WITHIN, growth, keeps, unit_of
 from karamelo_py.language import registry
 from karamelo_py.output.point_table import PointTable
 from karamelo_py.points.laws import can, constrained_velocity
@@ -15,6 +15,7 @@ from karamelo_py.run.advice.facts import SceneFacts
 from karamelo_py.run.lower.build import warms_by_friction
 from karamelo_py.scene.hub import Hub
 
+LOSS = 0.05  # of the largest energy so far: more is told
 TOLD = 2  # windows of growth one after another, of which a run tells
 WHOLE = "more points a cell, a finer grid, cpgimp or ulcpdi, or method tlmpm"
 
@@ -138,6 +139,71 @@ def words_of_growth(hub: Hub, simulation: Any) -> tuple[str, str] | None:
     return message, cure
 
 
+def taken_by(hub: Hub) -> list[str]:
+    """Name what a script has chosen that takes energy without an account of it."""
+    found, transfer = [], hub.update.transfer
+    alpha = getattr(transfer, "alpha", None)
+    if alpha is None or alpha < 1:
+        share = "" if alpha is None else f" {alpha:g}"
+        found.append(f"transfer {registry.name_of('transfer', type(transfer))}{share}")
+    if warms_by_friction(hub) or any(_rubs(fix) for fix in hub.fixes.values()):
+        found.append("friction")
+    return found
+
+
+def _rubs(fix: Any) -> bool:
+    return fix.friction is not None or fix.wall_friction is not None
+
+
+def _lost(simulation: Any) -> float:
+    """Share of the largest energy so far that has gone since the start; negative: a gain."""
+    clock = simulation.control.clock[0]
+    mean = (clock.balance + clock.last_balance + clock.last_but_one) / FEW
+    return -growth(clock.first_balance, mean, max(clock.largest_energy, clock.energy_floor))
+
+
+def words_of_loss(hub: Hub, simulation: Any) -> tuple[str, str] | None:
+    """Describe a loss of energy that nothing chosen explains, with its cure; None without one."""
+    clock = simulation.control.clock[0]
+    if not clock.watch_energy or clock.looks <= LOOKS:
+        return None
+    lost = _lost(simulation)
+    if lost <= LOSS or taken_by(hub):
+        return None
+    cause, cure = _cause_of_loss(hub)
+    message = (
+        f"step {simulation.step}, time {simulation.time:.6g}: energy is lost, {100 * lost:.2g} % "
+        f"of the largest so far since the start (kinetic + stored + dissipated - work). Known to "
+        f"do that here: {cause}"
+    )
+    return message, cure
+
+
+def _cause_of_loss(hub: Hub) -> tuple[str, str]:
+    update, method = hub.update, hub.update.method
+    if getattr(update.scheme, "damps", False):
+        name = registry.name_of("scheme", type(update.scheme))
+        return f"scheme {name}, which damps what vibrates", "scheme(musl)"
+    if method.fields_per_solid:
+        return (
+            "collisions: nodes of a surface lose what they have of the motion of approach",
+            "finer cells, of which collisions take less",
+        )
+    if method.frame.moves and getattr(method.basis, "gradient_jumps", False):
+        return (
+            f"points that go from cell to cell, where the gradients of {method.basis_name} "
+            "functions jump, and velocities that differ from point to point",
+            "quadratic-spline, or method tlmpm for a solid",
+        )
+    if method.frame.moves:
+        return (
+            "waves and fronts that the cells do not resolve: velocities differ from point to point "
+            "where the grid sees none",
+            "finer cells, TPIC or APIC, or method tlmpm for a solid",
+        )
+    return "waves that the cells do not resolve", "finer cells"
+
+
 def grown_little(simulation: Any) -> bool:
     """Judge the present state a good one, as far as its energy and its last step tell."""
     clock = simulation.control.clock[0]
@@ -157,16 +223,16 @@ def growth_since(simulation: Any, before: float) -> float:
     return growth(before, simulation.energy(), unit)
 
 
-def change_of_energy(simulation: Any) -> dict[str, str]:
+def change_of_energy(hub: Hub, simulation: Any) -> dict[str, str]:
     """Describe the change of energy for the end of a run; columns of a log have it at two times."""
     clock = simulation.control.clock[0]
     if not clock.watch_energy or clock.looks <= FEW:
         return {}
-    mean = (clock.balance + clock.last_balance + clock.last_but_one) / FEW
-    # Not from `first_few`, which `forget_growth` changes.
-    share = 100 * growth(clock.first_balance, mean, unit_of(clock))
-    words = "since the start (kinetic + stored + dissipated - work, at one time)"
-    return {"energy": f"{share:+.2f} % {words}"}
+    # Since the first balance, not `first_few`, which `forget_growth` changes.
+    share, takers = -100 * _lost(simulation), taken_by(hub)
+    words = "of the largest since the start (kinetic + stored + dissipated - work)"
+    by = f"; {' and '.join(takers)} takes some" if takers and share < -1 else ""
+    return {"energy": f"{share:+.2f} % {words}{by}"}
 
 
 def forget_growth(simulation: Any) -> None:
