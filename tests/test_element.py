@@ -232,3 +232,27 @@ def test_check_writes_nothing(run_script, tmp_path):
     script.write_text(STEEL + "load_path(a, 2, exx=1e-3)\nelement(b, steel, a)\n" + used)
     assert main(["check", str(script)]) == 0
     assert not list(tmp_path.glob("element_*"))
+
+
+TANGENT = (
+    STEEL
+    + """
+load_path(press, 10, exx=-0.01)
+element(pressed, steel, press, kinematics=plane-strain, tangent=true)
+"""
+)
+
+
+def test_the_tangent_of_steel_that_flows(run_script):
+    """Uniaxial flow changes the pressure alone: K J before the step; shear has G Y/q of the trial.
+
+    The deviator after the step is that before it, so that q = Y + 2 G |e| of the trial.
+    """
+    lines = run_script(TANGENT).out.splitlines()
+    (at,) = [k for k, line in enumerate(lines) if line.split() == ["exx", "eyy", "gxy"]]
+    rows = {
+        line.split()[0]: [float(x) for x in line.split()[1:]] for line in lines[at + 1 : at + 5]
+    }
+    for name in ("sxx", "syy", "szz"):
+        assert rows[name][0] == pytest.approx(K * 0.999**9, rel=2e-6)
+    assert rows["sxy"] == [0, 0, pytest.approx(G * Y / (Y + 2 * G * 1e-3), rel=2e-6)]

@@ -219,6 +219,7 @@ def element(
     first: LoadPath,
     *more: LoadPath,
     kinematics: Literal["3D", "plane-strain", "axisymmetric", "1D"] = "3D",
+    tangent: bool = False,
 ) -> None:
     """Take one point of a material along a load path, to see its law before using it.
 
@@ -236,6 +237,9 @@ def element(
     kinematics
         Which strains there can be: ``3D``; ``plane-strain`` (none out of the plane xy);
         ``axisymmetric`` (x the radius, y the axis, z around it); ``1D`` (exx only).
+    tangent
+        Whether the tangent of the last increment is printed: derivatives of the Cauchy stress by
+        strains, and by angles of shear, which are twice the strain of the tensor.
 
     Example
     -------
@@ -243,6 +247,7 @@ def element(
     load_path(pull, 100, exx=0.5, syy=0, szz=0)
     load_path(release, 100, sxx=0, syy=0, szz=0)
     element(tension, rubber, pull, release)
+    element(soft, rubber, pull, tangent=true)
 
     Notes
     -----
@@ -254,8 +259,9 @@ def element(
     The law gets dt grad v as in a run, so that det F of n increments e is (1 + e)^n. An increment
     of a turn is skew to first order; to second order it has the form in which it stores the least
     energy, since laws in rate form and laws in F take different ones for rigid. Strains whose
-    stress is prescribed follow from Newton's iteration with a numerical tangent; an increment that
-    does not converge is halved, up to eight times. Where that fails, files show what was reached.
+    stress is prescribed follow from Newton's iteration with the exact tangent of the law; an
+    increment that does not converge is halved, up to eight times. Where that fails, files show what
+    was reached.
 
     See Also
     --------
@@ -292,6 +298,12 @@ def element(
             response.draw(hub.folder / picture, what)
     files = "" if hub.checking else f": {table}, {picture}"
     hub.console.say(f"{what}, {len(response.rows) - 1} increments{files}")
+    if tangent:
+        names = [f"e{name}" if name in NORMAL else f"g{name}" for name in point.free]
+        lines = [" " * 4 + "".join(f"{name:>14}" for name in names)]
+        for name, row in zip(COMPONENTS, point.tangent(), strict=False):
+            lines.append(f"s{name:<3}" + "".join(f"{x + 0.0:14.6g}" for x in row))
+        hub.console.say("\n".join(lines))
 
 
 def _follow(point: Point, paths: tuple[LoadPath, ...], response: Response) -> None:

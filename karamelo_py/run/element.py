@@ -13,6 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from karamelo_py.compiler.algebra import on_numbers
+from karamelo_py.compiler.slopes import Dual, slopes_of
 from karamelo_py.language.arguments import Named
 from karamelo_py.output.files import savefig, whole
 from karamelo_py.output.plots import blank_figure, tidy
@@ -113,6 +115,11 @@ class Loading(NamedTuple):
     end: np.ndarray
 
 
+def stress_after(law, kin, state, dl, dt):
+    """Cauchy stress after an increment."""
+    return laws.cauchy_stress(law, kin, laws.advance(law, kin, state, dl, dt))
+
+
 class Point:
     """A point of a material, and where it has come to."""
 
@@ -122,6 +129,7 @@ class Point:
         self.strain = np.zeros(6)  # sum of the strain increments, symmetric parts of dt grad v
         self.time = 0.0
         self.work = 0.0  # of the stress, per reference volume
+        self.last: tuple = (self.state, np.zeros((3, 3)), 1.0)  # increment, and the state before
 
     @property
     def free(self) -> tuple[str, ...]:
@@ -183,9 +191,9 @@ class Point:
         def after(unknown: np.ndarray) -> tuple[tuple, np.ndarray] | None:
             """The state and its stress; None where there is none."""
             increment[prescribed] = unknown
-            dl = self._flat(self._strained(increment, motion) + rigid)
+            dl = self._strained(increment, motion.shear) + rigid
             try:
-                state = laws.advance(self.law, self.kin, self.state, dl, dt)
+                state = laws.advance(self.law, self.kin, self.state, self._flat(dl), dt)
                 if laws.jacobian(self.law, self.kin, state) > 0:
                     return state, self._stress(state)
             except (ArithmeticError, ValueError):
@@ -198,17 +206,49 @@ class Point:
                 np.full(len(prescribed), np.inf) if found is None else found[1][prescribed] - target
             )
 
-        unknown = self._newton(misfit, rate * (b - a), increment, target)
+        def slopes(unknown: np.ndarray) -> np.ndarray:
+            increment[prescribed] = unknown
+            dl = self._strained(increment, motion.shear) + rigid
+            ways = [self._strained(e, motion.shear) for e in np.eye(6)[prescribed]]
+            return self._slopes(self.state, dl, dt, ways)[prescribed]
+
+        unknown = self._newton(misfit, slopes, rate * (b - a), increment, target)
         found = after(unknown)
+        self.last = (self.state, self._strained(increment, motion.shear) + rigid, dt)
         if found is None or not np.isfinite(found[1]).all():
             raise Unreachable("the point is turned inside out (det F <= 0) or has no stress")
         self._accept(found[0], increment)
         return unknown
 
-    def _newton(
-        self, misfit: Callable, guess: np.ndarray, increment: np.ndarray, target: np.ndarray
+    def tangent(self) -> np.ndarray:
+        """Find the tangent (n, m) of the last increment.
+
+        Derivatives of the n components of Cauchy stress, by the m strains that there can be; shears
+        are angles, twice the strain of the tensor.
+        """
+        numbers = [COMPONENTS.index(name) for name in self.free]
+        ways = [self._strained((0.5 if k > 2 else 1) * np.eye(6)[k], ()) for k in numbers]
+        return self._slopes(*self.last, ways)[: len(self.kin.symmetric_names)]
+
+    def _slopes(
+        self, state: tuple, dl: np.ndarray, dt: float, ways: Sequence[np.ndarray]
     ) -> np.ndarray:
-        """The strains at which `misfit` vanishes, by a tangent from finite differences."""
+        """Derivatives (6, w) of the stress after an increment `dl`, by w changes of it (3, 3)."""
+        places = GRADIENT[type(self.kin)]
+        numbers = [Dual(float(dl[at]), tuple([float(way[at]) for way in ways])) for at in places]
+        found = on_numbers(stress_after)(self.law, self.kin, state, tensor(self.kin, numbers), dt)
+        rows = [slopes_of(x, len(ways)) for x in found]
+        return np.pad(np.array(rows, float), ((0, 6 - len(rows)), (0, 0)))
+
+    def _newton(
+        self,
+        misfit: Callable,
+        slopes: Callable,
+        guess: np.ndarray,
+        increment: np.ndarray,
+        target: np.ndarray,
+    ) -> np.ndarray:
+        """The strains at which `misfit` vanishes, by its exact tangent."""
         if not len(guess):
             return guess
         volume = laws.specific_volume(self.law) * laws.jacobian(self.law, self.kin, self.state)
@@ -225,10 +265,7 @@ class Point:
                 return unknown
             if not np.isfinite(size):
                 break
-            # Small enough to stay on one side of yield mostly, large enough against rounding.
-            small = float(np.clip(1e-3 * np.abs(unknown).max(), 1e-9, 1e-6))
-            columns = [(misfit(unknown + small * e) - found) / small for e in np.eye(len(unknown))]
-            tangent = np.stack(columns, axis=1)
+            tangent = slopes(unknown)
             if not np.isfinite(tangent).all():
                 break
             # Least squares: a component that no stiffness holds is left where it is.
@@ -243,11 +280,11 @@ class Point:
             unknown, found = trial, there
         raise Unreachable("the law does not reach the prescribed stress")
 
-    def _strained(self, increment: np.ndarray, motion: Loading) -> np.ndarray:
-        """(3, 3) dt grad v of a strain increment: pure, or simple where the motion says so."""
+    def _strained(self, increment: np.ndarray, shear: Sequence[int]) -> np.ndarray:
+        """(3, 3) dt grad v of a strain increment: pure, or simple in components of `shear`."""
         full = np.diag(increment[:3])
         for k, (i, j) in SHEARS.items():
-            simple = k in motion.shear
+            simple = k in shear
             full[i, j] = (2 if simple else 1) * increment[k]
             full[j, i] = 0 if simple else increment[k]
         return full
