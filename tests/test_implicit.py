@@ -75,10 +75,14 @@ def test_a_column_under_its_weight(run_script):
     assert log(errors[0] / errors[1]) / log(2) > 1.4
 
 
-def test_elastica(run_script):
-    """Tip of a beam that bends by 80 % of its length (Bisshopp & Drucker 1945)."""
+@pytest.mark.parametrize(("law", "steps"), [("neo-hookean", "50"), ("linear", "20")])
+def test_elastica(run_script, law, steps):
+    """Tip of a beam that bends by 80 % of its length (Bisshopp & Drucker 1945).
+
+    Laws in rate form do so, too: points turn by up to 10 degrees a step.
+    """
     # Cells of a quarter of the height: 1 % of the length, as AMPLE has it (tip 0.813 to 0.821).
-    result = run_script(INPUTS / "in.elastica")
+    result = run_script(INPUTS / "in.elastica", "-var", "law", law, "-var", "steps", steps)
     assert result.log["down"][-1] == pytest.approx(0.8106, abs=0.012)
     assert result.log["back"][-1] == pytest.approx(0.5550, abs=0.012)
     assert result.log["pin_y"][-1] == pytest.approx(100e3, rel=1e-8)
@@ -128,6 +132,13 @@ def test_a_strip_footing(run_script):
     """(2 + pi) c (Prandtl 1920), within the 3 % that cells of a tenth of the width give."""
     result = run_script(INPUTS / "in.static_footing", "-var", "steps", "20")
     assert result.log["load"][-1] == pytest.approx(2 + pi, rel=0.03)
+
+
+def test_a_vertical_cut(run_script):
+    """N = 3.78 (Pastor et al. 2000), 12 % above on 10 cells to the height, 7 % on 20."""
+    result = run_script(INPUTS / "in.vertical_cut")
+    assert 3.78 < result.log["N"][-1] < 3.78 * 1.15
+    assert result.log["sunk"][-2] < 0.005 < result.log["sunk"][-1]
 
 
 def period(log_of) -> float:
@@ -274,6 +285,31 @@ def test_steps_that_are_too_large_are_done_in_parts(run_script):
     assert max(log_of["parts"]) > 1
     assert log_of["Time"][-1] == 4 and len(log_of["Time"]) == 5
     assert np.all(np.diff(log_of["pull_x"]) > 0)
+
+
+BEYOND = """fix(hold, velocity_nodes, left, 0, NULL)
+    region(foot, block, -INF, 1e-6, -INF, 1e-6)
+    region(end, block, 0.95, INF, -INF, INF)
+    group(foot, nodes, region, foot, all)
+    group(end, particles, region, end, solid, s)
+    fix(middle, velocity_nodes, foot, NULL, 0)
+    fix(pull, force_particles, end, time/2, 0)
+    F = time/2"""
+STEEL = """eos(steel, linear, 1, 1000)
+    strength(steel, plastic, 400, 1)
+    material(m, eos-strength, steel, steel)"""
+
+
+def test_a_run_ends_at_the_limit_load(run_script):
+    """A bar bears 2/sqrt(3) of its yield stress in plane strain: its ends are pulled by no more."""
+    text = patch(BEYOND).replace("pull_x", "F").replace("material(m, linear, 1, 1000, 0.25)", STEEL)
+    text = text.replace("quasi-static", "quasi-static, limit=stop, stabilisation=0")
+    words = "-var", "basis", "quadratic-spline"
+    result = run_script(text, *words)
+    assert "limit load: no equilibrium beyond time 2.2" in result.out
+    assert result.log["F"][-1] == pytest.approx(2 / sqrt(3), rel=0.01)
+    result = run_script(text.replace("limit=stop", "limit=error"), *words, status=1, folder="error")
+    assert "there is no equilibrium" in result.err
 
 
 def test_multigrid_solves_as_a_direct_solver(run_script):

@@ -30,13 +30,14 @@ from karamelo_py.points.laws import (
     wave_speed_squared,
     with_stress,
 )
+from karamelo_py.points.laws.hencky import Hencky
 from karamelo_py.points.laws.linear import FixedFrame, LinearElastic
 from karamelo_py.points.laws.neo_hookean import NeoHookean
 from karamelo_py.points.laws.parameters import lame_parameters
 
 E, NU, RHO = 100.0, 0.3, 2.0
 LAM, G = E * NU / ((1 + NU) * (1 - 2 * NU)), E / (2 * (1 + NU))
-LAWS = [law(1 / RHO, LAM, G) for law in (LinearElastic, FixedFrame, NeoHookean)]
+LAWS = [law(1 / RHO, LAM, G) for law in (LinearElastic, FixedFrame, NeoHookean, Hencky)]
 NEO = LAWS[2]
 SPACE = Space()
 

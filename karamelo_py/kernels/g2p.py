@@ -18,7 +18,7 @@ from karamelo_py.points import frames, laws, transfers
 from karamelo_py.points.basis import carried, carrier, carry, deformed, entry, extent
 from karamelo_py.points.basis.cpdi import AtCorners
 from karamelo_py.points.grid import Bounces, inside, reflected
-from karamelo_py.points.kinematics import I, det, outer, vector, zero, zero_vector
+from karamelo_py.points.kinematics import I, det, large, outer, vector, zero, zero_vector
 from karamelo_py.points.transfers.xpic import Reflected, Series, TermOfSeries
 
 
@@ -50,6 +50,13 @@ class SecondStrain(Strain):
     """The same for the second of two strain increments of a step."""
 
     says = "second half of the stress"
+
+
+class StrainOfLoadStep(Strain):
+    """The same of a step that may turn points far (:func:`~karamelo_py.points.kinematics.large`).
+
+    Implicit schemes take such.
+    """
 
 
 class StrainInMove(Strain):
@@ -111,6 +118,7 @@ def _is_known(task, w):
 @empty.on(Strain)
 @empty.on(StrainOfLastStep)
 @empty.on(SecondStrain)
+@empty.on(StrainOfLoadStep)
 @empty.on(StrainInMove)
 def _empty_strain(task, w, x):
     gradient = zero(w.kin, x[0])
@@ -194,6 +202,7 @@ def add_gradient(w, stencil, k, grad_v):
 @gathered.on(Strain)
 @gathered.on(StrainOfLastStep)
 @gathered.on(SecondStrain)
+@gathered.on(StrainOfLoadStep)
 @gathered.on(StrainInMove)
 def _gathered_strain(task, w, stencil, k, total):
     return (
@@ -236,6 +245,7 @@ def settled(task, w, stencil, p, dt, total, totals, fastest):
 @settled.on(Strain)
 @settled.on(StrainOfLastStep)
 @settled.on(SecondStrain)
+@settled.on(StrainOfLoadStep)
 @settled.on(StrainInMove)
 def _settled_strain(task, w, stencil, p, dt, total, totals, fastest):
     """State of the law and shape of the domain after a step; growth in cells, and rate."""
@@ -248,7 +258,8 @@ def _settled_strain(task, w, stencil, p, dt, total, totals, fastest):
     dl = visit.averaged(w, p, dl, ratio)
     law, old, f = visit.deformed_state(w, p, dt)
     growth = frames.spatial_increment(w.frame, w.kin, dl, f)
-    state = laws.advance(law, w.kin, old, growth, dt)
+    load_step = isinstance(task, StrainOfLoadStep) and laws.by_rates(law)
+    state = laws.advance(law, w.kin, old, large(growth) if load_step else growth, dt)
     store(w.points.state, p, state)
     now = frames.strained(w.frame, w.kin, f, dl)
     store(field(w.points.fields, frames.DeformationGradient), p, now)

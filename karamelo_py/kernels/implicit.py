@@ -29,6 +29,7 @@ from karamelo_py.points.kinematics import (
     I,
     gradient,
     inv,
+    large,
     outer,
     total,
     unit,
@@ -36,7 +37,13 @@ from karamelo_py.points.kinematics import (
     zero,
     zero_vector,
 )
-from karamelo_py.points.laws import advance, initial_state, kirchhoff_stress, specific_volume
+from karamelo_py.points.laws import (
+    advance,
+    by_rates,
+    initial_state,
+    kirchhoff_stress,
+    specific_volume,
+)
 
 PARTS = 64  # of a loop that threads share out; points of whole groups of lanes each
 GROUP = 8
@@ -148,7 +155,7 @@ def _strain(kin, seen, u, response, part):
 @shared
 def nominal_stress(law, kin, state, H, dt):
     """P by the places before the step, per reference volume."""
-    after = advance(law, kin, state, H, dt)
+    after = advance(law, kin, state, large(H) if by_rates(law) else H, dt)
     return kirchhoff_stress(law, kin, after).nominal(I + H)
 
 

@@ -294,7 +294,9 @@ class Runner:
         self.interrupted = int(simulation.comm.allreduce_max(np.array([self.signal]))[0])
 
     def _steps_left(self, simulation: Simulation) -> bool:
-        return simulation.step < self.last_step and simulation.time < self.end_time
+        # A limit load ends a run, too: it moves the end to the time that was reached.
+        end_time = simulation.control.clock[0].end_time
+        return simulation.step < self.last_step and simulation.time < end_time
 
     def _condition_allows(self) -> bool:
         if self.condition is None:

@@ -37,6 +37,7 @@ class Newmark(NamedTuple):
     """
 
     implicit = True
+    limit = "error"
     inertia = True
     begin = BEGIN
     hold = HOLD

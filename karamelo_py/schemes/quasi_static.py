@@ -10,7 +10,7 @@ from karamelo_py.kernels.arrays import (
     POST_PARTICLES_TO_GRID,
     POST_UPDATE_GRID_STATE,
 )
-from karamelo_py.kernels.g2p import Strain
+from karamelo_py.kernels.g2p import StrainOfLoadStep
 from karamelo_py.kernels.table import (
     AVERAGED,
     AXIS,
@@ -32,7 +32,7 @@ BEGIN = (
     AXIS,
 )
 HOLD = (AtNodes(POST_UPDATE_GRID_STATE, ON_UPDATE), AXIS)
-CLOSE = (WORK_OF_LOADS, *MOVE, Gather(Strain()), AtPoints(FINAL_INTEGRATE, 1))
+CLOSE = (WORK_OF_LOADS, *MOVE, Gather(StrainOfLoadStep()), AtPoints(FINAL_INTEGRATE, 1))
 # Of the last step: corrections, the share of forces that was left, and parts it was done in.
 PUBLISHED = "iterations", "residual", "parts"
 
@@ -57,11 +57,16 @@ class QuasiStatic(NamedTuple):
         Share of Young's modulus by which jumps of the gradient at the border of a body are
         penalised (ghost stabilisation; Coombs 2023). It bears nodes that see next to nothing of
         the body. 0: none.
+    limit
+        What a load is that has no equilibrium, even in 1/1024 of a step: an ``error``, or the end
+        of the run (``stop``). The script goes on then, and `time` is that of the last equilibrium:
+        loads as formulas of it are the limit load.
 
     Example
     -------
     scheme(quasi-static)
     scheme(quasi-static, tolerance=1e-8, iterations=30, solver=direct)
+    scheme(quasi-static, limit=stop)
 
     Notes
     -----
@@ -85,6 +90,7 @@ class QuasiStatic(NamedTuple):
     iterations: int
     solver: str
     stabilisation: float
+    limit: str
 
     @classmethod
     def given(
@@ -94,6 +100,7 @@ class QuasiStatic(NamedTuple):
         iterations: Annotated[int, Positive] = 20,
         solver: Literal["auto", "direct", "amg"] = "auto",
         stabilisation: Annotated[float, NonNegative] = 1 / 30,
+        limit: Literal["error", "stop"] = "error",
     ):
         """The scheme from the words of a script."""
-        return cls(tolerance, iterations, solver, stabilisation)
+        return cls(tolerance, iterations, solver, stabilisation, limit)

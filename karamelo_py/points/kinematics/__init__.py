@@ -303,6 +303,10 @@ class Tensor(Matrix):
         made = self.vector.tensor
         return self if made is type(self) else made._make(self[:4])
 
+    def generator(self):
+        """Give what strain and turn of this increment, dt grad v, are taken from."""
+        return self
+
     def after(self, dl):
         """(I + dl) F, as F + dl F: small increments keep their digits."""
         a, b = dl.at(), self.at()
@@ -370,6 +374,11 @@ class Tensor(Matrix):
         return self.symmetric._make([component(i, j) for i, j in self.symmetric.places])
 
 
+def further_terms(squared):
+    """tan(x) / x - 1 - x^2 / 3 by the square of x, right to x^8/46."""
+    return squared * squared * (2 / 15 + squared * (17 / 315))
+
+
 # Round-off is reached after four steps for ratios of principal stretches up to 2, and after seven
 # for whatever the inverse itself can bear.
 POLAR_STEPS = 7
@@ -396,6 +405,42 @@ def squares(a, axes, i, j):
     return total(terms) if len(terms) else 1
 
 
+class LargeIncrement(namedtuple("LargeIncrement", "dl logarithm")):
+    """dl of a step that may turn a point far, and the logarithm of I + dl.
+
+    Strain and turn are those of the logarithm: of the constant dt grad v that leads to I + dl.
+    """
+
+    __slots__ = ()
+
+    def __add__(self, other):
+        return self.dl + other
+
+    def at(self):
+        """Find components of dl by row and column."""
+        return self.dl.at()
+
+    def generator(self):
+        """Give what strain and turn are taken from."""
+        return self.logarithm
+
+
+algebra(LargeIncrement)
+
+
+def large(dl):
+    """Find strain and turn of a step that may turn a point far.
+
+    ln(I + dl) = 2 artanh(G / 2), by the gradient G = 2 dl (2 I + dl)^-1 in the middle of the step.
+    Of a pure turn G is skew (Hughes & Winget 1980), and so are its odd powers: no strain comes of
+    it, wherever the series ends. It is right to G^7/448.
+    """
+    G = dl @ inv(I + 0.5 * dl)
+    squared = G @ G
+    cubed = squared @ G
+    return LargeIncrement(dl, G + (1 / 12) * cubed + (1 / 80) * (squared @ cubed))
+
+
 class SymmetricTensor(Matrix):
     """A tensor such as stress or strain."""
 
@@ -416,7 +461,8 @@ class SymmetricTensor(Matrix):
 
         R is the rotation by the vector w = axial(skew(dl)), built by Cayley's formula from
         tan(|w|/2) ~ |w|/2 (1 + |w|^2/12): orthogonal to round-off, its angle right to |w|^5/120
-        (Hughes & Winget 1980 use tan(|w|/2) ~ |w|/2, right to |w|^3/12).
+        (Hughes & Winget 1980 use tan(|w|/2) ~ |w|/2, right to |w|^3/12). Of a `LargeIncrement` the
+        series has two terms more.
         """
         if self.kin.dimension == 1:
             return self
@@ -424,10 +470,12 @@ class SymmetricTensor(Matrix):
 
     def turned_in_plane(self, dl):
         """See `turned`."""
-        dl = dl.at()
+        turn = dl.generator().at()
         xx, yy, zz, xy = self
-        t = 0.25 * (dl[1, 0] - dl[0, 1])
-        t = fma(t * (t * t), 1 / 3, t)
+        half = 0.25 * (turn[1, 0] - turn[0, 1])
+        t = fma(half * (half * half), 1 / 3, half)
+        if isinstance(dl, LargeIncrement):
+            t = t + half * further_terms(half * half)
         tt = t * t
         scale = 1 / (1 + tt)
         cosine = (1 - tt) * scale
@@ -444,9 +492,12 @@ class SymmetricTensor(Matrix):
     def turned_in_space(self, dl):
         """See `turned`."""
         # R = I + k (T + T T), T the cross product with the scaled w / 2
-        dl, s, axes = dl.at(), self.at(), range(3)
-        w = [0.25 * (dl[(i + 2) % 3, (i + 1) % 3] - dl[(i + 1) % 3, (i + 2) % 3]) for i in axes]
-        longer = 1 + total([x * x for x in w]) * (1 / 3)
+        turn, s, axes = dl.generator().at(), self.at(), range(3)
+        w = [0.25 * (turn[(i + 2) % 3, (i + 1) % 3] - turn[(i + 1) % 3, (i + 2) % 3]) for i in axes]
+        squared = total([x * x for x in w])
+        longer = 1 + squared * (1 / 3)
+        if isinstance(dl, LargeIncrement):
+            longer = longer + further_terms(squared)
         w = [x * longer for x in w]
         k = 2 / total([1, *[x * x for x in w]])
 
@@ -459,6 +510,19 @@ class SymmetricTensor(Matrix):
         r = {(i, j): rotation(i, j) for i in axes for j in axes}
         a = {(i, j): total([r[i, m] * s[m, j] for m in axes]) for i in axes for j in axes}
         return self._make([total([a[i, m] * r[j, m] for m in axes]) for i, j in self.places])
+
+    def carried(self, dl):
+        """F s F^T with F = I + dl."""
+        f, s = {(i, i): 1 for i in range(3)} | (I + dl).at(), self.at()
+
+        def times_s(i, j):
+            return total([f[i, k] * s[k, j] for k in range(3) if (i, k) in f and (k, j) in s])
+
+        def component(i, j):
+            terms = [times_s(i, k) * f[j, k] for k in range(3) if (i, k) in s and (j, k) in f]
+            return total(terms)
+
+        return self._make([component(i, j) for i, j in self.places])
 
     def largest_row_sum(self):
         """max_i sum_j |s_ij|: a bound of the largest eigenvalue (Gershgorin)."""
@@ -592,6 +656,7 @@ def inv(f):
 
 def sym(a):
     """(a_ij + a_ji) / 2."""
+    a = a.generator()
     made, a = a.symmetric, a.at()
     return made._make(
         [0.5 * (a[i, j] + a[j, i]) if i != j else a.get((i, i), 0) for i, j in made.places]

@@ -4,6 +4,7 @@ from math import sqrt
 from typing import Any, NamedTuple
 
 from karamelo_py.compiler.compile import implements, round_off, shared, where
+from karamelo_py.compiler.powers import exponential, logarithm
 from karamelo_py.compiler.slopes import Dual, size_of, slopes_of, value_of
 from karamelo_py.points.kinematics import Space
 
@@ -17,8 +18,12 @@ def principal(s):
 
 
 @shared
-def from_principal(s, values, directions):
-    """Make the symmetric tensor with principal values in directions; of the class of `s`."""
+def from_principal(s, values, directions, slopes=None):
+    """Make the symmetric tensor with principal values in directions; of the class of `s`.
+
+    Where each value is a function of that of another tensor, `slopes` (3,) are its derivatives:
+    tensors with equal values need them for their own.
+    """
     if s.kin.dimension == 1:
         return s._make(values)
     if s.kin.dimension == 2:
@@ -93,6 +98,28 @@ def rotated(k, g, u, v):
     return k * u - g * v, k * v - (-g) * u  # differences: a sum would be rounded once
 
 
+def real_principal(s):
+    """See `principal`; values that are whole as long as nothing strains are real numbers, too."""
+    values, directions = principal(s)
+    return [1.0 * x for x in values], directions
+
+
+@shared
+def logarithm_of(s):
+    """ln of a symmetric tensor with principal values above 0."""
+    values, directions = real_principal(s)
+    found = tuple([logarithm(x) for x in values])
+    return from_principal(s, found, directions, tuple([1 / x for x in values]))
+
+
+@shared
+def exponential_of(s):
+    """exp of a symmetric tensor."""
+    values, directions = real_principal(s)
+    found = tuple([exponential(x) for x in values])
+    return from_principal(s, found, directions, found)
+
+
 # --- slopes -----------------------------------------------------------------------------------
 # Jacobi's rotations end where a tensor is diagonal, its slopes need not be. With S' in the frame of
 # the principal directions n, f(S)' = sum_a f_a' n_a n_a
@@ -163,17 +190,29 @@ def _principal_slopes(s):
     return tuple(made), TurningFrame(directions, tuple([t[1] for t in turned]), tuple(apart))
 
 
+# Of values that differ by a smaller share quotients of differences are worse than mean slopes.
+ALIKE = 1e-5
+
+
+def turning_ratios(values, directions, slopes):
+    """(f_a - f_b) / (s_a - s_b) of the pairs of principal values."""
+    ratios = []
+    for (a, b), apart in zip(PAIRS, directions.apart, strict=False):
+        if slopes is None:  # equal principal values stay equal: both lie on an edge, or at the apex
+            alike, limit = apart == 0, 0
+        else:
+            limit = 0.5 * (slopes[a] + slopes[b])
+            alike = abs(apart) * limit < ALIKE
+        ratios.append(where(alike, limit, (values[a] - values[b]) / where(alike, 1, apart)))
+    return ratios
+
+
 @implements(from_principal, Dual)
-def _from_principal_slopes(s, values, directions):
+def _from_principal_slopes(s, values, directions, slopes=None):
     if not isinstance(directions, TurningFrame):
         return s._make(values)
     plain, frame = value_of(values), directions.directions
-    pairs = zip(PAIRS[: len(directions.apart)], directions.apart, strict=True)
-    # Equal principal values stay equal: both lie on an edge, or at the apex.
-    ratios = [
-        where(apart == 0, 0, (plain[a] - plain[b]) / where(apart == 0, 1, apart))
-        for (a, b), apart in pairs
-    ]
+    ratios = turning_ratios(plain, directions, value_of(slopes))
     each = zip(columns(values, len(directions.shears)), directions.shears, strict=True)
     tensors = [
         out_of_frame(s, slopes, tuple([r * c for r, c in zip(ratios, shears, strict=True)]), frame)

@@ -124,6 +124,12 @@ def deformation(law, kin, state):
     """F, of laws whose state holds it; left out by the others."""
 
 
+@point_function(otherwise=True)
+def by_rates(law):
+    """Tell whether a law adds up strains, so that load steps need their logarithm: a constant."""
+    return True
+
+
 @point_function()
 def wave_speed_squared(law, kin, state):
     """Square of the speed of the fastest small disturbance, for the stable step."""

@@ -9,7 +9,7 @@ a plug-in's, are chained (`karamelo_py.points.laws.further`).
 """
 
 from math import inf, isinf, log, sqrt
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple
 
 from karamelo_py.compiler.compile import where
 from karamelo_py.language.arguments import Argument, look_up
@@ -25,6 +25,7 @@ from karamelo_py.points.laws.further import (
     further_pressure,
     initial_further,
 )
+from karamelo_py.points.laws.logarithmic import Logarithmic, elastic_trial
 from karamelo_py.points.laws.temperatures import (
     at_temperature,
     heated,
@@ -94,17 +95,24 @@ class EosStrength(NamedTuple):
         ID of a strength.
     parts
         ID of a damage, ID of a temperature, in either order; each may be left out.
+    strain
+        ``rate``: the strain of a step is the symmetric part of dt grad v, and s turns by the skew
+        part. ``logarithmic``: the elastic part of s is the logarithm of a stretch, which steps of
+        any size take along exactly.
 
     Example
     -------
     eos(bulk, linear, 7850, 160e9)
     strength(mild, plastic, 80e9, 400e6)
     material(body, eos-strength, bulk, mild)
+    material(bar, eos-strength, bulk, mild, strain=logarithmic)
 
     Notes
     -----
     sigma = s - p I. The deviatoric stress s turns with the point (Jaumann rate; Hughes & Winget
-    1980). The elastic strain is that of s and, with J the volume over the reference volume,
+    1980), or is 2 G times the deviator of the logarithmic elastic strain (Simo 1992); both are the
+    same where steps are small, but in large shear that stays elastic. The elastic strain is that of
+    s and, with J the volume over the reference volume,
     ln J / 3; of soils, J is its elastic part. The strain energy is what unloading would give back;
     plastic work is not in it, compute dissipated_energy measures it. Where fix initial_stress sets
     a pressure, the points get the volume that has this pressure.
@@ -121,12 +129,19 @@ class EosStrength(NamedTuple):
     viscosity: Any = Absent()
     damage: Any = Absent()
     temperature: Any = Absent()
+    strain: Any = Absent()  # by rates
     further: Any = Absent()  # of other kinds
 
-    syntax = "eos, strength[, damage][, temperature]"
+    syntax = "eos, strength[, damage][, temperature][, strain=logarithmic]"
 
     @classmethod
-    def given(cls, eos: Eos, strength: Strength, *parts: Option):
+    def given(
+        cls,
+        eos: Eos,
+        strength: Strength,
+        *parts: Option,
+        strain: Literal["rate", "logarithmic"] = "rate",
+    ):
         """The law of the parts that a script has named, each in the place of its kind."""
         kinds: dict[str, Any] = {}
         for part in parts:
@@ -139,7 +154,8 @@ class EosStrength(NamedTuple):
             kinds[part.kind] = part
         laws = {k: law for part in (eos, strength, *parts) for k, law in part.laws.items()}
         further = [laws.pop(kind) for kind in list(laws) if kind not in cls._fields]
-        return cls(**laws, further=chained(further))
+        elastic = Absent() if strain == "rate" else Logarithmic()
+        return cls(**laws, strain=elastic, further=chained(further))
 
 
 column(EosStrength, "dissipated", laws.dissipated_energy)
@@ -221,8 +237,8 @@ def _initial_state_eos_strength(law, kin, like):
 def _advance_eos_strength(law, kin, state, dl, dt):
     before, s, m = state
     J = before * det(I + dl)
-    eps = sym(dl)
-    s, memory, work = strengths.respond(law.strength, law, kin, s.turned(dl), eps, J, m, dt)
+    s, eps = carried_along(law, kin, s, dl)
+    s, memory, work = strengths.respond(law.strength, law, kin, s, eps, J, m, dt)
     work = J * work * borne_share(law, m.damage)
     viscous = viscous_after(law, J, m, tr(eps) / dt)
     viscous_work = sum(viscous) * (before - J)
@@ -236,6 +252,15 @@ def _advance_eos_strength(law, kin, state, dl, dt):
     loss = tuple([lost + gone for lost in m.loss])
     further = further_after(law.further, m.further, law, kin, J, s, now, dt)
     return State(J, s, now._replace(damage=broken, heat=heat, loss=loss, further=further))
+
+
+def carried_along(law, kin, s, dl):
+    """Carry the deviatoric stress along with an increment; and find the strain that adds to it."""
+    if isinstance(law.strain, Absent):
+        return s.turned(dl), sym(dl)
+    # The part of the old strain that turns is in the difference.
+    e = symmetric_tensor(kin, strengths.shear_strain(law.strength, kin, s))
+    return s, elastic_trial(law.strain, e, dl) - e
 
 
 # --- pressure ---------------------------------------------------------------------------------
@@ -318,6 +343,7 @@ def _kirchhoff_stress_eos_strength(law, kin, state):
     return J * stress_left(law, state) - J * full_pressure(law, J, state.m) * I
 
 
+laws.by_rates.on(EosStrength)(lambda law: isinstance(law.strain, Absent))
 laws.jacobian.on(EosStrength)(lambda law, kin, state: state.J)
 laws.dissipated_energy.on(EosStrength)(lambda law, kin, state: sum(state.m.loss))
 laws.specific_volume.on(EosStrength)(lambda law: laws.specific_volume(law.eos))

@@ -74,6 +74,7 @@ class State(NamedTuple):
 
 
 laws.initial_state.on(NeoHookean)(lambda law, kin, like: State(unit(kin)))
+laws.by_rates.on(NeoHookean)(lambda law: False)
 laws.deformation.on(NeoHookean)(lambda law, kin, state: state.F)
 
 

@@ -129,6 +129,7 @@ def _with_stress_thermoelastic(law, kin, state, stress):
     return State(laws.with_stress(law.elastic, kin, state.elastic, elastic), state.T)
 
 
+laws.by_rates.on(Thermoelastic)(lambda law: laws.by_rates(law.elastic))
 laws.specific_volume.on(Thermoelastic)(lambda law: laws.specific_volume(law.elastic))
 laws.temperature.on(Thermoelastic)(lambda law, kin, state: state.T)
 laws.heat_capacity.on(Thermoelastic)(lambda law, like: law.heat.cp)

@@ -54,14 +54,17 @@ class LoadSteps:
         end = float(control.values[TIME]) + whole
         if abs(end - control.clock[0].end_time) <= 1e-9 * whole:
             end = float(control.clock[0].end_time)
-        left, part, parts, iterations = 1.0, 1.0, 0, 0
+        left, part, parts, iterations, residual = 1.0, 1.0, 0, 0, 0.0
         while left > 0:
             part = min(part, left)
             try:
                 taken, residual = self._part(hooks, part * whole)
             except Failed as reason:
                 if part <= 2.0**-HALVINGS:
-                    raise self._explained(reason, part) from None
+                    if self.scheme.limit == "error":
+                        raise self._explained(reason, part) from None
+                    end = self._limit_reached(reason)
+                    break
                 part /= 2
                 continue
             left -= part
@@ -73,7 +76,16 @@ class LoadSteps:
                     self.simulation.sort_if_due()
         for name, value in zip(PUBLISHED, (iterations, residual, parts), strict=True):
             self.simulation.hub.values.set(name, float(value))
-        control.values[TIME], control.values[TIMESTEP] = end, step + 1
+        control.values[TIME], control.values[TIMESTEP] = end, step + (parts > 0)
+
+    def _limit_reached(self, reason: Failed) -> float:
+        """End the run at the load that was reached; return its time."""
+        control = self.simulation.setup.control
+        time = control.clock[0].end_time = float(control.values[TIME])
+        self.simulation.hub.console.say(
+            f"limit load: no equilibrium beyond time {time:.6g}, {reason}; the run ends there"
+        )
+        return time
 
     def _part(self, hooks: Any, dt: float) -> tuple[int, float]:
         """Take a part of a step: find its equilibrium, and let the points follow.

@@ -1,0 +1,279 @@
+"""material cam-clay: modified Cam-clay in logarithmic strains."""
+
+from math import sqrt
+from typing import Annotated, Any, NamedTuple
+
+from karamelo_py.compiler.compile import implements, real, shared, where
+from karamelo_py.compiler.powers import exponential as exp
+from karamelo_py.compiler.powers import logarithm as log
+from karamelo_py.compiler.slopes import Dual, value_of
+from karamelo_py.language.signature import Positive
+from karamelo_py.points import laws
+from karamelo_py.points.kinematics import (
+    I,
+    det,
+    dev,
+    inner,
+    nothing,
+    symmetric_tensor,
+    tr,
+    von_mises,
+)
+from karamelo_py.points.laws.logarithmic import Logarithmic, elastic_trial
+from karamelo_py.script.errors import ScriptError
+
+
+class CamClay(NamedTuple):
+    """Clay that consolidates, yields on an ellipse, and flows on at a critical state.
+
+    Parameters
+    ----------
+    rho
+        Density at the beginning.
+    G
+        Shear modulus.
+    M
+        Ratio q/p of the critical state; 6 sin(phi)/(3 - sin(phi)) in triaxial compression.
+    lam
+        Slope of ln(volume) over ln(p) of virgin consolidation: about lambda/(1 + e).
+    kappa
+        The same of swelling, below lam.
+    p0
+        Pressure at the beginning: a point without a load has it.
+    pc
+        Preconsolidation pressure at the beginning, of at least p0; p0 when left out.
+
+    Example
+    -------
+    material(clay, cam-clay, 1800, 4e6, 1.0, 0.1, 0.02, 100e3)
+    material(crust, cam-clay, 1800, 4e6, 1.0, 0.1, 0.02, 50e3, pc=200e3)
+
+    Notes
+    -----
+    Stresses are Kirchhoff's, J times Cauchy's: p = p0 exp(-tr(e)/kappa), s = 2 G dev(e), with the
+    logarithmic elastic strain e. The yield surface is q^2/M^2 + p (p - pc) = 0, plastic flow is
+    normal to it, and pc rises with plastic compression v as exp(v/(lam - kappa)) (Roscoe & Burland
+    1968; in logarithmic strains and volumes Borja & Tamagnini 1998, "Cam-Clay plasticity part III",
+    Comput. Methods Appl. Mech. Eng. 155). A step ends on the surface, whatever its size.
+
+    Without drainage p = p0 ((M^2 + eta^2)/M^2)^-(1 - kappa/lam), eta = q/p, of clay that begins at
+    p0 = pc: p0 2^-(1 - kappa/lam) at the critical state. Dump columns ep, equivalent plastic
+    strain, and pc. Where fix initial_stress puts a stress outside of the surface, pc is what takes
+    the surface there. There is no tension: p only tends to 0.
+
+    See Also
+    --------
+    hencky, strength drucker-prager, strength mohr-coulomb, fix initial_stress
+    """
+
+    in_lanes = True
+    flows = True
+    rings = False
+
+    specific_volume: float  # reference volume per mass
+    G: float
+    M: float
+    lam: float
+    kappa: float
+    p0: float
+    pc: float
+
+    @classmethod
+    def given(
+        cls,
+        rho: Annotated[float, Positive],
+        G: Annotated[float, Positive],
+        M: Annotated[float, Positive],
+        lam: Annotated[float, Positive],
+        kappa: Annotated[float, Positive],
+        p0: Annotated[float, Positive],
+        *,
+        pc: Annotated[float, Positive] | None = None,
+    ):
+        """The law from its parameters."""
+        if kappa >= lam:
+            raise ScriptError(
+                f"swelling is as soft as virgin consolidation: kappa {kappa:g}, lam {lam:g}",
+                argument="kappa",
+                expected=f"a number below lam, {lam:g}",
+            )
+        if pc is not None and pc < p0:
+            raise ScriptError(
+                f"the preconsolidation pressure {pc:g} is below the pressure {p0:g}",
+                argument="pc",
+                expected=f"a pressure of at least p0 = {p0:g}",
+            )
+        return cls(1 / rho, G, M, lam, kappa, p0, p0 if pc is None else pc)
+
+
+class State(NamedTuple):
+    """State of a point."""
+
+    J: Any  # det F
+    e: Any  # logarithmic elastic strain
+    pc: Any  # preconsolidation pressure
+    ep: Any  # equivalent plastic strain
+    loss: Any  # dissipated energy per reference volume
+
+
+def pressure(law, e):
+    """Kirchhoff pressure of an elastic strain."""
+    return law.p0 * exp(-tr(e) / law.kappa)
+
+
+@laws.initial_state.on(CamClay)
+def _initial_state_cam_clay(law, kin, like):
+    return State(1, nothing(kin), law.pc, 0, 0)
+
+
+@laws.advance.on(CamClay)
+def _advance_cam_clay(law, kin, state, dl, dt):
+    trial = elastic_trial(Logarithmic(), state.e, dl)
+    p, q = pressure(law, trial), 2 * law.G * von_mises(dev(trial))
+    y, w = plastic_flow(law, q, p, state.pc)
+    share = 1 / (1 + w)
+    e = share * dev(trial) + (tr(trial) + y) / 3 * I
+    slip = (1 - share) * q / (3 * law.G)
+    work = pressure(law, e) * y + share * q * slip
+    return State(
+        state.J * det(I + dl),
+        e,
+        state.pc * exp(y / (law.lam - law.kappa)),
+        state.ep + slip,
+        state.loss + work,
+    )
+
+
+# --- the return to the surface ----------------------------------------------------------------
+# Plastic compression y and w = 6 G / M^2 of the plastic multiplier: q shrinks to q / (1 + w), p to
+# p exp(-y / kappa), and pc becomes pc exp(y / (lam - kappa)).
+
+
+def at_step(law, q, p, pc, y, w):
+    """Deviatoric stress, pressure and preconsolidation pressure after plastic flow."""
+    return q / (1 + w), p * exp(-y / law.kappa), pc * exp(y / (law.lam - law.kappa))
+
+
+def unbalanced(law, q, p, pc, y, w):
+    """Find what is left of the yield function, and of the flow rule y = w M^2/6G (2 p - pc)."""
+    q, p, pc = at_step(law, q, p, pc, y, w)
+    return q * q / law.M**2 + p * (p - pc), y - w * law.M**2 / (6 * law.G) * (2 * p - pc)
+
+
+def corrections(law, q, p, pc, y, w, f, g):
+    """Newton's corrections of y and w, from what is left there, `f` and `g`."""
+    q, p, pc = at_step(law, q, p, pc, y, w)
+    c, apart = law.M**2 / (6 * law.G), 2 * p - pc
+    falls, rises = p / law.kappa, pc / (law.lam - law.kappa)
+    fy = -apart * falls - p * rises
+    fw = -2 * q * q / (law.M**2 * (1 + w))
+    gy = 1 + w * c * (2 * falls + rises)
+    gw = -c * apart
+    k = 1 / (fy * gw - fw * gy)
+    return k * (fw * g - gw * f), k * (gy * f - fy * g)
+
+
+_BISECTIONS = 14  # then Newton's method squares the error
+_NEWTON = 4
+
+
+@shared
+def plastic_flow(law, q, p, pc):
+    """Find y and w that return a trial with q and p to the surface, or 0 where it is within.
+
+    With (1 + w) = q / q_s, q_s on the surface, one equation of y is left. Its solution lies between
+    y = 0, or p = pc where the trial has more, and the critical state, 2 p = pc.
+    """
+    yields = q * q / law.M**2 + p * (p - pc) > 0
+    q = where(yields, q, law.M * pc)  # a trial beyond, for what is not used
+    c, a = law.M**2 / (6 * law.G), law.kappa * (law.lam - law.kappa) / law.lam
+    isotropic = a * log(p / pc)
+    critical = isotropic + a * log(real(2, p))
+    low = where(critical > 0, max(isotropic, 0), critical)
+    high = where(critical > 0, critical, 0)
+    y, w = 0.5 * (low + high), real(0, p)
+    for _ in range(_BISECTIONS):
+        _, now, of_clay = at_step(law, q, p, pc, y, 0)
+        apart, above = 2 * now - of_clay, now * (of_clay - now)
+        on_surface = law.M * sqrt(max(above, 0))
+        far = on_surface * (y / c + apart) > q * apart
+        near_top = on_surface > 0.5 * law.M * abs(apart)
+        w = where(
+            near_top,
+            q / where(near_top, on_surface, 1) - 1,
+            y / (c * where(near_top, 1, apart)),
+        )
+        low, high = where(far, low, y), where(far, y, high)
+        y = 0.5 * (low + high)
+    w = max(w, 0)  # but for rounding
+    for _ in range(_NEWTON):
+        f, g = unbalanced(law, q, p, pc, y, w)
+        dy, dw = corrections(law, q, p, pc, y, w, f, g)
+        y, w = y + dy, w + dw
+    return where(yields, y, 0), where(yields, w, 0)
+
+
+@implements(plastic_flow, Dual)
+def _plastic_flow_slopes(law, q, p, pc):
+    # What is left stays 0: a correction by its slopes gives those of y and w.
+    plain = value_of((q, p, pc))
+    y, w = plastic_flow(law, *plain)
+    f, g = unbalanced(law, q, p, pc, y, w)
+    found = zip((y, w), corrections(law, *plain, y, w, f, g), strict=True)
+    return tuple(
+        [Dual(x, tuple([where(w > 0, s, 0) for s in change.slopes])) for x, change in found]
+    )
+
+
+# --- quantities of the law ----------------------------------------------------------------------
+
+
+@laws.kirchhoff_stress.on(CamClay)
+def _kirchhoff_stress_cam_clay(law, kin, state):
+    return 2 * law.G * dev(state.e) - pressure(law, state.e) * I
+
+
+@laws.cauchy_stress.on(CamClay)
+def _cauchy_stress_cam_clay(law, kin, state):
+    return laws.kirchhoff_stress(law, kin, state) / state.J
+
+
+laws.by_rates.on(CamClay)(lambda law: False)
+laws.jacobian.on(CamClay)(lambda law, kin, state: state.J)
+laws.elastic_strain.on(CamClay)(lambda law, kin, state: state.e)
+laws.plastic_strain.on(CamClay)(lambda law, kin, state: state.ep)
+laws.dissipated_energy.on(CamClay)(lambda law, kin, state: state.loss)
+
+
+@laws.number
+def preconsolidation(law, kin, state):
+    """Preconsolidation pressure."""
+    return state.pc
+
+
+laws.column(CamClay, "ep", laws.plastic_strain)
+laws.column(CamClay, "pc", preconsolidation)
+laws.column(CamClay, "dissipated", laws.dissipated_energy)
+
+
+@laws.wave_speed_squared.on(CamClay)
+def _wave_speed_squared_cam_clay(law, kin, state):
+    # (K + 4/3 G - tau) / rho_0 along a principal direction: plastic waves are slower.
+    modulus = pressure(law, state.e) / law.kappa + 4 / 3 * law.G
+    tau = laws.kirchhoff_stress(law, kin, state)
+    return (modulus + tau.largest_row_sum()) * law.specific_volume
+
+
+@laws.energy_density.on(CamClay)
+def _energy_density_cam_clay(law, kin, state):
+    shear = dev(state.e)
+    return law.kappa * (pressure(law, state.e) - law.p0) + law.G * inner(shear, shear)
+
+
+@laws.with_stress.on(CamClay)
+def _with_stress_cam_clay(law, kin, state, stress):
+    tau = state.J * symmetric_tensor(kin, stress)
+    p = max(-1 / 3 * tr(tau), 1e-6 * law.p0)
+    q = von_mises(dev(tau))
+    e = 0.5 / law.G * dev(tau) - law.kappa / 3 * log(p / law.p0) * I
+    return state._replace(e=e, pc=max(state.pc, p + q * q / (law.M**2 * p)))

@@ -1,0 +1,117 @@
+"""material hencky: elasticity by logarithmic strain."""
+
+from typing import Annotated, Any, NamedTuple
+
+from karamelo_py.compiler.powers import logarithm_near_one as log
+from karamelo_py.language.signature import NonNegative, Positive
+from karamelo_py.points import laws
+from karamelo_py.points.kinematics import I, det, inner, unit
+from karamelo_py.points.kinematics.principal import logarithm_of
+from karamelo_py.points.laws.parameters import lame_parameters
+from karamelo_py.points.laws.thermoelastic import expanding
+
+
+class Hencky(NamedTuple):
+    """Elastic solid whose stress follows the logarithmic strain, at any strain and rotation.
+
+    Parameters
+    ----------
+    rho
+        Density before deformation.
+    E
+        Young's modulus.
+    nu
+        Poisson's ratio, above -1 and below 0.5.
+    cp, kappa
+        Heat capacity per mass, and conductivity; both or neither. With them points have a
+        temperature, at first that of their solid.
+    alpha
+        Coefficient of linear expansion.
+
+    Example
+    -------
+    material(rubber, hencky, 1000, 1e6, 0.3)
+
+    Notes
+    -----
+    Kirchhoff stress tau = 2 G ln V + lambda ln(det F) I with the left stretch V, ln V = 1/2 ln F
+    F^T; stored energy W = G ln V : ln V + lambda/2 (ln J)^2 (Hencky 1928; Anand 1979, "On H.
+    Hencky's approximate strain-energy function for moderate deformations", J. Appl. Mech. 46). It
+    is Hooke's law in the strains that add up, and the elastic part of most soil plasticity at
+    large strain.
+
+    A temperature T other than that at the start, T0, adds the stress -3 K alpha (T - T0), K the
+    bulk modulus; the elastic strain is without the expansion alpha (T - T0).
+
+    See Also
+    --------
+    material, neo-hookean, linear, eos-strength, cam-clay
+    """
+
+    in_lanes = True
+    rebounds = True
+    scalarised = ("kirchhoff_stress", "elastic_strain")
+
+    specific_volume: float  # reference volume per mass
+    lam: float  # Lame's first parameter
+    G: float  # shear modulus
+
+    @classmethod
+    def given(
+        cls,
+        rho: Annotated[float, Positive],
+        E: Annotated[float, Positive],
+        nu: float,
+        cp: Annotated[float, Positive] | None = None,
+        kappa: Annotated[float, NonNegative] | None = None,
+        alpha: float = 0.0,
+    ):
+        """The law from Young's modulus and Poisson's ratio; with a temperature where it has one."""
+        return expanding(cls(1 / rho, *lame_parameters(E, nu)), cp, kappa, alpha)
+
+
+class State(NamedTuple):
+    """State of a point."""
+
+    F: Any  # deformation gradient
+
+
+laws.initial_state.on(Hencky)(lambda law, kin, like: State(unit(kin)))
+laws.by_rates.on(Hencky)(lambda law: False)
+laws.deformation.on(Hencky)(lambda law, kin, state: state.F)
+laws.jacobian.on(Hencky)(lambda law, kin, state: det(state.F))
+
+
+@laws.advance.on(Hencky)
+def _advance_hencky(law, kin, state, dl, dt):
+    return State(state.F.after(dl))
+
+
+@laws.elastic_strain.on(Hencky)
+def _elastic_strain_hencky(law, kin, state):
+    """ln V."""
+    return 0.5 * logarithm_of(state.F.left_cauchy_green())
+
+
+@laws.kirchhoff_stress.on(Hencky)
+def _kirchhoff_stress_hencky(law, kin, state):
+    return law.G * logarithm_of(state.F.left_cauchy_green()) + law.lam * log(det(state.F)) * I
+
+
+@laws.cauchy_stress.on(Hencky)
+def _cauchy_stress_hencky(law, kin, state):
+    return laws.kirchhoff_stress(law, kin, state) / det(state.F)
+
+
+@laws.wave_speed_squared.on(Hencky)
+def _wave_speed_squared_hencky(law, kin, state):
+    # Along a principal direction rho_0 c^2 = lam + 2 G - tau; slides between two stretches a and b,
+    # 2 G ln(a/b) a^2 / (a^2 - b^2), stay below while a/b is below 4.
+    tau = laws.kirchhoff_stress(law, kin, state)
+    return (law.lam + 2 * law.G + tau.largest_row_sum()) * law.specific_volume
+
+
+@laws.energy_density.on(Hencky)
+def _energy_density_hencky(law, kin, state):
+    strain, ln_J = laws.elastic_strain(law, kin, state), log(det(state.F))
+    return law.G * inner(strain, strain) + 0.5 * law.lam * ln_J * ln_J
