@@ -211,7 +211,7 @@ class Tiles:
             scratch[2:],
         )
         top, least = self._nodes - 1, self.least_nodes - 1
-        offset = first_node(s.basis, s.grids.h[0])
+        offset = float(first_node(s.basis, s.grids.h[0]))
         sight = sorting.Neighbourhood(top, self.per_cell, self.beyond, least, reach, offset)
         kin, of, ids = planar(s.kin), points.grid, points.id
         rows = addresses_of_rows(array for _, array in arrays_of(points))
