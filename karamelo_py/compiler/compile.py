@@ -6,6 +6,7 @@ A function of numbers is given first, then what it is of lanes (:mod:`karamelo_p
 import math
 import operator
 from collections.abc import Callable
+from itertools import product
 from typing import Any, NamedTuple
 
 from llvmlite import ir
@@ -70,9 +71,10 @@ def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Calla
     """Declare a pure function of one point, selected by the classes of its first `tags` arguments.
 
     The decorated function gives name, parameters and docstring. Implementations are added with
-    ``name.on(Class, ...)`` and serve both as plain Python (``NUMBA_DISABLE_JIT=1``, tests) and
-    inside kernels, where the types are known at compile time and no branch is left. A plug-in adds
-    its own in the same way. With ``otherwise`` what the decorated function does is for all others.
+    ``name.on(Class, ...)``, serve classes derived from these that have none of their own, and serve
+    both as plain Python (``NUMBA_DISABLE_JIT=1``, tests) and inside kernels, where the types are
+    known at compile time and no branch is left. A plug-in adds its own in the same way. With
+    ``otherwise`` what the decorated function does is for all others.
 
     Point functions serve one point or several at once (:mod:`karamelo_py.compiler.lanes`). Those
     that a class names in ``scalarised``, since they branch, are called for one point after another.
@@ -81,13 +83,17 @@ def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Calla
     def declare(stub: Callable) -> Callable:
         table: dict[tuple[type, ...], Callable] = {}
         fallback = stub if otherwise else None
+        nearest: dict[tuple[type, ...], Callable | None] = {}
 
         def find(classes: tuple) -> Callable | None:
-            return table.get(classes, fallback)
+            if classes not in nearest:
+                ways = product(*(getattr(one, "__mro__", (one,)) for one in classes))
+                nearest[classes] = next((table[way] for way in ways if way in table), fallback)
+            return nearest[classes]
 
         def plain(*arguments: Any) -> Any:
             classes = tuple([a.__class__ for a in arguments[:tags]])
-            chosen = table.get(classes, fallback)
+            chosen = nearest[classes] if classes in nearest else find(classes)
             if chosen is None:
                 raise Undefined(stub.__name__, classes)
             return chosen(*arguments)
@@ -112,6 +118,7 @@ def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Calla
         def on(*classes: type) -> Callable[[Callable], Callable]:
             def register(implementation: Callable) -> Callable:
                 table[classes] = implementation
+                nearest.clear()
                 forget()
                 return implementation
 
@@ -119,7 +126,7 @@ def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Calla
 
         def defined(*classes: type) -> bool:
             note([(dispatch, classes)])
-            return classes in table
+            return find(classes) is not fallback
 
         dispatch.tags, dispatch.find, dispatch.on, dispatch.defined = tags, find, on, defined
         declare_point_function(dispatch)

@@ -116,10 +116,6 @@ def _is_known(task, w):
 
 
 @empty.on(Strain)
-@empty.on(StrainOfLastStep)
-@empty.on(SecondStrain)
-@empty.on(StrainOfLoadStep)
-@empty.on(StrainInMove)
 def _empty_strain(task, w, x):
     gradient = zero(w.kin, x[0])
     if _is_known(task, w):
@@ -128,7 +124,6 @@ def _empty_strain(task, w, x):
 
 
 @empty.on(TrialStrain)
-@empty.on(TrialStrainOfLastStep)
 def _empty_trial_strain(task, w, x):
     return zero(w.kin, x[0])
 
@@ -149,9 +144,8 @@ def _records_of_move(task, nodes):
 
 
 @visit.records_of.on(Strain)
-@visit.records_of.on(StrainOfLastStep)
 def _records_of_strain(task, nodes):
-    return nodes.velocity
+    return nodes.velocity if type(task) in (Strain, StrainOfLastStep) else None
 
 
 @point_function()
@@ -200,10 +194,6 @@ def add_gradient(w, stencil, k, grad_v):
 
 
 @gathered.on(Strain)
-@gathered.on(StrainOfLastStep)
-@gathered.on(SecondStrain)
-@gathered.on(StrainOfLoadStep)
-@gathered.on(StrainInMove)
 def _gathered_strain(task, w, stencil, k, total):
     return (
         add_gradient(w, stencil, k, total[0]),
@@ -212,7 +202,6 @@ def _gathered_strain(task, w, stencil, k, total):
 
 
 @gathered.on(TrialStrain)
-@gathered.on(TrialStrainOfLastStep)
 def _gathered_trial_strain(task, w, stencil, k, total):
     return add_gradient(w, stencil, k, total)
 
@@ -243,10 +232,6 @@ def settled(task, w, stencil, p, dt, total, totals, fastest):
 
 
 @settled.on(Strain)
-@settled.on(StrainOfLastStep)
-@settled.on(SecondStrain)
-@settled.on(StrainOfLoadStep)
-@settled.on(StrainInMove)
 def _settled_strain(task, w, stencil, p, dt, total, totals, fastest):
     """State of the law and shape of the domain after a step; growth in cells, and rate."""
     gradient, ratio = total
@@ -285,7 +270,6 @@ def _settled_strain(task, w, stencil, p, dt, total, totals, fastest):
 
 
 @settled.on(TrialStrain)
-@settled.on(TrialStrainOfLastStep)
 def _settled_trial_strain(task, w, stencil, p, dt, total, totals, fastest):
     dl = increment(dt, total)
     if isinstance(task, TrialStrainOfLastStep):

@@ -164,7 +164,6 @@ def _at_node_update_to_velocity(task, kin, nodes, n, dt):
 
 
 @at_node.on(TakeMean)
-@at_node.on(TakeMeanStress)
 def _at_node_take_mean(task, kin, nodes, n, dt):
     sums = field(nodes.fields, NodalStress if isinstance(task, TakeMeanStress) else NodalMean)
     if sums[n, 1] > 0:

@@ -47,12 +47,14 @@ class UGIMP(_Box):
     method(ulmpm, FLIP, ugimp, 0.99)
     """
 
-    steep_edge = True
-    in_lanes = True
     shape = ("half_size",)
 
 
-class CPGIMPDet(_Box):
+class _Following(_Box):
+    """Base of boxes that follow the deformation."""
+
+
+class CPGIMPDet(_Following):
     """Boxes that keep their shape: l <- l (det(I + dl))^(1/d), d the directions that can stretch.
 
     Turns leave them as they are; a stretch in one direction goes into all alike.
@@ -66,7 +68,7 @@ class CPGIMPDet(_Box):
     shape = ("half_size",)
 
 
-class CPGIMPDiagonal(_Box):
+class CPGIMPDiagonal(_Following):
     """Boxes with the half sizes l0 |F_ii|, for bodies that do not turn.
 
     A turn by 90 degrees makes the boxes vanish: the functions are then those of `linear`.
@@ -91,7 +93,7 @@ known_failure(
 )
 
 
-class CPGIMPStretch(_Box):
+class CPGIMPStretch(_Following):
     """Boxes with the half sizes l0 U_ii, with the right stretch U = sqrt(F^T F).
 
     A turn leaves them as they are (Charlton, Coombs & Augarde 2017, "iGIMP: An implicit
@@ -106,7 +108,7 @@ class CPGIMPStretch(_Box):
     shape = ("half_size", "half_size", "deformation")  # half sizes now and at the start, F
 
 
-class CPGIMPCorners(_Box):
+class CPGIMPCorners(_Following):
     """Boxes as wide as their corners, moved by the grid, lie apart on average.
 
     With the displacements u of the 2^d corners c, on the side s_c = -1 or 1 of the point in
@@ -209,9 +211,7 @@ def _along_ugimp(basis, kin, grid, place, direction):
     return averaged_hats(2, grid, first, lo - first, hi - first)
 
 
-@along.on(CPGIMPDet)
-@along.on(CPGIMPDiagonal)
-@along.on(CPGIMPStretch)
+@along.on(_Following)
 def _along_box(basis, kin, grid, place, direction):
     a, lo, hi = box(grid, kin, place, direction, LEAST, MOST)
     last = cells_along(grid, direction)

@@ -75,15 +75,12 @@ class LinearElastic(NamedTuple):
         return expanding(law(1 / rho, *lame_parameters(E, nu)), cp, kappa, alpha)
 
 
-class FixedFrame(NamedTuple):
+class FixedFrame(LinearElastic):
     """The same law without the turn: its stress stays behind when a point turns (Karamelo's)."""
 
-    in_lanes = True
+    __slots__ = ()
+    rebounds = False
     turns = False
-
-    specific_volume: float  # reference volume per mass
-    lam: float  # Lame's first parameter
-    G: float  # shear modulus
 
 
 class State(NamedTuple):
@@ -93,22 +90,21 @@ class State(NamedTuple):
     sigma: Any  # Cauchy stress
 
 
-for _law in (LinearElastic, FixedFrame):
-    gain(
-        _law,
-        when=lambda law, scene: scene.shear_stress > 0.25 * law.G,
-        cause="material linear at large strain: it adds up stress by rates, and gives back another "
-        "work than it took",
-        cure="material neo-hookean, which stores what it is given",
-    )
-    laws.initial_state.on(_law)(lambda law, kin, like: State(1, nothing(kin)))
-    laws.cauchy_stress.on(_law)(lambda law, kin, state: state.sigma)
-    laws.jacobian.on(_law)(lambda law, kin, state: state.J)
+gain(
+    LinearElastic,
+    when=lambda law, scene: scene.shear_stress > 0.25 * law.G,
+    cause="material linear at large strain: it adds up stress by rates, and gives back another "
+    "work than it took",
+    cure="material neo-hookean, which stores what it is given",
+)
+
+laws.initial_state.on(LinearElastic)(lambda law, kin, like: State(1, nothing(kin)))
+laws.cauchy_stress.on(LinearElastic)(lambda law, kin, state: state.sigma)
+laws.jacobian.on(LinearElastic)(lambda law, kin, state: state.J)
 
 
 @laws.advance.on(LinearElastic)
-@laws.advance.on(FixedFrame)
-def _advance_fixed_frame(law, kin, state, dl, dt):
+def _advance_linear_elastic(law, kin, state, dl, dt):
     eps = sym(dl)
     sigma = state.sigma.turned(dl) if law.turns else state.sigma
     increment = 2 * law.G * eps + law.lam * tr(eps) * I
@@ -116,33 +112,28 @@ def _advance_fixed_frame(law, kin, state, dl, dt):
 
 
 @laws.kirchhoff_stress.on(LinearElastic)
-@laws.kirchhoff_stress.on(FixedFrame)
-def _kirchhoff_stress_fixed_frame(law, kin, state):
+def _kirchhoff_stress_linear_elastic(law, kin, state):
     return state.J * state.sigma
 
 
 @laws.wave_speed_squared.on(LinearElastic)
-@laws.wave_speed_squared.on(FixedFrame)
-def _wave_speed_squared_fixed_frame(law, kin, state):
+def _wave_speed_squared_linear_elastic(law, kin, state):
     # (lam + 2 G) / rho: the moduli are constant, the volume per mass has grown by det F
     return (law.lam + 2 * law.G) * law.specific_volume * state.J
 
 
 @laws.elastic_strain.on(LinearElastic)
-@laws.elastic_strain.on(FixedFrame)
-def _elastic_strain_fixed_frame(law, kin, state):
+def _elastic_strain_linear_elastic(law, kin, state):
     # Hooke's law is isotropic and turns with the point, so the strain follows from the stress.
     mean = law.lam / (3 * law.lam + 2 * law.G) * tr(state.sigma)
     return 0.5 / law.G * (state.sigma - mean * I)
 
 
 @laws.energy_density.on(LinearElastic)
-@laws.energy_density.on(FixedFrame)
-def _energy_density_fixed_frame(law, kin, state):
+def _energy_density_linear_elastic(law, kin, state):
     return 0.5 * state.J * inner(state.sigma, laws.elastic_strain(law, kin, state))
 
 
 @laws.with_stress.on(LinearElastic)
-@laws.with_stress.on(FixedFrame)
-def _with_stress_fixed_frame(law, kin, state, stress):
+def _with_stress_linear_elastic(law, kin, state, stress):
     return State(state.J, symmetric_tensor(kin, stress))

@@ -8,7 +8,8 @@ at the corners x_c (Sadeghirad, Brannon & Burghardt 2011; Sadeghirad, Brannon & 
 with the means w_c and g_c, over the domain, of the function of corner c and of its gradient. The
 domains tile the body however far it stretches, so that it does not break between points.
 
-A family of domains gives only :func:`domain`, its place, and calls :func:`register`.
+A family of domains derives from `ConvectedDomain` and gives only :func:`domain`; one whose corners
+are kept and go with the grid derives from `CarriedDomain` and gives `upright`, too.
 """
 
 from math import inf
@@ -51,7 +52,13 @@ class Element(NamedTuple):
 
 
 class ConvectedDomain(NamedTuple):
-    """Base of these bases; they add `dimension`, `shape` and, for `corners`, `element`."""
+    """Base of these bases, of 2^d corners; they add `dimension` and `shape`.
+
+    Arms of the affine transfers begin at the weighted centre x = sum_I N_I X_I. Where that is not
+    the point (corners beyond the grid; quadrilaterals and hexahedra that are no parallelograms),
+    linear momentum stays exact, and angular momentum is that about these centres: what the points
+    themselves show wanders by a thousandth of what it does with FLIP (a spinning square, Q4).
+    """
 
     cells = 3
     nodes_per_cell = 1
@@ -60,6 +67,13 @@ class ConvectedDomain(NamedTuple):
     steep_edge = False
     in_lanes = True
     element = None
+
+
+class CarriedDomain(ConvectedDomain):
+    """Base of domains whose corners a place keeps, and the grid moves; they add `element`."""
+
+    __slots__ = ()
+    shape = ("corners",)
 
 
 # By dimension, the cells that domains count as reaching at least: in the plane points give to the
@@ -188,6 +202,7 @@ def solve(kin, spread, a):
     return vector(kin, [k * row for row in rows])
 
 
+@locate.on(ConvectedDomain)
 def _locate_corners(basis, kin, grid, place):
     x, weights, gradients = domain(basis, kin, place)
     corners = tuple([corner_at(kin, grid, corner) for corner in x])
@@ -208,6 +223,7 @@ def seen_at_corner(kin, stencil, c):
     return item(stencil.corners, c), weight, with_hoop(kin, weight, slopes, stencil.inv_r)
 
 
+@entry.on(ConvectedDomain)
 def _entry_corners(basis, kin, grid, stencil, k):
     nodes = 2**kin.dimension
     corner, weight, slopes = seen_at_corner(kin, stencil, k // nodes)
@@ -216,12 +232,14 @@ def _entry_corners(basis, kin, grid, stencil, k):
     return index(first + far), weight * share, gradient(kin, [share * g for g in slopes])
 
 
+@reach.on(ConvectedDomain)
 def _reach_corners(basis, kin, grid, stencil, k):
     nodes, d = 2**kin.dimension, kin.dimension
     cell, far = item(stencil.corners, k // nodes).cell, digits(k % nodes, 2, d)
     return vector(kin, [arm(grid, cell[i], far[i], stencil.centre[i]) for i in range(d)])
 
 
+@affine_weight.on(ConvectedDomain)
 def _affine_weight_corners(basis, kin, grid, stencil, k):
     nodes = 2**kin.dimension
     weight = item(stencil.weights, k // nodes)
@@ -230,42 +248,34 @@ def _affine_weight_corners(basis, kin, grid, stencil, k):
     return vector(kin, [weight * a for a in solved])
 
 
-# --- registration -----------------------------------------------------------------------------
-
-
+@support.on(ConvectedDomain)
 def _support_corners(basis, kin):
-    return basis.domain_corners * 2**kin.dimension
+    return 2**kin.dimension * 2**kin.dimension
 
 
-def _first_node_corners(basis, like):
-    return 0.5
+first_node.on(ConvectedDomain)(lambda basis, like: 0.5)
 
 
-def register(basis: type, corners: int) -> None:
-    """Give `basis`, a class with :func:`domain`, what an engine asks of a basis.
-
-    Arms of the affine transfers begin at the weighted centre x = sum_I N_I X_I. Where that is not
-    the point (corners beyond the grid; quadrilaterals and hexahedra that are no parallelograms),
-    linear momentum stays exact, and angular momentum is that about these centres: what the points
-    themselves show wanders by a thousandth of what it does with FLIP (a spinning square, Q4).
-    """
-    basis.domain_corners = corners
-    first_node.on(basis)(_first_node_corners)
-    locate.on(basis)(_locate_corners)
-    support.on(basis)(_support_corners)
-    entry.on(basis)(_entry_corners)
-    reach.on(basis)(_reach_corners)
-    affine_weight.on(basis)(_affine_weight_corners)
+# --- corners that go with the grid ------------------------------------------------------------
 
 
+@support.on(CarriedDomain)
+def _support_carried(basis, kin):
+    return basis.element.corners * 2**kin.dimension
+
+
+@carried.on(CarriedDomain)
+@placed.on(CarriedDomain)
 def _carried_corners(basis, kin):
-    return basis.domain_corners
+    return basis.element.corners
 
 
+@carrier.on(CarriedDomain)
 def _carrier_corners(basis, kin, grid, stencil, corner):
     return around(grid, stencil.corners[corner])
 
 
+@carry.on(CarriedDomain)
 def _carry_corners(basis, kin, place, old, corner, displacement):
     first = kin.dimension * (1 + corner)
     last = first + kin.dimension
@@ -273,22 +283,16 @@ def _carry_corners(basis, kin, place, old, corner, displacement):
     return (*place[:first], *[a + u for a, u in moves], *place[last:])
 
 
+@extent.on(CarriedDomain)
 def _extent_corners(basis, kin, grid, place):
     d = kin.dimension  # NaN if any corner is
     far = abs(place[d] - place[0])
-    for k in range(d + 1, d + d * basis.domain_corners):
+    for k in range(d + 1, d + d * basis.element.corners):
         far = max(abs(place[k] - place[k % d]), far)
     return where(upright(basis, kin, place), max(far * grid.inv_h, LEAST[d]), inf)
 
 
-def register_carried(basis: type) -> None:
-    """Let the corners of `basis`, which defines `upright`, be kept and go with the grid."""
-    register(basis, basis.element.corners)
-    carried.on(basis)(_carried_corners)
-    placed.on(basis)(_carried_corners)
-    carrier.on(basis)(_carrier_corners)
-    carry.on(basis)(_carry_corners)
-    extent.on(basis)(_extent_corners)
+# --- corners in the place of nodes ------------------------------------------------------------
 
 
 @support.on(AtCorners)

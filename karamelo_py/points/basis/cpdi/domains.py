@@ -6,17 +6,23 @@ from karamelo_py.points.basis.cpdi import (
     CUBE,
     LEAST,
     SQUARE,
+    CarriedDomain,
     ConvectedDomain,
     Element,
     domain,
-    register,
-    register_carried,
     upright,
 )
 from karamelo_py.points.kinematics import Space, cofactor, determinant, total, vector
 
 
-class R4(ConvectedDomain):
+class _Parallel(ConvectedDomain):
+    """Base of domains by their half edges."""
+
+    __slots__ = ()
+    shape = ("half_edges",)
+
+
+class R4(_Parallel):
     """Parallelograms: x and two half edges r, which turn and stretch with the point.
 
     Neighbouring domains may overlap or part a little where the strain is not uniform
@@ -29,10 +35,9 @@ class R4(ConvectedDomain):
 
     __slots__ = ()
     dimension = 2
-    shape = ("half_edges",)
 
 
-class R8(ConvectedDomain):
+class R8(_Parallel):
     """Parallelepipeds: x and three half edges r, which turn and stretch with the point.
 
     Example
@@ -42,7 +47,6 @@ class R8(ConvectedDomain):
 
     __slots__ = ()
     dimension = 3
-    shape = ("half_edges",)
 
 
 def half_edges(kin, place):
@@ -63,6 +67,7 @@ def signed(sign, a, b):
     return a + b if sign > 0 else a - b
 
 
+@domain.on(_Parallel)
 def _domain_parallel(basis, kin, place):
     d = kin.dimension
     x, edges = vector(kin, place[:d]), half_edges(kin, place)
@@ -85,12 +90,14 @@ def _domain_parallel(basis, kin, place):
     return tuple(corners), (weight,) * len(corners), tuple(gradients)
 
 
+@deformed.on(_Parallel)
 def _deformed_parallel(basis, kin, place, dl):
     dl = dl.planar()  # r <- (I + dl) r
     edges = [r + dl @ r for r in half_edges(kin, place)]
     return (*place[: kin.dimension], *[a for edge in edges for a in edge])
 
 
+@extent.on(_Parallel)
 def _extent_parallel(basis, kin, grid, place):
     away = [total([abs(a) for a in parts]) for parts in zip(*half_edges(kin, place), strict=True)]
     far = away[0]
@@ -99,14 +106,13 @@ def _extent_parallel(basis, kin, grid, place):
     return max(far * grid.inv_h, LEAST[kin.dimension])
 
 
-for _basis in (R4, R8):
-    domain.on(_basis)(_domain_parallel)
-    deformed.on(_basis)(_deformed_parallel)
-    extent.on(_basis)(_extent_parallel)
-    register(_basis, 2**_basis.dimension)
+class _Simplex(CarriedDomain):
+    """Base of triangles and tetrahedra."""
+
+    __slots__ = ()
 
 
-class T3(ConvectedDomain):
+class T3(_Simplex):
     """Triangles of a mesh: three corners, each with a third of the weight.
 
     Example
@@ -116,11 +122,10 @@ class T3(ConvectedDomain):
 
     __slots__ = ()
     dimension = 2
-    shape = ("corners",)
     element = Element("triangle", 3, ((0, 1), (0, 2)), (0, 2, 1))
 
 
-class Tet4(ConvectedDomain):
+class Tet4(_Simplex):
     """Tetrahedra of a mesh: four corners, each with a quarter of the weight.
 
     The choice of Sinaie et al. 2017 for the cantilever.
@@ -132,7 +137,6 @@ class Tet4(ConvectedDomain):
 
     __slots__ = ()
     dimension = 3
-    shape = ("corners",)
     element = Element("tetra", 4, ((0, 1), (0, 2), (0, 3)), (0, 2, 1, 3))
 
 
@@ -144,6 +148,7 @@ def corners_and_edges(kin, place):
     return corners, {(e, i): edges[e][i] for e in range(d) for i in range(d)}
 
 
+@domain.on(_Simplex)
 def _domain_simplex(basis, kin, place):
     d = kin.dimension
     corners, edges = corners_and_edges(kin, place)
@@ -157,17 +162,12 @@ def _domain_simplex(basis, kin, place):
     return tuple(corners), (weight,) * (d + 1), (first, *others)
 
 
+@upright.on(_Simplex)
 def _upright_simplex(basis, kin, place):
     return determinant(corners_and_edges(kin, place)[1], kin.dimension) > 0
 
 
-for _basis in (T3, Tet4):
-    domain.on(_basis)(_domain_simplex)
-    upright.on(_basis)(_upright_simplex)
-    register_carried(_basis)
-
-
-class Q4(ConvectedDomain):
+class Q4(CarriedDomain):
     """Quadrilaterals of four corners, which neighbouring points move alike.
 
     Domains go on tiling the body without gaps (Sadeghirad, Brannon & Guilkey 2013). In strong shear
@@ -180,7 +180,6 @@ class Q4(ConvectedDomain):
 
     __slots__ = ()
     dimension = 2
-    shape = ("corners",)
     element = Element("quad", 4, ((0, 2), (1, 3)), (0, 3, 2, 1), SQUARE)
 
 
@@ -217,16 +216,13 @@ def _upright_q4(basis, kin, place):
     return least > 0
 
 
-register_carried(Q4)
-
-
 # Weights of the ends of an edge at the nearer and the farther of its two Gauss points.
 NEAR, FAR = (1 + 3**-0.5) / 2, (1 - 3**-0.5) / 2
 # Of two directions, in the order of `_at_gauss`.
 PAIRS = (0, 0), (1, 0), (0, 1), (1, 1)
 
 
-class H8(ConvectedDomain):
+class H8(CarriedDomain):
     """Trilinear hexahedra of eight corners, which neighbouring points move alike.
 
     Weights and gradients are the exact means over the hexahedron: 2 x 2 x 2 Gauss points integrate
@@ -239,7 +235,6 @@ class H8(ConvectedDomain):
 
     __slots__ = ()
     dimension = 3
-    shape = ("corners",)
     element = Element("hexahedron", 8, ((0, 1), (0, 3), (0, 4)), (4, 5, 6, 7, 0, 1, 2, 3), CUBE)
 
 
@@ -335,6 +330,3 @@ def _upright_h8(basis, kin, place):
     u, v, w = _edges(place)
     met = [(u[_at(y, z)], v[_at(x, z)], w[_at(x, y)]) for x, y, z in CUBE]
     return min(*[_dot(a, _cross(b, c)) for a, b, c in met]) > 0
-
-
-register_carried(H8)
