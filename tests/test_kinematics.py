@@ -37,7 +37,6 @@ from karamelo_py.points.kinematics import (
     Space,
     det,
     dev,
-    dimension,
     from_columns,
     inner,
     inv,
@@ -242,7 +241,6 @@ def test_units_and_zeros(kin):
     assert close(matrix(kin, unit(kin), 1.0), np.eye(3))
     assert zero(kin, 1.0) == (0.0,) * kin.tensor_size
     assert nothing(kin) == (0.0,) * len(kin.symmetric_names)
-    assert dimension(kin) == kin.dimension
     plane = planar(kin)
     assert (plane.dimension, plane.tensor_size) == (kin.dimension, kin.dimension**2)
     assert zero_vector(kin, 1.0) == (0.0,) * kin.dimension
@@ -347,7 +345,7 @@ def of_all(kin, f, dl, s, a, g):
         inner(0.5 * s + 0.25 * I, nothing(kin)),
         inner(f.stretch(), s),
         (moved.diagonal() + s.nominal(f).dot(g)).largest(),
-        dimension(planar(kin)),
+        planar(kin).dimension,
     )
 
 

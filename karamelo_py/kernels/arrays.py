@@ -16,7 +16,7 @@ from karamelo_py.compiler.loops import noinline
 from karamelo_py.compiler.tuples import row
 from karamelo_py.kernels.totals import LIMBS, Alone
 from karamelo_py.points.grid import Grid
-from karamelo_py.points.kinematics import dimension, vector
+from karamelo_py.points.kinematics import vector
 
 # A NamedTuple, often empty, whose class selects the implementation of point functions.
 Tag: TypeAlias = Any
@@ -51,13 +51,13 @@ def of_momentum(kin):
 @shared
 def of_force(kin):
     """First component of the force in `Nodes.sums`."""
-    return 2 if dimension(kin) == 1 else 4
+    return 2 if kin.dimension == 1 else 4
 
 
 @shared
 def of_change(kin):
     """First component of v* - v in `Nodes.update`; that of v* is 0."""
-    return 4 if dimension(kin) == 3 else dimension(kin)
+    return 4 if kin.dimension == 3 else kin.dimension
 
 
 @shared

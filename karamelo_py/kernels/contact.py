@@ -33,7 +33,7 @@ from karamelo_py.kernels.table import touch, touch_velocity
 from karamelo_py.kernels.totals import add_to, counts, publish
 from karamelo_py.points.basis.surface import ENTRIES
 from karamelo_py.points.grid import node_position
-from karamelo_py.points.kinematics import dimension, vector, zero_vector
+from karamelo_py.points.kinematics import vector, zero_vector
 
 REPEATS = 16  # at most, where more than two fields meet; what remains falls by a half or more
 
@@ -126,7 +126,7 @@ def _shares(contact, kin, nodes, n, m):
     of_n, of_m = _normal(kin, nodes, n), _normal(kin, nodes, m)
     of_n, of_m = _dot(of_n, of_n), _dot(of_m, of_m)
     prescribed_n = prescribed_m = False
-    for k in range(dimension(kin)):
+    for k in range(kin.dimension):
         prescribed_n = prescribed_n or _immovable(contact, n, k)
         prescribed_m = prescribed_m or _immovable(contact, m, k)
     if not of_n + of_m > 0:
@@ -148,7 +148,7 @@ def _pair_of(contact, kin, nodes, records, n, m):
     per_n, per_m = 1.0 / nodes.sums[n, MASS], 1.0 / nodes.sums[m, MASS]
     share_n, share_m = _shares(contact, kin, nodes, n, m)
     outward = share_n * _normal(kin, nodes, n) - share_m * _normal(kin, nodes, m)
-    axes = range(dimension(kin))
+    axes = range(kin.dimension)
     yielding = [_yielding(contact, n, k, per_n) + _yielding(contact, m, k, per_m) for k in axes]
     like = zero_vector(kin, 0.0)
     relative = vector_at(kin, records, n, 0, like) - vector_at(kin, records, m, 0, like)
@@ -321,7 +321,7 @@ def _touch_pair(contact, kin, nodes, control, i, j, place, share, where):
         warmth = contact.warmth[a, b]
         warm_node(field(nodes.fields, FrictionalHeat), n, warmth * heat * pair.per_n)
         warm_node(field(nodes.fields, FrictionalHeat), m, (1.0 - warmth) * heat * pair.per_m)
-    for k in range(dimension(kin)):
+    for k in range(kin.dimension):
         impulse = push * pair.outward[k] / size
         if rub > 0:
             impulse += rub * slide[k]
@@ -348,7 +348,7 @@ def _touch_place(contact, kin, nodes, control, place, count, where):
                 _touch_pair(contact, kin, nodes, control, i, j, place, share, where)
         for i in range(count):
             n = _node(contact, place, i)
-            for k in range(dimension(kin)):
+            for k in range(kin.dimension):
                 nodes.update[n, k] += contact.change[i, k]
                 nodes.update[n, of_change(kin) + k] += contact.change[i, k]
 
@@ -367,7 +367,7 @@ def touch_node(contact, kin, grids, nodes, control, n):
 def _keep_rigid(contact, kin, nodes, n):
     """Rigid bodies have their velocity, whatever acts on the nodes."""
     if contact.rigid[n // contact.stride] and nodes.sums[n, MASS] > 0:
-        for k in range(dimension(kin)):
+        for k in range(kin.dimension):
             nodes.update[n, k] = nodes.sums[n, of_momentum(kin) + k] / nodes.sums[n, MASS]
             nodes.update[n, of_change(kin) + k] = 0
 
@@ -396,7 +396,7 @@ def _touch_nodes(contact, kin, grids, nodes, spans, control):
             if contact.pair[a, b] >= 0:
                 publish(control, contact.pair[a, b], 3)
     for c in range(contact.reactions[0]):
-        publish(control, contact.reactions[1 + c], dimension(kin))
+        publish(control, contact.reactions[1 + c], kin.dimension)
     for c in range(len(contact.copies)):
         for k in range(3):
             values[contact.copies[c, 1] + k] = values[contact.copies[c, 0] + k]
@@ -441,7 +441,7 @@ def _stay_place(contact, kin, nodes, place, count, step):
                     _stay_pair(contact, i, j, pair, _share(contact, i, j), touched < 0)
         for i in range(count):
             n = _node(contact, place, i)
-            for k in range(dimension(kin)):
+            for k in range(kin.dimension):
                 nodes.velocity[n, k] += contact.change[i, k]
 
 

@@ -5,14 +5,13 @@ from karamelo_py.compiler.fields import load, store
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.tuples import put_at, record, row
-from karamelo_py.kernels.visit import place_at
+from karamelo_py.kernels.visit import place_at, state_at
 from karamelo_py.points.basis import entry, locate, reach, support
 from karamelo_py.points.kinematics import outer, planar, zero
 from karamelo_py.points.laws import (
     cauchy_stress,
     elastic_strain,
     energy_density,
-    initial_state,
     jacobian,
     shown,
     specific_volume,
@@ -24,12 +23,11 @@ EXPORTED = 14  # columns: stress, elastic strain (6 each), det F, stored energy 
 
 
 @kernel
-def export_state(kin, like, points, laws, out):
+def export_state(kin, points, laws, out):
     """Fill ``out`` (n, EXPORTED) in the order of the points."""
     points, laws = at_hand(points), at_hand(laws)
     for p in range(points.mass.size):
-        law = record(laws, points.material[p])
-        state = load(points.state, p, initial_state(law, kin, like))
+        law, state = state_at(kin, points, laws, p)
         put_at(out, p, 0, cauchy_stress(law, kin, state))
         put_at(out, p, STRAIN, elastic_strain(law, kin, state))
         out[p, JACOBIAN] = jacobian(law, kin, state)
@@ -38,21 +36,20 @@ def export_state(kin, like, points, laws, out):
 
 
 @kernel
-def export(what, times_volume, kin, like, points, laws, out):
+def export(what, times_volume, kin, points, laws, out):
     """One number ``out`` (n,) of each point, declared by laws that have it (`columns_of`).
 
     ``times_volume`` multiplies it by the reference volume: energies from their densities.
     """
     points, laws = at_hand(points), at_hand(laws)
     for p in range(points.mass.size):
-        law = record(laws, points.material[p])
-        state = load(points.state, p, initial_state(law, kin, like))
+        law, state = state_at(kin, points, laws, p)
         number = shown(what, law, kin, state)
         out[p] = points.mass[p] * specific_volume(law) * number if times_volume else number
 
 
 @kernel
-def impose_stress(kin, like, points, laws, chosen, given, stress):
+def impose_stress(kin, points, laws, chosen, given, stress):
     """Set the Cauchy stress of the chosen points, where ``given`` (6,) says so.
 
     ``stress`` (n, 6) is in the order of the points and of the components of `kin`.
@@ -61,8 +58,7 @@ def impose_stress(kin, like, points, laws, chosen, given, stress):
     for p in range(points.mass.size):
         if not chosen[p]:
             continue
-        law = record(laws, points.material[p])
-        state = load(points.state, p, initial_state(law, kin, like))
+        law, state = state_at(kin, points, laws, p)
         old = cauchy_stress(law, kin, state)
         for k in range(len(old)):
             if not given[k]:

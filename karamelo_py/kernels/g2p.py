@@ -22,20 +22,25 @@ from karamelo_py.points.kinematics import I, det, large, outer, vector, zero, ze
 from karamelo_py.points.transfers.xpic import Reflected, Series, TermOfSeries
 
 
-class Move(NamedTuple):
-    """Gather v* and its change; settle velocity and new position."""
+class Task(NamedTuple):
+    """Base of tasks that lanes do, too, and corners of domains."""
 
     in_lanes = True
+    not_at_corners = ()
+
+
+class Move(Task):
+    """Gather v* and its change; settle velocity and new position."""
+
     not_at_corners = ("moments",)
     says = "g2p, move"
     reads = ("x", "v")
     writes = ("x moved", "v", "moment", "bounces")
 
 
-class Strain(NamedTuple):
+class Strain(Task):
     """Gather the gradient of the nodal velocity; settle the state of the law."""
 
-    in_lanes = True
     not_at_corners = ("moments",)
     says = "stress"
     reads = ("x", "v", "state", "material", "deformation gradient", "volume ratio")
@@ -74,11 +79,9 @@ class TrialStrainOfLastStep(TrialStrain):
     """The same of `StrainOfLastStep`."""
 
 
-class SetMeanStress(NamedTuple):
+class SetMeanStress(Task):
     """Gather the averaged mean stress of F-bar."""
 
-    in_lanes = True
-    not_at_corners = ()
     says = "averaged mean stress"
     reads = ("x",)
     writes = ("averaged stress",)
@@ -241,7 +244,7 @@ def _settled_strain(task, w, stencil, p, dt, total, totals, fastest):
     if isinstance(task, StrainOfLastStep):
         dl = frames.of_places_before(w.frame, w.kin, dl)
     dl = visit.averaged(w, p, dl, ratio)
-    law, old, f = visit.deformed_state(w, p, dt)
+    law, old, f = visit.deformed_state(w, p)
     growth = frames.spatial_increment(w.frame, w.kin, dl, f)
     load_step = isinstance(task, StrainOfLoadStep) and laws.by_rates(law)
     state = laws.advance(law, w.kin, old, large(growth) if load_step else growth, dt)
@@ -274,7 +277,7 @@ def _settled_trial_strain(task, w, stencil, p, dt, total, totals, fastest):
     dl = increment(dt, total)
     if isinstance(task, TrialStrainOfLastStep):
         dl = frames.of_places_before(w.frame, w.kin, dl)
-    _, _, f = visit.deformed_state(w, p, dt)
+    _, _, f = visit.deformed_state(w, p)
     dl = frames.spatial_increment(w.frame, w.kin, dl, f)
     field(w.points.fields, visit.VolumeRatio)[0, p] = det(I + dl)
     return real(0, dt), fastest
@@ -309,7 +312,7 @@ def further_reach(basis, kin, grid, before, after):
 @settled.on(Move)
 def _settled_move(task, w, stencil, p, dt, total, totals, fastest):
     """New velocity, position and carried corners; how far that is in cells."""
-    law, state = visit.law_and_state(w, p, dt)
+    law, state = visit.law_and_state(w, p)
     v_pic, dv, moment, *corners = total
     old = load_vector(w.kin, w.points.v, p)
     v = laws.constrained_velocity(law, old, transfers.updated_velocity(w.transfer, old, v_pic, dv))

@@ -37,7 +37,7 @@ from karamelo_py.kernels.visit import NodalMean, deformed_state, law_and_state
 from karamelo_py.points import laws
 from karamelo_py.points.basis import entry, reach
 from karamelo_py.points.frames import inverse_stretch_squared, pulled_back
-from karamelo_py.points.kinematics import Line, dimension
+from karamelo_py.points.kinematics import Line
 
 
 class Temperature(StepField):
@@ -154,7 +154,7 @@ def at_least_round_off(weight):
 
 @load_of.on(HeatContent)
 def _load_of_heat_content(quantity, w, p, like):
-    law, state = law_and_state(w, p, like)
+    law, state = law_and_state(w, p)
     mass = w.points.mass[p]
     volume = mass * laws.specific_volume(law) * laws.jacobian(law, w.kin, state)
     T = laws.temperature(law, w.kin, state)
@@ -193,7 +193,7 @@ def _scattered_heat_content(quantity, w, stencil, k, load):
 
 @load_of.on(HeatFlow)
 def _load_of_heat_flow(quantity, w, p, like):
-    _, _, f = deformed_state(w, p, like)
+    _, _, f = deformed_state(w, p)
     against = pulled_back(w.frame, w.kin, _gradient(w, p), f)
     fields = w.points.fields
     conductance = of_present(p, field(fields, Conductance)[0, p])
@@ -248,13 +248,13 @@ def _gathered_warming(task, w, stencil, k, total):
 
 @settled.on(Warming)
 def _settled_warming(task, w, stencil, p, dt, total, totals, fastest):
-    law, state, f = deformed_state(w, p, dt)
+    law, state, f = deformed_state(w, p)
     fields = w.points.fields
     T = field(fields, Temperature)[0, p]
     capacity = field(fields, Capacity)[0, p]
     some = capacity > 0
     rate = field(fields, Conductance)[0, p] / where(some, capacity, real(1, capacity))
-    hidden = real(4 * dimension(w.kin), dt) * (rate * w.grid.inv_h * w.grid.inv_h) * dt
+    hidden = real(4 * w.kin.dimension, dt) * (rate * w.grid.inv_h * w.grid.inv_h) * dt
     change = total[0] + min(hidden, real(1, hidden)) * (total[1] - T)
     T = where(some, fma(field(fields, TemperatureShare)[0, p], change, T), T)
     store(w.points.state, p, laws.with_temperature(law, w.kin, state, T))

@@ -25,7 +25,7 @@ from karamelo_py.kernels.walls import FRICTION, rub, stick
 from karamelo_py.points.basis import placed
 from karamelo_py.points.bodies import face
 from karamelo_py.points.grid import node_position
-from karamelo_py.points.kinematics import dimension, planar
+from karamelo_py.points.kinematics import planar
 
 # Bare numbers would be types of their own.
 NONE, VALUE, BEFORE = np.int64(0), np.int64(arrays.VALUE), np.int64(arrays.BEFORE)
@@ -320,7 +320,7 @@ def _clear_held(what, held):
     if held.size > 0:
         for r in range(ranges[0, 0], ranges[ranges[0, 0] - 1, 1]):
             for n in range(ranges[r, 0], ranges[r, 1]):
-                for c in range(dimension(kin)):
+                for c in range(kin.dimension):
                     held[n, c].slot = 0
 
 
@@ -431,7 +431,7 @@ def _work_at_nodes(what, hooks, control, dt, count):
     """
     update, change = what.nodes.update, arrays.of_change(what.kin)
     terms = hooks.scratch[VALUE]
-    for c in range(dimension(what.kin)):
+    for c in range(what.kin.dimension):
         for q in range(count):
             n = hooks.chosen[q]
             load = hooks.loads[n, c]

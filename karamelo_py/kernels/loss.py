@@ -26,7 +26,6 @@ from karamelo_py.kernels.arrays import of_change, vector_at
 from karamelo_py.kernels.visit import law_and_state
 from karamelo_py.points import laws, transfers
 from karamelo_py.points.basis import entry, support
-from karamelo_py.points.kinematics import dimension
 from karamelo_py.points.transfers.xpic import Reflected, Series
 
 # Share of the mass at its nodes from where on a point loses its moment, to the power of dimensions:
@@ -65,7 +64,7 @@ def _nodes_of(w, stencil):
 def warm_by_friction(rubbed, w, stencil, p, like):
     """Point `p` takes the heat of friction at its nodes by its weights: none is lost."""
     if rubbed is not None:
-        law, state = law_and_state(w, p, like)
+        law, state = law_and_state(w, p)
         heat = like - like
         for i, weight, _ in _nodes_of(w, stencil):
             heat += weight * rubbed[i, 0]
@@ -121,7 +120,7 @@ def in_company(w, stencil, p, moment):
         return moment
     mass = w.points.mass[p]
     one = real(1, mass)
-    kept = (one - _own_share(lost, w, stencil, mass)) / real(1 - ALONE ** dimension(w.kin), mass)
+    kept = (one - _own_share(lost, w, stencil, mass)) / real(1 - ALONE**w.kin.dimension, mass)
     return max(min(kept, one), mass - mass) * moment
 
 
@@ -137,7 +136,7 @@ def _own_share(lost, w, stencil, mass):
 @shared
 def _heat(w, p, gone):
     """Give point `p` the energy per mass that is gone."""
-    law, state = law_and_state(w, p, gone)
+    law, state = law_and_state(w, p)
     fields.store(
         w.points.state, p, laws.warmed(law, w.kin, state, gone / laws.specific_volume(law))
     )

@@ -10,7 +10,6 @@ from karamelo_py.kernels.arrays import Index, Nodes, Number, Tag
 from karamelo_py.kernels.loss import EnergyLoss, FrictionalHeat
 from karamelo_py.kernels.p2g import SquaredMass
 from karamelo_py.kernels.visit import NodalMean, NodalStress
-from karamelo_py.points.kinematics import dimension
 from karamelo_py.points.transfers.xpic import Series
 
 
@@ -105,7 +104,7 @@ def _at_node_keep_loss(task, kin, nodes, n, dt):
         one = real(1, mass)
         factor = one / mass
         kinetic = mass - mass
-        for k in range(dimension(kin)):
+        for k in range(kin.dimension):
             v = nodes.sums[n, arrays.of_momentum(kin) + k] * factor
             kinetic += real(0.5, mass) * v * v
         # Of bodies that fly as one, the difference is round-off of either sign, and no heat.
@@ -122,7 +121,7 @@ def _at_node_clear_frictional_heat(task, kin, nodes, n, dt):
 @at_node.on(NodalUpdate)
 def _at_node_update(task, kin, nodes, n, dt):
     factor = per_mass(nodes, n, dt)
-    for k in range(dimension(kin)):
+    for k in range(kin.dimension):
         dv = dt * nodes.sums[n, arrays.of_force(kin) + k] * factor
         nodes.update[n, k] = nodes.sums[n, arrays.of_momentum(kin) + k] * factor + dv
         nodes.update[n, arrays.of_change(kin) + k] = dv
@@ -131,14 +130,14 @@ def _at_node_update(task, kin, nodes, n, dt):
 @at_node.on(MomentumToVelocity)
 def _at_node_momentum_to_velocity(task, kin, nodes, n, dt):
     factor = per_mass(nodes, n, dt)
-    for k in range(dimension(kin)):
+    for k in range(kin.dimension):
         nodes.velocity[n, k] *= factor
 
 
 @at_node.on(SumsToVelocity)
 def _at_node_sums_to_velocity(task, kin, nodes, n, dt):
     factor = per_mass(nodes, n, dt)
-    for k in range(dimension(kin)):
+    for k in range(kin.dimension):
         nodes.velocity[n, k] = nodes.sums[n, arrays.of_momentum(kin) + k] * factor
 
 
@@ -158,7 +157,7 @@ def _at_node_update_to_velocity(task, kin, nodes, n, dt):
     # share of its mass. Points take the whole change: momentum is kept.
     one = real(1, dt)
     share = unlimited(field(nodes.fields, SquaredMass), n, nodes.sums[n, arrays.MASS], task.light)
-    for k in range(dimension(kin)):
+    for k in range(kin.dimension):
         dv = nodes.update[n, arrays.of_change(kin) + k]
         nodes.velocity[n, k] = nodes.update[n, k] - (one - share) * dv
 
@@ -172,7 +171,7 @@ def _at_node_take_mean(task, kin, nodes, n, dt):
 
 @at_node.on(StartSeries)
 def _at_node_start_series(task, kin, nodes, n, dt):
-    d = dimension(kin)
+    d = kin.dimension
     series = field(nodes.fields, Series)
     factor = per_mass(nodes, n, dt)
     for k in range(d):
@@ -183,7 +182,7 @@ def _at_node_start_series(task, kin, nodes, n, dt):
 
 @at_node.on(ExtendSeries)
 def _at_node_extend_series(task, kin, nodes, n, dt):
-    d = dimension(kin)
+    d = kin.dimension
     series = field(nodes.fields, Series)
     factor = per_mass(nodes, n, dt)
     for k in range(d):

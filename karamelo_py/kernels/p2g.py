@@ -14,46 +14,33 @@ from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.lanes.records import move_record
 from karamelo_py.compiler.loops import noinline
 from karamelo_py.compiler.tuples import put_at
-from karamelo_py.kernels.arrays import (
-    ADD,
-    CLEAR,
-    MASS,
-    SUMS_WIDTH,
-    VELOCITY_WIDTH,
-    Buffers,
-    Index,
-    Nodes,
-    Number,
-    Tag,
-    of_force,
-)
+from karamelo_py.kernels import arrays, visit
+from karamelo_py.kernels.arrays import MASS, Buffers, Index, Nodes, Number, Tag, of_force
 from karamelo_py.kernels.loss import EnergyLoss, bring_energy
-from karamelo_py.kernels.visit import (
-    AveragedStress,
-    FBar,
-    NodalMean,
-    NodalStress,
-    VolumeRatio,
-    Work,
-    deformed_state,
-    for_tags,
-    law_and_state,
-    law_of,
-    records_of,
-)
+from karamelo_py.kernels.visit import Work, for_tags
 from karamelo_py.points import laws
 from karamelo_py.points.basis import entry, mapped_again
 from karamelo_py.points.frames import force_stress
-from karamelo_py.points.kinematics import I, dimension, nothing
-from karamelo_py.points.laws import constrained_velocity
+from karamelo_py.points.kinematics import I, nothing
 from karamelo_py.points.transfers import Moment, gradient_weight, nodal_momentum, zero_moment
 from karamelo_py.points.transfers.xpic import Series, TermOfSeries
 
 
-class MassMomentum(NamedTuple):
-    """Scatter mass and momentum."""
+class Quantity(NamedTuple):
+    """Base of quantities that lanes give, too, and corners of domains."""
 
     in_lanes = True
+    not_at_corners = ()
+
+
+def _forces(kin):
+    """Name the columns of forces."""
+    return "sums", of_force(kin), arrays.SUMS_WIDTH[kin.dimension]
+
+
+class MassMomentum(Quantity):
+    """Scatter mass and momentum."""
+
     not_at_corners = ("moments", "loss")
     says = "p2g mass and momentum"
     reads = ("x moved", "mass", "v", "moment")
@@ -61,67 +48,59 @@ class MassMomentum(NamedTuple):
     @staticmethod
     def fills(kin):
         """Name the columns of the nodes that it adds to, see `columns_of`."""
-        vectors = [(kind, 0, dimension(kin)) for kind in (Normal, Centre)]
+        vectors = [(kind, 0, kin.dimension) for kind in (Normal, Centre)]
         numbers = [(kind, 0, 1) for kind in (SquaredMass, EnergyLoss)]
-        return ("sums", 0, of_force(kin)), (RigidSums, 0, of_force(kin)), *vectors, *numbers
+        whole = [(kind, 0, of_force(kin)) for kind in ("sums", RigidSums)]
+        return *whole, *vectors, *numbers
 
 
-class InternalForce(NamedTuple):
+class InternalForce(Quantity):
     """Scatter the internal force, and that of fixes on points."""
 
-    in_lanes = True
     not_at_corners = ("moments",)
     says = "internal force"
     reads = ("mass", "state", "material", "deformation gradient", "force")
 
-    fills = staticmethod(
-        lambda kin: (("sums", of_force(kin), SUMS_WIDTH[dimension(kin)]), (NodalStress, 0, 2))
-    )
+    fills = staticmethod(lambda kin: (_forces(kin), (visit.NodalStress, 0, 2)))
 
 
-class MomentumAgain(NamedTuple):
+class MomentumAgain(Quantity):
     """Scatter momentum to the velocity array."""
 
-    in_lanes = True
     not_at_corners = ("moments",)
     says = "momentum to grid"
     reads = ("mass", "v", "moment")
 
-    fills = staticmethod(lambda kin: (("velocity", 0, VELOCITY_WIDTH[dimension(kin)]),))
+    fills = staticmethod(lambda kin: (("velocity", 0, arrays.VELOCITY_WIDTH[kin.dimension]),))
 
 
-class Volumes(NamedTuple):
+class Volumes(Quantity):
     """Scatter volume, after and before the trial increment (F-bar)."""
 
-    in_lanes = True
-    not_at_corners = ()
     says = "volumes to grid"
     reads = ("mass", "state", "material", "volume ratio")
 
-    fills = staticmethod(lambda kin: ((NodalMean, 0, 2),))
+    fills = staticmethod(lambda kin: ((visit.NodalMean, 0, 2),))
 
 
-class AveragedForce(NamedTuple):
+class AveragedForce(Quantity):
     """Scatter the internal force of the averaged mean stress less that of a point's own (F-bar)."""
 
-    in_lanes = True
     not_at_corners = ("moments",)
     says = "internal force of the averaged mean stress"
     reads = ("mass", "state", "material", "deformation gradient", "averaged stress")
     adds = True  # to a force that is there
 
-    fills = staticmethod(lambda kin: (("sums", of_force(kin), SUMS_WIDTH[dimension(kin)]),))
+    fills = staticmethod(lambda kin: (_forces(kin),))
 
 
-class SeriesBack(NamedTuple):
+class SeriesBack(Quantity):
     """Scatter the term of the series of XPIC, times mass."""
 
-    in_lanes = True
-    not_at_corners = ()
     says = "term of the series to the grid"
     reads = ("mass", "term of series")
 
-    fills = staticmethod(lambda kin: ((Series, dimension(kin), 2 * dimension(kin)),))
+    fills = staticmethod(lambda kin: ((Series, kin.dimension, 2 * kin.dimension),))
 
 
 class Force(StepField):
@@ -158,7 +137,7 @@ class RigidSums(SummedField):
     @staticmethod
     def shape(kin):
         """The components of the sums of a node."""
-        return SUMS_WIDTH[kin.dimension]
+        return arrays.SUMS_WIDTH[kin.dimension]
 
 
 @point_function()
@@ -166,12 +145,12 @@ def load_of(quantity: Tag, w: Work, p: Index, like: Number) -> tuple:
     """Return the load of a point: the numbers that it scatters, before they are weighted."""
 
 
-@records_of.on(MassMomentum)
+@visit.records_of.on(MassMomentum)
 def _records_of_mass_momentum(quantity, nodes):
     return nodes.sums
 
 
-@records_of.on(MomentumAgain)
+@visit.records_of.on(MomentumAgain)
 def _records_of_momentum_again(quantity, nodes):
     return nodes.velocity
 
@@ -187,22 +166,23 @@ def _moment(w, p, like):
 
 
 @shared
-def _is_apart(w, law):
+def _is_apart(w):
     """Return True for rigid points whose nodes have sums of their own for them."""
-    return field(w.nodes.fields, RigidSums) is not None and constrained_velocity.defined(type(law))
+    rigid = laws.constrained_velocity.defined(type(w.laws))
+    return rigid and field(w.nodes.fields, RigidSums) is not None
 
 
 @shared
 def _mass(w, p):
     """The mass that a point gives to the sums of all solids."""
     mass = of_present(p, w.points.mass[p])
-    return mass - mass if _is_apart(w, law_of(w, p)) else mass
+    return mass - mass if _is_apart(w) else mass
 
 
 @load_of.on(MassMomentum)
 def _load_of_mass_momentum(quantity, w, p, like):
     v = load_vector(w.kin, w.points.v, p)
-    rigid = (of_present(p, w.points.mass[p]),) if _is_apart(w, law_of(w, p)) else ()
+    rigid = (of_present(p, w.points.mass[p]),) if _is_apart(w) else ()
     x = () if field(w.nodes.fields, Centre) is None else load_vector(w.kin, w.places.y, p)
     return _mass(w, p), v, _moment(w, p, like), rigid, x
 
@@ -232,10 +212,10 @@ def _mean_stress(kin, law, state, volume):
 
 @load_of.on(AveragedForce)
 def _load_of_averaged_force(quantity, w, p, like):
-    law, state, f = deformed_state(w, p, like)
+    law, state, f = visit.deformed_state(w, p)
     volume = _mass(w, p) * laws.specific_volume(law)
     own, present = _mean_stress(w.kin, law, state, volume)
-    change = present * field(w.points.fields, AveragedStress)[0, p] - own
+    change = present * field(w.points.fields, visit.AveragedStress)[0, p] - own
     return force_stress(w.frame, w.kin, nothing(w.kin) - change * I, f)
 
 
@@ -248,12 +228,12 @@ def _scattered_averaged_force(quantity, w, stencil, k, load):
 
 @load_of.on(InternalForce)
 def _load_of_internal_force(quantity, w, p, like):
-    law, state, f = deformed_state(w, p, like)
+    law, state, f = visit.deformed_state(w, p)
     volume = _mass(w, p) * laws.specific_volume(law)
     # Minus volume times stress, with the sign of the internal force.
     stress = -volume * force_stress(w.frame, w.kin, laws.kirchhoff_stress(law, w.kin, state), f)
     force = load(field(w.points.fields, Force), p, load_vector(w.kin, w.points.v, p))
-    of_mean = isinstance(w.averaging, FBar)
+    of_mean = isinstance(w.averaging, visit.FBar)
     mean = _mean_stress(w.kin, law, state, volume) if of_mean else ()
     here = of_present(p, real(1, volume))
     return stress, here * force if len(force) else (), mean
@@ -268,7 +248,7 @@ def _scattered_internal_force(quantity, w, stencil, k, load):
     if len(of_fixes):
         force = N * of_fixes + force
     accumulate(w.nodes.sums, i, of_force(w.kin), (*force,))
-    accumulate_optional(field(w.nodes.fields, NodalStress), i, tuple([N * a for a in mean]))
+    accumulate_optional(field(w.nodes.fields, visit.NodalStress), i, tuple([N * a for a in mean]))
 
 
 @load_of.on(MomentumAgain)
@@ -289,16 +269,16 @@ def _scattered_momentum_again(quantity, w, stencil, k, load):
 
 @load_of.on(Volumes)
 def _load_of_volumes(quantity, w, p, like):
-    law, state = law_and_state(w, p, like)
+    law, state = visit.law_and_state(w, p)
     volume = _mass(w, p) * laws.specific_volume(law) * laws.jacobian(law, w.kin, state)
-    return volume * field(w.points.fields, VolumeRatio)[0, p], volume
+    return volume * field(w.points.fields, visit.VolumeRatio)[0, p], volume
 
 
 @scattered.on(Volumes)
 def _scattered_volumes(quantity, w, stencil, k, load):
     i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
     part = (weight * load[0], weight * load[1])
-    accumulate(field(w.nodes.fields, NodalMean), i, 0, part)
+    accumulate(field(w.nodes.fields, visit.NodalMean), i, 0, part)
 
 
 @load_of.on(SeriesBack)
@@ -387,12 +367,12 @@ def sum_share(quantities: tuple, kin: Tag, nodes: Nodes, buffers: Buffers, share
             for j in range(parts[part, 3]):
                 n = parts[part, 0] + i * parts[part, 5] + j * parts[part, 6]
                 m = parts[part, 1] + i * parts[part, 7] + j * parts[part, 8]
-                if what == CLEAR:
+                if what == arrays.CLEAR:
                     for k in range(count):
                         _clear_record(quantities, kin, nodes, index(n + k))
                 else:
                     for k in range(count):
                         _take_record(
                             quantities, kin, nodes, index(n + k), buffers.nodes, index(m + k),
-                            what == ADD,
+                            what == arrays.ADD,
                         )  # fmt: skip

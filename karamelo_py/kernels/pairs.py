@@ -10,13 +10,13 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.compiler.compile import shared
-from karamelo_py.compiler.fields import load, load_vector
+from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import kernel, noinline
-from karamelo_py.compiler.tuples import record
+from karamelo_py.kernels.visit import state_at
 from karamelo_py.points.bodies import force_between, radius
-from karamelo_py.points.kinematics import dimension, vector
-from karamelo_py.points.laws import initial_state, jacobian, specific_volume
+from karamelo_py.points.kinematics import vector
+from karamelo_py.points.laws import jacobian, specific_volume
 
 
 class TwoBodies(NamedTuple):
@@ -60,10 +60,8 @@ def _body(id, begin1, end1, begin2, end2):
 
 @shared
 def _radius(kin, x, points, laws, p):
-    law = record(laws, points.material[p])
-    mass = points.mass[p]
-    state = load(points.state, p, initial_state(law, kin, mass))
-    volume = mass * specific_volume(law) * jacobian(law, kin, state)
+    law, state = state_at(kin, points, laws, p)
+    volume = points.mass[p] * specific_volume(law) * jacobian(law, kin, state)
     return radius(kin, float(volume), load_vector(kin, x, p))
 
 
@@ -77,7 +75,7 @@ def extend(kin, x, points, laws, begin1, end1, begin2, end2, extents):
     for p in range(points.id.size):
         body = _body(points.id[p], begin1, end1, begin2, end2)
         if body >= 0:
-            for k in range(dimension(kin)):
+            for k in range(kin.dimension):
                 extents[body, k] = max(extents[body, k], -float(x[k, p]))
                 extents[body, 3 + k] = max(extents[body, 3 + k], float(x[k, p]))
             extents[body, 6] = max(extents[body, 6], _radius(kin, x, points, laws, p))
@@ -89,7 +87,7 @@ def pick(kin, x, points, begin1, end1, begin2, end2, low, high, rows):
     points, count = at_hand(points), 0
     for p in range(points.id.size):
         inside = _body(points.id[p], begin1, end1, begin2, end2) >= 0
-        for k in range(dimension(kin)):
+        for k in range(kin.dimension):
             inside = inside and low[k] <= x[k, p] <= high[k]
         if inside:
             rows[count] = p
@@ -100,7 +98,7 @@ def pick(kin, x, points, begin1, end1, begin2, end2, low, high, rows):
 @kernel
 def collect(kin, x, points, laws, rows, found):
     """Number, mass, radius, position and velocity of points of a block (n, 3 + 2 d)."""
-    points, laws, d = at_hand(points), at_hand(laws), dimension(kin)
+    points, laws, d = at_hand(points), at_hand(laws), kin.dimension
     for i in range(rows.size):
         p = rows[i]
         found[i, 0], found[i, 1] = points.id[p], points.mass[p]
@@ -200,7 +198,7 @@ def _touch(law, kin, bodies, reach, dt, kick, i, j, total):
     x, f = bodies.x, bodies.force
     dx = vector_at(kin, x, j) - vector_at(kin, x, i)
     squared = 0.0
-    for k in range(dimension(kin)):
+    for k in range(kin.dimension):
         if not abs(dx[k]) < reach:
             return 0
         squared += dx[k] * dx[k]
@@ -212,7 +210,7 @@ def _touch(law, kin, bodies, reach, dt, kick, i, j, total):
         law, kin, dx, sqrt(squared), bodies.radius[i], bodies.radius[j],
         bodies.mass[i], bodies.mass[j], dv, dt, kick,
     )  # fmt: skip
-    for k in range(dimension(kin)):
+    for k in range(kin.dimension):
         f[i, k] += force[k]
         f[j, k] -= force[k]
         total[k] += force[k]
@@ -227,7 +225,7 @@ def push_apart(law, kin, bodies, cells, reach, dt, kick, total):
     every direction. `total` (3,) takes the force on the first body.
     """
     bodies, cells = at_hand(bodies), at_hand(cells)
-    d = dimension(kin)
+    d = kin.dimension
     total[:] = 0.0
     touching = 0
     width = _lay_cells(d, bodies, cells, reach)

@@ -21,7 +21,6 @@ from karamelo_py.kernels.totals import add_to, publish
 from karamelo_py.kernels.visit import place_at
 from karamelo_py.points.basis import entry, locate, support
 from karamelo_py.points.grid import node_position
-from karamelo_py.points.kinematics import dimension
 from karamelo_py.points.laws.rigid import Rigid
 
 
@@ -42,7 +41,7 @@ def _lead(kin, nodes, led, spans, dt, kept):
     As with a body of infinite mass, v* - v is nothing: points that keep their velocity take none
     from there. `kept` is the share that they keep.
     """
-    d = dimension(kin)
+    d = kin.dimension
     for s in range(1, 1 + spans[0, 0]):
         for n in range(spans[s, 0], spans[s, 1]):
             if not led[n, MASS] > 0:
@@ -67,14 +66,14 @@ def _lead_velocity(kin, nodes, led, spans):
     for s in range(1, 1 + spans[0, 0]):
         for n in range(spans[s, 0], spans[s, 1]):
             if led[n, MASS] > 0:
-                for k in range(dimension(kin)):
+                for k in range(kin.dimension):
                     nodes.velocity[n, k] = led[n, of_momentum(kin) + k] / led[n, MASS]
 
 
 @kernel
 def _sum_forces(basis, kin, grids, places, points, led, forces, torques, totals):
     """Add up the forces on rigid points, and their torques about the origin."""
-    d = dimension(kin)
+    d = kin.dimension
     for p in range(points.mass.size):
         grid = record(grids, points.grid[p])
         stencil = locate(basis, kin, grid, place_at(basis, kin, places, p))

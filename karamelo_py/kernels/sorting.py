@@ -15,7 +15,6 @@ from karamelo_py.kernels.sweep import by_threads
 from karamelo_py.kernels.visit import place_at
 from karamelo_py.points.basis import extent
 from karamelo_py.points.grid import Grid, cells_along, in_cells
-from karamelo_py.points.kinematics import dimension
 
 
 class TileGrid(NamedTuple):
@@ -84,7 +83,7 @@ def _find_tiles(kin, grids, tiles, x, of, ends, tile, k):
         g = of[p]
         grid = record(grids, g)
         number = 0
-        for i in range(dimension(kin)):
+        for i in range(kin.dimension):
             cell = cell_of(grid, i, in_cells(grid, i, x[i, p]))
             number = number * tiles.count[g, i] + cell // tiles.size[i]
         number += tiles.first[g]
@@ -131,7 +130,7 @@ def _order_in_tiles(kin, grids, sight, tiles, x, of, ids, found, k):
     grids, tiles, found, sight = at_hand(grids), at_hand(tiles), at_hand(found), at_hand(sight)
     boxes, bins, cell, order = found.boxes, found.bins, found.room, found.order
     ends, cells = found.ends[found.ends.shape[0] - 1], bins.shape[2]
-    d = dimension(kin)
+    d = kin.dimension
     for t in range(found.share[k], found.share[k + 1]):
         begin, end = ends[t - 1] if t > 0 else 0, ends[t]
         if begin == end:

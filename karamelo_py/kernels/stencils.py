@@ -18,7 +18,7 @@ from karamelo_py.points.basis import carried, entry, product, reach, support
 from karamelo_py.points.basis.cpdi import AtCorners, CornerStencil
 from karamelo_py.points.basis.cpdi.block import InBlock, block_of, is_one_block, is_whole, of_one
 from karamelo_py.points.basis.product import Stencil, inverse_spread, spacing
-from karamelo_py.points.kinematics import dimension, from_columns, zero_vector
+from karamelo_py.points.kinematics import from_columns, zero_vector
 
 # --- what is affine around a point: mass, momentum, force of MLS ------------------------------
 #
@@ -100,7 +100,7 @@ def joined(lanes, kin, parts):
         return parts
     array, first, a, to_a = parts[0]
     _, _, b, to_b = parts[1]
-    of_sums = len(a) == 1 + dimension(kin) and len(b) == dimension(kin)
+    of_sums = len(a) == 1 + kin.dimension and len(b) == kin.dimension
     if not (of_sums and len(to_a) and len(to_b)):
         return parts
     growths = [_beside(x, y) for x, y in zip(to_a, to_b, strict=True)]

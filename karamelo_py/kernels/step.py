@@ -9,11 +9,10 @@ from math import sqrt
 from typing import Any, NamedTuple
 
 from karamelo_py.compiler.compile import implements, real, shared
-from karamelo_py.compiler.fields import load, load_vector
+from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.threads import by_team
-from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels import table
 from karamelo_py.kernels.arrays import DT, TIME, NoHooks, Setup, Tag
 from karamelo_py.kernels.clock import (
@@ -29,10 +28,10 @@ from karamelo_py.kernels.g2p import Strain, TrialStrain, TrialStrainOfLastStep
 from karamelo_py.kernels.hook_loop import at_nodes, at_points
 from karamelo_py.kernels.sweep import sweep, sweep_nodes
 from karamelo_py.kernels.table import average_volumes
-from karamelo_py.kernels.visit import deformation_of
+from karamelo_py.kernels.visit import deformation_of, state_at
 from karamelo_py.kernels.watch import look, look_at_heat
 from karamelo_py.points.frames import inverse_stretch_squared
-from karamelo_py.points.laws import initial_state, wave_speed_squared
+from karamelo_py.points.laws import wave_speed_squared
 
 
 class Fused(NamedTuple):
@@ -191,13 +190,10 @@ def _fastest(frame, kin, points, laws, control):
     rate = 0.0
     common = common_velocity(kin, clock, clock.rate)
     for p in range(points.mass.size):
-        law = record(laws, points.material[p])
-        mass = points.mass[p]
-        state = load(points.state, p, initial_state(law, kin, mass))
+        law, state = state_at(kin, points, laws, p)
         f = deformation_of(frame, kin, law, state, points, p)
-        speed = sqrt(
-            wave_speed_squared(law, kin, state) * inverse_stretch_squared(frame, kin, f, mass)
-        )
+        shorter = inverse_stretch_squared(frame, kin, f, points.mass[p])
+        speed = sqrt(wave_speed_squared(law, kin, state) * shorter)
         v = load_vector(kin, points.v, p) - common
         rate = max(rate, speed + v.largest())
     clock.rate = max(clock.rate, rate)

@@ -36,16 +36,7 @@ from karamelo_py.compiler.lanes import room_for
 from karamelo_py.compiler.loops import kernel, noinline
 from karamelo_py.compiler.threads import shared_out
 from karamelo_py.compiler.tuples import flat, nested_as, record
-from karamelo_py.kernels.arrays import (
-    Block,
-    Index,
-    Nodes,
-    Number,
-    Places,
-    Points,
-    Setup,
-    Tag,
-)
+from karamelo_py.kernels.arrays import Block, Index, Nodes, Number, Places, Points, Setup, Tag
 from karamelo_py.kernels.clock import common_velocity
 from karamelo_py.kernels.g2p import empty_all, settled_all
 from karamelo_py.kernels.lanes import (

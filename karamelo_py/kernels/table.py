@@ -24,7 +24,7 @@ from karamelo_py.kernels.hook_loop import add_work
 from karamelo_py.kernels.loss import EnergyLoss, FrictionalHeat
 from karamelo_py.kernels.sweep import OldWeights, PresentWeights, Visit, sweep, sweep_nodes
 from karamelo_py.kernels.visit import FBar
-from karamelo_py.points.kinematics import Axisymmetric, dimension
+from karamelo_py.points.kinematics import Axisymmetric
 from karamelo_py.points.transfers.xpic import XPIC
 
 
@@ -287,7 +287,7 @@ def light_node(s):
     """
     clock = s.control.clock[0]
     courant = clock.rate * s.control.values[arrays.DT] / clock.spacing
-    masses = min(dimension(s.kin) * courant * courant, 1.0)
+    masses = min(s.kin.dimension * courant * courant, 1.0)
     return nodes.UpdateToVelocity(real(masses, s.nodes.sums[0, arrays.MASS]))
 
 

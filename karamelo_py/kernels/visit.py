@@ -46,22 +46,28 @@ def place_at(basis: Tag, kin: Tag, array: np.ndarray, p: Index) -> tuple:
 
 
 @shared
-def law_of(w: Work, p: Index) -> Tag:
+def law_at(points: Points, laws: NamedTuple, p: Index) -> Tag:
     """Load the law of point `p`, with the parameters of its material."""
-    return record(w.laws, index(w.points.material[p]))  # type: ignore[arg-type]
+    return record(laws, index(points.material[p]))
 
 
 @shared
-def law_and_state(w: Work, p: Index, like: Number) -> tuple:
-    """Load the law of point `p` and its state (s,)."""
-    law = law_of(w, p)
-    return law, load(w.points.state, p, initial_state(law, w.kin, like))
+def state_at(kin: Tag, points: Points, laws: NamedTuple, p: Index) -> tuple:
+    """Load the law of point `p` and its state."""
+    law = law_at(points, laws, p)
+    return law, load(points.state, p, initial_state(law, kin, points.mass[p]))
 
 
 @shared
-def deformed_state(w: Work, p: Index, like: Number) -> tuple:
+def law_and_state(w: Work, p: Index) -> tuple:
+    """Load the law of point `p` and its state."""
+    return state_at(w.kin, w.points, w.laws, p)
+
+
+@shared
+def deformed_state(w: Work, p: Index) -> tuple:
     """Load the law of point `p`, its state, and F as `deformation_of`."""
-    law, state = law_and_state(w, p, like)
+    law, state = law_and_state(w, p)
     return law, state, deformation_of(w.frame, w.kin, law, state, w.points, p)
 
 
@@ -76,7 +82,7 @@ def ask_ahead(w: Work, p: Index, like: Number, apart: bool) -> None:
     d, fields = w.kin.dimension, w.points.fields
     moment = len(zero_moment(w.transfer, w.kin, like))
     if d == 3 and (apart or moment):
-        state = count_in(initial_state(law_of(w, p), w.kin, like))
+        state = count_in(initial_state(law_at(w.points, w.laws, p), w.kin, like))
         more = (field(fields, Moment), moment)
         if apart:
             more = (field(fields, DeformationGradient), w.kin.tensor_size)
@@ -200,6 +206,6 @@ def averaged(w, p, dl, ratio):
     # weighted with their volumes (after Coombs et al. 2018, "Overcoming volumetric locking in
     # material point methods", eq. 23; there over the points of a cell). In the total frame, `dl`
     # is dt Fdot, and F + dl is scaled.
-    _, _, f = deformed_state(w, p, ratio[0])
+    _, _, f = deformed_state(w, p)
     own = field(w.points.fields, VolumeRatio)[0, p]
     return scaled_increment(w.frame, w.kin, dl, f, ratio[0] / own)

@@ -12,7 +12,6 @@ from karamelo_py.compiler.loops import noinline
 from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
 from karamelo_py.kernels.loss import FrictionalHeat, warm_node
 from karamelo_py.kernels.totals import add_to, counts
-from karamelo_py.points.kinematics import dimension
 
 FRICTION = 3  # the program of the coefficient, behind those of the components
 
@@ -31,7 +30,7 @@ def rub(kin, nodes, programs, held, n, mu, dt, kept, control, slot):
     points that keep the share `kept` of their velocity take both, is the impulse across the wall.
     Where several fixes hold the node (`held`), each rubs for the directions in which it decides.
     """
-    d = dimension(kin)
+    d = kin.dimension
     mass = nodes.sums[n, MASS]
     across = 0.0
     along = 0.0
@@ -70,7 +69,7 @@ def stick(kin, nodes, programs, n):
 
     Where it is mapped apart from v*, stress would else do work on a slip that there is not.
     """
-    d = dimension(kin)
+    d = kin.dimension
     for c in range(d):
         if programs[c].begin < 0 and nodes.update[n, c] != 0:
             return

@@ -12,28 +12,21 @@ cannot hide what vibrates.
 
 from math import inf
 
-from karamelo_py.compiler.compile import (
-    added,
-    all_lanes,
-    index,
-    of_present,
-    real,
-    shared,
-)
-from karamelo_py.compiler.fields import load, load_vector
+from karamelo_py.compiler.compile import added, all_lanes, of_present, real, shared
+from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import kernel, noinline
 from karamelo_py.compiler.threads import shared_out
-from karamelo_py.compiler.tuples import put_at, record
+from karamelo_py.compiler.tuples import put_at
 from karamelo_py.kernels import totals
 from karamelo_py.kernels.arrays import TIMESTEP, first_from, known_to_laws
 from karamelo_py.kernels.lanes import lanes_with, points_from
-from karamelo_py.points.kinematics import dimension, free_from
+from karamelo_py.kernels.visit import state_at
+from karamelo_py.points.kinematics import free_from
 from karamelo_py.points.laws import (
     dissipated_energy,
     energy_density,
     heat_capacity,
-    initial_state,
     specific_volume,
     temperature,
 )
@@ -75,10 +68,8 @@ def _look_at_share(kin, points, laws, tiling, firsts, k):
         total = (0.0,) * (1 + kin.dimension)
         for q in range(start, end, lanes.width):
             p = points_from(lanes, q, end)
-            law = record(laws, index(points.material[p]))
-            own = of_present(p, points.mass[p])
-            state = load(points.state, p, initial_state(law, kin, own))
-            mass = real(own, 0.0)
+            law, state = state_at(kin, points, laws, p)
+            mass = real(of_present(p, points.mass[p]), 0.0)
             v = [real(x, 0.0) for x in load_vector(kin, points.v, p)]
             kinetic = added(kinetic, 0.5 * mass * sum([x * x for x in v]))
             energy = energy_density(law, kin, state) + dissipated_energy(law, kin, state)
@@ -149,7 +140,7 @@ def _add_momentum(control, solid, d):
 @shared
 def _sum_drift(s):
     """Kinetic energy of the centres of mass of the solids, into the clock; after `sum_energies`."""
-    control, d = s.control, dimension(s.kin)
+    control, d = s.control, s.kin.dimension
     own = control.values.size
     control.totals[own:] = 0
     for block in s.blocks:
@@ -243,11 +234,9 @@ def judge(control):
 def _range_of_heat(kin, points, laws, control):
     clock = control.clock[0]
     for p in range(points.mass.size):
-        law = record(laws, points.material[p])
-        mass = points.mass[p]
-        capacity = heat_capacity(law, mass)
+        law, state = state_at(kin, points, laws, p)
+        capacity = heat_capacity(law, points.mass[p])
         if capacity > 0:
-            state = load(points.state, p, initial_state(law, kin, mass))
             T = float(temperature(law, kin, state))
             # So written, NaN is noticed.
             clock.T_low = T if not clock.T_low <= T else clock.T_low

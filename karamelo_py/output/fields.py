@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.compiler import fields
-from karamelo_py.kernels.arrays import MASS, known_to_laws
+from karamelo_py.kernels.arrays import known_to_laws
 from karamelo_py.kernels.export import export
 from karamelo_py.kernels.laws import elastic_law
 from karamelo_py.language.scene import Scene
@@ -131,10 +131,10 @@ def _of_law(density: Callable) -> Callable:
     def energies(s: Any, block: Any) -> np.ndarray | None:
         if not can(block.laws, density):
             return None
-        points, like = known_to_laws(block.points), s.nodes.sums[0, MASS]
+        points = known_to_laws(block.points)
         rows = np.zeros(len(points.id))
         if len(rows):
-            export(density.tag, True, s.kin, like, points, block.laws, rows)
+            export(density.tag, True, s.kin, points, block.laws, rows)
         return rows
 
     return energies

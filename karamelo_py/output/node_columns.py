@@ -171,7 +171,7 @@ def _volume(simulation: Any, block: Any) -> np.ndarray:
     s = simulation.setup
     points = known_to_laws(block.points)
     rows = np.zeros((len(points.id), EXPORTED))
-    export_state(s.kin, s.nodes.sums[0, MASS], points, block.laws, rows)
+    export_state(s.kin, points, block.laws, rows)
     return volumes_before(simulation.hub, points.id) * rows[:, JACOBIAN]
 
 

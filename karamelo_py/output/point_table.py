@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.compiler import fields
-from karamelo_py.kernels.arrays import MASS, Block, Points, Setup, known_to_laws, some_of
+from karamelo_py.kernels.arrays import Block, Points, Setup, known_to_laws, some_of
 from karamelo_py.kernels.export import (
     ENERGY,
     EXPORTED,
@@ -100,7 +100,7 @@ class Rows(NamedTuple):
     def computed(self, of: Callable[[Block], Callable | None], *columns: int) -> np.ndarray:
         """Compute (n, *columns) numbers of each point by a kernel.
 
-        ``of(laws)`` is called as ``fill(kin, like, points, laws, rows)``. Points are left at 0
+        ``of(laws)`` is called as ``fill(kin, points, laws, rows)``. Points are left at 0
         where their laws do not have it, and ``of(laws)`` is None.
         """
         own, s = [], self.s
@@ -109,7 +109,7 @@ class Rows(NamedTuple):
             # Arrays without points are of another type, for which all would be compiled once more.
             if len(points.id) and (fill := of(part.block.laws)):
                 rows = np.zeros((len(points.id), *columns))
-                fill(s.kin, s.nodes.sums[0, MASS], points, part.block.laws, rows)
+                fill(s.kin, points, part.block.laws, rows)
                 own.append((part.places, rows.T))
         return self._filled(np.zeros((*columns, len(self.ids))), own)
 

@@ -395,7 +395,7 @@ class PointsView(View):
     def set_stress(self, given: dict[str, np.ndarray]) -> None:
         """Set components of the Cauchy stress: ``{"11": (n,) values, ...}`` of rate-form laws."""
         s = self._simulation.setup
-        names, like = s.kin.symmetric_names, s.nodes.sums[0, arrays.MASS]
+        names = s.kin.symmetric_names
         flags = np.array([name in given for name in names])
         values = np.stack(
             [np.broadcast_to(given.get(name, 0.0), len(self.ids)) for name in names], axis=1
@@ -407,7 +407,7 @@ class PointsView(View):
                 chosen[rows] = True
                 stress = np.zeros((len(points.id), len(names)), values.dtype)
                 stress[rows] = values[own]
-                impose_stress(s.kin, like, points, block.laws, chosen, flags, stress)
+                impose_stress(s.kin, points, block.laws, chosen, flags, stress)
 
     def set_column(self, name: str, values: np.ndarray) -> None:
         """Set a column of dumps to `values` (n,): a place, velocity, stress, or field of a part."""

@@ -6,14 +6,7 @@ from typing import NamedTuple
 from karamelo_py.compiler.compile import Weighted, index
 from karamelo_py.compiler.powers import power
 from karamelo_py.language.rules import known_failure
-from karamelo_py.points.basis import (
-    carried,
-    carrier,
-    carry,
-    deformed,
-    leave_moment_out,
-    mapped_again,
-)
+from karamelo_py.points import basis as bases
 from karamelo_py.points.basis.product import Along, along, node_number, product, register, wide
 from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.points.kinematics import I, det, planar, tensor, total
@@ -238,22 +231,22 @@ def _end(at, first, top):
 
 
 # As with linear functions, which these become where the box vanishes.
-mapped_again.on(CPGIMPDiagonal)(leave_moment_out)
+bases.mapped_again.on(CPGIMPDiagonal)(bases.leave_moment_out)
 
 
 # --- boxes ------------------------------------------------------------------------------------
 # F in the plane is enough for boxes: axisymmetric points need no part around the axis.
 
 
-@deformed.on(CPGIMPDet)
+@bases.deformed.on(CPGIMPDet)
 def _deformed_cpgimp_det(basis, kin, place, dl):
     factor = power(det(I + dl), 1 / len(dl.axes))
     d = kin.dimension
     return (*place[:d], *[factor * half for half in place[d : 2 * d]])
 
 
-@deformed.on(CPGIMPDiagonal)
-@deformed.on(CPGIMPStretch)
+@bases.deformed.on(CPGIMPDiagonal)
+@bases.deformed.on(CPGIMPStretch)
 def _deformed_cpgimp_stretch(basis, kin, place, dl):
     d = kin.dimension
     start, F = place[2 * d : 3 * d], tensor(planar(kin), place[3 * d :]).after(dl.planar())
@@ -267,7 +260,7 @@ def _deformed_cpgimp_stretch(basis, kin, place, dl):
 # the number of a node that carries it, on which side of its cell.
 
 
-@carried.on(CPGIMPCorners)
+@bases.carried.on(CPGIMPCorners)
 def _carried_cpgimp_corners(basis, kin):
     return 1 << kin.dimension
 
@@ -278,7 +271,7 @@ def _side(line, corner, j):
     return (i + 1, b) if j else (i, 1 - b)
 
 
-@carrier.on(CPGIMPCorners)
+@bases.carrier.on(CPGIMPCorners)
 def _carrier_cpgimp_corners(basis, kin, grid, stencil, corner):
     first = node_number(grid, grid.first, [line.first for line in stencil.lines])
     rows, weights = [], []
@@ -290,7 +283,7 @@ def _carrier_cpgimp_corners(basis, kin, grid, stencil, corner):
     return Weighted(tuple(rows), tuple(weights))
 
 
-@carry.on(CPGIMPCorners)
+@bases.carry.on(CPGIMPCorners)
 def _carry_cpgimp_corners(basis, kin, place, old, corner, displacement):
     d = kin.dimension
     moves = enumerate(zip(place[d : 2 * d], displacement, strict=True))

@@ -81,12 +81,6 @@ KINEMATICS = {1: Line, 2: PlaneStrain, 3: Space}
 
 
 @shared
-def dimension(kin):
-    """Number of components of a vector, a constant at compile time."""
-    return kin.dimension
-
-
-@shared
 def free_from(kin):
     """First direction in which a body may move as a whole: no radius is one, a constant."""
     return 1 if isinstance(kin, Axisymmetric) else 0

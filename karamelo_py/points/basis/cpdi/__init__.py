@@ -16,19 +16,7 @@ from math import inf
 from typing import Any, NamedTuple
 
 from karamelo_py.compiler.compile import Weighted, beside, index, point_function, real, where
-from karamelo_py.points.basis import (
-    affine_weight,
-    carried,
-    carrier,
-    carry,
-    entry,
-    extent,
-    first_node,
-    locate,
-    placed,
-    reach,
-    support,
-)
+from karamelo_py.points import basis as bases
 from karamelo_py.points.basis.product import (
     digits,
     inverse_radius,
@@ -202,7 +190,7 @@ def solve(kin, spread, a):
     return vector(kin, [k * row for row in rows])
 
 
-@locate.on(ConvectedDomain)
+@bases.locate.on(ConvectedDomain)
 def _locate_corners(basis, kin, grid, place):
     x, weights, gradients = domain(basis, kin, place)
     corners = tuple([corner_at(kin, grid, corner) for corner in x])
@@ -223,7 +211,7 @@ def seen_at_corner(kin, stencil, c):
     return item(stencil.corners, c), weight, with_hoop(kin, weight, slopes, stencil.inv_r)
 
 
-@entry.on(ConvectedDomain)
+@bases.entry.on(ConvectedDomain)
 def _entry_corners(basis, kin, grid, stencil, k):
     nodes = 2**kin.dimension
     corner, weight, slopes = seen_at_corner(kin, stencil, k // nodes)
@@ -232,14 +220,14 @@ def _entry_corners(basis, kin, grid, stencil, k):
     return index(first + far), weight * share, gradient(kin, [share * g for g in slopes])
 
 
-@reach.on(ConvectedDomain)
+@bases.reach.on(ConvectedDomain)
 def _reach_corners(basis, kin, grid, stencil, k):
     nodes, d = 2**kin.dimension, kin.dimension
     cell, far = item(stencil.corners, k // nodes).cell, digits(k % nodes, 2, d)
     return vector(kin, [arm(grid, cell[i], far[i], stencil.centre[i]) for i in range(d)])
 
 
-@affine_weight.on(ConvectedDomain)
+@bases.affine_weight.on(ConvectedDomain)
 def _affine_weight_corners(basis, kin, grid, stencil, k):
     nodes = 2**kin.dimension
     weight = item(stencil.weights, k // nodes)
@@ -248,34 +236,34 @@ def _affine_weight_corners(basis, kin, grid, stencil, k):
     return vector(kin, [weight * a for a in solved])
 
 
-@support.on(ConvectedDomain)
+@bases.support.on(ConvectedDomain)
 def _support_corners(basis, kin):
     return 2**kin.dimension * 2**kin.dimension
 
 
-first_node.on(ConvectedDomain)(lambda basis, like: 0.5)
+bases.first_node.on(ConvectedDomain)(lambda basis, like: 0.5)
 
 
 # --- corners that go with the grid ------------------------------------------------------------
 
 
-@support.on(CarriedDomain)
+@bases.support.on(CarriedDomain)
 def _support_carried(basis, kin):
     return basis.element.corners * 2**kin.dimension
 
 
-@carried.on(CarriedDomain)
-@placed.on(CarriedDomain)
+@bases.carried.on(CarriedDomain)
+@bases.placed.on(CarriedDomain)
 def _carried_corners(basis, kin):
     return basis.element.corners
 
 
-@carrier.on(CarriedDomain)
+@bases.carrier.on(CarriedDomain)
 def _carrier_corners(basis, kin, grid, stencil, corner):
     return around(grid, stencil.corners[corner])
 
 
-@carry.on(CarriedDomain)
+@bases.carry.on(CarriedDomain)
 def _carry_corners(basis, kin, place, old, corner, displacement):
     first = kin.dimension * (1 + corner)
     last = first + kin.dimension
@@ -283,7 +271,7 @@ def _carry_corners(basis, kin, place, old, corner, displacement):
     return (*place[:first], *[a + u for a, u in moves], *place[last:])
 
 
-@extent.on(CarriedDomain)
+@bases.extent.on(CarriedDomain)
 def _extent_corners(basis, kin, grid, place):
     d = kin.dimension  # NaN if any corner is
     far = abs(place[d] - place[0])
@@ -295,12 +283,12 @@ def _extent_corners(basis, kin, grid, place):
 # --- corners in the place of nodes ------------------------------------------------------------
 
 
-@support.on(AtCorners)
+@bases.support.on(AtCorners)
 def _support_at_corners(basis, kin):
-    return support(basis.basis, kin) // 2**kin.dimension
+    return bases.support(basis.basis, kin) // 2**kin.dimension
 
 
-@entry.on(AtCorners)
+@bases.entry.on(AtCorners)
 def _entry_at_corners(basis, kin, grid, stencil, k):
     corner, weight, slopes = seen_at_corner(kin, stencil, k)
     return around(grid, corner), weight, slopes

@@ -1,7 +1,7 @@
 """Domains: parallelograms that deform with the point; elements whose corners go with the grid."""
 
 from karamelo_py.compiler.compile import real
-from karamelo_py.points.basis import deformed, extent
+from karamelo_py.points import basis as bases
 from karamelo_py.points.basis.cpdi import (
     CUBE,
     LEAST,
@@ -90,14 +90,14 @@ def _domain_parallel(basis, kin, place):
     return tuple(corners), (weight,) * len(corners), tuple(gradients)
 
 
-@deformed.on(_Parallel)
+@bases.deformed.on(_Parallel)
 def _deformed_parallel(basis, kin, place, dl):
     dl = dl.planar()  # r <- (I + dl) r
     edges = [r + dl @ r for r in half_edges(kin, place)]
     return (*place[: kin.dimension], *[a for edge in edges for a in edge])
 
 
-@extent.on(_Parallel)
+@bases.extent.on(_Parallel)
 def _extent_parallel(basis, kin, grid, place):
     away = [total([abs(a) for a in parts]) for parts in zip(*half_edges(kin, place), strict=True)]
     far = away[0]
