@@ -31,9 +31,10 @@ from karamelo_py.kernels.loss import FrictionalHeat, warm_node
 from karamelo_py.kernels.p2g import Centre, Normal
 from karamelo_py.kernels.table import touch, touch_velocity
 from karamelo_py.kernels.totals import add_to, counts, publish
+from karamelo_py.points.basis.product import product
 from karamelo_py.points.basis.surface import ENTRIES
 from karamelo_py.points.grid import node_position
-from karamelo_py.points.kinematics import vector, zero_vector
+from karamelo_py.points.kinematics import total, vector, zero_vector
 
 REPEATS = 16  # at most, where more than two fields meet; what remains falls by a half or more
 
@@ -51,10 +52,9 @@ class SeparateFields(NamedTuple):
     copies: np.ndarray  # (k, 2) slots: from a field to the other solids that share it
     touched: np.ndarray  # (N, F) int32: the last step (from 1) in which a node touched that of
     #                      another field, which comes later; minus that where the two stuck
-    prescribed: (
-        np.ndarray
-    )  # (N, d) 1 + slot of the reaction, where a fix prescribes the velocity, else 0
+    prescribed: np.ndarray  # (N, d) 1 + slot of the reaction, where a fix prescribes v, else 0
     reactions: np.ndarray  # number of slots of such reactions, and these
+    forces: np.ndarray  # number of slots of all forces and torques, and these
     rigid: np.ndarray  # (F,) bool: whether contact does not move a field
     torque: np.ndarray  # (F,) slot of the published torque on each field
     surface: np.ndarray  # (F, k) distance of the surface by the mean place of the points, in cells
@@ -95,13 +95,7 @@ class NodePair(NamedTuple):
 @shared
 def _dot(*vectors):
     """sum_k a_k b_k, or of the products of three vectors."""
-    total = 0
-    for components in zip(*vectors, strict=True):
-        product = components[0]
-        for component in components[1:]:
-            product = product * component
-        total = total + product
-    return total
+    return total([product(components) for components in zip(*vectors, strict=True)])
 
 
 @noinline
@@ -327,11 +321,9 @@ def _touch_pair(contact, kin, nodes, control, i, j, place, share, where):
             impulse += rub * slide[k]
         _take(contact, control, a, i, n, k, -impulse, pair.per_n, where.x)
         _take(contact, control, b, j, m, k, impulse, pair.per_m, where.x)
-        force = impulse / control.clock[0].kick
-        if contact.pair[a, b] >= 0 and counts(control.ranks, n):
-            add_to(control.totals, contact.pair[a, b] + k, -force)
-        if contact.pair[b, a] >= 0 and counts(control.ranks, n):
-            add_to(control.totals, contact.pair[b, a] + k, force)
+        for slot, sign in ((contact.pair[a, b], -1.0), (contact.pair[b, a], 1.0)):
+            if slot >= 0 and counts(control.ranks, n):
+                add_to(control.totals, slot + k, sign * impulse / control.clock[0].kick)
 
 
 @noinline
@@ -375,26 +367,17 @@ def _keep_rigid(contact, kin, nodes, n):
 @kernel
 def _touch_nodes(contact, kin, grids, nodes, spans, control):
     """Resolve contact in v* and the change of velocity of this step; publish the forces."""
-    fields = contact.slot.size
-    values, totals = control.values, control.totals
+    values, totals, forces = control.values, control.totals, contact.forces
     for s in range(1, 1 + spans[0, 0]):
         for n in range(spans[s, 0], spans[s, 1]):
             _keep_rigid(contact, kin, nodes, n)
-    for a in range(fields):
-        totals[contact.slot[a] : contact.slot[a] + 3] = 0
-        totals[contact.torque[a] : contact.torque[a] + 3] = 0
-        for b in range(fields):
-            if contact.pair[a, b] >= 0:
-                totals[contact.pair[a, b] : contact.pair[a, b] + 3] = 0
+    for c in range(1, 1 + forces[0]):
+        totals[forces[c] : forces[c] + 3] = 0
     for s in range(1, 1 + spans[0, 0]):
         for n in range(spans[s, 0], spans[s, 1]):
             touch_node(contact, kin, grids, nodes, control, n)
-    for a in range(fields):
-        publish(control, contact.slot[a], 3)
-        publish(control, contact.torque[a], 3)
-        for b in range(fields):
-            if contact.pair[a, b] >= 0:
-                publish(control, contact.pair[a, b], 3)
+    for c in range(1, 1 + forces[0]):
+        publish(control, forces[c], 3)
     for c in range(contact.reactions[0]):
         publish(control, contact.reactions[1 + c], kin.dimension)
     for c in range(len(contact.copies)):

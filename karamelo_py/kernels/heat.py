@@ -281,7 +281,11 @@ def _at_heat_nodes_hooks(hooks, stage, target, s):
     clock.hottest = max(clock.hottest, clock.set_high)
 
 
-HEATED = Capacity, Temperature, Volume, Supply, TemperatureShare  # arrays of `HeatedPoints`
+@shared
+def _heated(kin, points, x):
+    kinds = Capacity, Temperature, Volume, Supply, TemperatureShare
+    own = [field(points.fields, kind) for kind in kinds]
+    return hook_loop.HeatedPoints(points.id, kin, *own, x)
 
 
 @point_function(otherwise=True)
@@ -293,13 +297,8 @@ def at_heated_points(hooks, s):
 def _at_heated_points_hooks(hooks, s):
     clock = s.control.clock[0]
     clock.rise = clock.fall = 0.0
-    hook_loop.clear_totals(arrays.SUPPLY_HEAT, hooks, s.control)
-    for block in s.blocks:
-        points = block.points
-        own = [field(points.fields, kind) for kind in HEATED]
-        warmth = hook_loop.HeatedPoints(points.id, s.kin, *own, points.x[clock.now])
-        hook_loop.point_hooks(arrays.SUPPLY_HEAT, warmth, hooks, s.control, step_size(s))
-    hook_loop.publish_totals(arrays.SUPPLY_HEAT, hooks, s.control)
+    blocks = tuple([_heated(s.kin, p, p.x[clock.now]) for p, _, _ in s.blocks])
+    hook_loop.point_hooks(arrays.SUPPLY_HEAT, blocks, hooks, s.control, step_size(s))
     agree_on_heat(s.control.ranks, s.control)
     clock.hottest += step_size(s) * clock.rise
     clock.coldest += step_size(s) * clock.fall

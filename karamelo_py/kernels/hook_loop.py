@@ -589,8 +589,7 @@ def _act_on_warmth(what, task, hooks, control, dt, h, count, share):
 
 
 @kernel
-def point_hooks(stage, what, hooks, control, dt):
-    """Call the point functions of `stage` on the members in a block."""
+def _point_hooks(stage, what, hooks, control, dt):
     dt = float(dt)
     for h in range(len(hooks.table)):
         if hooks.table[h].stage == stage:
@@ -598,19 +597,22 @@ def point_hooks(stage, what, hooks, control, dt):
 
 
 @kernel
-def clear_totals(stage, hooks, control):
-    """Let totals of point functions start from zero: they are summed over the blocks."""
+def _begin_or_end_totals(stage, hooks, control, begin):
     for h in range(len(hooks.table)):
         if hooks.table[h].stage == stage:
-            _clear_total(hooks, h, control)
+            if begin:
+                _clear_total(hooks, h, control)
+            else:
+                _publish_total(hooks, h, control)
 
 
-@kernel
-def publish_totals(stage, hooks, control):
-    """Publish the totals of point functions."""
-    for h in range(len(hooks.table)):
-        if hooks.table[h].stage == stage:
-            _publish_total(hooks, h, control)
+@shared
+def point_hooks(stage, blocks, hooks, control, dt):
+    """Call the point functions of `stage` on the members in each of `blocks`; sum over them."""
+    _begin_or_end_totals(stage, hooks, control, True)
+    for what in blocks:
+        _point_hooks(stage, what, hooks, control, dt)
+    _begin_or_end_totals(stage, hooks, control, False)
 
 
 @shared
@@ -626,12 +628,10 @@ def at_points(hooks, stage, then, s):
 
 @at_points.on(arrays.Hooks)
 def _at_points_hooks(hooks, stage, then, s):
-    clear_totals(stage, hooks, s.control)
     now = s.control.clock[0].now
     y = 1 - now if then else now
     corners = corners_that_move(s)
-    for block in s.blocks:
-        points = block.points
-        motion = MovingPoints(points.id, points.v, points.mass, points.x[now], points.x[y], corners)
-        point_hooks(stage, motion, hooks, s.control, step_size(s))
-    publish_totals(stage, hooks, s.control)
+    blocks = tuple(
+        [MovingPoints(p.id, p.v, p.mass, p.x[now], p.x[y], corners) for p, _, _ in s.blocks]
+    )
+    point_hooks(stage, blocks, hooks, s.control, step_size(s))

@@ -140,34 +140,23 @@ def fused(rows: Iterable[Any]) -> list[Any]:
 def staged(rows: Iterable[Any]) -> list[Any]:
     """The rows of a step one by one, as parts of the visits of the fused step where they can be."""
     rows = list(rows)
-    loops = [row.visit for row in fused(rows) if isinstance(row, Sweep)]
+    return one_by_one(rows, [row.visit for row in fused(rows) if isinstance(row, Sweep)])
+
+
+def one_by_one(rows: Iterable[Any], loops: Iterable[Visit] = ()) -> list[Any]:
+    """The rows of a part of a step, each a visit of its own, or a part of one of `loops`."""
 
     def loop_of(own: Visit) -> Visit:
-        """The visit of the fused step with such tasks, or such quantities; else its own."""
+        """The one of `loops` with such tasks, or such quantities; else the visit itself."""
         part = slice(0, 1) if own.tasks else slice(1, 3)
         return next((visit for visit in loops if _kinds(visit[part]) == _kinds(own[part])), own)
 
-    out: list[Any] = []
-    for row in rows:
-        if isinstance(row, Gather):
-            visit = loop_of(Visit(_tasks([row]), (), OldWeights()))
-            out.append(Sweep(visit, *row[1:], gathers=True, scatters=False))
-        elif isinstance(row, Scatter):
-            out.append(Sweep(loop_of(Visit((), *row)), gathers=False, moves=False))
-        else:
-            out.append(row)
-    return out
-
-
-def one_by_one(rows: Iterable[Any]) -> list[Any]:
-    """The rows of a part of a step, each with a visit of its own."""
-
     def alone(row: Any) -> Any:
         if isinstance(row, Gather):
-            return Sweep(Visit(_tasks([row]), (), OldWeights()), *row[1:], True, False)
+            visit = loop_of(Visit(_tasks([row]), (), OldWeights()))
+            return Sweep(visit, *row[1:], gathers=True, scatters=False)
         if isinstance(row, Scatter):
-            visit = Visit((), row.quantities, row.weights)
-            return Sweep(visit, gathers=False, moves=False)
+            return Sweep(loop_of(Visit((), *row)), gathers=False, moves=False)
         return row
 
     return [alone(row) for row in rows]

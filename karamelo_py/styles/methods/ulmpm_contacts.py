@@ -152,6 +152,7 @@ class ULMPMContacts(Method):
             touched=np.zeros((nodes, count), np.int32),
             prescribed=np.zeros((nodes, d), np.int32),
             reactions=np.zeros(1 + len(hub.values.array), np.int64),
+            forces=np.zeros(1 + len(hub.values.array), np.int64),
             meeting=np.zeros(count, np.int64),
             partners=np.zeros(count, np.int64),
             change=np.zeros((count, d)),
@@ -169,6 +170,9 @@ class ULMPMContacts(Method):
         for (a, b), fix in self._rubbing(hub):
             contact.friction[a, b] = contact.friction[b, a] = fix.friction
             contact.pair[a, b] = hub.values.slot(f"{fix.id}_x")
+        pairs = contact.pair[contact.pair >= 0]
+        published = [*contact.slot, *contact.torque, *pairs]
+        contact.forces[: 1 + len(published)] = [len(published), *published]
         fixes = [fix for fix in hub.fixes.values() if fix.prescribes_velocity]
         slots = [hub.values.slot(f"{fix.id}_x") for fix in fixes]
         contact.reactions[: 1 + len(slots)] = [len(slots), *slots]
