@@ -17,7 +17,7 @@ from karamelo_py.compiler.compile import index, shared
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Nodes, Setup
-from karamelo_py.kernels.g2p import SeriesTerm, SetMeanStress, TrialStrain, empty_all, settled_all
+from karamelo_py.kernels.g2p import SeriesTerm, SetMeanStress, TrialStrain, empty_all, updated_all
 from karamelo_py.kernels.heat import HeatContent, HeatFlow, TemperatureGradient, Warming
 from karamelo_py.kernels.lanes import OneByOne, zero_of
 from karamelo_py.kernels.nodes import at_node
@@ -63,7 +63,7 @@ def visit_point(visit, s, block, p, report):
     stencil = locate(s.basis, s.kin, grid, place_at(s.basis, s.kin, places.where, p))
     totals = empty_all(visit.tasks, w, load_vector(s.kin, places.x, p))
     totals = gather_nodes(stencil, width, visit.tasks, w, totals)
-    moved, rate = settled_all(visit.tasks, w, stencil, p, dt, totals, zero_of(width, dt))
+    moved, rate = updated_all(visit.tasks, w, stencil, p, dt, totals, zero_of(width, dt))
     report[p, 0] = moved
     report[p, 1] = rate
     if not (moved <= 1 and rate < 1e300):

@@ -25,7 +25,7 @@ from karamelo_py.compiler.threads import Serial
 from karamelo_py.compiler.trace import CannotCompile
 from karamelo_py.compiler.tuples import flat, nested_as, row
 from karamelo_py.kernels.arrays import arrays_of, with_items_of
-from karamelo_py.kernels.g2p import empty, gathered, settled
+from karamelo_py.kernels.g2p import empty, gathered, updated
 from karamelo_py.kernels.heat import HeatContent, HeatFlow, TemperatureGradient, Warming
 from karamelo_py.kernels.sweep import OldWeights, Visit, context_of, sweep_points
 from karamelo_py.kernels.visit import NodalMean, place_at
@@ -532,7 +532,7 @@ class Alone(NamedTuple):
 
 empty.on(Alone)(lambda task, w, x: ())
 gathered.on(Alone)(lambda task, w, stencil, k, total: total)
-settled.on(Alone)(lambda task, w, stencil, p, dt, total, totals, fastest: (real(0, dt), fastest))
+updated.on(Alone)(lambda task, w, stencil, p, dt, total, totals, fastest: (real(0, dt), fastest))
 WARM_DISK = """
 method(tlmpm, FLIP, linear, 1, thermo-mechanical)
 dimension(2, 0, 1, 0, 1, 0.2)

@@ -30,7 +30,7 @@ class Task(NamedTuple):
 
 
 class Move(Task):
-    """Gather v* and its change; settle velocity and new position."""
+    """Gather v* and its change; update velocity and new position."""
 
     not_at_corners = ("moments",)
     says = "g2p, move"
@@ -39,7 +39,7 @@ class Move(Task):
 
 
 class Strain(Task):
-    """Gather the gradient of the nodal velocity; settle the state of the law."""
+    """Gather the gradient of the nodal velocity; update the state of the law."""
 
     not_at_corners = ("moments",)
     says = "stress"
@@ -69,7 +69,7 @@ class StrainInMove(Strain):
 
 
 class TrialStrain(Strain):
-    """Gather the gradient; settle only by what factor it would change the volume (F-bar)."""
+    """Gather the gradient; update only by what factor it would change the volume (F-bar)."""
 
     says = "trial volume"
     writes = ("volume ratio",)
@@ -221,11 +221,11 @@ def _gathered_series_term(task, w, stencil, k, total):
     return total + weight * vector_at(w.kin, field(w.nodes.fields, Series), i, 0, total)
 
 
-# --- settle -----------------------------------------------------------------------------------
+# --- update -----------------------------------------------------------------------------------
 
 
 @point_function()
-def settled(task, w, stencil, p, dt, total, totals, fastest):
+def updated(task, w, stencil, p, dt, total, totals, fastest):
     """Store what follows from `total`; return how far the point moved in cells, and its rate.
 
     The rate, c + max |v_i - common_i|, bounds the stable step; what is returned is the larger of it
@@ -234,8 +234,8 @@ def settled(task, w, stencil, p, dt, total, totals, fastest):
     """
 
 
-@settled.on(Strain)
-def _settled_strain(task, w, stencil, p, dt, total, totals, fastest):
+@updated.on(Strain)
+def _updated_strain(task, w, stencil, p, dt, total, totals, fastest):
     """State of the law and shape of the domain after a step; growth in cells, and rate."""
     gradient, ratio = total
     if not len(gradient):  # the point keeps it
@@ -272,8 +272,8 @@ def _settled_strain(task, w, stencil, p, dt, total, totals, fastest):
     return grown, where(fastest > rate, fastest, rate)
 
 
-@settled.on(TrialStrain)
-def _settled_trial_strain(task, w, stencil, p, dt, total, totals, fastest):
+@updated.on(TrialStrain)
+def _updated_trial_strain(task, w, stencil, p, dt, total, totals, fastest):
     dl = increment(dt, total)
     if isinstance(task, TrialStrainOfLastStep):
         dl = frames.of_places_before(w.frame, w.kin, dl)
@@ -289,14 +289,14 @@ def increment(dt, grad_v):
     return grad_v._make(dt * grad_v)
 
 
-@settled.on(SetMeanStress)
-def _settled_average_stress(task, w, stencil, p, dt, total, totals, fastest):
+@updated.on(SetMeanStress)
+def _updated_average_stress(task, w, stencil, p, dt, total, totals, fastest):
     field(w.points.fields, visit.AveragedStress)[0, p] = total
     return real(0, dt), fastest
 
 
-@settled.on(SeriesTerm)
-def _settled_series_term(task, w, stencil, p, dt, total, totals, fastest):
+@updated.on(SeriesTerm)
+def _updated_series_term(task, w, stencil, p, dt, total, totals, fastest):
     store(field(w.points.fields, TermOfSeries), p, total)
     reflect(field(w.points.fields, Reflected), w, stencil, p, total, task.k)
     return real(0, dt), fastest
@@ -309,8 +309,8 @@ def further_reach(basis, kin, grid, before, after):
     return max(further, 0)
 
 
-@settled.on(Move)
-def _settled_move(task, w, stencil, p, dt, total, totals, fastest):
+@updated.on(Move)
+def _updated_move(task, w, stencil, p, dt, total, totals, fastest):
     """New velocity, position and carried corners; how far that is in cells."""
     law, state = visit.law_and_state(w, p)
     v_pic, dv, moment, *corners = total
@@ -352,10 +352,10 @@ gathered_all = visit.for_tags(gathered, "w, stencil, k, totals", each="totals")
 
 
 @shared
-def settled_all(tasks, w, stencil, p, dt, totals, fastest):
-    """Settle the tasks in turn: distances add up, and the rate goes from one to the next."""
+def updated_all(tasks, w, stencil, p, dt, totals, fastest):
+    """Update by the tasks in turn: distances add up, and the rate goes from one to the next."""
     moved = real(0, fastest)
     for task, total in zip(tasks, totals, strict=True):
-        further, fastest = settled(task, w, stencil, p, dt, total, totals, fastest)
+        further, fastest = updated(task, w, stencil, p, dt, total, totals, fastest)
         moved += further
     return moved, fastest

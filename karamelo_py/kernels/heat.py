@@ -27,7 +27,7 @@ from karamelo_py.compiler.fields import Field, StepField, field, load, load_vect
 from karamelo_py.kernels import arrays, hook_loop
 from karamelo_py.kernels.arrays import MASS, Buffers, Nodes, of_force
 from karamelo_py.kernels.clock import read_reports, step_size
-from karamelo_py.kernels.g2p import empty, gathered, settled
+from karamelo_py.kernels.g2p import empty, gathered, updated
 from karamelo_py.kernels.nodes import NodalUpdate, SumsToVelocity, TakeMean
 from karamelo_py.kernels.p2g import load_of, scattered
 from karamelo_py.kernels.sweep import OldWeights, Visit, sweep, sweep_nodes
@@ -123,7 +123,7 @@ class HeatFlow(NamedTuple):
 
 
 class Warming(NamedTuple):
-    """Gather the change of the nodal temperature; settle the temperature of the point."""
+    """Gather the change of the nodal temperature; update the temperature of the point."""
 
     in_lanes = True
     says = "temperature"
@@ -225,8 +225,8 @@ def _gathered_temperature_gradient(task, w, stencil, k, total):
     return total + w.nodes.velocity[i, 0] * gradient.planar()
 
 
-@settled.on(TemperatureGradient)
-def _settled_temperature_gradient(task, w, stencil, p, dt, total, totals, fastest):
+@updated.on(TemperatureGradient)
+def _updated_temperature_gradient(task, w, stencil, p, dt, total, totals, fastest):
     store(field(w.points.fields, HeatGradient), p, total)
     return real(0, dt), fastest
 
@@ -246,8 +246,8 @@ def _gathered_warming(task, w, stencil, k, total):
     return fma(weight, w.nodes.update[i, 1], change), mean
 
 
-@settled.on(Warming)
-def _settled_warming(task, w, stencil, p, dt, total, totals, fastest):
+@updated.on(Warming)
+def _updated_warming(task, w, stencil, p, dt, total, totals, fastest):
     law, state, f = deformed_state(w, p)
     fields = w.points.fields
     T = field(fields, Temperature)[0, p]

@@ -35,8 +35,8 @@ class RigidBodies(NamedTuple):
 
 
 @kernel
-def _lead(kin, nodes, led, spans, dt, kept):
-    """Nodes that see rigid points take their velocity; the force of that comes to stand in `led`.
+def _impose(kin, nodes, rigid, spans, dt, kept):
+    """Nodes that see rigid points take their velocity; the force of that comes to stand in `rigid`.
 
     As with a body of infinite mass, v* - v is nothing: points that keep their velocity take none
     from there. `kept` is the share that they keep.
@@ -44,34 +44,34 @@ def _lead(kin, nodes, led, spans, dt, kept):
     d = kin.dimension
     for s in range(1, 1 + spans[0, 0]):
         for n in range(spans[s, 0], spans[s, 1]):
-            if not led[n, MASS] > 0:
+            if not rigid[n, MASS] > 0:
                 for k in range(d):
-                    led[n, of_force(kin) + k] = 0
+                    rigid[n, of_force(kin) + k] = 0
                 continue
             mass = nodes.sums[n, MASS]
             for k in range(d):
-                velocity = led[n, of_momentum(kin) + k] / led[n, MASS]
+                velocity = rigid[n, of_momentum(kin) + k] / rigid[n, MASS]
                 impulse = 0.0
                 if mass > 0:
                     before = nodes.sums[n, of_momentum(kin) + k] / mass
                     impulse = velocity - nodes.update[n, k] + kept * (before - velocity)
-                led[n, of_force(kin) + k] = -mass * impulse / dt
+                rigid[n, of_force(kin) + k] = -mass * impulse / dt
                 nodes.update[n, k] = velocity
                 nodes.update[n, of_change(kin) + k] = 0
 
 
 @kernel
-def _lead_velocity(kin, nodes, led, spans):
+def _impose_on_strain(kin, nodes, rigid, spans):
     """The same of the velocity that deforms the points."""
     for s in range(1, 1 + spans[0, 0]):
         for n in range(spans[s, 0], spans[s, 1]):
-            if led[n, MASS] > 0:
+            if rigid[n, MASS] > 0:
                 for k in range(kin.dimension):
-                    nodes.velocity[n, k] = led[n, of_momentum(kin) + k] / led[n, MASS]
+                    nodes.velocity[n, k] = rigid[n, of_momentum(kin) + k] / rigid[n, MASS]
 
 
 @kernel
-def _sum_forces(basis, kin, grids, places, points, led, forces, torques, totals):
+def _sum_forces(basis, kin, grids, places, points, rigid, forces, torques, totals):
     """Add up the forces on rigid points, and their torques about the origin."""
     d = kin.dimension
     for p in range(points.mass.size):
@@ -82,9 +82,9 @@ def _sum_forces(basis, kin, grids, places, points, led, forces, torques, totals)
             n, weight, _ = entry(basis, kin, grid, stencil, node)
             if not weight > 0:
                 continue
-            share = weight * points.mass[p] / led[n, MASS]
+            share = weight * points.mass[p] / rigid[n, MASS]
             x = node_position(grid, n)
-            force = [share * led[n, of_force(kin) + i] if i < d else 0.0 for i in range(3)]
+            force = [share * rigid[n, of_force(kin) + i] if i < d else 0.0 for i in range(3)]
             for i in range(3):
                 j, k = (i + 1) % 3, (i + 2) % 3
                 add_to(totals, first + i, force[i])
@@ -93,28 +93,29 @@ def _sum_forces(basis, kin, grids, places, points, led, forces, torques, totals)
 
 @touch.on(RigidBodies)
 def _touch_rigid_bodies(contact, s):
-    led = field(s.nodes.fields, RigidSums)
-    _lead(s.kin, s.nodes, led, s.spans, kick(s), s.control.clock[0].kept)
+    rigid = field(s.nodes.fields, RigidSums)
+    _impose(s.kin, s.nodes, rigid, s.spans, kick(s), s.control.clock[0].kept)
     _publish_forces(contact, s)
 
 
 def put_forces(contact, s, nodes, forces):
     """Publish forces (n, d) that nodes put on rigid bodies, with their torques."""
-    led, first = field(s.nodes.fields, RigidSums), of_force(s.kin)
-    led[nodes, first : first + dimension(s.kin)] = forces
+    rigid, first = field(s.nodes.fields, RigidSums), of_force(s.kin)
+    rigid[nodes, first : first + s.kin.dimension] = forces
     _publish_forces(contact, s)
 
 
 @shared
 def _publish_forces(contact, s):
-    led = field(s.nodes.fields, RigidSums)
+    rigid = field(s.nodes.fields, RigidSums)
     for slot in contact.slots:
         s.control.totals[slot : slot + 3] = 0
-    for block in s.blocks:
-        if isinstance(block.laws, Rigid):
+    now = s.control.clock[0].now
+    for points, laws, _ in s.blocks:
+        if isinstance(laws, Rigid):
             _sum_forces(
-                s.basis, s.kin, s.grids, block.points.x[s.control.clock[0].now], block.points, led,
-                contact.force, contact.torque, s.control.totals,
+                s.basis, s.kin, s.grids, points.x[now], points, rigid, contact.force, contact.torque,
+                s.control.totals,
             )  # fmt: skip
     for slot in contact.slots:
         publish(s.control, slot, 3)
@@ -122,4 +123,4 @@ def _publish_forces(contact, s):
 
 @touch_velocity.on(RigidBodies)
 def _touch_velocity_rigid_bodies(contact, s, steps):
-    _lead_velocity(s.kin, s.nodes, field(s.nodes.fields, RigidSums), s.spans)
+    _impose_on_strain(s.kin, s.nodes, field(s.nodes.fields, RigidSums), s.spans)

@@ -59,14 +59,14 @@ def cell_of(grid: Grid, direction: int, at: Number) -> int:
 
 
 @shared
-def _seen(grid, sight, g, direction, at):
+def _seen(grid, around, g, direction, at):
     """The first and last nodes of grid `g` that a point at `at` cells may see along a direction."""
-    first = cell_of(grid, direction, at - sight.reach)
-    last = cell_of(grid, direction, at + sight.reach)
-    top = sight.top[g, direction]
-    low = max(first * sight.per_cell - sight.beyond, 0)
-    high = min((last + 1) * sight.per_cell + sight.beyond, top)
-    return min(low, top - sight.least), max(high, sight.least)
+    first = cell_of(grid, direction, at - around.reach)
+    last = cell_of(grid, direction, at + around.reach)
+    top = around.top[g, direction]
+    low = max(first * around.per_cell - around.beyond, 0)
+    high = min((last + 1) * around.per_cell + around.beyond, top)
+    return min(low, top - around.least), max(high, around.least)
 
 
 @noinline
@@ -121,13 +121,13 @@ def _order_part(found, k):
 
 
 @noinline
-def _order_in_tiles(kin, grids, sight, tiles, x, of, ids, found, k):
+def _order_in_tiles(kin, grids, around, tiles, x, of, ids, found, k):
     """Sort the points of each tile of the k-th share by the first node that they see, then by id.
 
     Groups of `width` points then mostly see the same nodes: cells whose points fill groups come
     first. The order follows from where the points are, not from where they were.
     """
-    grids, tiles, found, sight = at_hand(grids), at_hand(tiles), at_hand(found), at_hand(sight)
+    grids, tiles, found, around = at_hand(grids), at_hand(tiles), at_hand(found), at_hand(around)
     boxes, bins, cell, order = found.boxes, found.bins, found.room, found.order
     ends, cells = found.ends[found.ends.shape[0] - 1], bins.shape[2]
     d = kin.dimension
@@ -144,9 +144,9 @@ def _order_in_tiles(kin, grids, sight, tiles, x, of, ids, found, k):
             number = 0
             for i in range(d):
                 at = in_cells(grid, i, x[i, p])
-                first = max(int(at + sight.offset), 0)
+                first = max(int(at + around.offset), 0)
                 number = number * tiles.size[i] + first % tiles.size[i]
-                low, high = _seen(grid, sight, of[p], i, at)
+                low, high = _seen(grid, around, of[p], i, at)
                 boxes[0, t, i] = low if q == begin else min(boxes[0, t, i], low)
                 boxes[1, t, i] = high if q == begin else max(boxes[1, t, i], high)
             cell[0, q] = number
@@ -172,9 +172,9 @@ def _order_in_tiles(kin, grids, sight, tiles, x, of, ids, found, k):
 
 
 @noinline
-def _find_rows(kin, grids, sight, x, tiling, parts, k):
+def _find_rows(kin, grids, around, x, tiling, parts, k):
     """Find `Tiling.rows` of the k-th part of the tiles in space; their points are at `x` (w, n)."""
-    grids, sight, tiling = at_hand(grids), at_hand(sight), at_hand(tiling)
+    grids, around, tiling = at_hand(grids), at_hand(around), at_hand(tiling)
     rows, box = tiling.rows, tiling.box
     count = tiling.count[0]
     for t in range(count * k // parts, count * (k + 1) // parts):
@@ -185,7 +185,7 @@ def _find_rows(kin, grids, sight, x, tiling, parts, k):
             rows[t, r, 0] = along
             rows[t, r, 1] = -1
         for p in range(tiling.range[t, 0], tiling.range[t, 1]):
-            ends = [_seen(grid, sight, g, i, in_cells(grid, i, x[i, p])) for i in range(3)]
+            ends = [_seen(grid, around, g, i, in_cells(grid, i, x[i, p])) for i in range(3)]
             first, last = ends[2][0] - box[t, 2], ends[2][1] - box[t, 2]
             for i in range(ends[0][0] - box[t, 0], ends[0][1] - box[t, 0] + 1):
                 for j in range(ends[1][0] - box[t, 1], ends[1][1] - box[t, 1] + 1):
@@ -238,12 +238,12 @@ def _permute(mode, rows, order, room, parts):
         first = last + 1
 
 
-def _sort(mode, kin, grids, sight, tiles, x, of, ids, found, rows):
+def _sort(mode, kin, grids, around, tiles, x, of, ids, found, rows):
     parts = found.ends.shape[0]
     find_tiles(mode, parts, kin, grids, tiles, x, of, found.ends, found.tile)
     _begin_tiles(found)
     _order_parts(mode, parts, found)
-    _order_in_all_tiles(mode, parts, kin, grids, sight, tiles, x, of, ids, found)
+    _order_in_all_tiles(mode, parts, kin, grids, around, tiles, x, of, ids, found)
     _permute(mode, rows, found.order, found.room, parts)
     return 0
 
@@ -252,14 +252,14 @@ _sort_by_team = by_team(_sort)
 
 
 @kernel
-def sort_points(mode, kin, grids, sight, tiles, x, of, ids, found, rows):
+def sort_points(mode, kin, grids, around, tiles, x, of, ids, found, rows):
     """Sort points at places `x` (w, n) by tile, and within by the first node that they see.
 
     They are on the grids `of` (n,) and have the numbers `ids` (n,). Of all that they carry, these
     and the places among it, the addresses of its `rows` are given (:mod:`~.compiler.rows`): one
     kernel serves all bases and laws in as many dimensions.
     """
-    _sort_by_team(mode, kin, grids, sight, tiles, x, of, ids, found, rows)
+    _sort_by_team(mode, kin, grids, around, tiles, x, of, ids, found, rows)
 
 
 @kernel

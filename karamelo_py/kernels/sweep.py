@@ -38,7 +38,7 @@ from karamelo_py.compiler.threads import shared_out
 from karamelo_py.compiler.tuples import flat, nested_as, record
 from karamelo_py.kernels.arrays import Block, Index, Nodes, Number, Places, Points, Setup, Tag
 from karamelo_py.kernels.clock import common_velocity
-from karamelo_py.kernels.g2p import empty_all, settled_all
+from karamelo_py.kernels.g2p import empty_all, updated_all
 from karamelo_py.kernels.lanes import (
     lanes_of_update,
     lanes_with,
@@ -207,7 +207,7 @@ def visit_tile(visit: Visit, s: Context, block: Block, t: int) -> None:
                     totals = nested_as(like, found)
                 else:
                     totals = gathered_by(lanes, visit.tasks, w, stencil, position_of(w, p))
-                moved, rate = settled_all(visit.tasks, w, stencil, p, dt, totals, fastest)
+                moved, rate = updated_all(visit.tasks, w, stencil, p, dt, totals, fastest)
             elif s.frame.moves:
                 moved = where(inside(grid, s.kin, position_of(w, p)), moved, real(inf, moved))
             good = (moved <= 1) & (rate < 1e300)  # so written, NaN counts as wrong too

@@ -1,6 +1,6 @@
 """The arrays and tags of a visit to a point, loops over its tags, and F-bar.
 
-A visit gathers from the nodes of the point's stencil and settles the point (grid to points,
+A visit gathers from the nodes of the point's stencil and updates the point (grid to points,
 :mod:`karamelo_py.kernels.g2p`), then scatters to the nodes (points to grid,
 :mod:`karamelo_py.kernels.p2g`). *What* is gathered and scattered are tuples of tags, so that one
 loop (:mod:`karamelo_py.kernels.sweep`) serves every scheme, fused or stage by stage.

@@ -212,10 +212,10 @@ class Tiles:
         )
         top, least = self._nodes - 1, self.least_nodes - 1
         offset = float(first_node(s.basis, s.grids.h[0]))
-        sight = sorting.Neighbourhood(top, self.per_cell, self.beyond, least, reach, offset)
+        around = sorting.Neighbourhood(top, self.per_cell, self.beyond, least, reach, offset)
         kin, of, ids = planar(s.kin), points.grid, points.id
         rows = addresses_of_rows(array for _, array in arrays_of(points))
-        sorting.sort_points(mode, kin, s.grids, sight, self._cut, x, of, ids, found, rows)
+        sorting.sort_points(mode, kin, s.grids, around, self._cut, x, of, ids, found, rows)
         ends = found.ends[-1]
         begins = np.append(0, ends[:-1])
         occupied = np.flatnonzero(ends > begins)
@@ -229,7 +229,7 @@ class Tiles:
         tiling.grid[:count] = grid
         tiling.box[:count] = np.concatenate(found.boxes[:, occupied], axis=1)
         if self._most_in_box:
-            sorting.find_rows(mode, parts, s.kin, s.grids, sight, x, tiling, parts)
+            sorting.find_rows(mode, parts, s.kin, s.grids, around, x, tiling, parts)
         return occupied
 
     def box_bytes(self, s: Setup) -> int:
