@@ -13,9 +13,9 @@ from karamelo_py.compiler.tuples import row
 from karamelo_py.kernels import visit
 from karamelo_py.kernels.arrays import Index, Nodes, Number, Tag, of_change, vector_at
 from karamelo_py.kernels.loss import FrictionalHeat, in_company, reflect, warm, warm_by_friction
-from karamelo_py.kernels.visit import Work
+from karamelo_py.kernels.visit import Work, node_of, straining_node
 from karamelo_py.points import frames, laws, transfers
-from karamelo_py.points.basis import carried, carrier, carry, deformed, entry, extent
+from karamelo_py.points.basis import carried, carrier, carry, deformed, extent
 from karamelo_py.points.basis.cpdi import AtCorners
 from karamelo_py.points.grid import Bounces, inside, reflected
 from karamelo_py.points.kinematics import I, det, large, outer, vector, zero, zero_vector
@@ -158,8 +158,7 @@ def gathered(task: Tag, w: Work, stencil: tuple, k: int, total: tuple) -> tuple:
 
 @gathered.on(Move)
 def _gathered_move(task, w, stencil, k, total):
-    i, N, grad_N = entry(w.basis, w.kin, w.grid, stencil, k)
-    grad_N = transfers.gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, grad_N)
+    i, N, grad_N = straining_node(w, stencil, k)
     v_pic, dv_pic, moment, *corners = total
     v, dv = update_at(w.kin, w.nodes, i, v_pic)
     moment = transfers.add_moment(
@@ -190,8 +189,7 @@ def add_gradient(w, stencil, k, grad_v):
     """The velocity gradient with the part of the k-th node, where it is gathered at all."""
     if not len(grad_v):
         return grad_v
-    i, _, grad_N = entry(w.basis, w.kin, w.grid, stencil, k)
-    grad_N = transfers.gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, grad_N)
+    i, _, grad_N = straining_node(w, stencil, k)
     v = vector_at(w.kin, w.nodes.velocity, i, 0, zero_vector(w.kin, grad_N[0]))
     return grad_v + outer(v, grad_N)
 
@@ -211,13 +209,13 @@ def _gathered_trial_strain(task, w, stencil, k, total):
 
 @gathered.on(SetMeanStress)
 def _gathered_average_stress(task, w, stencil, k, total):
-    i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
+    i, weight, _ = node_of(w, stencil, k)
     return fma(weight, row(field(w.nodes.fields, visit.NodalStress), i, 0, (total,))[0], total)
 
 
 @gathered.on(SeriesTerm)
 def _gathered_series_term(task, w, stencil, k, total):
-    i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
+    i, weight, _ = node_of(w, stencil, k)
     return total + weight * vector_at(w.kin, field(w.nodes.fields, Series), i, 0, total)
 
 

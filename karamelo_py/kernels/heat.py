@@ -33,9 +33,9 @@ from karamelo_py.kernels.p2g import load_of, scattered
 from karamelo_py.kernels.sweep import OldWeights, Visit, sweep, sweep_nodes
 from karamelo_py.kernels.table import conduct
 from karamelo_py.kernels.totals import agree_on_heat
-from karamelo_py.kernels.visit import NodalMean, deformed_state, law_and_state
+from karamelo_py.kernels.visit import NodalMean, deformed_state, law_and_state, node_of
 from karamelo_py.points import laws
-from karamelo_py.points.basis import entry, reach
+from karamelo_py.points.basis import reach
 from karamelo_py.points.frames import inverse_stretch_squared, pulled_back
 from karamelo_py.points.kinematics import Line
 
@@ -179,7 +179,7 @@ def _gradient(w, p):
 
 @scattered.on(HeatContent)
 def _scattered_heat_content(quantity, w, stencil, k, load):
-    i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
+    i, weight, _ = node_of(w, stencil, k)
     capacity, conductance, T, gradient = load
     weight = at_least_round_off(weight)
     arm = reach(w.basis, w.kin, w.grid, stencil, k)
@@ -202,7 +202,7 @@ def _load_of_heat_flow(quantity, w, p, like):
 
 @scattered.on(HeatFlow)
 def _scattered_heat_flow(quantity, w, stencil, k, load):
-    i, weight, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
+    i, weight, gradient = node_of(w, stencil, k)
     flow, supply = load
     total = at_least_round_off(weight) * supply
     for axis in range(len(flow)):
@@ -220,7 +220,7 @@ def _empty_temperature_gradient(task, w, x):
 
 @gathered.on(TemperatureGradient)
 def _gathered_temperature_gradient(task, w, stencil, k, total):
-    i, _, gradient = entry(w.basis, w.kin, w.grid, stencil, k)
+    i, _, gradient = node_of(w, stencil, k)
     # An axisymmetric gradient has the part around the axis behind; a scalar has none there.
     return total + w.nodes.velocity[i, 0] * gradient.planar()
 
@@ -239,7 +239,7 @@ def _empty_warming(task, w, x):
 
 @gathered.on(Warming)
 def _gathered_warming(task, w, stencil, k, total):
-    i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
+    i, weight, _ = node_of(w, stencil, k)
     weight = at_least_round_off(weight)
     change, mean = total
     mean = fma(weight, field(w.nodes.fields, NodalMean)[i, 0], mean)

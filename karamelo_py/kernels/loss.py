@@ -23,9 +23,9 @@ move (not with splines), and that usl strains by dv, which may only cost.
 from karamelo_py.compiler import fields
 from karamelo_py.compiler.compile import accumulate, real, shared, where
 from karamelo_py.kernels.arrays import of_change, vector_at
-from karamelo_py.kernels.visit import law_and_state
+from karamelo_py.kernels.visit import law_and_state, nodes_of, straining_node
 from karamelo_py.points import laws, transfers
-from karamelo_py.points.basis import entry, support
+from karamelo_py.points.basis import support
 from karamelo_py.points.transfers.xpic import Reflected, Series
 
 # Share of the mass at its nodes from where on a point loses its moment, to the power of dimensions:
@@ -54,19 +54,12 @@ def warm_node(rubbed, n, heat):
 
 
 @shared
-def _nodes_of(w, stencil):
-    """(node, weight, gradient) of the nodes that a point sees."""
-    nodes = range(support(w.basis, w.kin))
-    return tuple([entry(w.basis, w.kin, w.grid, stencil, k) for k in nodes])
-
-
-@shared
 def warm_by_friction(rubbed, w, stencil, p, like):
     """Point `p` takes the heat of friction at its nodes by its weights: none is lost."""
     if rubbed is not None:
         law, state = law_and_state(w, p)
         heat = like - like
-        for i, weight, _ in _nodes_of(w, stencil):
+        for i, weight, _ in nodes_of(w, stencil):
             heat += weight * rubbed[i, 0]
         capacity = laws.heat_capacity(law, like)
         warms = capacity > 0
@@ -128,7 +121,7 @@ def in_company(w, stencil, p, moment):
 def _own_share(lost, w, stencil, mass):
     """The share of a point of this mass in what its nodes have, by its weights."""
     share = mass - mass
-    for i, weight, _ in _nodes_of(w, stencil):
+    for i, weight, _ in nodes_of(w, stencil):
         share += weight * weight * mass / max(lost[i, 2], real(1e-36, mass))
     return share
 
@@ -165,7 +158,7 @@ def reflect(reflected, w, stencil, p, term, k):
 @shared
 def gathered_term(w, stencil, term):
     """The present term of XPIC's series at a point."""
-    for i, weight, _ in _nodes_of(w, stencil):
+    for i, weight, _ in nodes_of(w, stencil):
         term = term + weight * term_at(w, i, term)
     return term
 
@@ -174,7 +167,7 @@ def gathered_term(w, stencil, term):
 def _spread(w, stencil, term):
     """sum_i N_i |w_i - term|^2 of the present term w of XPIC's series."""
     spread = term[0] - term[0]
-    for i, weight, _ in _nodes_of(w, stencil):
+    for i, weight, _ in nodes_of(w, stencil):
         spread += weight * (term_at(w, i, term) - term).squared()
     return spread
 
@@ -195,8 +188,8 @@ def _before(w, i, like):
 @shared
 def _moment_before(w, stencil, v, moment):
     """Gather the moment of the velocity that the nodes had before the update."""
-    for k, (i, N, grad_N) in enumerate(_nodes_of(w, stencil)):
-        grad_N = transfers.gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, grad_N)
+    nodes = [straining_node(w, stencil, k) for k in range(support(w.basis, w.kin))]
+    for k, (i, N, grad_N) in enumerate(nodes):
         u = _before(w, i, v)
         moment = transfers.add_moment(
             w.transfer, w.kin, w.basis, w.grid, stencil, k, N, grad_N, u, moment
@@ -210,7 +203,7 @@ def _gone(lost, w, stencil, v, moment):
     gone = v[0] - v[0]
     there, here = transfers.lost_shares(w.transfer, gone)
     one = real(1, gone)
-    for k, (i, N, _) in enumerate(_nodes_of(w, stencil)):
+    for k, (i, N, _) in enumerate(nodes_of(w, stencil)):
         mine = transfers.nodal_momentum(
             w.transfer, w.kin, w.basis, w.grid, stencil, k, N, one, v - v, moment
         )

@@ -17,12 +17,12 @@ from karamelo_py.compiler.tuples import put_at
 from karamelo_py.kernels import arrays, visit
 from karamelo_py.kernels.arrays import MASS, Buffers, Index, Nodes, Number, Tag, of_force
 from karamelo_py.kernels.loss import EnergyLoss, bring_energy
-from karamelo_py.kernels.visit import Work, for_tags
+from karamelo_py.kernels.visit import Work, for_tags, node_of, straining_node
 from karamelo_py.points import laws
-from karamelo_py.points.basis import entry, mapped_again
+from karamelo_py.points.basis import mapped_again
 from karamelo_py.points.frames import force_stress
 from karamelo_py.points.kinematics import I, nothing
-from karamelo_py.points.transfers import Moment, gradient_weight, nodal_momentum, zero_moment
+from karamelo_py.points.transfers import Moment, nodal_momentum, zero_moment
 from karamelo_py.points.transfers.xpic import Series, TermOfSeries
 
 
@@ -189,7 +189,7 @@ def _load_of_mass_momentum(quantity, w, p, like):
 
 @scattered.on(MassMomentum)
 def _scattered_mass_momentum(quantity, w, stencil, k, load):
-    i, N, grad_N = entry(w.basis, w.kin, w.grid, stencil, k)
+    i, N, grad_N = node_of(w, stencil, k)
     mass, v, moment, rigid, x = load
     momentum = nodal_momentum(w.transfer, w.kin, w.basis, w.grid, stencil, k, N, mass, v, moment)
     accumulate(w.nodes.sums, i, MASS, (N * mass, *momentum))
@@ -221,8 +221,7 @@ def _load_of_averaged_force(quantity, w, p, like):
 
 @scattered.on(AveragedForce)
 def _scattered_averaged_force(quantity, w, stencil, k, load):
-    i, _, grad_N = entry(w.basis, w.kin, w.grid, stencil, k)
-    grad_N = gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, grad_N)
+    i, _, grad_N = straining_node(w, stencil, k)
     accumulate(w.nodes.sums, i, of_force(w.kin), (*load.dot(grad_N),))
 
 
@@ -241,8 +240,7 @@ def _load_of_internal_force(quantity, w, p, like):
 
 @scattered.on(InternalForce)
 def _scattered_internal_force(quantity, w, stencil, k, load):
-    i, N, grad_N = entry(w.basis, w.kin, w.grid, stencil, k)
-    grad_N = gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, grad_N)
+    i, N, grad_N = straining_node(w, stencil, k)
     stress, of_fixes, mean = load
     force = stress.dot(grad_N)
     if len(of_fixes):
@@ -261,7 +259,7 @@ def _load_of_momentum_again(quantity, w, p, like):
 
 @scattered.on(MomentumAgain)
 def _scattered_momentum_again(quantity, w, stencil, k, load):
-    i, N, _ = entry(w.basis, w.kin, w.grid, stencil, k)
+    i, N, _ = node_of(w, stencil, k)
     mass, v, moment = load
     momentum = nodal_momentum(w.transfer, w.kin, w.basis, w.grid, stencil, k, N, mass, v, moment)
     accumulate(w.nodes.velocity, i, 0, (*momentum,))
@@ -276,7 +274,7 @@ def _load_of_volumes(quantity, w, p, like):
 
 @scattered.on(Volumes)
 def _scattered_volumes(quantity, w, stencil, k, load):
-    i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
+    i, weight, _ = node_of(w, stencil, k)
     part = (weight * load[0], weight * load[1])
     accumulate(field(w.nodes.fields, visit.NodalMean), i, 0, part)
 
@@ -289,7 +287,7 @@ def _load_of_series_back(quantity, w, p, like):
 
 @scattered.on(SeriesBack)
 def _scattered_series_back(quantity, w, stencil, k, load):
-    i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
+    i, weight, _ = node_of(w, stencil, k)
     mass, u = load
     accumulate(field(w.nodes.fields, Series), i, len(u), (*(weight * mass * u),))
 

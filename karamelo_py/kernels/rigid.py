@@ -114,8 +114,8 @@ def _publish_forces(contact, s):
     for points, laws, _ in s.blocks:
         if isinstance(laws, Rigid):
             _sum_forces(
-                s.basis, s.kin, s.grids, points.x[now], points, rigid, contact.force, contact.torque,
-                s.control.totals,
+                s.basis, s.kin, s.grids, points.x[now], points, rigid,
+                contact.force, contact.torque, s.control.totals,
             )  # fmt: skip
     for slot in contact.slots:
         publish(s.control, slot, 3)

@@ -12,7 +12,7 @@ from karamelo_py.kernels.g2p import Move, empty_all, gathered_all, update_at
 from karamelo_py.kernels.lanes import OneByOne
 from karamelo_py.kernels.loss import EnergyLoss
 from karamelo_py.kernels.p2g import scattered_all
-from karamelo_py.kernels.visit import NodalStress, Work, all_records_of, for_tags
+from karamelo_py.kernels.visit import NodalStress, Work, all_records_of, for_tags, nodes_of
 from karamelo_py.points import transfers
 from karamelo_py.points.basis import carried, entry, product, reach, support
 from karamelo_py.points.basis.cpdi import AtCorners, CornerStencil
@@ -110,8 +110,7 @@ def joined(lanes, kin, parts):
 @shared
 def give_affine(lanes, w, stencil, parts):
     """Give the nodes of a stencil what is affine."""
-    seen = [entry(w.basis, w.kin, w.grid, stencil, k)[:2] for k in range(support(w.basis, w.kin))]
-    nodes, weights = tuple([node for node, _ in seen]), tuple([weight for _, weight in seen])
+    nodes, weights, _ = zip(*nodes_of(w, stencil), strict=True)
     for array, first, value, growths in joined(lanes, w.kin, parts):
         value, growths = (*value,), tuple([(*growth,) for growth in growths])
         accumulate_affine(array, nodes, first, weights, value, growths)
@@ -134,8 +133,7 @@ def _gathered_at_once_move(task, w, stencil, total):
     factor = gathered_by_arms(w)
     if not len(factor):
         return ()
-    nodes = [entry(w.basis, w.kin, w.grid, stencil, k)[0] for k in range(support(w.basis, w.kin))]
-    found = [update_at(w.kin, w.nodes, i, total[0]) for i in nodes]
+    found = [update_at(w.kin, w.nodes, i, total[0]) for i, _, _ in nodes_of(w, stencil)]
     # sum N v (X - x)^T from sum N v and sum N v k, X being k nodes from the first: of rows, then of
     # planes, as the weights are products.
     sums = tuple([(v,) for v, _ in found])

@@ -15,12 +15,12 @@ from karamelo_py.compiler.compile import fma, index, point_function, prefetch, r
 from karamelo_py.compiler.fields import StepField, SummedField, field, load, load_vector, pair
 from karamelo_py.compiler.tuples import count_in, record, row
 from karamelo_py.kernels.arrays import Index, Nodes, Number, Places, Points, Tag
-from karamelo_py.points.basis import blank, entry
+from karamelo_py.points.basis import blank, entry, support
 from karamelo_py.points.frames import DeformationGradient, scaled_increment
 from karamelo_py.points.grid import Grid
 from karamelo_py.points.kinematics import zero
 from karamelo_py.points.laws import deformation, initial_state
-from karamelo_py.points.transfers import Moment, zero_moment
+from karamelo_py.points.transfers import Moment, gradient_weight, zero_moment
 
 
 class Work(NamedTuple):
@@ -43,6 +43,25 @@ class Work(NamedTuple):
 def place_at(basis: Tag, kin: Tag, array: np.ndarray, p: Index) -> tuple:
     """Load the place (w,) of point `p`: its position and the shape of its domain."""
     return load(array, p, blank(basis, kin, load_vector(kin, array, p)))
+
+
+@shared
+def node_of(w: Work, stencil: tuple, k: int) -> tuple:
+    """Return number i, weight N and gradient of N of the k-th node of a stencil."""
+    return entry(w.basis, w.kin, w.grid, stencil, k)
+
+
+@shared
+def straining_node(w: Work, stencil: tuple, k: int) -> tuple:
+    """Return the same, with its weight in strains and forces in the place of the gradient."""
+    i, N, grad_N = node_of(w, stencil, k)
+    return i, N, gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, grad_N)
+
+
+@shared
+def nodes_of(w: Work, stencil: tuple) -> tuple:
+    """Return what `node_of` says of all nodes that a point sees."""
+    return tuple([node_of(w, stencil, k) for k in range(support(w.basis, w.kin))])
 
 
 @shared
@@ -192,7 +211,7 @@ def gathered_ratio(w, stencil, k, total):
     """`total` with the ratio of volumes at the k-th node, where it is averaged."""
     if not len(total):
         return total
-    i, weight, _ = entry(w.basis, w.kin, w.grid, stencil, k)
+    i, weight, _ = node_of(w, stencil, k)
     (mean,) = row(field(w.nodes.fields, NodalMean), i, 0, total)
     return (fma(weight, mean, total[0]),)
 
