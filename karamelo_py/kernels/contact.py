@@ -31,10 +31,9 @@ from karamelo_py.kernels.loss import FrictionalHeat, warm_node
 from karamelo_py.kernels.p2g import Centre, Normal
 from karamelo_py.kernels.table import touch, touch_velocity
 from karamelo_py.kernels.totals import add_to, counts, publish
-from karamelo_py.points.basis.product import product
 from karamelo_py.points.basis.surface import ENTRIES
 from karamelo_py.points.grid import node_position
-from karamelo_py.points.kinematics import total, vector, zero_vector
+from karamelo_py.points.kinematics import dot, vector, zero_vector
 
 REPEATS = 16  # at most, where more than two fields meet; what remains falls by a half or more
 
@@ -92,12 +91,6 @@ class NodePair(NamedTuple):
     relative: tuple  # velocity of the first body as the second one sees it
 
 
-@shared
-def _dot(*vectors):
-    """sum_k a_k b_k, or of the products of three vectors."""
-    return total([product(components) for components in zip(*vectors, strict=True)])
-
-
 @noinline
 def _immovable(contact, n, k):
     """Return True if contact cannot move a node in direction k."""
@@ -118,7 +111,7 @@ def _shares(contact, kin, nodes, n, m):
     equal ones are averaged. A body with a prescribed velocity knows its surface best.
     """
     of_n, of_m = _normal(kin, nodes, n), _normal(kin, nodes, m)
-    of_n, of_m = _dot(of_n, of_n), _dot(of_m, of_m)
+    of_n, of_m = dot(of_n, of_n), dot(of_m, of_m)
     prescribed_n = prescribed_m = False
     for k in range(kin.dimension):
         prescribed_n = prescribed_n or _immovable(contact, n, k)
@@ -167,7 +160,7 @@ def _reach(contact, nodes, pair, n, where, side):
     for k, outward in enumerate(pair.outward):
         mean += side * outward * (centre[n, k] / nodes.sums[n, MASS] - where.x[k])
     table = contact.surface[n // contact.stride]
-    row = (mean / (sqrt(_dot(pair.outward, pair.outward)) * where.h) + 3) * ENTRIES
+    row = (mean / (sqrt(dot(pair.outward, pair.outward)) * where.h) + 3) * ENTRIES
     low = min(max(int(row), 0), table.size - 2)
     share = min(max(row - low, 0.0), 1.0)
     return where.h * (table[low] + share * (table[low + 1] - table[low]))
@@ -176,10 +169,10 @@ def _reach(contact, nodes, pair, n, where, side):
 @noinline
 def _excess_of(contact, nodes, pair, where):
     """Return the excess of the approach velocity over the one that closes the gap in a step."""
-    size = sqrt(_dot(pair.outward, pair.outward))
+    size = sqrt(dot(pair.outward, pair.outward))
     if not size > 0:
         return 0.0
-    approach = _dot(pair.outward, pair.relative)
+    approach = dot(pair.outward, pair.relative)
     if not approach > 0:
         return 0.0
     gap = -_reach(contact, nodes, pair, pair.n, where, 1)
@@ -190,10 +183,10 @@ def _excess_of(contact, nodes, pair, where):
 @noinline
 def _friction_of(pair, friction, push, slide, share):
     """Impulse along the surface over the speed of sliding, and whether it stops all sliding."""
-    compliance = _dot(slide, slide, pair.yielding)
+    compliance = dot(slide, slide, pair.yielding)
     if not compliance > 0:
         return 0.0, False
-    slip = sqrt(_dot(slide, slide))
+    slip = sqrt(dot(slide, slide))
     stop = share * slip * slip * slip / compliance
     return min(stop, friction * push) / slip, stop <= friction * push
 
@@ -291,15 +284,15 @@ def _touch_pair(contact, kin, nodes, control, i, j, place, share, where):
     excess = _excess_of(contact, nodes, pair, where)
     if not excess > 0:
         return
-    size = sqrt(_dot(pair.outward, pair.outward))
+    size = sqrt(dot(pair.outward, pair.outward))
     normal = pair.outward._make([outward / size for outward in pair.outward])
-    compliance = _dot(normal, normal, pair.yielding)
+    compliance = dot(normal, normal, pair.yielding)
     if not compliance > 0:
         return  # the fixes move both
     push = share * excess / compliance
     left = _left(pair, push / size)
     # Friction does not act on the rest of the approach: bodies that are apart come together freely.
-    slide = left - _dot(pair.outward, left) / (size * size) * pair.outward
+    slide = left - dot(pair.outward, left) / (size * size) * pair.outward
     rub, sticks = 0.0, False
     if contact.friction[a, b] > 0:
         rub, sticks = _friction_of(pair, contact.friction[a, b], push, slide, share)
@@ -396,8 +389,8 @@ def _touch_separate_fields(contact, s):
 @noinline
 def _stay_pair(contact, i, j, pair, share, sticks):
     """Take `share` of the relative velocity across the surface, or of all where the pair sticks."""
-    across = _dot(pair.outward, pair.relative)
-    compliance = _dot(pair.outward, pair.outward, pair.yielding)
+    across = dot(pair.outward, pair.relative)
+    compliance = dot(pair.outward, pair.outward, pair.yielding)
     push = share * across / compliance if compliance > 0 else 0.0
     for k, yielding in enumerate(pair.yielding):
         if yielding > 0:

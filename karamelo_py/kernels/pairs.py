@@ -13,9 +13,10 @@ from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import kernel, noinline
+from karamelo_py.kernels.arrays import vector_at
 from karamelo_py.kernels.visit import state_at
 from karamelo_py.points.bodies import force_between, radius
-from karamelo_py.points.kinematics import vector
+from karamelo_py.points.kinematics import zero_vector
 from karamelo_py.points.laws import jacobian, specific_volume
 
 
@@ -186,17 +187,12 @@ def _find_cells(d, bodies, cells, width):
             cells.start[c] += 1
 
 
-@shared
-def vector_at(kin, array, i):
-    """Row `i` of `array` (n, >= d) as a vector."""
-    return vector(kin, [array[i, k] for k in range(kin.dimension)])
-
-
 @noinline
 def _touch(law, kin, bodies, reach, dt, kick, i, j, total):
     """The force between two points, if they touch; whether they do."""
     x, f = bodies.x, bodies.force
-    dx = vector_at(kin, x, j) - vector_at(kin, x, i)
+    none = zero_vector(kin, 0.0)
+    dx = vector_at(kin, x, j, 0, none) - vector_at(kin, x, i, 0, none)
     squared = 0.0
     for k in range(kin.dimension):
         if not abs(dx[k]) < reach:
@@ -205,7 +201,7 @@ def _touch(law, kin, bodies, reach, dt, kick, i, j, total):
     both = bodies.radius[i] + bodies.radius[j]
     if not 0 < squared < both * both:
         return 0
-    dv = vector_at(kin, bodies.v, j) - vector_at(kin, bodies.v, i)
+    dv = vector_at(kin, bodies.v, j, 0, none) - vector_at(kin, bodies.v, i, 0, none)
     force = force_between(
         law, kin, dx, sqrt(squared), bodies.radius[i], bodies.radius[j],
         bodies.mass[i], bodies.mass[j], dv, dt, kick,

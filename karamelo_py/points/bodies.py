@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from karamelo_py.compiler.compile import point_function, shared
 from karamelo_py.compiler.powers import power
-from karamelo_py.points.kinematics import Axisymmetric, total
+from karamelo_py.points.kinematics import Axisymmetric, dot
 
 
 class Hertz(NamedTuple):
@@ -66,7 +66,7 @@ def _force_between_minimize_penetration(
     push = reduced * p / (dt * kick)
     force = -push / r * dx
     if law.friction > 0:
-        along = total([a * b for a, b in zip(dv, dx, strict=True)])
+        along = dot(dv, dx)
         slide = dv + -along / (r * r) * dx
         slip = sqrt(slide.squared())
         if slip > 0:

@@ -17,7 +17,7 @@ from karamelo_py.compiler.compile import (
 )
 from karamelo_py.language.rules import suggestion
 from karamelo_py.points.basis import affine_weight, entry, locate, reach, support
-from karamelo_py.points.kinematics import Axisymmetric, gradient, vector
+from karamelo_py.points.kinematics import Axisymmetric, gradient, product, vector
 
 
 class Along(NamedTuple):
@@ -127,14 +127,6 @@ def digits(k, base, d):
 def item(values, k):
     """Take values[k], where only a run may know k."""
     return values[k]
-
-
-def product(factors):
-    """Multiply factors, from the first on."""
-    made = factors[0]
-    for factor in factors[1:]:
-        made = made * factor
-    return made
 
 
 # --- the product ------------------------------------------------------------------------------

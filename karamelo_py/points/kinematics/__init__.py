@@ -100,6 +100,19 @@ def total(terms):
     return sum(terms[1:], terms[0])
 
 
+def product(factors):
+    """Multiply factors, from the first on."""
+    made = factors[0]
+    for factor in factors[1:]:
+        made = made * factor
+    return made
+
+
+def dot(*vectors):
+    """sum_k a_k b_k, or of the products of three vectors."""
+    return total([product(components) for components in zip(*vectors, strict=True)])
+
+
 # --- what vectors and tensors share -----------------------------------------------------------
 
 

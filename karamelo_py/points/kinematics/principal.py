@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 from karamelo_py.compiler.compile import implements, round_off, shared, where
 from karamelo_py.compiler.powers import exponential, logarithm
 from karamelo_py.compiler.slopes import Dual, size_of, slopes_of, value_of
-from karamelo_py.points.kinematics import Space
+from karamelo_py.points.kinematics import Space, dot
 
 
 @shared
@@ -137,12 +137,6 @@ class TurningFrame(NamedTuple):
     apart: tuple  # s_a - s_b of the pairs
 
 
-def product(a, b):
-    """a_i b_i."""
-    x, y, z = [p * q for p, q in zip(a, b, strict=True)]
-    return x + y + z
-
-
 def in_frame(s, directions):
     """Find components of a tensor in a frame: (3,) of the diagonal, and those of the pairs."""
     if s.kin.dimension == 2:
@@ -151,9 +145,9 @@ def in_frame(s, directions):
         radius = apart * k + s.xy * g
         return (mean + radius, mean - radius, s.zz), (s.xy * k - apart * g,)
     a = s.at()
-    along = [tuple([product([a[i, j] for j in range(3)], n) for i in range(3)]) for n in directions]
-    shears = tuple([product(directions[a], along[b]) for a, b in PAIRS])
-    return tuple([product(n, t) for n, t in zip(directions, along, strict=True)]), shears
+    along = [tuple([dot([a[i, j] for j in range(3)], n) for i in range(3)]) for n in directions]
+    shears = tuple([dot(directions[a], along[b]) for a, b in PAIRS])
+    return tuple([dot(n, t) for n, t in zip(directions, along, strict=True)]), shears
 
 
 def out_of_frame(s, diagonal, shears, directions):
@@ -167,8 +161,8 @@ def out_of_frame(s, diagonal, shears, directions):
 
     def component(i, j):
         n = directions
-        own = product(diagonal, [m[i] * m[j] for m in n])
-        return own + product(shears, [n[a][i] * n[b][j] + n[b][i] * n[a][j] for a, b in PAIRS])
+        own = dot(diagonal, [m[i] * m[j] for m in n])
+        return own + dot(shears, [n[a][i] * n[b][j] + n[b][i] * n[a][j] for a, b in PAIRS])
 
     return s._make([component(i, j) for i, j in s.places])
 

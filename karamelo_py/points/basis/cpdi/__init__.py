@@ -22,11 +22,10 @@ from karamelo_py.points.basis.product import (
     inverse_radius,
     item,
     node_number,
-    product,
     with_hoop,
 )
 from karamelo_py.points.grid import cells_along, in_cells
-from karamelo_py.points.kinematics import cofactor, determinant, gradient, total, vector
+from karamelo_py.points.kinematics import cofactor, determinant, gradient, product, total, vector
 
 
 class Element(NamedTuple):

@@ -12,7 +12,7 @@ from karamelo_py.points.basis.cpdi import (
     domain,
     upright,
 )
-from karamelo_py.points.kinematics import Space, cofactor, determinant, total, vector
+from karamelo_py.points.kinematics import Space, cofactor, determinant, dot, total, vector
 
 
 class _Parallel(ConvectedDomain):
@@ -242,10 +242,6 @@ def _cross(a, b):
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
-def _dot(a, b):
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
 def _at_gauss(a, b, c, d):
     """Interpolate values at (-,-), (+,-), (-,+), (+,+) to the Gauss points, bilinearly.
 
@@ -297,7 +293,7 @@ def _domain_h8(basis, kin, place):
     q = _at_gauss(*[_add(_cross(w[a, 0], u[0, c]), _cross(w[a, 1], u[1, c])) for a, c in PAIRS])
     r = _at_gauss(*[_add(_cross(u[b, 0], v[a, 0]), _cross(u[b, 1], v[a, 1])) for a, b in PAIRS])
     # det J, two Gauss points of xi in each tuple; spread over the corners.
-    d = _at_gauss(*[tuple([_dot(u[b, c], first[a, b, c]) for a in (0, 1)]) for b, c in PAIRS])
+    d = _at_gauss(*[tuple([dot(u[b, c], first[a, b, c]) for a in (0, 1)]) for b, c in PAIRS])
     return _means(place, d, p, q, r)
 
 
@@ -329,4 +325,4 @@ def _upright_h8(basis, kin, place):
     # The least of the corners' Jacobians, from the half edges that meet there.
     u, v, w = _edges(place)
     met = [(u[_at(y, z)], v[_at(x, z)], w[_at(x, y)]) for x, y, z in CUBE]
-    return min(*[_dot(a, _cross(b, c)) for a, b, c in met]) > 0
+    return min(*[dot(a, _cross(b, c)) for a, b, c in met]) > 0
