@@ -67,7 +67,7 @@ def nodes_of(w: Work, stencil: tuple) -> tuple:
 @shared
 def law_at(points: Points, laws: NamedTuple, p: Index) -> Tag:
     """Load the law of point `p`, with the parameters of its material."""
-    return record(laws, index(points.material[p]))
+    return record(laws, index(points.material[p]))  # type: ignore[arg-type]
 
 
 @shared
