@@ -224,6 +224,20 @@ def list_points(seen):
     starts[0] = 0
 
 
+@kernel
+def spread(seen, places):
+    """How far nodes at places (m, d) that a point sees lie apart at most along a direction."""
+    most = 0
+    for p in range(seen.nodes.shape[0]):
+        for i in range(places.shape[1]):
+            low = high = places[seen.nodes[p, 0], i]
+            for k in range(1, seen.nodes.shape[1]):
+                at = places[seen.nodes[p, k], i]
+                low, high = min(low, at), max(high, at)
+            most = max(most, high - low)
+    return most
+
+
 @noinline
 def _mark_pairs(seen, pairs, part):
     """Mark the pairs of nodes that there are, by 0 in `Pairs.rank`."""

@@ -24,6 +24,7 @@ from karamelo_py.kernels.implicit import (
     respond,
     scatter,
     see,
+    spread,
     strain,
     stress_and_tangent,
 )
@@ -66,7 +67,8 @@ class Equations:
         self.blocks = [block for block in s.blocks if not isinstance(block.laws, Rigid)]
         self.parts = [self._seen(block) for block in self.blocks]
         # Gradients of points on a line between cells reach nodes where they have no weight.
-        counts = [seen.nodes[self._counts(seen)] for seen, _ in self.parts]
+        given = [self._counts(seen) for seen, _ in self.parts]
+        counts = [seen.nodes[own] for (seen, _), own in zip(self.parts, given, strict=True)]
         soft = np.unique(np.concatenate(counts)) if counts else np.zeros(0, np.int64)
         tools = [(b, self._seen(b)[0]) for b in s.blocks if isinstance(b.laws, Rigid)]
         counts += [seen.nodes[seen.weights > 0] for _, seen in tools]
@@ -74,7 +76,8 @@ class Equations:
         self.mass = s.nodes.sums[self.nodes, MASS].astype(float)
         self.places = self._places()
         self.parts = [
-            (self._numbered(seen, self._counts(seen)), response) for seen, response in self.parts
+            (self._numbered(seen, own), response)
+            for (seen, response), own in zip(self.parts, given, strict=True)
         ]
         tools = [(block, self._numbered(seen, seen.weights > 0)) for block, seen in tools]
         self.deforming = np.isin(self.nodes, soft)
@@ -128,15 +131,10 @@ class Equations:
         list_points(seen)
         return seen
 
-    def _spread(self, seen: Seen) -> int:
-        if not len(seen.nodes):
-            return 0
-        return int(np.ptp(self.places[seen.nodes], axis=1).max())
-
     def _find_pairs(self) -> None:
         """Find the pairs of nodes that points see both of, and lay out K for all components."""
         d, m = self.d, len(self.nodes)
-        reach = max((self._spread(seen) for seen, _ in self.parts), default=0)
+        reach = max((spread(seen, self.places) for seen, _ in self.parts), default=0)
         row = 2 * reach + 1
         weights = row ** np.arange(d)[::-1]
         rank = np.full((m, row**d), -1, np.int32)

@@ -1,5 +1,6 @@
 """Load steps: Newton's method in the place of a step that an explicit scheme takes."""
 
+from math import ceil
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from karamelo_py.kernels.step import DONE, SORT, STOPPED, take_rows
 from karamelo_py.points.kinematics import free_from
 from karamelo_py.run.implicit.equations import Equations
 from karamelo_py.run.implicit.inertia import Motion, Rest
-from karamelo_py.run.implicit.newton import Failed, Newton
+from karamelo_py.run.implicit.newton import Failed, Newton, TooFar
 from karamelo_py.schemes.quasi_static import PUBLISHED
 from karamelo_py.script.errors import ScriptError
 
@@ -54,8 +55,8 @@ class LoadSteps:
         end = float(control.values[TIME]) + whole
         if abs(end - control.clock[0].end_time) <= 1e-9 * whole:
             end = float(control.clock[0].end_time)
-        left, part, parts, iterations, residual = 1.0, 1.0, 0, 0, 0.0
-        while left > 0:
+        left, part, most, parts, iterations, residual = 1.0, 1.0, 1.0, 0, 0, 0.0
+        while left > 1e-9:
             part = min(part, left)
             try:
                 taken, residual = self._part(hooks, part * whole)
@@ -66,12 +67,15 @@ class LoadSteps:
                     end = self._limit_reached(reason)
                     break
                 part /= 2
+                if isinstance(reason, TooFar):
+                    # In as many equal parts as bring the points there.
+                    part = most = 2 * part / min(max(ceil(1.1 * reason.times), 2), 4)
                 continue
             left -= part
             control.values[TIMESTEP] = step
             parts, iterations = parts + 1, iterations + taken
-            if left > 0:
-                part *= 2 if taken <= self.scheme.iterations // 2 else 1
+            if left > 1e-9:
+                part = min(2 * part, most) if taken <= self.scheme.iterations // 2 else part
                 if control.clock[0].drift > control.clock[0].drift_limit:
                     self.simulation.sort_if_due()
         for name, value in zip(PUBLISHED, (iterations, residual, parts), strict=True):

@@ -15,6 +15,14 @@ class Failed(Exception):
     """Newton's method finds no equilibrium, for a reason."""
 
 
+class TooFar(Failed):
+    """Points would go so many times as far as they may at once."""
+
+    def __init__(self, reason: str, times: float):
+        super().__init__(reason)
+        self.times = times
+
+
 class Newton:
     """The balance of forces after displacements, and its solution.
 
@@ -132,5 +140,6 @@ class Newton:
         if not np.all(np.isfinite(self.inner)):
             raise Failed("a point turns inside out")
         far = equations.furthest() / self.spacing
-        if not far <= (FAR if equations.s.frame.moves else 0.95):
-            raise Failed(f"points would go {far:.3g} cells at once")
+        most = FAR if equations.s.frame.moves else 0.95
+        if not far <= most:
+            raise TooFar(f"points would go {far:.3g} cells at once", far / most)
