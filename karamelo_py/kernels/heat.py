@@ -323,17 +323,35 @@ def show_heat(heat, s, mode):
         sweep_nodes(mode, SumsToVelocity(), Line(), heat.nodes, s.ranges, step_size(s))
 
 
-@conduct.on(Conducting)
-def _conduct_conducting(heat, s, mode, hooks):
-    dt = step_size(s)
+@shared
+def flow_of_heat(heat, s, mode, hooks):
+    """See that the nodes of heat have capacity, heat, and the flow that present gradients make."""
     show_heat(heat, s, mode)
-    sweep_nodes(mode, TakeMean(), Line(), heat.nodes, s.ranges, dt)
+    sweep_nodes(mode, TakeMean(), Line(), heat.nodes, s.ranges, step_size(s))
     at_heat_nodes(hooks, arrays.POST_HEAT_TO_GRID, arrays.ON_VELOCITY, s)
     at_heated_points(hooks, s)
     visit_for_heat(heat, s, mode, FLOW, True, True)
-    sweep_nodes(mode, NodalUpdate(), Line(), heat.nodes, s.ranges, dt)
+
+
+@shared
+def hold_heat(s, hooks):
+    """Let the fixes hold the new temperature of nodes."""
     at_heat_nodes(hooks, arrays.POST_UPDATE_GRID_HEAT, arrays.ON_UPDATE, s)
+
+
+@shared
+def warm_points(heat, s, mode):
+    """Let the points take what the temperature of the nodes changes by."""
     visit_for_heat(heat, s, mode, MAP, True, False)
+
+
+@conduct.on(Conducting)
+def _conduct_conducting(heat, s, mode, hooks):
+    dt = step_size(s)
+    flow_of_heat(heat, s, mode, hooks)
+    sweep_nodes(mode, NodalUpdate(), Line(), heat.nodes, s.ranges, dt)
+    hold_heat(s, hooks)
+    warm_points(heat, s, mode)
     # What `Warming` reports as a rate is by what factor conduction has become faster.
     read_reports(s)
     clock = s.control.clock[0]

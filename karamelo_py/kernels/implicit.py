@@ -330,6 +330,20 @@ add_stiffness = by_threads(_add_stiffness)
 
 
 @kernel
+def add_conductance(kin, seen, conductance, pairs, C):
+    """Add conductances (1, n) of points times grad N_a grad N_b to pairs of nodes."""
+    for a in range(pairs.codes.size):
+        for e in range(seen.starts[a], seen.starts[a + 1]):
+            p, k = seen.entries[e] // seen.nodes.shape[1], seen.entries[e] % seen.nodes.shape[1]
+            g = gradient_at(kin, seen, p, k).planar()
+            for other in range(seen.nodes.shape[1]):
+                code = pairs.codes[seen.nodes[p, other]] - pairs.codes[a]
+                h = gradient_at(kin, seen, p, other).planar()
+                along = total([x * y for x, y in zip(g, h, strict=True)])
+                C[pairs.first[a] + pairs.rank[a, pairs.middle + code]] += conductance[0, p] * along
+
+
+@kernel
 def scatter(seen, mass, values, nodes):
     """Add mass times values (d, n) of points to nodes (m, d)."""
     for p in range(seen.nodes.shape[0]):

@@ -52,7 +52,8 @@ class QuasiStatic(NamedTuple):
         How often a step is corrected before it is done in halves.
     solver
         Of the linear equations: ``direct``, ``amg`` (conjugate gradients with algebraic
-        multigrid), or ``auto``, which takes amg from 5000 unknowns on if the matrix is symmetric.
+        multigrid), or ``auto``: amg from 5000 unknowns on in the plane if the matrix is symmetric,
+        and from 2000 on in space.
     stabilisation
         Share of Young's modulus by which jumps of the gradient at the border of a body are
         penalised (ghost stabilisation; Coombs 2023). It bears nodes that see next to nothing of

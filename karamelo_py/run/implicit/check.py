@@ -14,6 +14,7 @@ from karamelo_py.script.errors import Place, ScriptError
 
 # Moments of fixes that implicit steps have; those of plug-ins may be called more than once a step.
 _MOMENTS = "initial_integrate", "post_particles_to_grid", "post_update_grid_state"
+_OF_HEAT = "post_heat_to_grid", "supply_heat", "post_update_grid_heat"
 _OF_PLUGINS = _MOMENTS[1:]
 _EXPLICIT = "an explicit scheme, scheme(musl)"
 
@@ -31,8 +32,10 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
             "FLIP in its place",
             method.place,
         )
-    if update.thermal:
-        yield "knows no heat that flows", f"mechanical, or {_EXPLICIT}", method.place
+    if update.thermal and any(
+        can(solid.material.law, constrained_velocity) for solid in hub.solids.values()
+    ):
+        yield "knows no heat that flows beside rigid solids", f"mechanical, or {_EXPLICIT}", None
     if update.boundary == "reflect":
         yield "knows no walls that points bounce from", "fix velocity_nodes", None
     if hub.settings.precision != "double":
@@ -41,7 +44,11 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
         yield "runs in one process", "no --ranks", None
     for fix in hub.fixes.values():
         own = registry.origin("fix", fix.style).startswith("karamelo-py ") and fix.style != "python"
-        other = [hook for hook in fix.hooks() if hook not in (_MOMENTS if own else _OF_PLUGINS)]
+        other = [
+            hook
+            for hook in fix.hooks()
+            if hook not in (_MOMENTS + _OF_HEAT if own else _OF_PLUGINS)
+        ]
         if fix.prescribes_velocity or fix.first_step_only:
             other = [hook for hook in other if hook != "post_velocities_to_grid"]
         if _of_rigid_points(hub, fix):

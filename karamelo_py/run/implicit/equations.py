@@ -8,13 +8,16 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from karamelo_py.compiler.algebra import on_numbers
+from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import MASS, Setup, known_to_laws
+from karamelo_py.kernels.heat import Conductance
 from karamelo_py.kernels.implicit import (
     PARTS,
     Pairs,
     Response,
     Seen,
+    add_conductance,
     add_forces,
     add_stiffness,
     keep_stress,
@@ -249,6 +252,19 @@ class Equations:
     def of_prescribed(self, change: np.ndarray) -> np.ndarray:
         """Find the forces at the free components of changes (m, d) of the others."""
         return (self.whole @ change.ravel())[self.free.ravel()]
+
+    def conduction(self) -> sp.csr_matrix:
+        """Assemble the heat that flows out of nodes (m, m) by their temperatures.
+
+        The state of points is that after their strain; where they see nodes has not changed.
+        """
+        data = np.zeros(len(self.pairs[1]))
+        for block, (seen, _) in zip(self.blocks, self.parts, strict=True):
+            seen.gradients[:] = self._seen(block)[0].gradients
+            conductance = field(block.points.fields, Conductance)
+            add_conductance(self.s.kin, seen, conductance, self.layout, data)
+        m = len(self.nodes)
+        return sp.csr_matrix((data, self.pairs[1], self.layout.first), (m, m))
 
     # --- ghost stabilisation ----------------------------------------------------------------------
 

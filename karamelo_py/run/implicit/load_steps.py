@@ -7,9 +7,11 @@ import numpy as np
 
 from karamelo_py.kernels.arrays import DT, TIME, TIMESTEP, Hooks, of_change, of_force
 from karamelo_py.kernels.clock import finish
+from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.rigid import RigidBodies, put_forces
 from karamelo_py.kernels.step import DONE, SORT, STOPPED, take_rows
 from karamelo_py.points.kinematics import free_from
+from karamelo_py.run.implicit.conduction import conduct
 from karamelo_py.run.implicit.equations import Equations
 from karamelo_py.run.implicit.inertia import Motion, Rest
 from karamelo_py.run.implicit.newton import Failed, Newton, TooFar
@@ -117,6 +119,8 @@ class LoadSteps:
             self._publish(found, hooks, dt)
             if not take_rows(self.scheme.close, s, simulation.mode, hooks):
                 raise PointsWrong
+            if isinstance(s.heat, Conducting):
+                conduct(found.equations, hooks, dt)
         except Failed:
             control.totals[:] = totals
             raise

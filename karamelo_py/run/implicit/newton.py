@@ -55,6 +55,7 @@ class Newton:
         self.ghost: sp.csr_matrix | None = None
         self.ghost_of_free: sp.csr_matrix | None = None
         self.floor = 0.0
+        self.kept: dict = {}  # what a solver keeps from one correction to the next
         self.inner = equations.respond(np.zeros_like(external), dt)
 
     def scale(self, modulus: float, stabilisation: float) -> None:
@@ -128,7 +129,7 @@ class Newton:
             try:
                 accuracy = max(1e-10, min(1e-4, 0.1 * residual))
                 rigid = equations.rigid_motions[free]
-                change[free] = solve(self.scheme.solver, A, b, rigid, accuracy)
+                change[free] = solve(self.scheme.solver, A, b, rigid, accuracy, self.kept)
             except Singular:
                 raise Failed("the equations are singular") from None
         return change

@@ -9,24 +9,27 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import MatrixRankWarning, splu
 
 MANY = 5000  # unknowns, from which on multigrid is faster than a direct solver
+MANY_IN_SPACE = 2000
+MANY_ITERATIONS = 25  # of multigrid, behind which its coarse equations are made anew
 
 
 class Singular(Exception):
     """The equations have no solution: something is not held, or a limit load is reached."""
 
 
-def scaled(A: sp.csr_matrix) -> tuple[sp.csr_matrix, np.ndarray]:
-    """Scale rows and columns such that the diagonal is 1."""
-    diagonal = np.abs(A.diagonal())
-    if not np.all(diagonal > 0):
-        raise Singular
-    s = 1 / np.sqrt(diagonal)
+def scaled(A: sp.csr_matrix, s: np.ndarray | None = None) -> tuple[sp.csr_matrix, np.ndarray]:
+    """Scale rows and columns such that the diagonal is 1, or by given factors (n,)."""
+    if s is None:
+        diagonal = np.abs(A.diagonal())
+        if not np.all(diagonal > 0):
+            raise Singular
+        s = 1 / np.sqrt(diagonal)
     data = A.data * s[A.indices]
     data *= np.repeat(s, np.diff(A.indptr))
     return sp.csr_matrix((data, A.indices, A.indptr), A.shape), s
 
 
-def direct(A: sp.csr_matrix, b: np.ndarray, rigid: np.ndarray, accuracy: float) -> np.ndarray:
+def direct(A: sp.csr_matrix, b: np.ndarray) -> np.ndarray:
     """Solve by SuperLU."""
     B, s = scaled(A)
     with warnings.catch_warnings():
@@ -39,28 +42,36 @@ def direct(A: sp.csr_matrix, b: np.ndarray, rigid: np.ndarray, accuracy: float) 
     return s * factors.solve(s * b, trans="T")
 
 
-def amg(A: sp.csr_matrix, b: np.ndarray, rigid: np.ndarray, accuracy: float) -> np.ndarray:
+def amg(
+    A: sp.csr_matrix, b: np.ndarray, rigid: np.ndarray, accuracy: float, kept: dict
+) -> np.ndarray:
     """Solve by conjugate gradients (GMRES where A is not symmetric) with algebraic multigrid.
 
     `rigid` are the rigid motions (n, k) of the unknowns: smoothed aggregation takes them for what
     hardly meets a resistance (Vanek, Mandel & Brezina 1996). `accuracy` is the residual that is
-    left, as a share of b.
+    left, as a share of b. The coarse equations are `kept` for matrices to come, which differ
+    little, as long as these are solved in a few iterations: to make them takes most of the time.
     """
     import pyamg
 
-    B, s = scaled(A)
+    s = kept["scale"] if kept else None
+    B, s = scaled(A, s)
     symmetric = is_symmetric(B)
     left: list[float] = []
     with from_one_seed(), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of a limit of iterations
-        solver = pyamg.smoothed_aggregation_solver(
-            B,
-            B=rigid / s[:, None],
-            symmetry="symmetric" if symmetric else "nonsymmetric",
-        )
-        x = solver.solve(
+        if kept:
+            kept["multigrid"].levels[0].A = B
+        else:
+            kept["scale"] = s
+            kept["multigrid"] = pyamg.smoothed_aggregation_solver(
+                B, B=rigid / s[:, None], symmetry="symmetric" if symmetric else "nonsymmetric"
+            )
+        x = kept["multigrid"].solve(
             s * b, tol=accuracy, accel="cg" if symmetric else "gmres", maxiter=300, residuals=left
         )
+    if len(left) > MANY_ITERATIONS:
+        kept.clear()
     if not np.all(np.isfinite(x)) or left[-1] > 1e-2 * max(left[0], 1e-300):
         raise Singular
     return s * x
@@ -85,12 +96,17 @@ def from_one_seed() -> Iterator[None]:
 
 
 def solve(
-    name: str, A: sp.csr_matrix, b: np.ndarray, rigid: np.ndarray, accuracy: float
+    name: str, A: sp.csr_matrix, b: np.ndarray, rigid: np.ndarray, accuracy: float, kept: dict
 ) -> np.ndarray:
-    """Solve by the solver of a `name`: direct, amg or auto."""
-    large = A.shape[0] >= MANY and is_symmetric(A)  # else a direct solver is faster, and safer
-    chosen = amg if name == "amg" or (name == "auto" and large) else direct
-    x = chosen(A, b, rigid, accuracy)
+    """Solve by the solver of a `name`: direct, amg or auto; `kept` is what amg keeps."""
+    in_space = rigid.shape[1] == 6
+    large = A.shape[0] >= (MANY_IN_SPACE if in_space else MANY)
+    if name == "auto" and large and (in_space or is_symmetric(A)):
+        try:
+            return solve("amg", A, b, rigid, accuracy, kept)
+        except Singular:  # multigrid is not made for all matrices
+            kept.clear()
+    x = amg(A, b, rigid, accuracy, kept) if name == "amg" else direct(A, b)
     if not np.all(np.isfinite(x)):
         raise Singular
     return x

@@ -1,0 +1,69 @@
+"""Conduction of heat in an implicit step, by the backward rule of Euler."""
+
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from karamelo_py.kernels.arrays import MASS, Setup, of_force
+from karamelo_py.kernels.heat import flow_of_heat, hold_heat, warm_points
+from karamelo_py.points.kinematics import Line
+from karamelo_py.run.implicit.equations import Equations
+from karamelo_py.run.implicit.solvers import direct
+
+SHOWN = 1e20  # a temperature that nobody prescribes
+
+
+def conduct(equations: Equations, hooks: Any, dt: float) -> None:
+    """Let heat flow for a step of `dt`, after the points have been strained and warmed by that.
+
+    With capacities C and conductances K of the nodes, C (T' - T) / dt = q - K T'. Conduction is
+    linear: one solution is exact. The split into an adiabatic step and conduction is of first order
+    in the step (Armero & Simo 1992).
+
+    Raises
+    ------
+    Singular
+        If the equations have no solution.
+    """
+    s, mode = equations.s, equations.mode
+    heat = s.heat
+    flow_of_heat(heat, s, mode, hooks)
+    nodes = equations.nodes
+    sums, update = heat.nodes.sums, heat.nodes.update
+    capacity = np.array(sums[nodes, MASS], float)
+    some = capacity > 0
+    own = np.divide(sums[nodes, MASS + 1], capacity, out=np.zeros(len(nodes)), where=some)
+    mapped = np.array(heat.nodes.velocity[nodes, 0], float)
+    flow = np.array(sums[nodes, of_force(Line())], float)
+    K = equations.conduction()
+    given, prescribed = _prescribed(s, nodes, hooks)
+    free = some & ~given
+    change = np.where(given, prescribed - mapped, 0.0)
+    stored = capacity / dt
+    balance = flow + stored * (own - mapped)
+    A = (K + sp.diags(stored)).tocsr()
+    if np.any(free):
+        right = (balance - K @ change)[free]
+        change[free] = direct(A[free][:, free], right)
+    new = mapped + change
+    # What the nodes would have without those that hold them, who publish the heat that it takes.
+    without = new - np.where(given, np.divide(
+        A @ change - balance, stored, out=np.zeros(len(nodes)), where=some), 0.0)  # fmt: skip
+    update[nodes, 0], update[nodes, 1] = without, without - own
+    hold_heat(s, hooks)
+    update[nodes, 0], update[nodes, 1] = new, new - own
+    warm_points(heat, s, mode)
+
+
+def _prescribed(s: Setup, nodes: np.ndarray, hooks: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Find which nodes have a temperature that fixes prescribe, and that."""
+    update, totals = s.heat.nodes.update, s.control.totals.copy()
+    found = []
+    for shown in (-SHOWN, SHOWN):
+        update[nodes, 0], update[nodes, 1] = shown, 0
+        hold_heat(s, hooks)
+        found.append(np.array(update[nodes, 0], float))
+    s.control.totals[:] = totals
+    given = found[0] == found[1]
+    return given, np.where(given, found[0], 0.0)

@@ -1,0 +1,68 @@
+"""Heat in implicit steps: conduction by large steps, and heating by plastic work."""
+
+from math import sqrt
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.special import erfc
+
+from comparisons.results import read_dump
+
+INPUTS = Path(__file__).parent.parent / "inputs"
+
+
+def slab(kind: str = "ulmpm") -> str:
+    """in.heat_slab in load steps: a body at rest, as stiff as copper is."""
+    text = (INPUTS / "in.heat_slab").read_text()
+    scheme = "scheme(quasi-static)\nsteps = 30\nset_dt(3/steps)"
+    for old, new in (
+        ('kind   = "ulmpm"', f'kind   = "{kind}"'),
+        ("1, thermo-mechanical)", f"1, thermo-mechanical)\n{scheme}"),
+        ("124,", "1.24e11,"),
+        (
+            "group(face, ",
+            "region(every, block, -INF, INF)\ngroup(every, nodes, region, every, all)\n"
+            "fix(rest, velocity_nodes, every, 0)\ngroup(face, ",
+        ),
+        ("set_output(100)", "set_output(1)"),
+        ("run_time(3)", "run(steps)"),
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    return text
+
+
+@pytest.mark.parametrize("kind", ["ulmpm", "tlmpm"])
+def test_heat_flows_into_a_slab(run_script, kind):
+    """T = erfc(x / (2 sqrt(a t))), by steps of 15 times the stable one; the rule is of order 1."""
+    errors = []
+    for steps in (30, 60):
+        words = "-var", "steps", str(steps)
+        result = run_script(slab(kind), *words, folder=f"run{steps}")
+        log_of = result.log
+        heat = log_of["heat"]
+        # What the face is given is what the slab has.
+        assert np.allclose(np.cumsum(log_of["face_s"][1:]) * 3 / steps, heat[1:], rtol=1e-9)
+        errors.append(abs(heat[-1] / log_of["exact"][-1] - 1))
+        points = read_dump(result.folder / f"heat_slab.{steps}.LAMMPS")[-1]
+        exact = 300 + 100 * erfc(points["x"] / (2 * sqrt(401 / 8960 / 385 * 3)))
+        assert np.abs(points["T"] - exact).max() < 60 / steps
+    assert errors[0] < 5e-3 and errors[1] < 0.6 * errors[0]
+
+
+def test_plastic_work_heats(run_script):
+    """T0 + chi/(rho cp) (Y ep + H ep^2/2): in.shear_heating where heat could flow."""
+    text = (INPUTS / "in.shear_heating").read_text()
+    for old, new in (
+        ("basis, 1)", "basis, 1, thermo-mechanical)\nscheme(quasi-static)\nset_dt(shear/rate/40)"),
+        ("fix(start, initial_velocity_particles, all, rate*y0, 0)", ""),
+        ("dt_factor(0.5)", ""),
+        ("dump(frames", "# dump(frames"),
+        ("run_time(shear/rate)", "run(40)"),
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    log_of = run_script(text).log
+    assert log_of["T"][-1] - 298 == pytest.approx(log_of["exact"][-1] - 298, rel=5e-3)
+    assert max(log_of["worst_Tmax"]) == pytest.approx(log_of["T"][-1], rel=1e-3)
