@@ -1,10 +1,14 @@
 """A package of styles that are wrong, each in its way; scripts call them in small letters."""
 
 import sys
+from math import inf, nan
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from karamelo_py.compiler.fields import scalar
 from karamelo_py.kernels.table import ACCELERATE, SUMS
+from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.basis.product import along, register
 from karamelo_py.points.laws import (
     advance,
@@ -19,6 +23,7 @@ from karamelo_py.points.laws import (
 )
 from karamelo_py.points.laws.strengths import remembers, shear_response
 from karamelo_py.points.laws.strengths.hardening import flow_stress, radial_return, updated_memory
+from karamelo_py.points.transfers import updated_velocity
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.modify import Compute, Fix, heat_hook, node_hook, point_hook
 from karamelo_py.script.expressions import Expression
@@ -123,7 +128,7 @@ class Misspelt(Group):
 
 class Silent(Group):
     published = ("x",)
-    initial_integrate = point_hook(at_point)
+    initial_integrate = point_hook(at_point, publishes=False)
 
 
 class Stop(Group):
@@ -151,6 +156,13 @@ class Gauge(Compute):
 
     def refresh(self):
         self.publish("s", 1)
+
+
+class Mute(Compute):
+    published = ("x",)
+
+    def refresh(self):
+        self.last = 1
 
 
 # --- fields
@@ -307,6 +319,18 @@ flow_stress.on(Forgetful)(lambda strength, memory, *others: (strength.G, strengt
 updated_memory.on(Forgetful)(lambda strength, memory, increment, dt: Less(memory.ep))
 
 
+class Endless(Forgetful): ...
+
+
+class Uncountable(Forgetful): ...
+
+
+for kind, number in ((Endless, inf), (Uncountable, nan)):
+    remembers(kind, ep=0.0)
+    shear_response.on(kind)(radial_return)
+    flow_stress.on(kind)(lambda strength, *others, number=number: (number, strength.G))
+
+
 # --- parts of a step
 class Basis(NamedTuple):
     cells = nodes_per_cell = 1
@@ -341,6 +365,47 @@ class Grounded(NamedTuple):
 register(Pathless, 2)
 register(Tuple, 2)
 along.on(Tuple)(lambda basis, kin, grid, place, direction: (0, 0.5, (0.5, 0.5), (-1.0, 1.0), ()))
+
+
+class Heavy(Basis): ...
+
+
+class Slanted(Basis): ...
+
+
+class Narrow(Basis): ...
+
+
+class Precise(Basis): ...
+
+
+def hats(weight=1.0, slope=1.0, nodes=2):
+    """Hats that are none."""
+
+    def along_of(basis, kin, grid, place, direction):
+        hat = along(Linear(), kin, grid, place, direction)
+        left, right = hat.weights
+        g = hat.gradients[0]
+        weights = (left * weight, right, right)[:nodes]
+        return hat._replace(weights=weights, gradients=(g, -g * slope, g)[:nodes])
+
+    return along_of
+
+
+for kind, shape in (
+    (Heavy, hats(weight=1.1)),
+    (Slanted, hats(slope=1.1)),
+    (Narrow, hats(nodes=3)),
+    (Precise, hats(weight=np.float64(1))),
+):
+    register(kind, 2)
+    along.on(kind)(shape)
+
+
+class Absent(Lazy): ...
+
+
+updated_velocity.on(Absent)(lambda transfer, v, old, new: (None,) * len(v))
 
 
 # --- others

@@ -27,11 +27,11 @@ FAMILIES = {
     "fix": "spring light misplaced swapped cold hot many few undirected viewless idle misspelt "
     "silent stop weigh bare formless oneword clashing nodal first again doubled lost leaving "
     "silenced orphan",
-    "compute": "gauge",
+    "compute": "gauge mute",
     "material": "motionless growing raising short uncompiled hiding double",
-    "strength": "forgetful",
-    "basis": "pathless tuple vague",
-    "transfer": "lazy",
+    "strength": "forgetful endless uncountable",
+    "basis": "pathless tuple vague heavy slanted narrow precise",
+    "transfer": "lazy absent",
     "scheme": "rowless wrong grounded",
     "dump": "torn",
     "command": "forget",
@@ -244,6 +244,38 @@ def scene(**lines):
             {"method": "method(ulmpm, FLIP, tuple, 1)"}, 1, "basis tuple",
             "along has to return an Along",
         ),
+        (
+            {"method": "method(ulmpm, FLIP, heavy, 1)"}, 1, "basis heavy",
+            "the weights of a point at 1.125 add up to 1.075, not to 1",
+        ),
+        (
+            {"method": "method(ulmpm, FLIP, slanted, 1)"}, 1, "basis slanted",
+            "the gradients, times h, of a point at 1.125 add up to 0.1, not to 0",
+        ),
+        (
+            {"method": "method(ulmpm, FLIP, narrow, 1)"}, 1, "basis narrow",
+            "along has to return 2 weights, not 3: register says so",
+        ),
+        (
+            {"method": "method(ulmpm, FLIP, precise, 1)\nprecision(single)"}, 1, "basis precise",
+            "a weight is a double (float64) in a run of precision(single)",
+        ),
+        (
+            {"method": "method(ulmpm, absent, linear)"}, 1, "transfer absent",
+            "updated_velocity is None for some point, no number",
+        ),
+        (
+            {
+                "material": "eos(e, linear, 3, 100)\nstrength(s, endless, 50)\n"
+                "material(m, eos-strength, e, s)"
+            }, 5, "strength endless", "flow_stress, or its slope, at a plastic strain of 0 is inf",
+        ),
+        (
+            {
+                "material": "eos(e, linear, 3, 100)\nstrength(s, uncountable, 50)\n"
+                "material(m, eos-strength, e, s)"
+            }, 5, "strength uncountable", "is nan for some point",
+        ),
     ],
 )  # fmt: skip
 def test_a_run_names_the_part(run_interpreted, lines, line, part, message):
@@ -251,6 +283,12 @@ def test_a_run_names_the_part(run_interpreted, lines, line, part, message):
     assert f"in.script:{line}:1: error: {part} (of mpm-broken 0.1): " in text
     assert message in text
     assert "internal error" not in text
+
+
+def test_a_compute_that_publishes_nothing_is_told(run_interpreted):
+    said = run_interpreted(scene(dump="compute(c, mute, all)\nlog_modify(custom, step, c_x)")).err
+    assert "in.script:9:1: warning: compute mute has measured and published nothing: c_x" in said
+    assert said.count("published nothing") == 1
 
 
 def test_what_a_hook_changes_in_place_is_written(run_interpreted):

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import zlib
 from pathlib import Path
 
 import h5py
@@ -53,7 +54,9 @@ def spoilt_numbers(path: Path) -> None:
 def put_content(path: Path, content: object) -> None:
     with h5py.File(path, "a") as root:
         del root["content"]
-        root["content"] = np.frombuffer(json.dumps(content).encode(), np.uint8)
+        text = json.dumps(content).encode()
+        root["content"] = np.frombuffer(text, np.uint8)
+        root["content"].attrs["crc32"] = zlib.crc32(text)
 
 
 def of_another_kind(path: Path) -> None:
@@ -82,7 +85,7 @@ def older(path: Path) -> None:
         (overwritten, "r.2.h5 is no file that this program can go on from: "),
         (of_another, "r.2.h5 is no file that this program can go on from\nexpected: a file that"),
         (of_another_kind, "r.2.h5 is no file that this program can go on from: list indices"),
-        (spoilt, "r.2.h5: the file is damaged: "),
+        (spoilt, "r.2.h5 is no file that this program can go on from: "),
         (spoilt_numbers, "r.2.h5: the file is damaged: "),
         (incomplete, "r.2.h5: its state is not one of this scene: v of points"),
         (older, "r.2.h5 has format 4, of an older karamelo-py"),

@@ -9,6 +9,7 @@ import re
 import shutil
 import subprocess
 import sys
+import zlib
 from itertools import product
 from pathlib import Path
 from textwrap import dedent
@@ -21,9 +22,9 @@ from going_on import CURVE, FLY, OUTPUTS, SCENES, SERIAL, arrays, goes_on, same_
 from scenes import block
 
 from karamelo_py.language import registry
-from karamelo_py.run.checkpoint.arrays import opened
+from karamelo_py.run.checkpoint.arrays import opened, reading
 from karamelo_py.run.checkpoint.parts import give_state, state_of
-from karamelo_py.run.checkpoint.restart_file import Restart
+from karamelo_py.run.checkpoint.restart_file import Restart, refuse_altered
 from karamelo_py.script.errors import ScriptError
 
 # --- every way to compute -----------------------------------------------------------------------
@@ -439,6 +440,8 @@ def test_what_has_been_altered_is_refused(tmp_path, run_interpreted):
 def read(path: Path) -> dict[str, np.ndarray]:
     """All of a file to go on from, as the program reads it."""
     restart = Restart(path)
+    with reading():
+        refuse_altered(path, large=True)
     with opened(path) as state:
         found = {name: array[()] for name, array in state.items()}
     return found | {"content": np.array(json.dumps(restart.content))}
@@ -448,10 +451,12 @@ def read(path: Path) -> dict[str, np.ndarray]:
     ("name", "number"), [("material", 1_000_000), ("grid", -1), ("id", 999), ("grid", 7)]
 )
 def test_numbers_that_the_scene_does_not_have(run_interpreted, name, number):
-    """Somebody has changed an array with a tool for HDF5, whose checksum is right."""
+    """Somebody has changed an array with a tool for HDF5, and its checksum."""
     folder = run_interpreted(with_files(FLY)).folder
     with h5py.File(folder / "r.2.h5", "r+") as file:
-        file[f"state/points/0/{name}"][3] = number
+        array = file[f"state/points/0/{name}"]
+        array[3] = number
+        array.attrs["crc32"] = zlib.crc32(array[:].tobytes())
     result = run_interpreted(FLY, "-restart", "r.2.h5", status=1)
     assert f"its state is not one of this scene: points/0/{name} has" in result.err
     assert str(number) in result.err

@@ -98,12 +98,12 @@ def node_hook(
 
 
 def point_hook(
-    function: Callable, *, publishes: bool = False, uses_before: bool = False
+    function: Callable, *, publishes: bool = True, uses_before: bool = False
 ) -> CompiledHook:
     """Make a compiled hook on points, of a function as described at the head of this file."""
     return CompiledHook(function, "points", publishes, uses_before, False, False)
 
 
-def heat_hook(function: Callable, *, publishes: bool = False, holds: bool = False) -> CompiledHook:
+def heat_hook(function: Callable, *, publishes: bool = True, holds: bool = False) -> CompiledHook:
     """Make a compiled hook for ``supply_heat``, of a function as described there."""
     return CompiledHook(function, "heated points", publishes, False, False, holds)

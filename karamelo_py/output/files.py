@@ -36,14 +36,14 @@ def folder_of_discarded() -> Path | None:
 
 @contextmanager
 def whole(path: Path) -> Iterator[BinaryIO]:
-    """Open `path` for writing; the file appears under its name only when all of it is written."""
+    """Open `path` for writing and reading; it has its name only when all of it is written."""
     if folder_of_discarded() is not None:
         yield BytesIO()
         return
     temporary = path.with_name(f"{path.name}.part")
     with reported(path):
         try:
-            with temporary.open("wb") as file:
+            with temporary.open("w+b") as file:
                 yield file
             os.replace(temporary, path)
         except BaseException:

@@ -254,6 +254,14 @@ class Hub:
                 name = f"{catalogue.kind} {item.style}"
                 with as_script_error(name, "refresh", type(item), item.place):
                     item.refresh()
+                if catalogue is self.computes and item.published and not item.has_published:
+                    item.has_published = True  # is told once
+                    self.warn(
+                        f"{name} has measured and published nothing: "
+                        f"{item.id}_{item.published[0]} is 0".replace("_ ", " "),
+                        item.place,
+                        hint="its author calls self.publish in refresh, or says published = ()",
+                    )
         # A compute of a plug-in may draw lots: all processes go on with the numbers of the first.
         self.values.array[:] = self.settings.comm.bcast(self.values.array)
 

@@ -31,11 +31,13 @@ class Publisher:
     place: Place | None = None
     # Suffixes of the values it sets: "x" for ``ID_x`` and the like, "" for ``ID``.
     published: tuple[str, ...] = SUFFIXES
+    has_published = False
 
     def publish(self, name: str, value: float) -> None:
         """Publish `value` as ID_`name`, or as the plain ID when `name` is empty."""
         if name not in self.published:
             raise ValueError(f"'{name}' is not in {type(self).__name__}.published")
+        self.has_published = True
         self.hub.values.set(f"{self.id}_{name}" if name else self.id, float(value))
 
     def publish_components(self, vector: np.ndarray) -> None:

@@ -10,7 +10,7 @@ import re
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -36,8 +36,10 @@ CONTENT = (
     "within", "statements", "values of statements", "presets", "variables", "runs", "scene",
     "values", "begun", "parts", "run",
 )  # fmt: skip
-# From this version on, HDF5 keeps a checksum of how a file is laid out.
-CHECKED = "v110"
+# HDF5 keeps checksums of all but arrays from this version on; these have one as an attribute.
+CHECKED, CHECKSUM = "v110", "crc32"
+LARGE = ("/state/", "/good/")
+PIECE = 1 << 22  # bytes that are looked at together
 
 
 class Restarts(Rhythmic):
@@ -114,17 +116,56 @@ def _write(hub: Hub, path: Path, within: bool, run: Any, groups: dict[str, Itera
                 _put(root.create_group(name), wholes({str(k): a for k, a in enumerate(one.arrays)}))
         for name, found in groups.items():
             _put(root.create_group(name), found)
+        root.flush()
+        for data in _arrays_in(root):
+            data.attrs[CHECKSUM] = _checksum(data, out)
+
+
+def _arrays_in(root: Any) -> list[Any]:
+    found: list[Any] = []
+    root.visititems(lambda _, item: found.append(item) if hasattr(item, "shape") else None)
+    return found
+
+
+def refuse_altered(path: Path, *, large: bool, rank: int = 0, size: int = 1) -> None:
+    """Compare the checksums of the arrays of points and nodes in a file, or of the other ones.
+
+    Of several processes each looks at some.
+    """
+    import h5py
+
+    with h5py.File(path, "r", locking=False) as root, path.open("rb") as file:
+        try:
+            arrays = [d for d in _arrays_in(root) if large == d.name.startswith(LARGE)]
+            for data in arrays[rank::size]:
+                if _checksum(data, file) != data.attrs.get(CHECKSUM):
+                    raise OSError(f"{data.name} has been altered")
+        except (RuntimeError, KeyError, ValueError) as error:
+            raise OSError(str(error)) from error
+
+
+def _checksum(data: Any, file: BinaryIO) -> int:
+    """The checksum of the bytes of an array, in one piece of the file unless somebody packed it."""
+    begin, found, left = data.id.get_offset(), 0, data.id.get_storage_size()
+    if begin is None:
+        return zlib.crc32(np.ascontiguousarray(data[()]))
+    file.seek(begin)
+    while left > 0:
+        piece = file.read(min(left, PIECE))
+        if not piece:
+            raise OSError(f"it ends within {data.name}")
+        found, left = zlib.crc32(piece, found), left - len(piece)
+    return found
 
 
 def _put(group: Any, found: Iterator[Stored]) -> None:
     begun: dict[str, Any] = {}
     for name, shape, where, array in found:
-        how = {"track_times": False, "fletcher32": 0 not in shape and shape != ()}
         if array.shape == shape and array.size and name not in begun:
-            group.create_dataset(name, data=array, **how)  # in half the time
+            group.create_dataset(name, data=array, track_times=False)  # in half the time
             continue
         if name not in begun:
-            begun[name] = group.create_dataset(name, shape, array.dtype, **how)
+            begun[name] = group.create_dataset(name, shape, array.dtype, track_times=False)
         if array.size:
             begun[name][where] = array
 
@@ -165,6 +206,7 @@ class Restart:
                         hint="run the script from its beginning, without this file, or go on with "
                         f"the {age.split()[1]} karamelo-py that wrote it",
                     )
+                refuse_altered(path, large=False)
                 self.content = json.loads(root["content"][()].tobytes())
                 _ = root["state"], *(self.content[name] for name in CONTENT)
         except (OSError, KeyError, ValueError, TypeError) as error:
@@ -195,7 +237,10 @@ class Restart:
         """Put the scene into the state of the file; with `outputs` they go on in their files."""
         check(hub, self)
         simulation, content = hub.simulation, self.content
+        comm = hub.settings.comm
         try:
+            with comm.joint(), reading():
+                refuse_altered(self.path, large=True, rank=comm.rank, size=comm.size)
             take_stored(simulation, self.path)
             states = self._parts("parts", content["values"])
         except ScriptError as error:

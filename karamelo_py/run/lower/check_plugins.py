@@ -1,6 +1,7 @@
-"""Parts of plug-ins are tried on one point, in plain Python, before loops are compiled with them.
+"""Parts of plug-ins are tried on some points, in plain Python, before loops are compiled with them.
 
-What is missing, or of the wrong length, so ends in a message about the part, not about a loop.
+What is missing, of the wrong length, or no number that a step can go on with so ends in a message
+about the part, not about a loop.
 """
 
 from collections.abc import Iterable, Iterator
@@ -17,11 +18,14 @@ from karamelo_py.points import laws
 from karamelo_py.points.basis import entry, locate, support
 from karamelo_py.points.basis.product import Along, along
 from karamelo_py.points.kinematics import tensor, vector
+from karamelo_py.points.laws.strengths.hardening import flow_stress, precompute
 from karamelo_py.points.transfers import updated_velocity
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.plugins import PartInUse, attributed, foreign_parts, is_foreign
 
 TENSORS = (laws.cauchy_stress, laws.kirchhoff_stress, laws.elastic_strain)
+STRAINS = (0, 1e-3, 0.05)  # the last beyond what metals yield at
+TRIED = 8  # points, at least, where the scene has so many
 NUMBERS = (laws.jacobian, laws.wave_speed_squared, laws.energy_density)
 
 
@@ -36,7 +40,9 @@ def try_parts(hub: Hub, setup: Any) -> None:
         part = _part_of(hub, [type(setup.transfer)])
         v = vector(setup.kin, (_one(setup),) * setup.kin.dimension)
         with _trial(hub, part):
-            _expect(part, updated_velocity, updated_velocity(setup.transfer, v, v, v), len(v))
+            found = updated_velocity(setup.transfer, v, v, v)
+            _expect(part, updated_velocity, found, len(v))
+            _numbers(part, "updated_velocity", found, v[0])
 
 
 def _part_of(hub: Hub, kinds: Iterable[type]) -> PartInUse | None:
@@ -68,6 +74,19 @@ def _expect(part: PartInUse, function: Any, given: Any, count: int) -> None:
         raise fault(part.name, what, part.place)
 
 
+def _numbers(part: PartInUse, what: str, found: Iterable, one: Any) -> None:
+    """Refuse what is no number, not finite, or more precise than the numbers of the run."""
+    for number in found:
+        if not isinstance(number, (int, float, np.number)):
+            raise fault(part.name, f"{what} is {number!r} for some point, no number", part.place)
+        if not np.isfinite(number):
+            raise fault(part.name, f"{what} is {number} for some point", part.place)
+        if isinstance(number, np.float64) and type(one) is not np.float64:
+            doubles = f"{what} is a double (float64) in a run of precision(single): its author "
+            doubles += "makes numbers of those that it is given, as in real(0.5, x)"
+            raise fault(part.name, doubles, part.place)
+
+
 def _try_law(hub: Hub, setup: Any, solid: Any) -> None:
     material, kinds = solid.material, laws.law_kind(solid.material.law)
     usual = PartInUse(f"material {material.style}", kinds[0], material.place)
@@ -75,7 +94,7 @@ def _try_law(hub: Hub, setup: Any, solid: Any) -> None:
     kin, one = setup.kin, _one(setup)
     law = law_in(law_on(solid.material.law, solid.h, solid.T0), type(one))
     size = len(kin.Symmetric.places)
-    for strain in (0, 1e-3):
+    for strain in STRAINS:
         dl = (type(one)(strain),) * kin.tensor_size
         with _trial(hub, part):
             state = laws.initial_state(law, kin, one)
@@ -84,29 +103,70 @@ def _try_law(hub: Hub, setup: Any, solid: Any) -> None:
                 what = f"what a point remembers is {len(flat(state))} numbers at first and "
                 what += f"{len(flat(after))} after a step: their number must not change"
                 raise fault(part.name, what, part.place)
+            _numbers(part, f"what a point remembers after a strain of {strain:g}", flat(after), one)
+            _try_flow_stress(part, law, state, one * strain)
             for function in TENSORS:
                 found = function(law, kin, after)
                 _expect(part, function, found, size)
                 if not isinstance(found, kin.Symmetric):
                     what = f"{function.__name__} has to return a symmetric tensor, not a tuple"
                     raise fault(part.name, what, part.place)
+                _numbers(part, f"{function.__name__} after a strain of {strain:g}", found, one)
             for function in NUMBERS:
-                function(law, kin, after)
+                name = f"{function.__name__} after a strain of {strain:g}"
+                _numbers(part, name, (function(law, kin, after),), one)
             laws.specific_volume(law)
 
 
-def _try_basis(hub: Hub, setup: Any) -> None:
-    basis, kin, points = setup.basis, setup.kin, setup.blocks[0].points
-    if not len(points.id):
+def _try_flow_stress(part: PartInUse, law: Any, state: Any, strain: Any) -> None:
+    """Try what a strength of a plug-in yields at, after so much plastic strain."""
+    strength = getattr(law, "strength", None)
+    if not (is_foreign(type(strength)) and flow_stress.defined(type(strength))):
         return
+    memory, heat = state.m.strength, state.m.heat
+    known = precompute(strength, memory, heat)
+    found = flow_stress(strength, memory, known, strain, heat, strain / strain if strain else 1)
+    _expect(part, flow_stress, found, 2)
+    _numbers(part, f"flow_stress, or its slope, at a plastic strain of {strain:g}", found, strain)
+
+
+def _try_basis(hub: Hub, setup: Any) -> None:
+    basis, points = setup.basis, setup.blocks[0].points
     part = _part_of(hub, [type(basis)])
-    grid = record(setup.grids, points.grid[0])
-    with _trial(hub, part):
-        where = points.x[0] if points.home is None else points.home
-        at = place_at(basis, kin, where, 0)
-        line = along(basis, kin, grid, at, 0) if along.defined(type(basis)) else None
-        if line is not None and not set(Along._fields) <= set(getattr(line, "_fields", ())):
+    for p in range(0, len(points.id), 1 + len(points.id) // TRIED):
+        with _trial(hub, part):
+            _try_functions(part, setup, points, p)
+
+
+def _try_functions(part: PartInUse, setup: Any, points: Any, p: int) -> None:
+    """Try the functions of a basis at a point: they add up to 1 everywhere, their slopes to 0."""
+    basis, kin, one = setup.basis, setup.kin, _one(setup)
+    grid = record(setup.grids, points.grid[p])
+    where = points.x[0] if points.home is None else points.home
+    at = place_at(basis, kin, where, p)
+    line = along(basis, kin, grid, at, 0) if along.defined(type(basis)) else None
+    if line is not None:
+        if not set(Along._fields) <= set(getattr(line, "_fields", ())):
             raise fault(part.name, "along has to return an Along", part.place)
-        stencil = locate(basis, kin, grid, at)
-        for k in range(support(basis, kin)):
-            entry(basis, kin, grid, stencil, k)
+        for name in ("weights", "gradients", "affine"):
+            got = len(getattr(line, name))
+            if got != basis.line_nodes and (got or name != "affine"):
+                what = f"along has to return {basis.line_nodes} {name}, not {got}: register says so"
+                raise fault(part.name, what, part.place)
+    stencil = locate(basis, kin, grid, at)
+    weights, slopes = [], []
+    for k in range(support(basis, kin)):
+        _, weight, slope = entry(basis, kin, grid, stencil, k)
+        weights.append(weight)
+        slopes.append(tuple(slope)[: kin.dimension])
+    _numbers(part, "a weight", weights, one)
+    _numbers(part, "a gradient", flat(slopes), one)
+    rounding = 1e3 * len(weights) * np.finfo(type(one)).eps
+    for what, total, wanted in (
+        ("weights", sum(weights), 1),
+        *(("gradients, times h,", sum(of) / grid.inv_h, 0) for of in zip(*slopes, strict=True)),
+    ):
+        if abs(total - wanted) > rounding:
+            x = ", ".join(f"{c:g}" for c in at[: kin.dimension])
+            what = f"the {what} of a point at {x} add up to {total:.6g}, not to {wanted}"
+            raise fault(part.name, what, part.place)

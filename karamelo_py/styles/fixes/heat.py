@@ -130,7 +130,7 @@ class HeatFluxParticles(HeatFix):
     convection_particles, temperature_nodes, temperature_particles, method
     """
 
-    supply_heat = heat_hook(heat, publishes=True)
+    supply_heat = heat_hook(heat)
 
     def __init__(self, hub: Hub, group: ParticleGroup, q: Expression):
         super().__init__(hub, group, q)
@@ -175,7 +175,7 @@ class ConvectionParticles(HeatFix):
     """
 
     acts_last = True  # what others supply bounds the temperatures that the watch allows
-    supply_heat = heat_hook(exchange, publishes=True, holds=True)
+    supply_heat = heat_hook(exchange, holds=True)
 
     def __init__(self, hub: Hub, group: ParticleGroup, h: Expression, T_inf: Expression):
         super().__init__(hub, group, h, T_inf)

@@ -24,8 +24,8 @@ def momentum_rate(mass, v, x_old, x, value, before, dt, kick):
 HOOKS = {
     "internal_force": ("post_particles_to_grid", node_hook(force_of_nodes)),
     "force": ("post_update_grid_state", node_hook(force_of_nodes)),
-    "momentum_before": ("initial_integrate", point_hook(momentum_rate, publishes=True)),
-    "momentum_after": ("final_integrate", point_hook(momentum_rate, publishes=True)),
+    "momentum_before": ("initial_integrate", point_hook(momentum_rate)),
+    "momentum_after": ("final_integrate", point_hook(momentum_rate)),
 }
 # Before all other fixes, whenever they are defined.
 COME_FIRST = ("internal_force", "momentum_before")

@@ -67,8 +67,8 @@ class VelocityParticles(VelocityOfPoints):
     published = ("x", "y", "z")
     leads_points = True
 
-    initial_integrate = point_hook(start, uses_before=True)
-    post_advance_particles = point_hook(carry, publishes=True)
+    initial_integrate = point_hook(start, publishes=False, uses_before=True)
+    post_advance_particles = point_hook(carry)
 
 
 class InitialVelocityParticles(VelocityOfPoints):
