@@ -86,7 +86,6 @@ def test_elastica(run_script, law, steps):
     assert result.log["down"][-1] == pytest.approx(0.8106, abs=0.012)
     assert result.log["back"][-1] == pytest.approx(0.5550, abs=0.012)
     assert result.log["pin_y"][-1] == pytest.approx(100e3, rel=1e-8)
-    assert result.log["iterations"][-1] <= 4
 
 
 def test_a_cylinder_flows_through(run_script):
@@ -159,6 +158,17 @@ def test_a_bar_swings_at_its_period(run_script):
     # The rule lengthens the period by (w dt)^2/12, 0.08 %.
     assert period(result.log) == pytest.approx(0.4, rel=4e-3)
     assert np.allclose(total, total[0], rtol=5e-3)
+
+
+def test_a_bar_swings_in_steps_of_a_hundred_cells(run_script):
+    """The trapezoidal rule turns by 2 atan(w dt/2) a step, and keeps the energy.
+
+    Points have less of it on the way, by the acceleration that the end of a step has still to give.
+    """
+    log_of = run_script(INPUTS / "in.slow_bar", "-var", "periods", "2").log
+    assert np.abs(log_of["v_x"] - log_of["exact"]).max() < 5e-3 * log_of["exact"][0]
+    total = log_of["Ek"] + log_of["Es"]
+    assert np.allclose(total, total[0], rtol=4e-3) and total[-1] == pytest.approx(total[0], 1e-5)
 
 
 def test_rules_that_damp(run_script):
