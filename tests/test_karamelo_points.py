@@ -1,5 +1,7 @@
 """delete_particles and translate_particles, and the forms of 2020."""
 
+import re
+
 import numpy as np
 import pytest
 from scenes import block
@@ -177,3 +179,52 @@ def test_one_method_where_the_script_has_none(run_interpreted):
     for text in (script, script.split("\n")[2]):
         err = run_interpreted(text, status=1).err
         assert "method(tlmpm, FLIP, cubic-spline, 0.99), before the first solid" in err
+
+
+FREE = ["fix(v, initial_velocity_particles, all, 1, 0)", *MEASURED, DUMP, "set_dt(0.001)"]
+
+
+def test_eroded_points_are_counted_with_their_mass_and_energy(run_interpreted):
+    """A block in free flight: 4 of 24 points are left of x = 0.39 or so; m v^2 / 2 of each goes."""
+    result = run_interpreted(
+        block(
+            2, *FREE, "compute(m, probe, all, mass)",
+            "fix(e, erosion, all, x - time < 0.38 && mass > 0, every=10)",
+            "log_modify(custom, step, Ek, e_points, e_mass, e_energy)", "set_output(5)", "run(45)",
+        )
+    )  # fmt: skip
+    log, first, last = result.log, result.dump("d.0.LAMMPS"), result.dump("d.45.LAMMPS")
+    gone = first.x < 0.38
+    assert 0 < gone.sum() < len(gone)
+    assert list(log.e_points) == [0, 0, *[gone.sum()] * 8]
+    assert set(last.id) == set(first.id[~gone])
+    assert log.e_mass[-1] == pytest.approx(first.mass[gone].sum(), rel=1e-12)
+    assert log.e_energy[-1] == pytest.approx(log.Ek[0] - log.Ek[-1], rel=1e-9)
+    assert f"deleted points    {gone.sum()}" in result.out
+    # What they took is work: the balance closes.
+    assert re.search(r"energy +[+-]0.00 % of the largest", result.out)
+
+
+def test_points_are_deleted_where_a_condition_holds(run_interpreted):
+    result = run_interpreted(
+        block(2, *FREE, "run(1)", "delete_particles(body, where, x > 0.5 && y < 0.4)", "run(1)")
+    )
+    first, last = result.dump("d.0.LAMMPS"), result.dump("d.2.LAMMPS")
+    gone = (first.x + 0.001 > 0.5) & (first.y < 0.4)
+    assert set(last.id) == set(first.id[~gone]) and gone.any()
+    mass = first.mass[gone].sum()
+    assert f"with a mass of {mass:.6g} and an energy of {mass / 2:.6g}" in result.out
+
+
+@pytest.mark.parametrize(
+    ("lines", "says"),
+    [
+        (["delete_particles(body, where, x > 0.5)"], "or a run before"),
+        (["run(1)", "delete_particles(body, where, x > -5)"], "no point would be left"),
+        (["fix(e, erosion, all, x > -5, every=1)", "run(1)"], "no point would be left"),
+        (["fix(e, erosion, all, 3)"], "has no column of dump particle"),
+        (["fix(e, erosion, all, damag > 1)"], "did you mean 'damage'?"),
+    ],
+)
+def test_what_cannot_be_eroded(run_interpreted, lines, says):
+    assert says in run_interpreted(block(2, *FREE, *lines), status=1).err

@@ -9,13 +9,15 @@ import numpy as np
 
 from karamelo_py.language.by_dimension import Forms
 from karamelo_py.language.signature import Argument
+from karamelo_py.output.fields import ColumnFormula
+from karamelo_py.scene.boundary import take_away
 from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.group import ALL, ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.placement import MAX_POINTS, Placement
 from karamelo_py.scene.region import Region, check_radius
 from karamelo_py.scene.solid import Solid, warn_of_coinciding
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.errors import ScriptError, render_message
 from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.formulas import per_direction, vector
 
@@ -33,7 +35,9 @@ class Solids(tuple):
         return cls((Solid.from_script(hub, argument),))
 
 
-def delete_particles(hub: Hub, solids: Solids, by: Literal["region"], region: Region) -> None:
+def delete_particles(
+    hub: Hub, solids: Solids, by: Literal["region", "where"], chosen: Argument
+) -> None:
     """Take points of a solid away: holes, notches, what a run has shown to be needless.
 
     Parameters
@@ -41,24 +45,31 @@ def delete_particles(hub: Hub, solids: Solids, by: Literal["region"], region: Re
     solids
         ID of the solid, or ``all``.
     by
-        The word ``region``.
-    region
-        ID of the region: its points go. As for groups, where they were at first counts.
+        The word ``region`` or ``where``.
+    chosen
+        ID of a region, whose points go (as for groups, where they were at first counts); or, after
+        ``where``, a formula of columns of dump particle: points go where it is not 0.
 
     Example
     -------
     delete_particles(s1, region, hole)
+    delete_particles(all, where, damage >= 1)
 
     Notes
     -----
+    With ``where`` it stands between runs. What has gone is told, with its mass and its energy.
     Before the first run the other points are numbered anew, so that it comes before the groups of
     particles and the contact fixes of these solids. Between runs the others keep their numbers.
     All points of a solid cannot be deleted before the first run.
 
     See Also
     --------
-    translate_particles, boundary, region
+    fix erosion, translate_particles, boundary, region
     """
+    if by == "where":
+        _delete_where(hub, solids, ColumnFormula.from_script(hub, chosen))
+        return
+    region = Region.from_script(hub, chosen)
     found = {solid: region.inside(solid.x0) for solid in solids}
     found = {solid: inside for solid, inside in found.items() if inside.any()}
     if not found and not region.unknown:
@@ -72,7 +83,7 @@ def delete_particles(hub: Hub, solids: Solids, by: Literal["region"], region: Re
         if inside.all():
             raise ScriptError(
                 f"no point of solid '{solid.id}' would be left",
-                argument="region",
+                argument="chosen",
                 hint="leave out the solid, and delete_particles",
             )
     for solid, inside in found.items():
@@ -84,10 +95,35 @@ def _delete_later(hub: Hub, found: dict[Solid, np.ndarray]) -> None:
         return
     simulation = hub.simulation
     ids = np.concatenate([np.flatnonzero(i) + solid.first_id for solid, i in found.items()])
-    ids = ids[simulation.present[ids]]
-    if len(ids) == np.count_nonzero(simulation.present):
-        raise ScriptError("no point would be left", argument="region")
-    simulation.remove(ids)
+    _take_away(hub, ids[simulation.present[ids]])
+
+
+def _delete_where(hub: Hub, solids: Solids, condition: ColumnFormula) -> None:
+    """Delete the points of solids that meet a condition now."""
+    if not hub.has_run:
+        raise ScriptError(
+            "points have no such columns before the first run",
+            argument="by",
+            expected="delete_particles(solids, region, regionID), or a run before",
+        )
+    if hub.rehearsing or hub.interpreter.replay is not None:
+        return
+    own, fields = {solid.index for solid in solids}, hub.fields
+    # Zero where points have gone: these are not asked.
+    meet = np.zeros(fields.count, np.bool_)
+    meet[fields.present] = condition.holds(fields)
+    _take_away(hub, np.flatnonzero(meet & np.isin(fields.solid, list(own))))
+
+
+def _take_away(hub: Hub, ids: np.ndarray) -> None:
+    if not len(ids):
+        hub.warn("no point is chosen: nothing is deleted")
+        return
+    mass, energy = take_away(hub, ids, hub.place)
+    words = (
+        f"{len(ids)} points are deleted, with a mass of {mass:.6g} and an energy of {energy:.6g}"
+    )
+    hub.console.say(render_message("note", words))
 
 
 def translate_particles(

@@ -1,5 +1,7 @@
 """Fields of points and nodes for output, in the order of their ids."""
 
+from __future__ import annotations
+
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
@@ -10,6 +12,7 @@ from karamelo_py.compiler import fields
 from karamelo_py.kernels.arrays import known_to_laws
 from karamelo_py.kernels.export import export
 from karamelo_py.kernels.laws import elastic_law
+from karamelo_py.language.arguments import Argument
 from karamelo_py.language.scene import Scene
 from karamelo_py.output import node_columns, point_table
 from karamelo_py.output.node_columns import BROUGHT, NodeFields
@@ -19,6 +22,7 @@ from karamelo_py.points.laws import can, dissipated_energy, energy_density
 from karamelo_py.points.laws.eos import initial_energy, taken_heat
 from karamelo_py.points.laws.further import has_rate
 from karamelo_py.script.errors import ScriptError, unknown
+from karamelo_py.script.expressions import Expression
 
 PIECE = 1 << 17  # points that are looked at together
 
@@ -166,6 +170,37 @@ SUMMED = {
     "born with": _born_with,
     "bounces": _bounces,
 }
+
+
+class ColumnFormula:
+    """For signatures: a formula of columns of dump particle, time and published values."""
+
+    script_kind = "a condition of columns of dump particle, such as damage > 0.9"
+    MOST = 6
+
+    def __init__(self, hub: Scene, argument: Argument):
+        known = hub.fields.particle_names()
+        self.hub = hub
+        self.formula = Expression(argument.value_with(known))
+        self.columns = sorted(self.formula.names & set(known))
+        if not self.columns or len(self.columns) > self.MOST:
+            many = "no column" if not self.columns else f"{len(self.columns)} columns"
+            raise ScriptError(
+                f"'{argument.text}' has {many} of dump particle",
+                place=argument.place,
+                expected=f"1 to {self.MOST} of {', '.join(known)}",
+            )
+
+    @classmethod
+    def from_script(cls, hub: Scene, argument: Argument) -> ColumnFormula:
+        """Read the formula that a script's argument stands for."""
+        return cls(hub, argument)
+
+    def holds(self, points: PointTable) -> np.ndarray:
+        """(n,) whether it is not 0 for points that there are."""
+        columns = {name: points.particle(name) for name in self.columns}
+        return self.formula.evaluate_columns(self.hub.values, columns) != 0
+
 
 # ---- columns that are asked for by name, and may be none ----------------------------------------
 

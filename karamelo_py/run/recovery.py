@@ -11,10 +11,10 @@ from karamelo_py.kernels.watch import GROWTH, LOOK, WITHIN, unit_of
 from karamelo_py.run.checkpoint import restart_file
 from karamelo_py.run.checkpoint.parts import OUTPUTS, PartStates, RollbackPoint
 from karamelo_py.run.diagnosis import energy, explain
-from karamelo_py.run.timestep import own_step_instead
+from karamelo_py.run.timestep import LimitsTold, own_step_instead
 from karamelo_py.scene import boundary
 from karamelo_py.scene.hub import Hub
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.errors import ScriptError, render_message
 
 CHUNK = 100  # steps between two looks at the run, and between two good states, at most
 HALVINGS = 5  # at most, in a run
@@ -57,8 +57,10 @@ class RollBack:
         self.smaller = "a smaller step" if ruined else own_step_instead(self.hub)
         self.smaller *= too_large
         # Points that are deleted would not come back.
-        lost = ruined or self.hub.update.boundary == "delete"
+        deletes = any(fix.every for fix in self.hub.fixes.values())
+        lost = ruined or deletes or self.hub.update.boundary == "delete"
         self.begun_at = -1 if lost else simulation.step
+        self._limits = None if simulation.implicit else LimitsTold(simulation)
         if not self.point.arrays:
             self._keep()
 
@@ -96,7 +98,16 @@ class RollBack:
         if lost is not None:
             hub.warn(lost[0], hint=lost[1])
             simulation.told_of_loss = True
+        if self._limits and simulation.step % CHUNK == 0 and (words := self._limits.words()):
+            hub.console.say(render_message("note", words))
         return True
+
+    def act_between_steps(self) -> None:
+        """Call what acts after the present step; what it takes away would not come back."""
+        step = self.simulation.step
+        due = [fix for fix in self.hub.fixes.values() if fix.every and step % fix.every == 0]
+        if sum(fix.between_steps() for fix in due):
+            self._keep()
 
     def _keep(self) -> None:
         self.point.keep(self.simulation)

@@ -250,12 +250,14 @@ class Runner:
 
     def _loop(self, simulation: Simulation) -> None:
         hub, rollback, timings = self.hub, self.rollback, self.timings
+        self._rhythms = {fix.every for fix in hub.fixes.values() if fix.every}
         length, longest = 1, CHUNK if self.condition is None else 1
         while self._goes_on(simulation):
             rollback.before()
             step, before = simulation.step, {name: timings.passed(name) for name in timings.on}
             kept = (step // CHUNK + 1) * CHUNK  # where a state may be kept
             end = min(hub.output.next_step(step), self.last_step, step + length, kept)
+            end = min([end, *((step // every + 1) * every for every in self._rhythms)])
             with timings.counted("steps"):
                 status = simulation.advance(int(end) - step)
             self._agree(simulation)  # what is written shows steps that no process has failed in
@@ -263,6 +265,7 @@ class Runner:
                 length = 1
                 continue
             boundary.tell_of_bounces(hub, simulation)
+            rollback.act_between_steps()
             elapsed = simulation.comm.bcast(timings.passed("steps") - before["steps"])
             in_time = PATIENCE * max(simulation.step - step, 1) / max(elapsed, 1e-9)
             length = int(min(longest, max(1, in_time)))

@@ -16,6 +16,7 @@ from karamelo_py.kernels.nodes import SumsToVelocity
 from karamelo_py.kernels.p2g import Force
 from karamelo_py.kernels.sweep import Visit, sweep, sweep_nodes
 from karamelo_py.kernels.table import SUMS
+from karamelo_py.kernels.totals import WORK, add_to
 from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.further import without_rate
 from karamelo_py.run.access import NodesByNumber, PointsById
@@ -25,7 +26,10 @@ from karamelo_py.run.lower.check_plugins import try_parts
 from karamelo_py.run.lower.memory import check_room, no_room
 from karamelo_py.run.mpi.subdomain import Subdomain
 from karamelo_py.scene.comm import SerialComm
+from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
+
+TAKEN_ALONG = ("mass", "kinetic", "stored", "dissipated")  # by points that are deleted
 
 
 def scene_key(hub: Hub) -> tuple:
@@ -160,18 +164,32 @@ class SceneArrays:
             found.append(points.id[beyond & finite])
         return np.sort(np.concatenate(self.comm.allgather(np.concatenate(found))))
 
-    def remove(self, ids: np.ndarray) -> None:
-        """Take points out of the run; the ids of the others stay."""
+    def remove(self, ids: np.ndarray) -> tuple[float, float]:
+        """Take points (ascending ids) out of the run; the ids of the others stay.
+
+        Returns their mass, and the energy that they take along: the balance counts it as work.
+        """
+        group = ParticleGroup(self.hub)
+        group.add_numbers(ids)
+        mass, kinetic, *inner = (self.points.total(name, group) for name in TAKEN_ALONG)
+        stored, clock = sum(inner), self.control.clock[0]
+        if self.comm.leads:
+            add_to(self.control.totals, WORK, -(kinetic + stored))
+        # Of a look that is half done.
+        clock.stored_before -= stored
+        clock.moving_before += stored
         self.present[ids] = False
         blocks = tuple(
             some_of(block, np.flatnonzero(self.present[block.points.id]))
             for block in self.setup.blocks
         )
         self.setup = self.setup._replace(blocks=blocks)
-        self.control.clock[0].drift = np.inf
+        clock.drift, followed = np.inf, self.followed
         self.changed()
+        self.followed = followed
         # The rate of the last step stays: the same whether or not a run begins here.
         self.measured = True
+        return mass, kinetic + stored
 
     def changed(self) -> None:
         """Take note that fields have changed without a step."""

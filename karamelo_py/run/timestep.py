@@ -24,6 +24,7 @@ from karamelo_py.scene.hub import Hub
 USUAL = 0.9
 BOXES = 6.0  # weight of a common drift in the steps of boxes
 LOST = 2.05  # times the stable step, beyond which everything is lost that was tried
+NO_LIMITS = ("set_dt", "end")  # of stability
 LONE = 0.9  # of the stable step of a lone point: one that swells is stiffer
 DAMPED = 0.5  # the least, with one point a cell, where a share of the nodal velocity damps
 
@@ -306,6 +307,28 @@ def ruling_limit(simulation: Any) -> str:
     if clock.courant < 1:
         return "lone_points" if clock.courant == lone_point(simulation.hub) else "light_nodes"
     return "waves"
+
+
+class LimitsTold:
+    """Tell what limits the step where that changes: a name once, and a limit that has halved."""
+
+    def __init__(self, simulation: Any):
+        self.simulation, self.names = simulation, {ruling_limit(simulation)}
+        self.least = simulation.limit
+
+    def words(self) -> str:
+        """Describe a change since it was told last; empty where there is none."""
+        simulation = self.simulation
+        name, limit, before = ruling_limit(simulation), simulation.limit, self.least
+        halved = not limit > 0.5 * before
+        if name in NO_LIMITS or (name in self.names and not halved):
+            return ""
+        self.names.add(name)
+        self.least = min(limit, before)
+        return (
+            f"step {simulation.step}, time {simulation.time:.6g}: the step is limited by {name} "
+            f"now: {limit:.4g} is stable, {before:.4g} before"
+        )
 
 
 def fastest_wave(simulation: Any) -> float:

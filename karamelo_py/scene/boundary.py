@@ -65,6 +65,20 @@ def delete_leaving(hub: Scene, simulation: Any, snapshot: dict) -> bool:
     return True
 
 
+def take_away(hub: Scene, ids: np.ndarray, place: Any) -> tuple[float, float]:
+    """Take points (by id, ascending) out of the run; return their mass and energy.
+
+    The energy is kinetic, stored and dissipated; the balance counts it as work that goes with them.
+    """
+    simulation = hub.simulation
+    if len(ids) == np.count_nonzero(simulation.present):
+        raise ScriptError(
+            f"step {simulation.step}, time {simulation.time:.6g}: no point would be left",
+            place=place,
+        )
+    return simulation.remove(ids)
+
+
 def tell_of_bounces(hub: Scene, simulation: Any) -> None:
     """Warn when the first points were reflected."""
     if hub.update.boundary == "reflect" and not hub.update.warned_of_bounces and simulation.bounces:
@@ -78,8 +92,9 @@ def tell_of_bounces(hub: Scene, simulation: Any) -> None:
 
 def counted(hub: Scene, simulation: Any) -> dict[str, int]:
     """Return counts for the end of a run: deleted points or reflections."""
-    if hub.update.boundary == "delete":
-        return {"deleted points": int(np.count_nonzero(~simulation.present))}
+    deleted = int(np.count_nonzero(~simulation.present))
+    if deleted or hub.update.boundary == "delete":
+        return {"deleted points": deleted}
     if hub.update.boundary == "reflect":
         return {"reflections": simulation.bounces}
     return {}

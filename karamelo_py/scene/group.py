@@ -125,6 +125,10 @@ class ParticleGroup(AnyGroup):
         """Add what lies in a region, see `AnyGroup`."""
         return self._take(self._found(region, solids))
 
+    def add_numbers(self, ids: np.ndarray) -> None:
+        """Add points by their numbers, which are ascending."""
+        self._take([ids])
+
     def _take(self, pieces: Iterable[np.ndarray]) -> int:
         """Make members of points, which come ascending, so many at a time; how many."""
         bits, count = self.bits(self.total() + 64), 0

@@ -82,6 +82,9 @@ class Fix(Publisher):
     # Its hooks in Python bring no energy: what they do to points and nodes stores it, passes it on
     # or takes it away. Otherwise the energy of the scene is not watched.
     conserves = False
+    # Acts between steps, by ``between_steps()``, after each step whose number is a multiple of
+    # this; returns whether it has taken points away. 0: it does not.
+    every = 0
     friction: float | None = None  # between its two `solids`, for methods with contact on the grid
     solids: tuple = ()  # that it acts between, without a group
 

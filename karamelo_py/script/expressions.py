@@ -6,7 +6,7 @@ the time, a published value), the result is a formula, with the numbers folded i
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -140,6 +140,25 @@ class Expression:
             here = _three_columns(x[some])
             before = here if x0 is None else _three_columns(x0[some])
             formula.evaluate_all(program, values.array, here, before, out[some], scratch)
+        return out
+
+    def evaluate_columns(self, values: Values, columns: Mapping[str, np.ndarray]) -> np.ndarray:
+        """Compute the (n,) numbers it has of rows of `columns`, at most six, by their names."""
+        names = list(columns)
+        if not names:
+            return np.array([self.evaluate(values)])
+
+        def place(name: str) -> tuple[int, int]:
+            if name in columns:
+                return formula.POINT, names.index(name)
+            return formula.GLOBAL, values.slot(_published(name, values))
+
+        rows = np.zeros((len(columns[names[0]]), len(POINT_SEEDS)))
+        for k, name in enumerate(names):
+            rows[:, k] = columns[name]
+        out, scratch = np.empty(len(rows)), np.empty((6 + formula.ROWS, formula.BLOCK))
+        now, before = (np.ascontiguousarray(part) for part in (rows[:, :3], rows[:, 3:]))
+        formula.evaluate_all(program(self._term, place), values.array, now, before, out, scratch)
         return out
 
 

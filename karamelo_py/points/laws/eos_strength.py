@@ -284,7 +284,24 @@ def sound(law, j, m):
     """Speed of sound without shear."""
     elastic = strengths.elastic_ratio(law.strength, m.strength, j)
     K = eos.bulk_modulus(law.eos, elastic, m.energy, m.heat)
-    return sqrt(K * laws.specific_volume(law.eos) * j)
+    return sqrt(K * laws.specific_volume(law.eos) * j - unborne(law, j, m))
+
+
+def unborne(law, j, m):
+    """The part of the squared speed of sound that damage takes.
+
+    A broken point in tension has no waves, however large it has grown. Where it closes again, at
+    its first volume, it has those of rubble; it always counts with these, as it may close soon.
+    """
+    if isinstance(law.damage, Absent):
+        return 0
+    closed = min(j, 1)
+    elastic = strengths.elastic_ratio(law.strength, m.strength, j)
+    whole = eos.bulk_modulus(law.eos, elastic, m.energy, m.heat) * j
+    rubble = eos.bulk_modulus(law.eos, elastic * (closed / j), m.energy, m.heat) * closed
+    gone = max(whole - max(borne_share(law, m.damage) * whole, rubble), 0)
+    tension = intact_pressure(law, j, m) < 0
+    return where(tension, gone * laws.specific_volume(law.eos), 0)
 
 
 def viscous_after(law, j, m, rate):
@@ -359,7 +376,8 @@ def _wave_speed_squared_eos_strength(law, kin, state):
     elastic = strengths.elastic_ratio(law.strength, m.strength, J)
     modulus = eos.bulk_modulus(law.eos, elastic, m.energy, m.heat)
     volume = laws.specific_volume(law.eos) * J
-    squared = (modulus + 4 / 3 * strengths.shear_modulus(law.strength)) * volume
+    shear = 4 / 3 * strengths.shear_modulus(law.strength) * borne_share(law, m.damage)
+    squared = (modulus + shear) * volume - unborne(law, J, m)
     squared = strengths.damped_speed_squared(law.strength, squared, 1 / volume)
     if isinstance(law.viscosity, Absent):
         return squared

@@ -1,0 +1,10 @@
+"""A bar is torn in two: broken points do not rule the step."""
+
+from comparisons.defaults import Case
+
+CASE = Case(
+    quantity="stable step at the end over that of the bar at rest",
+    exact=1.0,
+    measure=lambda result: result.log.kept[-1],
+    source="h/c, c the speed of waves in the two ends",
+)

@@ -1,0 +1,75 @@
+"""Erosion: points that meet a condition are taken out of the run."""
+
+from typing import Annotated
+
+import numpy as np
+
+from karamelo_py.language.signature import Positive
+from karamelo_py.output.fields import ColumnFormula
+from karamelo_py.output.point_table import PointTable
+from karamelo_py.scene.boundary import take_away
+from karamelo_py.scene.group import ParticleGroup
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.modify import Fix
+
+
+class Erosion(Fix):
+    """Take points out of the run that meet a condition: broken, swollen, or gone too far.
+
+    Parameters
+    ----------
+    condition
+        A formula of columns of dump particle (damage, volume, x, ep, T, ...), time and published
+        values; points go where it is not 0.
+    every
+        Steps between two looks.
+
+    Example
+    -------
+    fix(erosion, erosion, all, damage >= 1 && volume > 1e-9)
+    fix(spall, erosion, plate, z < -0.1, every=100)
+
+    Notes
+    -----
+    Published are the sums since the start: ID_points, their number, ID_mass, and ID_energy, their
+    kinetic and stored energy and what they had dissipated. The balance of energy counts this as
+    work of the fix.
+
+    A column means that of the point also where the script has a variable of this name. Points go
+    between two steps, after every step whose number is a multiple of `every`; rows of log and dumps
+    at this step are without them.
+
+    See Also
+    --------
+    delete_particles, boundary
+    """
+
+    syntax = "group, condition, every=10"
+    published = ("points", "mass", "energy")
+    conserves = True
+
+    def __init__(
+        self,
+        hub: Hub,
+        group: ParticleGroup,
+        condition: ColumnFormula,
+        *,
+        every: Annotated[int, Positive] = 10,
+    ):
+        super().__init__(hub, group)
+        self.condition, self.every = condition, every
+
+    def between_steps(self) -> bool:
+        """Take points away that meet the condition; whether there were any."""
+        found = self.hub.fields.each(self, "meeting")
+        ids = np.sort(np.concatenate([np.empty(0, np.int64), *found]))
+        if not len(ids):
+            return False
+        gone = len(ids), *take_away(self.hub, ids, self.place)
+        before = (self.hub.values.get(f"{self.id}_{name}") for name in self.published)
+        self.publish_all(*map(sum, zip(before, gone, strict=True)))
+        return True
+
+    def meeting(self, points: PointTable) -> np.ndarray | None:
+        """Ids of the points, of some, that meet the condition."""
+        return points.ids[self.condition.holds(points)] if points.count else None
