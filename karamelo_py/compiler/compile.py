@@ -1,4 +1,4 @@
-"""What functions are in kernels, by type: of points, of numbers, and of numbers in lanes.
+"""Functions in kernels, by type: of points, of numbers, and of numbers in lanes.
 
 A function of numbers is given first, then what it is of lanes (:mod:`karamelo_py.compiler.lanes`).
 """

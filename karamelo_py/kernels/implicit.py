@@ -226,7 +226,7 @@ def list_points(seen):
 
 @kernel
 def spread(seen, places):
-    """How far nodes at places (m, d) that a point sees lie apart at most along a direction."""
+    """Find the largest distance along a direction between nodes (at places) of one point."""
     most = 0
     for p in range(seen.nodes.shape[0]):
         for i in range(places.shape[1]):

@@ -41,7 +41,7 @@ from karamelo_py.points.laws import (
 
 
 class Averages(NamedTuple):
-    """What averaging needs of the n points of a block; t components of a tensor."""
+    """Averaging of the n points of a block; t components of a tensor."""
 
     volume: np.ndarray  # (1, n) V
     grown: np.ndarray  # (1, n) V J

@@ -26,7 +26,7 @@ from karamelo_py.points.transfers import Moment, nodal_momentum, zero_moment
 from karamelo_py.points.transfers.xpic import Series, TermOfSeries
 
 
-class Quantity(NamedTuple):
+class Scattered(NamedTuple):
     """Base of quantities that lanes give, too, and corners of domains."""
 
     in_lanes = True
@@ -38,7 +38,7 @@ def _forces(kin):
     return "sums", of_force(kin), arrays.SUMS_WIDTH[kin.dimension]
 
 
-class MassMomentum(Quantity):
+class MassMomentum(Scattered):
     """Scatter mass and momentum."""
 
     not_at_corners = ("moments", "loss")
@@ -54,7 +54,7 @@ class MassMomentum(Quantity):
         return *whole, *vectors, *numbers
 
 
-class InternalForce(Quantity):
+class InternalForce(Scattered):
     """Scatter the internal force, and that of fixes on points."""
 
     not_at_corners = ("moments",)
@@ -64,7 +64,7 @@ class InternalForce(Quantity):
     fills = staticmethod(lambda kin: (_forces(kin), (visit.NodalStress, 0, 2)))
 
 
-class MomentumAgain(Quantity):
+class MomentumAgain(Scattered):
     """Scatter momentum to the velocity array."""
 
     not_at_corners = ("moments",)
@@ -74,7 +74,7 @@ class MomentumAgain(Quantity):
     fills = staticmethod(lambda kin: (("velocity", 0, arrays.VELOCITY_WIDTH[kin.dimension]),))
 
 
-class Volumes(Quantity):
+class Volumes(Scattered):
     """Scatter volume, after and before the trial increment (F-bar)."""
 
     says = "volumes to grid"
@@ -83,7 +83,7 @@ class Volumes(Quantity):
     fills = staticmethod(lambda kin: ((visit.NodalMean, 0, 2),))
 
 
-class AveragedForce(Quantity):
+class AveragedForce(Scattered):
     """Scatter the internal force of the averaged mean stress less that of a point's own (F-bar)."""
 
     not_at_corners = ("moments",)
@@ -94,7 +94,7 @@ class AveragedForce(Quantity):
     fills = staticmethod(lambda kin: (_forces(kin),))
 
 
-class SeriesBack(Quantity):
+class SeriesBack(Scattered):
     """Scatter the term of the series of XPIC, times mass."""
 
     says = "term of the series to the grid"
