@@ -133,6 +133,17 @@ def test_a_strip_footing(run_script):
     assert result.log["load"][-1] == pytest.approx(2 + pi, rel=0.03)
 
 
+def test_cooks_membrane(run_script):
+    """Way of the load 23.96 F/E (Bergan & Felippa 1985): 7.9 and 3.2 % below, on two grids."""
+    ways = []
+    for refine in ("1", "2"):
+        result = run_script(INPUTS / "in.cook", "-var", "refine", refine, folder=refine)
+        assert result.log["left_y"][-1] == pytest.approx(-1, rel=1e-8)
+        ways.append(result.log["way"][-1])
+    errors = 1 - np.array(ways) / 23.96
+    assert 0 < errors[1] < 0.035 and errors[0] / errors[1] > 2
+
+
 def test_a_vertical_cut(run_script):
     """N = 3.78 (Pastor et al. 2000), 12 % above on 10 cells to the height, 7 % on 20."""
     result = run_script(INPUTS / "in.vertical_cut")
