@@ -168,6 +168,19 @@ def faked(tmp_path, monkeypatch):
     return tmp_path
 
 
+def test_load_steps_are_timed(tmp_path, monkeypatch, capsys):
+    """Unknowns, corrections, and shares of a step that make up the whole."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(measure, "bandwidth", lambda threads, size=1: 2e10)
+    words = "column-implicit", "-var", "N", "8", "--seconds", "0.1", "--threads", "1"
+    assert main(["bench", *words, "-o", "a.json"]) == 0
+    one = json.loads((tmp_path / "a.json").read_text("utf-8"))["workloads"]["column-implicit"]
+    assert one["points"] == 32 and one["unknowns"] > 8 and one["corrections"] >= 2
+    assert sum(one["stages"].values()) == pytest.approx(1)
+    assert min(one["stages"].values()) > 0
+    assert "seconds a load step" in capsys.readouterr().out
+
+
 def test_a_file_and_a_comparison_with_it(faked, capsys):
     assert main(["bench", "disks-20", "disks-80", "-o", "a.json"]) == 0
     found = json.loads((faked / "a.json").read_text(encoding="utf-8"))

@@ -10,6 +10,7 @@ from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument, Parameter
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.plugins import check_part
+from karamelo_py.schemes.quasi_static import PUBLISHED
 from karamelo_py.script.errors import ScriptError, meant
 
 
@@ -98,12 +99,21 @@ def scheme(hub: Hub, style: StyleOf("scheme"), *arguments: Argument) -> None:
     --------
     method
     """
-    target = registry.find("scheme", style)
-    chosen = signature.call(target, hub, arguments, f"scheme {style}")
-    check_part(hub, f"scheme {style}", chosen)
+    try:
+        target = registry.find("scheme", style)
+        chosen = signature.call(target, hub, arguments, f"scheme {style}")
+        check_part(hub, f"scheme {style}", chosen)
+    except ScriptError:
+        for name in PUBLISHED:  # who asks for these is not at fault
+            hub.values.publish(name)
+        raise
     hub.update.scheme, hub.update.scheme_place = chosen, hub.place
     for name in getattr(chosen, "published", ()):
         hub.values.publish(name)
+
+
+# A run may go on with another solver.
+scheme.may_vary = "tolerance", "iterations", "solver", "limit"  # type: ignore[attr-defined]
 
 
 def precision(hub: Hub, kind: Literal["double", "single"]) -> None:

@@ -220,9 +220,10 @@ class Interpreter:
     def _execute_recorded(self, statement: syntax.Statement) -> None:
         name = statement.name if isinstance(statement, syntax.CommandCall) else ""
         known = registry.knows("command", name)
-        if known and getattr(registry.find("command", name), "may_differ", False):
+        command = registry.find("command", name) if known else None
+        if getattr(command, "may_differ", False):
             return self._execute(statement)
-        text, replay = spelled(statement), self.replay
+        text, replay = spelled(statement, getattr(command, "may_vary", ())), self.replay
         self.record.statements.append(text)
         if replay is None:
             return self._execute(statement)

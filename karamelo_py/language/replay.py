@@ -1,6 +1,7 @@
 """A script gone through once more, up to the place where an earlier run of it left off."""
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from math import nan
 
@@ -10,9 +11,15 @@ from karamelo_py.script.syntax import Statement
 _BLANKS = re.compile(r'"[^"\n]*"|\s+')
 
 
-def spelled(statement: Statement) -> str:
-    """Write the text of a statement without what means nothing: blanks, comments, line ends."""
-    return _BLANKS.sub(lambda m: m[0] if m[0][0] == '"' else "", statement.raw.code)
+def spelled(statement: Statement, without: Iterable[str] = ()) -> str:
+    """Write the text of a statement without what means nothing: blanks, comments, line ends.
+
+    Nor has it the keywords `without` which it is read.
+    """
+    text = _BLANKS.sub(lambda m: m[0] if m[0][0] == '"' else "", statement.raw.code)
+    for word in without:
+        text = re.sub(rf",{word}=[^,()]*", "", text)
+    return text
 
 
 @dataclass

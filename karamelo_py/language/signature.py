@@ -266,7 +266,8 @@ def _filled(
 def _unknown_keyword(
     word: str, argument: Argument, expected: list[Parameter], by_name: dict
 ) -> ScriptError:
-    hint = meant(word, by_name) or f"leave out '{word} ='; == compares"
+    longer = next((f"did you mean '{name}'?" for name in by_name if name.startswith(word)), None)
+    hint = meant(word, by_name) or longer or f"leave out '{word} ='; == compares"
     if any(p.name == word for p in expected):
         hint = f"arguments are given by position: leave out '{word} ='"
     known = ", ".join(f"{name}=..." for name in by_name)

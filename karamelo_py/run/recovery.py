@@ -52,7 +52,7 @@ class RollBack:
         looked at between any two steps (`looks_always`).
         """
         self.simulation, self.first_step, self._always = simulation, first_step, looks_always
-        too_large = not simulation.control.clock[0].watch_limit
+        too_large = not simulation.control.clock[0].watch_limit and not simulation.implicit
         # Said of the first state: a later one is ruined, and its limit with it.
         self.smaller = "a smaller step" if ruined else own_step_instead(self.hub)
         self.smaller *= too_large
@@ -66,12 +66,14 @@ class RollBack:
 
     def before(self) -> None:
         """Keep the present state where it is due and good; else note what parts remember."""
-        watched = self.simulation.control.clock[0].watch_limit
+        watched = self.simulation.control.clock[0].watch_limit or self.simulation.implicit
         if self.point.step == self.begun_at and not watched:
             return  # the first state alone is good, whose rows are not gone back to
         step = self.simulation.step
         # When states are kept must not depend on how fast steps are: runs go back to them.
-        due = step != self.point.step and (step % CHUNK == 0 or step == self.first_step + 1)
+        # Load steps take long: none is done twice.
+        often = step % CHUNK == 0 or step == self.first_step + 1 or self.simulation.implicit
+        due = step != self.point.step and often
         if due and energy.grown_little(self.simulation):
             self._keep()
         else:

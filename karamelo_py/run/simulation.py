@@ -280,6 +280,11 @@ class Simulation(SceneArrays):
         return SORT  # there is more to do, unless that was all
 
     @property
+    def begins(self) -> bool:
+        """Tell whether fixes of the first step are still to act."""
+        return self._first is not None
+
+    @property
     def implicit(self) -> bool:
         """Tell whether the scheme solves equations."""
         return getattr(self.hub.update.scheme, "implicit", False)

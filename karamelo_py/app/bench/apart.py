@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.app.bench import measure
-from karamelo_py.app.bench.measure import WORKLOADS, Measured
+from karamelo_py.app.bench.measure import WORKLOADS, Measured, Solved
 from karamelo_py.app.launch import ERROR, keep_to_oneself, launch, outcome_of, together
 from karamelo_py.run.mpi.comm import MpiComm
 from karamelo_py.script.errors import ScriptError
@@ -54,18 +54,18 @@ class Measurement(NamedTuple):
 # ---- one process --------------------------------------------------------------------------------
 
 
-def measured(part: Measurement) -> Measured:
+def measured(part: Measurement) -> Measured | Solved:
     """Measure a workload in this process."""
     workload = WORKLOADS[part.workload]
     simulation = measure.build(workload, part.threads, part.presets)
     return measure.measured(simulation, part.seconds, part.triad, workload.lead)
 
 
-def measured_apart(part: Measurement) -> Measured | int:
+def measured_apart(part: Measurement) -> Measured | Solved | int:
     """Measure a workload in a process of its own; its status where it went wrong and said why."""
     status, found = _found_apart(part)
     if found:
-        return Measured(**found)
+        return Solved(**found) if "stages" in found else Measured(**found)
     if status == ERROR:
         return status
     by = f"with the status {status}" if status >= 0 else f"by {_SIGNALS.get(-status, -status)}"

@@ -124,9 +124,12 @@ def _scaling(part: apart.Measurement, ranks: list[int], available: int) -> dict[
     return {"points": first["points"], "best": first["best"], "scaling": scaling}
 
 
-def _print(name: str, one: measure.Measured, *, published: bool) -> None:
+def _print(name: str, one: measure.Measured | measure.Solved, *, published: bool) -> None:
     workload, best = WORKLOADS[name], one.best
     print(f"\n{name}: {workload.title}; {one.points} points")
+    if isinstance(one, measure.Solved):
+        _print_solved(one)
+        return
     print(f"  {'particle-steps/s':<34} {best / 1e6:8.2f} million (median {one.median / 1e6:.2f})")
     if workload.karamelo is not None and published:
         print(f"  {'of Karamelo in C++':<34} {workload.karamelo:8.2f} million ({ELSEWHERE})")
@@ -143,6 +146,15 @@ def _print(name: str, one: measure.Measured, *, published: bool) -> None:
     if one.told_apart:
         shares = f"nodes {100 * one.nodes:.0f} % of the sweeps, {100 * one.rest:.0f} % beside them"
     print(f"  {'limited by':<34} {one.limit:>8} ({shares})")
+
+
+def _print_solved(one: measure.Solved) -> None:
+    print(f"  {'unknowns':<34} {one.unknowns:8d}")
+    print(f"  {'seconds a load step':<34} {one.points / one.best:8.3f} (median "
+          f"{one.points / one.median:.3f})")  # fmt: skip
+    print(f"  {'corrections a load step':<34} {one.corrections:8.1f}")
+    for stage, share in one.stages.items():
+        print(f"    {stage:<38} {100 * share:6.1f} %")
 
 
 # ---- files of what was measured -----------------------------------------------------------------

@@ -147,6 +147,24 @@ class Measured(NamedTuple):
         return speeds | {"share_of_nodes": self.nodes, "share_of_rest": self.rest} | self._asdict()
 
 
+class Solved(NamedTuple):
+    """Measured speed of load steps."""
+
+    points: int
+    speeds: list[float]  # particle-steps per second of each repetition
+    unknowns: int
+    corrections: float  # of Newton's method in a step
+    stages: dict[str, float]  # shares of a step
+    precision: str
+
+    best = Measured.best
+    median = Measured.median
+
+    def record(self) -> dict[str, Any]:
+        """Write what is kept in a file; speeds in particle-steps/s."""
+        return {"best": self.best, "median": self.median} | self._asdict()
+
+
 def _name(*tags: Any) -> str:
     return " + ".join(type(tag).__name__ for tag in tags)
 
@@ -194,8 +212,10 @@ def build(
     return hub.simulation
 
 
-def measured(simulation: Simulation, seconds: float, triad: float, lead: int) -> Measured:
+def measured(simulation: Simulation, seconds: float, triad: float, lead: int) -> Measured | Solved:
     """Measure a scene for about so many seconds; `triad` is the bandwidth of the memory."""
+    if simulation.implicit:
+        return _solved(simulation, seconds, lead)
     count, found = repeated(simulation, seconds, lead)
     rates = [simulation.count * count / taken for taken, _ in found]
     per_step, held, regions = traffic(simulation)
@@ -210,6 +230,22 @@ def measured(simulation: Simulation, seconds: float, triad: float, lead: int) ->
         regions * start_of_threads() if simulation.threads > 1 else 0.0,
         simulation.hub.settings.precision,
     )
+
+
+def _solved(simulation: Simulation, seconds: float, lead: int) -> Solved:
+    """Measure load steps."""
+    timed_steps(simulation, lead)  # and compile
+    steps, before = simulation.load_steps, simulation.step
+    steps.seconds.clear()
+    steps.corrections = 0
+    taken = timed_steps(simulation, 5)
+    shares = {stage: spent / taken for stage, spent in steps.seconds.items()}
+    corrections = steps.corrections / (simulation.step - before)
+    count, found = repeated(simulation, seconds, 0)
+    rates = [simulation.count * count / spent for spent, _ in found]
+    shares["rest"] = 1 - sum(shares.values())
+    precision = simulation.hub.settings.precision
+    return Solved(simulation.count, rates, steps.unknowns, corrections, shares, precision)
 
 
 def repeated(

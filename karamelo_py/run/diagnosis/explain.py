@@ -41,6 +41,10 @@ def trouble(hub: Hub, simulation: Simulation, status: int) -> Trouble:
     if status in (GAINED, HEATED):
         message, hint = (_gained if status == GAINED else _heated)(hub, simulation)
         return Trouble(message, _smaller_step(hub, simulation) if too_large else hint)
+    if simulation.implicit and simulation.load_steps.failure:
+        message = simulation.load_steps.failure
+        hint = "smaller load steps; beyond the load that a body bears there is no equilibrium"
+        return Trouble(f"step {simulation.step + 1}, time {simulation.time:.6g}: {message}", hint)
     message, hint, place = Trouble(*_wrong_point(hub, simulation))
     message = f"step {simulation.step + 1}, time {simulation.time:.6g}: {message}"
     if place is None and energy.has_grown(simulation):

@@ -2,10 +2,13 @@
 
 import importlib.util
 from collections.abc import Iterator
+from typing import Any
 
+from karamelo_py.compiler.algebra import on_numbers
 from karamelo_py.compiler.fields import declared
+from karamelo_py.kernels.implicit import stress_and_tangent
 from karamelo_py.language import registry
-from karamelo_py.points.laws import can, constrained_velocity
+from karamelo_py.points.laws import can, constrained_velocity, initial_state
 from karamelo_py.points.transfers import Moment
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
@@ -16,6 +19,7 @@ from karamelo_py.script.errors import Place, ScriptError
 _MOMENTS = "initial_integrate", "post_particles_to_grid", "post_update_grid_state"
 _OF_HEAT = "post_heat_to_grid", "supply_heat", "post_update_grid_heat"
 _OF_PLUGINS = _MOMENTS[1:]
+LONG = 1e30  # a time in which viscosity bears nothing
 _EXPLICIT = "an explicit scheme, scheme(musl)"
 
 
@@ -42,6 +46,16 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
         yield "needs double precision", "no precision(single)", None
     if hub.settings.comm.size > 1:
         yield "runs in one process", "no --ranks", None
+    if not update.scheme.inertia:
+        kin = method.kinematics(hub)
+        for solid in hub.solids.values():
+            law = solid.material.law
+            if not can(law, constrained_velocity) and not _bears_shear(law, kin):
+                yield (
+                    f"finds no equilibrium of '{solid.id}', which bears no shear: a gas or fluid",
+                    f"scheme(newmark), or {_EXPLICIT}",
+                    solid.place,
+                )
     for fix in hub.fixes.values():
         own = registry.origin("fix", fix.style).startswith("karamelo-py ") and fix.style != "python"
         other = [
@@ -82,6 +96,18 @@ def _of_rigid_points(hub: Hub, fix: Fix) -> bool:
         return False
     soft = (s for s in hub.solids.values() if not can(s.material.law, constrained_velocity))
     return not any(fix.group.touches(solid) for solid in soft)
+
+
+def _bears_shear(law: Any, kin: Any) -> bool:
+    """Tell whether a law resists a shear that takes any time; in one dimension all do."""
+    places = kin.Tensor.places
+    if kin.dimension == 1:
+        return True
+    rest = kin.Tensor._make([0.0] * len(places))
+    state = initial_state(law, kin, 1.0)
+    _, C = on_numbers(stress_and_tangent)(law, kin, state, rest, LONG)
+    shear = places.index((0, 1))
+    return abs(C[shear][shear]) > 1e-12 * abs(C[0][0])
 
 
 def _only_prescribes(fix: Fix) -> bool:

@@ -31,11 +31,11 @@ def conduct(equations: Equations, hooks: Any, dt: float) -> None:
     flow_of_heat(heat, s, mode, hooks)
     nodes = equations.nodes
     sums, update = heat.nodes.sums, heat.nodes.update
-    capacity = np.array(sums[nodes, MASS], float)
+    capacity = sums[nodes, MASS].astype(float)
     some = capacity > 0
     own = np.divide(sums[nodes, MASS + 1], capacity, out=np.zeros(len(nodes)), where=some)
-    mapped = np.array(heat.nodes.velocity[nodes, 0], float)
-    flow = np.array(sums[nodes, of_force(Line())], float)
+    mapped = heat.nodes.velocity[nodes, 0].astype(float)
+    flow = sums[nodes, of_force(Line())].astype(float)
     K = equations.conduction()
     given, prescribed = _prescribed(s, nodes, hooks)
     free = some & ~given
@@ -63,7 +63,7 @@ def _prescribed(s: Setup, nodes: np.ndarray, hooks: Any) -> tuple[np.ndarray, np
     for shown in (-SHOWN, SHOWN):
         update[nodes, 0], update[nodes, 1] = shown, 0
         hold_heat(s, hooks)
-        found.append(np.array(update[nodes, 0], float))
+        found.append(update[nodes, 0].astype(float))
     s.control.totals[:] = totals
     given = found[0] == found[1]
     return given, np.where(given, found[0], 0.0)

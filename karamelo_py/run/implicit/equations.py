@@ -223,12 +223,16 @@ class Equations:
         return self._forces()
 
     @cached_property
-    def rigid_motions(self) -> np.ndarray:
-        """Rigid motions (m, d, k) of the nodes."""
+    def positions(self) -> np.ndarray:
+        """Positions (m, d) of the nodes."""
         grids, g = self.s.grids, self.grid
         origin = np.stack([grids.x0[g], grids.y0[g], grids.z0[g]], 1)[:, : self.d]
-        positions = origin + grids.spacing[g][:, None] * self.places
-        return rigid_motions(positions, isinstance(self.s.kin, Axisymmetric))
+        return origin + grids.spacing[g][:, None] * self.places
+
+    @cached_property
+    def rigid_motions(self) -> np.ndarray:
+        """Rigid motions (m, d, k) of the nodes."""
+        return rigid_motions(self.positions, isinstance(self.s.kin, Axisymmetric))
 
     def for_all_components(self, matrix: sp.csr_matrix) -> sp.csr_matrix:
         """Make of a matrix (m, m) that of all components (m d, m d), each by itself."""

@@ -14,7 +14,7 @@ from karamelo_py.points.kinematics import free_from
 from karamelo_py.run.implicit.conduction import conduct
 from karamelo_py.run.implicit.equations import Equations
 from karamelo_py.run.implicit.inertia import Motion, Rest
-from karamelo_py.run.implicit.newton import Failed, Newton, TooFar
+from karamelo_py.run.implicit.newton import Broken, Failed, Loose, Newton, TooFar, counted
 from karamelo_py.schemes.quasi_static import PUBLISHED
 from karamelo_py.script.errors import ScriptError
 
@@ -26,6 +26,10 @@ class PointsWrong(Exception):
     """A point has left the domain, or has gone wrong."""
 
 
+class NoEquilibrium(Exception):
+    """A load step has none; parts of it may have been done."""
+
+
 class LoadSteps:
     """Take the load steps of a simulation."""
 
@@ -34,6 +38,10 @@ class LoadSteps:
         self.scheme = simulation.hub.update.scheme
         self.dynamic = self.scheme.inertia
         self.modulus = 0.0
+        self.within = False  # whether a part of a step has been done
+        self.failure = ""  # why a step has no equilibrium
+        self.unknowns = self.corrections = 0  # of the last equilibrium; so far
+        self.seconds: dict[str, float] = {}  # in stages of the steps so far
 
     def advance(self, hooks: Any, count: int) -> int:
         """Take up to `count` load steps; return how they ended, as `run_steps` does."""
@@ -45,6 +53,11 @@ class LoadSteps:
             try:
                 self._step(hooks)
             except PointsWrong:
+                return STOPPED
+            except Broken:
+                break
+            except NoEquilibrium as error:
+                self.failure = str(error)
                 return STOPPED
             if clock.drift > clock.drift_limit:
                 return SORT
@@ -62,10 +75,13 @@ class LoadSteps:
             part = min(part, left)
             try:
                 taken, residual = self._part(hooks, part * whole)
+            except Broken:
+                raise
             except Failed as reason:
                 if part <= 2.0**-HALVINGS:
                     if self.scheme.limit == "error":
-                        raise self._explained(reason, part) from None
+                        share = f" even in 1/{round(1 / part)} of the load step"
+                        raise NoEquilibrium(f"{reason}{share}") from None
                     end = self._limit_reached(reason)
                     break
                 part /= 2
@@ -76,6 +92,7 @@ class LoadSteps:
             left -= part
             control.values[TIMESTEP] = step
             parts, iterations = parts + 1, iterations + taken
+            self.within = left > 1e-9
             if left > 1e-9:
                 part = min(2 * part, most) if taken <= self.scheme.iterations // 2 else part
                 if control.clock[0].drift > control.clock[0].drift_limit:
@@ -83,6 +100,12 @@ class LoadSteps:
         for name, value in zip(PUBLISHED, (iterations, residual, parts), strict=True):
             self.simulation.hub.values.set(name, float(value))
         control.values[TIME], control.values[TIMESTEP] = end, step + (parts > 0)
+
+    def _interrupted(self) -> bool:
+        """Tell whether the user wants the run to end, where a step can be left out."""
+        simulation = self.simulation
+        signal = getattr(simulation.hub.running, "signal", 0)
+        return bool(signal) and not self.within and not simulation.begins
 
     def _limit_reached(self, reason: Failed) -> float:
         """End the run at the load that was reached; return its time."""
@@ -155,7 +178,8 @@ class LoadSteps:
         beginning and of the end; `before` is None where there is no inertia.
         """
         s = self.simulation.setup
-        equations = Equations(s, self.simulation.mode)
+        with counted(self.seconds, "layout"):
+            equations = Equations(s, self.simulation.mode)
         nodes = equations.nodes
         external = after[nodes] + equations.present_forces()
         fixed, prescribed = self._prescribed(equations, hooks)
@@ -164,16 +188,26 @@ class LoadSteps:
         prescribed = np.where(led, equations.velocity_of_rigid, prescribed)
         if not self.dynamic:
             self._check_held(equations, given)
-        equations.unknowns(~given)
+        with counted(self.seconds, "layout"):
+            equations.unknowns(~given)
         if before is None:
             inertia: Rest | Motion = Rest(equations)
         else:
             inertia = Motion(equations, self.scheme, dt, before[nodes], given, prescribed)
-        newton = Newton(self.scheme, equations, inertia, external, dt)
+        newton = Newton(self.scheme, equations, inertia, external, dt, self.seconds)
         if not self.modulus:
             self.modulus = equations.modulus()
         newton.scale(self.modulus, self.scheme.stabilisation)
-        u, iterations, residual = newton.solve(np.where(given, prescribed * dt, 0.0))
+        try:
+            jump = np.where(given, prescribed * dt, 0.0)
+            u, iterations, residual = newton.solve(jump, self._interrupted)
+        except Loose as reason:
+            chosen = np.arange(len(nodes)) == reason.node
+            where = ", ".join(f"{x:.4g}" for x in equations.positions[reason.node])
+            solid = self._solid_at(equations, chosen)
+            raise Failed(f"{reason}: nothing holds solid '{solid}' near ({where})") from None
+        self.unknowns = int(np.count_nonzero(~given))
+        self.corrections += iterations
         reaction = newton.reaction(u)
         return Equilibrium(equations, inertia, u, fixed, reaction, iterations, residual)
 
@@ -226,14 +260,6 @@ class LoadSteps:
             forces = np.where(found.fixed, 0.0, -found.reaction)
             led = found.equations.led
             put_forces(s.contact, s, nodes[led], forces[led])
-
-    def _explained(self, reason: Failed, part: float) -> ScriptError:
-        """Make of a failure what the user should know."""
-        share = f" even in 1/{round(1 / part)} of the load step" if part < 1 else ""
-        return self._error(
-            f"{reason}{share}",
-            "smaller load steps; beyond the load that a body bears there is no equilibrium",
-        )
 
     def _error(self, message: str, hint: str) -> ScriptError:
         hub, values = self.simulation.hub, self.simulation.setup.control.values

@@ -1,14 +1,28 @@
 """Newton's method for the displacements of the nodes in an implicit step."""
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from time import perf_counter
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
 from karamelo_py.run.implicit.equations import Equations
-from karamelo_py.run.implicit.solvers import Singular, solve
+from karamelo_py.run.implicit.solvers import Singular, direct, solve
 
+ASTRAY = 1e4  # times as far as points may go: nothing holds them
 FAR = 0.5  # cells that points may go at once, where weights follow them; else less than one
+
+
+@contextmanager
+def counted(seconds: dict[str, float], stage: str) -> Iterator[None]:
+    """Add the time of what is done within to that of its stage."""
+    begun = perf_counter()
+    try:
+        yield
+    finally:
+        seconds[stage] = seconds.get(stage, 0.0) + perf_counter() - begun
 
 
 class Failed(Exception):
@@ -21,6 +35,18 @@ class TooFar(Failed):
     def __init__(self, reason: str, times: float):
         super().__init__(reason)
         self.times = times
+
+
+class Loose(Failed):
+    """The equations are singular: hardly anything holds a node."""
+
+    def __init__(self, node: int):
+        super().__init__("the equations are singular")
+        self.node = node
+
+
+class Broken(Failed):
+    """The user does not want to wait for the step."""
 
 
 class Newton:
@@ -38,6 +64,8 @@ class Newton:
         (m, d) forces that are not those of stress.
     dt
         The step.
+    seconds
+        Takes the time of stages: of stress and tangent, assembly, and solution.
 
     Attributes
     ----------
@@ -46,17 +74,24 @@ class Newton:
     """
 
     def __init__(
-        self, scheme: Any, equations: Equations, inertia: Any, external: np.ndarray, dt: float
+        self,
+        scheme: Any,
+        equations: Equations,
+        inertia: Any,
+        external: np.ndarray,
+        dt: float,
+        seconds: dict[str, float],
     ):
         self.scheme, self.equations, self.inertia = scheme, equations, inertia
-        self.external, self.dt = external, dt
+        self.external, self.dt, self.seconds = external, dt, seconds
         self.free = equations.free
         self.spacing = float(np.min(equations.s.grids.spacing))
         self.ghost: sp.csr_matrix | None = None
         self.ghost_of_free: sp.csr_matrix | None = None
         self.floor = 0.0
         self.kept: dict = {}  # what a solver keeps from one correction to the next
-        self.inner = equations.respond(np.zeros_like(external), dt)
+        with counted(seconds, "stress"):
+            self.inner = equations.respond(np.zeros_like(external), dt)
 
     def scale(self, modulus: float, stabilisation: float) -> None:
         """Tell the stiffness of the bodies; a share of it penalises jumps at their border."""
@@ -66,7 +101,9 @@ class Newton:
             free = self.free.ravel()
             self.ghost_of_free = self.equations.for_all_components(self.ghost)[free][:, free]
 
-    def solve(self, jump: np.ndarray) -> tuple[np.ndarray, int, float]:
+    def solve(
+        self, jump: np.ndarray, interrupted: Callable[[], bool]
+    ) -> tuple[np.ndarray, int, float]:
         """Find displacements (m, d); `jump` (m, d) are those of the components that are given.
 
         Returns the number of corrections, too, and the residual that is left.
@@ -74,7 +111,8 @@ class Newton:
         Raises
         ------
         Failed
-            If there are none within the iterations allowed.
+            If there are none within the iterations allowed; `Broken` if the user has `interrupted`
+            them.
         """
         scheme, free = self.scheme, self.free
         u = np.zeros_like(jump)
@@ -85,6 +123,8 @@ class Newton:
             done = residual <= scheme.tolerance or (settled and residual <= 1e-6)
             if done and not (iteration == 0 and np.any(jump)):
                 return u, iteration, residual
+            if interrupted():
+                raise Broken
             if iteration < scheme.iterations:
                 change = self._correction(balance, jump, residual)
                 u += change
@@ -116,7 +156,8 @@ class Newton:
         """
         equations, inertia, free = self.equations, self.inertia, self.free
         change = jump.copy()
-        equations.linearise()
+        with counted(self.seconds, "assembly"):
+            equations.linearise()
         A = equations.matrix
         b = balance[free] - equations.of_prescribed(jump)
         if self.ghost is not None:
@@ -129,18 +170,33 @@ class Newton:
             try:
                 accuracy = max(1e-10, min(1e-4, 0.1 * residual))
                 rigid = equations.rigid_motions[free]
-                change[free] = solve(self.scheme.solver, A, b, rigid, accuracy, self.kept)
+                with counted(self.seconds, "solution"):
+                    change[free] = solve(self.scheme.solver, A, b, rigid, accuracy, self.kept)
             except Singular:
-                raise Failed("the equations are singular") from None
+                raise Loose(self._loosest(A)) from None
         return change
+
+    def _loosest(self, A: sp.csr_matrix) -> int:
+        """Find the node that moves most in the softest motion, by inverse iteration."""
+        size = np.abs(A.diagonal()) + 1e-12 * np.abs(A.data).max(initial=1e-300)
+        B = A + sp.diags(1e-9 * size)
+        x = np.random.default_rng(0).standard_normal(A.shape[0])
+        with suppress(Singular):
+            for _ in range(2):
+                x = direct(B.tocsr(), x * size)
+                x /= np.abs(x).max()
+        return int(np.argwhere(self.free)[np.abs(x).argmax(), 0])
 
     def _respond(self, u: np.ndarray) -> None:
         """Find the forces of stress after displacements (m, d), if points can follow."""
         equations = self.equations
-        self.inner = equations.respond(u, self.dt)
+        with counted(self.seconds, "stress"):
+            self.inner = equations.respond(u, self.dt)
         if not np.all(np.isfinite(self.inner)):
             raise Failed("a point turns inside out")
         far = equations.furthest() / self.spacing
         most = FAR if equations.s.frame.moves else 0.95
+        if far > ASTRAY * most:
+            raise Loose(int(np.abs(u).max(1).argmax()))
         if not far <= most:
             raise TooFar(f"points would go {far:.3g} cells at once", far / most)
