@@ -403,3 +403,26 @@ def test_hooks_in_python(tmp_path, starts_are_cheap):
         text=True,
     )
     assert done.returncode == 0, done.stderr
+
+
+def test_average_temperature_of_a_ball_around_its_axis(run_interpreted):
+    """The mean by mass: of the ball the core r < R/2 has 1 - (3/4)^(3/2), if the grid is fine."""
+    text = """
+    method(ulmpm, FLIP, linear, 1)
+    dimension(2, 0, 2, 0, 2, 0.1)
+    axisymmetric(true)
+    region(ball, sphere, 0, 1, 0.5)
+    region(inner, block, INF, 0.25, INF, INF)
+    region(core, intersection, ball, inner)
+    region(rim, difference, ball, inner)
+    material(a, linear, 2, 1, 0.3, 1, 0)
+    solid(core, region, core, 2, a, 0.1, 0)
+    solid(rim, region, rim, 2, a, 0.1, 1)
+    compute(T, average_temperature, all)
+    log_modify(custom, step, T)
+    run(1)
+    """
+    result = run_interpreted(text)
+    assert result.log.T[-1] == pytest.approx(0.75**1.5, abs=0.01)
+    # The half of the disk at x < 0 is its mirror image.
+    assert "outside the domain" not in result.err

@@ -262,3 +262,19 @@ def test_a_tool_needs_a_shear_modulus(run_interpreted):
     fluid = "eos(e, fluid, 2, 100, 7)\nstrength(s, fluid, 0)\nmaterial(rubber, e, s)"
     text = text.replace("material(rubber, linear, 2, 100, 0.3)", fluid)
     assert "has no shear modulus" in run_interpreted(text, status=1).err
+
+
+@pytest.mark.parametrize(
+    "style", ["contact/minimize_penetration/plane, body", "impenetrablesurface, all, 1"]
+)
+@pytest.mark.parametrize(("normal", "says"), [(-1, "all points"), (1, "8 of 24 points")])
+def test_a_body_that_begins_behind_a_plane_is_told(run_interpreted, style, normal, says):
+    """The block from 0.3 to 0.6, a plane at 0.4 with the normal to the body, or away from it."""
+    place = 0.4 if normal > 0 else 0.2
+    mu = ", 0" * ("contact" in style)
+    fix = f"fix(F, {style}, {place}, 0, 0, {normal}, 0, 0{mu})"
+    result = run_interpreted(block(2, fix, "set_dt(1e-9)", "run(1)"), status=None)
+    assert f"points behind the plane of fix 'F': {says} of its group begin there" in result.err
+    touching = block(2, fix.replace("0.4", "0.3"), "set_dt(1e-9)", "run(1)")
+    if normal > 0:
+        assert "behind" not in run_interpreted(touching).err

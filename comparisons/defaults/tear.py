@@ -7,4 +7,5 @@ CASE = Case(
     exact=1.0,
     measure=lambda result: result.log.kept[-2],
     source="h/c, c the speed of waves in the two ends",
+    half_step=False,
 )

@@ -213,13 +213,16 @@ def fill(
         raise ScriptError(
             f"about {inner:.3g} points would be needed", expected=f"at most {MAX_POINTS}"
         )
-    reaches_out = (lo < domain.lo[used] - domain.tolerance) & np.isfinite(lo)
+    # Beyond an axis lies the mirror image of what is there.
+    near = np.where(domain.axisymmetric & (np.arange(dimension) == 0), np.maximum(lo, 0), lo)
+    reaches_out = (near < domain.lo[used] - domain.tolerance) & np.isfinite(lo)
     reaches_out |= (hi > domain.hi[used] + domain.tolerance) & np.isfinite(hi)
     whole = math.prod(np.maximum(last - first + 1, 0).tolist()) * float(ppc) ** dimension
     counted = reaches_out.any() and whole <= max(_MAX_COUNTED, 4 * inner)
     if not counted:
         first, last = inner_first, inner_last
     open_lo = np.where(np.isinf(lo), domain.lo[used] - domain.tolerance, -np.inf)
+    open_lo = np.where(near > lo, 0.0, open_lo)
     open_hi = np.where(np.isinf(hi), domain.hi[used] + domain.tolerance, np.inf)
 
     places, sizes = (of_unit * h for of_unit in cell_pattern(ppc, dimension, rule))

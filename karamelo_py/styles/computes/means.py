@@ -73,7 +73,7 @@ class AverageStress(Mean):
 class AverageTemperature(Mean):
     """Measure the mean temperature of a group of points; published as ID.
 
-    All points count alike, and those of materials without a temperature as 0.
+    Points count by their mass, and those of materials without a temperature as 0.
 
     Example
     -------
@@ -88,7 +88,8 @@ class AverageTemperature(Mean):
     published = ("",)
 
     def terms(self, points: PointTable) -> list[np.ndarray]:
-        return [np.ones(points.count), points.particle("T")]
+        mass = points.particle("mass")
+        return [mass, mass * points.particle("T")]
 
 
 class MaxPlasticStrain(Compute):

@@ -6,8 +6,10 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from karamelo_py.kernels.laws import elastic_law
+from karamelo_py.language.rules import known_failure
 from karamelo_py.language.signature import Argument, NonNegative
 from karamelo_py.language.unknown import words_of
+from karamelo_py.output.point_table import PointTable
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import Solid
@@ -38,7 +40,9 @@ class ToolFix(PointForces):
         """The present numbers (n,) of formulas of time."""
         return np.array([formula.evaluate(self.hub.values) for formula in formulas])
 
-    def from_place(self, points: PointsView, place: Sequence[Expression]) -> np.ndarray:
+    def from_place(
+        self, points: PointsView | PointTable, place: Sequence[Expression]
+    ) -> np.ndarray:
         """Vectors (n, d) from a place to the points."""
         return points.position.astype(float) - self.now(*place)
 
@@ -139,10 +143,35 @@ class Plane(ToolFix):
         if not self.hub.rehearsing:  # which does not know all numbers
             unit(self.now(*self.towards))
 
-    def depth(self, points: PointsView) -> tuple[np.ndarray, np.ndarray]:
+    def depth(self, points: PointsView | PointTable) -> tuple[np.ndarray, np.ndarray]:
         """Measure how far (n,) points are behind the plane now, and find its normal (d,)."""
         normal = unit(self.now(*self.towards))
         return -(self.from_place(points, self.origin) @ normal), normal
+
+    def behind(self, points: PointTable) -> tuple[int, float]:
+        """Count points that are behind the plane now, and find how deep the deepest is."""
+        depth, _ = self.depth(points)
+        return int(np.sum(depth > self.hub.domain.tolerance)), float(depth.max(initial=0.0))
+
+
+def _begin_behind(plane: Plane, scene: Any) -> Any:
+    """Count the points that are behind a plane before the first step, for words."""
+    if scene.simulation.step > 0:
+        return False
+    counts, depths = zip(*scene.hub.fields.each(plane, "behind"), strict=True)
+    count = sum(counts)
+    which = "all" if count == len(plane.group) else f"{count} of {len(plane.group)}"
+    return {"which": which, "depth": max(depths)} if count else False
+
+
+known_failure(
+    Plane,
+    "points behind the plane of fix '{part.id}'",
+    when=_begin_behind,
+    reason="{which} points of its group begin there, up to {depth:.3g} deep, and are thrown out",
+    cure="the other direction of the normal, which shows where points may be, or another place of "
+    "the plane or the body",
+)
 
 
 class ImpenetrableSurface(Plane):
