@@ -95,6 +95,11 @@ class SceneFacts:
         return max((one.spin for one in self.motions), default=0.0) * self.duration
 
     @property
+    def share(self) -> float:
+        """The step over the stable one."""
+        return self.simulation.dt / self.simulation.limit
+
+    @property
     def turns(self) -> bool:
         """Tell whether a solid turns by an angle that counts."""
         return self.turn > TURN
@@ -135,17 +140,41 @@ class SceneFacts:
         return most
 
     @cached_property
-    def sag(self) -> float:
-        """The strain of a solid under its own weight, g L / c^2."""
-        most = 0.0
+    def weights(self) -> list[np.ndarray]:
+        """Mean accelerations (d,) that fixes give the solids."""
+        found = []
         for fix in self.hub.fixes.values():
             if fix.accelerates and self.waves > 0 and self.motions:
                 x = np.array([one.centre for one in self.motions])
-                for k, formula in enumerate(fix.formulas[: self.d]):
-                    if formula is not None:
-                        g = abs(formula.evaluate_points(self.hub.values, x, x).mean())
-                        size = max(one.high[k] - one.low[k] for one in self.motions)
-                        most = max(most, float(g * size / self.waves**2))
+                given = (
+                    0.0 if f is None else f.evaluate_points(self.hub.values, x, x).mean()
+                    for f in fix.formulas[: self.d]
+                )  # fmt: skip
+                found.append(np.array([*given]))
+        return found
+
+    @cached_property
+    def sag(self) -> float:
+        """The strain of a solid under its own weight, g L / c^2."""
+        sizes = [one.high - one.low for one in self.motions]
+        found = (np.abs(g) * np.max(sizes, axis=0) / self.waves**2 for g in self.weights)
+        return max((float(one.max()) for one in found), default=0.0)
+
+    @cached_property
+    def bending(self) -> float:
+        """The strain of the slenderest solid if it bends: under its weight, or by what it moves.
+
+        A cantilever of the length L and the height H bears 3 g L^2 / (H c^2) at its clamp; the
+        kinetic energy of a beam becomes that of strains up to sqrt(3) v / c.
+        """
+        most = 3**0.5 * 2 * self.impact
+        for g in self.weights:
+            for one in self.motions:
+                sides = one.high - one.low
+                across = np.delete(np.abs(g), sides.argmax()).max(initial=0.0)
+                if sides.min() > 0:
+                    bent = 3 * across * sides.max() ** 2 / sides.min()
+                    most = max(most, float(bent) / self.waves**2)
         return most
 
     @property

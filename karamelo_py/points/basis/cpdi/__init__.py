@@ -16,6 +16,7 @@ from math import inf
 from typing import Any, NamedTuple
 
 from karamelo_py.compiler.compile import Weighted, beside, index, point_function, real, where
+from karamelo_py.language.rules import known_failure
 from karamelo_py.points import basis as bases
 from karamelo_py.points.basis.product import (
     digits,
@@ -62,6 +63,27 @@ class CarriedDomain(ConvectedDomain):
     __slots__ = ()
     shape = ("corners",)
 
+
+BENT, SMALL = 0.2, 0.15  # a strain; a share of the stable step
+
+
+def _torn_by_bending(basis, scene):
+    return (
+        scene.moves and scene.elastic and scene.kept > 0.9
+        and scene.bending > BENT and scene.share > SMALL
+    )  # fmt: skip
+
+
+known_failure(
+    ConvectedDomain,
+    "domains in large bending",
+    when=_torn_by_bending,
+    reason="bodies will strain by about {scene.bending:.1g} if they bend (from their speed and "
+    "weight), and CPDI domains with {scene.transfer_name} at {scene.share:.2g} of the stable step "
+    "gain energy then, fold or come apart, on fine grids the sooner (a soft cantilever: 1.6 times "
+    "the energy with 16 cells of height)",
+    cure="dt_factor(0.1), which keeps the energy of such a beam to 0.1 % (R4), or method tlmpm",
+)
 
 # By dimension, the cells that domains count as reaching at least: in the plane points give to the
 # nodes next to them at once.
