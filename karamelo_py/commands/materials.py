@@ -9,6 +9,7 @@ from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument, Positive, style_of
 from karamelo_py.language.unknown import longer
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
+from karamelo_py.points.laws.doubts import doubts
 from karamelo_py.run.element import COMPONENTS, NORMAL, LoadPath, Point, Response, Unreachable
 from karamelo_py.scene.hub import Catalogue, Hub
 from karamelo_py.scene.material import Material, MaterialPart
@@ -42,6 +43,8 @@ def material(hub: Hub, ID: str, style: StyleOf("material"), *arguments: Argument
         arguments = (Argument(parse_text(style)[0], hub.interpreter), *arguments)
         style = "eos-strength"
     define(hub, hub.materials, ID, style, arguments)
+    for what, hint in doubts(hub.materials[ID].law):
+        hub.warn(f"material '{ID}': {what}", hint=hint)
 
 
 def _part(kind: str, summary: str, example: str, others: str) -> Callable:

@@ -72,6 +72,12 @@ def method(
             expected="method(...) before the first solid",
             hint=f"move it above line {next(iter(hub.solids.values())).place.line}",
         )
+    before = hub.update.method
+    if before is not None:
+        hub.warn(
+            f"this method takes the place of that of line {before.place.line}",
+            hint="one line method(...)",
+        )
     chosen = hub.update.method = parts["method"]
     hub.update.transfer, chosen.basis = parts["transfer"], parts["basis"]
     for family, part in parts.items():

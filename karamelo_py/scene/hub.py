@@ -292,6 +292,13 @@ class Hub:
 
     def _tell_of_late(self, rehearsed: Hub) -> None:
         """Warn of what the script has only behind its last run."""
+        curve = next(iter(rehearsed.output.plots.values()), None)
+        if curve is not None and rehearsed.output.plots.file is None and not self.open_ended:
+            self.warn(
+                f"plot '{curve.id}' is drawn nowhere: the script has no save_plot",
+                curve.place,
+                hint="save_plot(curves.png)",
+            )
         seen = {id(item) for item in rehearsed.in_runs}
         for item in () if self.open_ended else rehearsed.lasting():
             if id(item) not in seen and item.place is not None:

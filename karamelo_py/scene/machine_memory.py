@@ -100,12 +100,13 @@ def _number(path: Path) -> float | None:
     return None
 
 
-def most_points(hub: Scene, already: int, dimension: int) -> float:
+def most_points(hub: Scene, already: int, dimension: int, state: int) -> float:
     """Count the points there may be beside those that are there `already`, whatever their fields.
 
-    Two places, a velocity and a mass in single precision, and three numbers that are whole.
+    Two places, a velocity, a mass and the `state` of a law in single precision, and three numbers
+    that are whole.
     """
-    of_one, comm = 4 * (3 * dimension + 1) + 16, hub.settings.comm
+    of_one, comm = 4 * (3 * dimension + 1 + state) + 16, hub.settings.comm
     found = machine_memory(comm.on_machine)
     whole = inf if found is None else found.whole
     return max(whole / comm.share_here / of_one - already, 0.0)

@@ -15,6 +15,7 @@ from karamelo_py.scene.region import Region
 from karamelo_py.script.errors import ScriptError
 
 MAX_POINTS = 2**31 - 1
+SAMPLE = 4096  # places of a region that are looked at before all are
 FEW = 1_000_000  # points that memory has room for everywhere, whatever their fields
 # Beyond this many candidates the points outside the domain are no longer counted, only mentioned.
 _MAX_COUNTED = 20_000_000
@@ -232,6 +233,8 @@ def fill(
     left: list[tuple[np.ndarray, Pieces]] = []
     outside = 0.0
     most = room() if inner > FEW else math.inf
+    if most < math.inf and _least(region, domain, h / ppc) > most:
+        raise _no_room(most)
     for begin, end in x0.chunks:
         x = x0.candidates(begin, end)
         if rule == "cut":
@@ -249,11 +252,7 @@ def fill(
         kept &= in_domain
         x0.keep(kept)
         if len(x0) > most:
-            raise ScriptError(
-                f"the scene has more than {most:.3g} points, and this machine has no memory for "
-                "so many",
-                hint="larger cells, or fewer points per cell",
-            )
+            raise _no_room(most)
         if not even:
             numbers.append(np.flatnonzero(kept) % len(places))
     if reaches_out.any() and not counted:
@@ -265,6 +264,24 @@ def fill(
         return placed
     sizes = sizes[np.concatenate(numbers)] if numbers else np.empty((0, dimension))
     return placed._replace(volume=sizes.prod(axis=1), half_size=sizes / 2)
+
+
+def _least(region: Region, domain: Domain, spacing: float) -> float:
+    """Number of points of this spacing that a region has at least, by some of its places."""
+    used = slice(0, domain.dimension)
+    lo, size = region.lo[used], region.hi[used] - region.lo[used]
+    x = lo + size * np.random.default_rng(1).random((SAMPLE, domain.dimension))
+    share = float(np.mean(region.inside(x)))
+    # Four times what its mean is uncertain by.
+    least = share - 4 * math.sqrt(max(share * (1 - share), 1 / SAMPLE) / SAMPLE)
+    return least * math.prod((size / spacing).tolist())
+
+
+def _no_room(most: float) -> ScriptError:
+    return ScriptError(
+        f"the scene has more than {most:.3g} points, and this machine has no memory for so many",
+        hint="larger cells, or fewer points per cell",
+    )
 
 
 def _cut_off(

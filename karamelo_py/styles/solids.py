@@ -3,7 +3,11 @@
 from functools import partial
 from typing import Annotated, Literal
 
+from karamelo_py.compiler.tuples import count_in
+from karamelo_py.kernels.laws import law_on
 from karamelo_py.language.signature import AtLeast, Positive
+from karamelo_py.points.kinematics import KINEMATICS
+from karamelo_py.points.laws import initial_state
 from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.machine_memory import most_points
@@ -12,6 +16,8 @@ from karamelo_py.scene.placement import fill, lattice_of
 from karamelo_py.scene.region import Region
 from karamelo_py.scene.solid import Solid, own_grids
 from karamelo_py.script.errors import ScriptError
+
+MANY = 10  # points a cell and direction that nobody needs
 
 
 class RegionSolid(Solid):
@@ -89,7 +95,14 @@ class RegionSolid(Solid):
                 argument="points",
                 hint="points=regular, a solid from a mesh, or another basis",
             )
-        room = partial(most_points, hub, self.first_id, domain.dimension)
+        if ppc > MANY:
+            hub.warn(
+                f"{ppc} points a cell and direction are {ppc**domain.dimension:.3g} in each cell",
+                hint="2 or 3, as a rule; smaller cells make more points, too",
+            )
+        kin = KINEMATICS[domain.dimension]()
+        state = count_in(initial_state(law_on(material.law, self.h, T0 or 0.0), kin, 1.0))
+        room = partial(most_points, hub, self.first_id, domain.dimension, state)
         placement = fill(region, domain, lattice, ppc, points, room)
         self.put(hub, placement, may_be_empty=region.unknown)
         if placement.missed:

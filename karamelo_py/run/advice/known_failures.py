@@ -13,6 +13,7 @@ import numpy as np
 
 from karamelo_py.kernels.watch import BORNE
 from karamelo_py.language.rules import Advice
+from karamelo_py.output.node_columns import places_of
 from karamelo_py.output.point_table import COMPONENTS, PointTable
 from karamelo_py.output.units import DENSITY, STRESS, VELOCITY
 from karamelo_py.points.laws import can, constrained_velocity, law_kind, specific_volume
@@ -191,7 +192,7 @@ def _other_units(s: SceneFacts) -> Iterator[Advice]:
 
 def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> None:
     """Tell what will go wrong in a run of `duration` and the next; each failure once."""
-    _warn_about_groups(hub)
+    _warn_about_groups(hub, simulation)
     refuse_endless_speeds(hub, simulation)
     scene = SceneFacts(hub, simulation, duration)
     scene.duration += _gone(hub, simulation) + _duration_of_later(hub, simulation)
@@ -247,8 +248,33 @@ def _warn_about_precision(s: SceneFacts) -> None:
         )
 
 
-def _warn_about_groups(hub: Hub) -> None:
-    """Say so, once, where the solids have brought no nodes to a group that waited for them."""
+def _out_of_reach(hub: Hub, simulation: Simulation, fix: Any) -> bool:
+    """Tell whether no point lies within the reach of the nodes of a fix, seen as a box."""
+    x = places_of(hub, fix.nodes)[:, : hub.domain.dimension]
+    method, setup = hub.update.method, simulation.setup
+    reach = (method.basis.cells + 1) / 2 * max(lattice.h for lattice in hub.lattices)
+    lo, hi = x.min(axis=0) - reach, x.max(axis=0) + reach
+
+    def near(points: PointTable) -> np.ndarray:
+        at = points.position if setup.frame.moves else points.reference_position
+        return ((lo <= at) & (at <= hi)).all(axis=1).astype(float)
+
+    return not simulation.points.largest(near)[0] > 0
+
+
+def _warn_about_groups(hub: Hub, simulation: Simulation) -> None:
+    """Say so, once, where groups of nodes that were to have some, or a body, have none."""
+    for fix in hub.fixes.values():
+        of_mass = any(getattr(hook, "uses_share", False) for hook in fix.hooks().values())
+        far = (
+            of_mass and not fix.group.all and len(fix.group) and _out_of_reach(hub, simulation, fix)
+        )
+        if far and hub.update.first_time(f"out of reach {fix.id}"):
+            hub.warn(
+                f"fix {fix.style} '{fix.id}' acts on nodes that no point reaches: {NOTHING_THERE}",
+                place=fix.place,
+                hint="a region that reaches into the body",
+            )
     for group in hub.groups.values():
         if isinstance(group, NodeGroup) and group.awaits_solids and not len(group):
             group.awaits_solids = False
