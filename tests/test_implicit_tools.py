@@ -1,7 +1,11 @@
 """Rigid solids and contact in implicit steps."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+
+from comparisons import hertz
 
 PRESS = """
     basis = "linear"
@@ -56,3 +60,123 @@ def test_velocities_of_soft_points_are_refused(run_script):
     lines = lines.replace("region, tool", "region, box")
     result = run_script(PRESS.format(scheme="quasi-static", lines=lines, columns=""), status=1)
     assert "velocity_particles" in result.err and "for rigid solids" in result.err
+
+
+INPUTS = Path(__file__).parent.parent / "inputs"
+
+
+def test_a_block_sticks_and_slides(run_script):
+    """Coulomb: mu times the pressing force, exactly; before, what the way of the top strains."""
+    result = run_script(INPUTS / "in.static_block", "-var", "mu", "0.3")
+    log_of = result.log
+    # A spring of 1000 times the modulus lies in between: 1/1000 of a cell, of 8.
+    assert log_of["pressing"][1] == pytest.approx(1000 * 1e-3, rel=1e-3)
+    assert np.allclose(log_of["ratio"][9:], 0.3, rtol=1e-9)
+    assert 0.05 < log_of["ratio"][5] < 0.1 and np.all(np.diff(log_of["ratio"][4:9]) > 0)
+    assert max(log_of["iterations"]) <= 8 and max(log_of["parts"]) == 1
+
+
+def test_contact_goes_on_from_a_file(run_script):
+    """The same bytes: what touched and stuck is in the file."""
+    text = (
+        (INPUTS / "in.static_block").read_text().replace("run(14)", "restart(7, r.*.h5)\nrun(14)")
+    )
+    whole = run_script(text)
+    rest = run_script(text, "-restart", str(whole.folder / "r.7.h5"), folder="again")
+    for name in ("pressing", "shear", "residual"):
+        assert whole.log[name][-1] == rest.log[name][-1]
+
+
+def test_bodies_part_freely(run_script):
+    """Pulled up again, the block leaves the plane: no force is left."""
+    text = (INPUTS / "in.static_block").read_text()
+    text = text.replace("if(time > 4.5, 0, -way)", "if(time > 4.5, 2*way, -way)")
+    log_of = run_script(text, "-var", "mu", "0").log
+    assert log_of["pressing"][4] > 3.9 and abs(log_of["pressing"][-1]) < 1e-12
+
+
+LYING = """
+    method(ulmpm/contacts, FLIP, linear, 1)
+    scheme(quasi-static)
+    dimension(2, 0, 2, 0, 2, 0.25)
+    region(block, block, 0.5, 1.5, 0.5, 1.5)
+    region(ground, block, 0, 2, 0, 0.5)
+    material(rubber, neo-hookean, 1, 1000, 0.25)
+    material(rock, rigid, 1)
+    solid(block, region, block, 2, rubber, 0.25, 0)
+    solid(ground, region, ground, 2, rock, 0.25, 0)
+    {lines}
+    fix(weight, body_force, all, 0, -1)
+    set_output(1)
+    log_modify(custom, step, iterations, ContactForce_block_y, ContactForce_ground_y)
+    run(2)
+"""
+
+
+def test_a_block_lies_on_a_plane(run_script):
+    """Nothing else holds it: the plane bears its weight, and friction keeps it in its place."""
+    log_of = run_script(LYING.format(lines="fix(rub, contact/friction, block, ground, 0.3)")).log
+    assert np.allclose(log_of["ContactForce_block_y"][1:], 1, rtol=1e-9)
+    assert np.allclose(log_of["ContactForce_ground_y"][1:], -1, rtol=1e-9)
+    result = run_script(LYING.format(lines=""), status=1, folder="smooth")
+    assert "not held along x" in result.err
+
+
+@pytest.mark.parametrize(
+    ("line", "name"),
+    [
+        ("fix(wall, impenetrablesurface, all, 1, 0, 0.6, 0, 0, 1, 0)", "impenetrablesurface"),
+        ("fix(h, contact/hertz, block, ground)", "contact/hertz"),
+    ],
+)
+def test_forces_that_follow_points_are_refused(run_script, line, name):
+    text = LYING.format(lines=line).replace("rock, rigid, 1", "rock, linear, 1, 1, 0")
+    result = run_script(text, status=1)
+    assert f"fix {name}" in result.err and "ulmpm/contacts" in result.err
+
+
+def test_a_pressed_disk(run_script):
+    """Force and stress below the contact after Hertz (Johnson 1985); errors fall with the cells."""
+    forces, errors = [], []
+    for refine in (0.5, 1):
+        result = run_script(
+            INPUTS / "in.static_hertz", "-var", "refine", str(refine), folder=f"run{refine}"
+        )
+        forces.append(result.log["force"][-1] / hertz.LOAD - 1)
+        errors.append(hertz.error(result.snapshots("static_hertz")[-1], 0.7))
+        assert max(result.log["iterations"]) <= 8 and max(result.log["parts"]) == 1
+    # With 64 cells -1.7 % and 0.007. The formula itself leaves out (half width / R)^2, 1.3 %.
+    assert abs(forces[1]) < 0.04 and np.log2(forces[0] / forces[1]) > 1
+    assert errors[1] < 0.028 and np.log2(errors[0] / errors[1]) > 1.5
+
+
+def test_a_rough_footing(run_script):
+    """(2 + pi) c, for a rough base as for a smooth one (Chen 1975)."""
+    log_of = run_script(INPUTS / "in.static_rough_footing").log
+    assert max(log_of["load"]) == pytest.approx(2 + np.pi, rel=0.03)
+    assert max(log_of["iterations"]) <= 8
+
+
+# Means of the load in kN over 1.2 % of the height, of the explicit steps of in.billet_axisymmetric.
+EXPLICIT = {0.05: 239.4, 0.1: 260.1, 0.15: 284.9, 0.2: 307.7}
+
+
+def test_a_billet_is_pressed(run_script):
+    """The load of explicit steps, within 2 %."""
+    log_of = run_script(
+        INPUTS / "in.static_billet", "-var", "squeeze", "0.21", "-var", "steps", "42"
+    ).log
+    for press, load in EXPLICIT.items():
+        near = abs(log_of["press"] - press) < 0.006
+        assert log_of["load"][near].mean() == pytest.approx(load, rel=0.02)
+
+
+def test_a_disk_slides_down(run_script):
+    """g (sin(angle) - mu cos(angle)), in steps of eight times what a wave needs for a cell."""
+    text = (INPUTS / "in.incline").read_text().replace("dt_factor(CFL)", "set_dt(0.01)")
+    text = text.replace("dimension(2, 0, 7", "scheme(newmark)\ndimension(2, 0, 7")
+    lines = [one for one in text.splitlines() if not one.startswith(("dump", "plot", "save_plot"))]
+    text = "\n".join(lines).replace("run_time(1)", "run_time(0.5)")
+    log_of = run_script(text, "-var", "mu", "0.1").log
+    exact = 10 * (np.sin(np.pi / 6) - 0.1 * np.cos(np.pi / 6)) * 0.5
+    assert log_of["v_x"][-1] == pytest.approx(exact, rel=0.01)

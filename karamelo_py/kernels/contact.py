@@ -166,6 +166,13 @@ def _reach(contact, nodes, pair, n, where, side):
     return where.h * (table[low] + share * (table[low + 1] - table[low]))
 
 
+@shared
+def _gap_of(contact, nodes, pair, where):
+    """Return the distance between the surfaces of two bodies; below 0 where they overlap."""
+    gap = -_reach(contact, nodes, pair, pair.n, where, 1)
+    return gap - _reach(contact, nodes, pair, pair.m, where, -1)
+
+
 @noinline
 def _excess_of(contact, nodes, pair, where):
     """Return the excess of the approach velocity over the one that closes the gap in a step."""
@@ -175,9 +182,7 @@ def _excess_of(contact, nodes, pair, where):
     approach = dot(pair.outward, pair.relative)
     if not approach > 0:
         return 0.0
-    gap = -_reach(contact, nodes, pair, pair.n, where, 1)
-    gap -= _reach(contact, nodes, pair, pair.m, where, -1)
-    return approach / size - max(gap, 0.0) / where.dt
+    return approach / size - max(_gap_of(contact, nodes, pair, where), 0.0) / where.dt
 
 
 @noinline
@@ -376,6 +381,34 @@ def _touch_nodes(contact, kin, grids, nodes, spans, control):
     for c in range(len(contact.copies)):
         for k in range(3):
             values[contact.copies[c, 1] + k] = values[contact.copies[c, 0] + k]
+
+
+@kernel
+def list_pairs(contact, kin, grids, nodes, spans, pairs, normals, gaps):
+    """List the pairs of nodes where two fields meet; return their number.
+
+    Of each pair `pairs` (n, 2) gets the nodes, `normals` (n, d) the unit normal from the first to
+    the second body, and `gaps` the distance that is left between them.
+    """
+    found = 0
+    for s in range(1, 1 + spans[0, 0]):
+        for first in range(spans[s, 0], spans[s, 1]):
+            count = _meet(contact, nodes, first)
+            place = first % contact.stride
+            grid = record(grids, first // contact.stride)
+            where = Where(node_position(grid, first), grid.h, 1.0)
+            for i in range(count if count > 1 else 0):
+                for j in range(i + 1, count):
+                    n, m = _node(contact, place, i), _node(contact, place, j)
+                    pair = _pair_of(contact, kin, nodes, nodes.update, n, m)
+                    size = sqrt(dot(pair.outward, pair.outward))
+                    if size > 0:
+                        pairs[found, 0], pairs[found, 1] = n, m
+                        for k in range(kin.dimension):
+                            normals[found, k] = pair.outward[k] / size
+                        gaps[found] = _gap_of(contact, nodes, pair, where)
+                        found += 1
+    return found
 
 
 @touch.on(SeparateFields)

@@ -77,6 +77,7 @@ class Fix(Publisher):
     point_fields: tuple[type, ...] = ()
     node_fields: tuple[type, ...] = ()
     leads_points = False  # against their forces, by work that no sum at nodes knows
+    follows_points = False  # pushes points by where they are, as tools do
     accelerates = False  # its formulas are forces per mass, as of weight
     acts_last = False  # after all others at each moment, wherever the script has it
     # Its hooks in Python bring no energy: what they do to points and nodes stores it, passes it on

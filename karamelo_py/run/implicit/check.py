@@ -28,8 +28,6 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
     update = hub.update
     method, transfer = update.method, update.transfer
     name = registry.name_of("transfer", type(transfer))
-    if method.fields_per_solid:
-        yield "knows no contact between solids", f"method ulmpm, or {_EXPLICIT}", method.place
     if Moment in declared([transfer], "point_fields") or name not in ("FLIP", "PIC"):
         yield (
             f"moves points by increments, which transfer {name} has no part in",
@@ -86,8 +84,18 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
             and not _of_rigid_points(hub, fix)
         ):
             yield f"knows no velocities for fix {fix.style}", "scheme(newmark)", fix.place
-        elif len(fix.solids) > 1 or fix.friction is not None:
-            yield f"knows no contact by fix {fix.style}", _EXPLICIT, fix.place
+        elif len(fix.solids) > 1 and fix.friction is None:
+            yield (
+                f"knows no contact by fix {fix.style}, whose force is one of the step",
+                f"method ulmpm/contacts, or {_EXPLICIT}",
+                fix.place,
+            )
+        elif fix.follows_points:
+            yield (
+                f"knows no fix {fix.style}, whose force changes as points move in a step",
+                f"a solid of material rigid in method ulmpm/contacts, or {_EXPLICIT}",
+                fix.place,
+            )
 
 
 def _of_rigid_points(hub: Hub, fix: Fix) -> bool:

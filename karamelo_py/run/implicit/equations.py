@@ -272,10 +272,14 @@ class Equations:
 
     # --- ghost stabilisation ----------------------------------------------------------------------
 
-    def modulus(self) -> float:
-        """Estimate Young's modulus of the bodies at rest: 2.6 of the mean shear modulus."""
+    def moduli(self) -> tuple[float, np.ndarray]:
+        """Estimate Young's modulus of the bodies at rest: 2.6 of the mean shear modulus.
+
+        Returns that of all bodies, and those of each grid (g,), 0 where nothing deforms.
+        """
         kin = self.s.kin
         places = kin.Tensor.places
+        of_grids = np.zeros((2, len(self.s.grids.first)))
         total = volume = 0.0
         for block in self.blocks:
             points = block.points
@@ -287,7 +291,11 @@ class Equations:
                 one = C[0][0] if self.d == 1 else 1.3 * (C[0][0] - C[0][places.index((1, 1))])
                 own = float(points.mass[points.material == k].sum() * specific_volume(law))
                 total, volume = total + own * float(one), volume + own
-        return total / volume if volume else 0.0
+                on = points.grid[points.material == k]
+                own_of = np.bincount(on, points.mass[points.material == k], of_grids.shape[1])
+                of_grids += own_of * float(specific_volume(law)) * np.array([[float(one)], [1.0]])
+        per = np.where(of_grids[1] > 0, of_grids[1], 1.0)
+        return (total / volume if volume else 0.0), of_grids[0] / per
 
     def ghost(self) -> sp.csr_matrix:
         """Make the matrix (m, m) that penalises jumps of the gradient at the border of bodies.

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.kernels.implicit import gather, scatter
+from karamelo_py.run.implicit.contact import Contact
 from karamelo_py.run.implicit.equations import Equations
 
 
@@ -45,6 +46,8 @@ class Motion:
         (m, d) what the forces of the beginning leave: with it the accelerations there.
     given, prescribed
         (m, d) which components are held, and the velocities that they get.
+    contact
+        Forces between bodies, or None.
     """
 
     def __init__(
@@ -55,6 +58,7 @@ class Motion:
         before: np.ndarray,
         given: np.ndarray,
         prescribed: np.ndarray,
+        contact: Contact | None,
     ):
         self.equations, self.scheme, self.dt = equations, scheme, dt
         self.given, self.prescribed = given, prescribed
@@ -62,6 +66,9 @@ class Motion:
         self.inverse = np.divide(1, self.mass, out=np.zeros_like(self.mass), where=self.mass > 0)
         self.v = self._velocities()
         self.a = before * self.inverse
+        self.contact, self.movable = contact, np.where(given, 0.0, self.inverse)
+        if contact is not None:
+            self.a = contact.accelerated(self.a, self.v, self.movable)
         if scheme.rule == "euler":
             self.beta, self.gamma, self.rest = 1.0, 1.0, 0.0
         else:
@@ -95,6 +102,8 @@ class Motion:
         dt, gamma = self.dt, self.gamma
         free = self.v + dt * ((1 - gamma) * self.a + gamma * self.acceleration(u))
         new = np.where(self.given, self.prescribed, free)
+        if self.contact is not None:
+            new = self.contact.stopped(new, self.movable)
         kept = getattr(self.equations.s.transfer, "alpha", 0.0)
         parts = zip(self.equations.blocks, self.equations.parts, self.old, strict=True)
         for block, (seen, _), old in parts:

@@ -12,6 +12,7 @@ from karamelo_py.kernels.rigid import RigidBodies, put_forces
 from karamelo_py.kernels.step import DONE, SORT, STOPPED, take_rows
 from karamelo_py.points.kinematics import free_from
 from karamelo_py.run.implicit.conduction import conduct
+from karamelo_py.run.implicit.contact import Contact, contact_of
 from karamelo_py.run.implicit.equations import Equations
 from karamelo_py.run.implicit.inertia import Motion, Rest
 from karamelo_py.run.implicit.newton import Broken, Failed, Loose, Newton, TooFar, counted
@@ -37,7 +38,7 @@ class LoadSteps:
         self.simulation = simulation
         self.scheme = simulation.hub.update.scheme
         self.dynamic = self.scheme.inertia
-        self.modulus = 0.0
+        self.modulus, self.moduli = 0.0, np.zeros(0)
         self.within = False  # whether a part of a step has been done
         self.failure = ""  # why a step has no equilibrium
         self.unknowns = self.corrections = 0  # of the last equilibrium; so far
@@ -186,17 +187,19 @@ class LoadSteps:
         led = equations.led[:, None]
         given = fixed | led
         prescribed = np.where(led, equations.velocity_of_rigid, prescribed)
+        if not self.modulus:
+            self.modulus, self.moduli = equations.moduli()
+        contact = contact_of(equations, self.moduli)
         if not self.dynamic:
-            self._check_held(equations, given)
+            self._check_held(equations, given, contact)
         with counted(self.seconds, "layout"):
             equations.unknowns(~given)
         if before is None:
             inertia: Rest | Motion = Rest(equations)
         else:
-            inertia = Motion(equations, self.scheme, dt, before[nodes], given, prescribed)
-        newton = Newton(self.scheme, equations, inertia, external, dt, self.seconds)
-        if not self.modulus:
-            self.modulus = equations.modulus()
+            held = given, prescribed
+            inertia = Motion(equations, self.scheme, dt, before[nodes], *held, contact)
+        newton = Newton(self.scheme, equations, inertia, contact, external, dt, self.seconds)
         newton.scale(self.modulus, self.scheme.stabilisation)
         try:
             jump = np.where(given, prescribed * dt, 0.0)
@@ -209,7 +212,8 @@ class LoadSteps:
         self.unknowns = int(np.count_nonzero(~given))
         self.corrections += iterations
         reaction = newton.reaction(u)
-        return Equilibrium(equations, inertia, u, fixed, reaction, iterations, residual)
+        found = equations, inertia, contact, u, fixed, reaction, iterations, residual
+        return Equilibrium(*found)
 
     def _prescribed(self, equations: Equations, hooks: Any) -> tuple[np.ndarray, np.ndarray]:
         """Find which components of the nodes are held, and the velocities that they get.
@@ -256,6 +260,8 @@ class LoadSteps:
         clock.kept = kept
         update[nodes, :d] = s.nodes.velocity[nodes, :d] = v
         update[nodes, change : change + d] = 0
+        if found.contact is not None:
+            found.contact.publish()
         if isinstance(s.contact, RigidBodies):
             forces = np.where(found.fixed, 0.0, -found.reaction)
             led = found.equations.led
@@ -266,7 +272,7 @@ class LoadSteps:
         step, time = int(values[TIMESTEP]) + 1, float(values[TIME])
         return ScriptError(f"step {step}, time {time:.6g}: {message}", place=hub.place, hint=hint)
 
-    def _check_held(self, equations: Equations, given: np.ndarray) -> None:
+    def _check_held(self, equations: Equations, given: np.ndarray, contact: Contact | None) -> None:
         """Refuse bodies that can move as a whole: without inertia nothing says where they are.
 
         Bodies are nodes that points connect.
@@ -279,6 +285,8 @@ class LoadSteps:
             held = motions[own][given[own]]
             if given[own].all():
                 continue
+            if contact is not None:
+                held = np.concatenate([held, contact.held(motions, own)])
             if np.linalg.matrix_rank(held) == motions.shape[2]:
                 continue
             free = free_from(s.kin)
@@ -308,6 +316,7 @@ class Equilibrium(NamedTuple):
 
     equations: Equations
     inertia: Rest | Motion
+    contact: Contact | None
     u: np.ndarray
     fixed: np.ndarray  # which components fixes hold
     reaction: np.ndarray

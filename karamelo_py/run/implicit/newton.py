@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+from karamelo_py.run.implicit.contact import Contact
 from karamelo_py.run.implicit.equations import Equations
 from karamelo_py.run.implicit.solvers import Singular, direct, solve
 
@@ -60,6 +61,8 @@ class Newton:
         Forces and stiffness, with numbered unknowns.
     inertia
         What moving bodies add.
+    contact
+        Forces between bodies, or None.
     external
         (m, d) forces that are not those of stress.
     dt
@@ -78,12 +81,14 @@ class Newton:
         scheme: Any,
         equations: Equations,
         inertia: Any,
+        contact: Contact | None,
         external: np.ndarray,
         dt: float,
         seconds: dict[str, float],
     ):
         self.scheme, self.equations, self.inertia = scheme, equations, inertia
-        self.external, self.dt, self.seconds = external, dt, seconds
+        self.contact, self.external = contact, external
+        self.dt, self.seconds = dt, seconds
         self.free = equations.free
         self.spacing = float(np.min(equations.s.grids.spacing))
         self.ghost: sp.csr_matrix | None = None
@@ -92,6 +97,8 @@ class Newton:
         self.kept: dict = {}  # what a solver keeps from one correction to the next
         with counted(seconds, "stress"):
             self.inner = equations.respond(np.zeros_like(external), dt)
+        if contact is not None:
+            contact.respond(np.zeros_like(external))
 
     def scale(self, modulus: float, stabilisation: float) -> None:
         """Tell the stiffness of the bodies; a share of it penalises jumps at their border."""
@@ -137,6 +144,8 @@ class Newton:
     def balance(self, u: np.ndarray) -> np.ndarray:
         """Find what the forces leave (m, d)."""
         forces = self.external - self.inner
+        if self.contact is not None:
+            forces += self.contact.forces()
         if self.ghost is not None:
             forces -= self.ghost @ u
         return self.inertia.balance(u, forces)
@@ -163,6 +172,10 @@ class Newton:
         if self.ghost is not None:
             A = A + self.ghost_of_free
             b -= (self.ghost @ jump)[free]
+        if self.contact is not None:
+            every = self.contact.matrix()
+            A = A + every[free.ravel()][:, free.ravel()]
+            b -= (every @ jump.ravel())[free.ravel()]
         if inertia.diagonal:
             mass = np.broadcast_to(equations.mass[:, None], free.shape)[free]
             A = A + sp.diags(inertia.diagonal * mass)
@@ -192,6 +205,8 @@ class Newton:
         equations = self.equations
         with counted(self.seconds, "stress"):
             self.inner = equations.respond(u, self.dt)
+        if self.contact is not None:
+            self.contact.respond(u)
         if not np.all(np.isfinite(self.inner)):
             raise Failed("a point turns inside out")
         far = equations.furthest() / self.spacing

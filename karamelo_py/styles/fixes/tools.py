@@ -23,6 +23,7 @@ from karamelo_py.styles.fixes.formulas import judge_friction, per_direction, vec
 class ToolFix(PointForces):
     """Base of fixes that push points, which they take for small cubes (in the plane squares)."""
 
+    follows_points = True
     needs_stiffness = False  # whether the force goes with the shear modulus of the point
 
     def __init__(self, hub: Hub, group: ParticleGroup):

@@ -1,0 +1,250 @@
+"""Contact between solids with fields of their own, within Newton's method.
+
+Where two bodies meet at a node, the displacement u of the first as the second sees it may close the
+gap g between them along their common normal N, and not more. What goes further meets a stiff
+spring: the pressing force is p = max(0, k (N u - g)). Along the surface the bodies stick by another
+one, as long as it bears less than friction, |k s| <= mu p for the slip s of the step; then they
+slide, and the force is mu p against the slip (Coulomb; the return mapping of Wriggers 2006,
+"Computational Contact Mechanics", chapter 10). Both derivatives are exact. Normals and gaps are
+those of the beginning of the step.
+"""
+
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.linalg import spsolve
+
+from karamelo_py.compiler.fields import field
+from karamelo_py.kernels.arrays import TIMESTEP
+from karamelo_py.kernels.contact import SeparateFields, list_pairs
+from karamelo_py.kernels.loss import FrictionalHeat
+from karamelo_py.points.kinematics import Axisymmetric
+from karamelo_py.run.implicit.equations import Equations
+
+STIFF = 1e3  # springs, by what a cell of the softer body bears
+LIGHT = 0.01  # share of the mass of nodes within a body
+CLOSE = 1e-4  # cells between bodies of which Newton's method first supposes that they touch
+
+
+class Contact:
+    """Pairs of nodes where bodies meet, and the forces between them. c pairs.
+
+    Parameters
+    ----------
+    equations
+        Equations of the step.
+    moduli
+        (g,) Young's moduli of the bodies on each grid, 0 of rigid ones.
+
+    Attributes
+    ----------
+    first, second
+        (c,) numbers of the two nodes of a pair among the unknown ones.
+    normal
+        (c, d) from the first body to the second.
+    close
+        (c,) which pairs touch, as far as is known before the step.
+    push, drag
+        (c,), (c, d) forces across and along the surface, on the second body.
+    """
+
+    def __init__(self, equations: Equations, moduli: np.ndarray):
+        self.equations, self.s, self.d = equations, equations.s, equations.d
+        s, nodes = equations.s, equations.nodes
+        tag = self.tag = s.contact
+        room = len(nodes) * len(tag.slot)
+        pairs, gap = np.zeros((room, 2), np.int64), np.zeros(room)
+        normal = np.zeros((room, self.d))
+        count = list_pairs(tag, s.kin, s.grids, s.nodes, s.spans, pairs, normal, gap)
+        # What has next to nothing of a body bears nothing: contact would only shake it.
+        shares = self._shares()[equations.number_of(pairs[:count])].min(1)
+        chosen = np.flatnonzero(shares >= LIGHT)
+        count = len(chosen)
+        self.pairs, self.normal = pairs[chosen], normal[chosen]
+        self.gap = np.maximum(gap[chosen], 0.0)
+        self.first, self.second = (equations.number_of(one) for one in self.pairs.T)
+        self.a, self.b = (equations.grid[one] for one in (self.first, self.second))
+        self.mu = tag.friction[self.a, self.b]
+        self.stiffness = self._stiffness(moduli)
+        h = float(np.min(s.grids.spacing))
+        self.gap[self.touched()] = 0  # whatever is measured, no gap has opened
+        self.close = (self.gap <= CLOSE * h) | self.touched()
+        ones, at = np.ones(count), np.arange(count)
+        m = len(nodes)
+        self.jump = sp.csr_matrix((ones, (at, self.first)), (count, m)) - sp.csr_matrix(
+            (ones, (at, self.second)), (count, m)
+        )
+        self.jumps = equations.for_all_components(self.jump)
+        self.begun = False
+
+    def _shares(self) -> np.ndarray:
+        """Find what share (m,) nodes have of the mass of one within the body."""
+        equations = self.equations
+        mass = equations.mass.copy()
+        if isinstance(self.s.kin, Axisymmetric):
+            mass /= np.maximum(equations.positions[:, 0], 0.25 * self.s.grids.spacing[0])
+        most = np.zeros(len(self.s.grids.first))
+        np.maximum.at(most, equations.grid, mass)
+        return mass / np.maximum(most[equations.grid], 1e-300)
+
+    def _stiffness(self, moduli: np.ndarray) -> np.ndarray:
+        """Find the stiffness (c,) of the springs from the softer one of two bodies."""
+        both = np.stack([moduli[self.a], moduli[self.b]])
+        softer = np.where(both > 0, both, np.inf).min(0)
+        h = self.s.grids.spacing[self.a]
+        stiffness = STIFF * np.where(np.isfinite(softer), softer, 0.0) * h ** (self.d - 2)
+        if isinstance(self.s.kin, Axisymmetric):  # forces are those of a radian
+            stiffness *= np.maximum(self.equations.positions[self.first, 0], 0.25 * h)
+        return stiffness
+
+    def touched(self, sign: int = 0) -> np.ndarray:
+        """Tell which pairs (c,) touched at the end of the last step; with -1 those that stuck."""
+        step = int(self.s.control.values[TIMESTEP])
+        last = self.tag.touched[self.pairs[:, 0], self.b]
+        last = sign * last if sign else np.abs(last)
+        return (last > 0) & (last >= step)
+
+    def respond(self, u: np.ndarray) -> None:
+        """Find forces after displacements (m, d) of the nodes, and their derivatives."""
+        k, N = self.stiffness, self.normal
+        glued = np.isinf(self.mu)
+        mu = np.where(glued, 0.0, self.mu)
+        x = self.jump @ u
+        across = (N * x).sum(1)
+        push = k * (across - self.gap)
+        # Before there are displacements nothing but the last step tells where bodies touch.
+        self.pressed = pressed = push >= 0 if self.begun else self.close
+        self.push = push = np.where(pressed, push, 0.0)
+        slip = x - across[:, None] * N
+        size = np.linalg.norm(slip, axis=1)
+        bound = mu * np.maximum(push, 0.0)
+        rubs = pressed & (self.mu > 0)
+        self.sticks = sticks = rubs & (glued | (k * size <= bound) | (not self.begun))
+        slides = rubs & ~sticks
+        way = slip / np.where(size > 0, size, 1.0)[:, None]
+        bound = np.where(slides, bound, 0.0)
+        self.drag = np.where(sticks[:, None], k[:, None] * slip, bound[:, None] * way)
+        self.slip = slip
+        self.begun = True
+        NN = N[:, :, None] * N[:, None, :]
+        along = np.eye(self.d) - NN
+        C = np.where(pressed, k, 0.0)[:, None, None] * NN
+        C += np.where(sticks, k, 0.0)[:, None, None] * along
+        turn = bound / np.where(size > 0, size, 1.0)
+        C += turn[:, None, None] * (along - way[:, :, None] * way[:, None, :])
+        rise = np.where(slides, mu * k, 0.0)
+        C += rise[:, None, None] * way[:, :, None] * N[:, None, :]
+        self.tangent = C
+
+    @property
+    def on_second(self) -> np.ndarray:
+        """Forces (c, d) on the second body of each pair."""
+        return self.push[:, None] * self.normal + self.drag
+
+    def forces(self) -> np.ndarray:
+        """Give the forces (m, d) on the nodes."""
+        return -(self.jump.T @ self.on_second)
+
+    def matrix(self) -> sp.csr_matrix:
+        """Give the derivatives (m d, m d) of the forces, with the sign of a stiffness."""
+        c, d = len(self.first), self.d
+        row = np.arange(c * d).reshape(c, d)
+        i, j = (np.broadcast_to(x, (c, d, d)).ravel() for x in (row[:, :, None], row[:, None, :]))
+        C = sp.csr_matrix((self.tangent.ravel(), (i, j)), (c * d, c * d))
+        return (self.jumps.T @ C @ self.jumps).tocsr()
+
+    def held(self, motions: np.ndarray, own: np.ndarray) -> np.ndarray:
+        """Give how pairs that touch hold rigid `motions` (m, d, k) of some nodes (m,): (r, k)."""
+        rows = []
+        for nodes in (self.first, self.second):
+            chosen = self.close & own[nodes]
+            moved = motions[nodes[chosen]]
+            rows.append(np.einsum("ci,cik->ck", self.normal[chosen], moved))
+            rows.append(moved[self.mu[chosen] > 0].reshape(-1, motions.shape[2]))
+        return np.concatenate(rows)
+
+    def stopped(self, v: np.ndarray, inverse: np.ndarray) -> np.ndarray:
+        """Take from velocities (m, d) by what bodies approach or part where they are pressed.
+
+        Momentum is kept: `inverse` (m, d) are one over the masses, 0 where nodes are held.
+        """
+        return v + inverse * self._stopping(v, inverse, self._across()[self.pressed])
+
+    def accelerated(self, a: np.ndarray, v: np.ndarray, inverse: np.ndarray) -> np.ndarray:
+        """Add to accelerations (m, d) what contact does at the beginning of the step.
+
+        It stops those that approach where they touched, and all of those that stuck; others slide
+        with their velocities `v` (m, d).
+        """
+        B, touched, stuck = self._across(), self.touched(), self.touched(-1)
+        touched = touched & (B @ a.ravel() > 0)  # others are left to part
+        every = np.repeat(touched & stuck, self.d)
+        rows = sp.vstack([B[touched & ~stuck], self.jumps[every]]).tocsr()
+        forces = self._stopping(a, inverse, rows)
+        way = self.jump @ v
+        way -= (way * self.normal).sum(1)[:, None] * self.normal
+        way /= np.maximum(np.linalg.norm(way, axis=1), 1e-300)[:, None]
+        slides = touched & ~stuck & (self.mu > 0)
+        push = -(self.normal * (self.jump @ (inverse * forces))).sum(1)
+        bears = (self.jumps.multiply(self.jumps) @ inverse.ravel()).reshape(-1, self.d)
+        push /= np.maximum((self.normal**2 * bears).sum(1), 1e-300)
+        drag = np.where(slides, np.where(np.isinf(self.mu), 0, self.mu) * push, 0)[:, None] * way
+        return a + inverse * (forces - self.jump.T @ drag)
+
+    def _stopping(self, v: np.ndarray, inverse: np.ndarray, rows: sp.csr_matrix) -> np.ndarray:
+        """Find impulses (m, d) that stop what `rows` (r, m d) see of velocities (m, d)."""
+        seen = rows @ v.ravel()
+        if not np.any(seen):
+            return np.zeros_like(v)
+        W = rows @ sp.diags(inverse.ravel()) @ rows.T
+        W = W + sp.diags(1e-9 * W.diagonal() + 1e-300)
+        return -(rows.T @ np.atleast_1d(spsolve(W.tocsc(), seen))).reshape(v.shape)
+
+    def _across(self) -> sp.csr_matrix:
+        """Give the relative displacement along the normal by that of the nodes, (c, m d)."""
+        c, d = self.normal.shape
+        at = np.repeat(np.arange(c), d), np.arange(c * d)
+        return (sp.csr_matrix((self.normal.ravel(), at), (c, c * d)) @ self.jumps).tocsr()
+
+    def publish(self) -> None:
+        """Publish the forces on bodies, and remember where they touched; friction warms nodes."""
+        tag, values = self.tag, self.s.control.values
+        step = int(values[TIMESTEP]) + 1
+        x = np.zeros((len(self.first), 3))
+        x[:, : self.d] = self.equations.positions[self.first]
+        force = np.zeros_like(x)
+        force[:, : self.d] = self.on_second
+        loads = np.concatenate([force, np.cross(x, force)], 1)
+        for k, (slot, torque) in enumerate(zip(tag.slot, tag.torque, strict=True)):
+            total = loads[self.b == k].sum(0) - loads[self.a == k].sum(0)
+            values[slot : slot + 3], values[torque : torque + 3] = total[:3], total[3:]
+        for (a, b), slot in np.ndenumerate(tag.pair):
+            if slot >= 0:
+                one, other = (self.a == a) & (self.b == b), (self.a == b) & (self.b == a)
+                values[slot : slot + 3] = force[other].sum(0) - force[one].sum(0)
+        for source, copy in tag.copies:
+            values[copy : copy + 3] = values[source : source + 3]
+        tag.touched[self.pairs[:, 0], self.b] = np.where(
+            self.pressed, np.where(self.sticks, -step, step), 0
+        )
+        self._warm()
+
+    def _warm(self) -> None:
+        """Give the nodes the heat of friction, per mass, where there is room for it."""
+        heat = field(self.s.nodes.fields, FrictionalHeat)
+        if heat is None:
+            return
+        nodes, mass = self.equations.nodes, self.equations.mass
+        heat[nodes] = 0
+        work = (self.drag * self.slip).sum(1) * ~self.sticks
+        share = self.tag.warmth[self.a, self.b]
+        for at, part in ((self.first, share), (self.second, 1 - share)):
+            np.add.at(heat[:, 0], nodes[at], part * work / mass[at])
+
+
+def contact_of(equations: Equations, moduli: np.ndarray) -> Any:
+    """Find where bodies meet; None where they have no fields of their own."""
+    if not isinstance(equations.s.contact, SeparateFields):
+        return None
+    return Contact(equations, moduli)
