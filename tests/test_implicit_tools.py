@@ -180,3 +180,20 @@ def test_a_disk_slides_down(run_script):
     log_of = run_script(text, "-var", "mu", "0.1").log
     exact = 10 * (np.sin(np.pi / 6) - 0.1 * np.cos(np.pi / 6)) * 0.5
     assert log_of["v_x"][-1] == pytest.approx(exact, rel=0.01)
+
+
+def test_sliding_warms(run_script):
+    """What the top is pulled with, less what the block stores, is heat of friction."""
+    text = (INPUTS / "in.static_block").read_text()
+    text = text.replace(
+        "rubber, neo-hookean, 1000, E, 0)", "rubber, neo-hookean, 1000, E, 0, 10, 0)"
+    )
+    text = text.replace("x, y, s11, s22, s12)", "x, y, T, mass)")
+    text = text.replace("set_output(1)", "compute(Es, strain_energy, all)\nset_output(1)")
+    result = run_script(text.replace("shear, ratio", "shear, Es"))
+    last = result.snapshots("static_block")[-1]
+    shear, stored = result.log["shear"], result.log["Es"]
+    work = 1e-3 * np.sum((shear[5:] + shear[4:-1]) / 2) - (stored[-1] - stored[4])
+    heat = 10 * np.sum(last.mass * last.T)
+    # Loads of a step are those of its end: half a step of the ten is not known better.
+    assert heat == pytest.approx(work, rel=0.05) and heat > 5e-3

@@ -38,6 +38,8 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
         can(solid.material.law, constrained_velocity) for solid in hub.solids.values()
     ):
         yield "knows no heat that flows beside rigid solids", f"mechanical, or {_EXPLICIT}", None
+    if update.thermal and method.fields_per_solid:
+        yield "knows no heat that flows beside contact", f"mechanical, or {_EXPLICIT}", method.place
     if update.boundary == "reflect":
         yield "knows no walls that points bounce from", "fix velocity_nodes", None
     if hub.settings.precision != "double":
