@@ -144,16 +144,32 @@ def test_elements_outside_the_domain_are_left_out_with_a_warning(tmp_path):
         solid_of(path, 2, lo=5, hi=6)
 
 
+def test_shapes_may_be_mixed_and_of_higher_order(tmp_path):
+    """What Gmsh makes by recombination: volumes are those of the elements, by their corners."""
+    nodes = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0]], float)
+    middles = (nodes[[0, 1, 2, 3]] + nodes[[1, 2, 3, 0]]) / 2
+    of_triangle = (nodes[[1, 4, 2]] + nodes[[4, 2, 1]]) / 2
+    cells = {"quad8": [[0, 1, 2, 3, 5, 6, 7, 8]], "triangle6": [[1, 4, 2, 9, 10, 11]]}
+    high = write(tmp_path / "high.vtu", np.concatenate([nodes, middles, of_triangle]), cells)
+    plain = {"quad": [[0, 1, 2, 3]], "triangle": [[1, 4, 2]]}
+    for path in (high, write(tmp_path / "m.vtu", nodes, plain)):
+        hub, solid = solid_of(path, 2, lo=-1, hi=3)
+        np.testing.assert_allclose(solid.volume0, [1, 0.5])
+        np.testing.assert_allclose(solid.x0, [[0.5, 0.5], [4 / 3, 1 / 3]])
+        np.testing.assert_allclose([solid.lo, solid.hi], [[0, 0], [2, 1]])
+        np.testing.assert_allclose(solid.half_size, 0.5)
+        assert not hub.warnings
+
+
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
 
 
 @pytest.mark.parametrize(
     ("nodes", "cells", "says"),
     [
-        (SQUARE, {"triangle6": [[0, 1, 2, 3, 0, 1]]}, "elements of type triangle6"),
+        (SQUARE, {"polygon": [[0, 1, 2, 3]]}, "elements of type polygon"),
         (SQUARE, {"line": [[0, 1]]}, "does not fit 2D: it has elements of type line"),
         (SQUARE, {"tetra": [[0, 1, 2, 3]]}, "does not fit 2D: it has elements of type tetra"),
-        (SQUARE, {"quad": [[0, 1, 2, 3]], "triangle": [[0, 1, 2]]}, "have one shape"),
         (SQUARE, {"triangle": [[0, 1, 2], [0, 1, 1]]}, "element 2 of the 2 triangles with 3 nodes"),
         (SQUARE + [0, 0, 0.1], {"triangle": [[0, 1, 2]]}, "not lie in the plane z = 0"),
         (SQUARE[[0, 1, 3, 2]], {"quad": [[0, 1, 2, 3]]}, "has no volume"),

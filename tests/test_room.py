@@ -293,10 +293,10 @@ def test_check_needs_no_copy_and_says_what_is_free(small, tmp_path, capsys, monk
 
 
 def test_points_are_not_counted_to_the_end_where_none_fits(small, tmp_path, capsys, monkeypatch):
-    """In the plane a point has 44 bytes, whatever its law."""
+    """In the plane a point of this law has 64 bytes, whatever its fields."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "in.script").write_text(block(2, "run(1)"), encoding="utf-8")
-    small(44 * 10)
+    small(64 * 10)
     assert main(["in.script"]) == 1
     assert "more than 10 points" in capsys.readouterr().err
 

@@ -53,8 +53,8 @@ class MeshRegion(Enclosed):
     Notes
     -----
     Elements are lines in 1D, triangles and quadrilaterals in 2D, tetrahedra and hexahedra in 3D,
-    of first order; their faces belong to them. Faces of hexahedra that are not plane count as two
-    triangles. In 2D the mesh lies in the plane z = 0.
+    and those of higher order by their corners; their faces belong to them. Faces of hexahedra that
+    are not plane count as two triangles. In 2D the mesh lies in the plane z = 0.
 
     See Also
     --------
@@ -171,9 +171,10 @@ class MeshSolid(Solid):
 
     Notes
     -----
-    Elements are lines in 1D, triangles or quadrilaterals in 2D, tetrahedra or hexahedra in 3D, of
-    first order and of one shape; those of lower dimension are left out. In 2D the mesh lies in the
-    plane z = 0. Elements whose centroid lies outside the domain are left out, with a warning.
+    Elements are lines in 1D, triangles and quadrilaterals in 2D, tetrahedra and hexahedra in 3D;
+    those of lower dimension are left out. Elements of higher order count by their corners, with
+    straight edges. The cpdi methods take elements of one shape. In 2D the mesh lies in the plane
+    z = 0. Elements whose centroid lies outside the domain are left out, with a warning.
 
     See Also
     --------
@@ -200,29 +201,27 @@ class MeshSolid(Solid):
         parts = elements_of(
             read(file, domain.dimension, hub.settings.trusts), domain.dimension, group
         )
-        if len(parts) > 1:
-            both = " and ".join(part.shape.words for part in parts)
-            raise ScriptError(
-                f"the mesh has {both}; the points of a solid have one shape",
-                argument="file",
-                expected="elements of one shape",
-                hint="a physical group for each shape, and a solid for each group: group=...",
-            )
-        elements, volume, centroid = measured(parts[0])
-        kept = domain.contains(centroid)
-        corners = elements.corners[kept]
-        reach = corners if len(corners) else elements.corners
+        found = [measured(part) for part in parts]
+        inside = [domain.contains(centroid) for _, _, centroid in found]
+        corners = [part.corners[kept] for (part, _, _), kept in zip(found, inside, strict=True)]
+        volume, centroid = (np.concatenate(of) for of in list(zip(*found, strict=True))[1:])
+        kept = np.concatenate(inside)
+        reach = np.concatenate(
+            [x.reshape(-1, domain.dimension) for x in corners if len(x)]
+            or [part.corners[:, 0] for part, _, _ in found]
+        )
+        mixed = len(found) > 1
         self.put(
             hub,
             Placement(
                 x0=centroid[kept],
                 volume=volume[kept],
-                half_size=np.ptp(corners, axis=1) / 2,
-                lo=reach.min(axis=(0, 1)),
-                hi=reach.max(axis=(0, 1)),
+                half_size=np.concatenate([np.ptp(x, axis=1) for x in corners]) / 2,
+                lo=reach.min(axis=0),
+                hi=reach.max(axis=0),
                 outside=int(np.count_nonzero(~kept)),
-                shape=elements.shape.name,
-                corners=corners,
+                shape="several shapes" if mixed else found[0][0].shape.name,
+                corners=None if mixed else corners[0],
             ),
         )
 

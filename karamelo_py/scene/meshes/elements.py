@@ -1,4 +1,4 @@
-"""First-order elements: which are known, their volumes and centroids, their orientation."""
+"""Elements by their corners: which are known, their volumes and centroids, their orientation."""
 
 from __future__ import annotations
 
@@ -44,6 +44,15 @@ SHAPES = {
 }
 
 
+# Elements of higher order begin with the corners of these.
+OF_HIGHER_ORDER = {
+    "line3": "line", "line4": "line", "triangle6": "triangle", "triangle7": "triangle",
+    "triangle10": "triangle", "quad8": "quad", "quad9": "quad", "quad16": "quad",
+    "tetra10": "tetra", "tetra20": "tetra", "hexahedron20": "hexahedron",
+    "hexahedron24": "hexahedron", "hexahedron27": "hexahedron",
+}  # fmt: skip
+
+
 class MeshElements(NamedTuple):
     """Elements of one shape."""
 
@@ -77,14 +86,14 @@ def elements_of(
             argument="file" if group is None else "group",
             expected=_accepted(dimension),
         )
-    wanted = [(name, nodes) for name, d, nodes in cells if d == highest]
+    wanted = [_by_corners(name, nodes) for name, d, nodes in cells if d == highest]
     for name, _ in wanted:
         if name not in SHAPES:
             raise ScriptError(
                 f"{of} has elements of type {name}",
                 argument="file",
                 expected=_accepted(highest),
-                hint="first-order elements: in Gmsh, Mesh.ElementOrder = 1",
+                hint="in Gmsh, Mesh.ElementOrder = 1",
             )
     positions = np.zeros((len(mesh.points), 3))
     positions[:, : mesh.points.shape[1]] = mesh.points
@@ -96,6 +105,13 @@ def elements_of(
         numbers = _once(np.concatenate([nodes for other, nodes in wanted if other == name]))
         found.append(MeshElements(SHAPES[name], numbers, positions[numbers]))
     return found
+
+
+def _by_corners(name: str, nodes: np.ndarray) -> tuple[str, np.ndarray]:
+    """The elements with their corners alone: type and nodes (n, c)."""
+    name = OF_HIGHER_ORDER.get(name, name)
+    shape = SHAPES.get(name)
+    return name, nodes if shape is None else nodes[:, : len(shape.mirrored)]
 
 
 def _once(numbers: np.ndarray) -> np.ndarray:
