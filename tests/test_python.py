@@ -164,6 +164,46 @@ def test_what_is_assigned_is_done_or_refused(interpreted, tmp_path):
     assert (tmp_path / "shown.png").read_bytes()[1:4] == b"PNG"
 
 
+def test_points_from_arrays_and_files(interpreted):
+    """Those of a solid of a region, given one by one, with what they begin with: the same bits."""
+    interpreted("""
+        import numpy as np
+        import pandas
+        import pytest
+        text = SCENE.replace("neo-hookean", "linear")
+        region = Simulation(text)
+        made = text.replace("solid(", "#").replace("fix(v", "#").replace("compute(", "#")
+        made = made.replace("log_modify(", "#")
+        columns = {name: region.points[name] for name in ("x", "y", "volume")}
+        columns |= {"vx": np.sin(9 * columns["x"]), "vy": np.full(24, 0.1)}
+        pandas.DataFrame(columns).to_csv("grains.csv", index=False, float_format="%.17g")
+        region.run(5)
+        for given in (columns, pandas.DataFrame(columns), "grains.csv"):
+            sim = Simulation(made)
+            sim.solid("body", "points", given, "rubber", 0.1)
+            assert (sim.points["vx"] == columns["vx"]).all()
+            sim.run(5)
+            for name in ("x", "vy", "s11", "mass"):
+                np.testing.assert_allclose(sim.points[name], region.points[name], rtol=1e-12,
+                                           atol=1e-14)
+        bent = Simulation(made)
+        bent.solid("body", "points", columns | {"s12": columns["x"]}, "rubber", 0.1)
+        np.testing.assert_allclose(bent.points["s12"], columns["x"])
+        for wrong, says in (
+            ({"volume": np.zeros(24)}, "point 1 of the table has no place, or no volume above 0"),
+            ({"volume": np.ones(3)}, "has columns of several lengths"),
+            ({"x": np.full(24, 9.0)}, "all of them lie outside the domain"),
+            ({"seq": np.ones(24)}, "'seq' cannot be set: it follows from other columns"),
+        ):
+            sim = Simulation(made)
+            with pytest.raises(SimulationError, match=says):
+                sim.solid("body", "points", columns | wrong, "rubber", 0.1)
+                sim.run(1)
+        with pytest.raises(SimulationError, match="has no column volume"):
+            Simulation(made).solid("body", "points", {"x": [1.0], "y": [1.0]}, "rubber", 0.1)
+    """)
+
+
 def test_functions_in_python(interpreted):
     """A force of the weight is the weight; a velocity that nodes are given is kept."""
     interpreted("""

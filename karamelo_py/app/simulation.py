@@ -203,7 +203,8 @@ class Simulation:
     Every command of scripts is a method with the same arguments: ``sim.solid("body", "region",
     "box", 2, "rubber", 0.1, 0)`` is the line ``solid(body, region, box, 2, rubber, 0.1, 0)``. Texts
     stand for what a script would say, names and formulas; numbers, True and False, and None (NULL)
-    are what they are; ``sim.fix(ID, "python", group, function)`` takes a function.
+    are what they are; ``sim.fix(ID, "python", group, function)`` takes a function,
+    ``sim.solid(ID, "points", columns, ...)`` arrays by name, or a DataFrame.
 
     Several simulations may live side by side and take turns; they do not run at the same time.
 
@@ -344,6 +345,10 @@ class Simulation:
         if callable(value) and not isinstance(value, type):
             name = f"{getattr(value, '__name__', 'function').strip('<>')}_{next(self._numbers)}"
             self.hub.functions[name] = value
+            return name
+        if isinstance(value, Mapping) or hasattr(value, "to_dict"):
+            name = f"table_{next(self._numbers)}"
+            self.hub.functions[name] = {column: np.array(value[column]) for column in value}
             return name
         return _as_script_text(value)
 

@@ -28,6 +28,7 @@ from karamelo_py.run.mpi.subdomain import Subdomain
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.views import set_columns
 
 TAKEN_ALONG = ("mass", "kinetic", "stored", "dissipated")  # by points that are deleted
 
@@ -92,6 +93,10 @@ class SceneArrays:
         self.told_of_growth = False  # since the balance of energy is followed
         self.told_of_loss = False
         self.mapped = False  # whether the nodes show a state of this simulation
+        for solid in hub.solids.values():
+            if solid.initial and (state is None or solid.first_id >= state.count):
+                ids = np.arange(solid.first_id, solid.first_id + solid.count)
+                set_columns(self, solid.initial, ids, solid.place)
 
     def fits(self, hub: Hub) -> bool:
         return self.key == scene_key(hub)

@@ -63,6 +63,7 @@ class Solid(Named):
             )
         self._compare_temperatures(hub)
         self.index = len(hub.solids)
+        self.initial: dict[str, np.ndarray] = {}  # columns (n,) that its points begin with
         # From 0; ids of points are such numbers plus 1.
         self.first_id = sum(other.count for other in hub.solids.values())
 

@@ -30,7 +30,7 @@ from karamelo_py.output.point_table import (
 )
 from karamelo_py.points.laws import can, with_stress
 from karamelo_py.points.transfers import Moment
-from karamelo_py.script.errors import NoItem, ScriptError, nearest
+from karamelo_py.script.errors import NoItem, Place, ScriptError, nearest
 
 
 class Shown:
@@ -442,7 +442,12 @@ class PointsView(View):
         return places_before(self._simulation.hub, self.ids)
 
 
-def set_columns(simulation: Any, given: Mapping[str, Any], ids: np.ndarray | None = None) -> None:
+def set_columns(
+    simulation: Any,
+    given: Mapping[str, Any],
+    ids: np.ndarray | None = None,
+    place: Place | None = None,
+) -> None:
     """Set columns of points (of these ids from 0, or all of the scene) between two steps.
 
     Values are numbers, or one for each point.
@@ -457,12 +462,19 @@ def set_columns(simulation: Any, given: Mapping[str, Any], ids: np.ndarray | Non
     view = PointsView(simulation, ids[present[ids]], then=False)
     for name, values in given.items():
         array = np.asarray(values, float)
+        what = ""
         if array.shape not in ((), ids.shape):
-            raise ScriptError(f"'{name}' is a number, or one for each of {len(ids)} points, not an "
-                              f"array of the shape {array.shape}")  # fmt: skip
-        if not np.isfinite(array).all():
-            raise ScriptError(f"'{name}' has numbers that are not finite")
-        view.set_column(name, np.broadcast_to(array, ids.shape)[present[ids]])
+            what = f"is a number, or one for each of {len(ids)} points, not an array of the shape "
+            what += str(array.shape)
+        elif not np.isfinite(array).all():
+            what = "has numbers that are not finite"
+        if what:
+            raise ScriptError(f"'{name}' {what}", place=place)
+        try:
+            view.set_column(name, np.broadcast_to(array, ids.shape)[present[ids]])
+        except ScriptError as error:
+            error.place = error.place or place
+            raise
     if view.moved:
         simulation.control.clock[0].drift = np.inf
     simulation.changed()

@@ -1,20 +1,24 @@
-"""Solid style region."""
+"""Solid styles region and points."""
 
 from functools import partial
 from typing import Annotated, Literal
 
+import numpy as np
+
 from karamelo_py.compiler.tuples import count_in
 from karamelo_py.kernels.laws import law_on
 from karamelo_py.language.signature import AtLeast, Positive
+from karamelo_py.output.point_table import AXES
 from karamelo_py.points.kinematics import KINEMATICS
 from karamelo_py.points.laws import initial_state
 from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.machine_memory import most_points
 from karamelo_py.scene.material import Material
-from karamelo_py.scene.placement import fill, lattice_of
+from karamelo_py.scene.placement import Placement, fill, lattice_of
 from karamelo_py.scene.region import Region
 from karamelo_py.scene.solid import Solid, own_grids
+from karamelo_py.scene.tables import Table
 from karamelo_py.script.errors import ScriptError
 
 MANY = 10  # points a cell and direction that nobody needs
@@ -126,3 +130,90 @@ class RegionSolid(Solid):
             f"a region that holds points of the grid with cell size {self.h:g} and "
             f"{self.ppc} per cell and direction, inside the domain"
         )
+
+
+class PointsSolid(Solid):
+    """A body of points that a file or a program in Python gives, with what they begin with.
+
+    Parameters
+    ----------
+    table
+        Name of a file of columns of numbers with a row of names: ``x``, ``y``, ``z`` (as many as
+        there are dimensions), ``volume`` (in the plane for a thickness of 1, in an axisymmetric
+        domain the area in the plane), and perhaps velocities (``vx`` ...) and Cauchy stresses
+        (``s11`` ..., of materials in rate form). In Python a dictionary of arrays, or a DataFrame.
+    GlueToSolid
+        As in solid region.
+
+    Example
+    -------
+    solid(grains, points, grains.csv, sand, 0.1)
+
+    Notes
+    -----
+    Each point stands for a square or cube of its volume, where the basis has domains around points.
+    The cpdi methods take none: their domains tile a body.
+
+    See Also
+    --------
+    region, mesh, fix initial_velocity_particles
+    """
+
+    syntax = "file, material, h[, T0][, GlueToSolid=solidID]"
+    source = "table"
+
+    def __init__(
+        self,
+        hub: Hub,
+        table: Table,
+        material: Material,
+        h: Annotated[float, Positive],
+        T0: float | None = None,
+        *,
+        GlueToSolid: Solid | None = None,
+    ):
+        domain = require_domain(hub)
+        super().__init__(hub, material, h, T0, GlueToSolid)
+        self.table, d = table.name, domain.dimension
+        columns, lengths = dict(table.columns), {np.shape(of) for of in table.columns.values()}
+        missing = [name for name in (*AXES[:d], "volume") if name not in columns]
+        if missing or len(lengths) > 1 or len(next(iter(lengths), ())) != 1:
+            what = f"has no column {missing[0]}" if missing else "has columns of several lengths"
+            raise ScriptError(
+                f"{self.table} {what}",
+                argument="table",
+                expected=f"columns {', '.join(AXES[:d])}, volume, and perhaps vx ..., s11 ...",
+            )
+        x = np.column_stack([columns.pop(axis) for axis in AXES[:d]])
+        volume = columns.pop("volume")
+        wrong = ~(np.isfinite(x).all(axis=1) & (volume > 0) & np.isfinite(volume))
+        if wrong.any():
+            raise ScriptError(
+                f"point {np.argmax(wrong) + 1} of {self.table} has no place, or no volume above 0",
+                argument="table",
+            )
+        half = volume[:, None] ** (1 / d) / 2 * np.ones(d)
+        kept = domain.contains(x)
+        self.initial = {name: of[kept] for name, of in columns.items()}
+        near, size = (x[kept], half[kept]) if kept.any() else (x, half)
+        self.put(
+            hub,
+            Placement(
+                x[kept],
+                volume[kept],
+                half[kept],
+                (near - size).min(axis=0, initial=np.inf),
+                (near + size).max(axis=0, initial=-np.inf),
+                int(np.count_nonzero(~kept)),
+                "points",
+            ),
+        )
+
+    def described(self) -> str:
+        return f"table '{self.table}'"
+
+    def why_empty(self) -> str:
+        return f"{self.described()} has no rows"
+
+    def wanted(self) -> str:
+        return "points inside the domain, in the lengths of the script"

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import re
-from math import inf, isnan
-from pathlib import Path
+from math import inf
 from typing import Any, Literal
 
 import numpy as np
@@ -17,9 +15,9 @@ from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.group import ALL, ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Compute
+from karamelo_py.scene.tables import read_table
 from karamelo_py.script.errors import ScriptError, nearest, unknown
 from karamelo_py.script.expressions import Expression
-from karamelo_py.script.terms import number_of
 
 VECTORS = {"displacement": "u", "velocity": "v"}
 TENSORS = {"stress": "s", "strain": "e"}
@@ -228,37 +226,6 @@ class Error(Compared, Compute):
             exact = formula.evaluate_points(self.hub.values, x, x0)
             squares += weight * np.stack([column(points, name) - exact, exact]) ** 2
         return np.sqrt(squares), points.reference_volume
-
-
-def read_table(path: Path) -> dict[str, np.ndarray]:
-    """The columns of a file of numbers, by the names in its first row (or "1", "2", ...).
-
-    Numbers are separated by commas, semicolons or blanks; a line that begins with # is a comment.
-    """
-    rows = []
-    for number, line in enumerate(path.read_text(encoding="utf-8-sig").splitlines(), 1):
-        if line.strip() and not line.lstrip().startswith("#"):
-            cells = re.split(r"\s*[,;\t]\s*" if re.search("[,;\t]", line) else r"\s+", line.strip())
-            rows.append((number, [cell.strip('" ') for cell in cells]))
-    if not rows:
-        raise ScriptError(f"{path} has no rows", expected="columns of numbers", argument="file")
-    names = rows[0][1]
-    if any(number_of(cell) is not None for cell in names):
-        names = [str(k + 1) for k in range(len(names))]
-    else:
-        rows = rows[1:]
-    table = []
-    for number, cells in rows:
-        values = [number_of(cell) for cell in cells]
-        if len(values) != len(names) or None in values or any(map(isnan, values)):
-            raise ScriptError(
-                f"line {number} of {path}: {' '.join(cells)}",
-                expected=f"{len(names)} numbers: {', '.join(names)}",
-                argument="file",
-            )
-        table.append(values)
-    columns = np.array(table, float).reshape(-1, len(names)).T
-    return dict(zip(names, columns, strict=True))
 
 
 class GroupOrValue:

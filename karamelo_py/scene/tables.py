@@ -1,0 +1,66 @@
+"""Tables of numbers that users bring: files of columns, or arrays of a program in Python."""
+
+import re
+from collections.abc import Mapping
+from math import isnan
+from pathlib import Path
+
+import numpy as np
+
+from karamelo_py.language.kinds import TableFile
+from karamelo_py.language.scene import Scene
+from karamelo_py.language.signature import Argument
+from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.terms import number_of
+
+
+class Table:
+    """For signatures: columns by name, of a file or of arrays that a program has given."""
+
+    script_kind = "the name of a file of columns"
+
+    def __init__(self, name: str, columns: Mapping[str, np.ndarray]):
+        self.name = name
+        self.columns = columns
+
+    @classmethod
+    def from_script(cls, hub: Scene, argument: Argument) -> "Table":
+        """Read the file, or take what `Simulation` has been given."""
+        given = hub.functions.get(argument.text)
+        if isinstance(given, Mapping):
+            return cls(
+                "the table", {str(name): np.asarray(of, float) for name, of in given.items()}
+            )
+        path = TableFile.from_script(hub, argument)
+        return cls(str(path), read_table(path))
+
+
+def read_table(path: Path) -> dict[str, np.ndarray]:
+    """The columns of a file of numbers, by the names in its first row (or "1", "2", ...).
+
+    Numbers are separated by commas, semicolons or blanks; a line that begins with # is a comment.
+    """
+    rows = []
+    for number, line in enumerate(path.read_text(encoding="utf-8-sig").splitlines(), 1):
+        if line.strip() and not line.lstrip().startswith("#"):
+            cells = re.split(r"\s*[,;\t]\s*" if re.search("[,;\t]", line) else r"\s+", line.strip())
+            rows.append((number, [cell.strip('" ') for cell in cells]))
+    if not rows:
+        raise ScriptError(f"{path} has no rows", expected="columns of numbers", argument="file")
+    names = rows[0][1]
+    if any(number_of(cell) is not None for cell in names):
+        names = [str(k + 1) for k in range(len(names))]
+    else:
+        rows = rows[1:]
+    table = []
+    for number, cells in rows:
+        values = [number_of(cell) for cell in cells]
+        if len(values) != len(names) or None in values or any(map(isnan, values)):
+            raise ScriptError(
+                f"line {number} of {path}: {' '.join(cells)}",
+                expected=f"{len(names)} numbers: {', '.join(names)}",
+                argument="file",
+            )
+        table.append(values)
+    columns = np.array(table, float).reshape(-1, len(names)).T
+    return dict(zip(names, columns, strict=True))
