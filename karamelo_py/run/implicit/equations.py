@@ -38,6 +38,21 @@ from karamelo_py.points.laws.rigid import Rigid
 from karamelo_py.run.implicit.averaging import AveragedVolumes
 from karamelo_py.run.implicit.solvers import rigid_motions
 
+# What is known of a step before where the first are the same.
+FOLLOWED, FOLLOWING = ("nodes", "deforming"), ("positions", "rigid_motions", "ghost")
+
+
+def distinct(numbers: list[np.ndarray]) -> np.ndarray:
+    """List the different numbers in arrays of them, in their order."""
+    numbers = [array for array in numbers if array.size]
+    if not numbers:
+        return np.zeros(0, np.int64)
+    low = min(int(array.min()) for array in numbers)
+    there = np.zeros(max(int(array.max()) for array in numbers) - low + 1, bool)
+    for array in numbers:
+        there[array - low] = True
+    return np.flatnonzero(there) + low
+
 
 class Equations:
     """Forces at the nodes that a scene uses in a step, and their derivatives.
@@ -48,6 +63,8 @@ class Equations:
         The arrays of the scene, with the masses of the step at the nodes.
     mode
         One thread, or several.
+    known
+        What those of the step before give (`known`), or nothing.
 
     Attributes
     ----------
@@ -65,17 +82,19 @@ class Equations:
         (m,) which of them see rigid points, and the velocities (m, d) that they have from these.
     """
 
-    def __init__(self, s: Setup, mode: Any):
+    def __init__(self, s: Setup, mode: Any, known: dict[str, Any]):
         self.s, self.mode, self.d = s, mode, s.kin.dimension
         self.blocks = [block for block in s.blocks if not isinstance(block.laws, Rigid)]
         self.parts = [self._seen(block) for block in self.blocks]
         # Gradients of points on a line between cells reach nodes where they have no weight.
         given = [self._counts(seen) for seen, _ in self.parts]
         counts = [seen.nodes[own] for (seen, _), own in zip(self.parts, given, strict=True)]
-        soft = np.unique(np.concatenate(counts)) if counts else np.zeros(0, np.int64)
+        soft = distinct(counts)
         tools = [(b, self._seen(b)[0]) for b in s.blocks if isinstance(b.laws, Rigid)]
         counts += [seen.nodes[seen.weights > 0] for _, seen in tools]
-        self.nodes = np.unique(np.concatenate(counts))
+        self.nodes = distinct(counts)
+        self.numbers = np.full(np.ptp(self.nodes) + 1, -1)
+        self.numbers[self.nodes - self.nodes[0]] = np.arange(len(self.nodes))
         self.mass = s.nodes.sums[self.nodes, MASS].astype(float)
         self.places = self._places()
         self.parts = [
@@ -87,6 +106,12 @@ class Equations:
         self.led, self.velocity_of_rigid = self._led(tools)
         self._find_pairs()
         self.averaged = AveragedVolumes(self) if isinstance(s.averaging, FBar) else None
+        if all(np.array_equal(vars(self)[name], known.get(name)) for name in FOLLOWED):
+            vars(self).update(known)
+
+    def known(self) -> dict[str, Any]:
+        """Give what follows from the nodes alone, and what it follows from, for steps to come."""
+        return {name: vars(self)[name] for name in (*FOLLOWED, *FOLLOWING) if name in vars(self)}
 
     def _places(self) -> np.ndarray:
         """Count the places of the nodes along each direction of their grid."""
@@ -165,8 +190,9 @@ class Equations:
 
     def number_of(self, nodes: np.ndarray) -> np.ndarray:
         """Find the numbers of nodes among the unknown ones; -1 of others."""
-        at = np.minimum(np.searchsorted(self.nodes, nodes), len(self.nodes) - 1)
-        return np.where(self.nodes[at] == nodes, at, -1)
+        at = nodes - self.nodes[0]
+        inside = (at >= 0) & (at < len(self.numbers))
+        return np.where(inside, self.numbers[np.where(inside, at, 0)], -1)
 
     def bodies(self) -> np.ndarray:
         """Number (m,) the bodies that nodes belong to: pieces that points connect."""
@@ -297,6 +323,7 @@ class Equations:
         per = np.where(of_grids[1] > 0, of_grids[1], 1.0)
         return (total / volume if volume else 0.0), of_grids[0] / per
 
+    @cached_property
     def ghost(self) -> sp.csr_matrix:
         """Make the matrix (m, m) that penalises jumps of the gradient at the border of bodies.
 

@@ -39,6 +39,7 @@ class LoadSteps:
         self.scheme = simulation.hub.update.scheme
         self.dynamic = self.scheme.inertia
         self.modulus, self.moduli = 0.0, np.zeros(0)
+        self.known: dict[str, Any] = {}  # of the last equations
         self.within = False  # whether a part of a step has been done
         self.failure = ""  # why a step has no equilibrium
         self.unknowns = self.corrections = 0  # of the last equilibrium; so far
@@ -180,7 +181,7 @@ class LoadSteps:
         """
         s = self.simulation.setup
         with counted(self.seconds, "layout"):
-            equations = Equations(s, self.simulation.mode)
+            equations = Equations(s, self.simulation.mode, self.known)
         nodes = equations.nodes
         external = after[nodes] + equations.present_forces()
         fixed, prescribed = self._prescribed(equations, hooks)
@@ -209,6 +210,7 @@ class LoadSteps:
             where = ", ".join(f"{x:.4g}" for x in equations.positions[reason.node])
             solid = self._solid_at(equations, chosen)
             raise Failed(f"{reason}: nothing holds solid '{solid}' near ({where})") from None
+        self.known = equations.known()
         self.unknowns = int(np.count_nonzero(~given))
         self.corrections += iterations
         reaction = newton.reaction(u)

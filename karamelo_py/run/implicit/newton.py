@@ -104,7 +104,7 @@ class Newton:
         """Tell the stiffness of the bodies; a share of it penalises jumps at their border."""
         self.floor = 1e-9 * modulus * self.spacing ** (self.equations.d - 1)
         if stabilisation * modulus:
-            self.ghost = stabilisation * modulus * self.equations.ghost()
+            self.ghost = stabilisation * modulus * self.equations.ghost
             free = self.free.ravel()
             self.ghost_of_free = self.equations.for_all_components(self.ghost)[free][:, free]
 
