@@ -210,6 +210,42 @@ def test_drained_triaxial(run_script):
     assert table["q"][-1] == pytest.approx(1.2 * table["p"][-1], rel=2e-3)
 
 
+SQUEEZED = """
+    method(tlmpm, FLIP, linear, 1)
+    scheme(quasi-static)
+    dimension(2, 0, 1.4, 0, 1, 0.1)
+    region(box, block, 0, 1, 0, 1)
+    material(clay, cam-clay, 1, 40, 1.2, 0.1, 0.02, 1, pc=2)
+    solid(s, region, box, 2, clay, 0.1, 0)
+    region(left, block, -INF, 1e-6, -INF, INF)
+    region(right, block, 1-1e-6, INF, -INF, INF)
+    region(everywhere, block, -INF, INF, -INF, INF)
+    group(left, nodes, region, left, all)
+    group(right, nodes, region, right, all)
+    group(everywhere, nodes, region, everywhere, all)
+    fix(flat, velocity_nodes, everywhere, NULL, 0)
+    fix(hold, velocity_nodes, left, 0, NULL)
+    fix(push, velocity_nodes, right, -0.02, NULL)
+    set_output(1)
+    log_modify(custom, step, time, iterations, push_x)
+    run(5)
+"""
+
+
+def test_clay_in_load_steps(run_script):
+    """Oedometer: the force is that of the law at one point, P = tau/F, found in few corrections."""
+    log_of = run_script(SQUEEZED).log
+    law = CamClay.given(1.0, 40.0, 1.2, 0.1, 0.02, 1.0, pc=2.0)
+    kin, F = PlaneStrain(), 1.0
+    state = initial_state(law, kin, 1.0)
+    for step in range(1, 6):
+        state = after(law, kin, state, np.diag([-0.02 / F, 0, 0]), far=False)
+        F -= 0.02
+        force = stress(law, kin, state)[0, 0] * jacobian(law, kin, state) / F
+        assert log_of["push_x"][step] == pytest.approx(force, rel=1e-7)
+    assert state.ep > 0.02 and max(log_of["iterations"]) <= 6
+
+
 WRONG = [
     ("1800, 4e6, 1.2, 0.1, 0.2, 100e3", "swelling is as soft"),
     ("1800, 4e6, 1.2, 0.1, 0.02, 100e3, pc=50e3", "below the pressure"),

@@ -216,12 +216,16 @@ def plastic_flow(law, q, p, pc):
 @implements(plastic_flow, Dual)
 def _plastic_flow_slopes(law, q, p, pc):
     # What is left stays 0: a correction by its slopes gives those of y and w.
-    plain = value_of((q, p, pc))
-    y, w = plastic_flow(law, *plain)
+    q0, p0, pc0 = value_of((q, p, pc))
+    y, w = plastic_flow(law, q0, p0, pc0)
+    yields = w > 0
     f, g = unbalanced(law, q, p, pc, y, w)
-    found = zip((y, w), corrections(law, *plain, y, w, f, g), strict=True)
+    found = corrections(law, where(yields, q0, law.M * pc0), p0, pc0, y, w, f, g)
     return tuple(
-        [Dual(x, tuple([where(w > 0, s, 0) for s in change.slopes])) for x, change in found]
+        [
+            Dual(x, tuple([where(yields, s, 0) for s in change.slopes]))
+            for x, change in zip((y, w), found, strict=True)
+        ]
     )
 
 
