@@ -273,10 +273,10 @@ def test_exterior_fills_the_rest_of_the_domain():
 
 def test_points_outside_the_domain_are_left_out_with_a_warning():
     hub = SmallHub(2, 0, 1, 0.1)
-    solid = hub.solid("s", hub.region("r", BlockRegion, 0.8, 1.2, -0.2, 0.2))
+    solid = hub.solid("s", hub.region("r", BlockRegion, 0.8, 1.3, -0.3, 0.2))
     assert solid.count == 16
     assert solid.x0.max() < 1
-    assert hub.warnings == ["48 points of region 'r' outside the domain left out of the solid"]
+    assert hub.warnings == ["84 points of region 'r' outside the domain left out of the solid"]
 
 
 def test_a_huge_region_is_not_walked_through():
@@ -455,3 +455,13 @@ def test_placing_a_million_points_is_quick_and_lean():
     assert solid.count == 1_000_000
     # The points once in chunks and once in one piece, and some chunks of work.
     assert peak < 3 * solid.x0.nbytes + 40e6
+
+
+def test_the_mirror_image_beyond_a_side_is_not_missed():
+    """A quarter of a disk about the corner of the domain, and a half one about a side."""
+    hub = SmallHub(2, 0, 1, 0.1)
+    hub.solid("a", hub.region("r", Cylinder, 0, 0, 0.4))
+    hub.solid("b", hub.region("s", Cylinder, 0.6, 1, 0.3))
+    assert not hub.warnings
+    hub.solid("c", hub.region("t", Cylinder, 0.9, 0.5, 0.2))
+    assert len(hub.warnings) == 1

@@ -214,17 +214,19 @@ def fill(
         raise ScriptError(
             f"about {inner:.3g} points would be needed", expected=f"at most {MAX_POINTS}"
         )
-    # Beyond an axis lies the mirror image of what is there.
-    near = np.where(domain.axisymmetric & (np.arange(dimension) == 0), np.maximum(lo, 0), lo)
-    reaches_out = (near < domain.lo[used] - domain.tolerance) & np.isfinite(lo)
-    reaches_out |= (hi > domain.hi[used] + domain.tolerance) & np.isfinite(hi)
+    # Beyond an axis, or a side that the region lies evenly about, is the mirror image of the rest.
+    ends = domain.lo[used], domain.hi[used]
+    with np.errstate(invalid="ignore"):  # of open sides
+        at_side = [np.abs((lo + hi) / 2 - end) <= domain.tolerance for end in ends]
+    at_side[0] |= domain.axisymmetric & (np.arange(dimension) == 0)
+    reaches_out = (lo < ends[0] - domain.tolerance) & np.isfinite(lo) & ~at_side[0]
+    reaches_out |= (hi > ends[1] + domain.tolerance) & np.isfinite(hi) & ~at_side[1]
     whole = math.prod(np.maximum(last - first + 1, 0).tolist()) * float(ppc) ** dimension
     counted = reaches_out.any() and whole <= max(_MAX_COUNTED, 4 * inner)
     if not counted:
         first, last = inner_first, inner_last
-    open_lo = np.where(np.isinf(lo), domain.lo[used] - domain.tolerance, -np.inf)
-    open_lo = np.where(near > lo, 0.0, open_lo)
-    open_hi = np.where(np.isinf(hi), domain.hi[used] + domain.tolerance, np.inf)
+    open_lo = np.where(np.isinf(lo) | at_side[0], ends[0] - domain.tolerance, -np.inf)
+    open_hi = np.where(np.isinf(hi) | at_side[1], ends[1] + domain.tolerance, np.inf)
 
     places, sizes = (of_unit * h for of_unit in cell_pattern(ppc, dimension, rule))
     even = sizes.ndim == 1

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Literal, NamedTuple
 
 from karamelo_py.compiler.compile import where
 from karamelo_py.language.arguments import Argument, look_up
-from karamelo_py.language.rules import suggestion
+from karamelo_py.language.rules import known_failure, suggestion
 from karamelo_py.language.scene import Scene
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, det, dev, nothing, sym, symmetric_tensor, tr, von_mises
@@ -192,6 +192,35 @@ suggestion(
     when=_idle_heat,
     cost="the temperature of material {owner.id} changes nothing but its column T",
     instead="leave the temperature out",
+)
+
+
+# --- shocks in gases ------------------------------------------------------------------------------
+
+
+def _supersonic(law, scene):
+    return can(law, eos.taken_heat) and scene.speed > 1
+
+
+known_failure(
+    EosStrength,
+    "shocks of material '{owner.id}'",
+    when=lambda law, scene: (
+        _supersonic(law, scene) and isinstance(law.viscosity, Absent) and scene.kept > 0.9
+    ),
+    reason="points move at {scene.speed:.2g} times the speed of sound, and with "
+    "{scene.transfer_name} and no artificial viscosity nothing makes a shock: gas that runs "
+    "together goes through itself",
+    cure="Q1=2, Q2=0.2 in eos ideal-gas, or TPIC with quadratic-spline",
+)
+known_failure(
+    EosStrength,
+    "wall heating in material '{owner.id}'",
+    when=lambda law, scene: _supersonic(law, scene) and not isinstance(law.viscosity, Absent),
+    reason="artificial viscosity heats a gas that runs against a wall, an axis or a point too much "
+    "at first: there its density stays too low, about a point by half four cells from it and by a "
+    "quarter ten cells from it, with any basis, transfer and step",
+    cure="finer cells, or TPIC with quadratic-spline, dt_factor(0.1), and no Q1 and Q2",
 )
 
 
