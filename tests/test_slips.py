@@ -99,3 +99,14 @@ def test_points_without_memory_are_not_counted():
     with pytest.raises(ScriptError, match=r"the scene has more than 4e\+07 points"):
         fill(disk, hub.domain, lattice, 2, room=lambda: 4e7)
     assert sum(looked) == SAMPLE
+
+
+def test_a_variable_wins_over_a_first_coordinate(run_interpreted):
+    """As in a script of Karamelo, whose FSI example says x0 = l0; it is told."""
+    fix = "fix(v, initial_velocity_particles, all, {}, 0)\ncompute(v, average_velocity, all)"
+    tail = ["log_modify(custom, v_x)", "set_dt(1e-9)", "run(1)"]
+    named = run_interpreted("l0 = 3\nx0 = l0\n" + block(2, fix.format("2*x0"), *tail))
+    assert "'x0' is a coordinate of points before the first step, too; from here on" in named.err
+    assert named.log.v_x[0] == 6
+    other = run_interpreted("l0 = 3\n" + block(2, fix.format("2*x0"), *tail))
+    assert "warning" not in other.err and 0.6 < other.log.v_x[0] < 1.2

@@ -22,7 +22,7 @@ from karamelo_py.language.unknown import (
 )
 from karamelo_py.script import evaluation, syntax
 from karamelo_py.script.errors import Pause, Place, Quit, ScriptError
-from karamelo_py.script.expressions import SEEDS, Expression, Value
+from karamelo_py.script.expressions import FIRST, SEEDS, Expression, Value
 from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, WORDS
 from karamelo_py.script.parser import parse, parse_expression, read_script
 
@@ -272,6 +272,9 @@ class Interpreter:
                 kind = "function" if name in FUNCTIONS else "command"
                 message = f"'{name}' is a {kind}, too; {means}, and the {kind} cannot be called"
                 self.hub.warn(message, hint=None)
+            if name in FIRST:
+                message = f"'{name}' is a coordinate of points before the first step, too; {means}"
+                self.hub.warn(message, hint="choose another name")
             if name in self.hub.values:
                 message = f"'{name}' is a value of a fix or a compute; {means}"
                 self.hub.warn(message, hint="choose another name")
@@ -315,10 +318,10 @@ class Interpreter:
 
     def name(self, name: str, node: syntax.Name, raw: syntax.Raw) -> Value:
         """Find the value of a name in an expression."""
-        if name in SEEDS:
-            return Expression.seed(name)
         if name in self.variables:
             return self.variables[name]
+        if name in SEEDS:
+            return Expression.seed(name)
         if name in CONSTANTS:
             return CONSTANTS[name]
         if name in self.hub.values:

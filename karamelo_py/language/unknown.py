@@ -7,7 +7,7 @@ from typing import Any
 from karamelo_py.language import registry
 from karamelo_py.script.errors import ScriptError, instead, meant, nearest, of_karamelo, table
 from karamelo_py.script.evaluation import usage
-from karamelo_py.script.expressions import SEEDS
+from karamelo_py.script.expressions import FIRST, SEEDS
 from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, RESERVED, WORDS
 from karamelo_py.script.mistakes import BLOCKS, NO_BLOCKS
 from karamelo_py.script.syntax import Assignment, CommandCall, Statement
@@ -203,7 +203,7 @@ def check_name(name: str) -> None:
     kinds = {
         "a logical operator": name in ("and", "or", "not"),
         MEANINGS.get(name, ""): name in MEANINGS,
-        "a coordinate of points": name in SEEDS,
+        "a coordinate of points": name in SEEDS - FIRST,
         "a word of the language": name in WORDS or name == "quit",
         "a command": registry.knows("command", name) and of_karamelo(name),
         "a function": name in RESERVED,
