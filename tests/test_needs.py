@@ -187,17 +187,20 @@ def test_bytes_of_a_point_are_those_that_are_listed(lowered, script):
 # --- Memory --------------------------------------------------------------------------------------
 
 
-def peak_of_check(path, *, compiled=False, **variables) -> float:
-    """MiB that `karamelo-py check` takes at most, in a process of its own; mostly interpreted."""
-    words = [word for k, v in variables.items() for word in ("-var", k, str(v))]
+def peak_of(path, command="check", *, compiled=False, find="", threads=0, **variables) -> float:
+    """MiB that a subcommand takes at most, in a process of its own, or that it says."""
+    words = ["--threads", str(threads)] if threads else []
+    words += [word for k, v in variables.items() for word in ("-var", k, str(v))]
     code = (
         "import sys; from karamelo_py.app.cli import main; status = main(sys.argv[1:]); "
         "print(open('/proc/self/status').read().split('VmHWM:')[1].split()[0]); sys.exit(status)"
     )
     done = subprocess.run(
-        [sys.executable, "-c", code, "check", str(path), *words], text=True, check=True,
+        [sys.executable, "-c", code, command, str(path), *words], text=True, check=True,
         env={**os.environ, "NUMBA_DISABLE_JIT": str(int(not compiled))}, capture_output=True,
     )  # fmt: skip
+    if find:
+        return float(re.search(find, done.stdout)[1])
     return int(done.stdout.split()[-1]) / 2**10
 
 
@@ -210,7 +213,7 @@ def test_a_domain_100_times_larger_takes_no_more_memory(tmp_path):
     """The same body; a million nodes more would be 112 MB if they were touched."""
     path = tmp_path / "in.script"
     path.write_text("side = 100\n" + plane(side="side"), encoding="utf-8")
-    near, far = (peak_of_check(path, side=side) for side in (100, 1000))
+    near, far = (peak_of(path, side=side) for side in (100, 1000))
     # Two processes differ by a MiB or so; 16 000 tiles have 60 bytes each.
     assert far - near < 4
 
@@ -229,8 +232,22 @@ def test_a_scene_is_made_in_twice_its_memory(tmp_path, monkeypatch, capsys):
     )
     whole, copy = float(said[1]), float(said[2])
     assert whole - copy > 60 and copy > 40
-    few, many = (peak_of_check(path, compiled=True, N=N) for N in (20, 700))
+    few, many = (peak_of(path, compiled=True, N=N) for N in (20, 700))
     assert 60 < many - few < 2 * (whole - copy)  # the copy is made later
+
+
+@known_peak
+@pytest.mark.xdist_group("disks")
+def test_what_check_says_of_the_memory_of_the_process(tmp_path, monkeypatch, capsys):
+    """Without dumps and without compiling; allocators keep a few percent for themselves."""
+    monkeypatch.chdir(tmp_path)
+    text = (INPUTS / "in.two_disks").read_text(encoding="utf-8").replace("run_time(3.5)", "run(20)")
+    path = tmp_path / "in.disks"
+    path.write_text(re.sub(r"(?m)^(dump|plot|save_plot)\(.*$", "", text), encoding="utf-8")
+    assert main(["in.disks", "--threads", "1"]) == 0  # and all is compiled
+    for N in (20, 700):
+        said = peak_of(path, compiled=True, threads=1, find=r"(\d+) MiB with the program", N=N)
+        assert said == pytest.approx(peak_of(path, "run", compiled=True, threads=1, N=N), rel=0.15)
 
 
 # --- What could be left out ----------------------------------------------------------------------

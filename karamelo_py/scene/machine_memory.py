@@ -1,5 +1,6 @@
 """Memory of this machine, and of a job on it."""
 
+import time
 import warnings
 from contextlib import suppress
 from math import inf
@@ -98,6 +99,20 @@ def _number(path: Path) -> float | None:
     with suppress(OSError, ValueError):
         return float(path.read_text(encoding="utf-8"))
     return None
+
+
+def taken() -> int:
+    """Count the bytes of memory that this process has taken."""
+    import psutil
+
+    return psutil.Process().memory_info().rss
+
+
+def age() -> float:
+    """Return how long ago this process was started, in seconds."""
+    import psutil
+
+    return time.time() - psutil.Process().create_time()
 
 
 def most_points(hub: Scene, already: int, dimension: int, state: int) -> float:

@@ -12,7 +12,13 @@ from karamelo_py.points.laws.further import without_rate
 from karamelo_py.run.advice.known_failures import refuse_endless_speeds
 from karamelo_py.run.advice.suggestions import suggestions
 from karamelo_py.run.diagnosis.energy import not_watched, unknown_work
-from karamelo_py.run.lower.memory import memory_of, node_fields, nodes_in_use, point_fields
+from karamelo_py.run.lower.memory import (
+    known,
+    memory_of,
+    node_fields,
+    nodes_in_use,
+    point_fields,
+)
 from karamelo_py.run.mpi.plan import report_lines
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.timestep import ruling_limit, words_of_share
@@ -20,13 +26,17 @@ from karamelo_py.scene import machine_memory
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
 
+LOADED = 24 << 20  # bytes of compiled loops and of what steps and output import, as measured
+
 
 def report(hub: Hub, end_time: float = inf) -> None:
     """Print fields with bytes, stages, tiles, memory and the first dt of a run to `end_time`."""
+    own = machine_memory.taken() - known(hub)
     simulation = hub.simulation
     simulation.begin(end_time)
     refuse_endless_speeds(hub, simulation)
     simulation.sort_if_due()
+    set_up = machine_memory.age()
     say = hub.console.say
     s = simulation.setup
     say(f"dimension      {s.kin.dimension} ({s.kin.word})")
@@ -49,6 +59,7 @@ def report(hub: Hub, end_time: float = inf) -> None:
         why = unknown_work(hub)
         say(f"energy         {not_watched(why) if why else 'is watched'}")
     say(f"threads        {simulation.threads}")
+    say(f"set-up         {set_up:.2g} s from the start of the program on, beside compiling")
     say("")
     say(f"{'':<34}numbers     bytes")
     for block in s.blocks:
@@ -65,6 +76,7 @@ def report(hub: Hub, end_time: float = inf) -> None:
     memory = memory_of(simulation, s, tiles.box_bytes(s))
     say(f"memory         {_size(sum(memory))} in a run, of which")
     say(f"               {_size(memory.copied)} are a copy of the last good state")
+    say(f"               {_size(sum(memory) + own + LOADED)} with the program itself")
     if (there := machine_memory.machine_memory()) is not None:
         free = _size(there.free)
         say(f"               {free} are free on this machine, beside what check has taken")
