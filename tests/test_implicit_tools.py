@@ -145,7 +145,7 @@ def test_a_pressed_disk(run_script):
         forces.append(result.log["force"][-1] / hertz.LOAD - 1)
         errors.append(hertz.error(result.snapshots("static_hertz")[-1], 0.7))
         assert max(result.log["iterations"]) <= 8 and max(result.log["parts"]) == 1
-    # With 64 cells -1.7 % and 0.007. The formula itself leaves out (half width / R)^2, 1.3 %.
+    # With 64 cells -1.4 % and 0.007. The formula itself leaves out (half width / R)^2, 1.3 %.
     assert abs(forces[1]) < 0.04 and np.log2(forces[0] / forces[1]) > 1
     assert errors[1] < 0.028 and np.log2(errors[0] / errors[1]) > 1.5
 

@@ -53,7 +53,12 @@ from karamelo_py.points.basis.gimp import (
     CPGIMPStretch,
 )
 from karamelo_py.points.basis.linear import Linear
-from karamelo_py.points.basis.splines import CubicSpline, QuadraticSpline
+from karamelo_py.points.basis.splines import (
+    CubicSpline,
+    CubicSplineAtWalls,
+    QuadraticSpline,
+    QuadraticSplineAtWalls,
+)
 from karamelo_py.points.grid import Grid, ReflectingGrid, reflected
 from karamelo_py.points.kinematics import PlaneStrain, Space, vector, zero
 from karamelo_py.points.laws import Absent, advance, initial_state, law_kind, plastic_strain
@@ -311,7 +316,7 @@ def test_powers_at_the_ends(real_type):
 
 GRID = Grid(
     x0=0.0, y0=0.0, z0=0.0, h=0.5, inv_h=2.0, spacing=0.5, nx=6, ny=5, nz=1, lx=6.0, ly=5.0,
-    lz=1.0, slack=1e-9, step_x=6, step_y=1, first=0,
+    lz=1.0, slack=1e-9, step_x=6, step_y=1, first=0, first_cell=0,
 )  # fmt: skip
 
 
@@ -367,7 +372,20 @@ def _map_in_lanes(basis, by, grid, x, mass, nodes, seen, out, n):
 
 
 HALF = (0.125, 0.125)
+FACES = np.random.default_rng(5).integers(0, 4, (30, 2), np.int8)
+
+
+def quadratic_at_walls():
+    return QuadraticSplineAtWalls(FACES)
+
+
+def cubic_at_walls():
+    return CubicSplineAtWalls(FACES)
+
+
 DOMAINS = {
+    quadratic_at_walls: (),
+    cubic_at_walls: (),
     Linear: (),
     QuadraticSpline: (),
     CubicSpline: (),

@@ -435,14 +435,6 @@ def test_finer_cells_are_early_by_less(run):
     assert early[1] == pytest.approx(early[0] / 2, abs=0.1)
 
 
-def test_splines_cut_at_walls_reproduce_linear_fields(run):
-    """Splines of nodes behind a wall inside the grid miss a part of the strain, cut ones do not."""
-    assert run("wall_kernels").log.error[-1] > 0.2
-    assert run("wall_kernels", basis="quadratic-spline").log.error[-1] > 0.2
-    for cure in ({"cure": 1}, {"cure": 1, "basis": "quadratic-spline"}, {"basis": "linear"}):
-        assert run("wall_kernels", **cure).log.error[-1] < 1e-12
-
-
 def test_a_free_axis_spoils_the_hoop_strain(run):
     """Held on the axis, radial and hoop strain of the cell at the axis are the same, exactly."""
     assert run("axis").log.ratio[1] > 2

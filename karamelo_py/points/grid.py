@@ -28,6 +28,7 @@ class Grid(NamedTuple):
     step_x: int  # from a node's number to that of its neighbour
     step_y: int
     first: int  # number of its first node
+    first_cell: int  # number of its first cell
 
 
 @shared

@@ -24,6 +24,7 @@ from karamelo_py.run.checkpoint import arrays as checkpoint
 from karamelo_py.run.lower.build import State, check_scene, lower, thread_count, warms_by_friction
 from karamelo_py.run.lower.check_plugins import try_parts
 from karamelo_py.run.lower.memory import check_room, no_room
+from karamelo_py.run.lower.walls import key_of_walls
 from karamelo_py.run.mpi.subdomain import Subdomain
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.group import ParticleGroup
@@ -52,6 +53,7 @@ def scene_key(hub: Hub) -> tuple:
         fields.declared(hub.fixes.values(), "node_fields"),
         hub.fields.rate_is_asked_for(),
         update.method is not None and warms_by_friction(hub),
+        key_of_walls(hub),
         hub.settings.precision,
         hub.settings.threads,
     )

@@ -172,7 +172,7 @@ class NodeGroup(AnyGroup):
 
     def __init__(self, hub: Scene, *, everything: bool = False):
         super().__init__(hub, everything=everything)
-        self._parts: tuple[tuple[Region, Sequence[Solid] | None], ...] = ()
+        self.parts: tuple[tuple[Region, Sequence[Solid] | None], ...] = ()
         self._found: tuple[list[Lattice], np.ndarray] | None = None
 
     nodes = AnyGroup.members
@@ -186,7 +186,7 @@ class NodeGroup(AnyGroup):
         """Members of a group that is not that of all; looked for anew where grids are others."""
         lattices = self.hub.lattices
         if self._found is None or self._found[0] is not lattices:
-            found = [numbers for part in self._parts if len(numbers := self._find(*part))]
+            found = [numbers for part in self.parts if len(numbers := self._find(*part))]
             # Each is ascending: millions would be sorted for nothing.
             members = [np.unique(np.concatenate(found))] if len(found) > 1 else found
             self._found = lattices, (members or [np.empty(0, np.int64)])[0]
@@ -194,7 +194,7 @@ class NodeGroup(AnyGroup):
 
     def add(self, region: Region, solids: Sequence[Solid] | None) -> int:
         """Add what lies in a region, see `AnyGroup`."""
-        self._parts = (*self._parts, (region, solids))
+        self.parts = (*self.parts, (region, solids))
         self._found = None
         return len(self._find(region, solids))
 

@@ -25,9 +25,9 @@ class Lattice:
     one cell.
 
     Cells have the size `h`, and `nodes_per_cell` 1, or 2 with nodes in their middle, too. Nodes are
-    numbered from `first` on. There are at least `least_nodes` per direction, of which those beyond
-    the box stay without mass. `cells` and `shape` (3,) count cells and nodes, 1 in unused
-    directions. More nodes than can be counted are an error.
+    numbered from `first` on, cells from `first_cell`. There are at least `least_nodes` per
+    direction, of which those beyond the box stay without mass. `cells` and `shape` (3,) count cells
+    and nodes, 1 in unused directions. More nodes than can be counted are an error.
     """
 
     def __init__(
@@ -44,7 +44,7 @@ class Lattice:
         self.lo[:dimension], self.hi[:dimension] = lo[:dimension], hi[:dimension]
         self.h = float(h)
         self.nodes_per_cell = nodes_per_cell
-        self.first = 0  # number of the first node, see `numbered`
+        self.first = self.first_cell = 0  # numbers of the first node and cell, see `numbered`
         lengths = (self.hi - self.lo)[:dimension]
         cells = [max(1, math.ceil(length / h - RELATIVE_TOLERANCE)) for length in lengths]
         nodes = [max(n * nodes_per_cell + 1, least_nodes) for n in cells]
@@ -124,6 +124,7 @@ class Lattice:
             step_x=ny * nz,
             step_y=nz,
             first=self.first,
+            first_cell=self.first_cell,
         )
 
 
@@ -135,11 +136,12 @@ def table(lattices: Sequence[Lattice], real: type) -> Grid:
 
 
 def numbered(lattices: Sequence[Any]) -> list[Lattice]:
-    """The same lattices with node numbers that follow each other."""
-    first = 0
+    """The same lattices with numbers of nodes, and of cells, that follow each other."""
+    first = first_cell = 0
     for lattice in lattices:
-        lattice.first = first
+        lattice.first, lattice.first_cell = first, first_cell
         first += lattice.node_count
+        first_cell += math.prod(lattice.cells)
     if first > MAX_NODES:
         raise ScriptError(
             f"the grids have {first:.3g} nodes together", expected=f"at most {MAX_NODES} nodes"

@@ -69,6 +69,9 @@ class Fix(Publisher):
     # Prescribes velocities of the nodes of its group in ``post_update_grid_state``, in the
     # directions in which it has a formula: contact does not move them.
     prescribes_velocity = False
+    # Directions in which it holds or bounds nodes: faces of cells that have all their nodes among
+    # them are walls, at which splines are modified as at the ends of the grid.
+    held_directions: tuple[int, ...] = ()
     # Formula of the coefficient of friction along the wall that it makes by such velocities, in the
     # directions in which it has no formula; None for walls without.
     wall_friction: Any = None

@@ -86,6 +86,12 @@ def affine_weight(basis, kin, grid, stencil, k):
 
 
 @point_function(otherwise=True)
+def walled(basis, faces):
+    """The same basis, modified at walls inside the grid (see `splines.AtWalls`), too."""
+    return basis
+
+
+@point_function(otherwise=True)
 def mapped_again(basis, grid, moment):
     """The part of a point's moment of velocity that MUSL maps to the nodes the second time."""
     return moment

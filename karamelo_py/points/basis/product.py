@@ -17,6 +17,7 @@ from karamelo_py.compiler.compile import (
 )
 from karamelo_py.language.rules import suggestion
 from karamelo_py.points.basis import affine_weight, entry, locate, reach, support
+from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.points.kinematics import Axisymmetric, gradient, product, vector
 
 
@@ -113,6 +114,15 @@ def node_number(grid, first, steps):
     for step, far in zip(others, (grid.step_x, grid.step_y), strict=False):
         first = first + step * far
     return first + last
+
+
+def cell_number(kin, grid, place):
+    """Number of the cell that a point is in, among those of all grids."""
+    number = 0
+    for k in range(kin.dimension):
+        count = cells_along(grid, k)
+        number = number * count + max(min(int(in_cells(grid, k, place[k])), count - 1), 0)
+    return number + grid.first_cell
 
 
 def digits(k, base, d):

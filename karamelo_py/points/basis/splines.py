@@ -1,13 +1,20 @@
-"""B-splines, modified at the walls of the grid: three or four nodes a direction."""
+"""B-splines, modified at the walls of the grid: three or four nodes a direction.
+
+Where nodes inside the grid are held, they make walls, too (:class:`AtWalls`). Then there is a class
+of its own with the same functions, so that scenes without such walls ask for none.
+"""
 
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import all_lanes, real, where
-from karamelo_py.points.basis import first_node
+import numpy as np
+
+from karamelo_py.compiler.compile import all_lanes, point_function, where
+from karamelo_py.points.basis import first_node, walled
 from karamelo_py.points.basis.product import (
     Along,
     affine_along,
     along,
+    cell_number,
     evenly,
     inverse_spread,
     register,
@@ -15,6 +22,37 @@ from karamelo_py.points.basis.product import (
 )
 from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.points.noise import CUBIC
+
+BELOW, ABOVE, BETWEEN = 1, 2, 3  # walls of a cell in a direction
+
+
+class AtWalls(NamedTuple):
+    """Base of splines that are modified at walls inside the grid, too."""
+
+    faces: np.ndarray  # (cells of all grids, d) int8: BELOW, ABOVE, BETWEEN; 0 where is no wall
+
+    steep_edge = False
+    in_lanes = True
+
+
+@point_function(otherwise=True)
+def walls_beside(basis, kin, grid, place, direction):
+    """(whether the lower face of the point's cell is a wall, whether the upper is), or nothing."""
+    return ()
+
+
+def _walls_beside_at_walls(basis, kin, grid, place, direction):
+    wall = basis.faces[cell_number(kin, grid, place), direction]
+    return (wall == BELOW) | (wall == BETWEEN), wall >= ABOVE
+
+
+def hats(grid, a, cell, first, count):
+    """The hat functions of a cell, of `count` nodes from the `first` on."""
+    t, number = a - cell, cell - first
+    weights = [where(number == k, 1 - t, where(number == k - 1, t, 0)) for k in range(count)]
+    slope = grid.inv_h
+    gradients = [where(number == k, -slope, where(number == k - 1, slope, 0)) for k in range(count)]
+    return Along(first, a - first, tuple(weights), tuple(gradients), ())
 
 
 class QuadraticSpline(NamedTuple):
@@ -44,6 +82,11 @@ def _along_quadratic_spline(basis, kin, grid, place, direction):
     last = cells_along(grid, direction)
     nearest = int(a + 0.5)
     bulk = (nearest >= 1) & (nearest < last)
+    cell = min(int(a), last - 1)
+    behind = nearest > cell
+    walls = walls_beside(basis, kin, grid, place, direction)
+    if len(walls):
+        bulk = where(where(behind, walls[1], walls[0]), False, bulk)
     t = a - nearest
     left, right = 0.5 - t, 0.5 + t
     weights = (0.5 * left * left, 0.75 - t * t, 0.5 * right * right)
@@ -51,26 +94,15 @@ def _along_quadratic_spline(basis, kin, grid, place, direction):
     line = Along(nearest - 1, 1 + t, weights, gradients, ())
     if all_lanes(bulk):
         return line
-    return where(bulk, line, hats_at_wall(grid, a, last))
+    # At a wall the third node, on the side of the material, has no weight.
+    first = max(min(where(behind, cell - 1, cell), last - 2), 0)
+    return where(bulk, line, hats(grid, a, cell, first, 3))
 
 
-def hats_at_wall(grid, a, last):
-    """The hat functions of the cell at a wall, with a third node of no weight."""
-    cell = min(int(a), last - 1)
-    first = max(min(cell, last - 2), 0)
-    t = a - cell
-    second = first < cell  # the cell is that between the last two of the three nodes
-    weights = (where(second, 0, 1 - t), where(second, 1 - t, t), where(second, t, 0))
-    gradients = (
-        where(second, 0, -grid.inv_h),
-        where(second, -grid.inv_h, grid.inv_h),
-        where(second, grid.inv_h, 0),
-    )
-    return Along(first, a - first, weights, gradients, ())
-
-
-def in_bulk(grid, line, direction):
+def in_bulk(basis, grid, line, direction):
     """Check that these are the splines, and not the functions at a wall."""
+    if isinstance(basis, AtWalls):
+        return line.weights[0] * line.weights[2] > 0
     return (cells_along(grid, direction) > 1) & (line.r >= 0.5) & (line.r < 1.5)
 
 
@@ -79,7 +111,7 @@ def _affine_along_quadratic_spline(basis, grid, line, direction):
     # D = h^2 / 4. For hat functions, N D^-1 (X - x) is the gradient.
     four = 4 * grid.inv_h
     affine = tuple([four * (k - line.r) * weight for k, weight in enumerate(line.weights)])
-    return where(in_bulk(grid, line, direction), affine, line.gradients)
+    return where(in_bulk(basis, grid, line, direction), affine, line.gradients)
 
 
 @inverse_spread.on(QuadraticSpline)
@@ -89,7 +121,7 @@ def _inverse_spread_quadratic_spline(basis, grid):
 
 @evenly.on(QuadraticSpline)
 def _evenly_quadratic_spline(basis, grid, stencil):
-    first, *rest = (in_bulk(grid, line, d) for d, line in enumerate(stencil.lines))
+    first, *rest = (in_bulk(basis, grid, line, d) for d, line in enumerate(stencil.lines))
     for bulk in rest:
         first = first & bulk
     return first
@@ -97,6 +129,26 @@ def _evenly_quadratic_spline(basis, grid, stencil):
 
 first_node.on(QuadraticSpline)(lambda basis, like: 0.5)
 register(QuadraticSpline, 3)
+
+
+class QuadraticSplineAtWalls(AtWalls):
+    """Quadratic B-splines where there are walls inside the grid."""
+
+
+def of_splines(basis: type, of: type, functions: tuple) -> None:
+    """Give a basis `of` with walls inside the grid the functions of that without."""
+    walled.on(basis)(lambda basis, faces: of(faces))
+    walls_beside.on(of)(_walls_beside_at_walls)
+    for function in functions:
+        function.on(of)(function.find((basis,)))
+    register(of, basis.line_nodes)
+
+
+of_splines(
+    QuadraticSpline,
+    QuadraticSplineAtWalls,
+    (along, affine_along, inverse_spread, evenly, first_node),
+)
 
 
 class CubicSpline(NamedTuple):
@@ -157,32 +209,36 @@ def _along_cubic_spline(basis, kin, grid, place, direction):
         three * (1 + s) * weights[3],
     )
     line = Along(cell - 1, r, weights, gradients, affine)
+    cell = min(cell, last - 1)
     bulk = (cell >= 1) & (cell < last - 1)
+    below, above = cell == 0, cell == last - 1
+    walls = walls_beside(basis, kin, grid, place, direction)
+    if len(walls):
+        below, above = below | walls[0], above | walls[1]
+        bulk = where(below | above, False, bulk)
     if all_lanes(bulk):
         return line
-    return where(bulk, line, at_wall(grid, a, last))
+    return where(bulk, line, at_wall(grid, a, cell, last, below, above))
 
 
-def at_wall(grid, a, last):
-    """The modified functions of the cell at a wall; nodes that make up the four have no weight."""
-    cell = min(int(a), last - 1)
-    first = max(min(cell, last - 3), 0)
-    r = a - first
-    if last == 1:  # both walls at once: what is left are the hat functions
-        zero = real(0, a)
-        gradients = (zero - grid.inv_h, zero + grid.inv_h, zero, zero)
-        return Along(first, r, (1 - r, r, zero, zero), gradients, gradients)
-    lower = cell == 0
-    n, g, c = beside_wall(grid, where(lower, a, last - a))
-    n = where(lower, n, (n[2], n[1], n[0]))
-    g = where(lower, g, (-g[2], -g[1], -g[0]))
-    c = where(lower, c, (-c[2], -c[1], -c[0]))
-    behind = (cell > 0) & (last > 2)  # they are the last three of the four
+def at_wall(grid, a, cell, last, below, above):
+    """The modified functions of a cell at a wall; nodes that make up the four have no weight."""
+    first = max(min(cell - 1, last - 3), 0)
+    between = hats(grid, a, cell, first, 4)  # what is left of both walls at once
+    between = between._replace(affine=between.gradients)
+    if last == 1:
+        return between
+    t = a - cell
+    n, g, c = beside_wall(grid, where(below, t, 1 - t))
+    n = where(below, n, (n[2], n[1], n[0]))
+    g = where(below, g, (-g[2], -g[1], -g[0]))
+    c = where(below, c, (-c[2], -c[1], -c[0]))
+    behind = where(below, cell, cell - 1) > first  # they are the last three of the four
     n, g, c = [
         tuple([where(behind, *pair) for pair in zip((0, *of), (*of, 0), strict=True)])
         for of in (n, g, c)
     ]
-    return Along(first, r, n, g, c)
+    return where(below & above, between, Along(first, a - first, n, g, c))
 
 
 def beside_wall(grid, t):
@@ -205,3 +261,10 @@ def beside_wall(grid, t):
 
 register(CubicSpline, 4)
 wide(CubicSpline)
+
+
+class CubicSplineAtWalls(AtWalls):
+    """Cubic B-splines where there are walls inside the grid."""
+
+
+of_splines(CubicSpline, CubicSplineAtWalls, (along,))

@@ -29,7 +29,7 @@ def profile(basis: NamedTuple, half: float) -> tuple[np.ndarray, np.ndarray]:
         return x, np.convolve(hats, box / len(box), mode="same")
     middle = CELLS // 2
     line = Grid(
-        0.0, 0.0, 0.0, 1.0, 1.0, 1.0, CELLS, 1, 1, float(CELLS), 0.0, 0.0, 0.0, 1, 1, 0
+        0.0, 0.0, 0.0, 1.0, 1.0, 1.0, CELLS, 1, 1, float(CELLS), 0.0, 0.0, 0.0, 1, 1, 0, 0
     )  # fmt: skip
     weights = np.zeros(len(x))
     for q, place in enumerate(x):

@@ -31,6 +31,7 @@ from karamelo_py.points.laws.temperatures import initial_heat
 from karamelo_py.points.transfers import lost_shares
 from karamelo_py.run.boxes import no_nodes
 from karamelo_py.run.implicit import check as implicit
+from karamelo_py.run.lower.walls import with_walls
 from karamelo_py.run.mpi.partition import SharedTiles
 from karamelo_py.run.tiles import Tiles
 from karamelo_py.run.timestep import keeps_moments, sparse
@@ -159,6 +160,7 @@ def lower(
     lattices = method.lattices(hub)
     transfer = hub.update.transfer_tag(real)
     basis = type(method.basis)(*(real(x) for x in method.basis))
+    basis = with_walls(hub, lattices, basis)
     count = sum(solid.count for solid in hub.solids.values())
     if comm.size == 1:
         tiles = Tiles(lattices, basis, count, sparse(hub))

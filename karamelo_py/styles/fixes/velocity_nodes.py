@@ -108,6 +108,9 @@ class VelocityNodes(Fix):
     The work of friction heats the points, where they have a temperature; the wall takes none of it.
     Where several such fixes hold a node in one direction, the last of them decides: the whole
     reaction of that node is its, and it alone rubs. A bound that a node keeps within holds nothing.
+    Planes of such nodes inside the grid are walls as its ends are: splines are modified in cells
+    beside faces all of whose nodes are held or bounded. A group should reach as far as the last
+    cell in which a body has points.
     In ulmpm/contacts a solid whose cells have all corners in the group is held by all nodes that
     its points see, where all components are given.
 
@@ -142,6 +145,10 @@ class VelocityNodes(Fix):
         self.post_update_grid_state, self.post_velocities_to_grid = HOOKS[self.bound]
         # Contact may move nodes that are held only as far as they come.
         self.prescribes_velocity = not self.bound
+
+    @property
+    def held_directions(self) -> tuple[int, ...]:
+        return tuple(k for k, formula in enumerate(self.formulas) if formula is not None)
 
     @property
     def nodes(self) -> np.ndarray:

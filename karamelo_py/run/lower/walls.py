@@ -1,0 +1,75 @@
+"""Walls inside the grid: faces of cells all of whose nodes are held."""
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from karamelo_py.points.basis import walled
+from karamelo_py.points.basis.splines import ABOVE, BELOW
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.lattice import Lattice
+from karamelo_py.scene.modify import Fix
+
+
+def fixes_of_walls(hub: Hub) -> list[Fix]:
+    """The fixes whose nodes make walls, where the basis asks for them."""
+    method = hub.update.method
+    if method is None or not walled.defined(type(method.basis)):
+        return []
+    return [fix for fix in hub.fixes.values() if fix.held_directions and not fix.group.all]
+
+
+def key_of_walls(hub: Hub) -> tuple:
+    """Return what walls depend on, besides the grids."""
+    fixes = fixes_of_walls(hub)
+    return tuple((fix.group, fix.group.parts, fix.held_directions) for fix in fixes)
+
+
+def with_walls(hub: Hub, lattices: list[Lattice], basis: NamedTuple) -> NamedTuple:
+    """The basis with the walls inside the grids, where there are some that it asks for."""
+    fixes = fixes_of_walls(hub)
+    found = []
+    for axis in sorted({axis for fix in fixes for axis in fix.held_directions}):
+        nodes = np.unique(np.concatenate([f.nodes for f in fixes if axis in f.held_directions]))
+        for lattice in lattices:
+            ends = lattice.first, lattice.first + lattice.node_count
+            own = nodes[slice(*np.searchsorted(nodes, ends))]
+            if len(own):
+                found += [(lattice, *wall) for wall in _walls(lattice, own)]
+    if not found:
+        return basis
+    cells = sum(math.prod(lattice.cells) for lattice in lattices)
+    faces = np.zeros((cells, hub.domain.dimension), np.int8)
+    for lattice, direction, above in found:
+        for step, side in ((0, BELOW), (-1, ABOVE)):
+            cell = above.copy()
+            cell[:, direction] += step
+            number = np.ravel_multi_index(tuple(cell.T), lattice.cells[: cell.shape[1]])
+            faces[lattice.first_cell + number, direction] |= side
+    return walled(basis, faces)
+
+
+def _walls(lattice: Lattice, nodes: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
+    """Walls that held nodes make: a direction, and the cells (n, d) whose lower faces they are.
+
+    A face of a cell is a wall if its nodes are held, but not within a block of held nodes, where
+    the next faces on both sides are held, too. At the ends of the grid there are walls anyway.
+    """
+    d = lattice.dimension
+    places = lattice.places(nodes)[:, :d]
+    corner = places.min(axis=0)
+    held = np.zeros(places.max(axis=0) - corner + 1, np.bool_)
+    held[tuple((places - corner).T)] = True
+    for k in range(d):
+        face = np.moveaxis(held, k, 0)
+        for axis in range(1, d):
+            face = np.moveaxis(face, axis, 0)
+            face = np.moveaxis(face[:-1] & face[1:], 0, axis)
+        wall = face.copy()
+        wall[1:-1] &= ~(face[:-2] & face[2:])
+        place = np.argwhere(np.moveaxis(wall, 0, k)) + corner
+        place = place[(place[:, k] > 0) & (place[:, k] < lattice.cells[k])]
+        if len(place):
+            yield k, place
