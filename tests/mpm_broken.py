@@ -136,6 +136,11 @@ class Stop(Group):
         points.velocity[:] = 0
 
 
+class Ids(Group):
+    def final_integrate(self, points):
+        points.velocity[:, 0] = points.ids
+
+
 class Weigh(Group):
     def initial_integrate(self, points):
         points.mass[:] = 0

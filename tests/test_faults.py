@@ -25,7 +25,7 @@ pytestmark = pytest.mark.xdist_group("faults")
 
 FAMILIES = {
     "fix": "spring light misplaced swapped cold hot many few undirected viewless idle misspelt "
-    "silent stop weigh bare formless oneword clashing nodal first again doubled lost leaving "
+    "silent stop ids weigh bare formless oneword clashing nodal first again doubled lost leaving "
     "silenced orphan",
     "compute": "gauge mute",
     "material": "motionless growing raising short uncompiled hiding double",
@@ -338,6 +338,13 @@ class View(PointsView):
         return SimpleNamespace(
             take=lambda _: self._v, put=lambda _, value: np.copyto(self._v, value)
         )
+
+
+def test_ids_are_those_of_dumps(run_interpreted):
+    """They count from 1 in hooks, too."""
+    folder = run_interpreted(scene(fix="fix(s, ids, all)")).folder
+    columns = np.loadtxt(folder / "d.2.LAMMPS", skiprows=11)
+    np.testing.assert_array_equal(columns[:, -1], columns[:, 0])
 
 
 def test_views_refuse_what_does_not_fit():

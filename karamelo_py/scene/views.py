@@ -278,7 +278,8 @@ class PointsView(View):
         self._simulation = simulation
         self._then = then
         self._take_times(simulation.control)
-        self.ids = ids
+        self._numbers = ids  # from 0
+        self.ids = ids + 1  # as dumps have them
         self.moved = False
         self._found: Rows | None = None
 
@@ -299,12 +300,12 @@ class PointsView(View):
         if self._found is None:
             s, parts = self._simulation.setup, []
             place = np.full(self._simulation.count, -1)
-            place[self.ids] = np.arange(len(self.ids))
+            place[self._numbers] = np.arange(len(self.ids))
             for block in s.blocks:
                 of_block = place[block.points.id]
                 rows = np.flatnonzero(of_block >= 0)
                 parts.append(Part(block, rows, of_block[rows]))
-            self._found = Rows(s, parts, self.ids, np.ones(len(self.ids), np.bool_))
+            self._found = Rows(s, parts, self._numbers, np.ones(len(self.ids), np.bool_))
         return self._found
 
     def _get(self, kind: type) -> np.ndarray:
@@ -439,7 +440,7 @@ class PointsView(View):
     @Shown
     def reference_position(self) -> np.ndarray:
         """(n, d) positions before the first step; read only."""
-        return places_before(self._simulation.hub, self.ids)
+        return places_before(self._simulation.hub, self._numbers)
 
 
 def set_columns(
@@ -496,7 +497,7 @@ class PieceView(PointsView):
         own = pairwise(np.cumsum([0, *map(len, ids)]).tolist())
         found = [Part(*part, slice(*places)) for part, places in zip(parts, own, strict=True)]
         present = np.ones(len(self.ids), np.bool_)
-        self._found = Rows(simulation.setup, found, self.ids, present)
+        self._found = Rows(simulation.setup, found, self._numbers, present)
         self._in_steps = in_steps
 
     def total(self, terms: Any) -> np.ndarray:

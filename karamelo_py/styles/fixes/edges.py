@@ -94,7 +94,7 @@ class EdgeFix(PointForces):
         raise NotImplementedError
 
     def forces(self, points: PointsView) -> np.ndarray:
-        faces = self._faces_of(points.ids)
+        faces = self._faces_of(points.ids - 1)
         force = np.zeros(points.position.shape)
         np.add.at(force, faces.point, self.loads(faces))
         return force
