@@ -159,6 +159,9 @@ def test_shapes_may_be_mixed_and_of_higher_order(tmp_path):
         np.testing.assert_allclose([solid.lo, solid.hi], [[0, 0], [2, 1]])
         np.testing.assert_allclose(solid.half_size, 0.5)
         assert not hub.warnings
+    bent = np.concatenate([nodes, middles, of_triangle + [[0, 0, 0], [0.1, 0.1, 0], [0, 0, 0]]])
+    hub, solid = solid_of(write(tmp_path / "bent.vtu", bent, cells), 2, lo=-1, hi=3)
+    assert "has edges that bend by 0.1 of their length" in hub.warnings[0]
 
 
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])

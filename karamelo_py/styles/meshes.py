@@ -9,13 +9,24 @@ from karamelo_py.language.signature import Positive
 from karamelo_py.scene.domain import RELATIVE_TOLERANCE, require_domain
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
-from karamelo_py.scene.meshes.elements import elements_of, measured
+from karamelo_py.scene.meshes.elements import bulge_of, elements_of, measured
 from karamelo_py.scene.meshes.inside import Simplices, Skin, Surface, outer_faces, split
 from karamelo_py.scene.meshes.reading import MeshFile, read
 from karamelo_py.scene.placement import Placement
 from karamelo_py.scene.region import EXTERIOR, Region
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import ScriptError
+
+CURVED = 0.01  # of the length of an edge: of a circle with 80 elements
+
+
+def _tell_of_curved_edges(hub: Hub, file: MeshFile, bulge: float) -> None:
+    if bulge > CURVED:
+        hub.warn(
+            f"{file.name} has edges that bend by {bulge:.2g} of their length, and elements count "
+            "by their corners: what lies behind the bend is missing",
+            hint="a finer mesh",
+        )
 
 
 class Enclosed(Region):
@@ -71,9 +82,9 @@ class MeshRegion(Enclosed):
         if group == EXTERIOR and exterior is None:
             group, exterior = None, EXTERIOR
         dimension = require_domain(hub).dimension
-        parts = elements_of(
-            read(file, dimension, hub.settings.trusts), dimension, group, lower=group is not None
-        )
+        mesh = read(file, dimension, hub.settings.trusts)
+        parts = elements_of(mesh, dimension, group, lower=group is not None)
+        _tell_of_curved_edges(hub, file, bulge_of(mesh, group))
         corners = np.concatenate([split(elements) for elements in parts])
         lo, hi = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
         super().__init__(hub, lo, hi, exterior=exterior == EXTERIOR)
@@ -198,9 +209,9 @@ class MeshSolid(Solid):
         domain = require_domain(hub)
         super().__init__(hub, material, h, T0, GlueToSolid)
         self.file = file
-        parts = elements_of(
-            read(file, domain.dimension, hub.settings.trusts), domain.dimension, group
-        )
+        mesh = read(file, domain.dimension, hub.settings.trusts)
+        parts = elements_of(mesh, domain.dimension, group)
+        _tell_of_curved_edges(hub, file, bulge_of(mesh, group))
         found = [measured(part) for part in parts]
         inside = [domain.contains(centroid) for _, _, centroid in found]
         corners = [part.corners[kept] for (part, _, _), kept in zip(found, inside, strict=True)]

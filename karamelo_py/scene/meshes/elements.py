@@ -44,6 +44,18 @@ SHAPES = {
 }
 
 
+# Corners at the ends of edges, in whose middles elements of second order have their next nodes.
+_EDGES = {
+    "line3": ((0, 1),),
+    **dict.fromkeys(("triangle6", "triangle7"), ((0, 1), (1, 2), (2, 0))),
+    **dict.fromkeys(("quad8", "quad9"), ((0, 1), (1, 2), (2, 3), (3, 0))),
+    "tetra10": ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)),
+    **dict.fromkeys(
+        ("hexahedron20", "hexahedron24", "hexahedron27"),
+        (*((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6)),
+         *((6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))),
+    ),
+}  # fmt: skip
 # Elements of higher order begin with the corners of these.
 OF_HIGHER_ORDER = {
     "line3": "line", "line4": "line", "triangle6": "triangle", "triangle7": "triangle",
@@ -104,6 +116,19 @@ def elements_of(
     for name in dict.fromkeys(name for name, _ in wanted):
         numbers = _once(np.concatenate([nodes for other, nodes in wanted if other == name]))
         found.append(MeshElements(SHAPES[name], numbers, positions[numbers]))
+    return found
+
+
+def bulge_of(mesh: meshio.Mesh, group: str | int | None = None) -> float:
+    """How far nodes in the middle of edges lie beside these, over their length: the largest."""
+    found = 0.0
+    for name, _, nodes in chosen_cells(mesh, group):
+        first = len(SHAPES[OF_HIGHER_ORDER[name]].mirrored) if name in _EDGES else 0
+        for k, (a, b) in enumerate(_EDGES.get(name, ())):
+            a, b, middle = (mesh.points[nodes[:, i]] for i in (a, b, first + k))
+            length = np.linalg.norm(b - a, axis=1)
+            beside = np.linalg.norm(middle - (a + b) / 2, axis=1)
+            found = max(found, float((beside / np.maximum(length, np.finfo(float).tiny)).max()))
     return found
 
 
