@@ -265,6 +265,8 @@ def _scene(dimension, folder, method="ulmpm"):
 def _write_meshes(folder):
     """The files that examples speak of: meshes (part.msh with the group "inside"), curves."""
     (folder / "measured.csv").write_text("time, velocity\n0, 0\n1, 2\n", encoding="utf-8")
+    rows = "0.1, 0.1, 0.1, 1e-3\n0.2, 0.2, 0.2, 1e-3\n"
+    (folder / "grains.csv").write_text("x, y, z, volume\n" + rows, encoding="utf-8")
     (folder / "exact.csv").write_text("x, s11\n0, 0\n1, 2\n", encoding="utf-8")
     square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]) / 2
     part = meshio.Mesh(

@@ -334,7 +334,7 @@ def test_a_solid_needs_a_method_and_a_domain():
 def test_other_kinds_of_solids(kind):
     with pytest.raises(ScriptError, match="unknown solid style") as caught:
         commands.solid(SmallHub(), "s", kind)
-    assert caught.value.expected == "one of mesh, region"
+    assert caught.value.expected == "one of mesh, points, region"
 
 
 def test_gauss_points_carry_the_weights_of_the_quadrature():
