@@ -123,6 +123,70 @@ def test_a_failure_is_told_and_its_cure_is_not(run_interpreted, name, fails, cur
     assert f"{name}: " not in run_interpreted(SCENE.format(**(QUIET | cured))).err
 
 
+TURN = {"u": "0.05*(3.5 - y), 0.05*(x - 3.5)", "steps": 30000}  # 15 rad
+SLOWER = TURN | {"steps": 15000}
+HELD = "group(n, nodes, region, left, all)\n    fix(n, velocity_nodes, n, 0, NULL)"
+WATER = {
+    "law": "liquid", "steps": 5000, "more": "fix(g, body_force, all, 0, -0.1)",
+    "method": "ulmpm, FLIP, linear, 1",
+}  # fmt: skip
+PRESSED = "fix(p, initial_stress, left, -{0}, -{0}, -{0}, 0, 0, 0)"
+GAS = {"law": "air", "method": "ulmpm, FLIP, linear, 1", "more": PRESSED.format(5)}
+SMOOTH = {"method": "ulmpm, FLIP, quadratic-spline, 1"}
+STRONG = GAS | SMOOTH | {"more": PRESSED.format(50)}
+USAVG = {"more": STRONG["more"] + "\n    scheme(usavg)"}
+SOIL = {"law": "soil", "method": "ulmpm, FLIP, linear, 1"}
+AVERAGED = {"more": "anti_volumetric_locking(true)"}
+
+
+@pytest.mark.parametrize(
+    ("name", "words", "told"),
+    [
+        ("angular momentum", TURN | SMOOTH, True),
+        ("angular momentum", SLOWER | SMOOTH, False),
+        ("angular momentum", TURN | {"method": "ulmpm, APIC, quadratic-spline"}, False),
+        ("angular momentum", TURN | {"method": "ulcpdi, FLIP, linear, 1, R4"}, True),
+        ("angular momentum", TURN | {"method": "ulcpdi, APIC, linear, R4"}, False),
+        ("angular momentum", TURN | {"method": "tlmpm, FLIP, linear, 1"}, False),
+        ("angular momentum", TURN | SMOOTH | {"more": HELD}, False),
+        ("affine noise", TURN | {"method": "ulmpm, APIC, linear"}, True),
+        ("affine noise", SLOWER | {"method": "ulmpm, APIC, linear"}, False),
+        ("liquids with linear functions", WATER, True),  # 9 times sqrt(L/g)
+        ("liquids with linear functions", WATER | {"steps": 3000}, False),
+        ("liquids with linear functions", WATER | {"more": "", "u": "0, 0.2*x"}, True),
+        ("liquids with linear functions", WATER | {"more": "", "u": "0, 0.2"}, False),
+        ("liquids with linear functions", WATER | SMOOTH, False),
+        ("shocks in a gas", GAS, True),
+        ("shocks in a gas", GAS | {"more": PRESSED.format(1.5)}, False),
+        ("shocks in a gas", GAS | SMOOTH, False),
+        ("shocks in a gas", STRONG, True),
+        ("shocks in a gas", STRONG | USAVG, False),
+        ("pressure of grains", SOIL | {"law": "grains"}, True),
+        ("pressure of grains", SOIL | SMOOTH | {"law": "grains"}, False),
+        ("locking", SOIL, True),
+        ("locking", SOIL | SMOOTH, False),
+        ("locking", SOIL | AVERAGED, False),
+        ("locking", SOIL | {"more": "scheme(newmark)"}, True),
+    ],
+)
+def test_what_the_default_cannot_do(run_interpreted, name, words, told):
+    """Scenes of docs/defaults.md in small: where these errors begin is measured there."""
+    laws = """
+        eos(water, fluid, 1, 1, 7)
+        eos(bulk, linear, 1, 1)
+        strength(clay, mohr-coulomb, 0.4, 0.01, 20, 20)
+        strength(sand, mu-i, 0.4, 0.382, 0.643, 0.279, 0.01, 1.6)
+        material(liquid, eos-strength, water, none)
+        material(soil, eos-strength, bulk, clay)
+        material(grains, eos-strength, bulk, sand)
+    """
+    text = dedent(SCENE.format(**(QUIET | words))).replace(
+        "material(air", dedent(laws) + "material(air", 1
+    )
+    said = run_interpreted(text, command="check").err
+    assert (f"warning: {name}: " in said) == told, said
+
+
 def test_each_failure_is_told_once(run_interpreted):
     script = SCENE.format(**(QUIET | {"method": "ulmpm, TPIC, linear"})) + "\n    run(1)\n"
     assert run_interpreted(script).err.count("affine noise") == 1

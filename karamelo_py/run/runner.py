@@ -180,10 +180,11 @@ class Runner:
 
     def warn(self, simulation: Simulation) -> None:
         """Warn of what is known to go wrong in this run, and of one that is very long."""
-        if simulation.implicit:
-            return
         steps = inf if self.steps is None else self.steps * simulation.dt
         duration = min(self.end_time - simulation.time, steps)
+        if simulation.implicit:
+            known_failures.warn_about_laws(self.hub, simulation, duration)
+            return
         known_failures.warn(self.hub, simulation, duration, self.rollback.halve)
         known_failures.warn_about_length(self.hub, simulation, self.end_time)
 

@@ -3,14 +3,14 @@
 from collections.abc import Iterator
 from functools import cached_property
 from itertools import chain
-from math import isfinite
+from math import isfinite, pi, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from karamelo_py.language import registry, rules
 from karamelo_py.run import timestep
-from karamelo_py.run.body_motion import BodyMotion, Noise, drift_of, motions, turn_of
+from karamelo_py.run.body_motion import BodyMotion, Noise, drift_of, held, motions, turn_of
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.plugins import attributed, foreign_parts
 
@@ -65,10 +65,12 @@ class SceneFacts:
         ]
         yield from ((field, None) for field in dict.fromkeys(chain(*fields)))
 
-    def advice(self, kind: str) -> Iterator[rules.Advice]:
-        """Tell what the rules of the parts say, of one kind."""
+    def advice(self, kind: str, *, of_laws: bool = False) -> Iterator[rules.Advice]:
+        """Tell what the rules of the parts say, of one kind, or of laws alone."""
         foreign = {part.kind: part for part in foreign_parts(self.hub)}
         for part, owner in self.parts():
+            if of_laws and owner is None:
+                continue
             with attributed(self.hub, foreign.get(type(part))):
                 said = list(rules.advice(kind, part, owner, self))
             yield from said
@@ -103,6 +105,12 @@ class SceneFacts:
     def turns(self) -> bool:
         """Tell whether a solid turns by an angle that counts."""
         return self.turn > TURN
+
+    @cached_property
+    def free_turns(self) -> float:
+        """How many times the solid turns that turns most and is held nowhere."""
+        free = [one.spin for one in self.motions if self.turn > TURN and not held(self, one).any()]
+        return max(free, default=0.0) * self.duration / (2 * pi)
 
     @cached_property
     def waves(self) -> float:
@@ -176,6 +184,27 @@ class SceneFacts:
                     bent = 3 * across * sides.max() ** 2 / sides.min()
                     most = max(most, float(bent) / self.waves**2)
         return most
+
+    @property
+    def falls(self) -> float:
+        """How long the run is, in times sqrt(L/g) in which a solid falls by its own size."""
+        sizes = [np.maximum(one.high - one.low, 1e-300) for one in self.motions]
+        found = (np.abs(g) / np.max(sizes, axis=0) for g in self.weights)
+        return self.duration * max((sqrt(one.max()) for one in found), default=0.0)
+
+    @property
+    def passes(self) -> float:
+        """How often points go, with the velocities that they have, past each other by its size."""
+        found = [(one.fast - one.slow).max() / (4 * one.size) for one in self.motions if one.size]
+        return self.duration * float(max(found, default=0.0))
+
+    @cached_property
+    def pressure_ratio(self) -> float:
+        """The largest pressure over the smallest, of all points; 1 where there is tension."""
+        points = self.simulation.points
+        low = -points.largest(lambda some: some.particle("s11"))[0]
+        high = points.largest(lambda some: -some.particle("s11"))[0]
+        return high / low if low > 0 else 1.0
 
     @property
     def strain(self) -> float:

@@ -5,7 +5,7 @@ documentation has for the failure; here is what no part says. `karamelo-py check
 run before its first step, once.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from math import fsum, inf, isfinite
 from typing import Any, NamedTuple
 
@@ -201,7 +201,16 @@ def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> Non
     warn_about_steps(hub, simulation, halves)
     _warn_about_precision(scene)
     warn_about_rest(hub, simulation, duration)
-    for one in (*scene.advice("failure"), *_impossible_speeds(scene), *_other_units(scene)):
+    _tell(hub, (*scene.advice("failure"), *_impossible_speeds(scene), *_other_units(scene)))
+
+
+def warn_about_laws(hub: Hub, simulation: Simulation, duration: float) -> None:
+    """Tell what will go wrong with the laws of a run in implicit steps; each failure once."""
+    _tell(hub, SceneFacts(hub, simulation, duration).advice("failure", of_laws=True))
+
+
+def _tell(hub: Hub, said: Iterable[Advice]) -> None:
+    for one in said:
         if hub.update.first_time(one.name):
             place = one.place or hub.update.method.place
             hub.warn(f"{one.name}: {one.reason}", place=place, hint=one.cure)

@@ -13,6 +13,7 @@ Trans. Graph. 36(4), section 4.3.4). What plastic flow by shear gains (dilatancy
 from math import inf, log, radians, sqrt
 
 from karamelo_py.compiler.compile import point_function
+from karamelo_py.language.rules import known_failure
 from karamelo_py.points.kinematics import inner
 from karamelo_py.points.laws.eos import bulk_modulus, pressure, ratio_at_pressure
 from karamelo_py.points.laws.strengths import elastic_ratio, pressure_response, remembers, respond
@@ -85,6 +86,21 @@ def frictional(strength: type) -> None:
     remembers(strength, ep=0.0, Jp=1.0, Js=1.0)
     elastic_ratio.on(strength)(elastic_part)
     respond.on(strength)(respond_by_friction)
+    known_failure(
+        strength,
+        "locking",
+        when=_locks,
+        reason="plastic flow of soil gives its cells a volume, and {scene.basis_name} functions "
+        "without averaged volumes cannot follow: limit loads are a tenth to a quarter too high, "
+        "and may go on rising",
+        cure="anti_volumetric_locking(true), and method tlmpm where soil with friction keeps its "
+        "neighbours, as below a footing: points that cross cells take a tenth of such loads",
+    )
+
+
+def _locks(strength, scene):
+    locks = scene.linear and scene.d > 1 and not scene.hub.update.anti_locking
+    return {"place": scene.method.place} if locks else None
 
 
 # --- parameters of soils -------------------------------------------------------------------------

@@ -1,0 +1,12 @@
+"""Vortices of a liquid without viscosity: the velocities after one turnover."""
+
+from comparisons.defaults import Case
+
+CASE = Case(
+    quantity="error of the velocity (L2, relative)",
+    exact=0.0,
+    measure=lambda result: result.log.off[-1],
+    source="Taylor & Green 1937",
+    scale=1.0,
+    advice="liquids with linear functions",
+)
