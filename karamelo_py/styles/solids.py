@@ -147,7 +147,7 @@ class PointsSolid(Solid):
 
     Example
     -------
-    solid(grains, points, grains.csv, sand, 0.1)
+    solid(grains, points, grains.csv, steel, 0.1)
 
     Notes
     -----
