@@ -19,6 +19,7 @@ from karamelo_py.styles.regions import (
     Cylinder,
     Difference,
     Intersection,
+    Plane,
     Sphere,
     Union,
 )
@@ -382,3 +383,15 @@ def test_distances_tell_inside_from_outside_and_are_none_too_long(dimension, ext
         depth, beside = region.depth(x, 0.3), region.depth(y, 0.3)
         np.testing.assert_array_equal(depth > 0, region.inside(x))
         assert (np.abs(depth - beside) <= np.linalg.norm(x - y, axis=1) * (1 + 1e-9)).all()
+
+
+def test_a_plane_has_two_sides():
+    hub = SmallHub(2)
+    slope = hub.region("slope", Plane, 0, 0.1, 3, 4)
+    x = np.array([[0.0, 0.1], [0.04, 0.07], [0.3, 0.5], [-0.3, -0.3]])
+    assert slope.inside(x).tolist() == [True, True, True, False]
+    assert slope.depth(x, 1) == pytest.approx([0, 0, (0.9 + 1.6) / 5, (-0.9 - 1.6) / 5], abs=1e-12)
+    other = hub.region("other", Plane, 0, 0.1, 3, 4, "exterior")
+    assert other.inside(x[2:]).tolist() == [False, True]
+    with pytest.raises(ScriptError, match="has no length"):
+        hub.region("none", Plane, 0, 0, 0, 0)

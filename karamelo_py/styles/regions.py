@@ -1,4 +1,4 @@
-"""Region styles block, cylinder and sphere; union, intersection and difference of regions."""
+"""Region styles block, cylinder, sphere, plane; union, intersection, difference of regions."""
 
 import math
 from collections.abc import Sequence
@@ -10,6 +10,7 @@ from karamelo_py.language.signature import Argument
 from karamelo_py.scene import region
 from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.hub import Hub
+from karamelo_py.script.errors import ScriptError
 
 _NAMES = ("xlo", "xhi", "ylo", "yhi", "zlo", "zhi")
 
@@ -19,6 +20,10 @@ class Primitive(region.Region):
 
     slabs: Sequence[tuple] = ()  # axis, lower and upper end of each
     across: Sequence[int] = ()  # the axes along which it is round, with a centre and a radius
+
+    @property
+    def aligned(self) -> bool:
+        return not self.across or self.dimension == 1
 
     def contains(self, x: np.ndarray) -> np.ndarray:
         return self.distance(x, np.inf) >= -self.tolerance
@@ -159,6 +164,66 @@ class Sphere(Primitive):
         self.across, self.centre = range(len(centre)), np.array(centre)
         lo, hi = self.centre - self.radius, self.centre + self.radius
         super().__init__(hub, lo, hi, exterior=exterior)
+
+
+class Plane(region.Region):
+    """All on one side of a plane, in 2D of a line; the plane belongs to it.
+
+    Parameters
+    ----------
+    plane
+        A position on the plane and a direction across it, which points into the region (of any
+        length): in 2D ``x, y, nx, ny``; in 3D ``x, y, z, nx, ny, nz``. A last word ``exterior``
+        makes the region the other side.
+
+    Example
+    -------
+    region(slope, plane, 0, 1, sin(radians(-20)), -cos(radians(20)))
+
+    Notes
+    -----
+    It reaches as far as the domain does. Bodies with leaning faces are intersections of such
+    regions.
+
+    See Also
+    --------
+    block, intersection
+    """
+
+    syntax = "x, y[, z], nx, ny[, nz][, exterior]"
+    forms = Forms(
+        "region(ID, plane, {names}[, exterior])",
+        {2: ("x", "y", "nx", "ny"), 3: ("x", "y", "z", "nx", "ny", "nz")},
+    )
+
+    def __init__(self, hub: Hub, *plane: Argument):
+        given, exterior = region.split_exterior(plane)
+        d = require_domain(hub).dimension
+        values = np.array([*self.forms.read(hub, given, d).values()])
+        self.middle, normal = values[:d], values[d:]
+        length = np.linalg.norm(normal)
+        if length == 0:
+            raise ScriptError(
+                "the direction across the plane has no length",
+                place=given[d].place,
+                expected="a direction that is not 0",
+            )
+        self.normal = normal / (length or 1)
+        super().__init__(hub, np.full(d, -np.inf), np.full(d, np.inf), exterior=exterior)
+        self.unknown |= bool(np.isnan(values).any())
+
+    @property
+    def aligned(self) -> bool:
+        return np.count_nonzero(self.normal) == 1
+
+    def contains(self, x: np.ndarray) -> np.ndarray:
+        return self.distance(x, np.inf) >= -self.tolerance
+
+    def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
+        depth = np.zeros(len(x))
+        for k, (middle, along) in enumerate(zip(self.middle, self.normal, strict=True)):
+            depth += along * (x[:, k] - middle)
+        return depth
 
 
 class Union(region.Region):
