@@ -30,7 +30,7 @@ HERE = Path(__file__).parent
 DOCS = HERE.parent / "docs"
 PICTURES = DOCS / "_static" / "comparison"
 INPUTS = HERE.parent / "inputs"
-TOOLS = ("__main__", "cost", "defaults", "exact", "lines", "pictures", "results", "row")
+TOOLS = ("__main__", "cost", "defaults", "exact", "lines", "pictures", "results", "row", "slopes")
 
 
 def scenes() -> list[str]:

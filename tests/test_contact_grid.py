@@ -264,7 +264,7 @@ def incline(mu: float) -> str:
 def test_contact_carries_the_weight_of_a_sliding_disk(run_script):
     """The force across the incline is m g cos. How fast the disk slides, comparisons/incline.py."""
     log = run_script(incline(0.1)).log
-    late = log.Time > 0.1
+    late = log.Time > 0.2  # a smooth disk bounces on its lowest point before
     assert log.v_x[-1] > 0.1
     weight = np.pi * 0.4**2 * 10 * 3**0.5 / 2
     assert log.ContactForce_disk_y[late].mean() == pytest.approx(weight, rel=0.03)

@@ -26,6 +26,7 @@ from karamelo_py.styles.regions import (
     Cylinder,
     Difference,
     Intersection,
+    Plane,
     Sphere,
     Union,
 )
@@ -465,3 +466,19 @@ def test_the_mirror_image_beyond_a_side_is_not_missed():
     assert not hub.warnings
     hub.solid("c", hub.region("t", Cylinder, 0.9, 0.5, 0.2))
     assert len(hub.warnings) == 1
+
+
+def test_solids_in_contact_have_smooth_faces_where_these_lean():
+    """Nothing said: whole boxes in a method with one grid, and of a block; cut of what leans."""
+    for method, leaning in (("ulmpm", False), ("ulmpm/contacts", True)):
+        hub = SmallHub(2)
+        hub.interpreter.run_text(f"method({method}, FLIP, linear, 1)")
+        block = hub.region("block", BlockRegion, -0.3, 0.3, -0.3, 0.3)
+        disk = hub.region("disk", Cylinder, 0, 0, 0.3)
+        slope = hub.region("slope", Plane, 0, 0, 1, 2)
+        level = hub.region("level", Plane, 0, 0, 0, -2)
+        wedge = hub.combine("wedge", Intersection, block, slope)
+        slab = hub.combine("slab", Intersection, block, level)
+        for region, leans in ((disk, True), (wedge, True), (block, False), (slab, False)):
+            assert hub.solid(region.id, region).cut == (leaning and leans)
+        assert hub.solid("whole", disk, points="regular").cut is False

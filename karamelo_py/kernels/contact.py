@@ -14,7 +14,9 @@ gets more than would stop it, and energy does not grow. What remains is taken in
 Fields meet at nodes up to two cells before the bodies do (the reach of the functions). Therefore
 the gap between the surfaces is measured, from the mean places of the points of each body that a
 node sees (`karamelo_py.points.basis.surface`). Bodies may approach until the gap is closed, and are
-stopped where it would be less than nothing at the end of the step.
+stopped where it would be less than nothing at the end of the step. Convex bodies are apart if they
+are along one direction: of the directions out of the two that one is the normal along which the gap
+is the largest, so that the corner of a body does not plough through the face of the other one.
 """
 
 from math import sqrt
@@ -42,8 +44,10 @@ class SeparateFields(NamedTuple):
     """Solids touch where their fields meet. F fields of equal grids, S solids."""
 
     node_fields = (Normal, Centre)
+    looks_beyond = 1  # cells beyond nodes that points see, at what others give
 
     stride: int  # from a node to the same place in the next field
+    beside: np.ndarray  # (d, 2) step from a node to the next one along each axis, number of nodes
     friction: np.ndarray  # (F, F) coefficient of each pair of fields; infinite: no slip
     warmth: np.ndarray  # (F, F) share of the heat of friction that goes to the first of two fields
     pair: np.ndarray  # (F, F) slot of the published force of a pair on its first field, or -1
@@ -103,14 +107,13 @@ def _yielding(contact, n, k, per_mass):
 
 
 @noinline
-def _shares(contact, kin, nodes, n, m):
+def _shares(contact, kin, n, m, of_n, of_m):
     """Weights of the two bodies' outward sums in their common normal.
 
     The sum of m grad N points out of a body. Where a body has little mass or ends in an edge it
     says little about the direction: the larger sum decides (after Lemiale, Nairn & Hurmane 2010),
     equal ones are averaged. A body with a prescribed velocity knows its surface best.
     """
-    of_n, of_m = _normal(kin, nodes, n), _normal(kin, nodes, m)
     of_n, of_m = dot(of_n, of_n), dot(of_m, of_m)
     prescribed_n = prescribed_m = False
     for k in range(kin.dimension):
@@ -124,17 +127,49 @@ def _shares(contact, kin, nodes, n, m):
     return share**4, (1 - share) ** 4
 
 
-@shared
-def _normal(kin, nodes, n):
-    return vector_at(kin, field(nodes.fields, Normal), n, 0, zero_vector(kin, 0.0))
+@noinline
+def _place(contact, n, k):
+    """Return the number of a node along direction k."""
+    return n % contact.stride // contact.beside[k, 0] % contact.beside[k, 1]
+
+
+@noinline
+def _kept(contact, n, k):
+    """Return 0 at an end of the grid: a body that ends there has no surface for others."""
+    return 1.0 if 0 < _place(contact, n, k) < contact.beside[k, 1] - 1 else 0.0
+
+
+@noinline
+def _normal(contact, kin, nodes, n):
+    """Return the direction out of a body: the mean of the sums of m grad N of nodes around `n`.
+
+    Those of one node turn by tens of degrees as points that lean to the grid pass it. With the
+    weights 1/4, 1/2, 1/4 along each axis a plane face keeps its direction to two degrees.
+    """
+    gradients, like = field(nodes.fields, Normal), zero_vector(kin, 0.0)
+    total = like
+    for which in range(3**kin.dimension):
+        beside, weight, left = n, 1.0, which
+        for k in range(kin.dimension):
+            way = left % 3 - 1
+            left //= 3
+            beside += way * contact.beside[k, 0]
+            within = 0 <= _place(contact, n, k) + way < contact.beside[k, 1]
+            weight *= (0.5 if way == 0 else 0.25) if within else 0.0
+        if weight > 0:
+            gradient = vector_at(kin, gradients, beside, 0, like)
+            kept = [_kept(contact, beside, k) * of_axis for k, of_axis in enumerate(gradient)]
+            total = total + weight * vector(kin, kept)
+    return total
 
 
 @noinline
 def _pair_of(contact, kin, nodes, records, n, m):
     """The two bodies with nodes `n` and `m`; velocities are the first components of `records`."""
     per_n, per_m = 1.0 / nodes.sums[n, MASS], 1.0 / nodes.sums[m, MASS]
-    share_n, share_m = _shares(contact, kin, nodes, n, m)
-    outward = share_n * _normal(kin, nodes, n) - share_m * _normal(kin, nodes, m)
+    of_n, of_m = _normal(contact, kin, nodes, n), _normal(contact, kin, nodes, m)
+    share_n, share_m = _shares(contact, kin, n, m, of_n, of_m)
+    outward = share_n * of_n - share_m * of_m
     axes = range(kin.dimension)
     yielding = [_yielding(contact, n, k, per_n) + _yielding(contact, m, k, per_m) for k in axes]
     like = zero_vector(kin, 0.0)
@@ -150,27 +185,47 @@ def _left(pair, push):
 
 
 @noinline
-def _reach(contact, nodes, pair, n, where, side):
+def _reach(contact, nodes, outward, n, where, side):
     """Return the distance from node `n` to the surface of its body, along the normal out of it.
 
     `side` is 1 for the first body of the pair and -1 for the second.
     """
     centre = field(nodes.fields, Centre)
     mean = 0.0
-    for k, outward in enumerate(pair.outward):
-        mean += side * outward * (centre[n, k] / nodes.sums[n, MASS] - where.x[k])
+    for k, component in enumerate(outward):
+        mean += side * component * (centre[n, k] / nodes.sums[n, MASS] - where.x[k])
     table = contact.surface[n // contact.stride]
-    row = (mean / (sqrt(dot(pair.outward, pair.outward)) * where.h) + 3) * ENTRIES
+    row = (mean / (sqrt(dot(outward, outward)) * where.h) + 3) * ENTRIES
     low = min(max(int(row), 0), table.size - 2)
     share = min(max(row - low, 0.0), 1.0)
     return where.h * (table[low] + share * (table[low + 1] - table[low]))
 
 
-@shared
-def _gap_of(contact, nodes, pair, where):
-    """Return the distance between the surfaces of two bodies; below 0 where they overlap."""
-    gap = -_reach(contact, nodes, pair, pair.n, where, 1)
-    return gap - _reach(contact, nodes, pair, pair.m, where, -1)
+@noinline
+def _gap(contact, nodes, outward, n, m, where):
+    """Return the distance between two bodies along a direction from the first to the second."""
+    gap = -_reach(contact, nodes, outward, n, where, 1)
+    return gap - _reach(contact, nodes, outward, m, where, -1)
+
+
+@noinline
+def _parted(contact, kin, nodes, pair, where):
+    """The pair with that direction out of a body as normal along which they are furthest apart.
+
+    At the corner of one body it is that of the other one's face.
+    """
+    n, m, outward = pair.n, pair.m, pair.outward
+    of_n, of_m = _normal(contact, kin, nodes, n), _normal(contact, kin, nodes, m)
+    share_n, share_m = _shares(contact, kin, n, m, of_n, of_m)
+    if share_n * share_m * dot(outward, outward) > 0:
+        gap = _gap(contact, nodes, outward, n, m, where)
+        gap_n = _gap(contact, nodes, of_n, n, m, where)
+        gap_m = _gap(contact, nodes, -1.0 * of_m, n, m, where)
+        if gap_n > max(gap, gap_m):
+            outward = of_n
+        elif gap_m > max(gap, gap_n):
+            outward = -1.0 * of_m
+    return pair._replace(outward=outward)
 
 
 @noinline
@@ -182,7 +237,8 @@ def _excess_of(contact, nodes, pair, where):
     approach = dot(pair.outward, pair.relative)
     if not approach > 0:
         return 0.0
-    return approach / size - max(_gap_of(contact, nodes, pair, where), 0.0) / where.dt
+    gap = _gap(contact, nodes, pair.outward, pair.n, pair.m, where)
+    return approach / size - max(gap, 0.0) / where.dt
 
 
 @noinline
@@ -241,6 +297,7 @@ def _count_partners(which, contact, kin, nodes, place, count):
             else:
                 m = _node(contact, place, j)
                 pair = _pair_of(contact, kin, nodes, nodes.update, n, m)
+                pair = _parted(contact, kin, nodes, pair, which)
                 belongs = _excess_of(contact, nodes, pair, which) > 0
             if belongs:
                 contact.partners[i] += 1
@@ -286,6 +343,7 @@ def _touch_pair(contact, kin, nodes, control, i, j, place, share, where):
     a, b = contact.meeting[i], contact.meeting[j]
     n, m = _node(contact, place, i), _node(contact, place, j)
     pair = _pair_of(contact, kin, nodes, nodes.update, n, m)
+    pair = _parted(contact, kin, nodes, pair, where)
     excess = _excess_of(contact, nodes, pair, where)
     if not excess > 0:
         return
@@ -406,7 +464,7 @@ def list_pairs(contact, kin, grids, nodes, spans, pairs, normals, gaps):
                         pairs[found, 0], pairs[found, 1] = n, m
                         for k in range(kin.dimension):
                             normals[found, k] = pair.outward[k] / size
-                        gaps[found] = _gap_of(contact, nodes, pair, where)
+                        gaps[found] = _gap(contact, nodes, pair.outward, pair.n, pair.m, where)
                         found += 1
     return found
 

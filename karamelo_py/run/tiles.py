@@ -94,8 +94,11 @@ class Tiles:
         self._steps = steps_of(self._nodes)
         self.shapes = -(-self._cells // self.size)
         self.first = numbered(self.shapes)
-        # Points without a domain reach no further than two cells from those of their tile.
-        widest = np.minimum((self.size + 4) * self.per_cell + 1 + 2 * self.beyond, self._nodes)
+        # Points without a domain reach no further than two cells from those of their tile, contact
+        # one more.
+        far = 2 if len(lattices) == 1 else 3
+        widest = (self.size + 2 * far) * self.per_cell + 1 + 2 * self.beyond
+        widest = np.minimum(widest, self._nodes)
         most = float(np.diff(self.first) @ np.prod(widest, axis=1, dtype=float))
         shaped = shape_size(type(basis), d) > 0
         self._most_rows = inf if shaped else most
@@ -173,7 +176,8 @@ class Tiles:
         cells = float(self._cells.max())
         rounding = ROUNDING + 4 * np.finfo(x.dtype).eps * cells
         drift = s.control.clock[0].drift_limit + rounding if s.frame.moves else 0.0
-        return far + drift if far < cells else cells  # also where it is not a number
+        beyond = far + drift + getattr(type(s.contact), "looks_beyond", 0)
+        return beyond if far < cells else cells  # also where it is not a number
 
     def _where(self, s: Setup, points: Points) -> np.ndarray:
         """The places (w, n) that weights belong to."""

@@ -65,6 +65,11 @@ class Region(Named):
         """Upper corner (3,) of the part that lies in the domain."""
         return np.clip(self.box_hi, self.domain.lo, self.domain.hi)
 
+    @property
+    def aligned(self) -> bool:
+        """True if all faces are known to lie along the axes."""
+        return bool(self.parts) and all(part.aligned for part in self.parts)
+
     def contains(self, x: np.ndarray) -> np.ndarray:
         """Test which positions `x` (n, >= dimension) lie in the shape, faces included: (n,) bool.
 

@@ -36,6 +36,11 @@ class Enclosed(Region):
     def skin(self) -> Skin:
         return Skin(self.faces())
 
+    @property
+    def aligned(self) -> bool:
+        across = np.ptp(self.faces(), axis=1).min(axis=1)
+        return bool((across <= self.domain.tolerance).all())
+
     def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
         distance = self.skin.distance(x[:, : self.dimension], reach)
         return np.where(self.contains(x), distance, -distance)
@@ -95,6 +100,10 @@ class MeshRegion(Enclosed):
 
     def contains(self, x: np.ndarray) -> np.ndarray:
         return self.simplices.contain(np.asarray(x)[:, : self.dimension])
+
+    @property
+    def aligned(self) -> bool:
+        return self.simplices.flat or super().aligned
 
     def faces(self) -> np.ndarray:
         return outer_faces(self.corners)

@@ -44,7 +44,9 @@ class RegionSolid(Solid):
         domains around the points (ugimp, cpgimp, cpdi) those of 3 are at equal distances, too:
         domains tile the cell. ``cut``: at equal distances, and what the region cuts of the boxes of
         the points at its edge is left out: these have the volume and stand in the middle of what
-        is left; less than a tenth of a box goes to the nearest point beside it. Round bodies so
+        is left; less than a tenth of a box goes to the nearest point beside it. In ulmpm/contacts
+        this is the default where a face of the region is curved or leans to the grid: with the
+        steps of whole boxes (``regular``, as in Karamelo) bodies hook each other. Round bodies so
         have their volume (to 0.01 %) and no steps of h/ppc at the rim, which contact would feel.
         Parts of a region (fins, slots) as thin as a tenth of h/ppc have their mass to 3 %, whatever
         their direction; where that of thinner ones may be missing, a message says so. A region of a
@@ -88,11 +90,15 @@ class RegionSolid(Solid):
         super().__init__(hub, material, h, T0, GlueToSolid)
         self.region = region
         self.ppc = ppc
+        basis = hub.update.method.basis
+        corners = {"corners", "half_edges"} & {*getattr(basis, "shape", ())}
+        # Contact feels the steps of whole boxes.
+        if points is None and hub.update.method.fields_per_solid:
+            points = None if corners or region.unknown or region.aligned else "cut"
         self.cut = points == "cut"
         lattice = lattice_of(region, domain, self.h, own=own_grids(hub))
         if points is None and hub.update.method.regular_points:
             points = "regular"
-        corners = {"corners", "half_edges"} & {*getattr(hub.update.method.basis, "shape", ())}
         if self.cut and corners:
             raise ScriptError(
                 "the domains of cpdi tile a body, and those of points that are cut do not",

@@ -1,6 +1,7 @@
 """method ulmpm/contacts: a velocity field for each solid, and contact on the grid."""
 
 from collections.abc import Iterator, Sequence
+from math import prod
 from typing import NamedTuple
 
 import numpy as np
@@ -68,8 +69,10 @@ class ULMPMContacts(Method):
     Where a surface is follows from the mean place of the points that a node sees, as of layers of
     points whose outermost is half their size below a plane surface (Nairn 2013, "Modeling imperfect
     interfaces in the material point method using multimaterial methods"). It is exact for plane
-    surfaces along the grid. A disk cut out of a square grid of points has a rim with steps, and is
-    met up to half a step early or late: force and stress of a pressed disk are of first order
+    surfaces along the grid. Bodies with curved or leaning faces have points that are cut there
+    (points=cut), unless their solid says otherwise. Of whole squares (points=regular) a rim has
+    steps, and is met up to half a step early or late: a block that should slide down a slope of 20
+    degrees sticks, and force and stress of a pressed disk are of first order
     (in.hertz), and finer points help as much as finer cells. With
     Bernstein-quadratic functions no gap is known: contact is felt as soon as two solids have mass
     at one node. A node at a surface loses what it has of the motion of approach: bars of 4, 8 and
@@ -81,8 +84,10 @@ class ULMPMContacts(Method):
     of a thinner one seems higher by a quarter of a cell or less.
 
     The normal at a node is one for both solids, so that they get opposite impulses and momentum is
-    kept: from the sums of m grad N of the two, that of the solid with a prescribed velocity, else
-    mostly the larger one. Where more than two solids meet at a node, every pair that approaches
+    kept: from the sums of m grad N of the two, averaged over the nodes around with the weights 1/4,
+    1/2, 1/4 along each axis; that of the solid with a prescribed velocity, else mostly the larger
+    one, or that of one solid if along it the two are further apart (the corner of one on the face
+    of the other). Where more than two solids meet at a node, every pair that approaches
     takes its impulse from the same velocities, reduced where a solid is in several pairs, and what
     remains is taken again, up to 16 times: the order in which solids are defined does not matter,
     and momentum is kept. Nodes that fix velocity_nodes holds are not moved by contact; what they
@@ -130,6 +135,7 @@ class ULMPMContacts(Method):
     def contact_between(self, hub: Hub, lattices: Sequence[Lattice]) -> NamedTuple:
         """Contact where the fields of two solids meet."""
         count, d = len(lattices), hub.domain.dimension
+        shape = lattices[0].shape[:d]
         nodes = sum(lattice.node_count for lattice in lattices)
         h = hub.domain.h
         first: dict[int, Solid] = {}
@@ -143,6 +149,7 @@ class ULMPMContacts(Method):
         slots = np.array([slots_of_loads(hub, first[k]) for k in range(count)])
         return SeparateFields(
             stride=lattices[0].node_count,
+            beside=np.array([(prod(shape[k + 1 :]), shape[k]) for k in range(d)]),
             friction=np.zeros((count, count)),
             warmth=heat_shares(laws, conducting=hub.update.thermal),
             pair=np.full((count, count), -1, np.int64),

@@ -1,0 +1,5 @@
+"""A block slides down a rigid slope of 33 degrees, with the friction 0.3."""
+
+from comparisons.slopes import slope
+
+CASE = slope(angle=33, mu=0.3)
