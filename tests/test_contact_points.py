@@ -249,3 +249,10 @@ def test_solids_without_contact_are_told(run_interpreted):
     assert said.count("pass through each other: a, b") == 1
     said = run_interpreted(script.format("fix(c, contact/minimize_penetration, a, b, 0)")).err
     assert "pass through" not in said
+
+
+@pytest.mark.parametrize(("mu", "told"), [("", 0), (", 0", 1), (", 0.2", 1), (", 0.3", 0)])
+def test_friction_that_balls_cannot_give_is_told(run_interpreted, mu, told):
+    """Riding from ball to ball brakes a block by more, see `sliding`."""
+    script = sliding(0.5).replace("run_time(0.5)", "run(0)").replace("base, 0.5)", f"base{mu})")
+    assert run_interpreted(script).err.count("their surfaces are made of balls") == told

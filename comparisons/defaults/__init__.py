@@ -6,6 +6,7 @@ variable `refine`: cells are h / refine.
 """
 
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -62,6 +63,8 @@ def run(name: str, folder: Path, refine: float, dt: float | None = None) -> Resu
     if dt is not None:
         head, line, tail = text.rpartition("\nrun")
         text = f"{head}\nset_dt({dt!r}){line}{tail}"
+    for part in INPUTS.glob("*.block"):  # that scripts include
+        shutil.copy(part, place)
     script = place / f"in.{name}"
     script.write_text(text, encoding="utf-8")
     command = [sys.executable, "-m", "karamelo_py.app.cli", str(script)]
