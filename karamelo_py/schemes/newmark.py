@@ -2,26 +2,39 @@
 
 from typing import Annotated, Any, Literal, NamedTuple
 
-from karamelo_py.language.signature import NonNegative, Positive
+from karamelo_py.compiler.fields import Field, vector
+from karamelo_py.language.signature import In, NonNegative, Positive
 from karamelo_py.schemes.quasi_static import BEGIN, CLOSE, HOLD, PUBLISHED
 from karamelo_py.script.errors import ScriptError
+
+
+class Surplus(Field):
+    """Acceleration of generalized-alpha over that of the forces, at the end of a step."""
+
+    shape = vector
 
 
 class Newmark(NamedTuple):
     """Steps in time that no wave limits: each ends in balance with inertia (Newmark 1959).
 
     The step is that of `set_dt`. Vibrations that it does not resolve stay, neither damped nor
-    resolved, unless `gamma` is above 1/2 or the rule is that of Euler. Accelerations at the
-    beginning of a step are those of the forces there.
+    resolved, unless `gamma` is above 1/2, `rho` below 1, or the rule is that of Euler.
+    Accelerations at the beginning of a step are those of the forces there; with `rho` those of the
+    rule.
 
     Parameters
     ----------
     beta, gamma
         Of displacement and velocity: u = dt v + dt^2 ((1/2 - beta) a + beta a'),
-        v' = v + dt ((1 - gamma) a + gamma a'). 1/4 and 1/2 are the trapezoidal rule, which keeps
-        the energy of linear bodies; gamma above 1/2 damps, the more the higher the frequency.
+        v' = v + dt ((1 - gamma) a + gamma a'). 1/4 and 1/2, if not given: the trapezoidal
+        rule, which keeps the energy of linear bodies. Gamma above 1/2 damps, the more the higher
+        the frequency.
     rule
         ``newmark``, or ``euler``: the backward rule of Euler, which damps all vibrations.
+    rho
+        Share that a step leaves of what is much faster than the step: generalized-alpha (Chung &
+        Hulbert 1993). Forces and accelerations are then in balance between the beginning and the
+        end of a step. Slow vibrations are hardly damped. 1: as without; 0: all goes in a step.
     tolerance, iterations, solver, stabilisation
         As of quasi-static.
 
@@ -29,6 +42,7 @@ class Newmark(NamedTuple):
     -------
     scheme(newmark)
     scheme(newmark, 0.3025, 0.6)
+    scheme(newmark, rho=0.8)
     scheme(newmark, rule=euler)
 
     See Also
@@ -52,24 +66,52 @@ class Newmark(NamedTuple):
     iterations: int
     solver: str
     stabilisation: float
+    rho: float
+
+    @property
+    def alphas(self) -> tuple[float, float]:
+        """Shares of the beginning of a step in its accelerations and its forces."""
+        # With a radius of 1 both are halves, which is balance at the end after balance before.
+        return _alphas(self.rho) if self.rho < 1 else (0.0, 0.0)
+
+    @property
+    def point_fields(self) -> tuple[type, ...]:
+        """What points carry from one step to the next."""
+        return (Surplus,) if self.rho < 1 else ()
 
     @classmethod
     def given(
         cls,
-        beta: Annotated[float, Positive] = 0.25,
-        gamma: Annotated[float, Positive] = 0.5,
+        beta: Annotated[float, Positive] | None = None,
+        gamma: Annotated[float, Positive] | None = None,
         *,
         rule: Literal["newmark", "euler"] = "newmark",
+        rho: Annotated[float, In(0, 1)] | None = None,
         tolerance: Annotated[float, Positive] = 1e-10,
         iterations: Annotated[int, Positive] = 20,
         solver: Literal["auto", "direct", "amg"] = "auto",
         stabilisation: Annotated[float, NonNegative] = 0.0,
     ) -> Any:
         """The scheme from the words of a script."""
+        if rho is not None:
+            if beta is not None or gamma is not None or rule != "newmark":
+                raise ScriptError(
+                    f"rho {rho:g} says beta, gamma and the rule already",
+                    argument="rho",
+                    expected="rho alone, or none",
+                )
+            m, f = _alphas(rho)
+            beta, gamma = (1 - m + f) ** 2 / 4, 0.5 - m + f
+            return cls(beta, gamma, rule, tolerance, iterations, solver, stabilisation, rho)
+        beta, gamma = 0.25 if beta is None else beta, 0.5 if gamma is None else gamma
         if gamma < 0.5 or beta < gamma / 2:
             raise ScriptError(
                 f"beta {beta:g} and gamma {gamma:g} are stable for small steps only",
                 argument="beta",
                 expected="gamma of at least 1/2, beta of at least gamma/2",
             )
-        return cls(beta, gamma, rule, tolerance, iterations, solver, stabilisation)
+        return cls(beta, gamma, rule, tolerance, iterations, solver, stabilisation, 1.0)
+
+
+def _alphas(rho: float) -> tuple[float, float]:
+    return (2 * rho - 1) / (rho + 1), rho / (rho + 1)

@@ -4,9 +4,11 @@ from typing import Any
 
 import numpy as np
 
+from karamelo_py.compiler.fields import field
 from karamelo_py.kernels.implicit import gather, scatter
 from karamelo_py.run.implicit.contact import Contact
 from karamelo_py.run.implicit.equations import Equations
+from karamelo_py.schemes.newmark import Surplus
 
 
 class Rest:
@@ -32,7 +34,11 @@ class Rest:
 
 
 class Motion:
-    """Inertia by the rules of Newmark.
+    """Inertia by the rules of Newmark, and by generalized-alpha.
+
+    That has (1 - alpha_m) a' + alpha_m a in balance with (1 - alpha_f) f' + alpha_f f. Points carry
+    by how much a exceeds the acceleration of the forces, and begin with nothing of that. The scheme
+    is stable with what their way to the nodes and back takes of it.
 
     Parameters
     ----------
@@ -64,8 +70,8 @@ class Motion:
         self.given, self.prescribed = given, prescribed
         self.mass = equations.mass[:, None]
         self.inverse = np.divide(1, self.mass, out=np.zeros_like(self.mass), where=self.mass > 0)
-        self.v = self._velocities()
-        self.a = before * self.inverse
+        self.v = self._means([block.points.v for block in equations.blocks])
+        self.a = self.of_forces = before * self.inverse
         self.contact, self.movable = contact, np.where(given, 0.0, self.inverse)
         if contact is not None:
             self.a = contact.accelerated(self.a, self.v, self.movable)
@@ -73,15 +79,21 @@ class Motion:
             self.beta, self.gamma, self.rest = 1.0, 1.0, 0.0
         else:
             self.beta, self.gamma, self.rest = scheme.beta, scheme.gamma, 0.5 / scheme.beta - 1
-        self.diagonal = 1 / (self.beta * dt * dt)
+        self.am, self.af = scheme.alphas
+        self.diagonal = (1 - self.am) / (1 - self.af) / (self.beta * dt * dt)
+        fields = [field(block.points.fields, Surplus) for block in equations.blocks]
+        self.surplus = [] if any(one is None for one in fields) else fields
+        if self.surplus:
+            self.a = self.of_forces + self._means(self.surplus)
         self.old = [block.points.v.copy() for block in equations.blocks]
 
-    def _velocities(self) -> np.ndarray:
-        """Average the velocities of the points at the nodes (m, d), by mass."""
+    def _means(self, values: list[np.ndarray]) -> np.ndarray:
+        """Average values (d, n) of the points of each block at the nodes (m, d), by mass."""
         equations = self.equations
         total = np.zeros((len(equations.nodes), equations.d))
-        for block, (seen, _) in zip(equations.blocks, equations.parts, strict=True):
-            scatter(seen, block.points.mass, block.points.v, total)
+        blocks = zip(equations.blocks, equations.parts, values, strict=True)
+        for block, (seen, _), own in blocks:
+            scatter(seen, block.points.mass, own, total)
         return total * self.inverse
 
     def acceleration(self, u: np.ndarray) -> np.ndarray:
@@ -91,7 +103,15 @@ class Motion:
 
     def balance(self, u: np.ndarray, forces: np.ndarray) -> np.ndarray:
         """Add inertia to what forces leave (m, d), after displacements (m, d)."""
-        return forces - self.mass * self.acceleration(u)
+        a = self.acceleration(u)
+        # Who holds a node does it with the force of the end of the step.
+        weighted = np.where(self.given, a, self._demand(a))
+        return forces - self.mass * weighted
+
+    def _demand(self, a: np.ndarray) -> np.ndarray:
+        """Find the forces per mass (m, d) that accelerations at the end ask for there."""
+        weighted = (1 - self.am) * a + self.am * self.a
+        return (weighted - self.af * self.of_forces) / (1 - self.af)
 
     def size(self, u: np.ndarray) -> float:
         """Give the size of the forces of inertia."""
@@ -100,7 +120,8 @@ class Motion:
     def end(self, u: np.ndarray) -> None:
         """Give the points their velocities after the step."""
         dt, gamma = self.dt, self.gamma
-        free = self.v + dt * ((1 - gamma) * self.a + gamma * self.acceleration(u))
+        a = self.acceleration(u)
+        free = self.v + dt * ((1 - gamma) * self.a + gamma * a)
         new = np.where(self.given, self.prescribed, free)
         if self.contact is not None:
             new = self.contact.stopped(new, self.movable)
@@ -109,3 +130,7 @@ class Motion:
         for block, (seen, _), old in parts:
             block.points.v[:] = kept * old
             gather(seen, new - kept * self.v, block.points.v)
+        more = np.where(self.given, 0.0, a - self._demand(a))
+        for (seen, _), own in zip(self.equations.parts, self.surplus, strict=False):
+            own[:] = 0
+            gather(seen, more, own)
