@@ -156,6 +156,13 @@ AVERAGED = {"more": "anti_volumetric_locking(true)"}
         ("liquids with linear functions", WATER | {"more": "", "u": "0, 0.2*x"}, True),
         ("liquids with linear functions", WATER | {"more": "", "u": "0, 0.2"}, False),
         ("liquids with linear functions", WATER | SMOOTH, False),
+        ("whirls with FLIP", WATER | SMOOTH | {"u": "0, 0.2*x"}, True),
+        ("whirls with FLIP", WATER | SMOOTH, False),
+        (
+            "whirls with FLIP",
+            WATER | {"method": "ulmpm, APIC, quadratic-spline", "u": "0, 0.2*x"},
+            False,
+        ),
         ("shocks in a gas", GAS, True),
         ("shocks in a gas", GAS | {"more": PRESSED.format(1.5)}, False),
         ("shocks in a gas", GAS | SMOOTH, False),

@@ -1,4 +1,4 @@
-"""Vortices of a liquid without viscosity: the velocities after one turnover."""
+"""A vortex of a liquid without viscosity: the error of its velocities."""
 
 from comparisons.defaults import Case
 

@@ -4,7 +4,7 @@ from types import MappingProxyType
 from typing import Annotated, NamedTuple
 
 from karamelo_py.language.kinds import Constraint
-from karamelo_py.language.rules import known_failure
+from karamelo_py.language.rules import gain, known_failure
 from karamelo_py.points import noise
 from karamelo_py.points.transfers import lost_shares, updated_velocity
 
@@ -121,6 +121,13 @@ def slows(transfer: type) -> None:
         "2 % with 8, then more and more; after ten turns little is left",
         cure="method tlmpm, or APIC with quadratic-spline; with ulcpdi and R4, APIC in the place "
         "of {scene.transfer_name}",
+    )
+    gain(
+        transfer,
+        when=lambda transfer, scene: _turns_away(transfer, scene) and {"share": 0.5},
+        cause="a body has turned freely, {scene.free_turns:.2g} times, and its points, which "
+        "{scene.transfer_name} moves with another velocity than their own, come out of step",
+        cure="method tlmpm, or APIC in the place of {scene.transfer_name}",
     )
 
 

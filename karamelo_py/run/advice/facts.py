@@ -108,7 +108,7 @@ class SceneFacts:
 
     @cached_property
     def free_turns(self) -> float:
-        """How many times the solid turns that turns most and is held nowhere."""
+        """Turns of the solid that turns most and is held nowhere."""
         free = [one.spin for one in self.motions if self.turn > TURN and not held(self, one).any()]
         return max(free, default=0.0) * self.duration / (2 * pi)
 
@@ -187,14 +187,14 @@ class SceneFacts:
 
     @property
     def falls(self) -> float:
-        """How long the run is, in times sqrt(L/g) in which a solid falls by its own size."""
+        """Duration of the run in times sqrt(L/g), in which a solid falls by its own size."""
         sizes = [np.maximum(one.high - one.low, 1e-300) for one in self.motions]
         found = (np.abs(g) / np.max(sizes, axis=0) for g in self.weights)
         return self.duration * max((sqrt(one.max()) for one in found), default=0.0)
 
     @property
     def passes(self) -> float:
-        """How often points go, with the velocities that they have, past each other by its size."""
+        """Ways of points past each other, at their present velocities, in sizes of their solid."""
         found = [(one.fast - one.slow).max() / (4 * one.size) for one in self.motions if one.size]
         return self.duration * float(max(found, default=0.0))
 
