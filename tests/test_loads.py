@@ -84,10 +84,77 @@ def test_loads_around_the_axis(run_interpreted):
     assert log.T_y[-1] == pytest.approx(5 * 0.3**2 / 2, rel=1e-9)
 
 
-def test_points_that_a_region_cuts_show_no_faces(run_interpreted):
-    cut = DISK.replace("rubber, 0.1)", "rubber, 0.1, points=cut)")
-    said = run_interpreted(cut + "fix(F, edge_pressure, all, disk, 3)\n", status=1).err
-    assert "the points of solid 'disk' are cut at its edge" in said
+LOADED = """
+fix(F, edge_pressure, all, body, 3)
+fix(T, edge_traction, all, body, xhi, 0, 5)
+dump(d, all, particle, 1, d.*.LAMMPS, x0, y0, bx, by)
+set_dt(1e-5)
+log_modify(custom, step, F_x, F_y, T_y)
+run(1)
+"""
+BODIES = {
+    "disk": "region(body, cylinder, 0.02, -0.03, 0.4)",
+    "square turned by 30 degrees": """
+        c = cos(PI/6)
+        region(a, plane, 0.4*c, 0.2, -c, -0.5)
+        region(b, plane, -0.4*c, -0.2, c, 0.5)
+        region(c, plane, -0.2, 0.4*c, 0.5, -c)
+        region(d, plane, 0.2, -0.4*c, -0.5, c)
+        region(body, intersection, a, b, c, d)""",
+}
+
+
+@pytest.mark.parametrize("body", BODIES)
+def test_a_smooth_edge_bears_what_its_projection_does(run_interpreted, body):
+    """Of points that a region cuts: the projected width, no resultant, no moment."""
+    width = {"disk": 0.8}.get(body, 0.8 * (np.cos(np.pi / 6) + 0.5))
+    scene = DISK.replace("region(disk, cylinder, 0, 0, 0.4)", BODIES[body])
+    scene = scene.replace(
+        "region, disk, 2, rubber, 0.1)", "region, body, 2, rubber, 0.1, points=cut)"
+    )
+    alone = LOADED.replace("fix(T", "#").replace(", T_y", "")
+    result = run_interpreted(scene + alone)
+    last, log = result.dump("d.1.LAMMPS"), run_interpreted(scene + LOADED, folder="both").log
+    assert abs(log.F_x[-1]) + abs(log.F_y[-1]) < 1e-6
+    if body == "disk":  # points at corners show opposite sides
+        assert last.bx[last.bx > 0].sum() == pytest.approx(3 * width, rel=2e-3)
+        assert last.by[last.by > 0].sum() == pytest.approx(3 * width, rel=2e-3)
+    # Forces act half a point inside the edge.
+    assert abs((last.x0 * last.by - last.y0 * last.bx).sum()) < 0.02 * 3 * width * 0.4
+    # Opposite sides cancel in a quarter of a point (0.0125) at each of two corners.
+    assert log.T_y[-1] == pytest.approx(5 * width, abs=5 * 0.0125)
+
+
+def test_no_load_on_the_side_of_the_domain(run_interpreted):
+    """Half a disk about it: what would be beyond has no points, and bears nothing."""
+    half = DISK.replace("-0.6, 0.6, -0.6", "0, 0.6, -0.6").replace(
+        "rubber, 0.1)", "rubber, 0.1, points=cut)"
+    )
+    lines = (
+        "fix(F, edge_pressure, all, disk, 3)\nset_dt(1e-5)\nlog_modify(custom, step, F_x)\nrun(1)"
+    )
+    log = run_interpreted(half + lines).log
+    assert log.F_x[-1] == pytest.approx(-3 * 0.8, rel=2e-3)
+
+
+def test_a_ball_around_the_axis_is_pressed_from_all_sides(run_interpreted):
+    """Per radian: p R^2/2 from above and from below."""
+    text = """
+        method(ulmpm, FLIP, linear, 1)
+        dimension(2, 0, 1, -1, 1, 0.1)
+        axisymmetric(true)
+        region(ball, cylinder, 0, 0, 0.6)
+        material(rubber, linear, 2, 100, 0.3)
+        solid(ball, region, ball, 2, rubber, 0.1, points=cut)
+        fix(F, edge_pressure, all, ball, 3)
+        fix(T, edge_traction, all, ball, ylo, 0, 1)
+        set_dt(1e-5)
+        log_modify(custom, step, F_y, T_y)
+        run(1)
+        """
+    log = run_interpreted(text).log
+    assert log.F_y[-1] == pytest.approx(0, abs=1e-6)
+    assert log.T_y[-1] == pytest.approx(0.6**2 / 2, rel=0.01)
 
 
 def test_an_edge_without_points_is_told(run_interpreted):

@@ -23,6 +23,7 @@ NOTHING = 1e-9  # of a box: rounding
 # third of that; a sheet that is thinner than these parts more, or it is most of its body.
 ROUGH = 0.025
 MOSTLY = 0.1
+FACE = 2  # parts of the face of a box along each direction
 SLOPE = 1e-3  # over the largest: one that is less is none (sums would lose their digits)
 
 
@@ -165,6 +166,32 @@ def _measure(
         lo = lo[:, None, bent] + corners.T[:, :, None] * edges[:, None, :]
         lo, edges, box = lo.reshape(d, -1), np.tile(edges, parts), np.tile(box[bent], parts)
     return sums[0], sums[1:].T, rough[rough > 0]
+
+
+def surface(region: Region, x: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
+    """Measure the surface of `region` in boxes of edge length `size` around `x` (n, d).
+
+    Returns its area times the normal out of the region, (n, d), and a place on it, (n, d). By what
+    the covered parts of opposite faces differ: in boxes beside each other it adds up exactly.
+    """
+    n, d = x.shape
+    ends = np.array(list(itertools.product((0.0, 1.0), repeat=d - 1)))
+    starts = np.array(list(itertools.product(range(FACE), repeat=d - 1)), float)
+    on_face = (starts[:, None, :] + ends) / FACE - 0.5  # corners of the parts
+    area = np.empty((n, d))
+    for k in range(d):
+        covered = []
+        for side in (-0.5, 0.5):
+            at = x[:, None, None, :] + np.insert(on_face, k, side, axis=2) * size
+            # A face along the surface is not covered, whichever of two boxes asks.
+            depth = region.depth(at.reshape(-1, d), 2 * size) - NOTHING * size
+            depth = np.ascontiguousarray(depth.reshape(-1, len(ends)).T)
+            slopes = (ends - 0.5).T @ depth * 2.0 ** (3 - d)
+            share = _plane(depth.mean(axis=0), slopes)[0] if d > 1 else depth[0] > 0
+            covered.append(share.reshape(n, -1).mean(axis=1))
+        area[:, k] = (covered[0] - covered[1]) * size ** (d - 1)
+    length = np.maximum(np.linalg.norm(area, axis=1, keepdims=True), np.finfo(float).tiny)
+    return area, x + region.depth(x, 2 * size)[:, None] * area / length
 
 
 def _plane(mean: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

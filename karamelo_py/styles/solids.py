@@ -53,8 +53,7 @@ class RegionSolid(Solid):
         plug-in without a `distance` is looked at along the axes, where thin parts may be missed.
         The domains that ugimp and cpgimp give to cut
         points are squares or cubes of the right volume, which do not tile the body at its edge;
-        cpdi refuses them. For edge_pressure and edge_traction points are whole boxes: they refuse
-        these.
+        cpdi refuses them.
 
     Example
     -------

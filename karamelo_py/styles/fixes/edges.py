@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+import itertools
+from functools import cached_property
 from typing import Literal, NamedTuple
 
 import numpy as np
 
 from karamelo_py.output.point_table import from_solids, places_before
+from karamelo_py.scene.clipping import surface
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import PointsView
 from karamelo_py.scene.region import Region
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.scene.solid import Solid
 from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.forces import PointForces
 from karamelo_py.styles.fixes.formulas import per_direction, vector
 
 SIDES = ("xlo", "xhi", "ylo", "yhi", "zlo", "zhi")
+
+PARTS = 4  # of a box along each direction, in which the surface is measured
 
 
 class Faces(NamedTuple):
@@ -36,9 +41,11 @@ def faces_on(hub: Hub, region: Region, ids: np.ndarray) -> Faces:
     """The faces behind which a region ends, of the points `ids` inside it.
 
     Points are boxes; a face counts where a box of the same size beyond it would have its centre
-    outside.
+    outside. For boxes that a region has cut see `faces_cut`.
     """
     d = hub.domain.dimension
+    if not len(ids):
+        return Faces(ids, ids, ids, np.empty(0), np.empty((0, d)))
     x0 = places_before(hub, ids)
     half = from_solids(hub, ids, lambda solid, own: solid.half_size[own], d)
     found = []
@@ -54,6 +61,53 @@ def faces_on(hub: Hub, region: Region, ids: np.ndarray) -> Faces:
                 area = area * middle[:, 0]
             ones = np.ones(len(rows), np.int64)
             found.append(Faces(ids[rows], axis * ones, sign * ones, area, middle))
+    return Faces(*(np.concatenate(columns) for columns in zip(*found, strict=True)))
+
+
+def faces_cut(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
+    """The surface of a region at the points `ids` of a solid whose boxes were cut.
+
+    What of the surface is in a part of a box belongs to the nearest of the points inside that are
+    in this box or beside it. Its projections across the axes are the faces: of an edge within a
+    part, where opposite ones meet, only their difference.
+    """
+    size, boxes, d = solid.h / solid.ppc, solid.places, solid.domain.dimension
+    x0 = solid.x0_of(ids - solid.first_id)
+    inside = region.inside(x0)
+    ids, x0 = ids[inside], x0[inside]
+    none = np.empty(0, np.int64)
+    found = [Faces(none, none, none, np.empty(0), np.empty((0, d)))]
+    if not len(ids):
+        return found[0]
+    corner = x0.min(axis=0) - 2 * size
+    shape = tuple(((x0.max(axis=0) - corner) / size + 4).astype(np.int64))
+    cells = np.ravel_multi_index(tuple(((x0 - corner) / size).astype(np.int64).T), shape)
+    order = np.argsort(cells, kind="stable")
+    cells = cells[order]
+    places = (np.array(list(itertools.product(range(PARTS), repeat=d))) + 0.5) / PARTS - 0.5
+    for begin, end in boxes.chunks:
+        x = boxes.candidates(begin, end)
+        near = np.abs(region.depth(x, 2 * size)) < size * np.sqrt(d)
+        near &= ((x > corner + size) & (x < corner + (np.array(shape) - 1) * size)).all(axis=1)
+        x = (x[near][:, None, :] + size * places).reshape(-1, d)
+        x = x[solid.domain.contains(x)]
+        area, middle = surface(region, x, size / PARTS)
+        at = ((x - corner) / size).astype(np.int64)
+        nearest, taker = np.full(len(at), np.inf), np.full(len(at), -1)
+        for step in itertools.product((-1, 0, 1), repeat=d):
+            number = np.ravel_multi_index(tuple((at + step).T), shape, mode="clip")
+            for k in (0, 1):  # two points may be in a box: one took what was little beside it
+                row = np.minimum(np.searchsorted(cells, number) + k, len(cells) - 1)
+                apart = np.linalg.norm(x0[order[row]] - middle, axis=1)
+                nearer = (cells[row] == number) & (apart < nearest * (1 - 1e-9))
+                nearest[nearer], taker[nearer] = apart[nearer], order[row[nearer]]
+        for axis in range(d):
+            some = np.flatnonzero((taker >= 0) & (np.abs(area[:, axis]) > 1e-9 * size ** (d - 1)))
+            of_axis, place = area[some, axis], middle[some]
+            radius = place[:, 0] if solid.domain.axisymmetric else 1.0
+            signs = np.sign(of_axis).astype(np.int64)
+            axes = np.full(len(some), axis)
+            found.append(Faces(ids[taker[some]], axes, signs, np.abs(of_axis) * radius, place))
     return Faces(*(np.concatenate(columns) for columns in zip(*found, strict=True)))
 
 
@@ -75,13 +129,7 @@ class EdgeFix(PointForces):
         self._seen: tuple[np.ndarray, Faces] | None = None
 
     def defined(self) -> None:
-        """Warn where there is nothing to load; refuse boxes of points that a region has cut."""
-        for solid in self.hub.solids.values():
-            if getattr(solid, "cut", False) and self.group.touches(solid):
-                raise ScriptError(
-                    f"the points of solid '{solid.id}' are cut at its edge: no faces are whole",
-                    hint="points=regular in its line",
-                )
+        """Warn where there is nothing to load."""
         if not self.hub.rehearsing and not self.region.unknown:
             pieces = self.group.pieces()
             if len(self.group) and not any(len(self._find(ids).point) for ids in pieces):
@@ -114,12 +162,32 @@ class EdgeFix(PointForces):
             self._seen = ids.copy(), found._replace(point=rows)
         return self._seen[1]
 
+    @cached_property
+    def _cut(self) -> dict[str, tuple[Solid, Faces]]:
+        """The solids whose boxes a region has cut, with the faces of all their points."""
+        members = np.concatenate([*self.group.pieces(), np.empty(0, np.int64)])
+        found = {}
+        for solid in self.hub.solids.values():
+            if getattr(solid, "cut", False):
+                own = members[_of(solid, members)]
+                found[solid.id] = solid, faces_cut(solid, self.region, own)
+        return found
+
     def _find(self, ids: np.ndarray) -> Faces:
-        found = faces_on(self.hub, self.region, ids)
-        loaded = found.area > 0  # not the axis
+        whole, found = np.ones(len(ids), np.bool_), []
+        for solid, faces in self._cut.values():
+            whole &= ~_of(solid, ids)
+            found.append(faces.some(np.isin(faces.point, ids)))
+        found.append(faces_on(self.hub, self.region, ids[whole]))
+        joined = Faces(*(np.concatenate(columns) for columns in zip(*found, strict=True)))
+        loaded = joined.area > 0  # not the axis
         if self.side is not None:
-            loaded &= 2 * found.axis + (found.sign > 0) == self.side
-        return found.some(loaded)
+            loaded &= 2 * joined.axis + (joined.sign > 0) == self.side
+        return joined.some(loaded)
+
+
+def _of(solid: Solid, ids: np.ndarray) -> np.ndarray:
+    return (ids >= solid.first_id) & (ids < solid.first_id + solid.count)
 
 
 class EdgeTraction(EdgeFix):
@@ -189,7 +257,8 @@ class EdgePressure(EdgeFix):
     Each face that a point of the group shows to the outside of the region gets the pressure times
     the area that it has before the first step, inwards. Points are boxes, so that a curved edge has
     steps: the forces along each axis are those on the projected area, as they are on the smooth
-    edge. They keep size and direction. A part of an edge is that of a region of its own:
+    edge; those of points=cut bear the load of the smooth edge itself. They keep size and direction.
+    A part of an edge is that of a region of its own:
     ``region(top, block, 0, 1, 0.9, 1)`` has other sides as well, where the group may have to end.
     Around an axis, forces belong to a radian. Publishes the sum as ID_x, ID_y, ID_z.
 
