@@ -14,7 +14,7 @@ from karamelo_py.run.diagnosis import energy, explain
 from karamelo_py.run.timestep import LimitsTold, own_step_instead
 from karamelo_py.scene import boundary
 from karamelo_py.scene.hub import Hub
-from karamelo_py.script.errors import ScriptError, render_message
+from karamelo_py.script.errors import ScriptError
 
 CHUNK = 100  # steps between two looks at the run, and between two good states, at most
 HALVINGS = 5  # at most, in a run
@@ -96,12 +96,7 @@ class RollBack:
                 return False
             hub.warn(found[0], hint=found[1])
             simulation.told_of_growth = True
-        lost = None if simulation.told_of_loss else energy.words_of_loss(hub, simulation)
-        if lost is not None:
-            hub.warn(lost[0], hint=lost[1])
-            simulation.told_of_loss = True
-        if self._limits and simulation.step % CHUNK == 0 and (words := self._limits.words()):
-            hub.console.say(render_message("note", words))
+        self.tell_of_loss(WITHIN)
         return True
 
     def act_between_steps(self) -> None:
@@ -110,6 +105,14 @@ class RollBack:
         due = [fix for fix in self.hub.fixes.values() if fix.every and step % fix.every == 0]
         if sum(fix.between_steps() for fix in due):
             self._keep()
+
+    def tell_of_loss(self, within: float) -> None:
+        """Warn once of a loss of energy above a share of the largest."""
+        hub, simulation = self.hub, self.simulation
+        lost = None if simulation.told_of_loss else energy.words_of_loss(hub, simulation, within)
+        if lost is not None:
+            hub.warn(lost[0], hint=lost[1])
+            simulation.told_of_loss = True
 
     def _keep(self) -> None:
         self.point.keep(self.simulation)

@@ -222,6 +222,7 @@ class Runner:
                 if isinstance(error, Stopped):
                     simulation.comm.end_together()
                 raise
+        self.rollback.tell_of_loss(energy.LOSS)
         self._summary(simulation, began, time.perf_counter() - started)
         if self.interrupted:
             simulation.comm.end_together()

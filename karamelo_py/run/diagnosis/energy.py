@@ -15,7 +15,7 @@ from karamelo_py.run.advice.facts import SceneFacts
 from karamelo_py.run.lower.build import warms_by_friction
 from karamelo_py.scene.hub import Hub
 
-LOSS = 0.05  # of the largest energy so far: more is told
+LOSS = 0.05  # of the largest energy, at the end of a run: more is told; WITHIN before the end
 TOLD = 2  # windows of growth one after another, of which a run tells
 WHOLE = "more points a cell, a finer grid, cpgimp or ulcpdi, or method tlmpm"
 
@@ -162,13 +162,13 @@ def _lost(simulation: Any) -> float:
     return -growth(clock.first_balance, mean, max(clock.largest_energy, clock.energy_floor))
 
 
-def words_of_loss(hub: Hub, simulation: Any) -> tuple[str, str] | None:
-    """Describe a loss of energy that nothing chosen explains, with its cure; None without one."""
+def words_of_loss(hub: Hub, simulation: Any, within: float) -> tuple[str, str] | None:
+    """Describe a loss above `within` that nothing chosen explains, with its cure; else None."""
     clock = simulation.control.clock[0]
     if not clock.watch_energy or clock.looks <= LOOKS:
         return None
     lost = _lost(simulation)
-    if lost <= LOSS or taken_by(hub):
+    if lost <= within or taken_by(hub):
         return None
     cause, cure = _cause_of_loss(hub)
     message = (
