@@ -14,7 +14,7 @@ from karamelo_py.run.diagnosis import energy, explain
 from karamelo_py.run.timestep import LimitsTold, own_step_instead
 from karamelo_py.scene import boundary
 from karamelo_py.scene.hub import Hub
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.errors import ScriptError, render_message
 
 CHUNK = 100  # steps between two looks at the run, and between two good states, at most
 HALVINGS = 5  # at most, in a run
@@ -97,6 +97,8 @@ class RollBack:
             hub.warn(found[0], hint=found[1])
             simulation.told_of_growth = True
         self.tell_of_loss(WITHIN)
+        if self._limits and simulation.step % CHUNK == 0 and (words := self._limits.words()):
+            hub.console.say(render_message("note", words))
         return True
 
     def act_between_steps(self) -> None:
