@@ -123,7 +123,7 @@ def test_a_block_between_plates(run_script, scheme):
     """
     text = PLATES.replace("SCHEME", scheme)
     result = run_script(text.replace("RHO", "1"), folder="light")
-    leads = r"energy +is not watched: nobody adds up the work of\s+fix velocity_particles 'va'"
+    leads = r"energy +is not watched: nobody adds up the work of\s+rigid solid 'a'"
     assert re.search(leads, result.out)
     light = result.log
     heavy = run_script(text.replace("RHO", "1024"), folder="heavy").log

@@ -423,3 +423,37 @@ def test_a_loss_is_told_once(run_interpreted, transfer, told):
     done = run_interpreted(script)
     assert done.err.count("energy is lost") == told
     assert ("transfer PIC takes some" in done.out) == (not told)
+
+
+@pytest.mark.parametrize(
+    "fix",
+    [
+        "force_particles, all, 0, 5*min(time/0.1, 1)",
+        "velocity_particles, grip, 0.3*min(time/0.1, 1), 0",
+        "impenetrablesurface, all, 3, 0.28, 0, 0, 1, 0, 0",
+        "indent, all, sphere, 1e4, 0.2, 0.1, 0.4, 0",
+    ],
+)
+def test_the_work_of_loads_on_points_is_known(run_interpreted, fix):
+    """In the total frame nothing but time integration errs, by a per cent: the balance closes."""
+    (share,), _ = balance(run_interpreted, fix)
+    assert abs(float(share)) < 1
+
+
+def test_what_impulses_of_contact_lose_is_told(run_interpreted):
+    fix = "contact/minimize_penetration/plane, body, 0.28, 0, 0, 1, 0, 0, 0"
+    (share,), said = balance(run_interpreted, fix)
+    assert float(share) < -10
+    assert "contact that undoes penetrations within a step" in said
+
+
+def balance(run_interpreted, fix):
+    """By how much the balance of energy does not close, in per cent, and what is said."""
+    text = block(
+        2, "region(end, block, 0.55, 1, INF, INF)", "group(grip, particles, region, end, all)",
+        *["fix(v, initial_velocity_particles, all, -0.5, 0)"] * ("velocity" not in fix),
+        f"fix(F, {fix})", "set_dt(0.002)", "run_time(0.3)",
+    ).replace("method(ulmpm", "method(tlmpm")  # fmt: skip
+    result = run_interpreted(text)
+    assert "is not watched" not in result.out
+    return re.findall(r"  energy +(\S+) % of the largest", result.out), result.err

@@ -13,12 +13,13 @@ from karamelo_py.compiler.tuples import row
 from karamelo_py.kernels import visit
 from karamelo_py.kernels.arrays import Index, Nodes, Number, Tag, of_change, vector_at
 from karamelo_py.kernels.loss import FrictionalHeat, in_company, reflect, warm, warm_by_friction
+from karamelo_py.kernels.p2g import Force, WorkOfForces
 from karamelo_py.kernels.visit import Work, node_of, straining_node
 from karamelo_py.points import frames, laws, transfers
 from karamelo_py.points.basis import carried, carrier, carry, deformed, extent
 from karamelo_py.points.basis.cpdi import AtCorners
 from karamelo_py.points.grid import Bounces, inside, reflected
-from karamelo_py.points.kinematics import I, det, large, outer, vector, zero, zero_vector
+from karamelo_py.points.kinematics import I, det, dot, large, outer, vector, zero, zero_vector
 from karamelo_py.points.transfers.xpic import Reflected, Series, TermOfSeries
 
 
@@ -319,6 +320,11 @@ def _updated_move(task, w, stencil, p, dt, total, totals, fastest):
     displacing = transfers.displacing_velocity(w.transfer, v, v_pic, j)
     step = vector(w.kin, dt * laws.constrained_velocity(law, v, displacing))
     y = x + step
+    force = field(w.points.fields, Force)
+    if force is not None:
+        # With the mean velocity of the nodes in the step: stress and holders act at the same time.
+        work = w.kick * dot(load_vector(w.kin, force, p), v_pic - 0.5 * dv)
+        increase(field(w.points.fields, WorkOfForces), p, (work,))
     warm_by_friction(field(w.nodes.fields, FrictionalHeat), w, stencil, p, v[0])
     warm(w, stencil, p, v_pic - dv)
     moment = in_company(w, stencil, p, moment)

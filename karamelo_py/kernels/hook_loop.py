@@ -537,6 +537,9 @@ def _act_on_motion(what, task, hooks, control, dt, h, count, share):
             continue
         _evaluate_now_and_before(hooks, h, c, count, control)
         slot = hooks.table[h].slot
+        # Forces act while a hook leads a point from what it had at the start of the step.
+        leads = hooks.table[h].stage == arrays.POST_ADVANCE_PARTICLES
+        leads = leads and hooks.table[h].uses_before > 0
         for q in range(count):
             p = hooks.chosen[q]
             velocity, place, total = _call_point_function(
@@ -544,7 +547,8 @@ def _act_on_motion(what, task, hooks, control, dt, h, count, share):
                 hooks.scratch[VALUE, q], hooks.scratch[BEFORE, q], dt, control.clock[0].kick,
             )  # fmt: skip
             speed = float(v[c, p])
-            work = 0.5 * float(what.mass[p]) * (velocity * velocity - speed * speed)
+            first = hooks.scratch[BEFORE, q] if leads else speed
+            work = 0.5 * float(what.mass[p]) * (velocity - speed) * (velocity + first)
             totals.add_to(control.totals, totals.WORK, work)
             v[c, p] = velocity
             # As far as a point moves, its corners do.

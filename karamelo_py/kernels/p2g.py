@@ -9,7 +9,15 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 from karamelo_py.compiler.compile import accumulate, index, of_present, point_function, real, shared
-from karamelo_py.compiler.fields import StepField, SummedField, field, load, load_vector, vector
+from karamelo_py.compiler.fields import (
+    Field,
+    StepField,
+    SummedField,
+    field,
+    load,
+    load_vector,
+    vector,
+)
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.lanes.records import move_record
 from karamelo_py.compiler.loops import noinline
@@ -108,6 +116,10 @@ class Force(StepField):
 
     shape = vector
     columns = ("bx", "by", "bz")
+
+
+class WorkOfForces(Field):
+    """Work of that force since the watch over the energy has looked last."""
 
 
 class Normal(SummedField):

@@ -86,6 +86,7 @@ class Context(NamedTuple):
     gathers: bool  # whether the tasks of the visit are done
     scatters: bool  # whether its quantities are scattered
     dt: Number
+    kick: Number  # how long forces act
 
 
 class OldWeights(NamedTuple):
@@ -101,7 +102,7 @@ def work_of(s: Context, grid: Grid, nodes: Nodes, block: Block, places: Places) 
     """Return the arrays and tags of a visit to points of a block; `nodes` are those of `grid`."""
     return Work(
         s.frame, s.kin, s.basis, grid, s.transfer, s.averaging, nodes, block.points, block.laws,
-        places, s.common,
+        places, s.common, s.kick,
     )  # fmt: skip
 
 
@@ -281,6 +282,7 @@ def context_of(s: Setup, dt: Number, gathers: bool, scatters: bool, moves: bool)
         s.frame, s.kin, s.basis, s.transfer, s.averaging, s.grids, s.nodes, s.buffers.nodes,
         clock.now, real(room, dt), common_velocity(s.kin, clock, dt),
         1 - clock.now if moves else clock.now, gathers, scatters, dt,
+        real(clock.kick, dt),
     )  # fmt: skip
 
 

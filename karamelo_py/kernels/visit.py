@@ -37,6 +37,7 @@ class Work(NamedTuple):
     laws: NamedTuple  # parameters of the materials, an array (m,) each
     places: Places
     common: tuple  # (d,) velocity that speeds are measured from
+    kick: Number  # how long forces act in the step
 
 
 @shared

@@ -13,7 +13,7 @@ cannot hide what vibrates.
 from math import inf
 
 from karamelo_py.compiler.compile import added, all_lanes, of_present, real, shared
-from karamelo_py.compiler.fields import load_vector
+from karamelo_py.compiler.fields import field, load_vector
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import kernel, noinline
 from karamelo_py.compiler.threads import shared_out
@@ -21,6 +21,7 @@ from karamelo_py.compiler.tuples import put_at
 from karamelo_py.kernels import totals
 from karamelo_py.kernels.arrays import TIMESTEP, first_from, known_to_laws
 from karamelo_py.kernels.lanes import lanes_with, points_from
+from karamelo_py.kernels.p2g import WorkOfForces
 from karamelo_py.kernels.visit import state_at
 from karamelo_py.points.kinematics import free_from
 from karamelo_py.points.laws import (
@@ -92,6 +93,15 @@ def _sum_energies(mode, kin, points, laws, tiling, control):
         totals.add_to(control.totals, totals.STORED, tiling.report[t, ENERGIES + 1])
 
 
+@kernel
+def _take_work(work, control):
+    """Add the work of forces on points to that of the loads on nodes."""
+    for p in range(work.shape[1]):
+        totals.add_to(control.totals, totals.WORK, float(work[0, p]))
+        work[0, p] = 0
+    totals.carry(control.totals[totals.WORK])
+
+
 @shared
 def sum_energies(s, mode):
     """Energies of all points, kinetic and stored plus dissipated, and the work into the clock."""
@@ -99,6 +109,9 @@ def sum_energies(s, mode):
     for block in s.blocks:
         points = known_to_laws(block.points)
         _sum_energies(mode, s.kin, points, block.laws, block.tiling, s.control)
+        work = field(block.points.fields, WorkOfForces)
+        if work is not None:
+            _take_work(work, s.control)
     totals.collect(s.control.ranks, s.control, totals.KINETIC, 3)
     clock, answer = s.control.clock[0], s.control.answer
     clock.kinetic = answer[totals.KINETIC]

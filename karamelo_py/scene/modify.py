@@ -79,7 +79,8 @@ class Fix(Publisher):
     # ``initial_integrate``.
     point_fields: tuple[type, ...] = ()
     node_fields: tuple[type, ...] = ()
-    leads_points = False  # against their forces, by work that no sum at nodes knows
+    impulsive = False  # undoes a penetration within one step
+    leads_points = False  # against their forces
     follows_points = False  # pushes points by where they are, as tools do
     accelerates = False  # its formulas are forces per mass, as of weight
     acts_last = False  # after all others at each moment, wherever the script has it

@@ -32,7 +32,7 @@ def unknown_work(hub: Hub) -> str:
     """
     for fix in hub.fixes.values():
         acts = any(not isinstance(hook, CompiledHook) for hook in fix.hooks().values())
-        if fix.leads_points or (acts and not fix.first_step_only and not fix.conserves):
+        if acts and not fix.first_step_only and not fix.conserves:
             return f"fix {fix.style} '{fix.id}'"
     for solid in hub.solids.values():
         if can(solid.material.law, constrained_velocity):
@@ -184,6 +184,12 @@ def _cause_of_loss(hub: Hub) -> tuple[str, str]:
     if getattr(update.scheme, "damps", False):
         name = registry.name_of("scheme", type(update.scheme))
         return f"scheme {name}, which damps what vibrates", "scheme(musl)"
+    if any(fix.impulsive for fix in hub.fixes.values()):
+        return (
+            "contact that undoes penetrations within a step: of such impulses the grid carries "
+            "only what it sees, the less the shorter the step",
+            "impenetrablesurface, indent or contact/hertz, whose forces grow with the depth",
+        )
     if method.fields_per_solid:
         return (
             "collisions: nodes of a surface lose what they have of the motion of approach",

@@ -5,7 +5,7 @@ from typing import Annotated
 import numpy as np
 
 from karamelo_py.kernels.laws import elastic_law
-from karamelo_py.kernels.p2g import Force
+from karamelo_py.kernels.p2g import Force, WorkOfForces
 from karamelo_py.language.signature import In
 from karamelo_py.points.laws import can, with_stress
 from karamelo_py.scene.group import NodeGroup, ParticleGroup
@@ -96,8 +96,9 @@ class PointForces(Fix):
     """Base of fixes that put a force on each point of their group."""
 
     published: tuple[str, ...] = ("x", "y", "z")
-    point_fields = (Force,)
+    point_fields = (Force, WorkOfForces)
     point_by_point = True
+    conserves = True  # but for the work of the forces, which steps add up
 
     def forces(self, points: PointsView) -> np.ndarray:
         """The forces (n, d) on the points."""

@@ -10,7 +10,7 @@ from karamelo_py.compiler.fields import field
 from karamelo_py.kernels import pairs
 from karamelo_py.kernels.arrays import Block
 from karamelo_py.kernels.laws import elastic_law
-from karamelo_py.kernels.p2g import Force
+from karamelo_py.kernels.p2g import Force, WorkOfForces
 from karamelo_py.language.rules import gain
 from karamelo_py.language.signature import NonNegative
 from karamelo_py.points.bodies import Hertz, MinimizePenetration
@@ -45,8 +45,9 @@ class PairContact(Fix):
 
     law: NamedTuple
     published = ("x", "y", "z")
-    point_fields = (Force,)
+    point_fields = (Force, WorkOfForces)
     point_by_point = True
+    conserves = True  # but for the work of the forces, which steps add up
 
     def __init__(self, hub: Hub, solid1: Solid, solid2: Solid):
         super().__init__(hub, ParticleGroup(hub, everything=True))
@@ -178,6 +179,8 @@ class ContactMinimizePenetration(PairContact):
     --------
     contact/hertz, contact/friction, method tlmpm
     """
+
+    impulsive = True
 
     def __init__(
         self,

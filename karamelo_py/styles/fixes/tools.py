@@ -258,6 +258,8 @@ class ContactMinimizePenetrationPlane(Plane):
     impenetrablesurface, contact/minimize_penetration, indent/minimize_penetration
     """
 
+    impulsive = True
+
     def __init__(
         self,
         hub: Hub,
@@ -393,6 +395,7 @@ class IndentMinimizePenetration(ToolFix):
     """
 
     published = ("x", "y", "z", "s")
+    impulsive = True
 
     def __init__(
         self,

@@ -68,7 +68,7 @@ class VelocityParticles(VelocityOfPoints):
     leads_points = True
 
     initial_integrate = point_hook(start, publishes=False, uses_before=True)
-    post_advance_particles = point_hook(carry)
+    post_advance_particles = point_hook(carry, uses_before=True)
 
 
 class InitialVelocityParticles(VelocityOfPoints):
