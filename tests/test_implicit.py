@@ -239,6 +239,52 @@ def test_rules_that_damp(run_script):
         assert kept == pytest.approx(exact, rel=0.06)
 
 
+DRIVEN = """
+    N = 32
+    h = 1/N
+    T = 0.4
+    led = 1
+    method(tlmpm, FLIP, linear, 1)
+    scheme(newmark)
+    dimension(1, 0, 1 + 4*h, h)
+    region(bar, block, 0, 1)
+    material(m, neo-hookean, 1, 100, 0.3)
+    solid(s, region, bar, 2, m, h, 0)
+    region(wall, block, -INF, 1e-9)
+    group(wall, nodes, region, wall, all)
+    fix(hold, velocity_nodes, wall, led*1e-2*sin(2*PI*time/0.37))
+    fix(g, body_force, all, (1-led)*sin(2*PI*time/0.37))
+    set_dt(T/16)
+    run_time(2*T)
+"""
+
+
+def energy_told(out: str) -> float:
+    """Change of the energy in the summary of a run, in percent."""
+    return float(next(line.split()[1] for line in out.splitlines() if " of the largest" in line))
+
+
+@pytest.mark.parametrize("led", ["0", "1"])
+def test_the_energy_of_newmark_is_watched(run_script, led):
+    """The trapezoidal rule adds what loads, and those who hold nodes, do; here by coarse steps."""
+    assert abs(energy_told(run_script(DRIVEN, "-var", "led", led).out)) < 0.3
+
+
+def test_energy_that_a_step_loses_is_told(run_script):
+    """Vibrations of five periods a step lose it on the way to the nodes; rho is known to damp."""
+    one = "v0*sin(PI*x0/(2*L))"
+    text = (INPUTS / "in.slow_bar").read_text()
+    text = text.replace(one, f"{one} + v0*sin(201*PI*x0/(2*L))")
+    told, damped = (
+        run_script(text, "-var", "periods", "0.5", "-var", "radius", rho, folder=rho)
+        for rho in ("1", "0.8")
+    )
+    assert "energy is lost" in told.err and "dt_factor" not in told.err
+    assert energy_told(told.out) < -25
+    assert "energy is lost" not in damped.err and energy_told(damped.out) < -45
+    assert "scheme newmark with rho 0.8 takes some" in damped.out
+
+
 FLIGHT = """
     kind = "ulmpm"
     method(kind, FLIP, linear, 1)

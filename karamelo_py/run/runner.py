@@ -347,8 +347,8 @@ class Runner:
             "stable dt": simulation.limit,
             **({"own dt": own} if own else {}),
             "limited by": f"{ruling_limit(simulation)}; {words_of_share(hub)}",
-            **({"energy": energy.not_watched(why)} if why else {}),
         }
+        of_energy = {"energy": energy.not_watched(why)} if why and simulation.moves else {}
         alone = f", one has all points: up to {DIRECT_UP_TO} are not shared out"
         processes = f"{simulation.comm.size}{alone if simulation.tiles.direct else ''}"
         hub.console.banner(
@@ -360,6 +360,7 @@ class Runner:
                 "bytes per particle": bytes_per_point(simulation),
                 "dt": simulation.dt,
                 **({} if simulation.implicit else of_waves),
+                **of_energy,
                 **({"processes": processes} if simulation.comm.size > 1 else {}),
                 "threads": simulation.threads,
                 "precision": hub.settings.precision,

@@ -187,7 +187,7 @@ class Simulation(SceneArrays):
     def _watch_energy(self, begun_before: int) -> None:
         """Begin to watch the balance of energy, or go on where nothing was set since."""
         clock = self.control.clock[0]
-        clock.watch_energy = int(not unknown_work(self.hub) and not self.implicit)
+        clock.watch_energy = int(not unknown_work(self.hub) and self.moves)
         set_anew = len(self.begun) > begun_before or bool(self._first_fixes)
         anew = not self.followed or set_anew
         self.followed = True
@@ -288,6 +288,11 @@ class Simulation(SceneArrays):
     def implicit(self) -> bool:
         """Tell whether the scheme solves equations."""
         return getattr(self.hub.update.scheme, "implicit", False)
+
+    @property
+    def moves(self) -> bool:
+        """Tell whether there is inertia: without it nobody watches the energy."""
+        return getattr(self.hub.update.scheme, "inertia", True)
 
     @cached_property
     def load_steps(self) -> Any:

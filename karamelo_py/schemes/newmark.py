@@ -75,6 +75,15 @@ class Newmark(NamedTuple):
         return _alphas(self.rho) if self.rho < 1 else (0.0, 0.0)
 
     @property
+    def damping(self) -> str:
+        """Name what takes energy from vibrations; empty where nothing does."""
+        if self.rule == "euler":
+            return "rule=euler"
+        if self.rho < 1:
+            return f"rho {self.rho:g}"
+        return f"gamma {self.gamma:g}" if self.gamma > 0.5 else ""
+
+    @property
     def point_fields(self) -> tuple[type, ...]:
         """What points carry from one step to the next."""
         return (Surplus,) if self.rho < 1 else ()

@@ -56,6 +56,7 @@ def report(hub: Hub, end_time: float = inf) -> None:
         say(f"first dt       {simulation.dt:.6g} (stable limit {simulation.limit:.6g})")
         say(f"               {words_of_share(hub)}")
         say(f"limited by     {ruling_limit(simulation)}")
+    if simulation.moves:
         why = unknown_work(hub)
         say(f"energy         {not_watched(why) if why else 'is watched'}")
     say(f"threads        {simulation.threads}")

@@ -58,6 +58,8 @@ def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
     scheme = registry.name_of("scheme", type(update.scheme))
     functions = f"{method.basis_name} functions"
     moves, jumps = method.frame.moves, getattr(method.basis, "gradient_jumps", False)
+    if simulation.implicit:
+        return _gain_of_implicit_steps(hub)
     share = simulation.dt / simulation.limit
     keeping = timestep.keeping_share(hub)
     smooth = "a basis with smooth gradients (quadratic-spline), or method tlmpm"
@@ -105,6 +107,19 @@ def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
     return "no cause that is known to do that", "another basis, transfer or scheme to compare with"
 
 
+def _gain_of_implicit_steps(hub: Hub) -> tuple[str, str]:
+    method, smaller = hub.update.method, "smaller steps (set_dt)"
+    if method.fields_per_solid:
+        return "contact, which pushes back in one step what came in another", smaller
+    if method.frame.moves and getattr(method.basis, "gradient_jumps", False):
+        functions = f"{method.basis_name} functions"
+        return (
+            f"points that go from cell to cell: the gradients of {functions} jump",
+            f"quadratic-spline, method tlmpm, or {smaller}",
+        )
+    return "steps that strain or turn points much at once", smaller
+
+
 def _step_of(hub: Hub, simulation: Any, share: float) -> str:
     if hub.update.fixed_dt is not None:
         return f"set_dt({share * simulation.limit:.3g})"
@@ -129,7 +144,8 @@ def words_of_growth(hub: Hub, simulation: Any) -> tuple[str, str] | None:
         return None
     cause, cure = cause_of_gain(hub, simulation)
     if clock.windows >= TOLD:
-        much = f"{100 * clock.growth:.2g} % of the largest so far in the last hundred steps"
+        steps = "ten" if simulation.implicit else "hundred"
+        much = f"{100 * clock.growth:.2g} % of the largest so far in the last {steps} steps"
     else:
         much = f"{100 * clock.grown:.2g} % of the largest so far since the start"
     message = (
@@ -141,7 +157,9 @@ def words_of_growth(hub: Hub, simulation: Any) -> tuple[str, str] | None:
 
 def taken_by(hub: Hub) -> list[str]:
     """Name what a script has chosen that takes energy without an account of it."""
-    found, transfer = [], hub.update.transfer
+    found, transfer, scheme = [], hub.update.transfer, hub.update.scheme
+    if getattr(scheme, "damping", ""):
+        found.append(f"scheme {registry.name_of('scheme', type(scheme))} with {scheme.damping}")
     alpha = getattr(transfer, "alpha", None)
     if alpha is None or alpha < 1:
         share = "" if alpha is None else f" {alpha:g}"
@@ -200,6 +218,11 @@ def _cause_of_loss(hub: Hub) -> tuple[str, str]:
             f"points that go from cell to cell, where the gradients of {method.basis_name} "
             "functions jump, and velocities that differ from point to point",
             "quadratic-spline, or method tlmpm for a solid",
+        )
+    if getattr(update.scheme, "implicit", False):
+        return (
+            "vibrations and turns that cells and steps do not resolve",
+            "finer cells, smaller steps",
         )
     if method.frame.moves:
         return (

@@ -37,7 +37,7 @@ def trouble(hub: Hub, simulation: Simulation, status: int) -> Trouble:
         return Trouble(*_above_limit(hub, simulation), hub.update.dt_place)
     if status == SHRUNK:
         return Trouble(*_shrunk(hub, simulation))
-    too_large = not simulation.control.clock[0].watch_limit
+    too_large = not simulation.control.clock[0].watch_limit and not simulation.implicit
     if status in (GAINED, HEATED):
         message, hint = (_gained if status == GAINED else _heated)(hub, simulation)
         return Trouble(message, _smaller_step(hub, simulation) if too_large else hint)

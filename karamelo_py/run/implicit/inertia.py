@@ -27,6 +27,10 @@ class Rest:
         """Give the size of the forces of inertia."""
         return 0.0
 
+    def work(self, u: np.ndarray, reaction: np.ndarray) -> float:
+        """Give no work: nobody watches the energy of load steps."""
+        return 0.0
+
     def end(self, u: np.ndarray) -> None:
         """Give the points their velocities after the step."""
         for block in self.blocks:
@@ -67,7 +71,7 @@ class Motion:
         contact: Contact | None,
     ):
         self.equations, self.scheme, self.dt = equations, scheme, dt
-        self.given, self.prescribed = given, prescribed
+        self.before, self.given, self.prescribed = before, given, prescribed
         self.mass = equations.mass[:, None]
         self.inverse = np.divide(1, self.mass, out=np.zeros_like(self.mass), where=self.mass > 0)
         self.v = self._means([block.points.v for block in equations.blocks])
@@ -116,6 +120,16 @@ class Motion:
     def size(self, u: np.ndarray) -> float:
         """Give the size of the forces of inertia."""
         return float(np.linalg.norm(self.mass * self.acceleration(u)))
+
+    def work(self, u: np.ndarray, reaction: np.ndarray) -> float:
+        """Find the work of those who hold nodes, by the mean of their forces (m, d) in the step.
+
+        So that it is what the trapezoidal rule adds to the energy of a linear body.
+        """
+        old, new, given = self.v, self.prescribed, self.given
+        after = self.mass * self.acceleration(u) - reaction
+        moving = 0.5 * self.mass * (new - old) * (new + old)
+        return float(np.sum((moving - 0.5 * u * (self.before + after))[given]))
 
     def end(self, u: np.ndarray) -> None:
         """Give the points their velocities after the step."""

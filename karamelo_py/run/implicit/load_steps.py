@@ -9,7 +9,9 @@ from karamelo_py.kernels.arrays import DT, TIME, TIMESTEP, Hooks, of_change, of_
 from karamelo_py.kernels.clock import finish
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.rigid import RigidBodies, put_forces
-from karamelo_py.kernels.step import DONE, SORT, STOPPED, take_rows
+from karamelo_py.kernels.step import DONE, GAINED, SORT, STOPPED, take_rows
+from karamelo_py.kernels.totals import WORK, add_to, carry
+from karamelo_py.kernels.watch import look_at_end
 from karamelo_py.points.kinematics import free_from
 from karamelo_py.run.implicit.conduction import conduct
 from karamelo_py.run.implicit.contact import Contact, contact_of
@@ -49,6 +51,9 @@ class LoadSteps:
         """Take up to `count` load steps; return how they ended, as `run_steps` does."""
         control = self.simulation.setup.control
         clock = control.clock[0]
+        s, mode = self.simulation.setup, self.simulation.mode
+        if clock.looks == 0 and not self.simulation.begins:
+            look_at_end(s, mode)
         for _ in range(count):
             if control.values[TIME] >= clock.end_time:
                 break
@@ -61,6 +66,8 @@ class LoadSteps:
             except NoEquilibrium as error:
                 self.failure = str(error)
                 return STOPPED
+            if not look_at_end(s, mode):
+                return GAINED
             if clock.drift > clock.drift_limit:
                 return SORT
         return DONE
@@ -138,8 +145,13 @@ class LoadSteps:
         control.values[DT] = control.clock[0].kick = control.clock[0].last_dt = dt
         try:
             before = self._forces(hooks).copy() if self.dynamic else None
+            own = simulation.hooks
+            loads = own.loads.copy() if self.dynamic and isinstance(own, Hooks) else None
             control.values[TIME] = time + dt
             after = self._forces(hooks)
+            if loads is not None:
+                # Their work is that of the mean of both, as Newmark's velocities are.
+                own.loads[:] = 0.5 * (loads + own.loads)
             found = self._equilibrium(hooks, dt, before, after)
             self._publish(found, hooks, dt)
             if not take_rows(self.scheme.close, s, simulation.mode, hooks):
@@ -257,9 +269,13 @@ class LoadSteps:
         update[nodes, :d] = v + without
         update[nodes, change : change + d] = without
         clock = s.control.clock[0]
+        work = s.control.totals[WORK].copy()
         kept, clock.kept = float(clock.kept), 0.0  # reactions have all that velocities change by
         take_rows(self.scheme.hold, s, simulation.mode, hooks)
         clock.kept = kept
+        s.control.totals[WORK] = work
+        add_to(s.control.totals, WORK, found.inertia.work(found.u, found.reaction))
+        carry(s.control.totals[WORK])
         update[nodes, :d] = s.nodes.velocity[nodes, :d] = v
         update[nodes, change : change + d] = 0
         if found.contact is not None:
