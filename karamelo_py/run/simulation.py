@@ -190,7 +190,7 @@ class Simulation(SceneArrays):
         clock.watch_energy = int(not unknown_work(self.hub) and self.moves)
         set_anew = len(self.begun) > begun_before or bool(self._first_fixes)
         anew = not self.followed or set_anew
-        self.followed = True
+        self.followed = self.moves  # what load steps do is not in the balance
         if anew:
             self.told_of_growth = self.told_of_loss = False
         if clock.watch_energy:
