@@ -18,9 +18,8 @@ def compare(run, axes, full):
         "slides without friction": ({"angle": 30, "mu": 0}, 0.001),
     }
     if full:
-        # Points of a square grid make a disk with an uneven rim.
         rolls = {"angle": 30, "mu": 0.5}
-        cases["rolls, 12 cells across"] = rolls, 0.1
+        cases["rolls, 12 cells across"] = rolls, 0.05
         cases["rolls, 24 cells across"] = rolls | {"refine": 2}, 0.05
         # Rigid, the base acts through all nodes that its points see.
         for basis in ("quadratic", "cubic"):
