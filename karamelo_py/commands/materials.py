@@ -227,7 +227,8 @@ def element(
     """Take one point of a material along a load path, to see its law before using it.
 
     Writes what the point answers to the table element_ID.txt and draws it to element_ID.png. Needs
-    no domain and compiles nothing. The point begins at rest, without stress.
+    no domain and compiles nothing. The point begins at rest, without stress;
+    of material cam-clay at its pressure p0.
 
     Parameters
     ----------
