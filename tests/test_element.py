@@ -215,6 +215,17 @@ def test_a_stress_beyond_yield_is_not_found(run_script):
             "1D cannot turn",
         ),
         ("load_path(a, 2, exx=0)\nelement(b/c, steel, a)", "cannot be part of a file name"),
+        ("load_path(a, 2)", "no strain and no stress is prescribed"),
+        ("load_path(a, 2, syx=0)", "did you mean 'sxy'?"),
+        (
+            "material(tool, rigid, 1)\nload_path(a, 2, exx=0)\nelement(b, tool, a)",
+            "material 'tool' is rigid",
+        ),
+        # What follows from a wrong line is not told.
+        (
+            "load_path(a, 0, ezz=-0.1)\nelement(b, steel, a)\nprint(value(b_exx))",
+            "'increments' must be a whole number above 0",
+        ),
         ("load_path(a, 1, exx=-2)\nelement(b, steel, a)", "turned inside out"),
     ],
 )

@@ -97,6 +97,9 @@ def test_the_last_good_state_is_written_once(run_interpreted, tmp_path):
     assert "leaves the domain" in again.err and "last_good." not in again.err
     assert (again.folder / "last_good.62.h5").read_text() == "mine"
     assert (again.folder / "r.62.h5").exists()
+    # Outputs go on where they were.
+    said = run_interpreted(script, "-out", "o", folder="b", status=1).err
+    assert "-restart o/last_good.62.h5 -out o goes on" in said.replace("\\", "/")
     # A folder in the place of a file to write: that is told, and what went wrong as well.
     (tmp_path / "b" / "last_good.62.h5.part").mkdir(parents=True)
     third = run_interpreted(script, folder="b", status=1)

@@ -132,7 +132,7 @@ def test_a_column_belongs_to_one_field(hub):
 @pytest.mark.parametrize(
     ("style", "told"),
     [
-        ("idle)", "idle has no hook and no refresh: it does nothing"),
+        ("idle)", "idle does nothing: no step calls it, and it measures nothing"),
         ("idle)", "initial_integrat, which is no hook"),
         ("idle)", "meant initial_integrate, or begins"),
         ("misspelt, all)", "post_gird_to_point, which is no hook and is never called"),

@@ -10,11 +10,12 @@ FLUID = """eos(w, fluid, 1000, 1e5, 7)
     material(m, eos-strength, w, w)"""
 
 
-@pytest.mark.parametrize("wrong", ["quasi-statc", "quasi-static, tol=1e-8"])
+@pytest.mark.parametrize("wrong", ["quasi-statc", "quasi-static, tol=1e-8", "quasi static"])
 def test_a_wrong_scheme_is_one_error(run_interpreted, wrong):
     """Names that the scheme would publish are not at fault, too; short names mean long ones."""
     result = run_interpreted(patch().replace("quasi-static", wrong), status=1)
-    assert result.err.count("error:") == 1 and "did you mean" in result.err
+    assert result.err.count("error:") == 1
+    assert "did you mean" in result.err or " " in wrong
 
 
 def test_a_fluid_finds_no_equilibrium(run_interpreted):
@@ -22,6 +23,24 @@ def test_a_fluid_finds_no_equilibrium(run_interpreted):
     text = patch().replace("material(m, linear, 1, 1000, 0.25)", FLUID)
     result = run_interpreted(text, status=1)
     assert "bears no shear" in result.err and "solid(s" in result.err
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("fix(v, initial_velocity_particles, all, 1, 0)", "has no inertia: the velocities of fix"),
+        ("fix(v, velocity_particles, all, 1, 0)", "at a moment that only explicit steps have"),
+    ],
+)
+def test_a_fix_of_explicit_steps_is_refused(run_interpreted, line, says):
+    result = run_interpreted(patch(f"{HELD}\n    {line}"), status=1)
+    assert says in result.err and line in result.err
+
+
+def test_solids_with_grids_of_their_own_are_told_of_contact_in_load_steps(run_interpreted):
+    second = HELD + "\n    solid(t, region, box, 2, m, 0.1, 0)"
+    said = run_interpreted(patch(second), "-var", "kind", "tlmpm").err
+    assert "pass through each other" in said and "hint: method(ulmpm/contacts" in said
 
 
 # A block that is pulled by its weight: no equilibrium beyond 2/sqrt(3) of the yield stress.

@@ -159,7 +159,9 @@ def test_a_ball_around_the_axis_is_pressed_from_all_sides(run_interpreted):
 
 def test_an_edge_without_points_is_told(run_interpreted):
     lines = "region(off, block, 0.9, 1, 0.9, 1)\nfix(F, edge_pressure, all, off, 5)\nset_dt(1e-4)\nrun(1)"  # noqa: E501
-    assert "no point of the group lies at this edge" in run_interpreted(block(2, lines)).err
+    said = run_interpreted(block(2, lines)).err
+    assert "no point of the group lies at this edge" in said
+    assert "hint: the region that the solid fills" in said
 
 
 def test_a_column_comes_to_rest_by_local_damping(run_script):

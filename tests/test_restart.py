@@ -311,6 +311,19 @@ def test_another_script(run_interpreted, old, new, says):
     assert result.err.count("error:") == 1
 
 
+def test_a_file_from_behind_the_last_run(run_interpreted):
+    """Nothing is left to do; another length of that run is refused, a further run works."""
+    text = FLY + "write_restart(end.h5)\n"
+    run_interpreted(text)
+    said = run_interpreted(text, "-restart", "end.h5").out
+    assert "note: end.h5 was written behind the last run" in said and "read_restart(end.h5)" in said
+    longer = run_interpreted(text.replace("run(4)", "run(9)"), "-restart", "end.h5", status=1).err
+    assert "end.h5 was written when this run was over, by run(4)" in longer
+    assert "run(4) as it was, a further run behind write_restart(end.h5)" in longer
+    further = run_interpreted(text + "run(5)\n", "-restart", "end.h5")
+    assert further.log.Step[-1] == 9 and "note:" not in further.out
+
+
 def test_a_longer_run_by_a_variable(run_interpreted):
     """The number stands in the last run; the message says what to write, and that works."""
     text = with_files("n = 4\n" + FLY.replace("run(4)", "run(2*n)"))

@@ -162,6 +162,14 @@ def test_plot_draws_columns_of_a_log(tmp_path, monkeypatch, capsys, name):
         assert status == 1 and remedy in err
 
 
+def test_plot_of_a_log_without_time(tmp_path, monkeypatch, capsys):
+    """Load steps have columns over the step."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "log.mpm").write_text("Step load\n0 0\n1 0.5\n")
+    assert call(capsys, "plot", "log.mpm", "load", "-o", "p.svg")[:2] == (0, "p.svg\n")
+    assert "<!-- Step -->" in (tmp_path / "p.svg").read_text()
+
+
 def test_plot_reads_a_log_whose_columns_change(tmp_path):
     (tmp_path / "log.mpm").write_text("Step Time\n0 0\n1 0.5\n# Step Time Ek\n1 0.5 7\n")
     rows = read_rows(tmp_path / "log.mpm")

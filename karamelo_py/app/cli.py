@@ -320,8 +320,9 @@ def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = 
         if taken := [f"{name} = {text}" for name, text in presets.items() if name not in given]:
             hub.console.say(f"{', '.join(taken)} taken from {hub.restart.path}, as -var had it")
     interpreter = Interpreter(hub, presets=presets)
-    if hub.restart is not None:
-        interpreter.replay = hub.restart.replay()
+    restart = hub.restart
+    if restart is not None:
+        interpreter.replay = restart.replay()
     try:
         interpreter.run_file(script)
     except Interrupted as signal:
@@ -331,6 +332,10 @@ def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = 
         hub.output.log.close()
     if not hub.rehearsed:
         _tell_of_no_run(hub, script)
+    elif restart is not None and restart.is_over(hub):
+        message = f"{restart.path} was written behind the last run of {script}: nothing is left"
+        hint = f"a further run at the end of the script, or read_restart({restart.path}) in another"
+        hub.console.say(render_message("note", message, hint=hint))
     return 0
 
 

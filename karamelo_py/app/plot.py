@@ -71,7 +71,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """Add what the subcommand takes."""
     parser.add_argument("log", metavar="LOG", type=Path)
     parser.add_argument("columns", metavar="Y", nargs="*", help="columns to draw")
-    parser.add_argument("-x", default="Time", help="column to draw over (default: Time)")
+    parser.add_argument("-x", help="column to draw over (default: Time, or Step)")
     parser.add_argument(
         "--right", nargs="+", default=[], metavar="Y", help="on an axis at the right"
     )
@@ -96,6 +96,8 @@ def run(options: argparse.Namespace) -> int:
         print(" ".join(known))
         return 0
     picture_format(options.output)
+    if options.x is None:
+        options.x = "Step" if "Time" not in known and "Step" in known else "Time"
     for name in (options.x, *options.columns, *options.right):
         if name not in known:
             close = " or ".join(f"'{column}'" for column in nearest_few(name, known))

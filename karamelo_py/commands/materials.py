@@ -9,6 +9,7 @@ from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument, Positive, style_of
 from karamelo_py.language.unknown import longer
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
+from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.points.laws.doubts import doubts
 from karamelo_py.run.element import COMPONENTS, NORMAL, LoadPath, Point, Response, Unreachable
 from karamelo_py.scene.hub import Catalogue, Hub
@@ -143,7 +144,7 @@ def load_path(
     syz: float | None = None,
     volumetric: float | None = None,
     turn: float = 0.0,
-    duration: Annotated[float, Positive] = 1.0,
+    duration: Annotated[float, Positive] | None = None,
 ) -> None:
     """Describe a piece of a load path: what an element is brought to, from wherever it is.
 
@@ -170,7 +171,8 @@ def load_path(
         Angle about z by which the point turns meanwhile, in radians. Strains and stresses are
         about axes that do not turn.
     duration
-        How long it takes, for laws that depend on the rate of strain.
+        How long it takes, 1 when left out, for laws that depend on the rate of strain. Alone it
+        holds the point where it is.
 
     Example
     -------
@@ -198,9 +200,16 @@ def load_path(
                 expected="one of them",
             )
         strains[name] = angles[name] / 2
+    if not turn and all(
+        value is None for value in (*strains.values(), *stresses.values(), volumetric, duration)
+    ):
+        raise ScriptError(
+            "no strain and no stress is prescribed: the point would stay where it is",
+            expected="exx=..., sxx=..., gxy=..., volumetric=... or turn=...; duration=... to hold it",
+        )
     path = LoadPath(
         increments=increments,
-        duration=duration,
+        duration=1.0 if duration is None else duration,
         strain={name: value for name, value in strains.items() if value is not None},
         stress={name: value for name, value in stresses.items() if value is not None},
         shear=shear,
@@ -276,6 +285,12 @@ def element(
             f"'{ID}' cannot be part of a file name and of names of values",
             argument="ID",
             expected="letters, digits and _, beginning with a letter",
+        )
+    if can(material.law, constrained_velocity):
+        raise ScriptError(
+            f"material '{material.id}' is rigid: it has no strain and no stress",
+            argument="material",
+            expected="a material that deforms",
         )
     point = Point(material.law, KINEMATICS[kinematics])
     paths = (first, *more)

@@ -24,9 +24,10 @@ _BASIS = frozenset({"method", "dimension", "create_domain", "axisymmetric", "inc
 _SCENE = frozenset(
     {"region", "solid", "group", "eos", "strength", "damage", "temperature", "material"}
 )
-_NAMED = frozenset({"fix", "compute", "dump", "plot"})
+_NAMED = frozenset({"fix", "compute", "dump", "plot", "load_path", "element"})
+_PLAIN = {"group", "plot", "load_path", "element"}  # have no style
 # Where the style stands among the arguments.
-_STYLED = {name: 2 if name == "dump" else 1 for name in (_SCENE | _NAMED) - {"group", "plot"}}
+_STYLED = {name: 2 if name == "dump" else 1 for name in (_SCENE | _NAMED) - _PLAIN}
 _RUNS = frozenset({"run", "run_time", "run_until", "run_while", "element"})
 
 
@@ -51,6 +52,12 @@ class Dependents:
             return False
         if name in _SCENE:
             self.names |= _RUNS
+        if name == "scheme":
+            self.names |= _RUNS | {
+                value
+                for style in registry.names("scheme")
+                for value in getattr(registry.find("scheme", style), "published", ())
+            }
         if name in _SCENE | _NAMED and statement.arguments:
             self.names.add(statement.arguments[0].code.strip())
         return True

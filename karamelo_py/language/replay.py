@@ -8,6 +8,7 @@ from math import nan
 from karamelo_py.script.errors import Place, ScriptError
 from karamelo_py.script.syntax import Statement
 
+_RUNS = frozenset({"run", "run_time", "run_until", "run_while"})
 _BLANKS = re.compile(r'"[^"\n]*"|\s+')
 
 
@@ -64,9 +65,21 @@ class Replay:
         before = self.record.statements[self.number]
         # A run that was in progress may become longer or shorter.
         if text != before and not (self.at_end and self.within):
+            if text.partition("(")[0] == before.partition("(")[0] in _RUNS:
+                raise self._was_over(before, place)
             error = self.other_script(f"there this statement was {before}", place)
             error.hint = self._longer_by(before, text) or error.hint
             raise error
+
+    def _was_over(self, run: str, place: Place | None) -> ScriptError:
+        """Make the error for another length of a run that the state of the file lies behind."""
+        behind = "" if self.within else f", a further run behind {self.record.statements[-1]}"
+        return ScriptError(
+            f"{self.file} was written when this run was over, by {run}",
+            place=place,
+            expected=f"{run} as it was{behind}",
+            hint=self._state_alone(),
+        )
 
     def _longer_by(self, before: str, text: str) -> str | None:
         """Give a run that was in progress the length that a variable of it now has."""
@@ -92,5 +105,8 @@ class Replay:
             place=place,
             expected="the script that wrote it; what it says about steps and output, and how long "
             "the last run is, may change",
-            hint=f"read_restart({self.file}) in a script of its own takes the state alone",
+            hint=self._state_alone(),
         )
+
+    def _state_alone(self) -> str:
+        return f"read_restart({self.file}) in a script of its own takes the state alone"

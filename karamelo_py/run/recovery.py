@@ -23,7 +23,7 @@ RETURNS = 2  # at most, to one state from where energy grows: what two halves do
 
 LAST_GOOD = "last_good.*.h5"
 GOES_ON = (
-    "karamelo-py SCRIPT -restart {} goes on from there, with a smaller step (set_dt, dt_factor): "
+    "karamelo-py SCRIPT {} goes on from there, with a smaller step (set_dt, dt_factor): "
     "as it is, it would end here again"
 )
 FAR = 100  # steps, more of which are not taken once more for the last rows of log and dumps
@@ -195,8 +195,13 @@ class RollBack:
         name = os.path.relpath(path)
         return (
             f"{words}. The state before the first step of this run is in {name}; karamelo-py "
-            f"SCRIPT -restart {name} goes on from there, with such a step"
+            f"SCRIPT {self._options(name)} goes on from there, with such a step"
         )
+
+    def _options(self, file: str) -> str:
+        """Write the options that go on from a file, with outputs where those of this run are."""
+        folder = os.path.relpath(self.hub.folder)
+        return f"-restart {file}" + (f" -out {folder}" if folder != os.curdir else "")
 
     def _keep_good(self, status: int) -> str:
         """Return to the last good state, write it, end the outputs, and say how to go on."""
@@ -225,7 +230,7 @@ class RollBack:
             return ""
         name = os.path.relpath(path)
         which = "The state from before energy grew" if grown else "The last good state"
-        return f". {which} is in {name}; {GOES_ON.format(name)}"
+        return f". {which} is in {name}; {GOES_ON.format(self._options(name))}"
 
     def _write_before_growth(self, end: int) -> Path | None:
         """Return to the last state before step `end` whose energy has not grown, and write it."""

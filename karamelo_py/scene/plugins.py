@@ -65,8 +65,11 @@ def check_fix(hub: Scene, fix: Fix) -> None:
                 hint=f"its author meant {close}, or begins the name with _",
             )
     measures = type(fix).refresh is not Fix.refresh
-    if not (fix.for_method or hooks or measures):
-        hub.warn(f"{name} has no hook and no refresh: it does nothing")
+    if not (fix.for_method or hooks or measures or fix.every):
+        hub.warn(
+            f"{name} does nothing: no step calls it, and it measures nothing",
+            hint="its author writes a hook, such as post_particles_to_grid, or refresh",
+        )
     said = type(fix).published is not Fix.published and fix.published
     silent = all(isinstance(hook, CompiledHook) and not hook.publishes for hook in hooks.values())
     if hooks and silent and said and not measures:

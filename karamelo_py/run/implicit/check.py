@@ -77,7 +77,8 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
             )
         elif other:
             yield (
-                f"knows no fix {fix.style}, which acts in {other[0]}",
+                f"knows no fix {fix.style}, which acts at a moment that only explicit steps have"
+                + ("" if own else f": {other[0]}"),
                 "fix velocity_nodes, or loads: force_particles, edge_traction; velocity_particles "
                 "for rigid solids",
                 fix.place,
@@ -87,10 +88,15 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
             and fix.style.startswith("initial_velocity")
             and not _of_rigid_points(hub, fix)
         ):
-            yield f"knows no velocities for fix {fix.style}", "scheme(newmark)", fix.place
+            yield (
+                f"has no inertia: the velocities of fix {fix.style} would change nothing",
+                "scheme(newmark)",
+                fix.place,
+            )
         elif len(fix.solids) > 1 and fix.friction is None:
             yield (
-                f"knows no contact by fix {fix.style}, whose force is one of the step",
+                f"cannot work with fix {fix.style}, which finds its force once a step, before the "
+                "points have moved",
                 f"method ulmpm/contacts, or {_EXPLICIT}",
                 fix.place,
             )

@@ -134,7 +134,8 @@ class EdgeFix(PointForces):
             pieces = self.group.pieces()
             if len(self.group) and not any(len(self._find(ids).point) for ids in pieces):
                 self.hub.warn(
-                    f"no point of the group lies at this edge of region '{self.region.id}'"
+                    f"no point of the group lies at this edge of region '{self.region.id}'",
+                    hint="the region that the solid fills: its points lie inside, at the edge",
                 )
 
     def loads(self, faces: Faces) -> np.ndarray:

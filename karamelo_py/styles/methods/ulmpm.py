@@ -72,10 +72,15 @@ class TLMPM(Method):
         alone = [ID for ID in hub.solids if ID not in touching]
         if len(hub.solids) > 1 and alone and not self.warned:
             self.warned = True
+            hint = (
+                "fix(ID, contact/minimize_penetration, solid1, solid2, mu) for those that may "
+                "meet, or method ulmpm"
+            )
+            if getattr(hub.update.scheme, "implicit", False):
+                hint = "method(ulmpm/contacts, ...) where they may meet"
             hub.warn(
                 f"solids with grids of their own pass through each other: {', '.join(alone)}",
-                hint="fix(ID, contact/minimize_penetration, solid1, solid2, mu) for those that may "
-                "meet, or method ulmpm",
+                hint=hint,
             )
 
     def lattices(self, hub: Hub) -> list[Lattice]:
