@@ -246,6 +246,38 @@ def test_clay_in_load_steps(run_script):
     assert state.ep > 0.02 and max(log_of["iterations"]) <= 6
 
 
+LAYER = """
+    method(ulmpm, FLIP, quadratic-spline, 1)
+    scheme(quasi-static)
+    dimension(2, 0, 1, 0, 1.5, 0.125)
+    region(b, block, 0, 1, 0, 1)
+    material(clay, cam-clay, 1800, 4e6, 1.0, 0.1, 0.02, 100e3)
+    solid(b, region, b, 2, clay, 0.125, 0)
+    region(left, block, -INF, 0, -INF, INF)
+    region(right, block, 1, INF, -INF, INF)
+    region(sides, union, left, right)
+    region(base, block, -INF, INF, -INF, 0)
+    group(sides, nodes, region, sides, all)
+    group(base, nodes, region, base, all)
+    fix(sides, velocity_nodes, sides, 0, NULL)
+    fix(base, velocity_nodes, base, 0, 0)
+    fix(cover, edge_traction, all, b, yhi, 0, -100e3)
+    compute(deep, probe, all, s11, s22, x=0.5, y=0.3)
+    log_modify(custom, step, deep_s11, deep_s22)
+    set_output(1)
+    run(1)
+"""
+
+
+def test_a_cover_balances_the_first_pressure(run_interpreted):
+    """As docs/materials.md says: p0 stays below a cover of p0, and goes without one."""
+    log_of = run_interpreted(LAYER).log
+    assert log_of.deep_s22[-1] == pytest.approx(-100e3, rel=0.01)
+    assert log_of.deep_s11[-1] == pytest.approx(-100e3, rel=0.01)
+    bare = run_interpreted(LAYER.replace("0, -100e3)", "0, 0)"), folder="bare").log
+    assert abs(bare.deep_s22[-1]) < 10e3
+
+
 WRONG = [
     ("1800, 4e6, 1.2, 0.1, 0.2, 100e3", "swelling is as soft"),
     ("1800, 4e6, 1.2, 0.1, 0.02, 100e3, pc=50e3", "below the pressure"),

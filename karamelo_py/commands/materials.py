@@ -200,12 +200,11 @@ def load_path(
                 expected="one of them",
             )
         strains[name] = angles[name] / 2
-    if not turn and all(
-        value is None for value in (*strains.values(), *stresses.values(), volumetric, duration)
-    ):
+    given = *strains.values(), *stresses.values(), volumetric, duration
+    if not turn and all(value is None for value in given):
         raise ScriptError(
             "no strain and no stress is prescribed: the point would stay where it is",
-            expected="exx=..., sxx=..., gxy=..., volumetric=... or turn=...; duration=... to hold it",
+            expected="exx=..., sxx=..., gxy=..., volumetric=... or turn=...; duration=... holds it",
         )
     path = LoadPath(
         increments=increments,

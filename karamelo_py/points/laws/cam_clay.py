@@ -61,9 +61,14 @@ class CamClay(NamedTuple):
     strain, and pc. Where fix initial_stress puts a stress outside of the surface, pc is what takes
     the surface there. There is no tension: p only tends to 0.
 
+    At a free surface something has to balance p0: nodes that hold the other sides and
+    ``fix(cover, edge_traction, all, b, yhi, 0, -100e3)`` at the top, or ``fix(cell, edge_pressure,
+    all, b, 100e3)`` all around; b is the region that the solid fills. Else the first step lets go
+    of p0. Where fix initial_stress puts another stress, the load is that of its normal component.
+
     See Also
     --------
-    hencky, strength drucker-prager, strength mohr-coulomb, fix initial_stress
+    hencky, strength drucker-prager, strength mohr-coulomb, fix initial_stress, fix edge_traction
     """
 
     in_lanes = True
