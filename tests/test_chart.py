@@ -266,7 +266,7 @@ def test_a_page_without_plotly_is_refused_before_the_table(table, monkeypatch, c
     assert main(["chart", "sweep.csv", "-accuracy", "err", "-o", "chart.html"]) == 1
     said = capsys.readouterr()
     assert not said.out and "a page needs the package plotly" in said.err
-    assert "karamelo-py[studies]" in said.err
+    assert "pip install '.[studies]'" in said.err
 
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")

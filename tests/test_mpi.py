@@ -26,7 +26,7 @@ from karamelo_py.app.simulation import Simulation, SimulationError
 MPIEXEC = shutil.which("mpiexec", path=str(Path(sys.executable).parent)) or shutil.which("mpiexec")
 needs_mpi = pytest.mark.skipif(
     MPIEXEC is None or find_spec("mpi4py") is None or sys.platform == "win32",
-    reason="needs mpi4py and mpiexec: pip install 'karamelo-py[mpi]'",
+    reason="needs mpi4py and mpiexec: pip install '.[mpi]'",
 )
 FULL = pytest.mark.full
 PROGRAM = [sys.executable, "-m", "karamelo_py.app.start"]
@@ -540,7 +540,7 @@ def test_a_plug_in_looks_at_its_part_alone(tmp_path, line, says):
 def test_without_mpi4py(tmp_path, monkeypatch, capsys):
     path = str(script(tmp_path, "run(2)"))
     monkeypatch.setitem(sys.modules, "mpi4py", None)
-    hint = "hint: pip install 'karamelo-py[mpi]'"
+    hint = "hint: pip install '.[mpi]'"
     if MPIEXEC:
         assert main([path, "--ranks", "2"]) == 1
         err = capsys.readouterr().err

@@ -316,7 +316,7 @@ def test_a_file_from_behind_the_last_run(run_interpreted):
     text = FLY + "write_restart(end.h5)\n"
     run_interpreted(text)
     said = run_interpreted(text, "-restart", "end.h5").out
-    assert "note: end.h5 was written behind the last run" in said and "read_restart(end.h5)" in said
+    assert "note: end.h5 holds the end of the last run" in said and "read_restart(end.h5)" in said
     longer = run_interpreted(text.replace("run(4)", "run(9)"), "-restart", "end.h5", status=1).err
     assert "end.h5 was written when this run was over, by run(4)" in longer
     assert "run(4) as it was, a further run behind write_restart(end.h5)" in longer

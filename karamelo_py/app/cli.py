@@ -333,8 +333,8 @@ def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = 
     if not hub.rehearsed:
         _tell_of_no_run(hub, script)
     elif restart is not None and restart.is_over(hub):
-        message = f"{restart.path} was written behind the last run of {script}: nothing is left"
-        hint = f"a further run at the end of the script, or read_restart({restart.path}) in another"
+        message = f"{restart.path} holds the end of the last run of {script}: nothing is left to do"
+        hint = f"a further run behind it, or read_restart({restart.path}) in a script of its own"
         hub.console.say(render_message("note", message, hint=hint))
     return 0
 

@@ -262,7 +262,8 @@ def write_restart(hub: Hub, file: OutputFile) -> None:
 
     Notes
     -----
-    ``karamelo-py SCRIPT -restart FILE`` goes on behind this line.
+    ``karamelo-py SCRIPT -restart FILE`` goes on behind this line, where a further run may stand;
+    those before it stay as long as they were.
 
     Example
     -------

@@ -249,7 +249,8 @@ def require_plotly() -> None:
     """See that Plotly is there, which takes long to import."""
     if importlib.util.find_spec("plotly") is None:
         raise ScriptError(
-            "a page needs the package plotly", hint='pip install "karamelo-py[studies]"'
+            "a page needs the package plotly",
+            hint="pip install '.[studies]' in the folder of karamelo-py",
         )
 
 

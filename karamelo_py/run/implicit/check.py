@@ -151,7 +151,7 @@ def check(hub: Hub) -> None:
         raise ScriptError(
             f"{name} needs SciPy",
             place=update.scheme_place,
-            hint="pip install 'karamelo-py[implicit]'",
+            hint="pip install '.[implicit]' in the folder of karamelo-py",
         )
     for reason, instead, place in _reasons(hub):
         raise ScriptError(f"{name} {reason}", place=place or update.scheme_place, expected=instead)

@@ -18,7 +18,7 @@ from karamelo_py.language.scene import Scene
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.script.errors import Quit, ScriptError
 
-INSTALL = "pip install 'karamelo-py[mpi]'"
+INSTALL = "pip install '.[mpi]' in the folder of karamelo-py"
 # What the launchers of MPI tell each process: how many there are, and which it is.
 LAUNCHED = (
     ("OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_RANK"),
