@@ -33,8 +33,7 @@ from karamelo_py.kernels.implicit import (
 )
 from karamelo_py.kernels.visit import FBar
 from karamelo_py.points.kinematics import Axisymmetric
-from karamelo_py.points.laws import initial_state, specific_volume
-from karamelo_py.points.laws.rigid import Rigid
+from karamelo_py.points.laws import can, constrained_velocity, initial_state, specific_volume
 from karamelo_py.run.implicit.averaging import AveragedVolumes
 from karamelo_py.run.implicit.solvers import rigid_motions
 
@@ -84,13 +83,13 @@ class Equations:
 
     def __init__(self, s: Setup, mode: Any, known: dict[str, Any]):
         self.s, self.mode, self.d = s, mode, s.kin.dimension
-        self.blocks = [block for block in s.blocks if not isinstance(block.laws, Rigid)]
+        self.blocks = [block for block in s.blocks if not can(block.laws, constrained_velocity)]
         self.parts = [self._seen(block) for block in self.blocks]
         # Gradients of points on a line between cells reach nodes where they have no weight.
         given = [self._counts(seen) for seen, _ in self.parts]
         counts = [seen.nodes[own] for (seen, _), own in zip(self.parts, given, strict=True)]
         soft = distinct(counts)
-        tools = [(b, self._seen(b)[0]) for b in s.blocks if isinstance(b.laws, Rigid)]
+        tools = [(b, self._seen(b)[0]) for b in s.blocks if can(b.laws, constrained_velocity)]
         counts += [seen.nodes[seen.weights > 0] for _, seen in tools]
         self.nodes = distinct(counts)
         self.numbers = np.full(np.ptp(self.nodes) + 1, -1)

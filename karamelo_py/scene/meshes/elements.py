@@ -120,7 +120,7 @@ def elements_of(
 
 
 def bulge_of(mesh: meshio.Mesh, group: str | int | None = None) -> float:
-    """How far nodes in the middle of edges lie beside these, over their length: the largest."""
+    """Find how far nodes in the middle of edges lie beside these, over their length, at most."""
     found = 0.0
     for name, _, nodes in chosen_cells(mesh, group):
         first = len(SHAPES[OF_HIGHER_ORDER[name]].mirrored) if name in _EDGES else 0
