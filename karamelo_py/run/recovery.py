@@ -201,6 +201,7 @@ class RollBack:
     def _options(self, file: str) -> str:
         """Write the options that go on from a file, with outputs where those of this run are."""
         folder = os.path.relpath(self.hub.folder)
+        file, folder = (f'"{name}"' if " " in name else name for name in (file, folder))
         return f"-restart {file}" + (f" -out {folder}" if folder != os.curdir else "")
 
     def _keep_good(self, status: int) -> str:
