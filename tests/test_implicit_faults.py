@@ -1,7 +1,13 @@
 """What load steps say of scenes and steps that go wrong, and how they end."""
 
-import pytest
+from types import SimpleNamespace
 
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from karamelo_py.points.kinematics import PlaneStrain
+from karamelo_py.run.implicit import check, solvers
 from karamelo_py.run.implicit.newton import Newton
 from tests.test_implicit import HELD, patch
 
@@ -115,3 +121,98 @@ def test_a_step_can_be_left(run_script, monkeypatch):
     )
     assert len(result.log["pull_x"]) == 3
     assert len({id(newton) for newton in steps}) == 3
+
+
+BESIDE = """
+    stiff = 1e3
+    method(ulmpm, FLIP, linear, 1)
+    scheme(quasi-static)
+    dimension(2, 0, 2, 0, 1, 0.25)
+    region(a, block, 0.25, 0.75, 0, 0.75)
+    region(b, block, 1.25, 1.75, 0, 0.75)
+    material(soft, neo-hookean, 1, 1000, 0.3)
+    material(hard, neo-hookean, 1, stiff, 0.3)
+    solid(a, region, a, 2, soft, 0.25, 0)
+    solid(b, region, b, 2, hard, 0.25, 0)
+    region(low, block, INF, INF, INF, 1e-6)
+    group(low, nodes, region, low, all)
+    fix(hold, velocity_nodes, low, 0, 0)
+    group(pa, nodes, region, a, solid, a)
+    group(pp, particles, region, a, solid, a)
+    fix(pull, body_force, pa, 5*time, 0)
+    set_output(1)
+    xa = xcm(pp, x)
+    log_modify(custom, step, xa)
+    run(1)
+"""
+
+
+def test_a_stiff_body_leaves_a_soft_one_as_it_is(run_interpreted):
+    """They share no node: the sway of the soft one does not know the modulus of the other."""
+    sways = []
+    for stiff in ("1e3", "1e6"):
+        log = run_interpreted(BESIDE, "-var", "stiff", stiff, folder=stiff).log
+        sways.append(log["xa"][-1] - log["xa"][0])
+    assert sways[0] > 1e-3 and sways[1] == pytest.approx(sways[0], rel=1e-9)
+
+
+TOOL = """
+    method(ulmpm, FLIP, linear, 1)
+    scheme(quasi-static)
+    dimension(2, 0, 4, 0, 2, 0.25)
+    region(b, block, 0.5, 1, 0.5, 1)
+    material(m, rigid, 1000)
+    solid(s, region, b, 2, m, 0.25, 0)
+    group(g, particles, region, b, solid, s)
+    fix(v, velocity_particles, g, 0.5, 0)
+    set_output(1)
+    xg = xcm(g, x)
+    log_modify(custom, step, parts, xg)
+    run(2)
+"""
+
+
+def test_rigid_solids_alone_move(run_interpreted):
+    """There is nothing to balance then; two cells are four parts of half a cell."""
+    log = run_interpreted(TOOL).log
+    assert log["xg"][-1] == pytest.approx(1.75) and log["parts"][-1] == 4
+
+
+def test_multigrid_that_fails_is_no_singular_matrix(monkeypatch, recwarn):
+    """It says so; `auto` takes the direct solver then, as it does where pyamg is missing."""
+    rng = np.random.default_rng(0)
+    A = sp.csr_matrix(rng.standard_normal((60, 60)) + np.diag(rng.choice([-3.0, 3.0], 60)))
+    A, rigid, b = (A + A.T).tocsr(), np.ones((60, 3)), np.ones(60)
+    with pytest.raises(solvers.Unconverged):
+        solvers.amg(A, b, rigid, 1e-10, {})
+    assert not recwarn.list
+    monkeypatch.setattr(solvers, "MANY", 10)
+    assert np.allclose(A @ solvers.solve("auto", A, b, rigid, 1e-10, {}), b)
+    monkeypatch.setattr(solvers, "find_spec", lambda name: None)
+    monkeypatch.setattr(solvers, "amg", None)
+    assert np.allclose(A @ solvers.solve("auto", A, b, rigid, 1e-10, {}), b)
+
+
+def test_pyamg_is_missed_before_the_run(run_script, monkeypatch):
+    found = check.importlib.util.find_spec
+    monkeypatch.setattr(
+        check.importlib.util, "find_spec", lambda name: found(name) if name != "pyamg" else None
+    )
+    text = patch().replace("quasi-static)", "quasi-static, solver=amg)")
+    result = run_script(text, status=1)
+    assert "needs PyAMG" in result.err and "solver=amg)" in result.err
+
+
+@pytest.mark.parametrize(("h", "told"), [(-1.5, "turns inside out"), (0.5, "no finite stress")])
+def test_points_that_go_wrong_are_told_apart(h, told):
+    """A law without a number is not a point that is turned inside out."""
+    t = len(PlaneStrain().tensor_names)
+    increment, stress = np.zeros((t, 3)), np.zeros((t, 3))
+    increment[0, 1], stress[0, 1] = h, np.nan
+    block = SimpleNamespace(points=SimpleNamespace(id=np.array([7, 8, 9])))
+    response = SimpleNamespace(increment=increment, stress=stress)
+    equations = SimpleNamespace(
+        s=SimpleNamespace(kin=PlaneStrain()), blocks=[block], parts=[(None, response)]
+    )
+    reason = Newton._wrong(SimpleNamespace(equations=equations), np.zeros((2, 2)))
+    assert told in str(reason) and "point 8" in str(reason) and reason.point == 8

@@ -1,5 +1,6 @@
 """Numbers with slopes go through all laws as they are: their tangents are those of differences."""
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,7 +10,7 @@ from numba import config
 from karamelo_py.compiler.algebra import on_numbers
 from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.loops import kernel
-from karamelo_py.compiler.slopes import seeded, slopes_of
+from karamelo_py.compiler.slopes import Dual, NoSlope, seeded, slopes_of
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space, large
 from karamelo_py.points.laws import advance, initial_state, kirchhoff_stress
 from karamelo_py.points.laws.cam_clay import CamClay
@@ -154,3 +155,42 @@ def test_kernels_know_them(name, kin):
         expected, tangents = on_numbers(tangent)(law, kin, state, dl, 1e-2)
         assert np.allclose(values, expected, rtol=1e-12, atol=1e-12 * E)
         assert np.allclose(slopes, tangents, rtol=1e-9, atol=1e-9 * E)
+
+
+OF_ONE = "log log1p exp expm1 exp2 log2 log10 sin cos tan sinh cosh tanh asin acos atan asinh atanh"
+OF_ONE += " sqrt cbrt fabs erf erfc degrees radians"
+
+
+@shared
+def of_two(x, y):
+    """Functions of two numbers, and powers of numbers below 0."""
+    a, b = -x, -y
+    powers = a**0, a**-1, a**5, a**-2, a**2.0, a**3.0, b**-3.0, x**y, math.pow(a, 3.0), 2.0**x
+    distances = math.atan2(a, y), math.atan2(x, b), math.hypot(a, y), math.copysign(x, b)
+    return (*powers, *distances, math.fmod(y, x), math.floor(y) * x)
+
+
+def test_functions_of_laws_know_slopes():
+    """What laws may call in explicit steps, against central differences (error 1e-10)."""
+
+    def difference(f, x, h=1e-5):
+        return (f(x + h) - f(x - h)) / (2 * h)
+
+    for name in OF_ONE.split():
+        function = getattr(math, name)
+        made = on_numbers(function)(Dual(0.4, (1,)))
+        assert made.value == function(0.4), name
+        assert made.slopes[0] == pytest.approx(difference(function, 0.4), rel=1e-8), name
+    x, y = 0.7, 1.9
+    made = on_numbers(of_two)(*seeded((x, y)))
+    for k, (number, value) in enumerate(zip(made, of_two(x, y), strict=True)):
+        assert number.value == value, k
+        exact = (
+            difference(lambda x, k=k: of_two(x, y)[k], x),
+            difference(lambda y, k=k: of_two(x, y)[k], y),
+        )
+        assert number.slopes == pytest.approx(exact, rel=1e-8, abs=1e-9), k
+    zero = Dual(0.0, (1,))
+    assert [(zero**n).slopes[0] for n in (0, 0.5, 1.0, 2.0, 5)] == [0, 0, 1, 0, 0]
+    with pytest.raises(NoSlope, match=r"math\.gamma"):
+        on_numbers(math.gamma)(Dual(0.4, (1,)))

@@ -81,10 +81,10 @@ class Dual(namedtuple("Dual", "value slopes")):
         if type(other) is int and 1 <= other <= 4:  # of numbers below 0, too
             square = self * self
             return (self, square, square * self, square * square)[other - 1]
-        return _power(self, other)
+        return _raised(self, other, self.value ** value_of(other))
 
     def __rpow__(self, other):
-        return _power(other, self)
+        return _raised(other, self, other**self.value)
 
     def __abs__(self):
         return _abs(self)
@@ -197,6 +197,11 @@ def elementary(function: Callable, slope: Callable, *others: Callable) -> Callab
     return of_dual
 
 
+def _inverse(x):
+    """Give 1/x, 0 of 0: the slopes there, which are infinite."""
+    return where(x > 0, 1 / where(x > 0, x, 1), 0)
+
+
 elementary(logarithm, lambda x, f: 1 / x, math.log)
 elementary(logarithm_near_one, lambda x, f: 1 / x)
 elementary(exponential, lambda x, f: f, math.exp)
@@ -205,21 +210,106 @@ elementary(math.cos, lambda x, f: -math.sin(x))
 elementary(math.tan, lambda x, f: 1 + f * f)
 elementary(math.atan, lambda x, f: 1 / (1 + x * x))
 elementary(math.tanh, lambda x, f: 1 - f * f)
-_abs = elementary(abs, lambda x, f: where(x < 0, -1, 1))
+elementary(math.asin, lambda x, f: _inverse(math.sqrt(1 - x * x)))
+elementary(math.acos, lambda x, f: -_inverse(math.sqrt(1 - x * x)))
+elementary(math.sinh, lambda x, f: math.cosh(x))
+elementary(math.cosh, lambda x, f: math.sinh(x))
+elementary(math.asinh, lambda x, f: 1 / math.sqrt(1 + x * x))
+elementary(math.acosh, lambda x, f: _inverse(math.sqrt(x * x - 1)))
+elementary(math.atanh, lambda x, f: 1 / (1 - x * x))
+elementary(math.log1p, lambda x, f: 1 / (1 + x))
+elementary(math.expm1, lambda x, f: 1 + f)
+elementary(math.log2, lambda x, f: 1 / (x * math.log(2)))
+elementary(math.log10, lambda x, f: 1 / (x * math.log(10)))
+elementary(math.exp2, lambda x, f: f * math.log(2))
+elementary(math.cbrt, lambda x, f: where(x == 0, 0, f / where(x == 0, 1, 3 * x)))
+elementary(math.erf, lambda x, f: 2 / math.sqrt(math.pi) * math.exp(-x * x))
+elementary(math.erfc, lambda x, f: -2 / math.sqrt(math.pi) * math.exp(-x * x))
+elementary(math.degrees, lambda x, f: 180 / math.pi)
+elementary(math.radians, lambda x, f: math.pi / 180)
+_abs = elementary(abs, lambda x, f: where(x < 0, -1, 1), math.fabs)
+
+
+@implements(math.atan2, Dual)
+def _atan2(y, x):
+    a, b = value_of(y), value_of(x)
+    square = a * a + b * b
+    over = where(square > 0, square, 1)
+    return combined(math.atan2(a, b), b / over, y, -a / over, x)
+
+
+@implements(math.hypot, Dual)
+def _hypot(x, y):
+    a, b = value_of(x), value_of(y)
+    made = math.hypot(a, b)
+    over = where(made > 0, made, 1)  # at 0 the slope is 0, as that of norms
+    return combined(made, a / over, x, b / over, y)
+
+
+@implements(math.copysign, Dual)
+def _copysign(x, y):
+    a, b = value_of(x), value_of(y)
+    made = math.copysign(a, b)
+    if not isinstance(x, Dual):
+        return y.constant(made)
+    return x.chain(made, math.copysign(1.0, a) * math.copysign(1.0, b))
+
+
+@implements(math.fmod, Dual)
+def _fmod(x, y):
+    a, b = value_of(x), value_of(y)
+    rest = math.fmod(a, b)
+    return combined(rest, 1, x, (rest - a) / b, y)
+
+
+@implements(math.pow, Dual)
+def _pow(x, y):
+    return _raised(x, y, math.pow(value_of(x), value_of(y)))
+
+
+def stepwise(*functions: Callable) -> None:
+    """Let functions whose slopes vanish, or whose results are no real numbers, know slopes."""
+    for one in functions:
+        implements(one, Dual)(lambda x, do=one: do(x.value))
+
+
+stepwise(math.floor, math.ceil, math.trunc, math.isnan, math.isinf, math.isfinite)
+
+
+class NoSlope(TypeError):
+    """A function has no derivative here; the message names it."""
+
+
+def _refused(*functions: Callable) -> None:
+    for one in functions:
+
+        def refuse(*_, name=one.__name__):
+            raise NoSlope(f"math.{name}")
+
+        implements(one, Dual)(refuse)
+
+
+_refused(math.gamma, math.lgamma, math.frexp, math.ldexp)
 
 
 @implements(power, Dual)
 @implements(pow, Dual)
 def _power(x, y):
+    return _raised(x, y, power(value_of(x), value_of(y)))
+
+
+def _raised(x, y, made):
+    """Give the power `made` its slopes; those of a base of 0 are 0, but for the exponent 1."""
     base, exponent = value_of(x), value_of(y)
-    made = power(base, exponent)
-    some = base > 0
+    above = base > 0
+    some = base != 0  # below 0 a power is a number if the exponent is whole
     over = where(some, base, 1)
+    alone = where(exponent == 1, 1, 0) if not is_literal(exponent) else int(exponent == 1)
     return combined(
         made,
-        where(some, exponent * made / over, 0),
+        where(some, exponent * made / over, alone) if isinstance(x, Dual) else 0,
         x,
-        where(some, made * logarithm(over), 0) if isinstance(y, Dual) else 0,
+        where(above, made * logarithm(where(above, base, 1)), 0) if isinstance(y, Dual) else 0,
         y,
     )
 

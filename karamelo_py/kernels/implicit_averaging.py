@@ -18,7 +18,9 @@ and Z of dq/dr.
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba import config
 
+from karamelo_py.compiler.algebra import on_numbers
 from karamelo_py.compiler.compile import index, shared
 from karamelo_py.compiler.fields import load, rows_of_points, store
 from karamelo_py.compiler.held import at_hand
@@ -90,6 +92,10 @@ def averaged_stress(law, kin, state, H, ratio, dt):
     tau = kirchhoff_stress(law, kin, advance(law, kin, state, dl, dt))
     p = tau.mean_of_stretching()
     return (tau - p * I).nominal(A), p / ratio
+
+
+if config.DISABLE_JIT:  # type: ignore[attr-defined]
+    averaged_stress = on_numbers(averaged_stress)
 
 
 @noinline

@@ -6,6 +6,7 @@ from typing import Any
 
 from karamelo_py.compiler.algebra import on_numbers
 from karamelo_py.compiler.fields import declared
+from karamelo_py.compiler.slopes import NoSlope
 from karamelo_py.kernels.implicit import stress_and_tangent
 from karamelo_py.language import registry
 from karamelo_py.points.laws import can, constrained_velocity, initial_state
@@ -48,16 +49,26 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
         yield "needs double precision", "no precision(single)", None
     if hub.settings.comm.size > 1:
         yield "runs in one process", "no --ranks", None
-    if not update.scheme.inertia:
-        kin = method.kinematics(hub)
-        for solid in hub.solids.values():
-            law = solid.material.law
-            if not can(law, constrained_velocity) and not _bears_shear(law, kin):
-                yield (
-                    f"finds no equilibrium of '{solid.id}', which bears no shear: a gas or fluid",
-                    f"scheme(newmark), or {_EXPLICIT}",
-                    solid.place,
-                )
+    kin = method.kinematics(hub)
+    for solid in hub.solids.values():
+        law = solid.material.law
+        if can(law, constrained_velocity):
+            continue
+        try:
+            bears = _bears_shear(law, kin)
+        except NoSlope as function:
+            yield (
+                f"knows no derivative of {function}, which the law of '{solid.id}' calls",
+                f"another function in the law, or {_EXPLICIT}",
+                solid.place,
+            )
+            continue
+        if not bears and not update.scheme.inertia:
+            yield (
+                f"finds no equilibrium of '{solid.id}', which bears no shear: a gas or fluid",
+                f"scheme(newmark), or {_EXPLICIT}",
+                solid.place,
+            )
     for fix in hub.fixes.values():
         own = registry.origin("fix", fix.style).startswith("karamelo-py ") and fix.style != "python"
         other = [
@@ -119,11 +130,11 @@ def _of_rigid_points(hub: Hub, fix: Fix) -> bool:
 def _bears_shear(law: Any, kin: Any) -> bool:
     """Tell whether a law resists a shear that takes any time; in one dimension all do."""
     places = kin.Tensor.places
-    if kin.dimension == 1:
-        return True
     rest = kin.Tensor._make([0.0] * len(places))
     state = initial_state(law, kin, 1.0)
     _, C = on_numbers(stress_and_tangent)(law, kin, state, rest, LONG)
+    if kin.dimension == 1:
+        return True
     shear = places.index((0, 1))
     return abs(C[shear][shear]) > 1e-12 * abs(C[0][0])
 
@@ -152,6 +163,12 @@ def check(hub: Hub) -> None:
             f"{name} needs SciPy",
             place=update.scheme_place,
             hint="pip install '.[implicit]' in the folder of karamelo-py",
+        )
+    if update.scheme.solver == "amg" and importlib.util.find_spec("pyamg") is None:
+        raise ScriptError(
+            "solver=amg needs PyAMG",
+            place=update.scheme_place,
+            hint="pip install pyamg, or solver=direct",
         )
     for reason, instead, place in _reasons(hub):
         raise ScriptError(f"{name} {reason}", place=place or update.scheme_place, expected=instead)

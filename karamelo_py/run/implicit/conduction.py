@@ -5,13 +5,12 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from karamelo_py.kernels.arrays import MASS, Setup, of_force
+from karamelo_py.kernels.arrays import MASS, of_force
 from karamelo_py.kernels.heat import flow_of_heat, hold_heat, warm_points
 from karamelo_py.points.kinematics import Line
 from karamelo_py.run.implicit.equations import Equations
+from karamelo_py.run.implicit.prescribed import prescribed
 from karamelo_py.run.implicit.solvers import direct
-
-SHOWN = 1e20  # a temperature that nobody prescribes
 
 
 def conduct(equations: Equations, hooks: Any, dt: float) -> None:
@@ -37,9 +36,10 @@ def conduct(equations: Equations, hooks: Any, dt: float) -> None:
     mapped = heat.nodes.velocity[nodes, 0].astype(float)
     flow = sums[nodes, of_force(Line())].astype(float)
     K = equations.conduction()
-    given, prescribed = _prescribed(s, nodes, hooks)
+    found = prescribed(s, update, nodes, 1, lambda: hold_heat(s, hooks))
+    given, temperatures = found[0][:, 0], found[1][:, 0]
     free = some & ~given
-    change = np.where(given, prescribed - mapped, 0.0)
+    change = np.where(given, temperatures - mapped, 0.0)
     stored = capacity / dt
     balance = flow + stored * (own - mapped)
     A = (K + sp.diags(stored)).tocsr()
@@ -54,16 +54,3 @@ def conduct(equations: Equations, hooks: Any, dt: float) -> None:
     hold_heat(s, hooks)
     update[nodes, 0], update[nodes, 1] = new, new - own
     warm_points(heat, s, mode)
-
-
-def _prescribed(s: Setup, nodes: np.ndarray, hooks: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Find which nodes have a temperature that fixes prescribe, and that."""
-    update, totals = s.heat.nodes.update, s.control.totals.copy()
-    found = []
-    for shown in (-SHOWN, SHOWN):
-        update[nodes, 0], update[nodes, 1] = shown, 0
-        hold_heat(s, hooks)
-        found.append(update[nodes, 0].astype(float))
-    s.control.totals[:] = totals
-    given = found[0] == found[1]
-    return given, np.where(given, found[0], 0.0)

@@ -1,7 +1,7 @@
 """The equations of an implicit step: unknown nodes, the sparse matrix, and ghost stabilisation."""
 
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -38,7 +38,7 @@ from karamelo_py.run.implicit.averaging import AveragedVolumes
 from karamelo_py.run.implicit.solvers import rigid_motions
 
 # What is known of a step before where the first are the same.
-FOLLOWED, FOLLOWING = ("nodes", "deforming"), ("positions", "rigid_motions", "ghost")
+FOLLOWED, FOLLOWING = ("nodes", "deforming"), ("positions", "rigid_motions", "differences")
 
 
 def distinct(numbers: list[np.ndarray]) -> np.ndarray:
@@ -51,6 +51,27 @@ def distinct(numbers: list[np.ndarray]) -> np.ndarray:
     for array in numbers:
         there[array - low] = True
     return np.flatnonzero(there) + low
+
+
+class Moduli(NamedTuple):
+    """Young's moduli of the bodies at rest."""
+
+    mean: float  # by volume; 0 if nothing deforms
+    of_grids: np.ndarray  # (g,) the means of each grid, 0 where nothing deforms
+    of_laws: list[np.ndarray]  # (2, k) those of the laws of each block; their specific volumes
+
+    def _every(self) -> np.ndarray:
+        none = np.zeros(0)
+        return np.concatenate([none, *(own[0, own[1] > 0] for own in self.of_laws)])
+
+    def alike(self) -> bool:
+        """Tell whether all bodies have the same modulus."""
+        return len(np.unique(self._every())) <= 1
+
+    def least(self) -> float:
+        """Find the smallest modulus of a body that bears shear."""
+        every = self._every()
+        return self.mean if self.alike() else float(every[every > 0].min())
 
 
 class Equations:
@@ -79,6 +100,8 @@ class Equations:
         (m,) which of them deforming points give something to.
     led, velocity_of_rigid
         (m,) which of them see rigid points, and the velocities (m, d) that they have from these.
+    fastest_tool
+        The largest component of a velocity of rigid points.
     """
 
     def __init__(self, s: Setup, mode: Any, known: dict[str, Any]):
@@ -103,6 +126,8 @@ class Equations:
         tools = [(block, self._numbered(seen, seen.weights > 0)) for block, seen in tools]
         self.deforming = np.isin(self.nodes, soft)
         self.led, self.velocity_of_rigid = self._led(tools)
+        speeds = [np.abs(b.points.v).max(initial=0.0) for b, _ in tools]
+        self.fastest_tool = float(max(speeds, default=0.0))
         self._find_pairs()
         self.averaged = AveragedVolumes(self) if isinstance(s.averaging, FBar) else None
         if all(np.array_equal(vars(self)[name], known.get(name)) for name in FOLLOWED):
@@ -236,7 +261,7 @@ class Equations:
 
     def furthest(self) -> float:
         """Find the largest component of a displacement of a point, at the last response."""
-        return max(float(response.furthest.max()) for _, response in self.parts)
+        return max((float(response.furthest.max()) for _, response in self.parts), default=0.0)
 
     def present_forces(self) -> np.ndarray:
         """Find the nodal forces (m, d) of the present stress."""
@@ -297,16 +322,14 @@ class Equations:
 
     # --- ghost stabilisation ----------------------------------------------------------------------
 
-    def moduli(self) -> tuple[float, np.ndarray]:
-        """Estimate Young's modulus of the bodies at rest: 2.6 of the mean shear modulus.
-
-        Returns that of all bodies, and those of each grid (g,), 0 where nothing deforms.
-        """
+    def moduli(self) -> "Moduli":
+        """Estimate Young's modulus of the bodies at rest: 2.6 of the mean shear modulus."""
         kin = self.s.kin
         places = kin.Tensor.places
         of_grids = np.zeros((2, len(self.s.grids.first)))
         total = volume = 0.0
-        for block in self.blocks:
+        of_laws = [np.zeros((2, block.points.material.max() + 1)) for block in self.blocks]
+        for block, of_own in zip(self.blocks, of_laws, strict=True):
             points = block.points
             for k in np.unique(points.material):
                 law = record(block.laws, k)
@@ -316,15 +339,39 @@ class Equations:
                 one = C[0][0] if self.d == 1 else 1.3 * (C[0][0] - C[0][places.index((1, 1))])
                 own = float(points.mass[points.material == k].sum() * specific_volume(law))
                 total, volume = total + own * float(one), volume + own
+                of_own[:, k] = one, specific_volume(law)
                 on = points.grid[points.material == k]
                 own_of = np.bincount(on, points.mass[points.material == k], of_grids.shape[1])
                 of_grids += own_of * float(specific_volume(law)) * np.array([[float(one)], [1.0]])
         per = np.where(of_grids[1] > 0, of_grids[1], 1.0)
-        return (total / volume if volume else 0.0), of_grids[0] / per
+        mean = total / volume if volume else 0.0
+        return Moduli(mean, of_grids[0] / per, of_laws)
+
+    def ghost(self, moduli: "Moduli") -> sp.csr_matrix:
+        """Make the matrix (m, m) that penalises jumps of the gradient at the border of bodies.
+
+        It is in units of the mean modulus. That of a node is the mean by volume of what it sees, of
+        a difference the smallest of its nodes.
+        """
+        lines, size, D = self.differences
+        weights = size**self.d
+        if not moduli.alike():
+            sums = np.zeros((len(self.nodes), 2))
+            for block, (seen, _), of_laws in zip(
+                self.blocks, self.parts, moduli.of_laws, strict=True
+            ):
+                young, volume = of_laws[:, block.points.material]
+                scatter(seen, block.points.mass, np.stack([volume * young, volume]), sums)
+            none = np.full(len(sums), np.inf)  # of nodes that see gradients only
+            means = np.divide(sums[:, 0], sums[:, 1], out=none, where=sums[:, 1] > 0)
+            least = means[lines].min(1, initial=np.inf)
+            weights = weights * np.where(np.isfinite(least), least, 0.0) / moduli.mean
+        share = 1 / 3 / 2 ** (self.d - 1)
+        return (share * (D.T @ sp.diags(weights) @ D)).tocsr()
 
     @cached_property
-    def ghost(self) -> sp.csr_matrix:
-        """Make the matrix (m, m) that penalises jumps of the gradient at the border of bodies.
+    def differences(self) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix]:
+        """Find second differences (n, m) at the border of bodies: nodes (n, 3), cells (n,), matrix.
 
         Linear functions have them across faces between cells, of which one lies at the border
         (Coombs 2023): second differences of the nodes on both sides. Splines have no such jumps;
@@ -354,8 +401,7 @@ class Equations:
         n = len(lines)
         at_nodes = np.repeat(np.arange(n), 3), lines.ravel()
         D = sp.csr_matrix((np.tile((1.0, -2.0, 1.0), n), at_nodes), (n, len(self.nodes)))
-        share = 1 / 3 / 2 ** (d - 1)
-        return (share * (D.T @ sp.diags(size**d) @ D)).tocsr()
+        return lines, size, D
 
     def _line(self, g: np.ndarray, corner: np.ndarray, axis: int) -> np.ndarray:
         """Number nodes and their neighbours along an axis (rows, 3); -1 where one is not used."""

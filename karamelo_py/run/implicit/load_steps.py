@@ -15,14 +15,15 @@ from karamelo_py.kernels.watch import look_at_end
 from karamelo_py.points.kinematics import free_from
 from karamelo_py.run.implicit.conduction import conduct
 from karamelo_py.run.implicit.contact import Contact, contact_of
-from karamelo_py.run.implicit.equations import Equations
+from karamelo_py.run.implicit.equations import Equations, Moduli
 from karamelo_py.run.implicit.inertia import Motion, Rest
-from karamelo_py.run.implicit.newton import Broken, Failed, Loose, Newton, TooFar, counted
+from karamelo_py.run.implicit.newton import Broken, Failed, Loose, Newton, TooFar, Wrong, counted
+from karamelo_py.run.implicit.prescribed import prescribed
+from karamelo_py.run.implicit.solvers import Singular
 from karamelo_py.schemes.quasi_static import PUBLISHED
 from karamelo_py.script.errors import ScriptError
 
 HALVINGS = 10  # of a load step, at most
-SHOWN = 1e20  # a velocity that nobody prescribes
 
 
 class PointsWrong(Exception):
@@ -40,7 +41,7 @@ class LoadSteps:
         self.simulation = simulation
         self.scheme = simulation.hub.update.scheme
         self.dynamic = self.scheme.inertia
-        self.modulus, self.moduli = 0.0, np.zeros(0)
+        self.moduli: Moduli | None = None
         self.known: dict[str, Any] = {}  # of the last equations
         self.within = False  # whether a part of a step has been done
         self.failure = ""  # why a step has no equilibrium
@@ -157,7 +158,13 @@ class LoadSteps:
             if not take_rows(self.scheme.close, s, simulation.mode, hooks):
                 raise PointsWrong
             if isinstance(s.heat, Conducting):
-                conduct(found.equations, hooks, dt)
+                try:
+                    conduct(found.equations, hooks, dt)
+                except Singular:
+                    raise self._error(
+                        "temperatures have no solution: something conducts no finite heat",
+                        "look at conductivities and heat capacities",
+                    ) from None
         except Failed:
             control.totals[:] = totals
             raise
@@ -196,13 +203,13 @@ class LoadSteps:
             equations = Equations(s, self.simulation.mode, self.known)
         nodes = equations.nodes
         external = after[nodes] + equations.present_forces()
-        fixed, prescribed = self._prescribed(equations, hooks)
+        fixed, velocities = self._prescribed(equations, hooks)
         led = equations.led[:, None]
         given = fixed | led
-        prescribed = np.where(led, equations.velocity_of_rigid, prescribed)
-        if not self.modulus:
-            self.modulus, self.moduli = equations.moduli()
-        contact = contact_of(equations, self.moduli)
+        velocities = np.where(led, equations.velocity_of_rigid, velocities)
+        if self.moduli is None:
+            self.moduli = equations.moduli()
+        contact = contact_of(equations, self.moduli.of_grids)
         if not self.dynamic:
             self._check_held(equations, given, contact)
         with counted(self.seconds, "layout"):
@@ -210,18 +217,20 @@ class LoadSteps:
         if before is None:
             inertia: Rest | Motion = Rest(equations)
         else:
-            held = given, prescribed
+            held = given, velocities
             inertia = Motion(equations, self.scheme, dt, before[nodes], *held, contact)
         newton = Newton(self.scheme, equations, inertia, contact, external, dt, self.seconds)
-        newton.scale(self.modulus, self.scheme.stabilisation)
+        newton.scale(self.moduli, self.scheme.stabilisation)
         try:
-            jump = np.where(given, prescribed * dt, 0.0)
+            jump = np.where(given, velocities * dt, 0.0)
             u, iterations, residual = newton.solve(jump, self._interrupted)
         except Loose as reason:
             chosen = np.arange(len(nodes)) == reason.node
             where = ", ".join(f"{x:.4g}" for x in equations.positions[reason.node])
             solid = self._solid_at(equations, chosen)
             raise Failed(f"{reason}: nothing holds solid '{solid}' near ({where})") from None
+        except Wrong as reason:
+            raise Failed(f"{reason} (solid '{self._solid_of(reason.point)}')") from None
         self.known = equations.known()
         self.unknowns = int(np.count_nonzero(~given))
         self.corrections += iterations
@@ -230,28 +239,23 @@ class LoadSteps:
         return Equilibrium(*found)
 
     def _prescribed(self, equations: Equations, hooks: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Find which components of the nodes are held, and the velocities that they get.
-
-        Fixes are shown two velocities: what comes out the same is what they prescribe.
-        """
+        """Find which components of the nodes are held, and the velocities that they get."""
         simulation, s = self.simulation, equations.s
-        d, nodes, update = equations.d, equations.nodes, s.nodes.update
-        totals = s.control.totals.copy()
-        found = []
-        for shown in (-SHOWN, SHOWN):
-            update[nodes] = 0
-            update[nodes, :d] = shown
-            take_rows(self.scheme.hold, s, simulation.mode, hooks)
-            found.append(np.array(update[nodes, :d]))
-        s.control.totals[:] = totals
-        given = found[0] == found[1]
-        if np.any(~given & ((found[0] != -SHOWN) | (found[1] != SHOWN))):
+        hold = self.scheme.hold
+        given, velocities, changed = prescribed(
+            s,
+            s.nodes.update,
+            equations.nodes,
+            equations.d,
+            lambda: take_rows(hold, s, simulation.mode, hooks),
+        )
+        if np.any(changed):
             raise self._error(
                 "a fix changes velocities of nodes without prescribing them, which implicit steps "
                 "know nothing of",
                 "fix velocity_nodes, or scheme(musl)",
             )
-        return given, np.where(given, found[0], 0.0)
+        return given, velocities
 
     def _publish(self, found: "Equilibrium", hooks: Any, dt: float) -> None:
         """Let those that hold nodes publish the forces that they do it with; velocities at nodes.
@@ -320,13 +324,16 @@ class LoadSteps:
 
     def _solid_at(self, equations: Equations, chosen: np.ndarray) -> str:
         """Name the solid of a point that sees some of the chosen nodes (m,)."""
-        hub, firsts = self.simulation.hub, equations.s.control.firsts
         for block, (seen, _) in zip(equations.blocks, equations.parts, strict=True):
             points = np.flatnonzero(chosen[seen.nodes].any(1))
             if len(points):
-                number = np.searchsorted(firsts, block.points.id[points[0]], side="right") - 1
-                return list(hub.solids)[number]
+                return self._solid_of(int(block.points.id[points[0]]))
         return ""
+
+    def _solid_of(self, point: int) -> str:
+        """Name the solid of the point of a number."""
+        firsts = self.simulation.setup.control.firsts
+        return list(self.simulation.hub.solids)[np.searchsorted(firsts, point, side="right") - 1]
 
 
 class Equilibrium(NamedTuple):

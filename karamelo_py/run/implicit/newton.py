@@ -9,8 +9,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from karamelo_py.run.implicit.contact import Contact
-from karamelo_py.run.implicit.equations import Equations
-from karamelo_py.run.implicit.solvers import Singular, direct, solve
+from karamelo_py.run.implicit.equations import Equations, Moduli
+from karamelo_py.run.implicit.solvers import Singular, Unconverged, direct, solve
 
 ASTRAY = 1e4  # times as far as points may go: nothing holds them
 FAR = 0.5  # cells that points may go at once, where weights follow them; else less than one
@@ -44,6 +44,14 @@ class Loose(Failed):
     def __init__(self, node: int):
         super().__init__("the equations are singular")
         self.node = node
+
+
+class Wrong(Failed):
+    """A point has no finite stress."""
+
+    def __init__(self, reason: str, point: int):
+        super().__init__(reason)
+        self.point = point
 
 
 class Broken(Failed):
@@ -100,11 +108,11 @@ class Newton:
         if contact is not None:
             contact.respond(np.zeros_like(external))
 
-    def scale(self, modulus: float, stabilisation: float) -> None:
+    def scale(self, moduli: Moduli, stabilisation: float) -> None:
         """Tell the stiffness of the bodies; a share of it penalises jumps at their border."""
-        self.floor = 1e-9 * modulus * self.spacing ** (self.equations.d - 1)
-        if stabilisation * modulus:
-            self.ghost = stabilisation * modulus * self.equations.ghost
+        self.floor = 1e-9 * moduli.least() * self.spacing ** (self.equations.d - 1)
+        if stabilisation * moduli.mean:
+            self.ghost = stabilisation * moduli.mean * self.equations.ghost(moduli)
             free = self.free.ravel()
             self.ghost_of_free = self.equations.for_all_components(self.ghost)[free][:, free]
 
@@ -187,7 +195,26 @@ class Newton:
                     change[free] = solve(self.scheme.solver, A, b, rigid, accuracy, self.kept)
             except Singular:
                 raise Loose(self._loosest(A)) from None
+            except Unconverged:
+                raise Failed("multigrid did not converge: take solver=direct") from None
         return change
+
+    def _wrong(self, u: np.ndarray) -> Failed:
+        """Tell why forces of stress after displacements (m, d) are no numbers."""
+        if not np.all(np.isfinite(u)):
+            return Failed("displacements are no finite numbers")
+        places = self.equations.s.kin.Tensor.places
+        for block, (_, response) in zip(self.equations.blocks, self.equations.parts, strict=True):
+            bad = np.flatnonzero(~np.isfinite(response.stress).all(0))
+            if len(bad):
+                A = np.eye(3)
+                for (i, j), h in zip(places, response.increment[:, bad[0]], strict=True):
+                    A[i, j] += h
+                point = int(block.points.id[bad[0]])
+                if np.linalg.det(A) > 0:
+                    return Wrong(f"the law gives no finite stress at point {point}", point)
+                return Wrong(f"point {point} turns inside out", point)
+        return Failed("forces of stress are no finite numbers")
 
     def _loosest(self, A: sp.csr_matrix) -> int:
         """Find the node that moves most in the softest motion, by inverse iteration."""
@@ -208,10 +235,11 @@ class Newton:
         if self.contact is not None:
             self.contact.respond(u)
         if not np.all(np.isfinite(self.inner)):
-            raise Failed("a point turns inside out")
+            raise self._wrong(u)
         far = equations.furthest() / self.spacing
         most = FAR if equations.s.frame.moves else 0.95
         if far > ASTRAY * most:
             raise Loose(int(np.abs(u).max(1).argmax()))
+        far = max(far, equations.fastest_tool * self.dt / self.spacing)
         if not far <= most:
             raise TooFar(f"points would go {far:.3g} cells at once", far / most)

@@ -3,6 +3,7 @@
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 
 import numpy as np
 import scipy.sparse as sp
@@ -15,6 +16,10 @@ MANY_ITERATIONS = 25  # of multigrid, behind which its coarse equations are made
 
 class Singular(Exception):
     """The equations have no solution: something is not held, or a limit load is reached."""
+
+
+class Unconverged(Exception):
+    """Multigrid leaves more than a hundredth of the residual."""
 
 
 def scaled(A: sp.csr_matrix, s: np.ndarray | None = None) -> tuple[sp.csr_matrix, np.ndarray]:
@@ -58,8 +63,8 @@ def amg(
     B, s = scaled(A, s)
     symmetric = is_symmetric(B)
     left: list[float] = []
-    with from_one_seed(), warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of a limit of iterations
+    # pyamg has its warnings shown whatever filters say: they are taken, and residuals tell.
+    with from_one_seed(), warnings.catch_warnings(record=True):
         if kept:
             kept["multigrid"].levels[0].A = B
         else:
@@ -68,12 +73,16 @@ def amg(
                 B, B=rigid / s[:, None], symmetry="symmetric" if symmetric else "nonsymmetric"
             )
         x = kept["multigrid"].solve(
-            s * b, tol=accuracy, accel="cg" if symmetric else "gmres", maxiter=300, residuals=left
+            s * b,
+            tol=accuracy,
+            accel="cg" if symmetric else "gmres",
+            maxiter=min(300, len(b)),
+            residuals=left,
         )
     if len(left) > MANY_ITERATIONS:
         kept.clear()
     if not np.all(np.isfinite(x)) or left[-1] > 1e-2 * max(left[0], 1e-300):
-        raise Singular
+        raise Unconverged
     return s * x
 
 
@@ -101,10 +110,10 @@ def solve(
     """Solve by the solver of a `name`: direct, amg or auto; `kept` is what amg keeps."""
     in_space = rigid.shape[1] == 6
     large = A.shape[0] >= (MANY_IN_SPACE if in_space else MANY)
-    if name == "auto" and large and (in_space or is_symmetric(A)):
+    if name == "auto" and large and (in_space or is_symmetric(A)) and find_spec("pyamg"):
         try:
             return solve("amg", A, b, rigid, accuracy, kept)
-        except Singular:  # multigrid is not made for all matrices
+        except (Singular, Unconverged):  # multigrid is not made for all matrices
             kept.clear()
     x = amg(A, b, rigid, accuracy, kept) if name == "amg" else direct(A, b)
     if not np.all(np.isfinite(x)):
