@@ -8,7 +8,9 @@ import scipy.sparse as sp
 
 from karamelo_py.points.kinematics import PlaneStrain
 from karamelo_py.run.implicit import check, solvers
+from karamelo_py.run.implicit.load_steps import LoadSteps
 from karamelo_py.run.implicit.newton import Newton
+from karamelo_py.script.errors import ScriptError
 from tests.test_implicit import HELD, patch
 
 FLUID = """eos(w, fluid, 1000, 1e5, 7)
@@ -104,8 +106,6 @@ def test_a_step_can_be_left(run_script, monkeypatch):
         if hub.values.get("timestep") == 2:
             hub.running.signal = 2
         return correction(self, *arguments)
-
-    from karamelo_py.run.implicit.load_steps import LoadSteps
 
     part = LoadSteps._part
 
@@ -216,3 +216,17 @@ def test_points_that_go_wrong_are_told_apart(h, told):
     )
     reason = Newton._wrong(SimpleNamespace(equations=equations), np.zeros((2, 2)))
     assert told in str(reason) and "point 8" in str(reason) and reason.point == 8
+
+
+def test_initial_velocities_of_points_are_told():
+    """Load steps would drop them in silence; rigid solids may have some."""
+    points = SimpleNamespace(v=np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 0.0]]), id=np.array([0, 1, 2]))
+    control = SimpleNamespace(firsts=np.array([0, 2]), values=np.zeros(50))
+    setup = SimpleNamespace(blocks=[SimpleNamespace(points=points, laws=())], control=control)
+    steps = LoadSteps.__new__(LoadSteps)
+    hub = SimpleNamespace(solids={"a": None, "b": None}, place=None)
+    steps.simulation = SimpleNamespace(setup=setup, hub=hub)
+    with pytest.raises(ScriptError, match="solid 'b' has initial velocities"):
+        steps._check_at_rest()
+    points.v[:] = 0
+    steps._check_at_rest()

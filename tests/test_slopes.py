@@ -194,3 +194,14 @@ def test_functions_of_laws_know_slopes():
     assert [(zero**n).slopes[0] for n in (0, 0.5, 1.0, 2.0, 5)] == [0, 0, 1, 0, 0]
     with pytest.raises(NoSlope, match=r"math\.gamma"):
         on_numbers(math.gamma)(Dual(0.4, (1,)))
+
+
+@pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
+def test_kernels_know_slopes_of_functions():
+    @kernel
+    def compiled(x, y):
+        made = of_two(*seeded((x, y)))
+        return tuple([tuple([0.0 + s for s in slopes_of(one, 2)]) for one in made])
+
+    expected = [number.slopes for number in on_numbers(of_two)(*seeded((0.7, 1.9)))]
+    assert np.allclose(compiled(0.7, 1.9), expected, rtol=1e-13, atol=1e-14)

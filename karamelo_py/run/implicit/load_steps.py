@@ -13,6 +13,7 @@ from karamelo_py.kernels.step import DONE, GAINED, SORT, STOPPED, take_rows
 from karamelo_py.kernels.totals import WORK, add_to, carry
 from karamelo_py.kernels.watch import look_at_end
 from karamelo_py.points.kinematics import free_from
+from karamelo_py.points.laws.rigid import Rigid
 from karamelo_py.run.implicit.conduction import conduct
 from karamelo_py.run.implicit.contact import Contact, contact_of
 from karamelo_py.run.implicit.equations import Equations, Moduli
@@ -80,6 +81,8 @@ class LoadSteps:
         end = float(control.values[TIME]) + whole
         if abs(end - control.clock[0].end_time) <= 1e-9 * whole:
             end = float(control.clock[0].end_time)
+        if not self.dynamic and step == 0:
+            self._check_at_rest()
         left, part, most, parts, iterations, residual = 1.0, 1.0, 1.0, 0, 0, 0.0
         while left > 1e-9:
             part = min(part, left)
@@ -110,6 +113,17 @@ class LoadSteps:
         for name, value in zip(PUBLISHED, (iterations, residual, parts), strict=True):
             self.simulation.hub.values.set(name, float(value))
         control.values[TIME], control.values[TIMESTEP] = end, step + (parts > 0)
+
+    def _check_at_rest(self) -> None:
+        """Refuse initial velocities of points: nothing is done with them without inertia."""
+        for block in self.simulation.setup.blocks:
+            moving = np.flatnonzero(block.points.v.any(0))
+            if len(moving) and not isinstance(block.laws, Rigid):
+                solid = self._solid_of(int(block.points.id[moving[0]]))
+                raise self._error(
+                    f"solid '{solid}' has initial velocities, which load steps know nothing of",
+                    "scheme(newmark), or none",
+                )
 
     def _interrupted(self) -> bool:
         """Tell whether the user wants the run to end, where a step can be left out."""
