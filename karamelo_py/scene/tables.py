@@ -14,7 +14,7 @@ from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.terms import number_of
 
 
-class PointColumns:
+class FileColumns:
     """For signatures: columns by name, of a file or of arrays that a program has given."""
 
     script_kind = "the name of a file of columns"
@@ -24,7 +24,7 @@ class PointColumns:
         self.columns = columns
 
     @classmethod
-    def from_script(cls, hub: Scene, argument: Argument) -> "PointColumns":
+    def from_script(cls, hub: Scene, argument: Argument) -> "FileColumns":
         """Read the file, or take what `Simulation` has been given."""
         given = hub.functions.get(argument.text)
         if isinstance(given, Mapping):

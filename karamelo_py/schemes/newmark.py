@@ -85,7 +85,7 @@ class Newmark(NamedTuple):
 
     @property
     def point_fields(self) -> tuple[type, ...]:
-        """What points carry from one step to the next."""
+        """Name the fields that points carry from one step to the next."""
         return (Surplus,) if self.rho < 1 else ()
 
     @classmethod

@@ -18,7 +18,7 @@ from karamelo_py.scene.material import Material
 from karamelo_py.scene.placement import Placement, fill, lattice_of
 from karamelo_py.scene.region import Region
 from karamelo_py.scene.solid import Solid, own_grids
-from karamelo_py.scene.tables import PointColumns
+from karamelo_py.scene.tables import FileColumns
 from karamelo_py.script.errors import ScriptError
 
 MANY = 10  # points a cell and direction that nobody needs
@@ -170,7 +170,7 @@ class PointsSolid(Solid):
     def __init__(
         self,
         hub: Hub,
-        table: PointColumns,
+        table: FileColumns,
         material: Material,
         h: Annotated[float, Positive],
         T0: float | None = None,

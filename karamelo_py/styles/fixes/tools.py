@@ -134,7 +134,7 @@ class NeumannBcMech(ToolFix):
         return self.face(points)[:, None] * vector(self.traction, self.hub, x, first)
 
 
-class Plane(ToolFix):
+class PlaneTool(ToolFix):
     """Base of walls: a plane that may move, with points on the side of its normal."""
 
     def lay(self, place: Sequence[Expression], normal: Sequence[Expression]) -> None:
@@ -155,7 +155,7 @@ class Plane(ToolFix):
         return int(np.sum(depth > self.hub.domain.tolerance)), float(depth.max(initial=0.0))
 
 
-def _begin_behind(plane: Plane, scene: Any) -> Any:
+def _begin_behind(plane: PlaneTool, scene: Any) -> Any:
     """Count the points that are behind a plane before the first step, for words."""
     if scene.simulation.step > 0:
         return False
@@ -166,7 +166,7 @@ def _begin_behind(plane: Plane, scene: Any) -> Any:
 
 
 known_failure(
-    Plane,
+    PlaneTool,
     "points behind the plane of fix '{part.id}'",
     when=_begin_behind,
     reason="{which} points of its group begin there, up to {depth:.3g} deep, and are thrown out",
@@ -175,7 +175,7 @@ known_failure(
 )
 
 
-class ImpenetrableSurface(Plane):
+class ImpenetrableSurface(PlaneTool):
     """Push points back that come behind a plane, with a force that grows with the depth.
 
     Parameters
@@ -226,7 +226,7 @@ class ImpenetrableSurface(Plane):
         return push[:, None] * normal
 
 
-class ContactMinimizePenetrationPlane(Plane):
+class ContactMinimizePenetrationPlane(PlaneTool):
     """Let a solid touch a fixed plane, as stiffly as the step allows, with friction.
 
     Parameters
