@@ -84,3 +84,10 @@ def test_a_footing_does_not_lock(run_script):
     load = run_script(INPUTS / "in.static_footing", *words).log["load"]
     assert max(load) == pytest.approx(2 + pi, rel=0.04)
     assert load[-1] < 1.01 * max(load[:-3])  # a plateau
+
+
+def test_laws_of_logarithms_run_interpreted(run_interpreted):
+    """What numbers with slopes implement is found there, too."""
+    text = block().replace("neo-hookean", "hencky").replace("run(3)", "run(1)")
+    log_of = run_interpreted(text.replace("0.25", "0.5").replace("1.25", "1.5")).log
+    assert log_of["residual"][-1] < 1e-10 and log_of["press_y"][-1] < 0

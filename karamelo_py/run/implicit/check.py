@@ -168,7 +168,7 @@ def check(hub: Hub) -> None:
         raise ScriptError(
             "solver=amg needs PyAMG",
             place=update.scheme_place,
-            hint="pip install pyamg, or solver=direct",
+            hint="pip install '.[implicit]' in the folder of karamelo-py, or solver=direct",
         )
     for reason, instead, place in _reasons(hub):
         raise ScriptError(f"{name} {reason}", place=place or update.scheme_place, expected=instead)

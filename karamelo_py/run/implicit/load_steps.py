@@ -13,7 +13,7 @@ from karamelo_py.kernels.step import DONE, GAINED, SORT, STOPPED, take_rows
 from karamelo_py.kernels.totals import WORK, add_to, carry
 from karamelo_py.kernels.watch import look_at_end
 from karamelo_py.points.kinematics import free_from
-from karamelo_py.points.laws.rigid import Rigid
+from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.run.implicit.conduction import conduct
 from karamelo_py.run.implicit.contact import Contact, contact_of
 from karamelo_py.run.implicit.equations import Equations, Moduli
@@ -118,7 +118,7 @@ class LoadSteps:
         """Refuse initial velocities of points: nothing is done with them without inertia."""
         for block in self.simulation.setup.blocks:
             moving = np.flatnonzero(block.points.v.any(0))
-            if len(moving) and not isinstance(block.laws, Rigid):
+            if len(moving) and not can(block.laws, constrained_velocity):
                 solid = self._solid_of(int(block.points.id[moving[0]]))
                 raise self._error(
                     f"solid '{solid}' has initial velocities, which load steps know nothing of",
