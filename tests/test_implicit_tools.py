@@ -197,3 +197,35 @@ def test_sliding_warms(run_script):
     heat = 10 * np.sum(last.mass * last.T)
     # Loads of a step are those of its end: half a step of the ten is not known better.
     assert heat == pytest.approx(work, rel=0.05) and heat > 5e-3
+
+
+SQUEEZED = """
+    basis = "quadratic-spline"
+    method(ulmpm/contacts, FLIP, basis, 1)
+    scheme(quasi-static)
+    dimension(2, -1, 2, 0, 2, 0.25)
+    region(body, block, 0, 1, 0, 1)
+    region(lid, block, -0.5, 1.5, 1, 1.5)
+    material(soft, neo-hookean, 1000, 1e6, 0.3)
+    material(steel, rigid, 7800)
+    solid(body, region, body, 2, soft, 0.25, 0)
+    solid(lid, region, lid, 2, steel, 0.25, 0)
+    fix(rub, contact/friction, body, lid, 0.2)
+    region(base, block, INF, INF, INF, 0)
+    group(base, nodes, region, base, solid, body)
+    fix(base, velocity_nodes, base, 0, 0)
+    group(lid, particles, region, lid, solid, lid)
+    fix(press, velocity_particles, lid, 0, -0.01)
+    set_output(1)
+    log_modify(custom, step, iterations, parts, base_y, ContactForce_lid_y)
+    run(4)
+"""
+
+
+@pytest.mark.parametrize("basis", ["quadratic-spline", "cubic-spline"])
+def test_splines_rub(run_script, basis):
+    """Nodes beside the body, which bear next to nothing, slide: Newton's method ends."""
+    log_of = run_script(SQUEEZED, "-var", "basis", basis).log
+    assert max(log_of["iterations"]) <= 8 and max(log_of["parts"]) == 1
+    assert np.allclose(log_of["base_y"], log_of["ContactForce_lid_y"], rtol=1e-8)
+    assert log_of["base_y"][-1] > 4e4 * 0.8  # E strain, less what the first contact takes

@@ -24,6 +24,7 @@ from karamelo_py.run.implicit.equations import Equations
 
 STIFF = 1e3  # springs, by what a cell of the softer body bears
 LIGHT = 0.01  # share of the mass of nodes within a body
+SLIPPERY = 0.05  # the same: below it nodes of splines beside a body bear too little to stick
 CLOSE = 1e-4  # cells between bodies of which Newton's method first supposes that they touch
 
 
@@ -65,7 +66,9 @@ class Contact:
         self.gap = np.maximum(gap[chosen], 0.0)
         self.first, self.second = (equations.number_of(one) for one in self.pairs.T)
         self.a, self.b = (equations.grid[one] for one in (self.first, self.second))
-        self.mu = tag.friction[self.a, self.b]
+        # Their drag would turn with each correction, and Newton's method would not end.
+        mu = tag.friction[self.a, self.b]
+        self.mu = np.where((shares[chosen] < SLIPPERY) & np.isfinite(mu), 0.0, mu)
         self.stiffness = self._stiffness(moduli)
         h = float(np.min(s.grids.spacing))
         self.gap[self.touched()] = 0  # whatever is measured, no gap has opened
