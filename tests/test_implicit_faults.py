@@ -230,3 +230,60 @@ def test_initial_velocities_of_points_are_told():
         steps._check_at_rest()
     points.v[:] = 0
     steps._check_at_rest()
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        (
+            HELD.replace("1e-4", "1e-4*sqrt(1.5-time)"),
+            "fix pull gets NaN from 0.0001*sqrt(1.5 - time)",
+        ),
+        (HELD + "\n    fix(w, body_force, all, 1/(2-time), 0)", "fix w gets inf"),
+    ],
+)
+def test_a_formula_that_gives_no_number_is_named(run_interpreted, lines, said):
+    """As explicit steps do, with the line of the fix."""
+    result = run_interpreted(patch(lines), status=1)
+    assert said in result.err and "step 2, time 2" in result.err
+
+
+def test_a_failed_load_step_is_told_what_may_change(run_interpreted):
+    result = run_interpreted(
+        patch().replace("quasi-static", "quasi-static, iterations=1, tolerance=1e-20"), status=1
+    )
+    assert "or another tolerance, iterations or solver" in result.err
+    assert "dt_factor" not in result.err
+
+
+def test_a_share_of_a_step_that_has_no_limit(run_interpreted):
+    """Warned of at its line, where set_dt does not say so already."""
+    result = run_interpreted(patch().replace("run(4)", "dt_factor(0.5)\n    run(1)"))
+    assert result.err.count("warning:") == 1 and "dt_factor has no effect: load steps" in result.err
+
+
+def test_explicit_steps_have_no_iterations(run_interpreted):
+    """Columns of load steps are 0 in steps of another scheme."""
+    then = "run(1)\n    scheme(musl)\n    set_dt(1e-5)\n    run(1)"
+    log_of = run_interpreted(patch().replace("run(4)", then)).log
+    for name in ("iterations", "parts", "residual"):
+        assert log_of[name][1] > 0 and log_of[name][-1] == 0
+
+
+def test_a_scheme_that_no_run_has(run_interpreted):
+    once = patch().replace("run(4)", "run(1)")
+    twice = once.replace("scheme(quasi-static)", "scheme(musl)\n    scheme(quasi-static)")
+    assert "takes the place of that of line 7" in run_interpreted(twice).err
+    then = once.replace("run(1)", "run(1)\n    scheme(quasi-static)\n    run(1)")
+    assert "takes the place" not in run_interpreted(then).err
+
+
+def test_columns_of_load_steps_in_explicit_ones(run_interpreted):
+    result = run_interpreted(patch().replace("    scheme(quasi-static)\n", ""), status=1)
+    assert "a value of scheme quasi-static" in result.err
+
+
+@pytest.mark.parametrize("scheme", ["quasi-static", "newmark"])
+def test_a_tolerance_that_is_none(run_interpreted, scheme):
+    text = patch().replace("quasi-static", f"{scheme}, tolerance=0.1")
+    assert "above 0 and at most 0.01, not 0.1" in run_interpreted(text, status=1).err

@@ -113,9 +113,18 @@ def scheme(hub: Hub, style: StyleOf("scheme"), *arguments: Argument) -> None:
         for name in PUBLISHED:  # who asks for these is not at fault
             hub.values.publish(name)
         raise
-    hub.update.scheme, hub.update.scheme_place = chosen, hub.place
-    for name in getattr(chosen, "published", ()):
-        hub.values.publish(name)
+    update, runs = hub.update, len(hub.runs)
+    if update.scheme_place is not None and update.scheme_behind == runs:
+        hub.warn(
+            f"this scheme takes the place of that of line {update.scheme_place.line}, which no run "
+            "has had",
+            hint="one line scheme(...) before a run",
+        )
+    update.scheme, update.scheme_place, update.scheme_behind = chosen, hub.place, runs
+    for name in PUBLISHED:
+        # Those of steps before say nothing of an explicit scheme.
+        if name in hub.values or name in getattr(chosen, "published", ()):
+            hub.values.publish(name)
 
 
 # A run may go on with another solver.

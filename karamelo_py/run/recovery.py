@@ -22,10 +22,10 @@ RETURNS = 2  # at most, to one state from where energy grows: what two halves do
 
 
 LAST_GOOD = "last_good.*.h5"
-GOES_ON = (
-    "karamelo-py SCRIPT {} goes on from there, with a smaller step (set_dt, dt_factor): "
-    "as it is, it would end here again"
-)
+GOES_ON = "karamelo-py SCRIPT {} goes on from there, with {}: as it is, it would end here again"
+SMALLER_STEP = "a smaller step (set_dt, dt_factor)"
+# Of implicit schemes; more of them is what a run may change.
+OTHER_LOAD_STEPS = "smaller steps (set_dt), or another tolerance, iterations or solver"
 FAR = 100  # steps, more of which are not taken once more for the last rows of log and dumps
 
 
@@ -231,7 +231,8 @@ class RollBack:
             return ""
         name = os.path.relpath(path)
         which = "The state from before energy grew" if grown else "The last good state"
-        return f". {which} is in {name}; {GOES_ON.format(self._options(name))}"
+        change = OTHER_LOAD_STEPS if simulation.implicit else SMALLER_STEP
+        return f". {which} is in {name}; {GOES_ON.format(self._options(name), change)}"
 
     def _write_before_growth(self, end: int) -> Path | None:
         """Return to the last state before step `end` whose energy has not grown, and write it."""

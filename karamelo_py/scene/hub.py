@@ -107,6 +107,7 @@ class Update:
         self.transfer: Any = None  # a NamedTuple: PIC, FLIP, APIC ...
         self.scheme: Any = MUSL()
         self.scheme_place: Place | None = None  # in the script, as of the others below
+        self.scheme_behind = 0  # how many runs it was chosen
         self.thermal = False  # heat flows between points
         self.anti_locking = False  # changes of volume are averaged against volumetric locking
         self.fixed_dt: float | None = None  # of set_dt; None: the step follows the fastest point

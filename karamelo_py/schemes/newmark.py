@@ -4,7 +4,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 from karamelo_py.compiler.fields import Field, vector
 from karamelo_py.language.signature import In, NonNegative, Positive
-from karamelo_py.schemes.quasi_static import BEGIN, CLOSE, HOLD, PUBLISHED
+from karamelo_py.schemes.quasi_static import BEGIN, CLOSE, HOLD, PUBLISHED, Tolerance
 from karamelo_py.script.errors import ScriptError
 
 
@@ -96,7 +96,7 @@ class Newmark(NamedTuple):
         *,
         rule: Literal["newmark", "euler"] = "newmark",
         rho: Annotated[float, In(0, 1)] | None = None,
-        tolerance: Annotated[float, Positive] = 1e-10,
+        tolerance: Annotated[float, Tolerance] = 1e-10,
         iterations: Annotated[int, Positive] = 20,
         solver: Literal["auto", "direct", "amg"] = "auto",
         stabilisation: Annotated[float, NonNegative] = 0.0,

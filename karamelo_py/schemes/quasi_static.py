@@ -21,7 +21,7 @@ from karamelo_py.kernels.table import (
     AtPoints,
     Gather,
 )
-from karamelo_py.language.signature import NonNegative, Positive
+from karamelo_py.language.signature import Constraint, NonNegative, Positive
 
 # What acts on the nodes in a step, by present stress; who holds them; and how points follow.
 BEGIN = (
@@ -37,6 +37,10 @@ CLOSE = (WORK_OF_LOADS, *MOVE, Gather(StrainOfLoadStep()), AtPoints(FINAL_INTEGR
 PUBLISHED = "iterations", "residual", "parts"
 
 
+# Above that a first correction is taken as it is, and a step is no equilibrium.
+Tolerance = Constraint("above 0 and at most 0.01", lambda value: 0 < value <= 0.01)
+
+
 class QuasiStatic(NamedTuple):
     """Load steps without inertia: each ends in equilibrium, found by Newton's method.
 
@@ -47,7 +51,7 @@ class QuasiStatic(NamedTuple):
     Parameters
     ----------
     tolerance
-        What is left of the largest nodal forces when a step ends, as a share of them.
+        What is left of the nodal forces when a step ends, as a share of them; at most 0.01.
     iterations
         How often a step is corrected before it is done in halves.
     solver
@@ -97,7 +101,7 @@ class QuasiStatic(NamedTuple):
     def given(
         cls,
         *,
-        tolerance: Annotated[float, Positive] = 1e-10,
+        tolerance: Annotated[float, Tolerance] = 1e-10,
         iterations: Annotated[int, Positive] = 20,
         solver: Literal["auto", "direct", "amg"] = "auto",
         stabilisation: Annotated[float, NonNegative] = 1 / 30,

@@ -204,6 +204,19 @@ def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> Non
     _tell(hub, (*scene.advice("failure"), *_impossible_speeds(scene), *_other_units(scene)))
 
 
+def warn_about_factor(hub: Hub) -> None:
+    """Tell, once, that implicit steps have no stable step to take a share of."""
+    update = hub.update
+    # Beside set_dt dt_factor has said so itself.
+    idle = update.dt_factor is not None and update.fixed_dt is None
+    if idle and update.first_time("dt_factor"):
+        hub.warn(
+            "dt_factor has no effect: load steps are those of set_dt, or 1",
+            place=update.dt_place,
+            hint="set_dt(...) in its place",
+        )
+
+
 def warn_about_laws(hub: Hub, simulation: Simulation, duration: float) -> None:
     """Tell what will go wrong with the laws of a run in implicit steps; each failure once."""
     _tell(hub, SceneFacts(hub, simulation, duration).advice("failure", of_laws=True))

@@ -14,6 +14,7 @@ from karamelo_py.kernels.totals import WORK, add_to, carry
 from karamelo_py.kernels.watch import look_at_end
 from karamelo_py.points.kinematics import free_from
 from karamelo_py.points.laws import can, constrained_velocity
+from karamelo_py.run.diagnosis.explain import no_number
 from karamelo_py.run.implicit.conduction import conduct
 from karamelo_py.run.implicit.contact import Contact, contact_of
 from karamelo_py.run.implicit.equations import Equations, Moduli
@@ -22,7 +23,7 @@ from karamelo_py.run.implicit.newton import Broken, Failed, Loose, Newton, TooFa
 from karamelo_py.run.implicit.prescribed import prescribed
 from karamelo_py.run.implicit.solvers import Singular
 from karamelo_py.schemes.quasi_static import PUBLISHED
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.errors import Place, ScriptError
 
 HALVINGS = 10  # of a load step, at most
 
@@ -217,6 +218,7 @@ class LoadSteps:
             equations = Equations(s, self.simulation.mode, self.known)
         nodes = equations.nodes
         external = after[nodes] + equations.present_forces()
+        self._check_numbers(external, "a node gets a force that is not a number")
         fixed, velocities = self._prescribed(equations, hooks)
         led = equations.led[:, None]
         given = fixed | led
@@ -263,6 +265,8 @@ class LoadSteps:
             equations.d,
             lambda: take_rows(hold, s, simulation.mode, hooks),
         )
+        now = s.nodes.update[equations.nodes, : equations.d]
+        self._check_numbers(now, "a node gets a velocity that is not a number")
         if np.any(changed):
             raise self._error(
                 "a fix changes velocities of nodes without prescribing them, which implicit steps "
@@ -270,6 +274,13 @@ class LoadSteps:
                 "fix velocity_nodes, or scheme(musl)",
             )
         return given, velocities
+
+    def _check_numbers(self, numbers: Any, message: str) -> None:
+        """Refuse what a fix gets from a formula that gives NaN or infinity."""
+        if not np.all(np.isfinite(numbers)):
+            hint = "look for a formula that gives NaN, such as a division by zero"
+            message, hint, place = no_number(self.simulation.hub, self.simulation, message, hint)
+            raise self._error(message, hint, place)
 
     def _publish(self, found: "Equilibrium", hooks: Any, dt: float) -> None:
         """Let those that hold nodes publish the forces that they do it with; velocities at nodes.
@@ -303,10 +314,12 @@ class LoadSteps:
             led = found.equations.led
             put_forces(s.contact, s, nodes[led], forces[led])
 
-    def _error(self, message: str, hint: str) -> ScriptError:
+    def _error(self, message: str, hint: str, place: Place | None = None) -> ScriptError:
         hub, values = self.simulation.hub, self.simulation.setup.control.values
         step, time = int(values[TIMESTEP]) + 1, float(values[TIME])
-        return ScriptError(f"step {step}, time {time:.6g}: {message}", place=hub.place, hint=hint)
+        return ScriptError(
+            f"step {step}, time {time:.6g}: {message}", place=place or hub.place, hint=hint
+        )
 
     def _check_held(self, equations: Equations, given: np.ndarray, contact: Contact | None) -> None:
         """Refuse bodies that can move as a whole: without inertia nothing says where they are.
