@@ -30,7 +30,10 @@ def test_scenes_have_the_published_size(name):
     assert sum(solid.count for solid in hub.solids.values()) == PUBLISHED[name]
 
 
-SMALL = {"disks": ("N", "6"), "block": ("N", "2"), "dam": ("N", "6"), "bar": ("coarser", "8")}
+SMALL = {
+    "column": ("N", "8"), "beam": ("N", "1", "-var", "ppc", "2"), "footing": ("N", "2"),
+    "disks": ("N", "6"), "block": ("N", "2"), "dam": ("N", "6"), "bar": ("coarser", "8"),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", WORKLOADS)

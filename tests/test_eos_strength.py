@@ -360,7 +360,8 @@ def test_values_of_a_replaced_compute_are_forgotten():
         ("material(m, eos-strength, 3, mild)", "'3' is not the ID of an eos"),
         (
             "material(m, eos-strength, bulk)",
-            "material(ID, eos-strength, eos, strength[, damage][, temperature])",
+            "material(ID, eos-strength, eos, strength[, damage][, temperature][, strain="
+            "logarithmic])",
         ),
     ],
 )

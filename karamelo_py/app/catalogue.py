@@ -200,6 +200,11 @@ def _explain_argument(word: str, found: dict[str, Parameter]) -> int:
 class _Page(Console):
     """Lines on standard output: bold and coloured on a terminal, plain elsewhere."""
 
+    def _write(self, text: str) -> None:
+        super()._write(text)
+        if self._broken:
+            raise BrokenPipeError  # there is nothing else to finish
+
     def heading(self, text: str) -> None:
         """Write a part of a page."""
         self.say()

@@ -11,7 +11,6 @@ from karamelo_py.output.node_columns import places_of
 from karamelo_py.output.point_table import PointTable
 from karamelo_py.points.basis import carried, extent
 from karamelo_py.run.diagnosis import energy
-from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.timestep import own_step_instead, step_by_script
 from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
@@ -31,7 +30,7 @@ class Trouble(NamedTuple):
     place: Place | None = None
 
 
-def trouble(hub: Hub, simulation: Simulation, status: int) -> Trouble:
+def trouble(hub: Hub, simulation: Any, status: int) -> Trouble:
     """Find what went wrong in a step, and what can be done."""
     if status == ABOVE_LIMIT:
         return Trouble(*_above_limit(hub, simulation), hub.update.dt_place)
@@ -54,11 +53,11 @@ def trouble(hub: Hub, simulation: Simulation, status: int) -> Trouble:
     return Trouble(message, hint, place)
 
 
-def _when(simulation: Simulation) -> str:
+def _when(simulation: Any) -> str:
     return f"step {simulation.step}, time {simulation.time:.6g}"
 
 
-def _above_limit(hub: Hub, simulation: Simulation) -> tuple[str, str]:
+def _above_limit(hub: Hub, simulation: Any) -> tuple[str, str]:
     speed, fastest = simulation.points.largest(_speeds)
     message = (
         f"{_when(simulation)}: the step {simulation.dt:g} is above the stable limit, which has "
@@ -71,7 +70,7 @@ def _speeds(points: PointTable) -> np.ndarray:
     return np.abs(points.velocity).max(axis=1, initial=0.0)
 
 
-def _gained(hub: Hub, simulation: Simulation) -> tuple[str, str]:
+def _gained(hub: Hub, simulation: Any) -> tuple[str, str]:
     clock, when = simulation.control.clock[0], _when(simulation)
     if not np.isfinite(clock.balance):
         _, first = simulation.points.largest(
@@ -91,7 +90,7 @@ def _gained(hub: Hub, simulation: Simulation) -> tuple[str, str]:
     return message, cure
 
 
-def _heated(hub: Hub, simulation: Simulation) -> tuple[str, str]:
+def _heated(hub: Hub, simulation: Any) -> tuple[str, str]:
     clock = simulation.control.clock[0]
     share = clock.last_dt / clock.heat_limit
     message = f"{_when(simulation)}: "
@@ -105,7 +104,7 @@ def _heated(hub: Hub, simulation: Simulation) -> tuple[str, str]:
     return message, own_step_instead(hub) if share > 1 else _smaller_step(hub, simulation)
 
 
-def _shrunk(hub: Hub, simulation: Simulation) -> tuple[str, str]:
+def _shrunk(hub: Hub, simulation: Any) -> tuple[str, str]:
     (speed, fastest), (volume, widest) = map(simulation.points.largest, (_speeds, energy.swelling))
     message = (
         f"{_when(simulation)}: the stable step has fallen to {simulation.limit:.3g}, less than a "
@@ -116,7 +115,7 @@ def _shrunk(hub: Hub, simulation: Simulation) -> tuple[str, str]:
     return message, f"something went wrong before: look at the dumps; {smaller}"
 
 
-def _first_wrong(simulation: Simulation) -> tuple | None:
+def _first_wrong(simulation: Any) -> tuple | None:
     """The first point that went wrong: number, positions before and after, velocity, grid."""
     wrong = []
     for block in simulation.setup.blocks:
@@ -131,7 +130,7 @@ def _first_wrong(simulation: Simulation) -> tuple | None:
     return number, old, new, points.v[:, p], int(points.grid[p])
 
 
-def _wrong_point(hub: Hub, simulation: Simulation) -> tuple:
+def _wrong_point(hub: Hub, simulation: Any) -> tuple:
     """Find what is wrong with the first point that went wrong, and what can be done."""
     wrong = [one for one in simulation.points.seen(_first_wrong) if one is not None]
     if not wrong and hub.update.thermal:
@@ -184,11 +183,11 @@ def _wrong_point(hub: Hub, simulation: Simulation) -> tuple:
     )
 
 
-def _loose(simulation: Simulation, number: int, x: np.ndarray, reach: float) -> bool:
+def _loose(simulation: Any, number: int, x: np.ndarray, reach: float) -> bool:
     """Tell whether a point has a solid of others, none of which is near."""
     solid = solid_with(simulation.hub, number)
 
-    def others(simulation: Simulation) -> tuple[int, int]:
+    def others(simulation: Any) -> tuple[int, int]:
         found, near = 0, 0
         for some in simulation.points.some(None):
             own = (some.solid == solid.index) & (some.ids != number)
@@ -200,7 +199,7 @@ def _loose(simulation: Simulation, number: int, x: np.ndarray, reach: float) -> 
     return found > 0 and near == 0
 
 
-def _is_tangled(simulation: Simulation, place: np.ndarray, grid: int) -> bool:
+def _is_tangled(simulation: Any, place: np.ndarray, grid: int) -> bool:
     """Tell whether the domain of a point, whose corners move, is folded over."""
     s = simulation.setup
     if not s.frame.moves or carried(s.basis, s.kin) == 0:
@@ -213,7 +212,7 @@ def _step_was_told(hub: Hub) -> bool:
     return step_by_script(update.fixed_dt, update.dt_factor) in update.warned_of
 
 
-def _smaller_step(hub: Hub, simulation: Simulation) -> str:
+def _smaller_step(hub: Hub, simulation: Any) -> str:
     """Say how to take a smaller step, and that the present one is too large where it is."""
     if not simulation.control.clock[0].watch_limit:
         return "the step is too large" + ", as the warning says" * _step_was_told(hub)
@@ -228,7 +227,7 @@ def _smaller_step(hub: Hub, simulation: Simulation) -> str:
     return "use a smaller step (set_dt)" if fixed else "use a smaller dt_factor"
 
 
-def _first_bad(simulation: Simulation) -> tuple | None:
+def _first_bad(simulation: Any) -> tuple | None:
     """The first such fix by numbers, at hand: (fix, formula, place), value, position."""
     hub, values = simulation.hub, simulation.hub.values
     for which, fix in enumerate(hub.fixes.values()):
@@ -263,7 +262,7 @@ def _formulas(value: Any) -> Iterator[Expression]:
             yield from _formulas(one)
 
 
-def _places(simulation: Simulation, group: Any, formula: Expression) -> Iterator[tuple]:
+def _places(simulation: Any, group: Any, formula: Expression) -> Iterator[tuple]:
     """Numbers of places at hand at which a fix evaluates a formula; now (n, d), and at first."""
     if not formula.names.intersection(POINT_SEEDS):
         yield np.zeros(1, np.int64), np.empty((1, 0)), None
@@ -278,7 +277,7 @@ def _places(simulation: Simulation, group: Any, formula: Expression) -> Iterator
             yield some.ids[there], some.position[there], some.reference_position[there]
 
 
-def no_number(hub: Hub, simulation: Simulation, message: str, hint: str) -> Trouble:
+def no_number(hub: Hub, simulation: Any, message: str, hint: str) -> Trouble:
     """The trouble with what is NaN, and the first fix whose formula gives NaN or infinity."""
     found = [one for one in simulation.points.seen(_first_bad) if one is not None]
     if not found:
