@@ -244,7 +244,8 @@ def test_what_check_says_of_the_memory_of_the_process(tmp_path, monkeypatch, cap
     text = (INPUTS / "in.two_disks").read_text(encoding="utf-8").replace("run_time(3.5)", "run(20)")
     path = tmp_path / "in.disks"
     path.write_text(re.sub(r"(?m)^(dump|plot|save_plot)\(.*$", "", text), encoding="utf-8")
-    assert main(["in.disks", "--threads", "1"]) == 0  # and all is compiled
+    for N in ("20", "100"):  # and all is compiled, for few points and for many
+        assert main(["in.disks", "--threads", "1", "-var", "N", N]) == 0
     for N in (20, 700):
         said = peak_of(path, compiled=True, threads=1, find=r"(\d+) MiB with the program", N=N)
         assert said == pytest.approx(peak_of(path, "run", compiled=True, threads=1, N=N), rel=0.15)
