@@ -35,7 +35,7 @@ from karamelo_py.kernels.table import touch, touch_velocity
 from karamelo_py.kernels.totals import add_to, counts, publish
 from karamelo_py.points.basis.surface import ENTRIES
 from karamelo_py.points.grid import node_position
-from karamelo_py.points.kinematics import dot, vector, zero_vector
+from karamelo_py.points.kinematics import Axisymmetric, dot, vector, zero_vector
 
 REPEATS = 16  # at most, where more than two fields meet; what remains falls by a half or more
 
@@ -160,6 +160,8 @@ def _normal(contact, kin, nodes, n):
             gradient = vector_at(kin, gradients, beside, 0, like)
             kept = [_kept(contact, beside, k) * of_axis for k, of_axis in enumerate(gradient)]
             total = total + weight * vector(kin, kept)
+    if isinstance(kin, Axisymmetric):  # on the axis bodies push along it
+        total = vector(kin, [_kept(contact, n, 0) * total[0], *total[1:]])
     return total
 
 

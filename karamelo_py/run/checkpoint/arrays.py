@@ -69,8 +69,9 @@ def touched(simulation: Any) -> dict[str, np.ndarray]:
     rows = np.concatenate(memory)
     # What touched before the last step is of no use.
     rows = np.where(np.abs(rows) == simulation.step, rows, 0)
-    there = np.flatnonzero(rows.any(axis=1))
-    return {"touched/nodes": numbers(spans)[there], "touched/rows": rows[there]}
+    nodes = numbers(spans)
+    there = np.flatnonzero(rows.any(axis=1) & np.isin(nodes, simulation.nodes.counted()))
+    return {"touched/nodes": nodes[there], "touched/rows": rows[there]}
 
 
 def stored(simulation: Any, kept: dict[str, np.ndarray] | None = None) -> Iterator[Stored]:

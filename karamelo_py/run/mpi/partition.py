@@ -209,6 +209,7 @@ class SharedTiles(Tiles):
     def _boxes(self, s: Setup) -> Boxes:
         """List the own boxes, and behind them those of others that may have nodes of them."""
         own, me = self.own_boxes(s), self.comm.rank
+        self._looks_beyond = getattr(type(s.contact), "looks_beyond", 0) > 0
         of_all = {me: own, **dict(enumerate(self.comm.allgather(own)))}
         if len(own.grid):
             low, high = own.lo.min(axis=0), own.hi.max(axis=0)
@@ -269,6 +270,7 @@ class SharedTiles(Tiles):
             for rank in unique(of)
             for here in [of == rank]
         }
+        self._inner = self._inner_boxes(boxes)
         own, others = np.flatnonzero(of == me), np.flatnonzero(of != me)
         self._passed, self._from = {}, of[:0]
         if not len(own):
@@ -292,6 +294,17 @@ class SharedTiles(Tiles):
             *(np.append(a[:count], b, axis=0) for a, b in zip(boxes, more, strict=True))
         ), found
 
+    def _inner_boxes(self, boxes: Boxes) -> dict[int, tuple]:
+        """Cut boxes down to nodes whose neighbours are in them, too, by process."""
+        low = np.where(boxes.lo > 0, boxes.lo + 1, 0)
+        end = self._nodes[boxes.grid] - 1
+        high = np.where(boxes.hi < end, boxes.hi - 1, end)
+        return {
+            int(rank): (boxes.grid[here], low[here], high[here])
+            for rank in unique(self._of)
+            for here in [self._of == rank]
+        }
+
     def _number(self, s: Setup, boxes: Boxes) -> tuple[np.ndarray, ...]:
         first, steps = super()._number(s, boxes)
         self.given = {
@@ -312,13 +325,30 @@ class SharedTiles(Tiles):
     ) -> None:
         # Of those that have a node in use the first counts it.
         self.foreign[self._marked] = 0
-        found = [self._marked[:0]]
-        for rank, needs in self._needs.items():
-            if rank < self.comm.rank:
-                which, low, high = needs.among(self._place(tiles), begin, end)
-                found.append(between(*rows_of(self._parts(grid[which], low, high, 0, 0))))
+        found, me = [self._marked[:0]], self.comm.rank
+        if self._looks_beyond:
+            found.append(self._unknown(between(*rows_of(self._parts(grid, begin, end, 0, 0)))))
+        else:
+            for rank, needs in self._needs.items():
+                if rank < me:
+                    which, low, high = needs.among(self._place(tiles), begin, end)
+                    found.append(between(*rows_of(self._parts(grid[which], low, high, 0, 0))))
         self._marked = np.concatenate(found)
         self.foreign[self._marked] = 1
+
+    def _unknown(self, nodes: np.ndarray) -> np.ndarray:
+        """List those of `nodes` that others count: of those that know what is beside, the first."""
+        count = int(self._nodes[0].prod()) if self.one_place else int(nodes.max(initial=0)) + 1
+        place = nodes % count
+        mine = np.zeros(len(nodes), bool)
+        for rank, boxes in sorted(self._inner.items()):
+            inner = between(*rows_of(self._parts(*boxes, 0, 0)))
+            known = np.isin(place, inner % count if self.one_place else inner)
+            if rank == self.comm.rank:
+                mine |= known
+                break
+            place = np.where(known, -1, place)
+        return nodes[~mine]
 
     def give(self, s: Setup, number: int, what: int) -> None:
         """Begin to pass on what the own tiles give to nodes of others, and theirs to own ones."""
