@@ -196,9 +196,18 @@ IMPLICIT = (
     "set_dt(0.5)", "set_output(1)", "log_modify(custom, step, iterations, residual, hold_y)",
     "run(6)",
 )  # fmt: skip
+SWAYS = (
+    "fix(v, initial_velocity_particles, all, 3*sin(9*x0), 1)", "set_output(1)",
+    "log_modify(custom, step, dt, time)", "run(6)",
+)  # fmt: skip
 SERIAL = {  # scenes that one process takes
     "load steps": block(2, "scheme(quasi-static)", *IMPLICIT),
     "large steps": block(2, "scheme(newmark)", *IMPLICIT),
+    "logarithmic strains": block(2, *SWAYS).replace("rubber, linear,", "rubber, hencky,"),
+    "clay": block(2, *SWAYS).replace(
+        "rubber, linear, 2, 100, 0.3", "rubber, cam-clay, 2, 40, 1, 0.1, 0.02, 1"
+    ),
+    "points that go": block(2, "fix(e, erosion, all, x > 0.55, every=2)", *SWAYS),
 }
 SCENES = {
     "loads": block(2, *LOADS),

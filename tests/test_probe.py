@@ -44,7 +44,7 @@ def test_probe_measures_what_the_dump_holds(run_interpreted):
 
 def test_probe_of_what_is_not_there(run_interpreted):
     script = SCRIPT.replace("point=7", "point=7000")
-    assert np.isnan(run_interpreted(script).log.p_vx).all()
+    assert "there is no point 7000" in run_interpreted(script, status=1).err
 
 
 @pytest.mark.parametrize(
