@@ -270,7 +270,7 @@ class SharedTiles(Tiles):
             for rank in unique(of)
             for here in [of == rank]
         }
-        self._inner = self._inner_boxes(boxes)
+        self._inner = self._inner_boxes(boxes) if self._looks_beyond else {}
         own, others = np.flatnonzero(of == me), np.flatnonzero(of != me)
         self._passed, self._from = {}, of[:0]
         if not len(own):
@@ -338,17 +338,14 @@ class SharedTiles(Tiles):
 
     def _unknown(self, nodes: np.ndarray) -> np.ndarray:
         """List those of `nodes` that others count: of those that know what is beside, the first."""
-        count = int(self._nodes[0].prod()) if self.one_place else int(nodes.max(initial=0)) + 1
+        count = int(self._nodes[0].prod()) if self.one_place else len(self.foreign)
         place = nodes % count
-        mine = np.zeros(len(nodes), bool)
         for rank, boxes in sorted(self._inner.items()):
-            inner = between(*rows_of(self._parts(*boxes, 0, 0)))
-            known = np.isin(place, inner % count if self.one_place else inner)
+            known = np.isin(place, between(*rows_of(self._parts(*boxes, 0, 0))) % count)
             if rank == self.comm.rank:
-                mine |= known
-                break
+                return nodes[~known]
             place = np.where(known, -1, place)
-        return nodes[~mine]
+        return nodes
 
     def give(self, s: Setup, number: int, what: int) -> None:
         """Begin to pass on what the own tiles give to nodes of others, and theirs to own ones."""
