@@ -1,5 +1,7 @@
 """The work of friction becomes heat."""
 
+import re
+
 import pytest
 
 from karamelo_py.points.laws.linear import LinearElastic
@@ -51,9 +53,13 @@ def test_heat_is_the_work_of_friction(run_script, method, ground, factor, rel):
     and more too large at 0.8 of the stable step. What differs from the first there is what the
     bouncing block gains. It is dropped on the ground with its weight: the second holds on average.
     """
-    log = run_script(BLOCK.format(method=method, ground=ground, factor=factor)).log
+    result = run_script(BLOCK.format(method=method, ground=ground, factor=factor))
+    log = result.log
     heat = 500 * (log.T - 300)
     assert heat[-1] == pytest.approx(log.E[0] - log.E[-1], rel=rel)
+    if factor < 0.5:  # enough steps for a look
+        (lost,) = re.findall(r"  energy +(\S+) % of", result.out)
+        assert abs(float(lost)) < 1  # what friction dissipates is in the balance
     assert heat[-1] == pytest.approx(MU * G * (log.x_x[-1] - log.x_x[0]), rel=0.08)
 
 

@@ -123,8 +123,8 @@ def test_a_block_between_plates(run_script, scheme):
     """
     text = PLATES.replace("SCHEME", scheme)
     result = run_script(text.replace("RHO", "1"), folder="light")
-    leads = r"energy +is not watched: nobody adds up the work of\s+rigid solid 'a'"
-    assert re.search(leads, result.out)
+    (share,) = re.findall(r"  energy +(\S+) % of the largest", result.out)
+    assert -3 < float(share) < 1  # FLIP 0.9 takes some of what vibrates
     light = result.log
     heavy = run_script(text.replace("RHO", "1024"), folder="heavy").log
     assert light.Es.tolist() == heavy.Es.tolist()

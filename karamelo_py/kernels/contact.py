@@ -28,11 +28,19 @@ from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.loops import kernel, noinline
 from karamelo_py.compiler.tuples import record
-from karamelo_py.kernels.arrays import DT, MASS, TIMESTEP, of_change, of_momentum, vector_at
+from karamelo_py.kernels.arrays import (
+    DT,
+    MASS,
+    TIMESTEP,
+    of_change,
+    of_force,
+    of_momentum,
+    vector_at,
+)
 from karamelo_py.kernels.loss import FrictionalHeat, warm_node
 from karamelo_py.kernels.p2g import Centre, Normal
 from karamelo_py.kernels.table import touch, touch_velocity
-from karamelo_py.kernels.totals import add_to, counts, publish
+from karamelo_py.kernels.totals import WORK, add_to, carry, counts, publish
 from karamelo_py.points.basis.surface import ENTRIES
 from karamelo_py.points.grid import node_position
 from karamelo_py.points.kinematics import Axisymmetric, dot, vector, zero_vector
@@ -363,25 +371,32 @@ def _touch_pair(contact, kin, nodes, control, i, j, place, share, where):
         rub, sticks = _friction_of(pair, contact.friction[a, b], push, slide, share)
     step = int(control.values[TIMESTEP]) + 1
     contact.touched[n, b] = -step if sticks else step
+    heat = 0.0
     if rub > 0:
         # The energy that friction dissipates: impulse times the mean of the sliding speeds at the
         # beginning and the end of the step. What forces within the bodies do in between they undo.
-        heat = 0.0
         before = _before(kin, nodes, n, pair.per_n) - _before(kin, nodes, m, pair.per_m)
         for speed, first, yielding in zip(slide, before, pair.yielding, strict=True):
             heat += rub * speed * 0.5 * (first + speed * (1.0 - rub * yielding))
         warmth = contact.warmth[a, b]
         warm_node(field(nodes.fields, FrictionalHeat), n, warmth * heat * pair.per_n)
         warm_node(field(nodes.fields, FrictionalHeat), m, (1.0 - warmth) * heat * pair.per_m)
+    work = -heat  # that is left of what rigid bodies do
     for k in range(kin.dimension):
         impulse = push * pair.outward[k] / size
         if rub > 0:
             impulse += rub * slide[k]
         _take(contact, control, a, i, n, k, -impulse, pair.per_n, where.x)
         _take(contact, control, b, j, m, k, impulse, pair.per_m, where.x)
+        if contact.rigid[a] and not _immovable(contact, m, k):
+            work += impulse * nodes.update[n, k]
+        if contact.rigid[b] and not _immovable(contact, n, k):
+            work -= impulse * nodes.update[m, k]
         for slot, sign in ((contact.pair[a, b], -1.0), (contact.pair[b, a], 1.0)):
             if slot >= 0 and counts(control.ranks, n):
                 add_to(control.totals, slot + k, sign * impulse / control.clock[0].kick)
+    if counts(control.ranks, n):
+        add_to(control.totals, WORK, float(work))
 
 
 @noinline
@@ -414,12 +429,16 @@ def touch_node(contact, kin, grids, nodes, control, n):
 
 
 @noinline
-def _keep_rigid(contact, kin, nodes, n):
-    """Rigid bodies have their velocity, whatever acts on the nodes."""
+def _keep_rigid(contact, kin, nodes, control, n):
+    """Rigid bodies have their velocity, whatever acts on the nodes; it does no work."""
     if contact.rigid[n // contact.stride] and nodes.sums[n, MASS] > 0:
         for k in range(kin.dimension):
-            nodes.update[n, k] = nodes.sums[n, of_momentum(kin) + k] / nodes.sums[n, MASS]
+            v = nodes.sums[n, of_momentum(kin) + k] / nodes.sums[n, MASS]
+            nodes.update[n, k] = v
             nodes.update[n, of_change(kin) + k] = 0
+            if counts(control.ranks, n):
+                load = control.clock[0].kick * nodes.sums[n, of_force(kin) + k]
+                add_to(control.totals, WORK, float(-load * v))
 
 
 @kernel
@@ -428,12 +447,13 @@ def _touch_nodes(contact, kin, grids, nodes, spans, control):
     values, totals, forces = control.values, control.totals, contact.forces
     for s in range(1, 1 + spans[0, 0]):
         for n in range(spans[s, 0], spans[s, 1]):
-            _keep_rigid(contact, kin, nodes, n)
+            _keep_rigid(contact, kin, nodes, control, n)
     for c in range(1, 1 + forces[0]):
         totals[forces[c] : forces[c] + 3] = 0
     for s in range(1, 1 + spans[0, 0]):
         for n in range(spans[s, 0], spans[s, 1]):
             touch_node(contact, kin, grids, nodes, control, n)
+    carry(totals[WORK])
     for c in range(1, 1 + forces[0]):
         publish(control, forces[c], 3)
     for c in range(contact.reactions[0]):

@@ -26,6 +26,7 @@ from karamelo_py.points.basis import placed
 from karamelo_py.points.bodies import face
 from karamelo_py.points.grid import node_position
 from karamelo_py.points.kinematics import planar
+from karamelo_py.points.laws import moves_as_told
 
 # Bare numbers would be types of their own.
 NONE, VALUE, BEFORE = np.int64(0), np.int64(arrays.VALUE), np.int64(arrays.BEFORE)
@@ -57,7 +58,8 @@ class HookedNodes(NamedTuple):
 class MovingPoints(NamedTuple):
     """Points whose velocity point functions change, and the places y that follow from x.
 
-    Behind the d coordinates of a point, `y` has those of `corners` corners of its domain.
+    Behind the d coordinates of a point, `y` has those of `corners` corners of its domain. What
+    moves rigid points does no work on others; they do, where they touch them.
     """
 
     ids: np.ndarray
@@ -66,6 +68,7 @@ class MovingPoints(NamedTuple):
     x: np.ndarray  # (w, n)
     y: np.ndarray
     corners: int
+    rigid: bool
 
 
 class HeatedPoints(NamedTuple):
@@ -549,7 +552,7 @@ def _act_on_motion(what, task, hooks, control, dt, h, count, share):
             speed = float(v[c, p])
             first = hooks.scratch[BEFORE, q] if leads else speed
             work = 0.5 * float(what.mass[p]) * (velocity - speed) * (velocity + first)
-            totals.add_to(control.totals, totals.WORK, work)
+            totals.add_to(control.totals, totals.WORK, 0.0 if what.rigid else work)
             v[c, p] = velocity
             # As far as a point moves, its corners do.
             for corner in range(what.corners):
@@ -636,6 +639,9 @@ def _at_points_hooks(hooks, stage, then, s):
     y = 1 - now if then else now
     corners = corners_that_move(s)
     blocks = tuple(
-        [MovingPoints(p.id, p.v, p.mass, p.x[now], p.x[y], corners) for p, _, _ in s.blocks]
+        [
+            MovingPoints(p.id, p.v, p.mass, p.x[now], p.x[y], corners, moves_as_told(laws))
+            for p, laws, _ in s.blocks
+        ]
     )
     point_hooks(stage, blocks, hooks, s.control, step_size(s))

@@ -180,8 +180,7 @@ def _moment(w, p, like):
 @shared
 def _is_apart(w):
     """Return True for rigid points whose nodes have sums of their own for them."""
-    rigid = laws.constrained_velocity.defined(type(w.laws))
-    return rigid and field(w.nodes.fields, RigidSums) is not None
+    return laws.moves_as_told(w.laws) and field(w.nodes.fields, RigidSums) is not None
 
 
 @shared

@@ -17,7 +17,7 @@ from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
 from karamelo_py.kernels.clock import kick
 from karamelo_py.kernels.p2g import RigidSums
 from karamelo_py.kernels.table import touch, touch_velocity
-from karamelo_py.kernels.totals import add_to, publish
+from karamelo_py.kernels.totals import WORK, add_to, carry, counts, publish
 from karamelo_py.kernels.visit import place_at
 from karamelo_py.points.basis import entry, locate, support
 from karamelo_py.points.grid import node_position
@@ -35,8 +35,10 @@ class RigidBodies(NamedTuple):
 
 
 @kernel
-def _impose(kin, nodes, rigid, spans, dt, kept):
+def _impose(kin, nodes, rigid, spans, dt, kept, control):
     """Nodes that see rigid points take their velocity; the force of that comes to stand in `rigid`.
+
+    Its work on the others is that of one that prescribes velocities.
 
     As with a body of infinite mass, v* - v is nothing: points that keep their velocity take none
     from there. `kept` is the share that they keep.
@@ -58,6 +60,9 @@ def _impose(kin, nodes, rigid, spans, dt, kept):
                 rigid[n, of_force(kin) + k] = -mass * impulse / dt
                 nodes.update[n, k] = velocity
                 nodes.update[n, of_change(kin) + k] = 0
+                if counts(control.ranks, n):
+                    add_to(control.totals, WORK, float(mass * impulse * velocity))
+    carry(control.totals[WORK])
 
 
 @kernel
@@ -94,7 +99,7 @@ def _sum_forces(basis, kin, grids, places, points, rigid, forces, torques, total
 @touch.on(RigidBodies)
 def _touch_rigid_bodies(contact, s):
     rigid = field(s.nodes.fields, RigidSums)
-    _impose(s.kin, s.nodes, rigid, s.spans, kick(s), s.control.clock[0].kept)
+    _impose(s.kin, s.nodes, rigid, s.spans, kick(s), s.control.clock[0].kept, s.control)
     _publish_forces(contact, s)
 
 

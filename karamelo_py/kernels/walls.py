@@ -11,7 +11,7 @@ from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.loops import noinline
 from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
 from karamelo_py.kernels.loss import FrictionalHeat, warm_node
-from karamelo_py.kernels.totals import add_to, counts
+from karamelo_py.kernels.totals import WORK, add_to, counts
 
 FRICTION = 3  # the program of the coefficient, behind those of the components
 
@@ -60,6 +60,8 @@ def rub(kin, nodes, programs, held, n, mu, dt, kept, control, slot):
             if counts(control.ranks, n):
                 add_to(control.totals, slot + c, -mass * taken / dt)
     # With the mean of the speeds at the beginning and the end of the step; a wall takes no heat.
+    if counts(control.ranks, n):
+        add_to(control.totals, WORK, float(-mass * work))
     warm_node(field(nodes.fields, FrictionalHeat), n, work)
 
 

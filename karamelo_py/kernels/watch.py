@@ -28,6 +28,7 @@ from karamelo_py.points.laws import (
     dissipated_energy,
     energy_density,
     heat_capacity,
+    moves_as_told,
     specific_volume,
     temperature,
 )
@@ -104,11 +105,15 @@ def _take_work(work, control):
 
 @shared
 def sum_energies(s, mode):
-    """Energies of all points, kinetic and stored plus dissipated, and the work into the clock."""
+    """Energies of points, kinetic and stored plus dissipated, and the work into the clock.
+
+    Rigid bodies have none: they move as they are told, and do work on others.
+    """
     s.control.totals[: totals.WORK] = 0
     for block in s.blocks:
         points = known_to_laws(block.points)
-        _sum_energies(mode, s.kin, points, block.laws, block.tiling, s.control)
+        if not moves_as_told(block.laws):
+            _sum_energies(mode, s.kin, points, block.laws, block.tiling, s.control)
         work = field(block.points.fields, WorkOfForces)
         if work is not None:
             _take_work(work, s.control)
@@ -158,7 +163,8 @@ def _sum_drift(s):
     control.totals[own:] = 0
     for block in s.blocks:
         points = block.points
-        _add_momenta(d, points.id, points.mass, points.v, block.tiling, control)
+        if not moves_as_told(block.laws):
+            _add_momenta(d, points.id, points.mass, points.v, block.tiling, control)
     totals.collect(control.ranks, control, own, control.totals.shape[0] - own)
     energy = 0.0
     for k in range(control.firsts.size - 1):

@@ -28,7 +28,7 @@ from collections import namedtuple
 from collections.abc import Callable
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import point_function, real
+from karamelo_py.compiler.compile import point_function, real, shared
 
 
 class Absent(NamedTuple):
@@ -151,6 +151,12 @@ def energy_density(law, kin, state):
 def constrained_velocity(law, own, given):
     """Velocity of a point after a step: what the grid gives, or of rigid bodies their own."""
     return given
+
+
+@shared
+def moves_as_told(law: tuple) -> bool:
+    """Return True for laws of rigid bodies."""
+    return constrained_velocity.defined(type(law))
 
 
 @number

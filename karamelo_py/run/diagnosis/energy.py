@@ -30,12 +30,14 @@ def unknown_work(hub: Hub) -> str:
     Compiled hooks on nodes and points have their work added up by the loops. Fixes in Python say
     by `Fix.conserves` that they bring none.
     """
+    method, implicit = hub.update.method, getattr(hub.update.scheme, "implicit", False)
+    apart = method.own_grids or (implicit and method.fields_per_solid)
     for fix in hub.fixes.values():
         acts = any(not isinstance(hook, CompiledHook) for hook in fix.hooks().values())
         if acts and not fix.first_step_only and not fix.conserves:
             return f"fix {fix.style} '{fix.id}'"
     for solid in hub.solids.values():
-        if can(solid.material.law, constrained_velocity):
+        if can(solid.material.law, constrained_velocity) and apart:
             return f"rigid solid '{solid.id}'"
         if hub.update.thermal and can(solid.material.law, initial_heat):
             return "heat"
@@ -164,13 +166,7 @@ def taken_by(hub: Hub) -> list[str]:
     if alpha is None or alpha < 1:
         share = "" if alpha is None else f" {alpha:g}"
         found.append(f"transfer {registry.name_of('transfer', type(transfer))}{share}")
-    if warms_by_friction(hub) or any(_rubs(fix) for fix in hub.fixes.values()):
-        found.append("friction")
     return found
-
-
-def _rubs(fix: Any) -> bool:
-    return fix.friction is not None or fix.wall_friction is not None
 
 
 def _lost(simulation: Any) -> float:
@@ -260,7 +256,8 @@ def change_of_energy(hub: Hub, simulation: Any) -> dict[str, str]:
     # Since the first balance, not `first_few`, which `forget_growth` changes.
     share, takers = -100 * _lost(simulation), taken_by(hub)
     words = "of the largest since the start (kinetic + stored + dissipated - work)"
-    by = f"; {' and '.join(takers)} takes some" if takers and share < -1 else ""
+    take = "takes" if len(takers) == 1 else "take"
+    by = f"; {' and '.join(takers)} {take} some" if takers and share < -1 else ""
     return {"energy": f"{share:+.2f} % {words}{by}"}
 
 
