@@ -6,7 +6,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from karamelo_py.compiler.compile import point_function
 from karamelo_py.compiler.fields import scalar
+from karamelo_py.kernels.p2g import Force, WorkOfForces
 from karamelo_py.kernels.table import ACCELERATE, SUMS
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.basis.product import along, register
@@ -25,9 +27,14 @@ from karamelo_py.points.laws.strengths import remembers, shear_response
 from karamelo_py.points.laws.strengths.hardening import flow_stress, radial_return, updated_memory
 from karamelo_py.points.transfers import updated_velocity
 from karamelo_py.scene.group import ParticleGroup
-from karamelo_py.scene.modify import Compute, Fix, heat_hook, node_hook, point_hook
+from karamelo_py.scene.modify import Compute, Fix, heat_hook, node_hook, point_hook, vector_hook
 from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.dumps.base import Dump
+
+
+@point_function()
+def heat_content(law, kin, state):
+    """Known of no law."""
 
 
 # --- hooks
@@ -88,6 +95,52 @@ class Many(Group):
 
 class Few(Group):
     initial_integrate = point_hook(lambda mass, v, x_old, x, value, before, dt, kick: (v, x))
+
+
+def whole(v, values, dt):
+    return v, v
+
+
+def laid(v, values, dt):
+    return 1.0
+
+
+def counted(v, values, dt):
+    return v * len(f"{dt:.3e}")
+
+
+class Wholly(Group):
+    initial_integrate = vector_hook(whole, reads=("velocity",), writes=("velocity",))
+
+
+class Heavily(Group):
+    initial_integrate = vector_hook(laid, reads=("weight",), writes=("velocity",))
+
+
+class Fixing(Group):
+    initial_integrate = vector_hook(laid, reads=("velocity",), writes=("mass",))
+
+
+class Homeless(Group):
+    initial_integrate = vector_hook(laid, reads=(Force,), writes=(Force,))
+
+
+class Late(Group):
+    point_fields = (Force, WorkOfForces)
+    final_integrate = vector_hook(laid, reads=(Force,), writes=(Force,))
+
+
+class Slim(Group):
+    final_integrate = vector_hook(laid, reads=("mass", "velocity"), writes=("velocity",))
+
+
+class Lawless(Group):
+    initial_integrate = vector_hook(laid, reads=(heat_content,), writes=("velocity",))
+
+
+class Dark(Group):
+    published = ()
+    initial_integrate = vector_hook(counted, reads=("velocity",), writes=("velocity",))
 
 
 class Undirected(Fix):

@@ -26,7 +26,7 @@ pytestmark = pytest.mark.xdist_group("faults")
 FAMILIES = {
     "fix": "spring light misplaced swapped cold hot many few undirected viewless idle misspelt "
     "silent stop ids weigh bare formless oneword clashing nodal first again doubled lost leaving "
-    "silenced orphan",
+    "silenced orphan wholly heavily fixing homeless late slim lawless dark",
     "compute": "gauge mute",
     "material": "motionless growing raising short uncompiled hiding double",
     "strength": "forgetful endless uncountable",
@@ -87,6 +87,14 @@ def test_init(hub):
         ("hot", "initial_integrate is a moment of points, and its hook was made for heated"),
         ("many", "post_particles_to_grid: too_few has to take the 8 arguments of a hook on nodes"),
         ("few", "initial_integrate: <lambda> has to return 3 numbers, not (1.0, 1.0)"),
+        (
+            "heavily",
+            "initial_integrate reads 'weight': 'mass', 'velocity', 'position', 'volume', a",
+        ),
+        ("fixing", "initial_integrate writes 'mass': 'velocity' or a class of a field"),
+        ("homeless", "initial_integrate: points have no Force because of this fix: its author nam"),
+        ("late", "final_integrate: forces on points are those of initial_integrate"),
+        ("slim", "final_integrate: laid has to take the 4 arguments of a hook on whole points: v"),
         ("undirected", "it has no formulas, so post_particles_to_grid would act in no direction"),
         ("viewless", "initial_integrate has to take one argument, the view of the group"),
         ("bare", "point_fields has to be a tuple of classes, as in (Other,)"),
@@ -216,6 +224,14 @@ def scene(**lines):
     ("lines", "line", "part", "message"),
     [
         ({"fix": "fix(s, spring, all)"}, 7, "fix spring", "initial_integrate: NameError: name 'mi"),
+        (
+            {"fix": "fix(s, wholly, all)"}, 7, "fix wholly",
+            "initial_integrate: whole has to return 1 number for velocity, not 2",
+        ),
+        (
+            {"fix": "fix(s, lawless, all)"}, 7, "fix lawless",
+            "initial_integrate: heat_content is not defined for (Linear",
+        ),
         ({"fix": "fix(s, weigh, all)"}, 7, "fix weigh", "initial_integrate: ValueError: assign"),
         ({"fix": "fix(s, leaving, all)"}, 7, "fix leaving", "initial_integrate: SystemExit: bye"),
         ({"fix": "fix(s, silenced, all)"}, 7, "fix silenced", "initial_integrate: SystemExit: 0"),
@@ -302,6 +318,7 @@ def test_what_a_hook_changes_in_place_is_written(run_interpreted):
     ("lines", "part"),
     [
         ({"fix": "fix(s, light, all)"}, "in.wrong:7:1: error: fix light"),
+        ({"fix": "fix(s, dark, all)"}, "in.wrong:7:1: error: fix dark"),
         ({"material": "material(m, uncompiled, 1)"}, "in.wrong:4:1: error: material uncompiled"),
     ],
 )

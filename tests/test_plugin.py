@@ -103,7 +103,7 @@ def test_pip_installs_it_and_styles_and_help_tell_of_it(tmp_path):
     lines = [line for line in done.stdout.splitlines() if "mpm-examples 0.1.0" in line]
     listed = {line.split()[0]: line for line in lines}
     page = (PLUGIN / "README.md").read_text("utf-8")
-    assert len(listed) == 18
+    assert len(listed) == 21
     assert all(name in page for name in listed)
     assert "Slow points down" in listed["drag"]
     done = karamelo_py(tmp_path / "site", tmp_path, "help", "drag")
@@ -241,6 +241,98 @@ def test_no_total_of_points_that_come_in_pieces(tmp_path, whole):
     done = karamelo_py(tmp_path / "site", tmp_path, "in.drag")
     assert done.returncode == (not whole), done.stderr
     assert ("points.total(terms) is known in steps alone" in done.stderr) == (not whole)
+
+
+# --- compiled hooks of whole points ---------------------------------------------------------------
+
+# A body that is as soft as air flies through it.
+AIR = """
+method(ulmpm, FLIP, linear, 1)
+dimension(2, -10, 30, -10, 30, 1)
+region(b, block, 0, 2, 0, 2)
+material(m, linear, 1, 100, 0.3)
+solid(s, region, b, 2, m, 1)
+fix(v, initial_velocity_particles, all, 3, 4)
+fix(wind, air_drag, all, 0.1)
+compute(p, linear_momentum, all)
+log_modify(custom, step, time, p_x, p_y, wind_x, wind_y)
+set_dt(0.002)
+set_output(100)
+run({steps})
+"""
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_force_by_the_whole_velocity(site, tmp_path, run_interpreted, threads):
+    """dv/dt = -c |v| v: v = v0/(1 + c |v0| t), of first order in dt; compiled as interpreted."""
+    done = run_interpreted(AIR.format(steps=200))
+    _, time, *p, fx, fy = read_log(done.folder)
+    assert "energy" in done.out + done.err  # the work of the force is added up
+    slower = 1 / (1 + 0.1 * 5 * time)
+    np.testing.assert_allclose(p, 4 * np.outer([3, 4], slower), rtol=1e-3)
+    np.testing.assert_allclose(np.hypot(fx, fy)[1:], (4 * 0.1 * 25 * slower**2)[1:], rtol=3e-3)
+    (tmp_path / "in.air").write_text(AIR.format(steps=200))
+    done = karamelo_py(site, tmp_path, "in.air", "--threads", str(threads), compiled=True)
+    assert done.returncode == 0, done.stderr
+    np.testing.assert_array_equal(read_log(tmp_path)[1:4], [time, *p])
+
+
+# Dust that feels no stress is blown up by its charge.
+DUST = """
+method(ulmpm, FLIP, linear, 1)
+dimension(2, -10, 10, -10, 10, 1)
+region(b, block, 1, 2, 1, 2)
+material(m, linear, 1, 1e-6, 0)
+solid(s, region, b, 2, m, 1)
+fix(dust, charged, all, {k}, {leak})
+compute(c, probe, all, charge)
+compute(x, center_of_mass, all)
+log_modify(custom, step, time, c, x_x, x_y)
+set_dt(0.002)
+set_output(50)
+run(200)
+"""
+
+
+def test_a_force_by_a_field_of_the_points_own(run_interpreted):
+    """x'' = k q x: x0 cosh(sqrt(k) t) at constant charge; a charge that leaks falls as exp(-t)."""
+    _, time, charge, x, y = read_log(run_interpreted(DUST.format(k=1, leak=0)).folder)
+    assert (charge == 1).all()
+    np.testing.assert_allclose(x, 1.5 * np.cosh(time), rtol=1e-3)
+    np.testing.assert_array_equal(x, y)
+    _, time, charge, x, _ = read_log(run_interpreted(DUST.format(k=0, leak=1)).folder)
+    np.testing.assert_allclose(charge, np.exp(-time), rtol=1e-3)
+    assert (x == 1.5).all()
+
+
+# Shear far beyond the yield stress; heat stays where it is made.
+SHEARED = """
+method(ulmpm, FLIP, linear, 1, thermo-mechanical)
+dimension(2, -1, 1, -1, 1, 0.5)
+region(b, block, -0.5, 0.5, -0.5, 0.5)
+eos(bulk, linear, 1, 160)
+strength(y, plastic, 80, 0.4)
+temperature(warm, plastic_work, {by_law}, 0.005, 0, 0, 300, 1300)
+material(m, eos-strength, bulk, y, warm)
+solid(s, region, b, 2, m, 0.5, 300)
+fix(v, initial_velocity_particles, all, 0.3*y, 0.3*x)
+fix(lead, velocity_particles, all, 0.3*y, 0.3*x)
+fix(heat, plastic_heat, all, {by_fix})
+compute(T, average_temperature, all)
+log_modify(custom, step, time, T, heat_s)
+set_dt(0.005)
+set_output(1)
+run(20)
+"""
+
+
+def test_heat_by_stress_and_plastic_strain(run_interpreted):
+    """The heat of plastic work that the law makes itself, a step later, for the fix comes first."""
+    own = read_log(run_interpreted(SHEARED.format(by_law=0.9, by_fix=0)).folder)[2]
+    _, _, T, heat = read_log(run_interpreted(SHEARED.format(by_law=0, by_fix=0.9)).folder)
+    assert T[-1] > 301
+    np.testing.assert_allclose(T[1:], own[:-1], atol=2e-4)
+    np.testing.assert_allclose(np.diff(T)[1:], 0.005 * heat[2:] / 0.005, rtol=1e-6, atol=1e-6)
 
 
 def test_the_page_tells_what_each_costs():

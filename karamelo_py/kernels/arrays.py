@@ -201,6 +201,7 @@ HOOK = np.dtype(
         ("uses_share", np.int64),  # one over the number of members with mass
         ("holds", np.int64),  # sets the velocity, or bounds it
         ("uses_place", np.int64),  # whether its formulas differ from place to place
+        ("totals", np.int64),  # that a hook on whole points publishes
     ]
 )
 PROGRAM = np.dtype(
@@ -219,7 +220,7 @@ class Apart(NamedTuple):
     """Arrays of each of A threads for hooks on nodes."""
 
     chosen: np.ndarray  # (A, BLOCK): see Hooks
-    scratch: np.ndarray  # (A, 8 + depth, BLOCK)
+    scratch: np.ndarray  # (A, 9 + depth, BLOCK)
     values: np.ndarray  # (A, ...): see Control
     totals: np.ndarray  # (A, rows, LIMBS), zero between two loops
     clock: np.ndarray  # (A, 1) CLOCK, of which what hooks read and write is used
@@ -236,14 +237,16 @@ class Hooks(NamedTuple):
     constants: np.ndarray  # (m,) float64
     x0: np.ndarray  # (n, d) reference positions of the points, by id
     chosen: np.ndarray  # (BLOCK,) int64 scratch
-    scratch: np.ndarray  # (8 + depth, BLOCK): x y z x0 y0 z0, value, value before, stack
+    scratch: np.ndarray  # (9 + depth, BLOCK): x y z x0 y0 z0, value, value before, stack, value 3
     held: np.ndarray  # (N, d) HELD, where hooks hold nodes in common; else (0, d)
     loads: np.ndarray  # (N, d) of this step, where hooks bring forces; else (0, d)
     mode: Tag  # one thread, or several
     apart: Apart
+    whole: tuple  # tags of the hooks on whole points, made by `vector_hook`
 
 
 VALUE, BEFORE = 6, 7  # rows of Hooks.scratch
+WHOLE = -1  # in the place of an address: one of Hooks.whole
 
 # Stages of a step at which fixes act, in Karamelo's names.
 INITIAL_INTEGRATE = 0

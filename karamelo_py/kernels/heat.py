@@ -288,6 +288,11 @@ def _heated(kin, points, x):
     return hook_loop.HeatedPoints(points.id, kin, *own, x)
 
 
+@shared
+def _heat_of(points):
+    return tuple([field(points.fields, kind) for kind in (Supply, Capacity)])
+
+
 @point_function(otherwise=True)
 def at_heated_points(hooks, s):
     """Let the fixes supply heat to points, or set their temperature."""
@@ -297,7 +302,15 @@ def at_heated_points(hooks, s):
 def _at_heated_points_hooks(hooks, s):
     clock = s.control.clock[0]
     clock.rise = clock.fall = 0.0
-    blocks = tuple([_heated(s.kin, p, p.x[clock.now]) for p, _, _ in s.blocks])
+    blocks = tuple(
+        [
+            (
+                _heated(s.kin, p, p.x[clock.now]),
+                hook_loop.whole_points(hooks, s.kin, p, laws, p.x[clock.now], _heat_of(p)),
+            )
+            for p, laws, _ in s.blocks
+        ]
+    )
     hook_loop.point_hooks(arrays.SUPPLY_HEAT, blocks, hooks, s.control, step_size(s))
     agree_on_heat(s.control.ranks, s.control)
     clock.hottest += step_size(s) * clock.rise

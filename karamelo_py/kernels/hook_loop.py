@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.compiler.compile import point_function, shared
-from karamelo_py.compiler.fields import load_vector
-from karamelo_py.compiler.formula import BLOCK, call_evaluate
+from karamelo_py.compiler.fields import field, load_vector
+from karamelo_py.compiler.formula import BLOCK, ROWS, STACK, call_evaluate
 from karamelo_py.compiler.held import hold
 from karamelo_py.compiler.loops import caller_of, kernel, noinline
 from karamelo_py.compiler.threads import Threaded, shared_out
@@ -21,15 +21,18 @@ from karamelo_py.kernels import hooks as kinds
 from karamelo_py.kernels.arrays import first_from
 from karamelo_py.kernels.clock import kick, step_size
 from karamelo_py.kernels.loss import FrictionalHeat
+from karamelo_py.kernels.p2g import Force
+from karamelo_py.kernels.visit import state_at
 from karamelo_py.kernels.walls import FRICTION, rub, stick
 from karamelo_py.points.basis import placed
 from karamelo_py.points.bodies import face
 from karamelo_py.points.grid import node_position
-from karamelo_py.points.kinematics import planar
+from karamelo_py.points.kinematics import dot, planar
 from karamelo_py.points.laws import moves_as_told
 
 # Bare numbers would be types of their own.
-NONE, VALUE, BEFORE = np.int64(0), np.int64(arrays.VALUE), np.int64(arrays.BEFORE)
+NONE, THIRD = np.int64(0), np.int64(STACK + ROWS)
+VALUE, BEFORE = np.int64(arrays.VALUE), np.int64(arrays.BEFORE)
 END = np.iinfo(np.int64).max  # behind the last of the members
 TURN = 4 * BLOCK  # points that a thread takes at a time
 COUNT, ACT, RUB = 0, 1, 2  # what is done with the members of a hook
@@ -69,6 +72,18 @@ class MovingPoints(NamedTuple):
     y: np.ndarray
     corners: int
     rigid: bool
+
+
+class WholePoints(NamedTuple):
+    """Points of one law that functions of whole points change."""
+
+    tag: NamedTuple  # the function, and what it reads and writes: see `kinds.vector_hook`
+    ids: np.ndarray
+    kin: NamedTuple
+    points: NamedTuple
+    laws: NamedTuple
+    x: np.ndarray  # (w, n)
+    heat: tuple  # supply and capacity, (1, n) each, where heat is supplied
 
 
 class HeatedPoints(NamedTuple):
@@ -218,6 +233,8 @@ def _evaluate_now_and_before(hooks, h, c, count, control):
 def _published(hooks, h):
     """Return the first of the totals of a hook, and how many it publishes."""
     slot = hooks.table[h].slot
+    if hooks.table[h].address == arrays.WHOLE:
+        return slot, hooks.table[h].totals
     rubs = hooks.programs[h, FRICTION].begin >= 0
     first, last = 3, -1
     for c in range(3):
@@ -444,6 +461,18 @@ def _work_at_nodes(what, hooks, control, dt, count):
         totals.add_many(control.totals, totals.WORK, terms, count)
 
 
+class _NoWhole(NamedTuple):
+    """What takes the place of the functions of whole points in loops that know none."""
+
+    whole: tuple
+
+
+@shared
+def without_whole(hooks):
+    """Leave functions of whole points out: loops are not compiled anew for each of these."""
+    return arrays.with_items_of(hooks, _NoWhole(()))
+
+
 @shared
 def node_hooks(stage, target, kin, grids, nodes, ranges, hooks, control, dt, kept):
     """Call the node functions of `stage` on the members that have mass.
@@ -454,7 +483,7 @@ def node_hooks(stage, target, kin, grids, nodes, ranges, hooks, control, dt, kep
     # Of declared fields walls know one; others would have all this compiled anew.
     fields = tuple([one for one in nodes.fields if type(one) is FrictionalHeat])
     nodes = arrays.Nodes(nodes.sums, nodes.update, nodes.velocity, fields)
-    kin, dt = planar(kin), float(dt)
+    kin, dt, hooks = planar(kin), float(dt), without_whole(hooks)
     _node_hooks(stage, target, kin, grids, nodes, ranges, hooks, control, dt, kept)
 
 
@@ -595,11 +624,45 @@ def _act_on_warmth(what, task, hooks, control, dt, h, count, share):
     return 0
 
 
+@act.on(WholePoints)
+def _act_on_whole_points(what, task, hooks, control, dt, h, count, share):
+    tag, points, kin = what.tag, what.points, what.kin
+    rows = (VALUE, BEFORE, THIRD)
+    for c in range(len(tag.values)):
+        evaluate(hooks, h, c, count, control, rows[c], 0.0)
+    for q in range(count):
+        p = hooks.chosen[q]
+        law, state = state_at(kin, points, what.laws, p)
+        values = tuple([hooks.scratch[rows[c], q] for c in range(len(tag.values))])
+        old = load_vector(kin, points.v, p)
+        found = kinds.results(tag, what, law, state, p, values, dt)
+        numbers = kinds.written(tag, what, p, found)
+        new = load_vector(kin, points.v, p)
+        work = 0.5 * float(points.mass[p]) * dot(new - old, new + old)
+        totals.add_to(control.totals, totals.WORK, 0.0 if moves_as_told(what.laws) else float(work))
+        if hooks.table[h].slot >= 0:
+            for c in range(len(numbers)):
+                totals.add_to(control.totals, hooks.table[h].slot + c, float(numbers[c]))
+        if len(what.heat):
+            supply, capacity = what.heat
+            if capacity[0, p] > 0:
+                rate = float(supply[0, p]) / float(capacity[0, p])
+                clock = control.clock[0]
+                clock.rise, clock.fall = max(clock.rise, rate), min(clock.fall, rate)
+    return 0
+
+
 @kernel
-def _point_hooks(stage, what, hooks, control, dt):
+def _point_hooks(stage, what, whole, hooks, control, dt):
     dt = float(dt)
     for h in range(len(hooks.table)):
-        if hooks.table[h].stage == stage:
+        if hooks.table[h].stage != stage:
+            continue
+        if hooks.table[h].address == arrays.WHOLE:
+            for one in whole:
+                if one.tag.row == h:
+                    _act_on_all(one, ACT, hooks, control, dt, h, 1.0)
+        else:
             _act_on_all(what, ACT, hooks, control, dt, h, 1.0)
 
 
@@ -615,11 +678,30 @@ def _begin_or_end_totals(stage, hooks, control, begin):
 
 @shared
 def point_hooks(stage, blocks, hooks, control, dt):
-    """Call the point functions of `stage` on the members in each of `blocks`; sum over them."""
+    """Call the point functions of `stage` on the members in each of `blocks`; sum over them.
+
+    A block is a pair: what functions of one component act on, and those of whole points.
+    """
+    hooks = without_whole(hooks)
     _begin_or_end_totals(stage, hooks, control, True)
-    for what in blocks:
-        _point_hooks(stage, what, hooks, control, dt)
+    for what, whole in blocks:
+        _point_hooks(stage, what, whole, hooks, control, dt)
     _begin_or_end_totals(stage, hooks, control, False)
+
+
+@shared
+def whole_points(hooks, kin, points, laws, x, heat):
+    """What each of the functions of whole points acts on."""
+    return tuple([WholePoints(tag, points.id, kin, points, laws, x, heat) for tag in hooks.whole])
+
+
+@shared
+def _clear(kin, force, count):
+    """Let points bear no force of fixes, until these say so anew."""
+    if force is not None:
+        for c in range(kin.dimension):
+            for p in range(count):
+                force[c, p] = 0
 
 
 @shared
@@ -638,9 +720,15 @@ def _at_points_hooks(hooks, stage, then, s):
     now = s.control.clock[0].now
     y = 1 - now if then else now
     corners = corners_that_move(s)
+    if stage == arrays.INITIAL_INTEGRATE and len(hooks.whole):
+        for block in s.blocks:
+            _clear(s.kin, field(block.points.fields, Force), block.points.mass.size)
     blocks = tuple(
         [
-            MovingPoints(p.id, p.v, p.mass, p.x[now], p.x[y], corners, moves_as_told(laws))
+            (
+                MovingPoints(p.id, p.v, p.mass, p.x[now], p.x[y], corners, moves_as_told(laws)),
+                whole_points(hooks, s.kin, p, laws, p.x[y], ()),
+            )
             for p, laws, _ in s.blocks
         ]
     )

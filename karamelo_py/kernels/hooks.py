@@ -1,4 +1,4 @@
-"""Compiled hooks of fixes: a scalar function of one component at one node or point.
+"""Compiled hooks of fixes: functions of one component at one node or point, or of whole points.
 
 A fix that is "a formula acting on a group" (all built-in ones are) gives a tiny function; the loops
 here choose the members, evaluate the formula over them block by block and apply the function. The
@@ -20,14 +20,23 @@ Heat function ``(capacity, T, face, supply, value, other, dt) -> (share, supply,
     takes of the change of the nodes' temperature. The total is of what it supplies. Of a hook that
     holds, `other` is the temperature that points are brought to.
 The node functions of heat see capacity, temperature before and after the step, and heat flow.
+
+Functions of whole points (:func:`vector_hook`) see vectors, fields and the state of the law. They
+are compiled into the loop, with it.
 """
 
+import sys
+from collections import namedtuple
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from numba import types
 
+from karamelo_py.compiler.compile import point_function
+from karamelo_py.compiler.fields import field, load_vector, store, vector
+from karamelo_py.compiler.tuples import flat
 from karamelo_py.kernels import arrays
+from karamelo_py.points.laws import jacobian, specific_volume
 
 _F8 = types.float64
 NODE_FUNCTION = types.UniTuple(_F8, 4)(*[_F8] * 8)
@@ -60,11 +69,14 @@ class CompiledHook(NamedTuple):
     """A scalar function that the compiled loop applies to each component of each member."""
 
     function: Callable
-    where: str  # nodes (of heat, too), points, or heated points
+    where: str  # nodes (of heat, too), points, heated points, or whole points
     publishes: bool  # its totals become ID_x, ID_y, ID_z
     uses_before: bool  # needs the formulas one step earlier as well
     uses_share: bool  # needs one over the number of members with mass
     holds: bool  # sets v_star, or bounds it: one of several decides; leads a temperature
+    tag: type | None = None  # of whole points: the class that stands for the function
+    reads: tuple = ()
+    writes: tuple = ()
 
     @property
     def on_nodes(self) -> bool:
@@ -77,7 +89,8 @@ class CompiledHook(NamedTuple):
         return FUNCTIONS[self.where]
 
 
-# What a compiled hook acts on at each moment.
+WHOLE_POINTS = "whole points"
+# What a compiled hook acts on at each moment; those on whole points act where any on points does.
 ACTS_ON = {
     **dict.fromkeys([*NODE_STAGES, "post_heat_to_grid", "post_update_grid_heat"], "nodes"),
     **dict.fromkeys(POINT_STAGES, "points"),
@@ -107,3 +120,97 @@ def point_hook(
 def heat_hook(function: Callable, *, publishes: bool = True, holds: bool = False) -> CompiledHook:
     """Make a compiled hook for ``supply_heat``, of a function as described there."""
     return CompiledHook(function, "heated points", publishes, False, False, holds)
+
+
+@point_function()
+def results(tag, what, law, state, p, values, dt):
+    """Return what a function of whole points gives for point `p` (`vector_hook`): a tuple."""
+
+
+@point_function()
+def written(tag, what, p, found):
+    """Write the results of a function of whole points; return the numbers that it publishes."""
+
+
+def _mass(what, law, state, p):
+    return what.points.mass[p]
+
+
+def _velocity(what, law, state, p):
+    return load_vector(what.kin, what.points.v, p)
+
+
+def _position(what, law, state, p):
+    return load_vector(what.kin, what.x, p)
+
+
+def _volume(what, law, state, p):
+    return what.points.mass[p] * specific_volume(law) * jacobian(law, what.kin, state)
+
+
+WORDS = {"mass": _mass, "velocity": _velocity, "position": _position, "volume": _volume}
+
+
+def _reader(item: Any) -> Callable:
+    """Return what reads an item of a point."""
+    if isinstance(item, type):
+        shape = item.shape
+        as_vector = shape is vector
+
+        def of_field(what, law, state, p):
+            array = field(what.points.fields, item)
+            numbers = tuple([array[k, p] for k in range(shape(what.kin))])
+            if as_vector:
+                return what.kin.Vector._make(numbers)
+            return numbers[0] if len(numbers) == 1 else numbers
+
+        return of_field
+    return WORDS.get(item) or (lambda what, law, state, p: item(law, what.kin, state))
+
+
+def _writer(item: Any) -> Callable:
+    """Return what writes an item of a point."""
+    if isinstance(item, type):
+        return lambda what, p, new: store(field(what.points.fields, item), p, (new,))
+    return lambda what, p, new: store(what.points.v, p, (new,))
+
+
+def vector_hook(
+    function: Callable, *, reads: tuple, writes: tuple, publishes: bool = False
+) -> CompiledHook:
+    """Make a compiled hook on points that sees vectors, declared fields, and the state of the law.
+
+    Parameters
+    ----------
+    function
+        ``function(*read, values, dt)``: what `reads` names, a tuple of the values of the fix's
+        `formulas`, and the time that the point moves for. It returns what becomes of `writes`,
+        and, with `publishes`, a number or vector whose sum is published; several as a tuple.
+    reads
+        Of these: a word of `WORDS`; a class of a declared field, which is a number, a vector,
+        or a tuple of numbers; a function (law, kin, state) such as ``laws.cauchy_stress``.
+    writes
+        ``"velocity"`` or classes of declared fields.
+    """
+    # Beside the function, so that it can be imported, and kernels with it be cached.
+    name, module = f"{function.__name__}_at_points", sys.modules[function.__module__]
+    while hasattr(module, name):  # it serves another hook, too
+        name += "_"
+    made = namedtuple(name, ("row", "values"), module=function.__module__)
+    setattr(module, name, made)
+    readers, writers = tuple(map(_reader, reads)), tuple(map(_writer, writes))
+    alone = len(writes) + publishes == 1
+
+    def results_of(tag, what, law, state, p, values, dt):
+        given = [read(what, law, state, p) for read in readers]
+        found = function(*given, values, dt)
+        return (found,) if alone else found
+
+    def written_of(tag, what, p, found):
+        for k, write in enumerate(writers):
+            write(what, p, found[k])
+        return flat(found[len(writers) :])
+
+    results.on(made)(results_of)
+    written.on(made)(written_of)
+    return CompiledHook(function, WHOLE_POINTS, publishes, False, False, False, made, reads, writes)

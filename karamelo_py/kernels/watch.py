@@ -97,7 +97,7 @@ def _sum_energies(mode, kin, points, laws, tiling, control):
 @kernel
 def _take_work(work, control):
     """Add the work of forces on points to that of the loads on nodes."""
-    for p in range(work.shape[1]):
+    for p in range(work.size):
         totals.add_to(control.totals, totals.WORK, float(work[0, p]))
         work[0, p] = 0
     totals.carry(control.totals[totals.WORK])

@@ -2,7 +2,8 @@
 
 A fix overrides the hooks it needs, by the names of Karamelo: the page on plug-ins lists them. Each
 is either a method, called with a view of the group (Python comes back at that stage of each step),
-or the result of :func:`node_hook` or :func:`point_hook`, which is compiled into the loop.
+or the result of :func:`node_hook`, :func:`point_hook` or :func:`vector_hook`, which is compiled
+into the loop.
 """
 
 from collections.abc import Callable
@@ -11,7 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.kernels.hooks import STAGES, CompiledHook, heat_hook, node_hook, point_hook
+from karamelo_py.kernels.hooks import (
+    STAGES,
+    CompiledHook,
+    heat_hook,
+    node_hook,
+    point_hook,
+    vector_hook,
+)
 from karamelo_py.language.faults import as_script_error
 from karamelo_py.language.scene import Scene
 from karamelo_py.scene.group import ParticleGroup
@@ -19,7 +27,16 @@ from karamelo_py.scene.views import NodesView, PointsView
 from karamelo_py.script.errors import Place
 from karamelo_py.script.values import SUFFIXES
 
-__all__ = ["Compute", "Fix", "NodesView", "PointsView", "heat_hook", "node_hook", "point_hook"]
+__all__ = [
+    "Compute",
+    "Fix",
+    "NodesView",
+    "PointsView",
+    "heat_hook",
+    "node_hook",
+    "point_hook",
+    "vector_hook",
+]
 
 
 class Publisher:

@@ -14,7 +14,9 @@ from typing import Any, NamedTuple
 from karamelo_py.compiler.fields import columns_of
 from karamelo_py.compiler.trace import Undefined, places_of
 from karamelo_py.kernels import table
-from karamelo_py.kernels.hooks import ACTS_ON, STAGES, CompiledHook
+from karamelo_py.kernels.heat import Conducting, Supply
+from karamelo_py.kernels.hooks import ACTS_ON, STAGES, WORDS, CompiledHook
+from karamelo_py.kernels.p2g import Force, WorkOfForces
 from karamelo_py.language import faults, registry
 from karamelo_py.language.scene import Scene
 from karamelo_py.output import node_columns, point_table
@@ -97,16 +99,20 @@ def _wrong_hooks(fix: Fix) -> Iterator[str]:
         elif misfit(hook, 1):
             yield f"{moment} has to take one argument, the view of the group"
     for moment, hook in compiled.items():
-        own = ACTS_ON[moment]
-        if hook.where != own:
+        own, whole = ACTS_ON[moment], hook.tag is not None
+        if hook.where != own and not (whole and own != "nodes"):
             yield f"{moment} is a moment of {own}, and its hook was made for {hook.where}"
-        function, takes = hook.function, len(hook.signature.args)
+        function = hook.function
+        takes = len(hook.reads) + 2 if whole else len(hook.signature.args)
         if misfit(function, takes):
             given = ", ".join(inspect.signature(function).parameters)
             yield (
                 f"{moment}: {function.__name__} has to take the {takes} arguments of a hook on "
                 f"{hook.where}: {given} is what it takes"
             )
+        if whole:
+            yield from _wrong_items(fix, moment, hook)
+            continue
         gives = len(hook.signature.return_type)
         with faults.as_script_error(f"fix {fix.style}", moment, function, fix.place):
             try:
@@ -115,13 +121,37 @@ def _wrong_hooks(fix: Fix) -> Iterator[str]:
                 continue
         if not isinstance(given, tuple) or len(given) != gives:
             yield f"{moment}: {function.__name__} has to return {gives} numbers, not {given!r}"
-    if compiled and not fix.formulas:
+    directed = [moment for moment, hook in compiled.items() if hook.tag is None]
+    if directed and not fix.formulas:
         yield (
-            f"it has no formulas, so {next(iter(compiled))} would act in no direction: its author "
+            f"it has no formulas, so {directed[0]} would act in no direction: its author "
             "sets self.formulas, one for each direction"
         )
     if compiled and len(fix.formulas) > 3:
         yield "it has more formulas than there are directions, three"
+
+
+def _wrong_items(fix: Fix, moment: str, hook: CompiledHook) -> Iterator[str]:
+    """Say what a hook on whole points cannot read or write."""
+    words = ", ".join(repr(word) for word in WORDS)
+    for item in (*hook.reads, *hook.writes):
+        written = item in hook.writes
+        if isinstance(item, type):
+            if item not in (*fix.point_fields, *Conducting.point_fields):
+                yield (
+                    f"{moment}: points have no {_shown(item)} because of this fix: its author "
+                    "names it in point_fields"
+                )
+            if written and item is Force and moment != "initial_integrate":
+                yield f"{moment}: forces on points are those of initial_integrate"
+            if written and item is Supply and moment != "supply_heat":
+                yield f"{moment}: heat is supplied in supply_heat"
+            if written and item is Force and WorkOfForces not in fix.point_fields:
+                yield f"{moment}: point_fields has to have Force and WorkOfForces"
+        elif written and item != "velocity":
+            yield f"{moment} writes {item!r}: 'velocity' or a class of a field"
+        elif item not in WORDS and not callable(item):
+            yield f"{moment} reads {item!r}: {words}, a class of a field, or a function of laws"
 
 
 def misfit(function: Callable, count: int) -> str:

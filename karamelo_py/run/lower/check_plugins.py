@@ -11,9 +11,11 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.compiler.tuples import flat, record
+from karamelo_py.kernels.hook_loop import WholePoints
+from karamelo_py.kernels.hooks import CompiledHook, results
 from karamelo_py.kernels.laws import law_in, law_on
-from karamelo_py.kernels.visit import place_at
-from karamelo_py.language.faults import fault
+from karamelo_py.kernels.visit import place_at, state_at
+from karamelo_py.language.faults import as_script_error, fault
 from karamelo_py.points import laws
 from karamelo_py.points.basis import entry, locate, support
 from karamelo_py.points.basis.product import Along, along
@@ -22,6 +24,7 @@ from karamelo_py.points.laws.strengths.hardening import flow_stress, precompute
 from karamelo_py.points.transfers import updated_velocity
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.plugins import PartInUse, attributed, foreign_parts, is_foreign
+from karamelo_py.script.errors import plural
 
 TENSORS = (laws.cauchy_stress, laws.kirchhoff_stress, laws.elastic_strain)
 STRAINS = (0, 1e-3, 0.05)  # the last beyond what metals yield at
@@ -43,6 +46,45 @@ def try_parts(hub: Hub, setup: Any) -> None:
             found = updated_velocity(setup.transfer, v, v, v)
             _expect(part, updated_velocity, found, len(v))
             _numbers(part, "updated_velocity", found, v[0])
+    for fix in hub.fixes.values():
+        for moment, hook in fix.hooks().items():
+            if isinstance(hook, CompiledHook) and hook.tag is not None:
+                _try_hook(setup, fix, moment, hook)
+
+
+def _try_hook(setup: Any, fix: Any, moment: str, hook: Any) -> None:
+    """Try a function of whole points on a point of each law that has points in its group."""
+    part, tag = PartInUse(f"fix {fix.style}", type(fix), fix.place), hook.tag(0, ())
+    says = f"{moment}: {hook.function.__name__} has to return "
+    for points, table, _ in setup.blocks:
+        members = np.flatnonzero(fix.group.has(points.id))
+        if not len(members):
+            continue
+        p = members[0]
+        what = WholePoints(tag, points.id, setup.kin, points, table, points.x[0], ())
+        law, state = state_at(setup.kin, points, table, p)
+        values = (1.0,) * len(fix.formulas)
+        with (
+            as_script_error(part.name, moment, hook.function, fix.place),
+            np.errstate(all="ignore"),
+        ):
+            try:
+                found = results(tag, what, law, state, p, values, 1.0)
+            except ArithmeticError:  # of numbers that this is not about
+                continue
+        wanted = len(hook.writes) + hook.publishes
+        if not isinstance(found, tuple) or len(found) != wanted:
+            got = len(found) if isinstance(found, tuple) else repr(found)
+            raise fault(part.name, f"{says}{wanted} results, not {got}", part.place)
+        for item, new in zip(hook.writes, found, strict=False):
+            size = item.shape(setup.kin) if isinstance(item, type) else setup.kin.dimension
+            if (got := len(flat((new,)))) != size:
+                name = item.__name__ if isinstance(item, type) else item
+                what = f"{says}{plural(size, 'number')} for {name}, not {got}"
+                raise fault(part.name, what, part.place)
+        if hook.publishes and len(flat(found[-1:])) > len(fix.published):
+            what = f"{says}as many totals as published has names, {len(fix.published)}"
+            raise fault(part.name, what, part.place)
 
 
 def _part_of(hub: Hub, kinds: Iterable[type]) -> PartInUse | None:

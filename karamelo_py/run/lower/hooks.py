@@ -20,7 +20,7 @@ from karamelo_py.run.boxes import unique
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.views import NodesView, PieceView, PointsView
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.script.expressions import FIRST, POINT_SEEDS
+from karamelo_py.script.expressions import FIRST, POINT_SEEDS, Expression
 
 NO_PROGRAM = (-1, -1, -1, -1)
 
@@ -49,18 +49,19 @@ def lower_hooks(
         constants=np.concatenate([np.empty(0), *builder.constants]),
         x0=np.concatenate([np.empty((0, dimension)), *(s.x0 for s in solids)]),
         chosen=np.zeros(BLOCK, np.int64),
-        scratch=np.zeros((STACK + ROWS, BLOCK)),
+        scratch=np.zeros((STACK + ROWS + 1, BLOCK)),
         held=np.zeros((builder.shared_nodes(), dimension), arrays.HELD).view(np.recarray),
         loads=np.zeros((builder.loaded_nodes, dimension)),
         mode=mode or Serial(),
         # What threads have of their own, with space between the values of two.
         apart=arrays.Apart(
             chosen=np.zeros((own, BLOCK), np.int64),
-            scratch=np.zeros((own, STACK + ROWS, BLOCK)),
+            scratch=np.zeros((own, STACK + ROWS + 1, BLOCK)),
             values=np.zeros((own, values + 16)),
             totals=np.zeros((own, values, LIMBS), np.int64),
             clock=np.zeros((own, 1), arrays.CLOCK).view(np.recarray),
         ),
+        whole=tuple(builder.whole),
     )
 
 
@@ -78,6 +79,7 @@ class _Builder:
         self.constants: list[np.ndarray] = []
         self.holding: list[Any] = []
         self.loaded_nodes = 0  # the number of nodes, where hooks bring forces
+        self.whole: list[Any] = []  # tags of hooks on whole points
 
     def add(self, fix: Any, moment: str, hook: CompiledHook) -> None:
         begin, end = self._members(fix, hook)
@@ -86,14 +88,21 @@ class _Builder:
             # Components lie one after another, from x on; a total without direction stands alone.
             first = "x" if "x" in fix.published else fix.published[0]
             slot = self.hub.values.slot(f"{fix.id}_{first}")
-        with as_script_error(f"fix {fix.style}", moment, hook.function, fix.place):
-            address = address_of(hook.function, hook.signature)
+        if hook.tag is not None:
+            address = arrays.WHOLE
+            self.whole.append(hook.tag(len(self.rows), (1,) * len(fix.formulas)))
+        else:
+            with as_script_error(f"fix {fix.style}", moment, hook.function, fix.place):
+                address = address_of(hook.function, hook.signature)
         formulas = [f for f in (*fix.formulas, fix.wall_friction) if f is not None]
         holds = hook.holds and (slot >= 0 or not hook.on_nodes)
         uses_place = any(f.names & set(POINT_SEEDS) for f in formulas)
-        uses = map(int, (hook.uses_before, hook.uses_share, holds, uses_place))
+        count = len(fix.published) if slot >= 0 and hook.tag is not None else 0
+        uses = map(int, (hook.uses_before, hook.uses_share, holds, uses_place, count))
         self.rows.append((address, STAGES[moment], begin, end, slot, *uses))
-        programs = [self._program(formula) for formula in fix.formulas]
+        whole = hook.tag is not None  # its functions know no direction that is left alone
+        given = (Expression(0.0) if f is None and whole else f for f in fix.formulas)
+        programs = list(map(self._program, given))
         programs += [NO_PROGRAM] * (FRICTION - len(programs))
         self.programs.append([*programs, self._program(fix.wall_friction)])
         self.uses_first |= not hook.on_nodes and any(f.names & FIRST for f in formulas)
@@ -231,9 +240,9 @@ def _at_points_python_hooks(hooks, stage, then, s):
     if stage == INITIAL_INTEGRATE and hooks.simulation.taken_up:
         hooks.simulation.taken_up = False
         return
-    at_points(hooks.compiled, stage, then, s)
     if stage == INITIAL_INTEGRATE:
         hooks.simulation.clear_forces()
+    at_points(hooks.compiled, stage, then, s)
     if stage in hooks.by_stage:
         hooks.act(_on_points, s, stage, then)
 
