@@ -154,7 +154,8 @@ WORDS = {"mass": _mass, "velocity": _velocity, "position": _position, "volume": 
 def _reader(item: Any) -> Callable:
     """Return what reads an item of a point."""
     if isinstance(item, type):
-        shape = item.shape
+        kind: Any = item
+        shape = kind.shape
         as_vector = shape is vector
 
         def of_field(what, law, state, p):
