@@ -124,13 +124,13 @@ def uneven_steps(count: int, time: float) -> list[float]:
 
 
 def test_a_ring_converges_with_second_order(state_interpreted):
-    """A ring vibrates in its lowest radial mode for a good half period, on grids of 4, 8, 16 cells.
+    """A ring vibrates in its lowest radial mode for a good half period, on grids of 4 and 8 cells.
 
     Exact: linear elasticity in cylindrical coordinates without strain along the axis (Love).
     """
     time, small = 0.6 * 2 * pi / OMEGA, 1e-6
     errors = []
-    for cells in (4, 8, 16):
+    for cells in (4, 8):
         h = (B - A) / cells
         r = A + h * (0.25 + 0.5 * np.arange(2 * cells))
         nodes = np.linspace(A, B, 65)
