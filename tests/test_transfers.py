@@ -55,7 +55,7 @@ of_any_data = pytest.mark.parametrize(
     ],
 )  # fmt: skip
 # What holds for each transfer with each basis needs few examples of each.
-few = settings(max_examples=12)
+few = settings(max_examples=6)
 everywhere = st.one_of(st.sampled_from([0.0, 1.0, 0.5]), st.floats(0, 1))
 # Where D does not vanish: affine fields are then taken exactly.
 inner = st.floats(0.01, 0.99)
