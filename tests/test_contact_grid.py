@@ -46,10 +46,10 @@ def test_one_solid_is_as_in_ulmpm(state_interpreted, d, scheme):
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_blocks_separate_freely(run_interpreted, scheme):
     """Two blocks that touch and move apart do not feel each other; in ulmpm they hold together."""
-    lines = ("dt_factor(0.5)", "log_modify(custom, step, va_x, vb_x, k)", "run(12)")
+    lines = ("dt_factor(0.5)", "log_modify(custom, step, va_x, vb_x, k)", "run(6)")
     free = run_interpreted(bars(0, *lines, v=-0.1, scheme=scheme, d=2)).log
-    assert free.va_x == pytest.approx(np.full(13, -0.1), rel=1e-12)
-    assert free.vb_x == pytest.approx(np.full(13, 0.1), rel=1e-12)
+    assert free.va_x == pytest.approx(np.full(7, -0.1), rel=1e-12)
+    assert free.vb_x == pytest.approx(np.full(7, 0.1), rel=1e-12)
     stuck = run_interpreted(bars(0, *lines, v=-0.1, scheme=scheme, d=2, method="ulmpm")).log
     assert abs(stuck.va_x[-1]) < 0.09
 
@@ -122,14 +122,13 @@ def test_three_solids_at_a_node_keep_momentum(run_interpreted):
     assert np.abs(log.cb_x).max() > 0.001
 
 
-@pytest.mark.parametrize("scheme", ["musl", "usf"])
-def test_three_solids_in_any_order(run_interpreted, scheme):
+@pytest.mark.parametrize(("scheme", "order"), [("musl", "cab"), ("usf", "bca")])
+def test_three_solids_in_any_order(run_interpreted, scheme, order):
     """Pairs that meet at a node take their impulses at once: the first of them has no advantage."""
     log = run_interpreted(three("abc", scheme)).log
-    for order in ("cab", "bca"):
-        other = run_interpreted(three(order, scheme), folder=order).log
-        for name in ("a_x", "a_y", "b_x", "b_y", "c_x", "c_y", "ab_x", "cb_x"):
-            assert other[name] == pytest.approx(log[name], rel=1e-9, abs=1e-9), name
+    other = run_interpreted(three(order, scheme), folder=order).log
+    for name in ("a_x", "a_y", "b_x", "b_y", "c_x", "c_y", "ab_x", "cb_x"):
+        assert other[name] == pytest.approx(log[name], rel=1e-9, abs=1e-9), name
 
 
 def test_two_bodies_on_a_third(run_interpreted):
@@ -313,7 +312,7 @@ def held(script: str, high: float = 0.2) -> str:
 
 def test_a_base_held_at_the_corners_of_its_cells_is_rigid(run_interpreted):
     """By all nodes that its points see, so that the normal is upright; not where only a part is."""
-    script = glide(0, 0.2, 8, "quadratic-spline")
+    script = glide(0, 0.2, 4, "quadratic-spline")
     rigid, whole, part = (
         run_interpreted(text).log for text in (script, held(script), held(script, 0.11))
     )
@@ -324,8 +323,8 @@ def test_a_base_held_at_the_corners_of_its_cells_is_rigid(run_interpreted):
 
 def test_no_friction_across_a_gap(run_interpreted):
     """Half a cell above the base both have mass at its nodes; the block slides on freely."""
-    log = run_interpreted(glide(H / 2, 0, 30)).log
-    assert log.v_x == pytest.approx(np.ones(31), rel=1e-12)
+    log = run_interpreted(glide(H / 2, 0, 15)).log
+    assert log.v_x == pytest.approx(np.ones(16), rel=1e-12)
     assert (log.rub_x == 0).all()
 
 

@@ -528,10 +528,11 @@ def test_torn_apart_in_any_way(state_interpreted):
 
     In boxes of small tiles nothing is missing that points give far away: mass is kept.
     """
-    whole = state_interpreted(TORN.format("Q4") + "run(26)", boxes=True)
+    torn = TORN.replace("0.8, 1.2", "0.9, 1.1")  # half as many points
+    whole = state_interpreted(torn.format("Q4") + "run(26)", boxes=True)
     assert seen_along_x(whole) > 2.5
     assert whole["nodal mass"] == pytest.approx(whole["mass"].sum(), rel=1e-13)
-    pieces = TORN.format("Q4") + "run(13)\nrun(13)"
+    pieces = torn.format("Q4") + "run(13)\nrun(13)"
     assert same_bits(whole, state_interpreted(pieces, boxes=True))
-    whole = state_interpreted(TORN.format("R4") + "run(12)")
-    assert same_bits(whole, state_interpreted(TORN.format("R4") + "run(6)\nrun(6)"))
+    whole = state_interpreted(torn.format("R4") + "run(6)")
+    assert same_bits(whole, state_interpreted(torn.format("R4") + "run(3)\nrun(3)"))
