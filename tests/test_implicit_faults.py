@@ -20,7 +20,9 @@ FLUID = """eos(w, fluid, 1000, 1e5, 7)
 
 def coarse(lines: str = HELD) -> str:
     """The patch on cells of a half: interpreted load steps are slow."""
-    return patch(lines).replace("0, 1.4, 0, 1, 0.1", "0, 1.5, 0, 1, 0.5").replace("m, 0.1", "m, 0.5")
+    return (
+        patch(lines).replace("0, 1.4, 0, 1, 0.1", "0, 1.5, 0, 1, 0.5").replace("m, 0.1", "m, 0.5")
+    )
 
 
 @pytest.mark.parametrize("wrong", ["quasi-statc", "quasi-static, tol=1e-8", "quasi static"])

@@ -156,9 +156,13 @@ Whole.gather = gathers
 """
 
 
+@pytest.mark.full
 @needs_mpi
 def test_nobody_has_the_whole(tmp_path):
-    """Dumps, computes, files to go on from, and three that go on from one of two."""
+    """Dumps, computes, files to go on from, and three that go on from one of two.
+
+    Of threads that stand for processes: `test_nobody_asks_for_the_whole` of test_ranks.py.
+    """
     (tmp_path / "sitecustomize.py").write_text(NOBODY, encoding="utf-8")
     shutil.copy(Path(__file__).parent / "shoves.py", tmp_path)
     lines = (
@@ -240,7 +244,11 @@ def running(folder: Path, *lines: str, **more: str) -> subprocess.Popen:
 @needs_mpi
 @pytest.mark.parametrize(
     ("rank", "number"),
-    [(None, signal.SIGTERM), (1, signal.SIGTERM), pytest.param(1, signal.SIGINT, marks=FULL)],
+    [
+        (None, signal.SIGTERM),
+        pytest.param(1, signal.SIGTERM, marks=FULL),
+        pytest.param(1, signal.SIGINT, marks=FULL),
+    ],
 )
 def test_a_signal(tmp_path, rank, number):
     """As with one process: the last state, whole files, 128 + its number; whoever gets it."""
@@ -262,7 +270,7 @@ time.sleep(60)
 
 
 @needs_mpi
-@pytest.mark.parametrize("ranks", ["1", "2"])
+@pytest.mark.parametrize("ranks", [pytest.param("1", marks=FULL), "2"])
 def test_a_signal_before_the_run(tmp_path, ranks):
     """One message, and nothing is left behind."""
     (tmp_path / "slow.py").write_text(SLOW, encoding="utf-8")
@@ -300,6 +308,7 @@ launch.LOOK, launch.STANDS = 0.1, 0.5
 """
 
 
+@pytest.mark.full
 @needs_mpi
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
 def test_a_process_is_stopped(tmp_path):
@@ -508,7 +517,11 @@ PART_OF_ALL = """
             marks=pytest.mark.full,  # test_ranks.py has it of a function
         ),
         ("self.publish('x', points.position[:, 0].sum())", "fix drag: air_x is "),
-        ("self.publish('x', points.total(points.mass))", ""),
+        pytest.param(
+            "self.publish('x', points.total(points.mass))",
+            "",
+            marks=pytest.mark.full,  # likewise
+        ),
     ],
 )
 def test_a_plug_in_looks_at_its_part_alone(tmp_path, line, says):
@@ -605,6 +618,7 @@ MpiComm.disconnect = lambda self, link, free=MpiComm.disconnect: free(self, link
 """
 
 
+@pytest.mark.full  # of one process: test_what_two_pass_on of test_ranks.py
 @needs_mpi
 def test_what_is_passed_on_is_foretold(tmp_path):
     """`check` makes the plan of all processes in one; the bytes are those of real ones."""

@@ -255,6 +255,26 @@ def test_computes_by_shares(state_interpreted, tmp_path):
     assert "nan" not in log and len(log.split()) > 100
 
 
+def test_nobody_asks_for_the_whole(state_interpreted, tmp_path):
+    """Dumps, computes, fixes and files take share after share: what gathers the scene is gone."""
+    lines = (
+        "compute(p, linear_momentum, all)", "compute(m, max_position, all)",
+        "compute(e, error, all, ux, 0.1*time)", "compute(at, probe, all, s11, x=0.4)",
+        "group(n, nodes, region, box, all)", "compute(c, center_of_mass, n)",
+        "compute(E, energy_balance, all)", "fix(s, python, all, shoves.sway_alone, final_integrate)",
+        "fix(f, force_particles, all, 3, sin(9*x0))", "fix(a, edge_pressure, all, box, 2)",
+        "dump(d, all, particle, 3, d.txt, x, vx, s11)", "dump(v, all, vtk, 3, v.*.vtu, seq)",
+        "dump(g, all, grid, 3, g.*.txt, vx, mass, vol)", "dump(h, all, grid/hdf5, 3, h.h5, mass)",
+        "dump(p, all, pyplot, 3, p.*.png, 3, 3, vx)", "restart(3, r.*.h5)",
+        "region(two, block, 0.59, 0.69, 0.3, 0.5)", "solid(two, region, two, 2, rubber, 0.1, 0)",
+        "fix(h, contact/hertz, body, two)",
+        "log_modify(custom, step, E_drift, p_x, m_x, e, at, c_y, f_y, a_x, s_x, h_x)",
+    )  # fmt: skip
+    script = block(2, *lines, MOVING[0], *MOVING[3:], "run(6)", size=(0.3, 0.3))
+    said = state_interpreted(script, boxes=True, ranks=2, out="parts", fails=True)
+    assert "error" not in said and (tmp_path / "parts" / "r.6.h5").exists()
+
+
 @pytest.mark.parametrize("parts", [2, 3, 4, 8])
 def test_tiles_are_cut_in_halves(parts):
     """A ball of tiles of equal work: each part has its share of them, but for the halves of tiles
