@@ -176,7 +176,7 @@ class Simulation(SceneArrays):
         return float(min(waves, clock.heat_limit))
 
     def above_limit(self) -> bool:
-        return self.control.values[DT] > self.limit * (1 + 1e-12)
+        return not self.implicit and self.control.values[DT] > self.limit * (1 + 1e-12)
 
     def _watch_limit(self) -> None:
         """Watch the limit, unless the step is above it from the start, as the user wants."""

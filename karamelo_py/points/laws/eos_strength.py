@@ -224,6 +224,28 @@ known_failure(
 )
 
 
+# --- limit loads ----------------------------------------------------------------------------------
+
+
+def _locks(law, scene):
+    """Tell whether a body flows without a change of volume in load steps, which cells cannot."""
+    slow = not getattr(scene.scheme, "inertia", True) and not scene.hub.domain.axisymmetric
+    flows = strengths.equivalent_plastic_strain.defined(type(law.strength))
+    by_shear = flows and not strengths.pressure_response.defined(type(law.strength))
+    return scene.locks and scene.linear and slow and by_shear and {"place": scene.method.place}
+
+
+known_failure(
+    EosStrength,
+    "locking",
+    when=_locks,
+    reason="plastic flow of material '{owner.id}' keeps its volume, and {scene.basis_name} "
+    "functions without averaged volumes cannot where a body flows around a corner: the load goes "
+    "on rising beyond the limit load (a footing bears 6.6 c B in the place of 5.1)",
+    cure="anti_volumetric_locking(true), or quadratic-spline in the place of the basis",
+)
+
+
 # --- state ------------------------------------------------------------------------------------
 
 

@@ -7,7 +7,7 @@ from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, det, inner, unit
 from karamelo_py.points.kinematics.principal import logarithm_of
-from karamelo_py.points.laws.parameters import lame_parameters
+from karamelo_py.points.laws.parameters import lame_parameters, tell_of_locking
 from karamelo_py.points.laws.thermoelastic import expanding
 
 
@@ -75,6 +75,8 @@ class State(NamedTuple):
 
     F: Any  # deformation gradient
 
+
+tell_of_locking(Hencky)
 
 laws.initial_state.on(Hencky)(lambda law, kin, like: State(unit(kin)))
 laws.by_rates.on(Hencky)(lambda law: False)

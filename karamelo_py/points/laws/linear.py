@@ -6,7 +6,7 @@ from karamelo_py.language.rules import gain
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, det, inner, nothing, sym, symmetric_tensor, tr
-from karamelo_py.points.laws.parameters import lame_parameters
+from karamelo_py.points.laws.parameters import lame_parameters, tell_of_locking
 from karamelo_py.points.laws.thermoelastic import expanding
 
 
@@ -97,6 +97,8 @@ gain(
     "work than it took",
     cure="material neo-hookean, which stores what it is given",
 )
+
+tell_of_locking(LinearElastic)
 
 laws.initial_state.on(LinearElastic)(lambda law, kin, like: State(1, nothing(kin)))
 laws.cauchy_stress.on(LinearElastic)(lambda law, kin, state: state.sigma)

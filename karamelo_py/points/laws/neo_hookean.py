@@ -7,7 +7,7 @@ from karamelo_py.compiler.powers import logarithm_near_one as log
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, det, tr, unit
-from karamelo_py.points.laws.parameters import lame_parameters
+from karamelo_py.points.laws.parameters import lame_parameters, tell_of_locking
 from karamelo_py.points.laws.thermoelastic import expanding
 
 
@@ -72,6 +72,8 @@ class State(NamedTuple):
 
     F: Any  # deformation gradient
 
+
+tell_of_locking(NeoHookean)
 
 laws.initial_state.on(NeoHookean)(lambda law, kin, like: State(unit(kin)))
 laws.by_rates.on(NeoHookean)(lambda law: False)

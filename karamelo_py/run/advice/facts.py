@@ -102,6 +102,12 @@ class SceneFacts:
         return self.simulation.dt / self.simulation.limit
 
     @property
+    def locks(self) -> bool:
+        """Tell whether hat functions are to keep the volume of several points a cell, each."""
+        hats = self.linear or bool(getattr(self.basis, "shape", ()))
+        return hats and self.d > 1 and not (self.sparse or self.hub.update.anti_locking)
+
+    @property
     def turns(self) -> bool:
         """Tell whether a solid turns by an angle that counts."""
         return self.turn > TURN

@@ -214,6 +214,9 @@ def _step_was_told(hub: Hub) -> bool:
 
 def _smaller_step(hub: Hub, simulation: Any) -> str:
     """Say how to take a smaller step, and that the present one is too large where it is."""
+    if simulation.implicit:
+        inertia = simulation.hub.update.scheme.inertia
+        return "use a smaller step (set_dt)" if inertia else "use more load steps, smaller ones"
     if not simulation.control.clock[0].watch_limit:
         return "the step is too large" + ", as the warning says" * _step_was_told(hub)
     if simulation.above_limit():

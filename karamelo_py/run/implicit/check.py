@@ -48,7 +48,7 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
     if hub.settings.precision != "double":
         yield "needs double precision", "no precision(single)", None
     if hub.settings.comm.size > 1:
-        yield "runs in one process", "no --ranks", None
+        yield "runs in one process", "no --ranks; --threads shares out points", None
     kin = method.kinematics(hub)
     for solid in hub.solids.values():
         law = solid.material.law

@@ -7,7 +7,7 @@ import numpy as np
 from karamelo_py.kernels.laws import elastic_law
 from karamelo_py.kernels.p2g import Force, WorkOfForces
 from karamelo_py.language.signature import In
-from karamelo_py.points.laws import can, with_stress
+from karamelo_py.points.laws import can, constrained_velocity, with_stress
 from karamelo_py.scene.group import NodeGroup, ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix, PointsView, node_hook
@@ -100,6 +100,19 @@ class PointForces(Fix):
     point_by_point = True
     conserves = True  # but for the work of the forces, which steps add up
 
+    def __init__(self, hub: Hub, group: ParticleGroup):
+        super().__init__(hub, group)
+        solids = list(hub.solids.values())
+        rigid = [can(solid.material.law, constrained_velocity) for solid in solids]
+        self.rigid = [s for s, r in zip(solids, rigid, strict=True) if r and group.touches(s)]
+        soft = (s for s, r in zip(solids, rigid, strict=True) if not r)
+        if self.rigid and not any(map(group.touches, soft)):
+            raise ScriptError(
+                f"solid '{self.rigid[0].id}' is rigid: it moves as it is told, and no force moves it",
+                argument="group",
+                expected="points of other solids; fix velocity_particles moves rigid ones",
+            )
+
     def forces(self, points: PointsView) -> np.ndarray:
         """The forces (n, d) on the points."""
         raise NotImplementedError
@@ -140,6 +153,11 @@ class ForceParticles(PointForces):
 
     def __init__(self, hub: Hub, group: ParticleGroup, *force: Expression | None):
         super().__init__(hub, group)
+        if self.rigid:
+            hub.warn(
+                f"solid '{self.rigid[0].id}' is rigid: its share of the force moves nothing",
+                hint="a group without its points",
+            )
         self.force = per_direction(hub, "f", force)
 
     def forces(self, points: PointsView) -> np.ndarray:

@@ -144,6 +144,8 @@ class Method:
     def check(self, hub: Hub) -> None:
         """Refuse what does not go together; called before every run."""
         transfer, basis, scheme = hub.update.transfer, self.basis, hub.update.scheme
+        if getattr(scheme, "implicit", False):
+            return  # which has no part for these transfers
         unsteady = transfer.inverts_spread and not basis.steady_moment and self.frame.moves
         if unsteady and not getattr(scheme, "maps_velocity_again", False):
             raise ScriptError(
