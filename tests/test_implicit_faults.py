@@ -294,3 +294,87 @@ def test_columns_of_load_steps_in_explicit_ones(run_interpreted):
 def test_a_tolerance_that_is_none(run_interpreted, scheme):
     text = patch().replace("quasi-static", f"{scheme}, tolerance=0.1")
     assert "above 0 and at most 0.01, not 0.1" in run_interpreted(text, status=1).err
+
+
+@pytest.mark.parametrize(
+    ("word", "instead", "told"),
+    [
+        ("1000, 0.25", "1000, 0.49", True),
+        ("1000, 0.25", "1000, 0.48", False),
+        ("1000, 0.25", "1000, 0.49)\n    anti_volumetric_locking(true", False),
+    ],
+)
+def test_linear_functions_that_lock_are_told(run_interpreted, word, instead, told):
+    """Before the run, with the cure, in explicit steps too."""
+    for scheme in ("quasi-static", "musl"):
+        text = patch().replace(word, instead).replace("scheme(quasi-static)", f"scheme({scheme})")
+        text = text.replace("iterations, residual, parts, ", "")
+        said = run_interpreted(text, command="check", folder=scheme).err
+        assert ("warning: locking: Poisson's ratio" in said) == told, said
+
+
+PLASTIC = """eos(e, linear, 1, 1000)
+    strength(y, plastic, 400, 100)
+    material(m, eos-strength, e, y)"""
+
+
+@pytest.mark.parametrize(("basis", "told"), [("linear", True), ("quadratic-spline", False)])
+def test_plastic_flow_that_locks_is_told(run_interpreted, basis, told):
+    text = patch().replace("material(m, linear, 1, 1000, 0.25)", PLASTIC)
+    said = run_interpreted(text, "-var", "basis", basis, command="check").err
+    assert ("locking: plastic flow of material 'm'" in said) == told
+
+
+RIGID = (
+    HELD
+    + """
+    material(r, rigid, 1)
+    solid(t, region, box, 2, r, 0.1, 0)
+    group(t, particles, region, box, solid, t)
+    group(both, particles, region, box, all)"""
+)
+
+
+def test_forces_on_rigid_solids_are_told(run_interpreted):
+    said = run_interpreted(patch(RIGID + "\n    fix(f, force_particles, t, 0, -1)"), status=1).err
+    assert "no force moves it, only" in said and "fix velocity_particles moves" in said
+    text = patch(RIGID + "\n    fix(f, force_particles, both, 0, 1)")
+    assert "its share of the force moves nothing" in run_interpreted(text, command="check").err
+
+
+def test_a_point_that_leaves_is_told_of_load_steps(run_script):
+    """The domain comes first; no word about a stable step, which load steps do not have."""
+    text = patch(HELD.replace("1e-4", "0.1")).replace("run(4)", "run(8)")
+    said = run_script(text, status=1).err
+    assert "leaves the domain" in said and "more load steps" in said and "dt_factor" not in said
+
+
+def test_a_transfer_without_a_part_is_told_first(run_interpreted):
+    text = patch().replace("FLIP, basis, 1, domains", "APIC, basis")
+    said = run_interpreted(text, status=1).err
+    assert "transfer APIC has no part in" in said and "unstable" not in said
+
+
+EULER = """
+    method(tlmpm, FLIP, quadratic-spline, 1)
+    scheme(quasi-static, stabilisation=0)
+    dimension(2, -1, 1, 0, 9, 0.5)
+    region(box, block, -0.5, 0.5, 0, 8)
+    material(m, linear, 1, 1e6, 0)
+    solid(s, region, box, 2, m, 0.5, 0)
+    region(base, block, -INF, INF, -INF, 1e-6)
+    region(top, block, -INF, INF, 7.75, INF)
+    group(base, nodes, region, base, all)
+    group(top, particles, region, top, solid, s)
+    fix(hold, velocity_nodes, base, 0, 0)
+    fix(press, force_particles, top, 0, -(0.85 + 0.1*time)*PI^2*1e6/12/(4*8^2))
+    set_output(1)
+    log_modify(custom, step, hold_y)
+    run(2)
+"""
+
+
+def test_a_column_that_could_buckle_is_told(run_script):
+    """Beyond pi^2 E I/(4 L^2) (Euler 1744), where the straight column is no stable equilibrium."""
+    said = run_script(EULER).err
+    assert said.count("an equilibrium that is not stable") == 1 and "step 2, time 2" in said

@@ -32,7 +32,7 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
     if Moment in declared([transfer], "point_fields") or name not in ("FLIP", "PIC"):
         yield (
             f"moves points by increments, which transfer {name} has no part in",
-            "FLIP in its place",
+            "FLIP, with an alpha of 1 behind the basis, in its place",
             method.place,
         )
     if update.thermal and any(

@@ -213,9 +213,10 @@ class LoadSteps:
         `before` and `after` are the forces at all nodes, by the present stress and by loads of the
         beginning and of the end; `before` is None where there is no inertia.
         """
-        s = self.simulation.setup
+        simulation = self.simulation
+        s = simulation.setup
         with counted(self.seconds, "layout"):
-            equations = Equations(s, self.simulation.mode, self.known)
+            equations = Equations(s, simulation.mode, self.known)
         nodes = equations.nodes
         external = after[nodes] + equations.present_forces()
         self._check_numbers(external, "a node gets a force that is not a number")
@@ -247,6 +248,12 @@ class LoadSteps:
             raise Failed(f"{reason}: nothing holds solid '{solid}' near ({where})") from None
         except Wrong as reason:
             raise Failed(f"{reason} (solid '{self._solid_of(reason.point)}')") from None
+        if not self.dynamic and newton.unstable and simulation.hub.update.first_time("unstable"):
+            simulation.hub.warn(
+                f"{self._now()}: an equilibrium that is not stable (the determinant of the "
+                "stiffness is negative): the body has a way to buckle, or is beyond a limit load",
+                hint="a small imperfection, or scheme(newmark), shows where it goes",
+            )
         self.known = equations.known()
         self.unknowns = int(np.count_nonzero(~given))
         self.corrections += iterations
@@ -315,11 +322,13 @@ class LoadSteps:
             put_forces(s.contact, s, nodes[led], forces[led])
 
     def _error(self, message: str, hint: str, place: Place | None = None) -> ScriptError:
-        hub, values = self.simulation.hub, self.simulation.setup.control.values
-        step, time = int(values[TIMESTEP]) + 1, float(values[TIME])
         return ScriptError(
-            f"step {step}, time {time:.6g}: {message}", place=place or hub.place, hint=hint
+            f"{self._now()}: {message}", place=place or self.simulation.hub.place, hint=hint
         )
+
+    def _now(self) -> str:
+        values = self.simulation.setup.control.values
+        return f"step {int(values[TIMESTEP]) + 1}, time {float(values[TIME]):.6g}"
 
     def _check_held(self, equations: Equations, given: np.ndarray, contact: Contact | None) -> None:
         """Refuse bodies that can move as a whole: without inertia nothing says where they are.

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 
 from karamelo_py.run.implicit.contact import Contact
 from karamelo_py.run.implicit.equations import Equations, Moduli
-from karamelo_py.run.implicit.solvers import Singular, Unconverged, direct, solve
+from karamelo_py.run.implicit.solvers import Singular, Unconverged, changed_sign, direct, solve
 
 ASTRAY = 1e4  # times as far as points may go: nothing holds them
 FAR = 0.5  # cells that points may go at once, where weights follow them; else less than one
@@ -161,6 +161,11 @@ class Newton:
     def reaction(self, u: np.ndarray) -> np.ndarray:
         """Find the forces (m, d) that hold given components."""
         return -self.balance(u)
+
+    @property
+    def unstable(self) -> bool:
+        """Tell whether the last stiffness is not positive definite, as far as a solver knows."""
+        return "factors" in self.kept and changed_sign(self.kept["factors"])
 
     def _size(self, u: np.ndarray) -> float:
         norms = np.linalg.norm(self.external), np.linalg.norm(self.inner), self.inertia.size(u)

@@ -4,9 +4,11 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import MatrixRankWarning, splu
 
 MANY = 5000  # unknowns, from which on multigrid is faster than a direct solver
@@ -34,9 +36,11 @@ def scaled(A: sp.csr_matrix, s: np.ndarray | None = None) -> tuple[sp.csr_matrix
     return sp.csr_matrix((data, A.indices, A.indptr), A.shape), s
 
 
-def direct(A: sp.csr_matrix, b: np.ndarray) -> np.ndarray:
-    """Solve by SuperLU."""
+def direct(A: sp.csr_matrix, b: np.ndarray, kept: dict | None = None) -> np.ndarray:
+    """Solve by SuperLU; the factors are `kept`."""
     B, s = scaled(A)
+    kept = {} if kept is None else kept
+    kept.clear()  # before there are others: they take most of the memory
     with warnings.catch_warnings():
         warnings.simplefilter("error", MatrixRankWarning)
         try:
@@ -44,7 +48,18 @@ def direct(A: sp.csr_matrix, b: np.ndarray) -> np.ndarray:
             factors = splu(B.T, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
         except (RuntimeError, MatrixRankWarning):
             raise Singular from None
+    kept["factors"] = factors
     return s * factors.solve(s * b, trans="T")
+
+
+def changed_sign(factors: Any) -> bool:
+    """Tell whether the determinant of a factorised matrix is negative."""
+    moved = np.empty_like(factors.perm_r)
+    moved[factors.perm_c] = factors.perm_r
+    n = len(moved)
+    cycles = sp.csr_matrix((np.ones(n, bool), (np.arange(n), moved)), (n, n))
+    swaps = n - connected_components(cycles, directed=False)[0]
+    return bool((swaps + np.count_nonzero(factors.U.diagonal() < 0)) % 2)
 
 
 def amg(
@@ -59,13 +74,13 @@ def amg(
     """
     import pyamg
 
-    s = kept["scale"] if kept else None
+    s = kept.get("scale")
     B, s = scaled(A, s)
     symmetric = is_symmetric(B)
     left: list[float] = []
     # pyamg has its warnings shown whatever filters say: they are taken, and residuals tell.
     with from_one_seed(), warnings.catch_warnings(record=True):
-        if kept:
+        if "multigrid" in kept:
             kept["multigrid"].levels[0].A = B
         else:
             kept["scale"] = s
@@ -107,7 +122,7 @@ def from_one_seed() -> Iterator[None]:
 def solve(
     name: str, A: sp.csr_matrix, b: np.ndarray, rigid: np.ndarray, accuracy: float, kept: dict
 ) -> np.ndarray:
-    """Solve by the solver of a `name`: direct, amg or auto; `kept` is what amg keeps."""
+    """Solve by the solver of a `name`: direct, amg or auto; `kept` is what it keeps."""
     in_space = rigid.shape[1] == 6
     large = A.shape[0] >= (MANY_IN_SPACE if in_space else MANY)
     if name == "auto" and large and (in_space or is_symmetric(A)) and find_spec("pyamg"):
@@ -115,7 +130,7 @@ def solve(
             return solve("amg", A, b, rigid, accuracy, kept)
         except (Singular, Unconverged):  # multigrid is not made for all matrices
             kept.clear()
-    x = amg(A, b, rigid, accuracy, kept) if name == "amg" else direct(A, b)
+    x = amg(A, b, rigid, accuracy, kept) if name == "amg" else direct(A, b, kept)
     if not np.all(np.isfinite(x)):
         raise Singular
     return x

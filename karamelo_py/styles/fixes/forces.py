@@ -108,7 +108,7 @@ class PointForces(Fix):
         soft = (s for s, r in zip(solids, rigid, strict=True) if not r)
         if self.rigid and not any(map(group.touches, soft)):
             raise ScriptError(
-                f"solid '{self.rigid[0].id}' is rigid: it moves as it is told, and no force moves it",
+                f"solid '{self.rigid[0].id}' is rigid: no force moves it, only what it is told",
                 argument="group",
                 expected="points of other solids; fix velocity_particles moves rigid ones",
             )
