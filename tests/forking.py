@@ -12,11 +12,11 @@ import sys
 
 
 def ask(path: str, words: list[str]) -> int:
-    """Have something done here, in this folder and with the output of this process."""
+    """Have something done here, in this folder and with the input and output of this process."""
     with socket.socket(socket.AF_UNIX) as link:
         link.connect(path)
         said = [os.getcwd(), os.environ.get("PYTHONPATH", ""), *words]
-        socket.send_fds(link, ["\0".join(said).encode()], [1, 2])
+        socket.send_fds(link, ["\0".join(said).encode()], [0, 1, 2])
         answer = link.recv(1)
     return answer[0] if answer else 1
 
@@ -67,9 +67,10 @@ def serve(path: str) -> None:
                 link.close()
                 continue
             signal.signal(signal.SIGCHLD, signal.SIG_DFL)
-            said, (out, err), _, _ = socket.recv_fds(link, 1 << 16, 2)
-            os.dup2(out, 1)
-            os.dup2(err, 2)
+            said, files, _, _ = socket.recv_fds(link, 1 << 16, 3)
+            for at, file in enumerate(files):
+                os.dup2(file, at)
+                os.close(file)
             status = do(said.decode().split("\0"))
             sys.stdout.flush()
             link.send(bytes([status]))

@@ -317,7 +317,16 @@ def test_names_of_folders():
     assert len(case.folder_name({"a": "x" * 500})) < 100
 
 
-@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+def process_in(folder):
+    """Find the process that works in a folder."""
+    for pid in filter(str.isdigit, os.listdir("/proc")):
+        with contextlib.suppress(OSError):
+            if os.readlink(f"/proc/{pid}/cwd") == str(folder):
+                return int(pid)
+    raise LookupError
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs /proc")
 def test_a_run_that_is_killed_is_recorded(folder):
     (folder / "in.flight").write_text(SCRIPT.replace("steps = 4", "steps = 9000000"), "utf-8")
     launch = case.Launch(folder / "in.flight")
@@ -328,12 +337,48 @@ def test_a_run_that_is_killed_is_recorded(folder):
         until = time.monotonic() + 60
         while not log.exists() and time.monotonic() < until:
             time.sleep(0.05)
-        found = subprocess.run(["pgrep", "-f", str(folder / "in.flight")], capture_output=True)
-        os.kill(int(found.stdout.split()[0]), signal.SIGKILL)
+        os.kill(process_in(folder / "run"), signal.SIGKILL)
 
     threading.Thread(target=kill).start()
     outcome = launch.run({"speed": "3"}, folder / "run")
     assert (outcome.status, outcome.reason) == ("killed", "ended by signal 9")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="runs are copies on Linux alone")
+@pytest.mark.usefixtures("starts_are_cheap")
+def test_runs_are_copies_of_warm_processes_and_write_what_others_do(folder):
+    """A copy of what has run, one of what has only imported, and a process that starts cold."""
+    launch = case.Launch(folder / "in.flight")
+    cases = {name: {"speed": speed} for name, speed in (("a", "3"), ("b", "300"), ("c", "3"))}
+    outcomes = {name: launch.run(values, folder / name) for name, values in cases.items()}
+    assert [one.status for one in outcomes.values()] == ["done", "failed", "done"]
+    assert set(launch.warm.keepers) == {(), ("kind",)}
+    first, warm = (launch.warm.keepers[key].pid for key in ((), ("kind",)))
+    launch.warm.tries = 0
+    for name, values in cases.items():
+        launch.run(values, folder / f"cold {name}")
+        for file in ("log.mpm", "err.txt"):
+            texts = [(folder / place / file).read_bytes() for place in (name, f"cold {name}")]
+            assert texts[0] == texts[1]
+    launch.warm.tries = 2
+    for pid in (warm, first):  # each but hurts the next start, which takes another way
+        os.kill(pid, signal.SIGKILL)
+        assert launch.run(cases["a"], folder / "a").status == "done"
+    pids = [keeper.pid for keeper in launch.warm.keepers.values() if keeper.is_ready()]
+    launch.warm.finalizer()
+    assert len(pids) == 2 and not any(os.path.exists(f"/proc/{pid}") for pid in pids)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="runs are copies on Linux alone")
+@pytest.mark.usefixtures("starts_are_cheap")
+def test_functions_in_python_find_nothing_of_another_run(folder):
+    """A module that counts its calls, and writes what it has counted, begins at 0 in each run."""
+    text = "calls = [0]\ndef count(points):\n    calls[0] += 1\n    return calls[0]\n"
+    (folder / "counting.py").write_text(text, encoding="utf-8")
+    script = SCRIPT.replace("set_dt", "fix(n, python, all, counting.count)\nset_dt")
+    (folder / "in.flight").write_text(script.replace("c_x)", "c_x, n)"), encoding="utf-8")
+    assert main(["sweep", "in.flight", "-var", "speed=1,2,3", "-record", "n", "-jobs", "1"]) == 0
+    assert [row["n"] for row in records.read(folder / "sweep.csv")] == ["4"] * 3
 
 
 @pytest.mark.parametrize(

@@ -137,6 +137,11 @@ def _entries(family: str, name: str) -> list[EntryPoint]:
     )
 
 
+def foreign() -> list[tuple[str, str]]:
+    """List styles of other packages that have been asked for."""
+    return [key for key, style in _loaded.items() if not style.__module__.startswith(PREFIX)]
+
+
 def forget() -> None:
     """Look for packages anew (tests install and remove them)."""
     _families.cache_clear()

@@ -10,14 +10,16 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import karamelo_py
+from karamelo_py.app.studies.warm import Warm
 from karamelo_py.output.files import write_whole
 from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.terms import number_of
 
 KEPT = "case.json"
 WAIT4 = hasattr(os, "wait4")
@@ -103,6 +105,14 @@ class Stop(Exception):
 
 
 @dataclass
+class Forked:
+    """A process that is a copy of another, by its number, as subprocess.Popen has one."""
+
+    pid: int | None
+    returncode: int | None = None
+
+
+@dataclass
 class Launch:
     """Run the cases of a study."""
 
@@ -112,6 +122,7 @@ class Launch:
     limit: float | None = None  # seconds after which a run is given up
     texts: tuple[str, ...] = ()  # of the script and those that it includes
     stop: threading.Event = field(default_factory=threading.Event)  # set when the study is to end
+    warm: Warm = field(default_factory=lambda: Warm(environment()))
 
     def key(self, case: Mapping[str, str]) -> str:
         """Hash what a result belongs to: it is used again only for the very same."""
@@ -160,18 +171,19 @@ class Launch:
         return outcome
 
     def _once(self, case: Mapping[str, str], folder: Path) -> CaseOutcome:
-        command = [*PROGRAM, str(self.script.resolve()), *options_of(case)]
-        command += ["--threads", str(self.threads)]
+        words = [str(self.script.resolve()), *options_of(case), "--threads", str(self.threads)]
         (folder / "log.mpm").unlink(missing_ok=True)
         begun = time.perf_counter()
         with (
-            (folder / "out.txt").open("w", encoding="utf-8") as out,
-            (folder / "err.txt").open("w", encoding="utf-8") as err,
+            (folder / "out.txt").open("wb") as out,
+            (folder / "err.txt").open("wb") as err,
         ):
-            process = subprocess.Popen(
-                command, cwd=folder, stdin=subprocess.DEVNULL, stdout=out, stderr=err,
-                env=environment(), start_new_session=os.name == "posix",
-            )  # fmt: skip
+            process: Any = Forked(self.warm.start(kind_of(case.values()), words, folder, out, err))
+            if process.pid is None:
+                process = subprocess.Popen(
+                    [*PROGRAM, *words], cwd=folder, stdin=subprocess.DEVNULL, stdout=out,
+                    stderr=err, env=environment(), start_new_session=os.name == "posix",
+                )  # fmt: skip
             memory, overdue = self._wait(process, begun)
         facts = read_facts(said_in(folder / "out.txt"))
         facts["wall_s"] = time.perf_counter() - begun
@@ -190,7 +202,7 @@ class Launch:
                 outcome.status = "refused"
         return outcome
 
-    def _wait(self, process: subprocess.Popen, begun: float) -> tuple[float | None, bool]:
+    def _wait(self, process: Any, begun: float) -> tuple[float | None, bool]:
         """Wait for the end; tells the peak memory in MiB, where known, and whether it was late."""
         pause, memory = 0.005, None
         while process.returncode is None:
@@ -212,6 +224,11 @@ class Launch:
             raise Stop
         late = bool(self.limit) and time.perf_counter() - begun > self.limit
         return memory, late and process.returncode != 0
+
+
+def kind_of(values: Iterable[str]) -> tuple[str, ...]:
+    """Pick what the loops of a case are compiled for, as far as variables tell: its words."""
+    return tuple(value for value in values if number_of(value) is None)
 
 
 def options_of(case: Mapping[str, str]) -> list[str]:

@@ -7,7 +7,7 @@ import os
 import sys
 import time
 from argparse import ArgumentParser
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,7 +17,7 @@ import numpy as np
 
 from karamelo_py.app.options import positive
 from karamelo_py.app.studies import variables
-from karamelo_py.app.studies.case import CaseOutcome, Launch, Refused, folder_name
+from karamelo_py.app.studies.case import CaseOutcome, Launch, Refused, folder_name, kind_of
 from karamelo_py.app.studies.records import Recorded, recorded, row, surroundings, write
 from karamelo_py.output.console import duration
 from karamelo_py.script.errors import ScriptError, plural
@@ -198,11 +198,6 @@ class _Display:
 
 def _said(case: Mapping[str, str]) -> str:
     return " ".join(f"{name}={value}" for name, value in case.items())
-
-
-def kind_of(values: Iterable[str]) -> tuple[str, ...]:
-    """Pick what the loops of a case are compiled for, as far as variables tell: its words."""
-    return tuple(value for value in values if number_of(value) is None)
 
 
 def guessed_time(
