@@ -16,6 +16,7 @@ names in ``carries``, too.
 from __future__ import annotations
 
 import copy
+import functools
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -72,7 +73,12 @@ class PartStates(NamedTuple):
 
 def named(part: Any, where: str = "remembers") -> tuple[str, ...]:
     """List the attributes that a part and its bases name in ``remembers`` or ``carries``."""
-    names = (name for c in reversed(type(part).__mro__) for name in vars(c).get(where, ()))
+    return _named_by(type(part), where)
+
+
+@functools.cache
+def _named_by(kind: type, where: str) -> tuple[str, ...]:
+    names = (name for c in reversed(kind.__mro__) for name in vars(c).get(where, ()))
     return tuple(dict.fromkeys(names))
 
 
