@@ -202,15 +202,15 @@ def test_the_copy_is_that_of_a_run(real):
 
 
 def test_a_scene_that_does_not_fit_is_refused_in_one_message(small, tmp_path, capsys, monkeypatch):
-    """48 points in space of 160 bytes, 112 more in the copy, and 6 nodes: 14 kB, 1.4 = 1.13^3."""
+    """48 points in space of 160 bytes, 112 more in the copy, and 6 nodes: more than 13 kB."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "in.large").write_text(block(3, "run(1)"), encoding="utf-8")
-    small(10_000)
+    small(13_000)
     assert main(["in.large"]) == 1
     said = capsys.readouterr().err
     assert said.startswith("in.large:6:1: error: solid: the scene has 48 points, which take at ")
-    assert said.count("error") == 1 and "cells 1.2 times as large" in said
-    assert "; this machine has 9.31e-06 GiB in all" in said
+    assert said.count("error") == 1 and "cells 1.1 times as large" in said
+    assert "; this machine has 1.21e-05 GiB in all" in said
     assert "precision(single)" in said and "several machines" in said
 
 
@@ -298,7 +298,7 @@ def test_points_are_not_counted_to_the_end_where_none_fits(small, tmp_path, caps
     (tmp_path / "in.script").write_text(block(2, "run(1)"), encoding="utf-8")
     small(64 * 10)
     assert main(["in.script"]) == 1
-    assert "more than 10 points" in capsys.readouterr().err
+    assert "the scene has some 24 points with these" in capsys.readouterr().err
 
 
 def test_a_grid_that_no_machine_has_room_for(tmp_path, capsys, monkeypatch):

@@ -5,6 +5,7 @@ from hubs import SmallHub
 from scenes import block
 
 from karamelo_py.scene.lattice import Lattice
+from karamelo_py.scene.machine_memory import Room
 from karamelo_py.scene.placement import SAMPLE, fill
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.regions import Cylinder
@@ -96,8 +97,12 @@ def test_points_without_memory_are_not_counted():
     inside = disk.inside
     disk.inside = lambda x: looked.append(len(x)) or inside(x)
     lattice = Lattice(2, hub.domain.lo, hub.domain.hi, 1e-4)
-    with pytest.raises(ScriptError, match=r"the scene has more than 4e\+07 points"):
-        fill(disk, hub.domain, lattice, 2, room=lambda: 4e7)
+    room = Room(whole=4e9, of_one=100, already=0, single=False)
+    said = (
+        r"the scene has some 4.\de\+07 points with these, which take more than 4.\d+ GiB of memory"
+    )
+    with pytest.raises(ScriptError, match=rf"{said}; this machine has 3.73 GiB in all"):
+        fill(disk, hub.domain, lattice, 2, room=lambda: room)
     assert sum(looked) == SAMPLE
 
 

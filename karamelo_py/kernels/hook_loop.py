@@ -462,7 +462,7 @@ def _work_at_nodes(what, hooks, control, dt, count):
 
 
 class _NoWhole(NamedTuple):
-    """What takes the place of the functions of whole points in loops that know none."""
+    """Take the place of the functions of whole points in loops that know none."""
 
     whole: tuple
 
@@ -691,7 +691,7 @@ def point_hooks(stage, blocks, hooks, control, dt):
 
 @shared
 def whole_points(hooks, kin, points, laws, x, heat):
-    """What each of the functions of whole points acts on."""
+    """Give what each of the functions of whole points acts on."""
     return tuple([WholePoints(tag, points.id, kin, points, laws, x, heat) for tag in hooks.whole])
 
 

@@ -2,6 +2,7 @@
 
 import time
 import warnings
+from collections.abc import Callable
 from contextlib import suppress
 from math import inf
 from pathlib import Path
@@ -13,6 +14,7 @@ except ImportError:  # Windows
     resource = None
 
 from karamelo_py.language.scene import Scene
+from karamelo_py.script.errors import ScriptError, render_message
 
 # Of all memory: what the system keeps for itself and gives back when it has to.
 SLACK = 0.03
@@ -115,13 +117,56 @@ def age() -> float:
     return time.time() - psutil.Process().create_time()
 
 
-def most_points(hub: Scene, already: int, dimension: int, state: int) -> float:
-    """Count the points there may be beside those that are there `already`, whatever their fields.
+GIB = 2**30
+MANY = 20_000_000  # points, which take seconds to be placed
 
-    Two places, a velocity, a mass and the `state` of a law in single precision, and three numbers
-    that are whole.
+
+def in_words(count: float) -> str:
+    size = count / GIB
+    return f"{size:.0f} GiB" if size >= 100 else f"{size:.3g} GiB"
+
+
+class Room(NamedTuple):
+    """Memory for points beside those that are there `already`, whatever their fields."""
+
+    whole: float  # bytes of memory for all points
+    of_one: int  # bytes that a point takes at least
+    already: int
+    single: bool  # they are in single precision
+    say: Callable[[str], None] = lambda text: None
+
+    @property
+    def most(self) -> float:
+        """Count the points that there may be yet."""
+        return max(self.whole / self.of_one - self.already, 0.0)
+
+    def tell(self, count: float) -> None:
+        """Tell of points that take a while to be placed."""
+        if count > MANY:
+            words = f"some {count:.2g} points are placed, which take more than "
+            self.say(render_message("note", f"{words}{in_words(count * self.of_one)} of memory"))
+
+    def refused(self, count: float) -> ScriptError:
+        """Make the error for so many points."""
+        need = in_words((count + self.already) * self.of_one)
+        return ScriptError(
+            f"the scene has some {count + self.already:.2g} points with these, which take more "
+            f"than {need} of memory; this machine has {in_words(self.whole)} in all",
+            hint="larger cells, or fewer points per cell"
+            + ("" if self.single else "; precision(single) before this line takes half of it"),
+        )
+
+
+def room_for_points(hub: Scene, already: int, dimension: int, state: int) -> Room:
+    """Ask what room there is for points with a law of so many numbers in its `state`.
+
+    A point has two places, a velocity, a mass and the state, and three numbers that are whole. In a
+    run the last good state has a place, the velocity and the state once more.
     """
-    of_one, comm = 4 * (3 * dimension + 1 + state) + 16, hub.settings.comm
-    found = machine_memory(comm.on_machine)
+    settings = hub.settings
+    found, comm = machine_memory(settings.comm.on_machine), settings.comm
+    single = settings.precision == "single"
+    numbers = 3 * dimension + 1 + state + (0 if hub.checking else 2 * dimension + state)
+    of_one = (4 if single else 8) * numbers + 16
     whole = inf if found is None else found.whole
-    return max(whole / comm.share_here / of_one - already, 0.0)
+    return Room(whole / comm.share_here, of_one, already, single, hub.console.say)

@@ -11,6 +11,7 @@ import numpy as np
 from karamelo_py.scene.clipping import Pieces, clip, join
 from karamelo_py.scene.domain import Domain
 from karamelo_py.scene.lattice import Lattice, chunks, positions
+from karamelo_py.scene.machine_memory import Room
 from karamelo_py.scene.region import Region
 from karamelo_py.script.errors import ScriptError
 
@@ -178,7 +179,7 @@ def fill(
     lattice: Lattice,
     ppc: int,
     rule: str | None = None,
-    room: Callable[[], float] = lambda: math.inf,
+    room: Callable[[], Room] | None = None,
 ) -> Placement:
     """The points of `lattice` that fill `region` within the domain.
 
@@ -234,9 +235,12 @@ def fill(
     numbers: list[np.ndarray] = []  # which point of the pattern each one is
     left: list[tuple[np.ndarray, Pieces]] = []
     outside = 0.0
-    most = room() if inner > FEW else math.inf
-    if most < math.inf and _least(region, domain, h / ppc) > most:
-        raise _no_room(most)
+    there = room() if room is not None and inner > FEW else None
+    if there is not None:
+        least = _least(region, domain, h / ppc)
+        if least > there.most:
+            raise there.refused(least)
+        there.tell(least)
     for begin, end in x0.chunks:
         x = x0.candidates(begin, end)
         if rule == "cut":
@@ -253,8 +257,8 @@ def fill(
             continue
         kept &= in_domain
         x0.keep(kept)
-        if len(x0) > most:
-            raise _no_room(most)
+        if there is not None and len(x0) > there.most:
+            raise there.refused(len(x0))
         if not even:
             numbers.append(np.flatnonzero(kept) % len(places))
     if reaches_out.any() and not counted:
@@ -277,13 +281,6 @@ def _least(region: Region, domain: Domain, spacing: float) -> float:
     # Four times what its mean is uncertain by.
     least = share - 4 * math.sqrt(max(share * (1 - share), 1 / SAMPLE) / SAMPLE)
     return least * math.prod((size / spacing).tolist())
-
-
-def _no_room(most: float) -> ScriptError:
-    return ScriptError(
-        f"the scene has more than {most:.3g} points, and this machine has no memory for so many",
-        hint="larger cells, or fewer points per cell",
-    )
 
 
 def _cut_off(

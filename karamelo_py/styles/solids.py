@@ -13,7 +13,7 @@ from karamelo_py.points.kinematics import KINEMATICS
 from karamelo_py.points.laws import initial_state
 from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.machine_memory import most_points
+from karamelo_py.scene.machine_memory import room_for_points
 from karamelo_py.scene.material import Material
 from karamelo_py.scene.placement import Placement, fill, lattice_of
 from karamelo_py.scene.region import Region
@@ -111,7 +111,7 @@ class RegionSolid(Solid):
             )
         kin = KINEMATICS[domain.dimension]()
         state = count_in(initial_state(law_on(material.law, self.h, T0 or 0.0), kin, 1.0))
-        room = partial(most_points, hub, self.first_id, domain.dimension, state)
+        room = partial(room_for_points, hub, self.first_id, domain.dimension, state)
         placement = fill(region, domain, lattice, ppc, points, room)
         self.put(hub, placement, may_be_empty=region.unknown)
         if placement.missed:

@@ -15,7 +15,7 @@ from karamelo_py.run.checkpoint.arrays import of_nodes
 from karamelo_py.run.lower.build import PRECISIONS, lower_points, part_of, point_kinds
 from karamelo_py.run.mpi.partition import occupied
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.machine_memory import machine_memory
+from karamelo_py.scene.machine_memory import in_words, machine_memory
 from karamelo_py.scene.solid import Solid, own_grids
 from karamelo_py.script.errors import ScriptError, plural
 
@@ -105,7 +105,6 @@ def bytes_per_point(simulation: Any) -> int:
     return round(np.dot(counts, of_one) / max(1, sum(counts)))
 
 
-GIB = 2**30
 FEW = 100_000  # points; so many have room everywhere
 
 
@@ -137,11 +136,6 @@ def check_room(hub: Hub, *, copied: bool) -> None:
     error = ScriptError(f"{message}{in_words(there.whole)} in all", place=place, hint=hint)
     error.command = "solid"
     raise error
-
-
-def in_words(count: float) -> str:
-    size = count / GIB
-    return f"{size:.0f} GiB" if size >= 100 else f"{size:.3g} GiB"
 
 
 def _ways(hub: Hub, need: float, there: float, copied: bool) -> str:
