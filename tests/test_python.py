@@ -189,7 +189,16 @@ def test_points_from_arrays_and_files(interpreted):
         bent = Simulation(made)
         bent.solid("body", "points", columns | {"s12": columns["x"]}, "rubber", 0.1)
         np.testing.assert_allclose(bent.points["s12"], columns["x"])
+        warm = Simulation(made.replace("FLIP, linear, 1", "FLIP, linear, 1, thermo-mechanical")
+                          .replace("100, 0.3)", "100, 0.3, 7, 0)"))
+        warm.solid("body", "points", columns | {"T": 300 + columns["x"]}, "rubber", 0.1, 300)
+        np.testing.assert_array_equal(warm.points["T"], 300 + columns["x"])
+        warm.run(3)
+        np.testing.assert_allclose(warm.points["T"], 300 + columns["x"], rtol=1e-4)
+        warm.points["T"] = 310
+        assert (warm.points["T"] == 310).all()
         for wrong, says in (
+            ({"T": np.ones(24)}, "a material of this scene has no temperature T"),
             ({"volume": np.zeros(24)}, "point 1 of the table has no place, or no volume above 0"),
             ({"volume": np.ones(3)}, "has columns of several lengths"),
             ({"x": np.full(24, 9.0)}, "all of them lie outside the domain"),

@@ -101,8 +101,8 @@ class Columns(Mapping):
 class PointColumns(Columns):
     """Columns of the points: ``points["vx"] = values`` sets one between two runs.
 
-    x, y, z, velocities, stresses (of materials in rate form) and fields of parts can be set, to a
-    number or to one for each point (n,); others follow from these.
+    x, y, z, velocities, temperatures, stresses (of materials in rate form) and fields of parts can
+    be set, to a number or to one for each point (n,); others follow from these.
     """
 
     def __init__(self, hub: Hub):

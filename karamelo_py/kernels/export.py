@@ -16,6 +16,7 @@ from karamelo_py.points.laws import (
     shown,
     specific_volume,
     with_stress,
+    with_temperature,
 )
 
 STRAIN, JACOBIAN, ENERGY = 6, 12, 13
@@ -64,6 +65,16 @@ def impose_stress(kin, points, laws, chosen, given, stress):
             if not given[k]:
                 stress[p, k] = old[k]
         store(points.state, p, with_stress(law, kin, state, row(stress, p, 0, old)))
+
+
+@kernel
+def impose_temperature(kin, points, laws, rows, temperature):
+    """Set the temperature (n,) of the points in these rows."""
+    points, laws = at_hand(points), at_hand(laws)
+    for k in range(rows.size):
+        p = index(rows[k])
+        law, state = state_at(kin, points, laws, p)
+        store(points.state, p, with_temperature(law, kin, state, temperature[k]))
 
 
 @kernel

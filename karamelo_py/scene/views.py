@@ -14,7 +14,7 @@ import numpy as np
 
 from karamelo_py.compiler.fields import field, name_of
 from karamelo_py.kernels import arrays
-from karamelo_py.kernels.export import export_velocity_moment, impose_stress
+from karamelo_py.kernels.export import export_velocity_moment, impose_stress, impose_temperature
 from karamelo_py.kernels.heat import Supply, Temperature
 from karamelo_py.kernels.hook_loop import corners_that_move
 from karamelo_py.kernels.laws import elastic_law
@@ -28,7 +28,7 @@ from karamelo_py.output.point_table import (
     declared_columns,
     places_before,
 )
-from karamelo_py.points.laws import can, with_stress
+from karamelo_py.points.laws import can, with_stress, with_temperature
 from karamelo_py.points.transfers import Moment
 from karamelo_py.script.errors import NoItem, Place, ScriptError, nearest
 
@@ -410,8 +410,16 @@ class PointsView(View):
                 stress[rows] = values[own]
                 impose_stress(s.kin, points, block.laws, chosen, flags, stress)
 
+    def set_temperature(self, values: np.ndarray) -> None:
+        """Set the temperatures (n,) of points whose materials have one."""
+        s = self._simulation.setup
+        for block, rows, own in self._rows.parts:
+            points = arrays.known_to_laws(block.points)
+            own_values = np.ascontiguousarray(values[own], s.nodes.sums.dtype)
+            impose_temperature(s.kin, points, block.laws, np.asarray(rows), own_values)
+
     def set_column(self, name: str, values: np.ndarray) -> None:
-        """Set a column of dumps to `values` (n,): a place, velocity, stress, or field of a part."""
+        """Set a column of dumps to `values` (n,): place, velocity, stress, T, field of a part."""
         d, hub = self._simulation.kin.dimension, self._simulation.hub
         attribute, k = VECTORS.get(name, ("", 0))
         kind, column = declared_columns(hub, "point_fields").get(name, (None, 0))
@@ -429,11 +437,19 @@ class PointsView(View):
                     expected="materials in rate form, such as linear or eos-strength",
                 )
             self.set_stress({name[1:]: values})
+        elif name == "T":
+            if not all(can(part.block.laws, with_temperature) for part in self._rows.parts):
+                raise ScriptError(
+                    "a material of this scene has no temperature T",
+                    expected="material(ID, linear, rho, E, nu, cp, kappa), or temperature(...) "
+                    "with eos-strength",
+                )
+            self.set_temperature(values)
         else:
             raise ScriptError(
                 f"'{name}' cannot be set: it follows from other columns",
-                expected=f"{', '.join(AXES[:d])}, v{', v'.join(AXES[:d])}, s11 and the like, or a "
-                "column of a field of a part",
+                expected=f"{', '.join(AXES[:d])}, v{', v'.join(AXES[:d])}, s11 and the like, T, "
+                "or a column of a field of a part",
             )
         self.write_back()
 

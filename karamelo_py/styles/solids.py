@@ -145,8 +145,9 @@ class PointsSolid(Solid):
     table
         Name of a file of columns of numbers with a row of names: ``x``, ``y``, ``z`` (as many as
         there are dimensions), ``volume`` (in the plane for a thickness of 1, in an axisymmetric
-        domain the area in the plane), and perhaps velocities (``vx`` ...) and Cauchy stresses
-        (``s11`` ..., of materials in rate form). In Python a dictionary of arrays, or a DataFrame.
+        domain the area in the plane), and perhaps velocities (``vx`` ...), temperatures (``T``) and
+        Cauchy stresses (``s11`` ..., of materials in rate form). In Python a dictionary of arrays,
+        or a DataFrame.
     GlueToSolid
         As in solid region.
 
@@ -187,7 +188,7 @@ class PointsSolid(Solid):
             raise ScriptError(
                 f"{self.table} {what}",
                 argument="table",
-                expected=f"columns {', '.join(AXES[:d])}, volume, and perhaps vx ..., s11 ...",
+                expected=f"columns {', '.join(AXES[:d])}, volume, and perhaps vx ..., T, s11 ...",
             )
         x = np.column_stack([columns.pop(axis) for axis in AXES[:d]])
         volume = columns.pop("volume")
@@ -199,7 +200,9 @@ class PointsSolid(Solid):
             )
         half = volume[:, None] ** (1 / d) / 2 * np.ones(d)
         kept = domain.contains(x)
-        self.initial = {name: of[kept] for name, of in columns.items()}
+        # A stress is that at the temperature of the point.
+        order = sorted(columns, key=lambda name: name != "T")
+        self.initial = {name: columns[name][kept] for name in order}
         near, size = (x[kept], half[kept]) if kept.any() else (x, half)
         self.put(
             hub,
