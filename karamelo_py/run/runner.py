@@ -15,6 +15,7 @@ import numpy as np
 from karamelo_py.compiler import cache
 from karamelo_py.compiler.loops import compilation
 from karamelo_py.output.console import duration
+from karamelo_py.points.basis import support
 from karamelo_py.run.advice import known_failures
 from karamelo_py.run.advice.report import report
 from karamelo_py.run.diagnosis import energy
@@ -358,6 +359,7 @@ class Runner:
                 "method": hub.update.words,
                 "points": int(simulation.present.sum()),
                 "nodes": hub.fields.node_count,
+                "nodes per point": support(simulation.setup.basis, simulation.setup.kin),
                 "bytes per particle": bytes_per_point(simulation),
                 "dt": simulation.dt,
                 **({} if simulation.implicit else of_waves),

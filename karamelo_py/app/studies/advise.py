@@ -5,16 +5,33 @@ import subprocess
 from argparse import ArgumentParser
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from math import inf
+from math import inf, prod
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from karamelo_py.app.options import above_zero, positive
-from karamelo_py.app.studies import records, variables
-from karamelo_py.app.studies.case import PROGRAM, environment, options_of, worded
-from karamelo_py.app.studies.curves import column, order, usable
+from karamelo_py.app.studies import look, records, variables
+from karamelo_py.app.studies.case import (
+    PROGRAM,
+    environment,
+    messages_in,
+    options_of,
+    said_in,
+    worded,
+)
+from karamelo_py.app.studies.curves import (
+    REACHED,
+    WORSE,
+    by_chance,
+    column,
+    credible,
+    errors,
+    order,
+    reached,
+    usable,
+)
 from karamelo_py.app.studies.study import Study, plain_table, shown, terminal
 from karamelo_py.script.errors import ScriptError, plural
 from karamelo_py.script.terms import number_of
@@ -26,9 +43,15 @@ target at the least cost, how sure that is, and what to write.
   karamelo-py advise in.file -var N=10,20,40,80,160 -var basis=linear,cubic-spline \\
     -accuracy err -target 1e-3
 
-One variable, the number with the most values, makes a scene finer; the others are choices. Runs go
-one at a time, since their times count, unless another cost is named. With -run the variant is run,
+One variable, the number with the most values, makes a scene finer; the others are choices. Where
+all numbers have one value, words are compared at that size. Runs go one at a time, since their
+times count, unless another cost is named. What an earlier call has run is used. A run that meets
+the target by chance is not advised: where the sign of its error changes, its order exceeds that of
+its functions, or a finer run is worse; a finer run is made to see it. With -run the variant is run,
 and it is told whether it met the target."""
+
+
+SECOND = 2.0  # the order that all methods here may reach
 
 
 @dataclass(frozen=True)
@@ -42,18 +65,20 @@ class Forecast:
 
 
 def forecast(
-    x: float, xs: Sequence[float], rows: Sequence[Mapping[str, Any]], accuracy: str, cost: str
-) -> Forecast | None:
+    x: float, xs: Sequence[float], rows: Sequence[Mapping[str, Any]], accuracy: str, cost: str,
+    highest: float = 4.0,
+) -> Forecast | None:  # fmt: skip
     """Expect a run at `x` from the runs at `xs`, coarse ones first.
 
     The error goes on with the order between the last two. Its bounds are those of the least and the
     largest order so far, at least a third of the expected order away; an order that has fallen may
-    fall by as much again. The time is steps times (a + b points), fitted to the runs; any other
-    cost goes on as between the last two. None where fewer than two runs have an error, or the last
-    one got worse.
+    fall by as much again, and one that has not yet reached 2 may. Errors that chance has made small
+    count as large as they may be (`credible`, with the order `highest` of the functions). The time
+    is steps times (a + b points), fitted to the runs; any other cost goes on as between the last
+    two. None where fewer than two runs have an error, or the last one got worse.
     """
     xs = np.asarray(xs, float)
-    error = column(rows, accuracy)
+    error = credible(xs, errors(rows, accuracy), highest)
     good = np.isfinite(error) & (error > 0)
     if good.sum() < 2 or not good[-1]:
         return None
@@ -70,7 +95,7 @@ def forecast(
     # An order that falls may go on falling.
     drop = max(-fall[-2] - expected, 0.0) if len(fall) > 1 else 0.0
     slow = max(min(*rates, 2 / 3 * expected, expected - drop), 0.0)
-    fast = max(*rates, 4 / 3 * expected)
+    fast = max(*rates, 4 / 3 * expected, min(highest, SECOND) if drop == 0 else 0.0)
     at = [float(error[-1] * np.exp(-rate * way)) for rate in (expected, fast, slow)]
     return Forecast(*at, _cost(x, xs, rows, cost))
 
@@ -103,11 +128,31 @@ class ChoiceRuns:
 
     values: dict[str, str]
     rows: list[Mapping[str, Any]] = field(default_factory=list)
+    words: frozenset[str] = frozenset()  # of its method, as its runs tell
+    warnings: tuple[str, ...] = ()  # of its finest run
 
     @property
     def label(self) -> str:
         """The choice in words."""
         return worded(self.values) or "the script"
+
+    @property
+    def kind(self) -> set[str]:
+        """Its functions, and whether they move with the body: what decides where errors end."""
+        return {*self.values.values(), *self.words} & {*REACHED, *look.FAMILIES[2]}
+
+    @property
+    def highest(self) -> float:
+        """The order of its functions."""
+        return reached(self.kind)
+
+    def look(self, folder: Path) -> None:
+        """Read what its finest run has said."""
+        place = folder / self.rows[-1]["folder"]
+        method = re.search(r"^  method +(.*)$", said_in(place / "out.txt"), re.M)
+        self.words = frozenset(method[1].split()) if method else frozenset()
+        said = messages_in(said_in(place / "err.txt"))
+        self.warnings = tuple(text for kind, text in said if kind == "warning")
 
 
 @dataclass
@@ -119,6 +164,7 @@ class Candidate:
     cost: float
     error: float
     forecast: Forecast | None = None
+    chance: str = ""  # why it may meet the target by chance alone
 
 
 class Adviser:
@@ -135,43 +181,68 @@ class Adviser:
         self.study = study
         self.name, self.values = along
         self.xs = [float(value) for value in self.values]
+        self.folder = getattr(study, "folder", Path()).parent
         self.choices = choices
         self.accuracy, self.cost, self.target = accuracy, cost, target
 
     def go_on(self, choice: ChoiceRuns) -> None:
         """Run the next finer variant of a choice."""
+        choice.rows += self.study.run([self._next(choice)])
+        choice.look(self.folder)
+
+    def _next(self, choice: ChoiceRuns) -> dict[str, str]:
         case = {**choice.values, self.name: self.values[len(choice.rows)]}
-        choice.rows += self.study.run([{name: case[name] for name in self.study.names}])
+        return {name: case[name] for name in self.study.names}
 
     def pilot(self, count: int) -> None:
-        """Run the coarsest variants of all choices, but none beyond the target."""
+        """Run the coarsest variants of all choices, but none beyond the target.
+
+        What an earlier study has run is known as well.
+        """
         for _ in range(min(count, len(self.values))):
             for choice in self.choices:
-                if self._met(choice) is None:
+                if not self._met(choice):
                     self.go_on(choice)
+        for choice in self.choices:
+            while len(choice.rows) < len(self.values) and self.study.knows(self._next(choice)):
+                self.go_on(choice)
 
-    def _met(self, choice: ChoiceRuns) -> int | None:
-        """Find the first of its runs that meets the target."""
-        errors = column(choice.rows, self.accuracy)
-        return next((k for k, e in enumerate(errors) if e <= self.target), None)
+    def _met(self, choice: ChoiceRuns) -> list[Candidate]:
+        """Find those of its runs that meet the target."""
+        signed = errors(choice.rows, self.accuracy)
+        costs = column(choice.rows, self.cost)
+        why = by_chance(self.xs[: len(signed)], signed, choice.highest)
+        return [
+            Candidate(choice, k, cost, abs(error), None, chance)
+            for k, (cost, error, chance) in enumerate(zip(costs, signed, why, strict=True))
+            if abs(error) <= self.target
+        ]
 
-    def candidate(self, choice: ChoiceRuns, hope: bool = False) -> Candidate | None:
+    def candidate(
+        self, choice: ChoiceRuns, hope: bool = False, lucky: bool = False
+    ) -> Candidate | None:
         """Find the cheapest variant of a choice that meets the target, known or expected.
 
-        With `hope` by the lower bound of the error.
+        With `hope` by the lower bound of the error; if `lucky`, one that may do so by chance.
         """
-        k = self._met(choice)
-        if k is not None:
-            cost, error = (column(choice.rows, name)[k] for name in (self.cost, self.accuracy))
-            return Candidate(choice, k, cost, error)
+        met = [found for found in self._met(choice) if lucky or not found.chance]
+        if met or lucky:
+            return met[0] if met else None
         known = self.xs[: len(choice.rows)]
         for step in range(len(known), len(self.xs)):
-            found = forecast(self.xs[step], known, choice.rows, self.accuracy, self.cost)
+            found = forecast(
+                self.xs[step], known, choice.rows, self.accuracy, self.cost, choice.highest
+            )
             if found is None:
                 break
             if (found.low if hope else found.error) <= self.target:
                 return Candidate(choice, step, found.cost, found.error, found)
         return None
+
+    def lucky(self) -> Candidate | None:
+        """Find the cheapest variant of all that meets the target, if only by chance."""
+        found = filter(None, (self.candidate(choice, lucky=True) for choice in self.choices))
+        return min(found, key=lambda c: c.cost, default=None)
 
     def candidates(self, hope: bool = False) -> list[Candidate]:
         """Find those of all choices, the cheapest first."""
@@ -187,6 +258,9 @@ class Adviser:
         while True:
             best = next(iter(self.candidates()), None)
             limit = best.cost if best else inf
+            if (doubted := self._doubted(limit)) is not None:
+                self.go_on(doubted)
+                continue
             doubtful = [
                 c for c in self.candidates(hope=True)
                 if c.forecast and c.step > len(c.choice.rows) and c.cost <= limit
@@ -195,13 +269,41 @@ class Adviser:
                 return best
             self.go_on(doubtful[0].choice)
 
+    def _doubted(self, limit: float) -> ChoiceRuns | None:
+        """Find a choice whose finest run meets the target below a cost, perhaps by chance."""
+        for choice in self.choices:
+            met = self._met(choice)
+            if met and met[0].cost < limit and len(choice.rows) < len(self.values):
+                last = met[-1]
+                if last.chance and last.step == len(choice.rows) - 1:
+                    return choice
+        return None
+
+    def doubts(self, best: Candidate) -> list[str]:
+        """Tell what the error of a forecast may end at: what is known of its kind."""
+        found = [f"its runs are warned of: {text}" for text in best.choice.warnings[:1]]
+        for other in self.choices:
+            if other.kind != best.choice.kind:
+                continue
+            signed = errors(other.rows, self.accuracy)
+            sizes = np.abs(signed)
+            floor = np.nanmin(credible(self.xs[: len(sizes)], signed, other.highest))
+            if sizes[-1] > WORSE * np.nanmin(sizes) and floor > best.forecast.low:
+                said = f"{other.label} did not stay below {floor:.3g}"
+                found.append(f"finer runs of the same functions turned round: {said}")
+        return found
+
     def hopeful(self) -> Candidate | None:
         """Find the cheapest variant that may meet the target though none is expected to."""
         return next((c for c in self.candidates(hope=True) if c.forecast), None)
 
     def label(self, choice: ChoiceRuns, step: int) -> str:
         """Write a variant in words."""
-        return f"{choice.label}, {self.name} = {self.values[step]}"
+        return worded({**choice.values, **self.at(step)})
+
+    def at(self, step: int) -> dict[str, str]:
+        """Give the value of the variable that makes the scene finer."""
+        return {self.name: self.values[step]}
 
 
 def add_options(parser: ArgumentParser) -> None:
@@ -232,11 +334,14 @@ def run(options: Any) -> int:
         raise ScriptError(f"-cost {options.cost}", expected="one of " + ", ".join(records.COLUMNS))
     numeric = [name for name in values if all(number_of(v) is not None for v in values[name])]
     name = options.along or max(numeric, key=lambda n: len(values[n]), default=None)
-    if name not in numeric or len(values[name]) < 3:
+    # Words may be compared at one size.
+    compared = name in numeric and len(values[name]) == 1 < prod(map(len, values.values()))
+    if name not in numeric or (len(values[name]) < 3 and not compared):
         wrong = "no variable makes the scene finer"
         if name in numeric:
             wrong = f"-var {name} has {plural(len(values[name]), 'value')}"
-        expected = "a number with at least 3 values, such as -var N=10,20,40,80"
+        expected = "a number with at least 3 values, such as -var N=10,20,40,80, or with one value "
+        expected += "and words to compare"
         raise ScriptError(wrong, expected=expected)
     others = {n: v for n, v in values.items() if n != name}
     together = variables.zipped(options)
@@ -247,7 +352,9 @@ def run(options: Any) -> int:
     most = len(choices) * len(values[name])
     study = Study(launch, out, list(values), items, jobs, options.again, strict=True, most=most)
     study.describe(variables=values, record=[items[0].text], timed=timed, repeat=1)
-    ordered = coarse_first(options.script, name, values[name], choices[0].values)
+    ordered = values[name]
+    if len(ordered) > 1:
+        ordered = coarse_first(options.script, name, ordered, choices[0].values)
     adviser = Adviser(study, (name, ordered), choices, items[0].word, options.cost, options.target)
     adviser.pilot(options.pilot)
     best = adviser.best()
@@ -284,16 +391,17 @@ def tell(adviser: Adviser) -> None:
     headings = ("runs", f"finest {adviser.name}", adviser.accuracy, "order", "meets it at", "cost")
     table = plain_table(["choice"], headings)
     for choice in adviser.choices:
-        errors = column(choice.rows, adviser.accuracy)
+        signed = errors(choice.rows, adviser.accuracy)
         last, count = choice.rows[-1], len(choice.rows)
-        found = adviser.candidate(choice)
+        found = adviser.candidate(choice) or adviser.candidate(choice, lucky=True)
         where = cost = error = "–"
         if found is not None:
-            where = adviser.values[found.step]
+            where = adviser.values[found.step] + " by chance" * bool(found.chance)
             cost = "about " * bool(found.forecast) + shown(float(found.cost))
         fit = f"{last['status']}: {last['reason']}"[:60]
-        if usable(errors[-1]):
-            error, fit = shown(float(errors[-1])), str(order(adviser.xs[:count], errors))
+        if np.isfinite(signed[-1]):
+            xs = adviser.xs[:count]
+            error, fit = shown(float(signed[-1])), str(order(xs, np.abs(signed)).towards(xs))
         fine = adviser.values[count - 1]
         table.add_row(choice.label, str(count), fine, error, fit, where, cost)
     terminal().print(table)
@@ -308,32 +416,49 @@ def advise(adviser: Adviser, best: Candidate, script: Path) -> None:
     words = " ".join(f"-var {name} {value}" for name, value in values.items())
     print(f"or: karamelo-py {script} {words}")
     print(sureness(adviser, best))
+    lucky = adviser.lucky()
+    if lucky is not None and lucky.chance and lucky.cost < best.cost:
+        print(f"cheaper, but perhaps by chance: {by_luck(adviser, lucky)}")
+
+
+def by_luck(adviser: Adviser, lucky: Candidate) -> str:
+    """Tell of a run that meets the target, if only by chance."""
+    said = f"{adviser.accuracy} {lucky.error:.3g}, {adviser.cost} {lucky.cost:.3g}"
+    return f"{adviser.label(lucky.choice, lucky.step)} ({said}): {lucky.chance}"
 
 
 def sureness(adviser: Adviser, best: Candidate) -> str:
     """Say how sure a candidate is."""
     said = f"{adviser.accuracy} {best.error:.3g}, {adviser.cost} {best.cost:.3g}"
     if best.forecast is None:
-        return f"sure: it was run ({said})"
+        alone = ", and whether finer runs are as good is not known" * (len(adviser.values) == 1)
+        return f"sure: it was run ({said}){alone}"
     low, high = best.forecast.low, best.forecast.high
+    doubts = adviser.doubts(best)
     word = "almost sure"
     if high > adviser.target:
         word = "uncertain" if adviser.target / best.error < 1.1 else "likely"
-    return f"{word}: expected {said}; by its orders the error lies between {low:.3g} and {high:.3g}"
+    if doubts:
+        word = "not sure"
+    said = f"{word}: expected {said}; by its orders the error lies between {low:.3g} and {high:.3g}"
+    return "\n  ".join([said, *doubts])
 
 
 def _nothing(adviser: Adviser) -> int:
     """Say that no variant meets the target, and what comes nearest."""
     print(f"\nno variant is expected to reach {adviser.accuracy} <= {adviser.target:g}")
     found = [
-        (error, adviser.label(choice, k))
+        (abs(error), adviser.label(choice, k))
         for choice in adviser.choices
-        for k, error in enumerate(column(choice.rows, adviser.accuracy)) if usable(error)
+        for k, error in enumerate(errors(choice.rows, adviser.accuracy)) if np.isfinite(error)
     ]  # fmt: skip
     if found:
         error, label = min(found, key=lambda item: item[0])
         others = f"finer values of {adviser.name} or other choices may do"
         print(f"nearest: {label} with {error:.3g}; {others}")
+    lucky = adviser.lucky()
+    if lucky is not None:
+        print(f"not sure, for it may meet the target by chance: {by_luck(adviser, lucky)}")
     hope = adviser.hopeful()
     if hope is not None:
         print(
@@ -354,7 +479,7 @@ def carry_out(adviser: Adviser, best: Candidate | None, script: Path) -> int:
         advised = best.step == len(best.choice.rows)
         adviser.go_on(best.choice)
         row = best.choice.rows[-1]
-        error = column([row], adviser.accuracy)[0]
+        error = abs(errors([row], adviser.accuracy)[0])
         word = "met" if error <= adviser.target else "missed" if advised else "not yet met"
         said = adviser.label(best.choice, len(best.choice.rows) - 1)
         print(f"\nrun: {said}: {adviser.accuracy} {error:.4g}, the target is {word}")

@@ -28,6 +28,8 @@ PROGRAM = [sys.executable, "-m", "karamelo_py.app.cli"]
 _FACT = re.compile(
     r"^( {2}| {4})(\S.*?) {2,}([-+]?\d(?:[\d ]*\d)?(?:\.\d+)?(?:[eE][-+]?\d+)?)", re.MULTILINE
 )
+# Of a script's first run.
+_FIRST = "points", "nodes", "nodes per point", "bytes per particle", "dt", "stable dt", "own dt"
 _MESSAGE = re.compile(r"(?:^|: )(warning|error): (.*)")
 _NOT_ITS_OWN = re.compile(r"internal error|another run is writing")
 # Before the first step as well, and no mistake of a script: larger scenes, longer steps.
@@ -60,6 +62,7 @@ COLUMNS = {
     "seconds_spread": "seconds_spread",  # largest less smallest of the repetitions
     "particle_steps_per_s": "particle-steps per second",
     "particle_steps": "steps times points",
+    "node_visits": "steps times points times nodes of a point",
     "steps": "steps",  # of all runs of the script
     "points": "points",  # at the beginning
     "dt": "first step (time of the script)",
@@ -248,7 +251,7 @@ def read_facts(said: str) -> dict[str, float]:
     seconds = cpu = steps = 0.0
     for indent, name, number in _FACT.findall(said):
         value = float(number.replace(" ", ""))
-        if name in ("points", "nodes", "dt", "stable dt", "own dt", "bytes per particle"):
+        if name in _FIRST:
             facts.setdefault(name.replace(" ", "_"), value)
         elif name == "steps" and len(indent) == 4:
             seconds += value
@@ -260,6 +263,8 @@ def read_facts(said: str) -> dict[str, float]:
         facts.update(steps=steps, seconds=seconds, cpu_seconds=cpu)
         if "points" in facts:
             facts["particle_steps"] = steps * facts["points"]
+            if "nodes_per_point" in facts:
+                facts["node_visits"] = facts["particle_steps"] * facts["nodes_per_point"]
             if seconds > 0:
                 facts["particle_steps_per_s"] = facts["particle_steps"] / seconds
     return facts

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.app.studies import look
-from karamelo_py.app.studies.records import value
+from karamelo_py.app.studies.records import SIGNED, value
 from karamelo_py.script.errors import ScriptError, unknown
 from karamelo_py.script.terms import number_of
 
@@ -22,6 +22,10 @@ class Order(NamedTuple):
     exponent: float  # NaN with fewer than two points
     lowest: float  # exponents between neighbouring points
     highest: float
+
+    def towards(self, x: Sequence[float]) -> "Order":
+        """The order of errors that fall from the first to the last of `x`, a positive number."""
+        return Order(-self.exponent, -self.highest, -self.lowest) if x[-1] > x[0] else self
 
     def __str__(self) -> str:
         if not isfinite(self.exponent):
@@ -41,6 +45,66 @@ def order(x: Sequence[float], y: Sequence[float]) -> Order:
     run, rise = np.diff(logs, axis=0).T
     local = rise[run > 0] / run[run > 0]
     return Order(float(slope), float(local.min()), float(local.max()))
+
+
+# Orders that functions reach where they are smooth (p + 1 of polynomials of order p); other words
+# do not tell.
+REACHED = {
+    "linear": 2, "ugimp": 2, "cpgimp": 2, "quadratic-spline": 3, "Bernstein-quadratic": 3,
+    "cubic-spline": 4,
+}  # fmt: skip
+CHANCES = {
+    "sign": "the sign of the error changes",
+    "falls": "the error falls faster than its functions let it",
+    "coarser": "a coarser run is better",
+    "finer": "a finer run is worse",
+}
+BEYOND = 0.5  # of an order, until a fall is too steep for the functions
+WORSE = 1.1  # times a value: one that is worse, and not as good
+
+
+def reached(words: Iterable[str]) -> float:
+    """Find the highest order to expect of a choice of words."""
+    return min((REACHED[word] for word in words if word in REACHED), default=4)
+
+
+def by_chance(x: Sequence[float], values: Sequence[float], highest: float) -> list[str]:
+    """Tell of runs, coarse ones first, why their small errors are chance; empty where they are not.
+
+    `values` are errors at `x`, signed where the sign is known. A small error is chance where a
+    finer run is worse; and where the sign has changed, it fell by more than `highest`, the order of
+    the functions, or it has grown, as long as no finer run is as good.
+    """
+    found, size = [], np.abs(np.asarray(values, float))
+    for k, own in enumerate(size):
+        why, finer = "", size[k + 1 :]
+        if k and not (np.isfinite(finer[:1]) & (finer[:1] <= own)).any():
+            ratio = abs(np.log(x[k] / x[k - 1]))
+            if values[k] * values[k - 1] < 0:
+                why = CHANCES["sign"]
+            elif own > 0 and np.log(size[k - 1] / own) > (highest + BEYOND) * ratio:
+                why = CHANCES["falls"]
+            elif (WORSE * size[:k] < own).any():
+                why = CHANCES["coarser"]
+        if (finer > WORSE * own).any():
+            why = CHANCES["finer"]
+        found.append(why if np.isfinite(own) else "")
+    return found
+
+
+def credible(x: Sequence[float], values: Sequence[float], highest: float) -> np.ndarray:
+    """Find sizes of errors that a forecast may begin with: never less than chance lets them be.
+
+    An error is at least what the step from the one before it leaves with the order `highest`, and
+    at least that of each finer run.
+    """
+    values = np.asarray(values, float)
+    size = np.abs(values)
+    if len(size) > 1:
+        ratio = np.exp(np.abs(np.diff(np.log(np.asarray(x, float)))))
+        size[1:] = np.fmax(size[1:], np.abs(np.diff(values)) / (ratio ** (highest + BEYOND) - 1))
+    size[~np.isfinite(values)] = np.nan
+    return np.fmax.accumulate(size[::-1])[::-1] + 0 * values
 
 
 def usable(a: float | None) -> bool:
@@ -169,6 +233,12 @@ class Family:
                 best = error
                 found.append(row)
         return found
+
+
+def errors(rows: Sequence[Mapping[str, Any]], name: str) -> np.ndarray:
+    """Read errors, with their signs where they are known, NaN where there is none."""
+    signed = column(rows, name + SIGNED)
+    return np.where(np.isfinite(signed), signed, column(rows, name))
 
 
 def column(rows: Sequence[Mapping[str, Any]], name: str) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 import csv
 import io
+import itertools
 import json
 import os
 import platform
@@ -35,6 +36,8 @@ _WORDS = "max:, min:, mean:, last:, first: and the name of a log column, or when
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _PART = re.compile(rf"\b([^\W\d]\w*):([^\W\d]\w*)(?::({_NUMBER}))?")
 _NAME = re.compile(r"\b([^\W\d]\w*)\b(?!\s*\()")
+_SIZE = re.compile(r"\s*abs\s*\((.*)\)\s*", re.DOTALL)
+SIGNED = "_signed"  # behind the name of a size: the column of the value that it is the size of
 
 
 class Reduction:
@@ -74,8 +77,11 @@ class Recorded:
     """Take a number from a log: ``err`` (the last value of that column), ``max:err``, ...
 
     ``off=abs(max:depth/3.28 - 1)`` is a formula of such numbers under a name of its own, in the
-    language of scripts; it knows the variables of the study as well.
+    language of scripts; it knows the variables of the study as well. What is abs(...) as a whole
+    is recorded with its sign, too: `signed`.
     """
+
+    signed: "Recorded | None" = None
 
     def __init__(self, word: str):
         name, equals, formula = (part.strip() for part in word.partition("="))
@@ -90,6 +96,9 @@ class Recorded:
         if not name.isidentifier() or not formula:
             raise ScriptError(f"-record {word}", expected="name=formula, as in off=abs(max:s - 1)")
         self.word = name
+        size = _SIZE.fullmatch(formula)
+        if size and _is_closed(size[1]):
+            self.signed = Recorded(f"{name}{SIGNED}={size[1]}")
 
         def named(match: re.Match) -> str:
             self.parts[f"part{len(self.parts)}"] = Reduction(*match.groups(), word)
@@ -141,6 +150,12 @@ def recorded(
     return found
 
 
+def _is_closed(text: str) -> bool:
+    """Tell whether no parenthesis closes that was not opened before it."""
+    depths = itertools.accumulate((sign == "(") - (sign == ")") for sign in text)
+    return min(depths, default=0) >= 0
+
+
 def _apart(text: str) -> list[str]:
     """Part words at commas that stand in no parentheses."""
     words, depth = [""], 0
@@ -161,11 +176,12 @@ def row(
     A run that did not end well has no recorded values: those of its last moments say nothing. The
     reason of one that is done is that of the first value that it lacks.
     """
-    numbers: dict[str, float | None] = dict.fromkeys(item.word for item in items)
+    words = [word for i in items for word in (i.word, *([i.signed.word] if i.signed else []))]
+    numbers: dict[str, float | None] = dict.fromkeys(words)
     reasons = [outcome.reason]
     if outcome.status == "done":
         log = read_log(outcome.folder)
-        for item in items:
+        for item in [*items, *(item.signed for item in items if item.signed)]:
             try:
                 numbers[item.word] = item.of(log, case)
             except ScriptError as error:

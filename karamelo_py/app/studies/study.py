@@ -58,6 +58,11 @@ class Study:
     def __post_init__(self) -> None:
         self.folder = self.out.with_suffix("")
 
+    def knows(self, case: Mapping[str, str]) -> bool:
+        """Tell whether a case need not be run."""
+        kept = not self.again and self.launch.kept(case, self.folder / folder_name(case))
+        return tuple(case.values()) in self.rows or bool(kept)
+
     def describe(self, **said: Any) -> None:
         """Write beside the table what it is made with."""
         how = {"threads": self.launch.threads, "jobs": self.jobs, **surroundings()}
