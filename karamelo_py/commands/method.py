@@ -87,7 +87,12 @@ def method(
     hub.update.thermal = chosen.thermal
 
 
-def scheme(hub: Hub, style: StyleOf("scheme"), *arguments: Argument) -> None:
+def scheme(
+    hub: Hub,
+    style: StyleOf("scheme"),
+    *arguments: Argument,
+    start: Literal["full", "half"] = "full",
+) -> None:
     """Choose when in a step the stress is updated, or implicit steps.
 
     Parameters
@@ -96,10 +101,21 @@ def scheme(hub: Hub, style: StyleOf("scheme"), *arguments: Argument) -> None:
         ``musl`` when there is no such command.
     arguments
         What the style asks for; explicit schemes ask for nothing.
+    start
+        For how much of the first explicit step forces act: all of it (``full``), or ``half``.
 
     Example
     -------
     scheme(usl)
+    scheme(musl, start=half)
+
+    Notes
+    -----
+    In explicit steps places belong to the ends of steps, and velocities to their middles. With
+    ``full`` the velocities that a run starts from are taken for those of half a step before, and
+    those that are shown are as they are: a thrown body is g dt t/2 further than it should be, and
+    kinetic energies lag by half a step. With ``half`` both are of the time that is shown, to second
+    order in the step. Points then carry their last velocity, too.
 
     See Also
     --------
@@ -113,7 +129,14 @@ def scheme(hub: Hub, style: StyleOf("scheme"), *arguments: Argument) -> None:
         for name in PUBLISHED:  # who asks for these is not at fault
             hub.values.publish(name)
         raise
+    if start == "half" and getattr(chosen, "implicit", False):
+        raise ScriptError(
+            "implicit steps take velocities at their ends",
+            argument="start",
+            expected="an explicit scheme, or no start",
+        )
     update, runs = hub.update, len(hub.runs)
+    update.half_start = start == "half"
     if update.scheme_place is not None and update.scheme_behind == runs:
         hub.warn(
             f"this scheme takes the place of that of line {update.scheme_place.line}, which no run "

@@ -272,6 +272,7 @@ CLOCK = np.dtype(
         ("end_time", np.float64),
         ("last_dt", np.float64),  # of the last step; of the present one before there was any
         ("kick", np.float64),  # how long the forces act: between the middles of the two steps
+        ("first_kick", np.float64),  # that of the first step, in steps
         ("rate", np.float64),  # of the fastest point, c + max |v_i - common_i|
         ("common", np.float64, (1, 3)),  # velocity that speeds are measured from
         ("weight", np.float64),  # of what all drift by in that: 1, with which `common` is 0

@@ -37,7 +37,8 @@ def kick(s: Setup) -> Number:
     """Return the time for which forces act in this step.
 
     Places belong to the ends of steps, velocities to their middles: forces lead from the middle of
-    one step to that of the next.
+    one step to that of the next. In the first one they act for a whole step, too: velocities at the
+    start are taken for those of half a step before, unless a script asks for half.
     """
     return real(s.control.clock[0].kick, s.nodes.sums[0, MASS])
 
@@ -89,6 +90,8 @@ def choose_dt(control: Control) -> None:
     if control.values[TIMESTEP] == 0:
         clock.last_dt = dt
     clock.kick = 0.5 * (clock.last_dt + dt)
+    if control.values[TIMESTEP] == 0:
+        clock.kick *= clock.first_kick
 
 
 @kernel

@@ -13,7 +13,7 @@ from karamelo_py.compiler.tuples import row
 from karamelo_py.kernels import visit
 from karamelo_py.kernels.arrays import Index, Nodes, Number, Tag, of_change, vector_at
 from karamelo_py.kernels.loss import FrictionalHeat, in_company, reflect, warm, warm_by_friction
-from karamelo_py.kernels.p2g import Force, WorkOfForces
+from karamelo_py.kernels.p2g import Force, VelocityBefore, WorkOfForces
 from karamelo_py.kernels.visit import Work, node_of, straining_node
 from karamelo_py.points import frames, laws, transfers
 from karamelo_py.points.basis import carried, carrier, carry, deformed, extent
@@ -330,6 +330,7 @@ def _updated_move(task, w, stencil, p, dt, total, totals, fastest):
     moment = in_company(w, stencil, p, moment)
     y, v, moment, hits = reflected(w.grid, w.kin, y, v, moment)
     increase(field(w.points.fields, Bounces), p, hits)
+    store(field(w.points.fields, VelocityBefore), p, old)
     store(w.points.v, p, v)
     store(field(w.points.fields, transfers.Moment), p, moment)
     store(w.places.y, p, y)

@@ -6,6 +6,7 @@ end), the array a name in `Nodes` or the class of a field, which a scene may not
 """
 
 from collections.abc import Iterator
+from math import nan
 from typing import Any, NamedTuple
 
 from karamelo_py.compiler.compile import accumulate, index, of_present, point_function, real, shared
@@ -109,6 +110,13 @@ class SeriesBack(Scattered):
     reads = ("mass", "term of series")
 
     fills = staticmethod(lambda kin: ((Series, kin.dimension, 2 * kin.dimension),))
+
+
+class VelocityBefore(Field):
+    """Velocity before the last step; NaN where there was none."""
+
+    shape = vector
+    start = nan
 
 
 class Force(StepField):

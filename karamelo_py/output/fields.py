@@ -126,7 +126,8 @@ class Fields(PointTable):
 
 def _kinetic(s: Any, block: Any) -> np.ndarray:
     points = block.points
-    return 0.5 * points.mass.astype(float) * (points.v.astype(float) ** 2).sum(axis=0)
+    v = point_table.shown_velocity(s, points).astype(float)
+    return 0.5 * points.mass.astype(float) * (v**2).sum(axis=0)
 
 
 def _of_law(density: Callable) -> Callable:

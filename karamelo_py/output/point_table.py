@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.compiler import fields
-from karamelo_py.kernels.arrays import Block, Points, Setup, known_to_laws, some_of
+from karamelo_py.kernels.arrays import TIMESTEP, Block, Points, Setup, known_to_laws, some_of
 from karamelo_py.kernels.export import (
     ENERGY,
     EXPORTED,
@@ -18,6 +18,7 @@ from karamelo_py.kernels.export import (
     export_velocity_moment,
 )
 from karamelo_py.kernels.heat import Conducting
+from karamelo_py.kernels.p2g import VelocityBefore
 from karamelo_py.language.scene import Scene
 from karamelo_py.points.grid import ReflectingGrid
 from karamelo_py.points.laws import columns_of
@@ -155,7 +156,7 @@ class PointTable:
     @property
     def velocity(self) -> np.ndarray:
         """(n, d) velocities."""
-        return self._cached("v", lambda rows: rows.take(lambda points: points.v))
+        return self._cached("v", lambda rows: rows.take(partial(shown_velocity, rows.s)))
 
     @property
     def mass(self) -> np.ndarray:
@@ -236,7 +237,7 @@ def owners_of_fields(hub: Scene, contact: Any = None) -> list:
         of_method = [method.frame, method.averaging(hub), method.basis, method]
     frame, averaging, *others = of_method
     owners = [frame, update.transfer, averaging, contact, heat, grids]
-    return [*owners, *hub.fixes.values(), update.scheme, *others]
+    return [*owners, *hub.fixes.values(), update, update.scheme, *others]
 
 
 def declared_columns(hub: Scene, attribute: str) -> dict[str, tuple[type, int]]:
@@ -255,6 +256,18 @@ def absent(columns: dict[str, Callable | None], present: set[str] = frozenset())
 
 def _place(s: Setup, points: Points) -> np.ndarray:
     return points.x[s.control.clock[0].now][: s.kin.dimension]
+
+
+def shown_velocity(s: Setup, points: Points) -> np.ndarray:
+    """Velocities (d, n) at the time of the places, where it is known how they change.
+
+    Else those that the points have, of half a step before.
+    """
+    before = fields.field(points.fields, VelocityBefore)
+    if before is None:
+        return points.v
+    ahead = 1.0 if s.control.values[TIMESTEP] == 1 else 0.5
+    return np.where(np.isnan(before), points.v, points.v + ahead * (points.v - before))
 
 
 def _velocity_moment(s: Setup, points: Points) -> np.ndarray:

@@ -44,6 +44,7 @@ def scene_key(hub: Hub) -> tuple:
         update.method,
         type(update.scheme),
         update.scheme,
+        update.half_start,
         update.transfer,
         type(update.transfer),
         update.thermal,

@@ -106,6 +106,7 @@ class Simulation(SceneArrays):
         )
         update, share = self.hub.update, 1 / 2**halvings
         numbers = {
+            "first_kick": 0.5 if update.half_start else 1.0,
             "courant": now[0],
             "courant_moving": moving[0],
             "fixed_dt": (update.fixed_dt or float(self.implicit)) * share,  # load steps of 1

@@ -6,6 +6,7 @@ import copy
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from karamelo_py.kernels.p2g import VelocityBefore
 from karamelo_py.language import registry
 from karamelo_py.language.faults import as_script_error
 from karamelo_py.language.unknown import line_below
@@ -110,6 +111,7 @@ class Update:
         self.scheme_behind = 0  # how many runs it was chosen
         self.thermal = False  # heat flows between points
         self.anti_locking = False  # changes of volume are averaged against volumetric locking
+        self.half_start = False  # whether the first forces act for half a step
         self.fixed_dt: float | None = None  # of set_dt; None: the step follows the fastest point
         self.dt_factor: float | None = None  # share of the stable step; None: the program chooses
         self.dt_place: Place | None = None
@@ -124,6 +126,11 @@ class Update:
         first = name not in self.warned_of
         self.warned_of += [name] * first
         return first
+
+    @property
+    def point_fields(self) -> tuple[type, ...]:
+        """Name the fields that points carry from one step to the next."""
+        return (VelocityBefore,) if self.half_start else ()
 
     @property
     def words(self) -> str:

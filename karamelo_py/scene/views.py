@@ -18,7 +18,7 @@ from karamelo_py.kernels.export import export_velocity_moment, impose_stress, im
 from karamelo_py.kernels.heat import Supply, Temperature
 from karamelo_py.kernels.hook_loop import corners_that_move
 from karamelo_py.kernels.laws import elastic_law
-from karamelo_py.kernels.p2g import Force
+from karamelo_py.kernels.p2g import Force, VelocityBefore
 from karamelo_py.output.point_table import (
     AXES,
     VECTORS,
@@ -338,9 +338,14 @@ class PointsView(View):
             behind[:, rows] += np.tile(step[own].T, (corners, 1))
         self.moved = True
 
+    def _write_velocity(self, value: np.ndarray) -> None:
+        self._rows.put(lambda points: points.v, value)
+        if self._rows.declared(VelocityBefore) is not None:  # nothing has led here
+            self._rows.put(_declared(VelocityBefore, "point"), np.full_like(value, np.nan))
+
     velocity = Shown(
         lambda view: view._rows.take(lambda points: points.v),
-        lambda view, value: view._rows.put(lambda points: points.v, value),
+        _write_velocity,
         "(n, d) velocities.",
     )
     mass = Shown(
