@@ -103,17 +103,17 @@ def test_flip_keeps_a_sawtooth_pic_and_xpic_take_it_away(run):
     """Hammerquist & Nairn 2017: a sawtooth of two points a cell is nothing on the nodes.
 
     FLIP never changes it; PIC and XPIC take it away in a step. Of the first mode PIC loses most
-    in 100 steps, and XPIC the less the higher its order.
+    in 40 steps, and XPIC the less the higher its order.
     """
-    assert kept(run, 0, 100) == pytest.approx(1, abs=1e-6)
-    assert kept(run, 1, 100) == pytest.approx(1, abs=1e-4)
+    assert kept(run, 0, 40) == pytest.approx(1, abs=1e-6)
+    assert kept(run, 1, 40) == pytest.approx(1, abs=1e-4)
     modes = []
     for cure in ({"transfer": "PIC", "order": "mechanical"}, {"cure": 1, "order": 2}, {"cure": 1}):
         assert abs(kept(run, 0, 1, **cure)) < 1e-9
-        modes.append(kept(run, 1, 100, **cure))
-    assert modes[0] < 0.85
+        modes.append(kept(run, 1, 40, **cure))
+    assert modes[0] < 0.94
     assert modes[0] < modes[1] < modes[2] < 1
-    assert modes[2] > 0.98
+    assert modes[2] > 0.992
 
 
 def test_flip_rings_behind_a_wave(run):
@@ -125,8 +125,8 @@ def test_flip_rings_behind_a_wave(run):
 
 @pytest.mark.xdist_group("bar")
 def test_flip_noise_does_not_grow(run_script):
-    """The energy of the vibrating bar over 40 periods."""
-    check_energy(run_script, 40)
+    """The energy of the vibrating bar over 20 periods."""
+    check_energy(run_script, 20)
 
 
 @pytest.mark.full
@@ -136,7 +136,7 @@ def test_flip_noise_does_not_grow_in_many_periods(run_script, periods):
 
 
 def check_energy(run_script, periods):
-    """What is gained is told from nothing by 40 periods as by 100: limits are a share of those.
+    """What is gained is told from nothing by 20 periods as by 100: limits are a share of those.
 
     Found: 5e-5 of the largest energy in 40 periods, 1e-4 in 100; nothing and 7e-5 of the mean.
     """
