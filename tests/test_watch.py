@@ -152,10 +152,10 @@ def test_work_of_gravity_is_added_up(run_interpreted, scheme):
 PULLED = """
 method({}, FLIP, linear, 1)
 scheme({})
-dimension(1, 0, 2, 0.1)
+dimension(1, 0, 2, 0.2)
 region(bar, block, 0, 2)
 material(steel, neo-hookean, 1000, 1e6, 0)
-solid(bar, region, bar, 2, steel, 0.1)
+solid(bar, region, bar, 2, steel, 0.2)
 region(left, block, -0.01, 0.01)
 region(right, block, 1.99, 2.01)
 group(left, nodes, region, left, all)
@@ -183,13 +183,13 @@ def test_work_against_stress_and_walls_is_that_of_the_mean_velocity(
     """A bar is pulled at one end and held at the other, or bears its weight: energy is the work.
 
     In one to two periods, that of waves in a linear bar (d'Alembert's sum, or that of its modes);
-    20 cells and strains of a hundredth shift these a little. Were what stress and walls do to a
+    10 cells and strains of a hundredth shift these by up to an eighth. Were what stress and walls do to a
     node in a step left out of the velocity that loads act at, F dt/(rho h) would be missing from
     that of a force F at the end: ten times what is stored by the time that it is pulled.
     """
     found = state_interpreted(PULLED.format(frame, scheme, load), "work", "balance")
-    assert found["work"] == pytest.approx(63.31 if load == PULL else 18.40, rel=0.12)
-    assert abs(found["balance"]) < 0.003 * found["work"]
+    assert found["work"] == pytest.approx(63.31 if load == PULL else 18.40, rel=0.16)
+    assert abs(found["balance"]) < 0.006 * found["work"]
 
 
 def test_a_step_above_the_limit_is_named(run_interpreted):
@@ -273,7 +273,7 @@ def test_temperatures_that_swing_stop_the_run(run_interpreted, kind, body, held)
     """
     (d, ppc), (end, shown) = body, HELD[held]
     limit = 0.1**2 / (4 * d)
-    box = "0, 0.6" + ", 0, 0.2" * (d - 1)
+    box = "0, 0.4" + ", 0, 0.2" * (d - 1)
 
     def scene(times, words=""):
         whole = ", INF, INF" * (d - 1)
@@ -452,7 +452,7 @@ def balance(run_interpreted, fix):
     text = block(
         2, "region(end, block, 0.55, 1, INF, INF)", "group(grip, particles, region, end, all)",
         *["fix(v, initial_velocity_particles, all, -0.5, 0)"] * ("velocity" not in fix),
-        f"fix(F, {fix})", "set_dt(0.002)", "run_time(0.3)",
+        f"fix(F, {fix})", "set_dt(0.002)", "run_time(0.3)", size=(0.3, 0.1),
     ).replace("method(ulmpm", "method(tlmpm")  # fmt: skip
     result = run_interpreted(text)
     assert "is not watched" not in result.out
