@@ -11,18 +11,11 @@ from karamelo_py.run.implicit import check, solvers
 from karamelo_py.run.implicit.load_steps import LoadSteps
 from karamelo_py.run.implicit.newton import Newton
 from karamelo_py.script.errors import ScriptError
-from tests.test_implicit import HELD, patch
+from tests.test_implicit import HELD, coarse, patch
 
 FLUID = """eos(w, fluid, 1000, 1e5, 7)
     strength(w, fluid, 1e-3)
     material(m, eos-strength, w, w)"""
-
-
-def coarse(lines: str = HELD) -> str:
-    """The patch on cells of a half: interpreted load steps are slow."""
-    return (
-        patch(lines).replace("0, 1.4, 0, 1, 0.1", "0, 1.5, 0, 1, 0.5").replace("m, 0.1", "m, 0.5")
-    )
 
 
 @pytest.mark.parametrize("wrong", ["quasi-statc", "quasi-static, tol=1e-8", "quasi static"])
