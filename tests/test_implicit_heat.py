@@ -33,7 +33,17 @@ def slab(kind: str = "ulmpm") -> str:
     return text
 
 
-@pytest.mark.parametrize("kind", ["ulmpm", "tlmpm"])
+def test_heat_is_kept_in_the_total_frame(run_interpreted):
+    """What the face is given is what the slab has, and it flows as in the updated frame."""
+    logs = [
+        run_interpreted(slab(kind), "-var", "steps", "4", "-var", "refine", "0.2", folder=kind).log
+        for kind in ("ulmpm", "tlmpm")
+    ]
+    assert np.allclose(np.cumsum(logs[1]["face_s"][1:]) * 3 / 4, logs[1]["heat"][1:], rtol=1e-9)
+    assert np.allclose(logs[0]["heat"], logs[1]["heat"], rtol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["ulmpm", pytest.param("tlmpm", marks=pytest.mark.full)])
 def test_heat_flows_into_a_slab(run_script, kind):
     """T = erfc(x / (2 sqrt(a t))), by steps of 15 times the stable one; the rule is of order 1."""
     errors = []
