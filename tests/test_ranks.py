@@ -94,7 +94,7 @@ def test_dumps_in_pieces(state_interpreted, tmp_path):
     """16 ids after another, with points that are not there any more: the bytes of all at once."""
     script = block(
         2, "boundary(delete)", *DUMPS, MOVING[0].replace("0.9", "9"), *MOVING[1:], "run(34)",
-        ppc=3, size=(0.3, 0.2),
+        ppc=3, size=(0.2, 0.2),
     )  # fmt: skip
     assert shared(state_interpreted, tmp_path, script)
     with h5py.File(tmp_path / "parts" / "h.h5") as file:
@@ -248,7 +248,7 @@ set_output(3)
 def test_computes_by_shares(state_interpreted, tmp_path):
     """Sums without rounding, largest values, and values at a point."""
     (tmp_path / "curve.csv").write_text(CURVE, encoding="utf-8")
-    script = block(2, COMPUTES.replace("&\n", ""), MOVING[0], *MOVING[3:], "run(10)",
+    script = block(2, COMPUTES.replace("&\n", ""), MOVING[0], *MOVING[3:], "run(6)",
                    transfer="APIC", size=(0.3, 0.2))  # fmt: skip
     assert shared(state_interpreted, tmp_path, script, ranks=3)
     log = (tmp_path / "parts" / "log.mpm").read_text(encoding="utf-8")

@@ -183,9 +183,9 @@ def test_work_against_stress_and_walls_is_that_of_the_mean_velocity(
     """A bar is pulled at one end and held at the other, or bears its weight: energy is the work.
 
     In one to two periods, that of waves in a linear bar (d'Alembert's sum, or that of its modes);
-    10 cells and strains of a hundredth shift these by up to an eighth. Were what stress and walls do to a
-    node in a step left out of the velocity that loads act at, F dt/(rho h) would be missing from
-    that of a force F at the end: ten times what is stored by the time that it is pulled.
+    10 cells and strains of a hundredth shift these by up to an eighth. Were what stress and walls
+    do to a node in a step left out of the velocity that loads act at, F dt/(rho h) would be missing
+    from that of a force F at the end: ten times what is stored by the time that it is pulled.
     """
     found = state_interpreted(PULLED.format(frame, scheme, load), "work", "balance")
     assert found["work"] == pytest.approx(63.31 if load == PULL else 18.40, rel=0.16)
