@@ -93,7 +93,7 @@ def test_nodes_in_pieces(state_interpreted, tmp_path, method):
 def test_dumps_in_pieces(state_interpreted, tmp_path):
     """16 ids after another, with points that are not there any more: the bytes of all at once."""
     script = block(
-        2, "boundary(delete)", *DUMPS, MOVING[0].replace("0.9", "9"), *MOVING[1:], "run(34)",
+        2, "boundary(delete)", *DUMPS, MOVING[0].replace("0.9", "12"), *MOVING[1:], "run(34)",
         ppc=3, size=(0.2, 0.2),
     )  # fmt: skip
     assert shared(state_interpreted, tmp_path, script)
