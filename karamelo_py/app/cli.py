@@ -24,7 +24,14 @@ from karamelo_py.app.launch import (
     together,
 )
 from karamelo_py.app.leaving import SIGNALLED, leaving_at_once
-from karamelo_py.app.options import VARIABLE, add_variables, make_folder, positive, threads_option
+from karamelo_py.app.options import (
+    LIVE,
+    VARIABLE,
+    add_variables,
+    make_folder,
+    positive,
+    threads_option,
+)
 from karamelo_py.run.mpi.comm import ENDING, MpiComm, handled_signals, launched
 from karamelo_py.script.errors import ScriptError, nearest, render_message
 
@@ -256,6 +263,11 @@ def _parser(command: str) -> tuple[CommandLine, Any]:
                 *RESTART, type=Path, metavar="FILE",
                 help="go on from a file that restart(...) has written",
             )  # fmt: skip
+        if name == "run":
+            script.add_argument(
+                *LIVE, action="store_true",
+                help="show points and curves on a page in a browser, while it runs",
+            )  # fmt: skip
         script.add_argument("--quiet", action="store_true", help="write warnings and errors only")
     summary = "List commands and styles, and where they come from."
     styles = add("styles", lambda given: _catalogue().print_styles(given.family), summary)
@@ -311,6 +323,7 @@ def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = 
     hub.settings.trusts = options.trust_geometries
     hub.checking = options.checking
     _direct(hub, options)
+    page = _live_page(hub, script) if getattr(options, "live", False) else None
     presets = dict(options.var)
     if getattr(options, "restart", None) is not None:
         from karamelo_py.run.checkpoint.restart_file import Restart
@@ -330,6 +343,8 @@ def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = 
         return SIGNALLED + signal.args[0]
     finally:
         hub.output.log.close()
+        if page is not None:
+            page.end()
     if not hub.rehearsed:
         _tell_of_no_run(hub, script)
     elif restart is not None and restart.is_over(hub):
@@ -337,6 +352,20 @@ def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = 
         hint = f"a further run behind it, or read_restart({restart.path}) in a script of its own"
         hub.console.say(render_message("note", message, hint=hint))
     return 0
+
+
+def _live_page(hub: Hub, script: str) -> Any:
+    """Open the page of a run, and say its address."""
+    if hub.settings.ranks > 1:
+        raise ScriptError(
+            f"a live page shows a run of one process, and {hub.settings.ranks} share this one",
+            hint="--threads instead of --ranks, or view --live FOLDER of the folder of its dumps",
+        )
+    from karamelo_py.app.live.run import RunPage
+
+    page = RunPage(hub, script)
+    hub.console.say(f"live: {page.server.address}")
+    return page
 
 
 def _direct(hub: Hub, options: argparse.Namespace) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 from karamelo_py.script.errors import ScriptError
 
 VARIABLE = ("-var", "--var", "-v")
+LIVE = ("--live", "-live")
 
 
 class _Variable(argparse.Action):

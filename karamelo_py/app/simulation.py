@@ -98,6 +98,24 @@ class Columns(Mapping):
         return pandas.DataFrame(dict(self))
 
 
+class LivePage:
+    """A page that follows a simulation: its `address`, and how a notebook shows it."""
+
+    def __init__(self, page: Any):
+        self._page = page
+        self.address = page.server.address
+
+    def _repr_html_(self) -> str:
+        return f'<iframe src="{self.address}" width="100%" height="760"></iframe>'
+
+    def __repr__(self) -> str:
+        return f"<live page {self.address}>"
+
+    def close(self) -> None:
+        """End the page."""
+        self._page.detach()
+
+
 class PointColumns(Columns):
     """Columns of the points: ``points["vx"] = values`` sets one between two runs.
 
@@ -459,6 +477,17 @@ class Simulation:
         if file is not None:
             picture.save(file)
         return picture
+
+    def live(self) -> LivePage:
+        """Open a page in a browser that follows the runs to come; a notebook shows it.
+
+        Points in colour, curves of the log, what limits the step; pause, step, stop. Close it with
+        ``.close()``. Needs the package plotly.
+        """
+        from karamelo_py.app.live.run import RunPage
+
+        with _as_simulation_error():
+            return LivePage(RunPage(self.hub, self._name))
 
     def close(self) -> None:
         """Close its files; a further run would begin the log anew."""

@@ -3,6 +3,7 @@
 import argparse
 import glob
 from collections.abc import Iterable
+from contextlib import suppress
 from itertools import chain
 from pathlib import Path
 from types import SimpleNamespace
@@ -10,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from karamelo_py.app.options import LIVE
 from karamelo_py.output.fields import unknown_column
 from karamelo_py.output.files import Frames, movie_format, picture_format, unwarned, whole
 from karamelo_py.output.snapshots import Snapshot, read
@@ -26,6 +28,11 @@ SAMPLE = 400  # points whose nearest neighbours are looked for
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add what the subcommand takes."""
     parser.add_argument("files", metavar="FILE", nargs="+", type=Path)
+    parser.add_argument(
+        *LIVE, action="store_true",
+        help="FILE is the folder of a run: its dumps and its log on a page in a browser, as they "
+        "come",
+    )  # fmt: skip
     parser.add_argument("-c", "--column", help="what colours the points (default: their solid)")
     parser.add_argument(
         "-o", "--output", metavar="FILE", type=Path,
@@ -45,6 +52,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Draw what the command line asks for; returns the exit status."""
+    if options.live:
+        return _live(options.files)
     movie = options.output.suffix.lower() in (".gif", ".mp4")
     if movie:
         movie_format(options.output)
@@ -74,6 +83,22 @@ def run(options: argparse.Namespace) -> int:
     if movie:
         frames.save(options.output)
     print(f"{options.output}: {drawn} {'frame' if movie else 'picture'}{'s' * (drawn > 1)}")
+    return 0
+
+
+def _live(folders: list[Path]) -> int:
+    """Serve the page of a folder until somebody interrupts."""
+    from karamelo_py.app.live.folder import FolderPage
+
+    if len(folders) > 1:
+        raise ScriptError(
+            f"--live shows one folder, not {len(folders)}", expected="view --live FOLDER"
+        )
+    page = FolderPage(folders[0])
+    print(f"live: {page.server.address} (Ctrl-C ends it)", flush=True)
+    with suppress(KeyboardInterrupt):
+        page.follow()
+    page.server.close()
     return 0
 
 

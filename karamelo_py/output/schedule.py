@@ -34,6 +34,8 @@ class Output:
         self.writes = True
         # Written after all others, which then have nothing to write of the same state.
         self.last: list[Rhythmic] = []
+        # Pages that somebody watches the run on.
+        self.pages: list[Rhythmic] = []
         # Who writes to a file.
         self.files: dict[Path, str] = {}
 
@@ -163,8 +165,8 @@ class Output:
 
     def _items(self) -> list[Rhythmic]:
         if not self.takes_part:
-            return [self.log, *self.plots.values()]
-        return [self.log, *self.hub.dumps.values(), *self.plots.values(), *self.last]
+            return [self.log, *self.plots.values(), *self.pages]
+        return [self.log, *self.hub.dumps.values(), *self.plots.values(), *self.pages, *self.last]
 
 
 def _located(error: ScriptError, place: Any) -> ScriptError:

@@ -214,6 +214,7 @@ class Hub:
         self.functions: dict[str, Any] = {}  # in Python, that a program has given
         self.running: Any = None  # the run in progress
         self.runs: list[dict[str, float]] = []  # published values at the end of each so far
+        self.warned: list[tuple[float, str]] = []  # times and messages, for those who watch
         self.later: list[Any] = []  # `known_failures.Step` of runs that a rehearsal came to
         self._simulation: Any = None
         self._lattices: tuple[tuple, list[Lattice]] | None = None
@@ -283,6 +284,7 @@ class Hub:
         """Tell the user of something that may not be meant; not during a rehearsal."""
         if not self.rehearsing:
             text = render_message("warning", message, place or self.place, expected, hint)
+            self.warned.append((self.update.time, text))
             self.console.warn(text)
 
     def rehearse(self) -> None:

@@ -32,7 +32,7 @@ from karamelo_py.app.studies.curves import (
     reached,
     usable,
 )
-from karamelo_py.app.studies.study import Study, plain_table, shown, terminal
+from karamelo_py.app.studies.study import Study, live_page, plain_table, shown, terminal
 from karamelo_py.script.errors import ScriptError, plural
 from karamelo_py.script.terms import number_of
 
@@ -351,6 +351,7 @@ def run(options: Any) -> int:
     choices = [ChoiceRuns(case) for case in combined]
     most = len(choices) * len(values[name])
     study = Study(launch, out, list(values), items, jobs, options.again, strict=True, most=most)
+    study.page = live_page(options, study)
     study.describe(variables=values, record=[items[0].text], timed=timed, repeat=1)
     ordered = values[name]
     if len(ordered) > 1:

@@ -16,7 +16,7 @@ from karamelo_py.app.options import above_zero, positive
 from karamelo_py.app.plot import read_log
 from karamelo_py.app.studies import records, variables
 from karamelo_py.app.studies.case import said_in
-from karamelo_py.app.studies.study import Study
+from karamelo_py.app.studies.study import Study, live_page
 from karamelo_py.kernels import watch
 from karamelo_py.output.files import savefig
 from karamelo_py.output.plots import blank_figure
@@ -98,6 +98,7 @@ def run(options: Any) -> int:
         launch, table, list(values), items, jobs, options.again, strict=True, most=most,
         writes=False,
     )  # fmt: skip
+    study.page = live_page(options, study, axes)
     study.describe(variables=values, energy=energy, bound=options.bound)
     chart = Map(study, values, axes, energy, options.bound)
     try:

@@ -50,6 +50,7 @@ class Study:
     strict: bool = False  # a variant that is refused ends the study
     most: int = 0  # cases of a study that asks for them by and by; 0: `run` gets all
     writes: bool = True  # the table, after each run
+    page: Any = None  # a `StudyPage`, where somebody wants to watch
     # Of finished runs, by the values of the case.
     rows: dict[tuple[str, ...], dict[str, Any]] = field(default_factory=dict)
     ran: int = 0  # not taken from an earlier study
@@ -91,6 +92,8 @@ class Study:
             else:
                 waiting.append((case, place))
         self.write()
+        if self.page and self.rows and not waiting:
+            self.page.follow(list(self.rows.values()), (), (), of=len(cases))
         if waiting:
             try:
                 display = _Display(self, len(waiting))
@@ -132,11 +135,23 @@ class Study:
                     display.finish(case, self.rows[tuple(case.values())])
                     self.write()
                 display.tick([case for case, _ in queue], list(running.values()))
+                if self.page:
+                    self._show(queue, list(running.values()), display)
         except BaseException:
             self.launch.stop.set()
             raise
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
+
+    def _show(self, queue: Sequence[tuple], running: Sequence[Mapping], display: _Display) -> None:
+        """Bring the page up to date; who has stopped the study there has interrupted it."""
+        of = self.most or display.count + len(self.rows) - display.finished
+        left = None if self.most else display.left([case for case, _ in queue], running)
+        places = [(case, self.folder / folder_name(case), display.since(case)) for case in running]
+        rows = list(self.rows.values())
+        self.page.follow(rows, queue, places, of=of, most=bool(self.most), left=left)
+        if self.page.stopped.is_set():
+            raise KeyboardInterrupt
 
     def _put(self, case: Mapping[str, str], outcome: CaseOutcome) -> None:
         if self.strict and outcome.status == "refused":
@@ -303,6 +318,17 @@ def terminal() -> Any:
     return Console() if sys.stdout.isatty() else Console(width=200)
 
 
+def live_page(options: Any, study: Study, axes: Sequence[str] = ()) -> Any:
+    """Open the page of a study where the options ask for it, and say its address; else None."""
+    if not options.live:
+        return None
+    from karamelo_py.app.live.study import StudyPage
+
+    page = StudyPage(options.script, study.names, [item.word for item in study.items], axes)
+    print(f"live: {page.server.address}", flush=True)
+    return page
+
+
 # ---- karamelo-py sweep --------------------------------------------------------------------------
 
 
@@ -331,6 +357,7 @@ def run(options: Any) -> int:
     combinations = variables.cases(values, variables.zipped(options), options.where)
     items = recorded(options.record, script, values)
     study = Study(launch, out, list(values), items, jobs, options.again, str(options.script))
+    study.page = live_page(options, study)
     if study.folder.exists() and not study.folder.is_dir():
         expected = "a free name for the folder of the runs"
         raise ScriptError(f"{study.folder} is a file", expected=expected)

@@ -9,7 +9,7 @@ from math import prod
 from pathlib import Path
 from typing import Any
 
-from karamelo_py.app.options import VARIABLE, above_zero, positive
+from karamelo_py.app.options import LIVE, VARIABLE, above_zero, positive
 from karamelo_py.app.studies.case import Launch
 from karamelo_py.output.quantity import KEYWORDS
 from karamelo_py.script.errors import ScriptError, meant, nearest, plural
@@ -228,6 +228,9 @@ def add_family(parser: Any) -> None:
     )
     parser.add_argument(
         "-again", action="store_true", help="run also what is known from an earlier study"
+    )
+    parser.add_argument(
+        *LIVE, action="store_true", help="show the study on a page in a browser, while it goes on"
     )
 
 

@@ -169,7 +169,7 @@ def taken_by(hub: Hub) -> list[str]:
     return found
 
 
-def _lost(simulation: Any) -> float:
+def share_lost(simulation: Any) -> float:
     """Share of the largest energy so far that has gone since the start; negative: a gain."""
     clock = simulation.control.clock[0]
     mean = (clock.balance + clock.last_balance + clock.last_but_one) / FEW
@@ -181,7 +181,7 @@ def words_of_loss(hub: Hub, simulation: Any, within: float) -> tuple[str, str] |
     clock = simulation.control.clock[0]
     if not clock.watch_energy or clock.looks <= LOOKS:
         return None
-    lost = _lost(simulation)
+    lost = share_lost(simulation)
     if lost <= within or taken_by(hub):
         return None
     cause, cure = _cause_of_loss(hub)
@@ -254,7 +254,7 @@ def change_of_energy(hub: Hub, simulation: Any) -> dict[str, str]:
     if not clock.watch_energy or clock.looks <= FEW:
         return {}
     # Since the first balance, not `first_few`, which `forget_growth` changes.
-    share, takers = -100 * _lost(simulation), taken_by(hub)
+    share, takers = -100 * share_lost(simulation), taken_by(hub)
     words = "of the largest since the start (kinetic + stored + dissipated - work)"
     take = "takes" if len(takers) == 1 else "take"
     by = f"; {' and '.join(takers)} {take} some" if takers and share < -1 else ""

@@ -1,0 +1,158 @@
+"""The page of a folder: the dumps and the log of a run that goes on elsewhere, or has ended."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.app.live import frames
+from karamelo_py.app.live.frames import Frame, plain
+from karamelo_py.app.live.server import Server
+from karamelo_py.app.plot import read_log
+from karamelo_py.output.snapshots import Snapshot, read
+from karamelo_py.script.errors import ScriptError
+
+PAUSE = 0.5  # seconds between looks into the folder
+WHOLE = (".h5", ".hdf5", ".pvd")  # dumps that hold many states
+
+
+class FolderPage:
+    """Shows what is in a folder, and what comes.
+
+    Raises
+    ------
+    ScriptError
+        Where there is no such folder, or neither a log nor a dump of points in it.
+    """
+
+    def __init__(self, folder: Path):
+        if not folder.is_dir():
+            raise ScriptError(f"{folder} is no folder", expected="the folder of a run")
+        self.folder = folder
+        self._states: list[tuple[Path, int, int, float, int]] = []  # file, place, step, time, count
+        self._seen: dict[Path, float] = {}
+        self._log: dict[str, np.ndarray] = {}
+        self._columns: list[str] = []
+        self._dimension, self._column = 2, ""
+        self.look()
+        if not self._states and not self._log:
+            raise ScriptError(
+                f"there is neither a log nor a dump of points in {folder}",
+                expected="the folder of a run: log.mpm, files of dump particle, hdf5 or vtk",
+            )
+        self.server = Server(
+            frames.PAGE, self._news, {"frame": self._frame}, {"column": self._choose}
+        )
+
+    def follow(self) -> None:
+        """Look for news until somebody interrupts."""
+        while True:
+            time.sleep(PAUSE)
+            if self.look():
+                self.server.changed()
+
+    def look(self) -> bool:
+        """Look into the folder; tell whether there is anything new."""
+        log, before = read_log(self.folder), len(self._states)
+        grown = len(next(iter(log.values()), ())) != len(next(iter(self._log.values()), ()))
+        self._log = log
+        for path in self._dumps():
+            changed = path.stat().st_mtime
+            if self._seen.get(path) == changed:
+                continue
+            known = sum(file == path for file, *_ in self._states)
+            try:
+                for place, snapshot in enumerate(read(path)):
+                    if place >= known:
+                        self._add(path, place, snapshot)
+                self._seen[path] = changed
+            except (ScriptError, FileNotFoundError):  # it is being written
+                continue
+        self._states.sort(key=lambda state: state[2])
+        return grown or len(self._states) > before
+
+    def _dumps(self) -> list[Path]:
+        """List the dumps of points of one name, but for numbers: of those with most columns."""
+        kinds: dict[str, list[Path]] = {}
+        for path in sorted(self.folder.iterdir()):
+            if path.suffix in WHOLE or _is_text_dump(path):
+                kinds.setdefault(re.sub(r"\d+", "#", path.name), []).append(path)
+        return max(kinds.values(), key=lambda paths: _width(paths[0]), default=[])
+
+    def _add(self, path: Path, place: int, snapshot: Snapshot) -> None:
+        columns = snapshot.columns
+        self._columns = self._columns or [name for name in columns if name not in "xyz"]
+        if not self._states:
+            directions = [axis for axis in "yz" if np.ptp(columns[axis]) > 0]
+            self._dimension = 3 if "z" in directions else 1 + len(directions)
+            known = [name for name in ("seq", "type") if name in columns]
+            self._column = [*known, *self._columns][0]
+        count = len(columns["x"])
+        self._states.append((path, place, snapshot.step, float(snapshot.time), count))
+
+    def _news(self, seen: int) -> tuple[int, dict]:
+        log = self._log
+        count = len(next(iter(log.values()), ()))
+        times = log.get("Time", log.get("Step", np.arange(count)))
+        rows = [
+            {
+                "step": int(log["Step"][k]) if "Step" in log else k,
+                "time": float(times[k]), "gain": None, "limit": "",
+                "dt": plain(float(log["dt"][k])) if "dt" in log else None,
+                "log": {name: plain(_number(values[k])) for name, values in log.items()},
+            }
+            for k in range(seen, count)
+        ]  # fmt: skip
+        listed = [
+            [k, step, plain(time), self._column, count]
+            for k, (_, _, step, time, count) in enumerate(self._states)
+        ]
+        told: dict[str, Any] = {"rows": rows, "frames": listed, "flags": [], "paused": False}
+        if not seen:
+            told["about"] = {
+                "title": self.folder.resolve().name, "dimension": self._dimension, "columns": self._columns,
+                "column": self._column, "method": "", "bounds": [], "steers": False,
+            }  # fmt: skip
+        return count, {**told, "over": False}
+
+    def _frame(self, words: Mapping[str, str]) -> bytes | None:
+        """Read a state again; its column is the one that the page shows now."""
+        k = int(words.get("k", "-1"))
+        if not 0 <= k < len(self._states):
+            return None
+        path, place, step, moment, _ = self._states[k]
+        columns = next(s for n, s in enumerate(read(path)) if n == place).columns
+        axes = "xyz"[: self._dimension]
+        frame = Frame.of_columns(step, moment, axes, self._column, columns.__getitem__)
+        return frame.numbers.tobytes()
+
+    def _choose(self, words: Mapping[str, str]) -> None:
+        if words.get("name") in self._columns:
+            self._column = words["name"]
+            self.server.changed()
+
+
+def _is_text_dump(path: Path) -> bool:
+    if path.suffix == ".gz":
+        return True
+    try:
+        with path.open("rb") as file:
+            return file.read(14) == b"ITEM: TIMESTEP"
+    except OSError:
+        return False
+
+
+def _width(path: Path) -> int:
+    try:
+        return len(next(read(path)).columns)
+    except (ScriptError, StopIteration, OSError):
+        return 0
+
+
+def _number(value: Any) -> Any:
+    return float(value) if np.issubdtype(np.asarray(value).dtype, np.number) else None

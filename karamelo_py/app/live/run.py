@@ -1,0 +1,164 @@
+"""The page of a run: points in colour, curves of the log, what limits the step; pause and stop."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections.abc import Mapping
+from contextlib import suppress
+from typing import Any, NamedTuple
+
+from karamelo_py.app.live import frames
+from karamelo_py.app.live.frames import Frame, Frames, plain
+from karamelo_py.app.live.server import Server
+from karamelo_py.output.rhythm import Rhythmic
+from karamelo_py.run.diagnosis import energy
+from karamelo_py.run.timestep import ruling_limit
+from karamelo_py.scene.hub import Hub
+
+
+class Row(NamedTuple):
+    """State of a run at an output."""
+
+    step: int
+    time: float
+    dt: float
+    limit: str  # what limits the step
+    gain: float | None  # of energy in percent, where it is watched
+    log: dict[str, float]
+
+
+class RunPage(Rhythmic):
+    """Shows a run in browsers: goes on in the rhythm of the log, and holds it where it is paused.
+
+    Parameters
+    ----------
+    hub
+        The scene, before its script is carried out.
+    title
+        What stands above the page.
+    """
+
+    remembers = ()
+    id, place = "live", None
+
+    def __init__(self, hub: Hub, title: str):
+        self.hub, self.title = hub, title
+        self.frames = Frames()
+        if hub.output.log.rows is None:
+            hub.output.log.rows = []
+        self._rows: list[Row] = []
+        self._held = threading.Condition()
+        self._paused = self._over = False
+        self._column = ""
+        self.server = Server(
+            frames.PAGE, self._news, {"frame": self.frames.answer},
+            {"pause": self._pause, "go": self._go, "step": self._step, "stop": self._stop,
+             "column": self._choose},
+        )  # fmt: skip
+        hub.output.pages.append(self)
+
+    @property
+    def every(self) -> Any:
+        """The rhythm of the log."""
+        return self.hub.output.log.every
+
+    # ---- in the run's own thread ----------------------------------------------------------------
+
+    def write(self) -> None:
+        """Show the present state; wait here while the page holds the run."""
+        hub, simulation = self.hub, self.hub.simulation
+        names, numbers = hub.output.log.rows[-1] if hub.output.log.rows else ([], [])
+        log = {name: n for name, n in zip(names, numbers, strict=True) if not isinstance(n, str)}
+        share = energy.share_lost(simulation) if simulation.control.clock[0].watch_energy else None
+        gain = None if share is None else -100 * share
+        limit = "load steps" if simulation.implicit else ruling_limit(simulation)
+        self._rows.append(Row(hub.update.step, hub.update.time, hub.update.dt, limit, gain, log))
+        self._take()
+        self.server.changed()
+        self._wait()
+
+    def end(self) -> None:
+        """Bring the last news to open pages, and answer them until they are closed."""
+        self._over = True
+        self.server.changed()
+        self.server.flush()
+        if self.server.watched:
+            self.hub.console.say("the live page stays until it is closed (Ctrl-C ends it)")
+            with suppress(KeyboardInterrupt):
+                self.server.stay()
+        self.server.close()
+
+    def detach(self) -> None:
+        """End the page; the run goes on without."""
+        self.hub.output.pages.remove(self)
+        self._go()
+        self.server.close()
+
+    def _take(self) -> None:
+        update, read = self.hub.update, self.hub.fields.particle
+        axes = "xyz"[: self.hub.domain.dimension]
+        column = self._column or "seq"
+        self.frames.add(Frame.of_columns(update.step, update.time, axes, column, read))
+
+    def _wait(self) -> None:
+        shown = self._column
+        with self._held:
+            while self._paused:
+                self._held.wait(0.2)  # a signal is seen by this thread alone
+                if self.hub.running is not None and self.hub.running.signal:
+                    self._paused = False
+                if shown != self._column:
+                    shown = self._column
+                    self.frames.drop_last()
+                    self._take()
+                    self.server.changed()
+
+    # ---- in threads of the server ---------------------------------------------------------------
+
+    def _news(self, seen: int) -> tuple[int, dict]:
+        rows = self._rows[seen:]
+        told = {
+            "rows": [
+                {**row._asdict(), "log": {k: plain(float(v)) for k, v in row.log.items()}}
+                for row in rows
+            ],
+            "frames": self.frames.listed(),
+            "flags": [{"time": time, "text": text} for time, text in self.hub.warned],
+            "paused": self._paused,
+            "over": self._over,
+        }
+        if not seen and self.hub.domain is not None:
+            told["about"] = {
+                "title": self.title,
+                "dimension": self.hub.domain.dimension,
+                "columns": self.hub.fields.particle_names(),
+                "column": self._column or "seq",
+                "method": self.hub.update.words,
+                "bounds": [-100 * energy.LOSS, 100 * energy.WITHIN],
+                "steers": True,
+            }
+        return seen + len(rows), told
+
+    def _choose(self, words: Mapping[str, str]) -> None:
+        if words.get("name") in self.hub.fields.particle_names():
+            self._column = words["name"]
+
+    def _pause(self, _: Mapping[str, str]) -> None:
+        self._paused = True
+        self.server.changed()
+
+    def _go(self, _: Mapping[str, str] = {}) -> None:
+        with self._held:
+            self._paused = False
+            self._held.notify_all()
+        self.server.changed()
+
+    def _step(self, _: Mapping[str, str]) -> None:
+        self._go()
+        self._paused = True
+
+    def _stop(self, _: Mapping[str, str]) -> None:
+        """Interrupt the run as Ctrl-C does: the last state is written."""
+        os.kill(os.getpid(), signal.SIGINT)

@@ -1,0 +1,181 @@
+"""The server of a page: answers at a secret address, and news as they come (server-sent events)."""
+
+from __future__ import annotations
+
+import json
+import secrets
+import threading
+import time
+from collections.abc import Callable, Mapping
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import Any
+from urllib.parse import parse_qsl, urlsplit
+
+from karamelo_py.app.studies.chart import require_plotly
+
+PATIENCE = 1.0  # seconds that the last news may take to a page, when all is over
+BEAT = 2.0  # seconds after which something is said, so that a closed page is noticed
+
+Answer = Callable[[Mapping[str, str]], "bytes | dict | None"]
+
+
+class Server:
+    """Serve a page to browsers on this machine.
+
+    Parameters
+    ----------
+    page
+        The file of the page (HTML).
+    news
+        ``news(seen)`` tells what has come since `seen` entries, and how many there are now; called
+        in threads of the server, at once when a page opens, then after each `changed`.
+    answers
+        What is given for further addresses, by their names: bytes or what becomes JSON, None where
+        there is none. Called with the words behind the question mark.
+    actions
+        What a page may ask for (POST), by name.
+
+    Attributes
+    ----------
+    address
+        What to open; whoever knows it sees the page and may use its actions.
+    """
+
+    def __init__(
+        self,
+        page: Path,
+        news: Callable[[int], tuple[int, dict]],
+        answers: Mapping[str, Answer],
+        actions: Mapping[str, Callable[[Mapping[str, str]], None]],
+    ):
+        require_plotly()
+        self.page, self.news = page, news
+        self.answers = {"plotly.js": _plotly, **answers}
+        self.actions = actions
+        self.version = 0
+        self._changed = threading.Condition()
+        self._shown: dict[int, int] = {}  # the version that each open page has
+        self.token = secrets.token_urlsafe(16)
+        self._http = ThreadingHTTPServer(("127.0.0.1", 0), _handler(self))
+        self._http.daemon_threads = True
+        self.address = f"http://127.0.0.1:{self._http.server_address[1]}/{self.token}/"
+        threading.Thread(target=self._http.serve_forever, daemon=True).start()
+
+    def changed(self) -> None:
+        """Let all pages know that there are news."""
+        with self._changed:
+            self.version += 1
+            self._changed.notify_all()
+
+    @property
+    def watched(self) -> bool:
+        """Tell whether a page is open."""
+        return bool(self._shown)
+
+    def flush(self) -> None:
+        """Wait, a moment at most, until open pages have the last news."""
+        with self._changed:
+            self._changed.wait_for(
+                lambda: all(shown >= self.version for shown in self._shown.values()), PATIENCE
+            )
+
+    def stay(self) -> None:
+        """Go on answering as long as a page is open."""
+        with self._changed:
+            self._changed.wait_for(lambda: not self._shown)
+
+    def close(self) -> None:
+        """Bring the last news, and end."""
+        self.flush()
+        self._http.shutdown()
+        self._http.server_close()
+
+    def events(self, write: Callable[[bytes], Any]) -> None:
+        """Write news as they come, until the page is closed."""
+        key, seen, version = threading.get_ident(), 0, -1
+        try:
+            while True:
+                with self._changed:
+                    self._changed.wait_for(lambda: self.version != version, BEAT)  # noqa: B023
+                    version = self.version
+                seen, told = self.news(seen)
+                write(b"data: " + json.dumps(told).encode() + b"\n\n")
+                with self._changed:
+                    self._shown[key] = version
+                    self._changed.notify_all()
+                time.sleep(0.1)  # more often nobody sees
+        finally:
+            with self._changed:
+                self._shown.pop(key, None)
+                self._changed.notify_all()
+
+
+def _plotly(_: Mapping[str, str]) -> bytes:
+    from plotly.offline import get_plotlyjs
+
+    return get_plotlyjs().encode()
+
+
+def _handler(server: Server) -> type[BaseHTTPRequestHandler]:
+    class Handler(BaseHTTPRequestHandler):
+        protocol_version = "HTTP/1.1"
+
+        def log_message(self, *_: Any) -> None:
+            """Say nothing: the terminal is that of the study."""
+
+        def do_GET(self) -> None:
+            name, words = self._asked()
+            if name == "":
+                self._give(server.page.read_bytes(), "text/html; charset=utf-8")
+            elif name == "events":
+                self._open("text/event-stream")
+                self.send_header("Connection", "close")
+                self.end_headers()
+                try:
+                    server.events(self._write)
+                except OSError:  # the page is closed
+                    self.close_connection = True
+            elif name in server.answers and (found := server.answers[name](words)) is not None:
+                if isinstance(found, bytes):
+                    kind = "text/javascript" if name.endswith(".js") else "application/octet-stream"
+                    self._give(found, kind)
+                else:
+                    self._give(json.dumps(found).encode(), "application/json")
+            else:
+                self._nothing()
+
+        def do_POST(self) -> None:
+            name, words = self._asked()
+            if name not in server.actions:
+                self._nothing()
+                return
+            server.actions[name](words)
+            self._give(b"{}", "application/json")
+
+        def _asked(self) -> tuple[str | None, dict[str, str]]:
+            """Read which address is asked for; None without the secret word."""
+            asked = urlsplit(self.path)
+            before, _, name = asked.path.lstrip("/").partition("/")
+            right = secrets.compare_digest(before.encode(), server.token.encode())
+            return (name if right else None), dict(parse_qsl(asked.query))
+
+        def _open(self, kind: str, status: int = 200) -> None:
+            self.send_response(status)
+            self.send_header("Content-Type", kind)
+            self.send_header("Cache-Control", "no-store")
+
+        def _give(self, content: bytes, kind: str, status: int = 200) -> None:
+            self._open(kind, status)
+            self.send_header("Content-Length", str(len(content)))
+            self.end_headers()
+            self.wfile.write(content)
+
+        def _nothing(self) -> None:
+            self._give(b"there is nothing here", "text/plain", 404)
+
+        def _write(self, text: bytes) -> None:
+            self.wfile.write(text)
+            self.wfile.flush()
+
+    return Handler

@@ -1,0 +1,108 @@
+"""The page of a study: its runs as they wait, run and end, and a chart that fills."""
+
+from __future__ import annotations
+
+import atexit
+import threading
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.app.live.frames import plain
+from karamelo_py.app.live.server import Server
+from karamelo_py.app.plot import read_log
+from karamelo_py.app.studies.case import COLUMNS, options_of, said_in, worded
+
+MOST = 400  # rows of a log that a page draws
+LINES = 12  # of what a run has said
+
+
+class StudyPage:
+    """Shows a study in browsers; `stopped` is set when somebody there ends it.
+
+    Parameters
+    ----------
+    script
+        Path of the script.
+    names
+        The variables of the study.
+    recorded
+        Names of what is recorded of each run.
+    axes
+        What the chart shows at first; empty: what suits the names.
+    """
+
+    def __init__(
+        self, script: Path, names: Sequence[str], recorded: Sequence[str], axes: Sequence[str] = ()
+    ):
+        self.stopped = threading.Event()
+        self._script, self._names = script, [*names]
+        self._about = {
+            "title": str(script), "names": self._names, "recorded": [*recorded],
+            "facts": [name for name in COLUMNS if name != "seconds_spread"], "axes": [*axes],
+        }  # fmt: skip
+        self._rows: list[dict[str, Any]] = []
+        self._waiting: list[str] = []
+        self._running: list[tuple[str, float]] = []
+        self._progress: dict[str, Any] = {}
+        self._folders: dict[str, Path] = {}
+        self.server = Server(
+            Path(__file__).with_name("study.html"), self._news, {"run": self._run},
+            {"stop": lambda words: self.stopped.set()},
+        )  # fmt: skip
+
+        atexit.register(self._end)
+
+    def _end(self) -> None:
+        self._waiting, self._running, self._progress = [], [], {**self._progress, "over": True}
+        self.server.changed()
+        self.server.close()
+
+    def follow(
+        self,
+        rows: Sequence[Mapping[str, Any]],
+        waiting: Sequence[tuple[Mapping[str, str], Path]],
+        running: Sequence[tuple[Mapping[str, str], Path, float]],
+        **progress: Any,
+    ) -> None:
+        """Take what is known: rows of runs that have ended, cases with their folders."""
+        for row in rows[len(self._rows) :]:
+            case = {name: row[name] for name in self._names}
+            command = f"karamelo-py {self._script} {' '.join(options_of(case))}"
+            self._rows.append({**row, "title": worded(case), "command": command})
+        cases = [*waiting, *((case, folder) for case, folder, _ in running)]
+        self._folders.update((worded(case), folder) for case, folder in cases)
+        self._waiting = [worded(case) for case, _ in waiting]
+        self._running = [(worded(case), since) for case, _, since in running]
+        self._progress = progress
+        self.server.changed()
+
+    def _news(self, seen: int) -> tuple[int, dict]:
+        rows = self._rows[seen:]
+        told = {
+            "waiting": self._waiting, "running": self._running,
+            "rows": [{name: plain(value) for name, value in row.items()} for row in rows],
+            **self._progress,
+        }  # fmt: skip
+        if not seen:
+            told["about"] = self._about
+        return seen + len(rows), told
+
+    def _run(self, words: Mapping[str, str]) -> dict | None:
+        """Tell of one run: the last lines that it has said, and the columns of its log."""
+        folder = self._folders.get(words.get("title", ""))
+        if folder is None:
+            return None
+        said = [
+            *said_in(folder / "err.txt").splitlines(),
+            *said_in(folder / "out.txt").splitlines(),
+        ]
+        told: dict[str, Any] = {"said": said[-LINES:], "columns": {}}
+        told["columns"] = {
+            name: [plain(float(value)) for value in values[:: max(1, len(values) // MOST)]]
+            for name, values in read_log(folder).items()
+            if np.issubdtype(values.dtype, np.number)
+        }
+        return told

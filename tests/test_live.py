@@ -1,0 +1,297 @@
+"""Live pages: a study, a run, a folder; served to who knows the address, and changing no bit."""
+
+import json
+import shutil
+import threading
+import urllib.error
+import urllib.request
+from contextlib import contextmanager
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from karamelo_py import Simulation
+from karamelo_py.app.cli import main
+from karamelo_py.app.live import frames
+from karamelo_py.app.live.folder import FolderPage
+from karamelo_py.app.live.frames import Frame, Frames
+from karamelo_py.app.live.study import StudyPage
+from karamelo_py.app.studies import study as studies
+
+pytest.importorskip("plotly")
+
+BAR = """
+method(ulmpm, FLIP, linear, 1)
+dimension(2, 0, 4, 0, 1, 0.5)
+region(bar, block, 0, 3, 0, 1)
+material(soft, linear, 1, 1, 0.3)
+solid(bar, region, bar, 2, soft, 0.5, 0)
+group(all_points, particles, region, bar, solid, bar)
+fix(v, initial_velocity_particles, all_points, 0.01, NULL)
+compute(Ek, kinetic_energy, all_points)
+log_modify(custom, step, dt, time, Ek)
+set_output(2)
+dump(points, all, particle, 4, points.*.txt, x, y, z, vx, seq)
+"""
+
+
+def get(address, name="", **words):
+    more = "&".join(f"{k}={v}" for k, v in words.items())
+    with urllib.request.urlopen(f"{address}{name}?{more}", timeout=20) as answer:
+        return answer.read()
+
+
+def post(address, name):
+    request = urllib.request.Request(address + name, data=b"", method="POST")
+    urllib.request.urlopen(request, timeout=20).read()
+
+
+class Events:
+    """What a page is told, event after event."""
+
+    def __init__(self, address):
+        self.stream = urllib.request.urlopen(address + "events", timeout=60)
+
+    def next(self):
+        while not (line := self.stream.readline()).startswith(b"data: "):
+            assert line, "the page was told that all is over"
+        return json.loads(line[6:])
+
+    def until(self, holds):
+        while not holds(told := self.next()):
+            pass
+        return told
+
+
+@contextmanager
+def in_background(act):
+    thread = threading.Thread(target=act, daemon=True)
+    thread.start()
+    yield thread
+    thread.join(60)
+    assert not thread.is_alive()
+
+
+@pytest.fixture
+def simulation(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with Simulation(BAR, folder=tmp_path) as made:
+        yield made
+
+
+def test_a_page_answers_only_behind_its_secret_word(simulation):
+    page = simulation.live()
+    assert page.address.startswith("http://127.0.0.1:")
+    assert b"<title>karamelo-py" in get(page.address)
+    assert len(get(page.address, "plotly.js")) > 1e6
+    root, secret = page.address.rstrip("/").rsplit("/", 1)
+    assert len(secret) > 20
+    for wrong in (f"{root}/", f"{root}/{secret[:-1]}/", page.address + "nothing"):
+        with pytest.raises(urllib.error.HTTPError, match="404"):
+            get(wrong)
+    with pytest.raises(urllib.error.HTTPError, match="404"):
+        post(page.address, "rm")
+    assert page.address in page._repr_html_()
+    page.close()
+    with pytest.raises(urllib.error.URLError):
+        get(page.address)
+
+
+def test_a_run_is_followed_and_keeps_its_bits(simulation, tmp_path):
+    page = simulation.live()
+    events = Events(page.address)
+    simulation.run(9)
+    told = events.until(lambda told: told["frames"] and told["frames"][-1][1] == 9)
+    assert [frame[1] for frame in told["frames"]] == [0, 2, 4, 6, 8, 9]
+    number, step, _, column, count = told["frames"][-1]
+    assert (step, column, count) == (9, "seq", 48)
+    numbers = np.frombuffer(get(page.address, "frame", k=number), np.float32).reshape(3, 48)
+    points = simulation.points
+    assert np.array_equal(numbers, np.float32([points["x"], points["y"], points["seq"]]))
+    first = Events(page.address).next()  # of a page that opens later
+    assert first["about"]["dimension"] == 2 and "vx" in first["about"]["columns"]
+    assert [row["step"] for row in first["rows"]] == [0, 2, 4, 6, 8, 9]
+    assert first["rows"][-1]["log"]["Ek"] == simulation.log["Ek"][-1]
+    assert {row["limit"] for row in first["rows"]} <= {"waves", "speed", "end"}
+    page.close()
+    simulation.run(5)  # without the page
+    alone = tmp_path / "alone"
+    alone.mkdir()
+    with Simulation(BAR, folder=alone) as other:
+        other.run(9)
+        other.run(5)
+        for name in ("x", "vx", "seq"):
+            assert np.array_equal(other.points[name], simulation.points[name])
+    assert (alone / "log.mpm").read_bytes() == (tmp_path / "log.mpm").read_bytes()
+
+
+def test_a_run_is_held_taken_on_and_coloured_anew(simulation):
+    page = simulation.live()
+    post(page.address, "pause")
+    events = Events(page.address)
+    with in_background(lambda: simulation.run(6)):
+        told = events.until(lambda told: told["frames"])
+        assert told["paused"] and [frame[1] for frame in told["frames"]] == [0]
+        get_column = page.address + "column?name=vx"
+        urllib.request.urlopen(urllib.request.Request(get_column, data=b""), timeout=20)
+        told = events.until(lambda told: told["frames"] and told["frames"][-1][3] == "vx")
+        assert [frame[1] for frame in told["frames"]] == [0]
+        post(page.address, "step")
+        told = events.until(lambda told: len(told["frames"]) == 2)
+        assert told["frames"][-1][1] == 2
+        post(page.address, "go")
+    assert simulation.step == 6
+    page.close()
+
+
+def test_a_warning_is_a_flag(simulation):
+    page = simulation.live()
+    simulation.hub.warn("water runs uphill")
+    flags = Events(page.address).next()["flags"]
+    assert "water runs uphill" in flags[0]["text"] and flags[0]["time"] == 0
+    page.close()
+
+
+def test_a_script_is_run_with_a_page_that_stops_it(tmp_path, monkeypatch, capsys):
+    """As Ctrl-C does: all is written, and the exit status says so."""
+    from karamelo_py.app.live.run import RunPage
+
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "in.bar").write_text(BAR + "run(100000)\n", encoding="utf-8")
+    stopped = SimpleNamespace(at=None)
+    write = RunPage.write
+
+    def stopping(page):
+        write(page)
+        if page.hub.update.step >= 4 and stopped.at is None:
+            stopped.at = page.hub.update.step
+            post(page.server.address, "stop")
+
+    monkeypatch.setattr(RunPage, "write", stopping)
+    assert main(["in.bar", "--live", "--threads", "1"]) == 130
+    said = capsys.readouterr()
+    assert "live: http://127.0.0.1" in said.out
+    assert "interrupted: the log and the dumps are complete" in said.err
+    assert main(["in.bar", "--live", "--ranks", "2"]) == 1
+    assert "a live page shows a run of one process" in capsys.readouterr().err
+
+
+def test_frames_are_thinned_and_bounded(monkeypatch):
+    monkeypatch.setattr(frames, "POINTS", 10)
+    monkeypatch.setattr(frames, "COUNT", 8)
+    columns = {name: np.arange(25.0) for name in ("x", "y", "seq")}
+    kept = Frames()
+    for step in range(30):
+        kept.add(Frame.of_columns(step, 0.1 * step, "xy", "seq", columns.__getitem__))
+    listed = kept.listed()
+    assert len(listed) <= 8 and listed[0][1] == 0 and listed[-1][1] == 29
+    assert listed[-1][4] == 25
+    shown = np.frombuffer(kept.answer({"k": str(listed[-1][0])}), np.float32).reshape(3, -1)
+    assert np.array_equal(shown[0], np.arange(0, 25, 3))
+    assert kept.answer({"k": "-1"}) is None
+
+
+def test_a_folder_is_followed(simulation, tmp_path, capsys):
+    simulation.run(4)
+    page = FolderPage(tmp_path)
+    first = Events(page.server.address).next()
+    assert [frame[1] for frame in first["frames"]] == [0, 4]
+    assert [row["step"] for row in first["rows"]] == [0, 2, 4]
+    assert first["about"]["dimension"] == 2 and not first["about"]["steers"]
+    simulation.run(4)
+    assert page.look()
+    assert not page.look()
+    urllib.request.urlopen(
+        urllib.request.Request(page.server.address + "column?name=vx", data=b""), timeout=20
+    )
+    numbers = np.frombuffer(get(page.server.address, "frame", k=2), np.float32).reshape(3, -1)
+    assert np.allclose(numbers[2], simulation.points["vx"], rtol=1e-5)
+    page.server.close()
+    (tmp_path / "empty").mkdir()
+    for name, said in (("empty", "neither a log nor a dump"), ("nowhere", "is no folder")):
+        assert main(["view", "--live", str(tmp_path / name)]) == 1
+        assert said in capsys.readouterr().err
+
+
+def test_a_study_is_followed_and_stopped(tmp_path):
+    folder = tmp_path / "N=20"
+    folder.mkdir()
+    (folder / "err.txt").write_text("warning: much\n", encoding="utf-8")
+    (folder / "log.mpm").write_text("Step Time Ek\n0 0 1\n1 0.5 0.25\n", encoding="utf-8")
+    page = StudyPage(tmp_path / "in.bar", ["N"], ["Ek"])
+    address = page.server.address
+    row = {"N": "10", "Ek": 0.5, "seconds": float("nan"), "status": "done", "reason": ""}
+    page.follow([], [({"N": "20"}, folder)], [({"N": "10"}, tmp_path, 1.0)], of=2, left=None)
+    page.follow([row], [], [({"N": "20"}, folder, 0.5)], of=2, left=3.0)
+    told = Events(address).next()
+    assert told["about"]["names"] == ["N"] and told["left"] == 3.0
+    assert told["running"] == [["N = 20", 0.5]]
+    assert told["rows"][0]["command"].endswith("in.bar -var N 10")
+    assert told["rows"][0]["seconds"] is None  # which JSON has not
+    run = json.loads(get(address, "run", title="N%20=%2020"))
+    assert run["said"] == ["warning: much"] and run["columns"]["Ek"] == [1, 0.25]
+    with pytest.raises(urllib.error.HTTPError):
+        get(address, "run", title="../../etc")
+    assert not page.stopped.is_set()
+    post(address, "stop")
+    assert page.stopped.is_set()
+    page.server.close()
+
+
+def test_who_stops_a_study_on_its_page_interrupts_it(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
+    (tmp_path / "in.bar").write_text(BAR + "n = 2\nrun(n)\n", encoding="utf-8")
+    follow = StudyPage.follow
+
+    def stopping(page, rows, *more, **words):
+        follow(page, rows, *more, **words)
+        if rows:
+            post(page.server.address, "stop")
+
+    monkeypatch.setattr(StudyPage, "follow", stopping)
+    words = ["sweep", "in.bar", "-var", "n=2,3,4", "-record", "Ek", "-jobs", "1", "--live"]
+    with pytest.raises(KeyboardInterrupt):
+        studies.run(parsed(words))
+    said = capsys.readouterr()
+    assert "live: http://127.0.0.1" in said.out
+    assert "1 of 3 runs are in sweep.csv; the same command goes on" in said.err
+
+
+def parsed(words):
+    from karamelo_py.app import cli
+
+    parser, _ = cli._parser(words[0])
+    return parser.parse_args(words)
+
+
+@pytest.mark.skipif(not shutil.which("chromium"), reason="no browser")
+def test_pages_in_a_browser(simulation):
+    """The page loads, news arrive, a click holds the run, another stops the study."""
+    sync = pytest.importorskip("playwright.sync_api")
+    page = simulation.live()
+    study = StudyPage(simulation.hub.folder / "in.bar", ["N"], ["Ek"])
+    row = {"N": "10", "Ek": 0.5, "seconds": 1.0, "status": "failed", "reason": "it broke"}
+    study.follow([row], [], [], of=1)
+    simulation.run(4)
+    with sync.sync_playwright() as started:
+        browser = started.chromium.launch(
+            executable_path=shutil.which("chromium"), args=["--no-sandbox"]
+        )
+        shown = browser.new_page()
+        wrong = []
+        shown.on("pageerror", wrong.append)
+        shown.goto(page.address)
+        shown.get_by_role("status").filter(has_text="step 4").wait_for()
+        shown.get_by_role("button", name="Pause").click()
+        shown.get_by_role("button", name="Go on").wait_for()
+        shown.goto(study.server.address)
+        shown.get_by_label("N = 10: failed").click()
+        shown.get_by_text("failed: it broke").wait_for()
+        shown.get_by_role("button", name="Stop the study").click()
+        assert study.stopped.wait(20)
+        browser.close()
+    assert not wrong
+    page.close()
+    study.server.close()
