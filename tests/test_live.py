@@ -76,7 +76,7 @@ def in_background(act):
 @pytest.fixture
 def simulation(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    with Simulation(BAR, folder=tmp_path) as made:
+    with Simulation(BAR, out=tmp_path) as made:
         yield made
 
 
@@ -118,7 +118,7 @@ def test_a_run_is_followed_and_keeps_its_bits(simulation, tmp_path):
     simulation.run(5)  # without the page
     alone = tmp_path / "alone"
     alone.mkdir()
-    with Simulation(BAR, folder=alone) as other:
+    with Simulation(BAR, out=alone) as other:
         other.run(9)
         other.run(5)
         for name in ("x", "vx", "seq"):
@@ -281,7 +281,7 @@ def test_pages_in_a_browser(simulation):
         )
         shown = browser.new_page()
         wrong = []
-        shown.on("pageerror", wrong.append)
+        shown.on("pageerror", lambda error: wrong.append(error))
         shown.goto(page.address)
         shown.get_by_role("status").filter(has_text="step 4").wait_for()
         shown.get_by_role("button", name="Pause").click()

@@ -302,6 +302,11 @@ def _run(options: argparse.Namespace) -> int:
             debugging=options.debug,
         )
     if (options.ranks or 1) > 1 and not options.checking:
+        if options.live:
+            raise ScriptError(
+                f"a live page shows a run of one process, and {options.ranks} share this one",
+                hint="--threads N in the place of --ranks, or karamelo-py view --live FOLDER",
+            )
         return launch(options.ranks, options.command_line)
     return _carry_out(options, script)
 
@@ -323,7 +328,7 @@ def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = 
     hub.settings.trusts = options.trust_geometries
     hub.checking = options.checking
     _direct(hub, options)
-    page = _live_page(hub, script) if getattr(options, "live", False) else None
+    page = _live_page(hub, script) if not options.checking and options.live else None
     presets = dict(options.var)
     if getattr(options, "restart", None) is not None:
         from karamelo_py.run.checkpoint.restart_file import Restart
@@ -356,11 +361,6 @@ def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = 
 
 def _live_page(hub: Hub, script: str) -> Any:
     """Open the page of a run, and say its address."""
-    if hub.settings.ranks > 1:
-        raise ScriptError(
-            f"a live page shows a run of one process, and {hub.settings.ranks} share this one",
-            hint="--threads instead of --ranks, or view --live FOLDER of the folder of its dumps",
-        )
     from karamelo_py.app.live.run import RunPage
 
     page = RunPage(hub, script)

@@ -115,8 +115,9 @@ class FolderPage:
         told: dict[str, Any] = {"rows": rows, "frames": listed, "flags": [], "paused": False}
         if not seen:
             told["about"] = {
-                "title": self.folder.resolve().name, "dimension": self._dimension, "columns": self._columns,
-                "column": self._column, "method": "", "bounds": [], "steers": False,
+                "title": self.folder.resolve().name, "dimension": self._dimension,
+                "columns": self._columns, "column": self._column,
+                "method": "", "bounds": [], "steers": False,
             }  # fmt: skip
         return count, {**told, "over": False}
 

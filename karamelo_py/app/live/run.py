@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
-import threading
+import time
 from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any, NamedTuple
@@ -49,8 +49,7 @@ class RunPage(Rhythmic):
         if hub.output.log.rows is None:
             hub.output.log.rows = []
         self._rows: list[Row] = []
-        self._held = threading.Condition()
-        self._paused = self._over = False
+        self._paused = self._once = self._over = False
         self._column = ""
         self.server = Server(
             frames.PAGE, self._news, {"frame": self.frames.answer},
@@ -93,7 +92,7 @@ class RunPage(Rhythmic):
     def detach(self) -> None:
         """End the page; the run goes on without."""
         self.hub.output.pages.remove(self)
-        self._go()
+        self._paused = False
         self.server.close()
 
     def _take(self) -> None:
@@ -104,16 +103,16 @@ class RunPage(Rhythmic):
 
     def _wait(self) -> None:
         shown = self._column
-        with self._held:
-            while self._paused:
-                self._held.wait(0.2)  # a signal is seen by this thread alone
-                if self.hub.running is not None and self.hub.running.signal:
-                    self._paused = False
-                if shown != self._column:
-                    shown = self._column
-                    self.frames.drop_last()
-                    self._take()
-                    self.server.changed()
+        while self._paused and not self._once:
+            time.sleep(0.05)
+            if self.hub.running is not None and self.hub.running.signal:
+                self._paused = False
+            if shown != self._column:
+                shown = self._column
+                self.frames.drop_last()
+                self._take()
+                self.server.changed()
+        self._once = False
 
     # ---- in threads of the server ---------------------------------------------------------------
 
@@ -149,15 +148,12 @@ class RunPage(Rhythmic):
         self._paused = True
         self.server.changed()
 
-    def _go(self, _: Mapping[str, str] = {}) -> None:
-        with self._held:
-            self._paused = False
-            self._held.notify_all()
+    def _go(self, _: Mapping[str, str]) -> None:
+        self._paused = False
         self.server.changed()
 
     def _step(self, _: Mapping[str, str]) -> None:
-        self._go()
-        self._paused = True
+        self._once = True
 
     def _stop(self, _: Mapping[str, str]) -> None:
         """Interrupt the run as Ctrl-C does: the last state is written."""

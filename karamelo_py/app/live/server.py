@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import secrets
 import threading
@@ -12,7 +13,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qsl, urlsplit
 
-from karamelo_py.app.studies.chart import require_plotly
+from karamelo_py.script.errors import ScriptError
 
 PATIENCE = 1.0  # seconds that the last news may take to a page, when all is over
 BEAT = 2.0  # seconds after which something is said, so that a closed page is noticed
@@ -109,6 +110,15 @@ class Server:
             with self._changed:
                 self._shown.pop(key, None)
                 self._changed.notify_all()
+
+
+def require_plotly() -> None:
+    """See that Plotly is there, which takes long to import."""
+    if importlib.util.find_spec("plotly") is None:
+        raise ScriptError(
+            "a page needs the package plotly",
+            hint="pip install '.[studies]' in the folder of karamelo-py",
+        )
 
 
 def _plotly(_: Mapping[str, str]) -> bytes:

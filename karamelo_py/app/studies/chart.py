@@ -2,7 +2,6 @@
 
 import base64
 import html
-import importlib.util
 import io
 import json
 from argparse import ArgumentParser
@@ -13,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from karamelo_py.app.live.server import require_plotly
 from karamelo_py.app.studies import keeping, look, pictures, records
 from karamelo_py.app.studies.case import options_of, worded
 from karamelo_py.app.studies.curves import Family, Table, column, order, require
@@ -243,15 +243,6 @@ def tell(family: Family, *, costs: bool) -> None:
 
 _WIDEST = 480  # pixels of a picture in the page
 _MOST = 60  # pictures in a page
-
-
-def require_plotly() -> None:
-    """See that Plotly is there, which takes long to import."""
-    if importlib.util.find_spec("plotly") is None:
-        raise ScriptError(
-            "a page needs the package plotly",
-            hint="pip install '.[studies]' in the folder of karamelo-py",
-        )
 
 
 def write_page(family: Family, path: Path, words: tuple[str, str], title: str) -> None:
