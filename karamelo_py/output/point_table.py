@@ -134,9 +134,14 @@ class PointTable:
         return self._cache[name]
 
     @property
-    def ids(self) -> np.ndarray:
+    def numbers(self) -> np.ndarray:
         """(n,) numbers of the points, from 0."""
         return self._rows.ids
+
+    @property
+    def ids(self) -> np.ndarray:
+        """(n,) ids of the points, from 1, as in dumps."""
+        return self.numbers + 1
 
     @property
     def count(self) -> int:
@@ -177,7 +182,7 @@ class PointTable:
     def solid(self) -> np.ndarray:
         """(n,) number of the solid of each point, from 0."""
         firsts = [solid.first_id for solid in self.hub.solids.values()]
-        return (np.searchsorted(firsts, self.ids, side="right") - 1).astype(np.int32)
+        return (np.searchsorted(firsts, self.numbers, side="right") - 1).astype(np.int32)
 
     @property
     def velocity_moment(self) -> np.ndarray | None:
@@ -328,7 +333,7 @@ def _exported(k: int, table: PointTable) -> np.ndarray:
 # Columns of every scene. Those with None only some materials or fields have; in other scenes they
 # are 0, as in Karamelo.
 COLUMNS: dict[str, Callable[[PointTable], np.ndarray] | None] = {
-    "id": lambda table: table.ids + 1,
+    "id": lambda table: table.ids,
     "type": lambda table: table.solid + 1,
     **{name: partial(_of_vector, *where) for name, where in VECTORS.items()},
     **{f"s{name}": partial(_exported, k) for k, name in enumerate(COMPONENTS)},

@@ -131,7 +131,7 @@ class PointsById:
             for some in self.some(None):
                 values = of(some)
                 value = np.fmax.reduce(values, initial=-inf)
-                first = some.ids[values == value].min(initial=LAST)
+                first = some.numbers[values == value].min(initial=LAST)
                 found = max(found, (float(value), -int(first)))
             return found
 

@@ -39,6 +39,7 @@ class Solid(Named):
 
     catalogue = "solids"
     source = "region"  # the argument that says where the points are, for messages
+    warm = False  # its points are given temperatures of their own
 
     def __init__(
         self,
@@ -91,8 +92,9 @@ class Solid(Named):
             )
         kinds = law_kind(self.material.law)
         if self.T0 is None and any("initial_temperature" in kind._fields for kind in kinds):
+            begins = "has no thermal stress at" if self.warm else "starts at"
             hub.warn(
-                "the solid starts at the temperature 0, since neither it nor its material says one",
+                f"the solid {begins} the temperature 0: neither it nor its material says one",
                 hint="give T0 behind the cell size",
             )
 

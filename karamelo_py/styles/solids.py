@@ -179,6 +179,7 @@ class PointsSolid(Solid):
         GlueToSolid: Solid | None = None,
     ):
         domain = require_domain(hub)
+        self.warm = "T" in table.columns
         super().__init__(hub, material, h, T0, GlueToSolid)
         self.table, d = table.name, domain.dimension
         columns, lengths = dict(table.columns), {np.shape(of) for of in table.columns.values()}

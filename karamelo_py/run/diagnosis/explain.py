@@ -190,7 +190,7 @@ def _loose(simulation: Any, number: int, x: np.ndarray, reach: float) -> bool:
     def others(simulation: Any) -> tuple[int, int]:
         found, near = 0, 0
         for some in simulation.points.some(None):
-            own = (some.solid == solid.index) & (some.ids != number)
+            own = (some.solid == solid.index) & (some.numbers != number)
             apart = np.abs(some.position[own] - x).max(axis=1, initial=0.0)
             found, near = found + len(apart), near + int(np.sum(~(apart > reach)))
         return found, near
@@ -277,7 +277,7 @@ def _places(simulation: Any, group: Any, formula: Expression) -> Iterator[tuple]
     else:
         for some in simulation.points.some(group):
             there = np.isfinite(some.position).all(axis=1)
-            yield some.ids[there], some.position[there], some.reference_position[there]
+            yield some.numbers[there], some.position[there], some.reference_position[there]
 
 
 def no_number(hub: Hub, simulation: Any, message: str, hint: str) -> Trouble:

@@ -71,5 +71,5 @@ class Erosion(Fix):
         return True
 
     def meeting(self, points: PointTable) -> np.ndarray | None:
-        """Ids of the points, of some, that meet the condition."""
-        return points.ids[self.condition.holds(points)] if points.count else None
+        """Numbers of the points, of some, that meet the condition."""
+        return points.numbers[self.condition.holds(points)] if points.count else None
