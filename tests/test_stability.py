@@ -170,6 +170,66 @@ def test_what_leaves_the_domain_tells_nothing_of_the_step(folder, capsys):
     assert "left the domain" in (folder / "map.svg").read_text(encoding="utf-8")
 
 
+def test_words_are_rows_and_what_loses_energy_is_damped(folder, capsys):
+    """PIC maps velocities to the nodes and back: modes of the bar lose energy in each step.
+
+    The mode of number k = pi/8 keeps cos^2(k h/2), 96 % of its velocity, in a step at any length.
+    """
+    text = SCRIPT.replace("FLIP, linear, 1)", "transfer, linear, share)")
+    text = 'transfer = "FLIP"\nshare = 1\n' + text.replace("Ek + Es)", "Ek + Es, err)")
+    text = text.replace("log_modify", "err = 0.01*factor\nlog_modify")
+    (folder / "in.bar").write_text(text, encoding="utf-8")
+    words = ["-var", "transfer=FLIP,PIC", "-var", "share=1,mechanical", "-zip", "transfer,share"]
+    words += ["-var", "factor=0.5:2.5:9", "-accuracy", "err", "-o", "map.svg"]
+    assert main(["stability", "in.bar", *words]) == 0
+    table = pandas.read_csv(folder / "map.csv")
+    classes = {name: list(rows["class"]) for name, rows in table.groupby("transfer")}
+    assert classes["FLIP"] == ["stable"] * 7 + ["failed"] * 2  # to 2 h/c, as above
+    assert classes["PIC"][:6] == ["damped"] * 6
+    run = table[table["run"] == "yes"]
+    assert set(run["reason"][run["class"] == "damped"]) == {"energy is lost"}
+    done = run[run["class"] == "stable"]
+    assert list(done["err"]) == pytest.approx(list(0.01 * done["factor"]))
+    said = (folder / "map.svg").read_text(encoding="utf-8")
+    assert all(f"<!-- {word} -->" in said for word in ("FLIP", "PIC", "err where it is stable"))
+    assert "damped   " in capsys.readouterr().out
+
+
+def test_a_column_that_falls_is_damped():
+    assert stability.remains(np.r_[np.ones(30), 0.5 * np.ones(30)]) == 0.5
+    assert stability.remains(np.zeros(9)) == 1 and stability.remains(np.empty(0)) == 1
+
+
+def test_nothing_lies_between_words():
+    """Each row of words is searched by itself: an edge that moves with the row, and none."""
+    asked = []
+
+    def classify(cells):
+        asked.extend(cells)
+        return [i > (11, 3, 17, 40)[j] for i, j in cells]
+
+    known, inferred = explore((20, 4), classify, 6, (False, True))
+    assert {**known, **inferred} == {
+        (i, j): i > (11, 3, 17, 40)[j] for i, j in product(range(20), range(4))
+    }
+    assert len(asked) < 40
+    assert len(explore((3, 4), classify, 6, (True, True))[0]) == 12
+
+
+def test_the_line_of_the_own_step_is_whole():
+    """Steps in proportion to the first variable: 1.2 in rows with runs, whatever they reach."""
+    map = stability.Map(None, {"f": ["0.5", "1", "2"], "y": ["0", "1", "2"]}, ["f", "y"], "", 2.0)
+    ends = {0: (0, 2), 1: (0, 1), 2: ()}
+    steps = {0: 1.2, 1: 1.5}
+    map.found = {
+        (i, j): {"dt": map.x[i], "own_dt": steps[j]} for j, cells in ends.items() for i in cells
+    }
+    assert map.line("own_dt") == [pytest.approx(1.2), pytest.approx(1.5), None]
+    map.found[0, 2] = map.found.pop((0, 1))
+    map.found[1, 2] = map.found.pop((1, 1))
+    assert map.line("own_dt") == pytest.approx([1.2, 1.35, 1.5])  # no run in the middle row
+
+
 # Edges over the unit square, and how many runs of 400 they may cost. The first two are those of a
 # lone point under usl as first published (inputs/failures/in.isolated_point): stable below
 # sqrt(2 xi (1 - xi)) of the Courant limit.
@@ -236,7 +296,8 @@ def test_growth():
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["-var", "factor=a,b"], "not numbers"),
+        (["-var", "factor=0.5:1:3", "-accuracy", "Ek,Es"], "one column"),
+        (["-var", "factor=1,2", "-var", "push=0,0,0", "-zip", "factor,push"], "push has 3 values"),
         (["-var", "factor=1"], "one or two"),
         (["-var", "factor=0.5:1:3", "-energy", "Et"], "-energy Et: in.bar does not log 'Et'"),
         (["-var", "factor=0.5:1:3", "-o", "map.csv"], "unknown kind of file"),

@@ -6,7 +6,7 @@ from argparse import ArgumentParser
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from itertools import pairwise
-from math import ceil, inf, isclose, isfinite, nan, prod
+from math import ceil, inf, isfinite, log, nan, prod
 from pathlib import Path
 from typing import Any
 
@@ -14,33 +14,41 @@ import numpy as np
 
 from karamelo_py.app.options import above_zero, positive
 from karamelo_py.app.plot import read_log
-from karamelo_py.app.studies import records, variables
+from karamelo_py.app.studies import look, records, variables
 from karamelo_py.app.studies.case import said_in
+from karamelo_py.app.studies.curves import usable
 from karamelo_py.app.studies.study import Study, live_page
 from karamelo_py.kernels import watch
 from karamelo_py.output.files import savefig
-from karamelo_py.output.plots import blank_figure
+from karamelo_py.output.plots import blank_figure, tick_text
 from karamelo_py.script.errors import ScriptError, plural
 from karamelo_py.script.terms import number_of
 
 DESCRIPTION = """\
-Maps where a script is stable over one or two of its variables: stable, growing (energy comes from
-nowhere, as the program itself finds by kinetic + stored + dissipated energy less the work of loads,
-or a log column exceeds a bound), left (a point left the domain, which tells nothing of the step),
-or failed, with the reason. A mistake of the script ends the study. Edges are searched by halves,
-from coarse to fine: cells between like ones are not run, and "run 7 of at most 400" is one of about
-100. The table is written beside the picture (map.csv), and says which cells were run; -var with one
-value is passed on.
+Maps where a script is stable over one or two of its variables: stable, damped (energy is lost),
+growing (energy comes from nowhere; both as the program itself finds by kinetic + stored +
+dissipated energy less the work of loads, or as a log column exceeds a bound), left (a point left
+the domain, which tells nothing of the step), or failed, with the reason. A mistake of the script
+ends the study. Edges are searched by halves, from coarse to fine: cells between like ones are not
+run, and "run 7 of at most 400" is one of about 100. Rows of words (basis, transfer, scheme) are
+searched one by one. The table is written beside the picture (map.csv), and says which cells were
+run; -var with one value is passed on. Where nothing grows and no run fails, -accuracy shades by
+errors.
 
-  karamelo-py stability in.file -var dt_factor=0.1:2:20 -var xi=0:1:20 -o map.png"""
+  karamelo-py stability in.file -var dt_factor=0.1:2:20 -var xi=0:1:20 -o map.png
+  karamelo-py stability in.file -var dt_factor=0.1:2:20 -var basis=linear,cubic-spline -accuracy err
+"""
 Cell = tuple[int, int]
 UNKNOWN = -1
 FROM_NOWHERE = "energy comes from nowhere"  # what the program says of growth
-CLASSES = ("stable", "growing", "left", "failed")
+LOST = "energy is lost"
+CLASSES = ("stable", "damped", "growing", "left", "failed")
+BORNE = ("stable", "damped")  # classes of steps that are borne
 FIRST = 0.1  # of the rows of a log: energies are means over so many
 FEW = 9  # values of a variable that stand at the axis one by one
 COLOURS = {
-    "stable": "#d9ecf7", "growing": "#f0a53c", "left": "#9b9b9b", "failed": "#7d2a3a"
+    "stable": "#d9ecf7", "damped": "#c3dfb5", "growing": "#f0a53c", "left": "#9b9b9b",
+    "failed": "#7d2a3a",
 }  # fmt: skip
 LEFT = re.compile("leaves the domain|left the domain")  # and was not thrown out of it
 # What the program says of failures, in short.
@@ -60,6 +68,7 @@ REASONS = {
 def add_options(parser: ArgumentParser) -> None:
     """Add what the subcommand takes."""
     variables.add_family(parser)
+    variables.add_steps(parser)
     parser.add_argument(
         "-energy", metavar="COLUMN", help="judge by a log column that should not grow"
     )
@@ -67,6 +76,9 @@ def add_options(parser: ArgumentParser) -> None:
         "-bound", type=above_zero, default=2.0,
         help="of -energy: growing is above this times the first tenth of the log, in the mean (2)",
     )  # fmt: skip
+    parser.add_argument(
+        "-accuracy", metavar="COLUMN", help="shade what is stable by this error: err, off=abs(...)"
+    )
     parser.add_argument("-stride", type=positive, default=6, help="cells between first runs (6)")
     variables.add_axes(parser)
     parser.add_argument("-o", type=Path, default=Path("map.png"), help="the picture (map.png)")
@@ -76,39 +88,48 @@ def run(options: Any) -> int:
     """Do what the command line says; returns the exit status."""
     out = variables.out_file(options.o, ".png", ".svg", ".pdf")
     values, script, launch, jobs = variables.family(options)
-    axes = [name for name in values if len(values[name]) > 1]
-    for name in axes:
-        if any(number_of(value) is None for value in values[name]):
-            raise ScriptError(f"-var {name}: not numbers", expected=f"-var {name}=0.1:2:20")
+    together = variables.zipped(options)
+    variables.cases(values, together)  # which finds lists that do not fit
+    leaders = {name: group[0] for group in together for name in group}
+    axes = [n for n in values if len(values[n]) > 1 and leaders.get(n, n) == n]
+    worded = [name for name in axes if any(number_of(value) is None for value in values[name])]
+    axes.sort(key=worded.__contains__)  # words stand along the second
     if not 1 <= len(axes) <= 2:
         raise ScriptError(
             f"{len(axes)} variables have several values",
             expected="one or two, such as -var dt_factor=0.1:2:20 -var xi=0:1:20",
         )
     for name in axes:
-        values[name].sort(key=float)
+        if name not in {*worded, *leaders}:
+            values[name].sort(key=float)
     energy = ""
     if options.energy:
         energy = records.recorded(options.energy, script, option="-energy")[0].columns()[0]
     words = variables.along(options, axes[0], axes[1] if len(axes) > 1 else "")
     table = out.with_suffix(".csv")
     items = [records.Recorded(f"max:{energy}")] if energy else []
+    shades = records.recorded(options.accuracy or "", script, values, "-accuracy")
+    if len(shades) > 1:
+        raise ScriptError(f"-accuracy {options.accuracy}", expected="one column")
     most = prod(len(values[name]) for name in axes)
     study = Study(
-        launch, table, list(values), items, jobs, options.again, strict=True, most=most,
+        launch, table, list(values), items + shades, jobs, options.again, strict=True, most=most,
         writes=False,
     )  # fmt: skip
     study.page = live_page(options, study, axes)
     study.describe(variables=values, energy=energy, bound=options.bound)
-    chart = Map(study, values, axes, energy, options.bound)
+    error = shades[0].word if shades else ""
+    chart = Map(study, values, axes, energy, options.bound, error, leaders)
+    apart = [name in worded for name in axes] + [False] * (2 - len(axes))
     try:
-        _, chart.inferred = explore(chart.shape, chart.classify, options.stride)
+        _, chart.inferred = explore(chart.shape, chart.classify, options.stride, apart)
     finally:
         if chart.found:  # also of a study that is interrupted
             records.write(table, chart.rows())
             chart.draw(out, options.script.name, words)
     chart.tell()
-    width = unseen(chart.shape, options.stride)
+    searched = [n for n, words in zip(chart.shape, apart, strict=True) if not words]
+    width = unseen(searched, options.stride)
     if chart.inferred and width:
         wide = plural(width, "cell")
         print(f"islands and strips up to {wide} wide between runs are not seen (-stride)")
@@ -133,6 +154,14 @@ def growth(energy: np.ndarray) -> float:
     return 1 + watch.growth(first, float(means.max()), first)
 
 
+def remains(energy: np.ndarray) -> float:
+    """Divide the mean of an energy over the last tenth of its rows by that over the first."""
+    rows = max(1, ceil(FIRST * len(energy)))
+    first, last = (float(np.abs(part).mean()) if len(part) else 0.0
+                   for part in (energy[:rows], energy[-rows:]))  # fmt: skip
+    return last / first if first > 0 else 1.0
+
+
 def in_short(row: Mapping[str, Any]) -> str:
     """Give the reason of a failure in a few words."""
     if row["status"] == "too long":
@@ -148,15 +177,26 @@ class Map:
     """The plane of a stability map.
 
     Of all variables in `values` the one or two `axes` vary. Growth is that of the log column
-    `energy` by more than the factor `bound`, or, where none is named, what the program finds.
+    `energy` by more than the factor `bound`, or, where none is named, what the program finds. The
+    column `error` shades what is stable. Variables go in step with their `leaders`.
     """
 
     def __init__(
-        self, study: Study, values: dict[str, list[str]], axes: list[str], energy: str, bound: float
-    ):
+        self, study: Study, values: dict[str, list[str]], axes: list[str], energy: str,
+        bound: float, error: str = "", leaders: Mapping[str, str] | None = None,
+    ):  # fmt: skip
+        self.leaders = leaders or {}
         self.study, self.values, self.axes = study, values, axes
-        self.energy, self.bound = energy, bound
-        self.x, *more = ([float(v) for v in values[name]] for name in axes)
+        self.energy, self.bound, self.error = energy, bound, error
+        # Words stand side by side.
+        self.words = [
+            [] if all(number_of(v) is not None for v in values[name]) else values[name]
+            for name in axes
+        ]
+        self.x, *more = (
+            [*map(float, range(len(words)) if words else values[name])]
+            for name, words in zip(axes, self.words, strict=True)
+        )
         self.y = more[0] if more else [0.0]
         self.shape = len(self.x), len(self.y)
         self.found: dict[Cell, dict[str, Any]] = {}  # cells that were run
@@ -176,7 +216,8 @@ class Map:
     def case(self, cell: Cell) -> dict[str, str]:
         """Find the values of the variables of a cell."""
         at = dict(zip(self.axes, cell, strict=False))
-        return {name: values[at.get(name, 0)] for name, values in self.values.items()}
+        place = {name: at.get(self.leaders.get(name, name), 0) for name in self.values}
+        return {name: values[place[name]] for name, values in self.values.items()}
 
     def classify(self, cells: Sequence[Cell]) -> list[str]:
         """Run cells, and tell the class of each."""
@@ -204,20 +245,26 @@ class Map:
                 raise ScriptError(
                     f"the log has no column '{self.energy}'", expected=", ".join(log) or "a log"
                 )
-            found["growth"] = factor = growth(log.get(self.energy, np.empty(0)))
+            energy = log.get(self.energy, np.empty(0))
+            found["growth"] = factor = growth(energy)
             grows = f"{self.energy} grows {factor:.3g} times" if factor > self.bound else ""
+            share = remains(energy)
+            falls = f"{self.energy} falls to {share:.3g}" if share < 1 / self.bound else ""
         else:
             changes = map(float, re.findall(r"^  energy +([-+][.\d]+) %", said, re.M))
             found["growth"] = max((1 + change / 100 for change in changes), default=None)
             if unwatched := re.search(r"^  energy +is (not watched: .*)", said, re.M):
                 found["unwatched"] = unwatched[1]
             grows = FROM_NOWHERE if FROM_NOWHERE in complaint else ""
+            falls = LOST if LOST in complaint or (found["growth"] or 1.0) < 1 - watch.WITHIN else ""
         if not done:
             # A domain that is too small tells nothing of the step.
             left = LEFT.search(row["reason"]) and FROM_NOWHERE not in complaint
             found |= {"class": "left" if left else "failed", "why": in_short(row)}
         elif grows:
             found |= {"class": "growing", "why": grows}
+        elif falls:
+            found |= {"class": "damped", "why": falls}
         return {**row, **found}
 
     def rows(self) -> list[dict]:
@@ -228,27 +275,52 @@ class Map:
             found = {"class": kind, "run": "yes" if row else "no", "reason": row.get("why")}
             found |= {name: row.get(name) for name in ("growth", "dt", "stable_dt", "own_dt")}
             found |= {"limit": row.get("limit"), "message": row.get("reason")}
+            if self.error:
+                found[self.error] = row.get(self.error)
             rows.append({**self.case(cell), **found, "folder": row.get("folder")})
         return rows
 
-    def where(self, step: str, j: int) -> float | None:
-        """Find the first variable where the first step is that of this column, in row j."""
-        points = []
-        for (i, other), row in sorted(self.found.items()):
+    def line(self, step: str) -> list[float | None]:
+        """Find in each row where the first step is that of this column; None where none is.
+
+        Beyond the runs of a row the ratio of the steps goes on as a power of the first variable.
+        Rows of numbers without runs lie between their neighbours.
+        """
+        points: list[list[tuple[float, float]]] = [[] for _ in self.y]
+        for (i, j), row in sorted(self.found.items()):
             dt, same = row.get("dt"), row.get(step)
-            if other == j and dt and same and isfinite(dt / same):
-                points.append((self.x[i], dt / same))
+            if dt and same and isfinite(dt / same):
+                points[j].append((self.x[i], dt / same))
+        known = {j: at for j, row in enumerate(points) if (at := self._crossing(row)) is not None}
+        found: list[float | None] = [known.get(j) for j in range(len(self.y))]
+        for (before, low), (after, high) in pairwise(sorted(known.items())):
+            for j in range(before + 1, after):
+                if not points[j] and not self.words[-1]:
+                    share = (self.y[j] - self.y[before]) / (self.y[after] - self.y[before])
+                    found[j] = low + share * (high - low)
+        return found
+
+    def _crossing(self, points: Sequence[tuple[float, float]]) -> float | None:
+        """Find where a ratio is 1, between its known values or beyond them, within the map."""
         for (xa, a), (xb, b) in pairwise(points):
             if (a - 1) * (b - 1) <= 0 and a != b:
                 return xa + (1 - a) / (b - a) * (xb - xa)
-        return None
+        if len(points) < 2 or self.x[0] <= 0:
+            return None
+        first_is_near = abs(points[0][1] - 1) < abs(points[-1][1] - 1)
+        (xa, a), (xb, b) = points[:2] if first_is_near else points[-2:]
+        if a == b:
+            return None
+        at = xa * (xb / xa) ** (log(1 / a) / log(b / a))
+        low, *_, high = edges(self.x)
+        return at if low <= at <= high else None
 
     def margins(self) -> list[float]:
         """Divide the largest stable step by the program's, in each row that has an edge."""
         found, classes = [], self.classes
         for j in range(self.shape[1]):
             column = [classes[i, j] for i in range(self.shape[0])]
-            edge = next((i for i, kind in enumerate(column) if kind != "stable"), None)
+            edge = next((i for i, kind in enumerate(column) if kind not in BORNE), None)
             row = self.found.get((edge - 1, j)) if edge and column[edge] != "left" else None
             if row and row.get("dt") and row.get("stable_dt"):
                 found.append(row["dt"] / row["stable_dt"])
@@ -288,10 +360,12 @@ class Map:
             edges(x), edges(y), grid.T, cmap=ListedColormap([COLOURS[k] for k in CLASSES]),
             vmin=-0.5, vmax=len(CLASSES) - 0.5,
         )  # fmt: skip
-        number_of = {reason: str(k) for k, (reason, _) in enumerate(self.failures, 1)}
+        if self.error:
+            self._shade(figure, axes)
+        numbers = {reason: str(k) for k, (reason, _) in enumerate(self.failures, 1)}
         for (i, j), row in self.found.items():
             if row["class"] == "failed":
-                axes.text(x[i], y[j], number_of[row["why"]], ha="center", va="center",
+                axes.text(x[i], y[j], numbers[row["why"]], ha="center", va="center",
                           fontsize=7, color="white")  # fmt: skip
             else:
                 axes.plot(x[i], y[j], "k.", markersize=4)
@@ -301,23 +375,18 @@ class Map:
         ]  # fmt: skip
         handles += [
             Patch(facecolor="none", edgecolor="none", label=f"{k}  {reason}")
-            for reason, k in number_of.items()
+            for reason, k in numbers.items()
         ]  # fmt: skip
         names = dict.fromkeys(row["limit"] for row in self.found.values() if row["limit"])
         limit = "the program's limit" + (f"\n({', '.join(names)})" if names else "")
         lines = ("stable_dt", limit, "k--"), ("own_dt", "the program's own", "k:")
         rows = list(pairwise(edges(y)))
         for step, said, style in lines:
-            ends: list[tuple[float, float]] = []
-            before = 0
-            for j, row in enumerate(rows):
-                if (at := self.where(step, j)) is None:
-                    continue
-                if ends and j > before + 1 and not isclose(at, ends[-1][0], rel_tol=1e-3):
-                    ends.append((nan, nan))  # nobody knows how it goes on between such rows
-                ends += [(at, up) for up in row]
-                before = j
-            if ends:
+            ends = [
+                (nan if at is None else at, up)
+                for at, row in zip(self.line(step), rows, strict=True) for up in row
+            ]  # fmt: skip
+            if any(at == at for at, _ in ends):
                 handles += axes.plot(
                     *zip(*ends, strict=True), style, linewidth=1.4, label=f"first step = {said}"
                 )
@@ -332,7 +401,40 @@ class Map:
         axes.set_title(", ".join([title, *fixed]), loc="left", fontsize=10)
         if len(y) <= FEW:
             axes.set_yticks(y if two else [])
+        for axis, at, words in zip((axes.xaxis, axes.yaxis), (x, y), self.words, strict=False):
+            if words:
+                axis.set_ticks(at, words)
         savefig(figure, path)
+
+    def _shade(self, figure: Any, axes: Any) -> None:
+        """Shade stable cells by their errors; those of cells that were not run lie between."""
+        from matplotlib.colors import LinearSegmentedColormap, LogNorm
+
+        stable = [cell for cell, kind in self.classes.items() if kind == "stable"]
+        known = {
+            cell: float(np.log(abs(row[self.error]))) for cell, row in self.found.items()
+            if cell in stable and usable(abs(row[self.error] or 0.0))
+        }  # fmt: skip
+        grid = np.full(self.shape, nan)
+        for i, j in stable:
+            near = {c: e for c, e in known.items() if c[1] == j or not self.words[-1]}
+            if near:
+                far = np.array([(i - k) ** 2 + (j - m) ** 2 for k, m in near], float)
+                weight = np.where(far == 0, 1e9, 1 / np.maximum(far, 1))
+                grid[i, j] = np.exp(np.average([*near.values()], weights=weight))
+        if not known:
+            return
+        low, high = np.nanmin(grid), np.nanmax(grid)
+        colours = LinearSegmentedColormap.from_list("", ["#eef6fb", "#3f8fc4"])
+        mesh = axes.pcolormesh(
+            edges(self.x), edges(self.y), np.ma.masked_invalid(grid.T), cmap=colours,
+            norm=LogNorm(low, max(high, 1.01 * low)),
+        )  # fmt: skip
+        bar = figure.colorbar(mesh, ax=axes, location="bottom", shrink=0.6, aspect=30)
+        bar.set_label(f"{self.error} where it is stable", fontsize=8)
+        ticks = look.log_ticks(float(low), float(high)) if high > low else [float(low)]
+        bar.set_ticks(ticks, labels=[tick_text(tick) for tick in ticks])
+        bar.minorticks_off()
 
 
 def edges(centres: Sequence[float]) -> np.ndarray:
@@ -351,6 +453,7 @@ def explore(
     shape: tuple[int, int],
     classify: Callable[[Sequence[Cell]], Sequence[Hashable]],
     stride: int = 6,
+    apart: Sequence[bool] = (False, False),
 ) -> tuple[dict[Cell, Hashable], dict[Cell, Hashable]]:
     """Find the class of every cell of a plane, most of them by inference.
 
@@ -358,26 +461,29 @@ def explore(
     between two cells of one class is taken to be like them, the nearest ones first; between unlike
     ones the middle is asked for, in the longest gaps first. Where an edge goes along a row, one in
     three of its cells is asked for, so that no bow of it is cut off. So edges are found to the
-    cell; an island that lies wholly between the cells that were asked for is missed.
+    cell; an island that lies wholly between the cells that were asked for is missed. Along a
+    direction of words (`apart`) nothing lies between cells.
 
     `classify` gives the classes of cells; it is asked for several at once, none of which tells
     another. Returns the classes of those cells, and of the others.
     """
     classes: list[Hashable] = []  # those of the numbers in the planes
     known = np.full(shape, UNKNOWN)
-    cells = [(i, j) for i in _cuts(shape[0], stride) for j in _cuts(shape[1], stride)]
+    first = [_cuts(n, 1 if words else stride) for n, words in zip(shape, apart, strict=True)]
+    cells = [(i, j) for i in first[0] for j in first[1]]
     while cells:
         for cell, kind in zip(cells, classify(cells), strict=True):
             if kind not in classes:
                 classes.append(kind)
             known[cell] = classes.index(kind)
-        found = _filled(known, stride)
-        cells = _apart([*_halves(found)] or [*_unproved(known, found)])
+        found = _filled(known, stride, apart)
+        halves = [*_halves(found, apart)]
+        cells = _spaced(halves or ([] if any(apart) else [*_unproved(known, found)]))
     asked = {cell: classes[k] for cell, k in np.ndenumerate(known) if k != UNKNOWN}
     return asked, {cell: classes[k] for cell, k in np.ndenumerate(found) if cell not in asked}
 
 
-def unseen(shape: tuple[int, int], stride: int) -> int:
+def unseen(shape: Sequence[int], stride: int) -> int:
     """Count the cells across islands and strips that no run needs to meet."""
     return max((b - a - 1 for n in shape for a, b in pairwise(_cuts(n, stride))), default=0)
 
@@ -392,11 +498,12 @@ def _gaps(line: np.ndarray) -> Iterator[tuple[int, int]]:
     return ((a, b) for a, b in pairwise(np.flatnonzero(line != UNKNOWN)) if b - a > 1)
 
 
-def _filled(known: np.ndarray, stride: int) -> np.ndarray:
+def _filled(known: np.ndarray, stride: int, apart: Sequence[bool]) -> np.ndarray:
     """Fill in what lies between like cells; where row and column disagree, nothing."""
     found, reach = known.copy(), 2
     while reach <= stride:
-        rows, columns = _between(found, reach), _between(found.T, reach).T
+        along_x, along_y = (0 if words else reach for words in apart)
+        rows, columns = _between(found, along_y), _between(found.T, along_x).T
         agreed = np.where((rows == columns) | (columns == UNKNOWN), rows, columns)
         agreed[(rows != columns) & (np.minimum(rows, columns) != UNKNOWN)] = UNKNOWN
         new = (found == UNKNOWN) & (agreed != UNKNOWN)
@@ -415,11 +522,11 @@ def _between(plane: np.ndarray, reach: int) -> np.ndarray:
     return said
 
 
-def _halves(found: np.ndarray) -> Iterator[tuple[int, Cell]]:
+def _halves(found: np.ndarray, apart: Sequence[bool]) -> Iterator[tuple[int, Cell]]:
     """The middles of gaps in rows and columns, each with the length of its gap."""
-    for i, line in enumerate(found):
+    for i, line in enumerate(found if not apart[1] else ()):
         yield from ((b - a, (i, (a + b) // 2)) for a, b in _gaps(line))
-    for j, line in enumerate(found.T):
+    for j, line in enumerate(found.T if not apart[0] else ()):
         yield from ((b - a, ((a + b) // 2, j)) for a, b in _gaps(line))
 
 
@@ -445,7 +552,7 @@ def _stretches(known: np.ndarray, near: np.ndarray, far: np.ndarray, which: int)
     return [stretch for stretch in stretches if len(stretch) > 1]
 
 
-def _apart(wanted: list[tuple[int, Cell]]) -> list[Cell]:
+def _spaced(wanted: list[tuple[int, Cell]]) -> list[Cell]:
     """Cells of the longest gaps, those left out that lie within half the gap of another."""
     chosen: list[tuple[int, Cell]] = []
     for size, (i, j) in sorted(wanted, key=lambda one: (-one[0], one[1])):

@@ -262,12 +262,17 @@ def names(text: str) -> list[str]:
     return list(filter(None, split(text)))
 
 
-def add_combinations(parser: Any) -> None:
-    """Add options of which values go together."""
+def add_steps(parser: Any) -> None:
+    """Add the option of variables that go in step."""
     parser.add_argument(
         "-zip", action="append", default=[], metavar="A,B",
         help="variables that go in step: the first values together, then the second, ...",
     )  # fmt: skip
+
+
+def add_combinations(parser: Any) -> None:
+    """Add options of which values go together."""
+    add_steps(parser)
     parser.add_argument(
         "-where", action="append", default=[], metavar="CONDITION",
         help="keep the combinations that fulfil it: 'N < 40 || basis == linear'",
