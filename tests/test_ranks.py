@@ -364,8 +364,8 @@ def test_touching_bodies_on_their_way(state_interpreted, tmp_path, scheme):
 method(ulmpm/contacts, FLIP, linear, 1)
 scheme({scheme})
 dimension(2, 0, 2, 0, 2, 0.1)
-region(a, block, 0.3, 0.6, 0.2, 0.8)
-region(b, block, 0.6, 0.9, 0.2, 0.8)
+region(a, block, 0.3, 0.6, 0.2, 0.5)
+region(b, block, 0.6, 0.9, 0.2, 0.5)
 material(m, neo-hookean, 1, 100, 0)
 solid(a, region, a, 2, m, 0.1, 0)
 solid(b, region, b, 2, m, 0.1, 0)
@@ -384,7 +384,7 @@ run(12)
 def test_points_moved_by_python(state_interpreted, tmp_path, method):
     """At the start of a step, in each of them: others have the points then."""
     script = block(
-        2, "fix(c, python, all, shoves.carry)", *DUMPS, *MOVING, "run(14)", ppc=3, size=(0.3, 0.2)
+        2, "fix(c, python, all, shoves.carry)", *DUMPS, *MOVING, "run(14)", ppc=3, size=(0.3, 0.1)
     ).replace("method(ulmpm,", f"method({method},")
     assert shared(state_interpreted, tmp_path, with_files(script, "restart(5, r.*.h5)\n"), ranks=3)
 
