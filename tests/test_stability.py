@@ -32,7 +32,7 @@ compute(Es, strain_energy, all)
 set_dt(factor*0.1)
 set_output(5)
 log_modify(custom, step, dt, time, Ek, Es, Ek + Es)
-run(200)
+run(80)
 """
 
 
@@ -135,7 +135,7 @@ def test_what_limits_the_step_stands_in_the_map(folder):
 def test_energy_that_grows_is_told_from_failure(folder):
     """An "energy" that is set to double and to treble beside the bound of 2.5."""
     text = SCRIPT.replace("Ek + Es)", "Etot)").replace(
-        "log_mod", "Etot = 1 + push*step(time - 5)\nlog_mod"
+        "log_mod", "Etot = 1 + push*step(time - 2)\nlog_mod"
     )
     (folder / "in.bar").write_text(text, encoding="utf-8")
     words = ["-var", "push=1e-3,1,2", "-var", "factor=0.5", "-o", "map.pdf"]
