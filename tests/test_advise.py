@@ -28,7 +28,7 @@ set_dt(1e-3/N)
 set_output(100000)
 err = max((10/N)^slope, least)
 log_modify(custom, step, time, err)
-run(price*N)
+run(price*N/10)
 """
 
 
@@ -45,13 +45,13 @@ def advise(*words, status=0, target="0.02", N="10,20,40,80,160"):
 
 
 def test_the_cheapest_choice_is_found_before_it_is_run(folder, capsys):
-    # (10/N)^p <= 0.02: order 1 needs N = 500; order 2 needs 70.7, thus 80, at 240 steps; order 4
-    # needs 26.6, thus 40, at 400 steps.
+    # (10/N)^p <= 0.02: order 1 needs N = 500; order 2 needs 70.7, thus 80, at 24 steps; order 4
+    # needs 26.6, thus 40, at 40 steps.
     words = ["-var", "slope=1,2,4", "-var", "price=1,3,10", "-zip", "slope,price"]
     advise(*words)
     out = capsys.readouterr().out
     assert "  N = 80\n" in out and "  slope = 2\n" in out and "  price = 3\n" in out
-    assert "likely: expected err 0.0156, steps 240" in out
+    assert "likely: expected err 0.0156, steps 24" in out
     ran = {(row["slope"], row["N"]) for row in records.read(folder / "advise.csv")}
     assert ("2", "80") not in ran and ("1", "160") not in ran
     advise(*words, "-run")
@@ -63,7 +63,7 @@ def test_the_cheapest_choice_is_found_before_it_is_run(folder, capsys):
 def test_what_has_been_run_is_sure(folder, capsys):
     advise(target="0.3")
     out = capsys.readouterr().out
-    assert "  N = 20\n" in out and "sure: it was run (err 0.25, steps 20)" in out
+    assert "  N = 20\n" in out and "sure: it was run (err 0.25, steps 2)" in out
     assert "-var N 20" in out
 
 
@@ -210,7 +210,7 @@ def test_words_are_compared_at_one_size(folder, capsys):
     words = ["-var", "slope=1,2", "-var", "price=1,3", "-zip", "slope,price"]
     advise(*words, "-along", "N", target="0.1", N="40")
     out = capsys.readouterr().out
-    assert "  slope = 2\n" in out and "sure: it was run (err 0.0625, steps 120), and whether" in out
+    assert "  slope = 2\n" in out and "sure: it was run (err 0.0625, steps 12), and whether" in out
 
 
 def test_doubts_of_a_forecast():
