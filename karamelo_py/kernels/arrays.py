@@ -291,6 +291,7 @@ CLOCK = np.dtype(
         ("heat_limit", np.float64),  # stable step of conduction, infinite where there is none
         ("heat_reference", np.float64),  # the same in undeformed bodies
         ("kept", np.float64),  # share of its own velocity that a point keeps (FLIP)
+        ("kept_by_time", np.float64),  # that in a stable step, where it follows from the step; or 0
         ("first_limit", np.float64),  # stable step at the start
         ("limit", np.float64),  # stable step now
         ("now", np.int64),  # which of the two arrays of places is the present one

@@ -92,6 +92,8 @@ def choose_dt(control: Control) -> None:
     clock.kick = 0.5 * (clock.last_dt + dt)
     if control.values[TIMESTEP] == 0:
         clock.kick *= clock.first_kick
+    if clock.kept_by_time > 0:
+        clock.kept = clock.kept_by_time ** (dt / clock.limit)
 
 
 @kernel

@@ -54,6 +54,7 @@ from karamelo_py.kernels.visit import Work, ask_ahead, place_at
 from karamelo_py.points.basis import locate
 from karamelo_py.points.grid import Grid, inside, renumbered
 from karamelo_py.points.kinematics import zero_vector
+from karamelo_py.points.transfers import in_step
 
 ROUNDING = 1e-3  # cells by which distances in cells may be rounded
 STRETCH = 64  # points: what they gather, and what they have, stays in the nearest cache
@@ -279,8 +280,8 @@ def context_of(s: Setup, dt: Number, gathers: bool, scatters: bool, moves: bool)
     # A little more, so that points are sorted next whenever one did not fit (see run.tiles).
     room = clock.drift_limit - clock.drift - clock.move + 0.5 * ROUNDING
     return Context(
-        s.frame, s.kin, s.basis, s.transfer, s.averaging, s.grids, s.nodes, s.buffers.nodes,
-        clock.now, real(room, dt), common_velocity(s.kin, clock, dt),
+        s.frame, s.kin, s.basis, in_step(s.transfer, clock.kept), s.averaging, s.grids, s.nodes,
+        s.buffers.nodes, clock.now, real(room, dt), common_velocity(s.kin, clock, dt),
         1 - clock.now if moves else clock.now, gathers, scatters, dt,
         real(clock.kick, dt),
     )  # fmt: skip

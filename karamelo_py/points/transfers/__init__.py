@@ -36,6 +36,12 @@ def updated_velocity(transfer, v, v_pic, dv):
     """The point's velocity after the step."""
 
 
+@point_function(otherwise=True)
+def in_step(transfer, kept):
+    """The transfer with its numbers for the present step, of which points keep a share."""
+    return transfer
+
+
 @point_function()
 def lost_shares(transfer, like):
     """Return the lost shares of the kinetic energy that mapping to the nodes, and back, takes.

@@ -3,10 +3,11 @@
 from types import MappingProxyType
 from typing import Annotated, NamedTuple
 
+from karamelo_py.compiler.compile import real
 from karamelo_py.language.kinds import Constraint
 from karamelo_py.language.rules import gain, known_failure
 from karamelo_py.points import noise
-from karamelo_py.points.transfers import lost_shares, updated_velocity
+from karamelo_py.points.transfers import in_step, lost_shares, updated_velocity
 
 Share = Constraint("from 0 (PIC) to 1 (pure FLIP)", lambda value: 0 <= value <= 1)
 SWING = 0.05  # strain of vibrations that bodies do not bear for long
@@ -51,6 +52,38 @@ class FLIP(NamedTuple):
     inverts_spread = False
     in_lanes = True
     variants = MappingProxyType({"gradient-enhanced": "TFLIP"})
+
+
+class FLIPPerTime(NamedTuple):
+    """FLIP whose damping goes with time: alpha is the share of a stable step.
+
+    A shorter step keeps alpha^(dt / stable dt). FLIP takes the share 1 - alpha in each step,
+    whatever it is: with half the step vibrations are damped twice as much in the same time.
+
+    Parameters
+    ----------
+    alpha
+        Share of FLIP in a stable step.
+
+    Example
+    -------
+    method(ulmpm, FLIP/per-time, linear, 0.99)
+
+    See Also
+    --------
+    transfer FLIP
+    """
+
+    alpha: Annotated[float, Share]
+
+    inverts_spread = False
+    in_lanes = True
+    per_time = True
+
+
+@in_step.on(FLIPPerTime)
+def _in_step_flip_per_time(transfer, kept):
+    return transfer._replace(alpha=real(kept, transfer.alpha))
 
 
 def take_nodal_velocity(transfer: type) -> None:
@@ -140,8 +173,9 @@ known_failure(
 )
 take_nodal_velocity(PIC)
 
-blend(FLIP)
-swings(FLIP)
-slows(FLIP)
-noise.drifts(FLIP)
-noise.turns(FLIP)
+for _flip in (FLIP, FLIPPerTime):
+    blend(_flip)
+    swings(_flip)
+    slows(_flip)
+    noise.drifts(_flip)
+    noise.turns(_flip)

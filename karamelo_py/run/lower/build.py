@@ -177,6 +177,7 @@ def lower(
     clock.spacing = min(lattice.h for lattice in lattices)
     clock.heat_limit = clock.heat_reference = stable_conduction(hub)
     clock.kept = getattr(transfer, "alpha", 0)
+    clock.kept_by_time = clock.kept * getattr(transfer, "per_time", False)
     clock.drift = np.inf  # the points are not sorted yet
     grids = table(lattices, real)
     if hub.update.boundary == "reflect":
