@@ -417,8 +417,8 @@ def test_a_loss_is_told_once(run_interpreted, transfer, told):
     fix(v1, initial_velocity_particles, left, 0.01)
     fix(v2, initial_velocity_particles, right, -0.01)
     set_dt(0.2)
-    run(150)
-    run(150)
+    run(80)
+    run(80)
     """
     done = run_interpreted(script)
     assert done.err.count("energy is lost") == told
