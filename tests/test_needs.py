@@ -21,11 +21,12 @@ from karamelo_py.kernels.step import advance
 from karamelo_py.kernels.visit import NodalMean
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
+from karamelo_py.run.advice.suggestions import _precision as precision
 from karamelo_py.run.advice.suggestions import suggestions
 from karamelo_py.run.lower.memory import bytes_per_point, node_fields, point_fields
 from karamelo_py.run.timestep import own_weight_of_drift
 from karamelo_py.scene.hub import Hub
-from karamelo_py.script.errors import Quit
+from karamelo_py.script.errors import Quit, ScriptError
 
 DOCS = ROOT / "docs" / "needs.md"
 
@@ -480,6 +481,53 @@ def test_wide_functions_where_no_point_crosses(advice):
 def test_many_points_a_cell(advice):
     said = advice(plane().replace("box, 2, rubber", "box, 5, rubber"))
     assert "25 points a cell" in said
+
+
+PULLED = "fix(pull, body_force, all, 0, -1)"
+
+
+def test_a_scene_with_two_equal_sides(advice):
+    """A square of 4 x 4 cells about x = 4, a plane of nodes; its weight acts along y."""
+    said = advice(plane(more=PULLED))
+    assert said.startswith("the scene is the same on both sides of x = 4: twice the points")
+    assert said.endswith("half of it, and the nodes at x = 4 held in x")
+    assert "y = 4" in advice(plane(more=PULLED.replace("0, -1", "-1, 0")))
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        PULLED.replace("0, -1", "1, -1"),
+        PULLED.replace("-1)", "-x)"),
+        "region(left, block, 2, 3, 2, 6)\ngroup(left, nodes, region, left, all)\n"
+        + PULLED.replace("all", "left"),
+    ],
+)
+def test_what_acts_on_one_side_more_is_no_mirror(advice, more):
+    assert "both sides" not in advice(plane(more=more))
+
+
+def test_no_mirror_between_nodes(advice):
+    assert "both sides" not in advice(plane(more=PULLED, n=3))
+
+
+def test_double_precision_of_a_large_scene(lowered):
+    hub = lowered(plane(side=170, n=160))
+    said = [
+        [reason for reason, _ in precision(hub, SimpleNamespace(dt=1e-3, fastest=lambda v=v: v))]
+        for v in (100.0, 1.0)
+    ]
+    assert len(said[0]) == 1 and "0.6 of the memory" in said[0][0]
+    assert not said[1]  # 1e-3 a step, where singles near 162 lie 1.5e-5 apart
+
+
+def test_a_temperature_that_is_logged_is_not_left_out(advice):
+    """It may be all that a scene is for, as in inputs/in.shear_heating."""
+    assert "temperature" not in advice(INPUTS / "in.shear_heating")
+    text = (INPUTS / "in.shear_heating").read_text(encoding="utf-8")
+    text = re.sub(r"^temperature.*$", "", text, flags=re.MULTILINE).replace(", adiabatic)", ")")
+    with pytest.raises(ScriptError, match="no material of the scene has a temperature"):
+        advice(text)
 
 
 def test_check_prints_what_could_be_left_out(tmp_path, monkeypatch, capsys):

@@ -76,6 +76,11 @@ class SceneFacts:
             yield from said
 
     @cached_property
+    def text(self) -> str:
+        """The text of the script, without comments."""
+        return script_text(self.hub)
+
+    @cached_property
     def motions(self) -> list[BodyMotion]:
         return motions(self.simulation)
 
@@ -221,6 +226,13 @@ class SceneFacts:
     def shear_stress(self) -> float:
         """The largest equivalent stress of a point."""
         return self.simulation.points.largest(lambda points: points.particle("seq"))[0]
+
+
+def script_text(hub: Hub) -> str:
+    """Read all files of the script, without comments."""
+    files = dict.fromkeys(getattr(hub.interpreter, "files", []))
+    lines = [line for path in files for line in path.read_text("utf-8").splitlines()]
+    return "\n".join(line.partition("#")[0] for line in lines)
 
 
 def is_zero(formula: Any) -> bool:

@@ -73,7 +73,8 @@ class AverageStress(Mean):
 class AverageTemperature(Mean):
     """Measure the mean temperature of a group of points; published as ID.
 
-    Points count by their mass, and those of materials without a temperature as 0.
+    Points count by their mass, and those of materials without a temperature as 0. A scene in which
+    no material has one is refused.
 
     Example
     -------
@@ -86,6 +87,15 @@ class AverageTemperature(Mean):
     """
 
     published = ("",)
+
+    def __init__(self, hub: Hub, group: ParticleGroup):
+        super().__init__(hub, group)
+        if hub.materials and "T" in hub.fields.absent_at_points():
+            raise ScriptError(
+                "no material of the scene has a temperature",
+                expected="a temperature in material(ID, eos-strength, ...), or a method that is "
+                "thermal",
+            )
 
     def terms(self, points: PointTable) -> list[np.ndarray]:
         mass = points.particle("mass")
