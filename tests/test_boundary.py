@@ -12,8 +12,9 @@ from tensors import KINEMATICS
 from comparisons.results import read_dump, read_log
 from karamelo_py.points.grid import turned
 
-MASS = {1: 2 * 0.3, 2: 2 * 0.3 * 0.2, 3: 2 * 0.3 * 0.2 * 0.1}
-COUNT = {1: 6, 2: 24, 3: 48}
+SIZE = (0.3, 0.1, 0.1)
+MASS = {1: 2 * 0.3, 2: 2 * 0.3 * 0.1, 3: 2 * 0.3 * 0.1 * 0.1}
+COUNT = {1: 6, 2: 12, 3: 24}
 # In single steps of 0.001 no point comes to stand on a node.
 V = (9.7, 3.1, -2.1)
 WATCH = (
@@ -28,7 +29,8 @@ def thrown(d: int, how: str, *lines: str, **options) -> str:
     """A soft block thrown at the edge x = 0.7: its points leave from step 13 to step 39."""
     velocity = ", ".join(map(str, V[:d]))
     fly = f"fix(v, initial_velocity_particles, all, {velocity})"
-    text = block(d, f"boundary({how})", fly, *WATCH, *lines, **{"law": "soft", **options})
+    options = {"law": "soft", "size": SIZE, **options}
+    text = block(d, f"boundary({how})", fly, *WATCH, *lines, **options)
     return re.sub(rf"dimension\({d}, 0, [\d.]+", f"dimension({d}, 0, 0.7", text)
 
 
@@ -52,12 +54,12 @@ def single(d: int, how: str, *lines: str, transfer: str = "FLIP") -> str:
     )
 
 
-@pytest.mark.parametrize("d", [1, 2, 3])
-def test_error_is_the_default(run_script, d):
-    said = run_script(thrown(d, "error", "run(35)"), status=1).err
+@pytest.mark.parametrize("d", [1, 2])
+def test_error_is_the_default(run_interpreted, d):
+    said = run_interpreted(thrown(d, "error", "run(35)"), status=1).err
     default = thrown(d, "error", "run(35)").replace("boundary(error)\n", "")
     assert (
-        run_script(default, status=1).err.replace(":12:", ":13:").splitlines()[0]
+        run_interpreted(default, status=1).err.replace(":12:", ":13:").splitlines()[0]
         == (said.splitlines()[0])
     )
     assert "leaves the domain" in said and "boundary(delete)" in said
@@ -122,7 +124,7 @@ def test_the_gradient_of_a_reflected_point_is_a_mirror_image(d):
     assert turned(tuple(np.diag(R)), ()) == ()
 
 
-@pytest.mark.parametrize("d", [1, 2, 3])
+@pytest.mark.parametrize("d", [1, 2, pytest.param(3, marks=pytest.mark.full)])
 def test_a_single_point_is_deleted_or_reflected_at_the_lower_edge(run_interpreted, d):
     script = single(d, "reflect", "run(100)").replace("all, 9.7", "all, -9.7")
     last = run_interpreted(script).dump("d.100.LAMMPS")
@@ -198,7 +200,7 @@ def test_what_is_deleted_stays_so(run_interpreted):
     )
     result = run_interpreted(thrown(2, "delete", *lines))
     before, after = result.dump("d.25.LAMMPS"), result.dump("d.26.LAMMPS")
-    assert set(after.id) == set(before.id) | {25, 26, 27, 28}
+    assert set(after.id) == set(before.id) | {13, 14, 15, 16}
     assert list(after.type[-4:]) == [2] * 4
 
 
