@@ -302,6 +302,34 @@ def hertz_load(approach: float, R: float, modulus: float) -> float:
     return low
 
 
+def spiral_slip(beta: float, phi: float) -> tuple[float, np.ndarray]:
+    """Weight times height over cohesion at which a slope fails, and where it slips, (n, 2).
+
+    The best bound by a body that turns on a logarithmic spiral through the toe of a slope inclined
+    by `beta`, of soil with the friction and dilatancy `phi`, in radians (Chen 1975, Limit Analysis
+    and Soil Plasticity, section 9.2). Places are relative to the toe, over the height; the slope
+    lies at x < 0.
+    """
+    t = tan(phi)
+    first, last = np.radians(np.arange(0, 90, 0.1)), np.radians(np.arange(45, 150, 0.1))[:, None]
+    grown = np.exp((last - first) * t)
+    H = np.sin(last) * grown - np.sin(first)
+    L = np.sin(last - first) / np.sin(last) - np.sin(last + beta) / np.sin(last) / sin(beta) * H
+    whole = (3 * t * np.cos(last) + np.sin(last)) * grown**3 - 3 * t * np.cos(first) - np.sin(first)
+    whole = whole / 3 / (1 + 9 * t**2)
+    above = L * (2 * np.cos(first) - L) * np.sin(first) / 6
+    beside = np.cos(first) - L + np.cos(last) * grown
+    beside *= grown * (np.sin(last - first) - L * np.sin(last)) / 6
+    with np.errstate(divide="ignore", invalid="ignore"):
+        N = H * (grown**2 - 1) / (2 * t * (whole - above - beside))
+    N[~((N > 0) & (H > 0.1) & (L > 0))] = np.inf
+    k = np.unravel_index(N.argmin(), N.shape)
+    angle = np.linspace(first[k[1]], last[k[0], 0], 100)
+    r = np.exp((angle - angle[0]) * t) / H[k]
+    line = np.stack([-r * np.cos(angle), -r * np.sin(angle)], 1)
+    return float(N[k]), line - line[-1]
+
+
 def granular_runout(aspect: float) -> float:
     """(l - l0) / l0 of a column of grains in a channel (Lube et al. 2005, eqs. 3 and 4).
 

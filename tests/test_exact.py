@@ -134,6 +134,14 @@ def test_bar_and_disk():
     assert exact.prandtl_load(1) == pytest.approx(5.14159, abs=1e-5)
 
 
+@pytest.mark.parametrize(("beta", "N"), [(30, 41.22), (45, 16.16), (60, 10.39), (90, 5.50)])
+def test_slopes_slip_on_spirals(beta, N):
+    """Critical heights of Chen 1975 for a friction of 20 degrees; the line ends at toe and top."""
+    found, line = exact.spiral_slip(np.radians(beta), np.radians(20))
+    assert found == pytest.approx(N, rel=1e-3)
+    assert np.allclose(line[-1], 0) and line[0, 1] == pytest.approx(1)
+
+
 def test_published_curve_of_the_cantilever_is_that_of_the_lower_corner():
     """Own finite elements (32 x 8) against the digitised curve: 0.06 m of a swing of 3.3 m.
 
