@@ -68,7 +68,7 @@ def test_the_table_tells_orders_and_front(table, capsys):
     out = capsys.readouterr().out
     # Errors fall with N^-p, and with the cost, N^2, to half that power.
     for basis, p in ORDERS.items():
-        assert re.search(rf"{basis} +-{p / 2:.2f} +-{p:.2f} +2.00", out)
+        assert re.search(rf"{basis} +{p / 2:.2f} +{p:.2f} +2.00", out)
     assert re.search(r"cubic-spline +80 +8.96 .* front", out)
     assert not re.search(r"quadratic-spline +40 .*front", out)
     assert "failed: point 3 <leaves>" in out
@@ -243,6 +243,107 @@ def test_round_ticks():
         assert said in [label.get_text() for label in axes.get_xticklabels()]
         assert not axes.xaxis.get_offset_text().get_text()
     assert tick_text(2e-7) == r"$2\cdot10^{-7}$"
+
+
+def lucky_rows():
+    """Order 1 of two choices; the errors of one change their sign at N = 40 and grow again."""
+    return [
+        {
+            "N": str(n), "kind": kind, "err": str(abs(value)), "err_signed": str(value),
+            "seconds": str(1e-3 * n**2), "seconds_spread": str(1e-4 * n**2), "points": str(n),
+        }
+        for kind, values in (("a", (-8, -4, -0.2, 3)), ("b", (-16, -8, -4, -2)))
+        for n, value in zip((10, 20, 40, 80), values, strict=True)
+    ]  # fmt: skip
+
+
+def test_small_errors_by_chance_are_hollow_and_off_the_front(monkeypatch):
+    drawn = []
+    monkeypatch.setattr(pictures, "savefig", lambda figure, path: drawn.append(figure))
+    family = Family(Table(lucky_rows(), ["N", "kind"]), "err", "seconds")
+    assert [[*line.lucky] for line in family.lines] == [[False, False, True, True], [False] * 4]
+    assert [row["N"] + row["kind"] for row in family.front()] == ["10a", "20a", "80b"]
+    pictures.lines(family, None, ("", ""))
+    (axes,) = drawn[0].axes
+    (hollow,) = [
+        line for line in axes.lines
+        if line.get_markerfacecolor() == "white" and len(line.get_xdata())
+    ]  # fmt: skip
+    assert list(hollow.get_ydata()) == [0.2, 3]
+    assert "hollow: small by chance" in drawn[0].get_supxlabel()
+    bars = [each for each in axes.collections if len(each.get_segments())]
+    ends = bars[0].get_segments()[0][:, 0]
+    assert ends == pytest.approx([0.095, 0.105])  # the spread of 10 % about 0.1 s
+    # A variable that changes no number of points refines nothing.
+    rows = [{**row, "points": "5"} for row in lucky_rows()]
+    assert not any(
+        line.lucky.any() for line in Family(Table(rows, ["N", "kind"]), "err", "seconds").lines
+    )
+
+
+@pytest.mark.parametrize(("p", "falls"), [(1, True), (2.2, True), (4, True), (2, False)])
+def test_a_triangle_shows_the_order_below_all_lines(monkeypatch, p, falls):
+    """Of errors N^-p or h^p, in halves."""
+    drawn = []
+    monkeypatch.setattr(pictures, "savefig", lambda figure, path: drawn.append(figure))
+    rows = [
+        {
+            "x": str(x),
+            "err": str(x ** (-p if falls else p)),
+            "seconds": str(x**2 if falls else x**-2),
+        }
+        for x in (1, 2, 4, 8, 16)
+    ]
+    pictures.lines(Family(Table(rows, ["x"]), "err", "seconds", along="x"), None, ("", ""))
+    (axes,) = drawn[0].axes
+    (shape,) = axes.patches
+    x, y = np.log(shape.get_xy()[:3]).T
+    assert (y[0] - y[1]) / abs(x[2] - x[1]) == pytest.approx(round(2 * p) / 2)
+    assert all(
+        y[0] < np.log(min(float(r["err"]) for r in rows if 4 <= float(r["x"]) <= 8)) for _ in "1"
+    )
+    assert {f"{round(2 * p) / 2:g}", "1"} <= {text.get_text() for text in axes.texts}
+    assert axes.get_ylim()[0] < np.exp(y.min())
+    (line,) = Family(Table(rows, ["x"]), "err", "seconds").lines
+    assert line.rises == falls
+
+
+def test_names_of_lines_can_be_read():
+    """A contrast of 4.5 to 1 on white at least; black letters have 21."""
+    greens = [colour for colour, *_ in look.styles([{"N": n} for n in "12345"])]
+    for colour in (*look.PALETTE, *greens):
+        rgb = [int(look.readable(colour)[k : k + 2], 16) / 255 for k in (1, 3, 5)]
+        assert look.contrast(rgb) >= 4.45
+    assert look.contrast([0, 0, 0]) == pytest.approx(21)
+    assert look.contrast([0.5, 0.5, 0.5]) == pytest.approx(3.98, abs=0.01)  # #808080 by WCAG
+    assert look.readable("#000000") == "#000000"
+
+
+def test_four_panels_make_a_square(table, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(pictures, "savefig", lambda figure, path: drawn.append(figure))
+    rows = [
+        {"a": a, "b": b, "c": c, "err": "0.1", "seconds": "1"}
+        for a in "12"
+        for b in "12"
+        for c in "1234"
+    ]
+    pictures.heat(Family(Table(rows, ["a", "b", "c"]), "err", "seconds"), "a", "b", None, ("", ""))
+    places = [axes.get_subplotspec().get_gridspec().get_geometry() for axes in drawn[0].axes[:4]]
+    assert places == [(2, 2)] * 4
+
+
+def test_titles_have_the_units_of_the_script(tmp_path):
+    script = tmp_path / "in.units"
+    computes = ("Ek, kinetic_energy", "v, average_velocity")
+    lines = ['units("mm", "g", "ms")', *(f"compute({words}, all)" for words in computes)]
+    script.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    table = Table([], [], made={"script": str(script)})
+    assert [table.label(name) for name in ("Time", "Ek", "v_x", "max:Ek", "err", "seconds")] == [
+        "Time [ms]", "Ek [mJ]", "v_x [mm/ms]", "max:Ek [mJ]", "err",
+        "time of the stepping loop (s)",
+    ]  # fmt: skip
+    assert Table([], []).label("wall_s") == "time of the process (s)"
 
 
 def test_a_page_needs_nothing_else(table):

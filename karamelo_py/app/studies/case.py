@@ -59,15 +59,16 @@ class CaseOutcome:
 COLUMNS = {
     "seconds": "time of the stepping loop (s)",  # without compilation and output
     "cpu_seconds": "processor time of the stepping loop (s)",  # of all threads
-    "seconds_spread": "seconds_spread",  # largest less smallest of the repetitions
+    "seconds_spread": "spread of that time over repetitions (s)",  # largest less smallest
     "particle_steps_per_s": "particle-steps per second",
     "particle_steps": "steps times points",
     "node_visits": "steps times points times nodes of a point",
     "steps": "steps",  # of all runs of the script
     "points": "points",  # at the beginning
     "dt": "first step (time of the script)",
-    "stable_dt": "stable_dt",  # the largest stable step at the beginning
-    "own_dt": "own_dt",  # the first of the program's own choice, where the script chose another
+    "stable_dt": "stable step (time of the script)",  # the largest stable step at the beginning
+    # The first of the program's own choice, where the script chose another.
+    "own_dt": "the program's own step (time of the script)",
     "bytes_per_particle": "bytes per particle",  # of all fields, the mean over points
     "peak_memory_mib": "peak memory (MiB)",
     "wall_s": "time of the process (s)",

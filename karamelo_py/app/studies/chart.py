@@ -15,7 +15,7 @@ import numpy as np
 from karamelo_py.app.live.server import require_plotly
 from karamelo_py.app.studies import keeping, look, pictures, records
 from karamelo_py.app.studies.case import options_of, worded
-from karamelo_py.app.studies.curves import Family, Table, column, order, require
+from karamelo_py.app.studies.curves import Family, Table, column, order, require, sizes
 from karamelo_py.app.studies.study import plain_table, shown, terminal
 from karamelo_py.app.studies.variables import add_axes, along, holds, names, out_file
 from karamelo_py.script.errors import ScriptError
@@ -96,7 +96,7 @@ def run(options: Any) -> int:
         raise ScriptError(f"-heat {options.heat}", expected="two variables: -heat N,ppc")
     if not options.x and not axes and not any(line.shown.any() for line in family.lines):
         raise ScriptError(f"no run has a value of '{options.cost}' above 0")
-    first = family.along if options.x else look.label(family.cost)
+    first = family.along if options.x else table.label(family.cost)
     words = along(options, *(axes or (first, family.error_label)))
     # First the picture: who reads the table may close the pipe.
     if out is None:
@@ -173,7 +173,7 @@ def curves(options: Any, table: Table, by: list[str]) -> int:
         exact = whole._replace(label=options.exact)
     title = table.script if options.title is None else options.title
     found = read(options.curve)
-    words = along(options, over, options.curve)
+    words = along(options, table.label(over), table.label(options.curve))
     pictures.draw_histories(found, out, words, title, exact)
     for each in found:
         print(f"{each.label}: {options.curve} {shown(float(each.y[-1]))} at the end")
@@ -212,7 +212,7 @@ def tell(family: Family, *, costs: bool) -> None:
         members.sort(key=lambda m: (np.isnan(m[0].cost[m[1]]), m[0].cost[m[1]]))
     for line, k in members:
         row = line.rows[k]
-        end = "front" if id(row) in front else ""
+        end = "front" if id(row) in front else line.chance[k] and f"by chance: {line.chance[k]}"
         if np.isnan(line.error[k]):
             end = (row.get("status", "") + ": " + row.get("reason", ""))[:70]
         numbers = {column: shown(float(getattr(line, column)[k])) for column in columns}
@@ -229,10 +229,15 @@ def tell(family: Family, *, costs: bool) -> None:
     if pairs:
         orders = plain_table([""], list(pairs), "\norders, of all and between neighbours")
         for line in family.lines:
-            fits = (order(getattr(line, x), getattr(line, y)) for x, y in pairs.values())
+            fits = []
+            for x, y in pairs.values():
+                fit = order(getattr(line, x), getattr(line, y))
+                # Errors fall where costs grow.
+                turned = line.rises or x == "cost" if y == "error" else not line.rises
+                fits.append(fit.of_fall if turned else fit)
             orders.add_row(line.label, *map(str, fits))
         console.print(orders)
-    if costs and family.cost == "seconds" and family.table.made.get("timed") is False:
+    if costs and family.cost in ("seconds", "wall_s") and family.table.made.get("timed") is False:
         print(
             "note: these runs went side by side, their times disturb each other; "
             "sweep -time measures"
@@ -255,7 +260,7 @@ def write_page(family: Family, path: Path, words: tuple[str, str], title: str) -
     figure = graph_objects.Figure()
     front = family.front()
     if not family.convergence:
-        cost, error = column(front, family.cost), column(front, family.accuracy)
+        cost, error = column(front, family.cost), sizes(front, family.accuracy)
         figure.add_scatter(
             x=cost, y=error, mode="lines+markers", name="Pareto front", hoverinfo="skip",
             line={"shape": "hv", "width": 8, "color": "#cccccc"},
@@ -270,7 +275,11 @@ def write_page(family: Family, path: Path, words: tuple[str, str], title: str) -
             text=[_said(line.rows[k], family) for k in shown],
             hovertemplate="%{text}<br>%{y:.4g} at %{x:.4g}<extra></extra>",
             line={"color": colour, "dash": look.PLOTLY_DASHES[dash], "width": 2},
-            marker={"symbol": look.PLOTLY_MARKERS[marker], "size": 10},
+            marker={
+                "symbol": [
+                    look.PLOTLY_MARKERS[marker] + "-open" * bool(line.chance[k]) for k in shown
+                ], "size": 10,
+            },
         )  # fmt: skip
     usual = {
         "showgrid": True, "gridcolor": "#e6e6e6", "exponentformat": "power",

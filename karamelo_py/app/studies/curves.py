@@ -10,6 +10,8 @@ import numpy as np
 
 from karamelo_py.app.studies import look
 from karamelo_py.app.studies.records import SIGNED, value
+from karamelo_py.app.studies.variables import ScriptFiles
+from karamelo_py.output.units import labelled
 from karamelo_py.script.errors import ScriptError, unknown
 from karamelo_py.script.terms import number_of
 
@@ -23,9 +25,14 @@ class Order(NamedTuple):
     lowest: float  # exponents between neighbouring points
     highest: float
 
+    @property
+    def of_fall(self) -> "Order":
+        """The order by which y falls while x grows, a positive number."""
+        return Order(-self.exponent, -self.highest, -self.lowest)
+
     def towards(self, x: Sequence[float]) -> "Order":
-        """The order of errors that fall from the first to the last of `x`, a positive number."""
-        return Order(-self.exponent, -self.highest, -self.lowest) if x[-1] > x[0] else self
+        """The order by which errors fall from the first to the last of `x`."""
+        return self.of_fall if x[-1] > x[0] else self
 
     def __str__(self) -> str:
         if not isfinite(self.exponent):
@@ -125,6 +132,12 @@ class Table(NamedTuple):
         """The name of the script."""
         return Path(self.made.get("script", "")).name
 
+    def label(self, name: str) -> str:
+        """Give the title of an axis: of a column of the table, or of the logs with its unit."""
+        path = Path(self.made.get("script", ""))
+        unit = ScriptFiles(path).unit(name) if path.is_file() else ""
+        return labelled(look.label(name), unit)
+
 
 @dataclass
 class GroupedRuns:
@@ -138,6 +151,17 @@ class GroupedRuns:
     error: np.ndarray
     across: np.ndarray  # one of the first two: what errors are drawn over
     linear: bool = False  # along an axis that shows zero and what is below
+    chance: Sequence[str] = ()  # why errors are small by chance (`by_chance`)
+
+    @property
+    def lucky(self) -> np.ndarray:
+        """Choose the members whose errors are small by chance."""
+        return np.array([*map(bool, self.chance)], bool)
+
+    @property
+    def rises(self) -> bool:
+        """Tell whether the variable along the line grows as runs get finer: as costs do."""
+        return not order(self.x, self.cost).exponent < 0
 
     @property
     def label(self) -> str:
@@ -196,16 +220,27 @@ class Family:
             self._line(dict(zip(self.by, key, strict=True)), members)
             for key, members in groups.items()
         ]
-        self.without = [row for row in rows if not usable(value(row, accuracy))]
+        self.without = [row for row in rows if not usable(abs(value(row, accuracy) or 0.0))]
 
     def _line(self, choice: dict[str, str], rows: list[Mapping[str, str]]) -> GroupedRuns:
         x = np.zeros(len(rows))
         if self.along:
             rows.sort(key=self.place)
             x = np.array([self.place(row) for row in rows], float)
-        cost, error = column(rows, self.cost), column(rows, self.accuracy)
+        cost, signed = column(rows, self.cost), errors(rows, self.accuracy)
         across = x if self.convergence else cost
-        return GroupedRuns(choice, rows, x, cost, error, across, self.linear)
+        chance = self._chance(rows, x, signed)
+        return GroupedRuns(choice, rows, x, cost, np.abs(signed), across, self.linear, chance)
+
+    def _chance(self, rows: Sequence[Mapping], x: np.ndarray, signed: np.ndarray) -> list[str]:
+        """Tell of chance in a line whose runs have ever more points, or ever fewer."""
+        points = column(rows, "points")
+        rise = np.diff(points[np.isfinite(points)])
+        if self.words or len(rise) < 1 or not ((rise > 0).all() or (rise < 0).all()):
+            return [""] * len(rows)
+        way = 1 if rise[0] > 0 else -1
+        highest = reached(rows[0][name] for name in self.table.variables)
+        return by_chance(x[::way], signed[::way], highest)[::way]
 
     def place(self, row: Mapping[str, str]) -> float:
         """Find the place of a run along its line: the number, or which of the words it is."""
@@ -217,15 +252,23 @@ class Family:
         """Name the error for an axis."""
         words = (word.partition("=") for word in self.table.made.get("record", ()))
         formula = {name: formula for name, _, formula in words}.get(self.accuracy)
-        return f"{self.accuracy} = {formula}" if formula else look.label(self.accuracy)
+        if not formula:
+            return self.table.label(self.accuracy)
+        signed = any((value(row, self.accuracy) or 0.0) < 0 for row in self.table.rows)
+        return f"{self.accuracy} = {f'abs({formula})' if signed else formula}"
 
     def front(self) -> list[Mapping[str, str]]:
-        """Find the Pareto front: runs that none beats in both cost and error, cheapest first."""
+        """Find the Pareto front: runs that none beats in both cost and error, cheapest first.
+
+        Runs whose errors are small by chance are not on it.
+        """
         members = [
             (c, e, k, row)
             for line in self.lines
-            for k, (c, e, row) in enumerate(zip(line.cost, line.error, line.rows, strict=True))
-            if usable(c) and usable(e)
+            for k, (c, e, row, lucky) in enumerate(
+                zip(line.cost, line.error, line.rows, line.lucky, strict=True)
+            )
+            if usable(c) and usable(e) and not lucky
         ]
         best, found = inf, []
         for _, error, _, row in sorted(members, key=lambda m: m[:3]):
@@ -239,6 +282,11 @@ def errors(rows: Sequence[Mapping[str, Any]], name: str) -> np.ndarray:
     """Read errors, with their signs where they are known, NaN where there is none."""
     signed = column(rows, name + SIGNED)
     return np.where(np.isfinite(signed), signed, column(rows, name))
+
+
+def sizes(rows: Sequence[Mapping[str, Any]], name: str) -> np.ndarray:
+    """Read the sizes of errors, NaN where there is none."""
+    return np.abs(column(rows, name))
 
 
 def column(rows: Sequence[Mapping[str, Any]], name: str) -> np.ndarray:

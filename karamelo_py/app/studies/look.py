@@ -80,6 +80,23 @@ def _in_order(value: str, values: Sequence[str]) -> str:
     return to_hex(colormaps["viridis"](0.85 * ranked.index(value) / (len(ranked) - 1)))
 
 
+def readable(colour: str) -> str:
+    """Darken a colour until letters of it can be read on white: a contrast of 4.5 to 1 (WCAG 2)."""
+    from matplotlib.colors import to_hex, to_rgb
+
+    rgb = np.array(to_rgb(colour))
+    while contrast(rgb) < 4.5:
+        rgb = 0.95 * rgb
+    return to_hex(rgb)
+
+
+def contrast(rgb: Any) -> float:
+    """Divide the luminance of white by that of a colour (sRGB, 0 to 1), as WCAG 2.1 defines it."""
+    rgb = np.asarray(rgb, float)
+    linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+    return 1.05 / (float(linear @ (0.2126, 0.7152, 0.0722)) + 0.05)
+
+
 def label(name: str) -> str:
     """Give the title of an axis."""
     return COLUMNS.get(name, name)
@@ -162,5 +179,6 @@ def direct_labels(axes: Any, ends: Sequence[tuple[float, float, str, str]]) -> N
             color=colour, linewidth=0.6, alpha=0.6, zorder=1,
         )  # fmt: skip
         axes.text(
-            1.04, place, name, transform=axes.transAxes, color=colour, fontsize=size, va="center"
-        )
+            1.04, place, name, transform=axes.transAxes, color=readable(colour), fontsize=size,
+            va="center",
+        )  # fmt: skip

@@ -9,8 +9,16 @@ import numpy as np
 
 from karamelo_py.app.plot import read_log
 from karamelo_py.app.studies import look
-from karamelo_py.app.studies.curves import Family, Table, column, label, require, usable
-from karamelo_py.app.studies.records import value
+from karamelo_py.app.studies.curves import (
+    Family,
+    Table,
+    column,
+    label,
+    order,
+    require,
+    sizes,
+    usable,
+)
 from karamelo_py.app.studies.study import plain_table, shown, terminal
 from karamelo_py.output.files import savefig
 from karamelo_py.output.plots import blank_figure, tick_text, tidy
@@ -46,9 +54,22 @@ def lines(family: Family, path: Path, words: tuple[str, str], title: str = "") -
                 px, py, color=colour, marker=look.MARKERS[marker], linestyle=look.DASHES[dash],
                 linewidth=1.5, markersize=5.5, zorder=3,
             )  # fmt: skip
+            lucky = line.lucky[line.shown][way]
+            axes.plot(
+                px[lucky], py[lucky], marker=look.MARKERS[marker], linestyle="", color=colour,
+                markerfacecolor="white", markersize=5.5, zorder=4,
+            )  # fmt: skip
+            spread = column(line.rows, f"{family.cost}_spread")[line.shown][way]
+            if not convergence and np.isfinite(spread).any():
+                axes.errorbar(
+                    px, py, xerr=np.nan_to_num(spread) / 2, fmt="none", ecolor=colour,
+                    elinewidth=1, capsize=3, zorder=2,
+                )  # fmt: skip
             last = int(np.argmax(px))
             ends.append((px[last], py[last], line.label, colour))
     _gone(axes, [(x, style[0]) for style, gone in zip(styles, failed, strict=True) for x in gone])
+    if convergence and not family.linear:
+        _slope(axes, family)
     look.direct_labels(axes, ends)
     axes.set(xlabel=words[0], ylabel=words[1])
     axes.set_title(title, loc="left", fontsize=10)
@@ -69,13 +90,48 @@ def _gone(axes: Any, marks: Sequence[tuple[float, str]]) -> None:
             )  # fmt: skip
 
 
+def _slope(axes: Any, family: Family) -> None:
+    """Draw a triangle below all lines, with the order that is the middle one of them, in halves."""
+    lines = [line for line in family.lines if len(set(line.x[line.shown])) > 1]
+    sure = [line for line in lines if not line.lucky.any()] or lines
+    fits = [order(line.x[line.shown], line.error[line.shown]).exponent for line in sure]
+    p = round(2 * float(np.median(np.abs(fits)))) / 2 if fits else 0
+    if p == 0:
+        return
+    falls = np.median(fits) < 0
+    logs = [np.log([line.x[line.shown], line.error[line.shown]]) for line in lines]
+    low, high = min(x.min() for x, _ in logs), max(x.max() for x, _ in logs)
+    bottom, top = np.log(axes.get_ylim())
+    left = low + 0.5 * (high - low)
+    right = min(left + 0.25 * (high - low), left + 0.3 * (top - bottom) / p)
+    below = []
+    for x, y in logs:
+        rank = np.argsort(x)
+        at = [each for each in np.linspace(left, right, 9) if x.min() <= each <= x.max()]
+        below += [*np.interp(at, x[rank], y[rank])]
+    head = min(below, default=bottom) - 0.05 * (top - bottom)
+    foot = head - p * (right - left)
+    corner = left if falls else right
+    shape = np.exp([(corner, head), (corner, foot), (right + left - corner, foot)])
+    axes.fill(*shape.T, facecolor="0.93", edgecolor="0.4", linewidth=0.8, zorder=1)
+    axes.annotate(
+        f"{p:g}", (np.exp(corner), np.exp((head + foot) / 2)), xytext=(-4 if falls else 4, 0),
+        textcoords="offset points", ha="right" if falls else "left", va="center", fontsize=8,
+    )  # fmt: skip
+    axes.annotate(
+        "1", (np.exp((left + right) / 2), np.exp(foot)), xytext=(0, -3),
+        textcoords="offset points", ha="center", va="top", fontsize=8,
+    )  # fmt: skip
+    axes.set_ylim(bottom=np.exp(min(bottom, foot - 0.07 * (top - bottom))))
+
+
 def _ends(values: np.ndarray) -> tuple[float, float]:
     return float(values.min()), float(values.max())
 
 
 def _front(axes: Any, family: Family) -> None:
     front = family.front()
-    cost, error = column(front, family.cost), column(front, family.accuracy)
+    cost, error = column(front, family.cost), sizes(front, family.accuracy)
     if len(front) > 1:
         axes.step(cost, error, where="post", color="0.8", linewidth=6, zorder=1)
     axes.plot(cost, error, "o", color="0.8", markersize=13, zorder=1)
@@ -85,6 +141,8 @@ def _footnote(figure: Any, family: Family) -> None:
     said = []
     if not family.convergence and family.front():
         said.append("grey band: Pareto front, no run is both cheaper and more accurate")
+    if any(line.lucky.any() for line in family.lines):
+        said.append("hollow: small by chance, a finer run is worse or the sign changes")
     if family.without:
         missing = f"not shown: {plural(len(family.without), 'run')} without a value"
         said.append("× at the top: no value (failed)" if family.convergence else missing)
@@ -105,20 +163,20 @@ def heat(
     for row in rows:
         panels.setdefault(tuple(row[n] for n in others), []).append(row)
     across, up = _sorted(rows, x), _sorted(rows, y)
-    wide = min(3, len(panels))
+    wide = 2 if len(panels) == 4 else min(3, len(panels))
     high = -(-len(panels) // wide)
     figure = blank_figure(
         1.4 + wide * (1.2 + 0.62 * len(across)), 0.9 + high * (0.9 + 0.42 * len(up))
     )
     all_axes = figure.subplots(high, wide, squeeze=False, sharex=True, sharey=True).ravel()
-    numbers = [a for a in column(rows, family.accuracy) if usable(a)]
+    numbers = [a for a in sizes(rows, family.accuracy) if usable(a)]
     low, top = min(numbers), max(numbers)
     norm = LogNorm(low, top if top > low else 2 * low)
     colours = colormaps["viridis"]
     for axes, (key, members) in zip(all_axes, panels.items(), strict=False):
         cells = np.full((len(up), len(across)), np.nan)
         ends = np.full(cells.shape, "", object)
-        for row, error in zip(members, column(members, family.accuracy), strict=True):
+        for row, error in zip(members, sizes(members, family.accuracy), strict=True):
             at = up.index(row[y]), across.index(row[x])
             cells[at] = error if usable(error) else np.nan
             ends[at] = row.get("status", "failed") if not usable(error) else f"{error:.2g}"
@@ -290,7 +348,7 @@ def pairs(table: Table, name: str, accuracy: str, cost: str) -> tuple[list[Pair]
 
 
 def _number(row: Mapping[str, str], column: str) -> float:
-    found = value(row, column)
+    (found,) = sizes([row], column)
     return found if usable(found) else np.nan
 
 

@@ -4,14 +4,18 @@ import csv
 import os
 import re
 from collections.abc import Container, Iterable, Mapping, Sequence
+from contextlib import suppress
 from itertools import product
 from math import prod
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 from karamelo_py.app.options import LIVE, VARIABLE, above_zero, positive
 from karamelo_py.app.studies.case import Launch
+from karamelo_py.language import registry
 from karamelo_py.output.quantity import KEYWORDS
+from karamelo_py.output.units import Units
 from karamelo_py.script.errors import ScriptError, meant, nearest, plural
 from karamelo_py.script.evaluation import evaluate
 from karamelo_py.script.functions import CONSTANTS
@@ -203,8 +207,33 @@ class ScriptFiles:
 
     def computes(self) -> list[str]:
         """List the IDs of its computes, as far as known."""
-        calls = [call for path in sorted(self.statements) for call in self.calls("compute", path)]
-        return [call.arguments[0].code.strip() for call in calls if call.arguments]
+        return [words[0] for words in self.words("compute")]
+
+    def words(self, name: str) -> list[list[str]]:
+        """List the arguments of all calls of a command that has some."""
+        calls = [call for path in sorted(self.statements) for call in self.calls(name, path)]
+        found = [[raw.code.strip().strip('"') for raw in call.arguments] for call in calls]
+        return [words for words in found if words]
+
+    def unit(self, name: str) -> str:
+        """Name the unit of a log column, empty where none is known."""
+        reduction, _, column = name.rpartition(":")
+        if reduction not in ("", "max", "min", "mean", "first", "last"):
+            return ""
+        parts = {
+            words[0]: SimpleNamespace(style=words[1], published=_published(family, words[1]))
+            for family in ("fix", "compute") for words in self.words(family) if len(words) > 1
+        }  # fmt: skip
+        for words in self.words("units"):
+            with suppress(TypeError, KeyError):
+                return Units(*words).of_value(column.lower() if column == "Time" else column, parts)
+        return ""
+
+
+def _published(family: str, style: str) -> tuple[str, ...]:
+    with suppress(ScriptError):
+        return tuple(getattr(registry.find(family, style), "published", ()))
+    return ()
 
 
 # ---- options ------------------------------------------------------------------------------------
