@@ -333,7 +333,8 @@ def test_colours_of_components_lie_about_zero(plane):
         lo, hi = dump._picture.limits
         assert lo == -hi
     assert lo < plane.fields.points["vx"].min()
-    assert (dump.cmap, PyPlot(plane, 1, "q.png", 4, 3, "seq").cmap) == ("coolwarm", "viridis")
+    seq = PyPlot(plane, 1, "q.png", 4, 3, "seq")
+    assert (dump.look["cmap"], seq.look["cmap"]) == ("coolwarm", "viridis")
 
 
 def test_limits_that_are_given_stay(plane):

@@ -1,15 +1,21 @@
 """karamelo-py view and plot, and where the files of a run go: what a person does after a run."""
 
+from pathlib import Path
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from fakes import FakeHub
 from PIL import Image
+from scenes import block
 
+from karamelo_py import Simulation
 from karamelo_py.app import view
 from karamelo_py.app.cli import main
 from karamelo_py.app.plot import read_rows
+from karamelo_py.output import pictures
 from karamelo_py.output.rhythm import ByTime
-from karamelo_py.output.snapshots import read
+from karamelo_py.output.snapshots import Snapshot, read
 from karamelo_py.styles.dumps.hdf5 import Hdf5
 from karamelo_py.styles.dumps.lammps import Particle, ParticleGz
 from karamelo_py.styles.dumps.vtk import Vtk
@@ -125,8 +131,12 @@ def test_points_that_move_stay_in_view(tmp_path, monkeypatch):
         (["text.vtu"], "is not a dump"),
         (["text.pvd"], "is not a dump"),
         (["p.dump", "-o", "p.avi"], ".png"),
-        (["p.dump", "-o", "p.pdf"], ".gif"),
+        (["p.dump", "-o", "p.jpg"], ".pdf"),
         (["p.dump", "--cmap", "rainbows"], "rainbows"),
+        (["p.dump", "--only", "vxx > 0"], "vxx"),
+        (["p.dump", "--xmin", "2", "--xmax", "1"], "above xmin"),
+        (["p.dump", "--scale", "log", "--vmin", "0"], "above 0"),
+        (["p.dump", "--quantile", "0.6"], "from 0 to 0.4"),
         ([], "FILE"),
     ],
 )
@@ -220,3 +230,91 @@ def test_words_of_a_log_are_no_numbers(tmp_path):
     rows = read_rows(tmp_path / "log.mpm")
     assert [(row["Step"], row["dt"]) for row in rows] == [(0, 0.5), (1, 0.25)]
     assert np.isnan(rows[0]["limit"])
+
+
+LOOKS = {
+    "zoom": ("xmin=0, xmax=0.5, ymin=0.2", {"xmin": "0", "xmax": "0.5", "ymin": "0.2"}),
+    "only": ("only=x > 0.4", {"only": "x > 0.4"}),
+    "log": ("scale=log, vmin=1e-3, vmax=10", {"scale": "log", "vmin": "1e-3", "vmax": "10"}),
+    "quantile": ("quantile=0.35", {"quantile": "0.35"}),
+    "letters": ('label="stress (Pa)", fontsize=14, dpi=200', {"label": "stress (Pa)",
+                "fontsize": "14", "dpi": "200"}),
+    "points": ("pointsize=1.4", {"pointsize": "1.4"}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", LOOKS)
+def test_words_of_pictures_are_the_same_everywhere(run_interpreted, capsys, monkeypatch, name):
+    """dump pyplot and view draw the same picture with a word, and another one without it."""
+    words, options = LOOKS[name]
+    text = block(
+        2, "fix(v, initial_velocity_particles, all, 30*x^3, 0)",
+        "dump(d, all, particle, 10, p.dump, x, y, type, seq)",
+        "dump(a, all, pyplot, 10, plain.*.png, 300, 300, seq)",
+        f"dump(b, all, pyplot, 10, own.*.png, 300, 300, seq, {words})",
+        "set_dt(1e-3)", "run(2)",
+    )  # fmt: skip
+    folder = run_interpreted(text).folder
+    own, plain = (folder / f"{one}.2.png" for one in ("own", "plain"))
+    assert own.read_bytes() != plain.read_bytes()
+    monkeypatch.chdir(folder)
+    given = [word for key, value in options.items() for word in (f"--{key}", value)]
+    own = call(
+        capsys, "view", "p.dump", "-c", "seq", "--size", "300", "300", *given, "-o", "v.*.png"
+    )
+    assert own[0] == 0, own[2]
+    call(capsys, "view", "p.dump", "-c", "seq", "--size", "300", "300", "-o", "w.*.png")
+    assert Image.open("v.2.png").size == Image.open(folder / "own.2.png").size
+    assert Path("v.2.png").read_bytes() != Path("w.2.png").read_bytes()
+
+
+def test_one_point_does_not_take_all_colours(hub):
+    """Of a hundred values one is a thousand times as large: quantile leaves it beyond the end."""
+    options = pictures.Options("seq", "seq", quantile=0.02)
+    domain = SimpleNamespace(dimension=2, lo=np.zeros(2), hi=np.ones(2))
+    picture = pictures.make(domain, (3, 3), 100, options)
+    x = np.linspace(0, 1, 100)
+    columns = {"id": np.arange(100), "x": x, "y": x, "z": 0 * x, "seq": np.append(x[:-1], 1e3)}
+    picture.show(Snapshot(0, 0.0, columns, domain.lo, domain.hi), 0.01, "")
+    assert picture.limits[1] < 1.5 and picture.beyond == (False, True)
+
+
+def test_a_logarithm_is_shown_by_its_number():
+    options = pictures.Options("seq", "seq", log=True)
+    domain = SimpleNamespace(dimension=2, lo=np.zeros(2), hi=np.ones(2))
+    picture = pictures.make(domain, (3, 3), 100, options)
+    x = np.array([0.1, 0.5, 0.9])
+    columns = {"id": np.arange(3), "x": x, "y": x, "z": 0 * x, "seq": np.array([0.0, 1.0, 1e4])}
+    picture.show(Snapshot(0, 0.0, columns, domain.lo, domain.hi), 0.01, "")
+    assert picture.limits == (0.0, 4.0)
+    ticks = [picture.scale.get_major_formatter()(v) for v in (0, 2, 4)]
+    assert ticks == ["1", "100", "1e+04"]
+    # What has no logarithm has the lowest colour.
+    assert list(picture.marks.rows[2]) == [0.0, 0.0, 1.0]
+
+
+def test_show_writes_the_format_that_a_name_asks_for(tmp_path):
+    sim = Simulation(block(2, "run(1)"))
+    for ending, magic in (("svg", b"<?xml"), ("pdf", b"%PDF"), ("png", b"\x89PNG")):
+        sim.show(file=tmp_path / f"s.{ending}")
+        assert (tmp_path / f"s.{ending}").read_bytes().startswith(magic)
+
+
+@pytest.mark.parametrize("ends", [(298.0, 600.0), (-600.0, -298.0)])
+def test_the_bar_of_colours_has_the_ends_that_are_given(ends):
+    options = pictures.Options("seq", "seq", limits=ends)
+    domain = SimpleNamespace(dimension=2, lo=np.zeros(2), hi=np.ones(2))
+    picture = pictures.make(domain, (3, 3), 100, options)
+    x = np.array([0.1, 0.9])
+    columns = {"id": np.arange(2), "x": x, "y": x, "z": 0 * x, "seq": np.array(ends)}
+    picture.show(Snapshot(0, 0.0, columns, domain.lo, domain.hi), 0.01, "")
+    assert picture.scale.axes.get_ylim() == ends
+
+
+def test_small_lengths_count_in_powers_of_a_thousand():
+    """20 micrometres are no 0.00002 beside a tick."""
+    options = pictures.Options("seq", "seq", lengths=" [m]")
+    domain = SimpleNamespace(dimension=2, lo=np.zeros(2), hi=np.full(2, 2e-5))
+    picture = pictures.make(domain, (3, 3), 100, options)
+    assert picture.axes.get_xlabel() == "x [1e-6 m]"
+    assert picture.axes.yaxis.get_major_formatter()(1e-5, 0) == "10"

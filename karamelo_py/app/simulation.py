@@ -459,9 +459,9 @@ class Simulation:
         width, height
             Size in inches.
         file
-            Write it there, too (PNG).
+            Write it there, too: .png, .pdf or .svg.
         look
-            As dump pyplot: vmin, vmax, cmap, azimuth, elevation, axes, title.
+            The words of dump pyplot: vmin, vmax, cmap, label, only, xmin, quantile, dpi ...
         """
         from karamelo_py.styles.dumps.pyplot import PyPlot
 
@@ -473,10 +473,9 @@ class Simulation:
             dump = signature.call(PyPlot, self.hub, arguments, "dump pyplot")
             drawn = io.BytesIO()
             dump.draw(drawn)
-        picture = ShownPicture(drawn.getvalue())
-        if file is not None:
-            picture.save(file)
-        return picture
+            if file is not None:
+                dump.save(Path(file))
+        return ShownPicture(drawn.getvalue())
 
     def live(self) -> LivePage:
         """Open a page in a browser that follows the runs to come; a notebook shows it.

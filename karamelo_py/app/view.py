@@ -11,16 +11,30 @@ from typing import Any
 
 import numpy as np
 
+from karamelo_py.app.catalogue import help_of
 from karamelo_py.app.options import LIVE
-from karamelo_py.output.fields import unknown_column
-from karamelo_py.output.files import Frames, movie_format, picture_format, unwarned, whole
+from karamelo_py.language import signature
+from karamelo_py.language.interpreter import Interpreter
+from karamelo_py.language.signature import Argument, Parameter
+from karamelo_py.output.fields import ColumnFormula, unknown_column
+from karamelo_py.output.files import (
+    Frames,
+    movie_format,
+    picture_format,
+    savefig,
+    unwarned,
+    whole,
+)
 from karamelo_py.output.snapshots import Snapshot, read
+from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.parser import parse
+from karamelo_py.styles.dumps.pyplot import look_of
 
 DESCRIPTION = """\
 Draw pictures or a movie of dumps of points.
 Files are those of dump particle, particle/gz, hdf5 and vtk (its .pvd). The pictures are those of
-dump pyplot."""
+dump pyplot, and so are the options that say how they look."""
 DPI = 100
 SAMPLE = 400  # points whose nearest neighbours are looked for
 
@@ -37,17 +51,20 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-o", "--output", metavar="FILE", type=Path,
         help="picture.*.png, where * becomes the step, or a movie: .gif, or .mp4 where ffmpeg is "
-        "installed (default: view.*.png)", default=Path("view.*.png"),
+        "installed (default: view.*.png); .pdf and .svg, too", default=Path("view.*.png"),
     )  # fmt: skip
     parser.add_argument(
         "--size", nargs=2, type=int, default=[600, 500], metavar=("WIDTH", "HEIGHT")
     )
-    parser.add_argument("--vmin", type=float, help="lower end of the colours")
-    parser.add_argument("--vmax", type=float, help="upper end of the colours")
-    parser.add_argument("--cmap", help="a colour map of Matplotlib")
-    parser.add_argument("--azimuth", type=float, default=-60.0, help="in 3D, degrees from x")
-    parser.add_argument("--elevation", type=float, default=30.0, help="in 3D, degrees")
+    for word in _look_words():
+        said = word.description.replace("%", "%%")
+        parser.add_argument(f"--{word.name}", metavar=word.name.upper(), help=said)
     parser.add_argument("--fps", type=float, default=25.0, help="frames a second of a movie")
+
+
+def _look_words() -> list[Parameter]:
+    """List the words of dump pyplot that say how a picture looks."""
+    return [word for word in help_of("dump", "pyplot").parameters if word.keyword]
 
 
 def run(options: argparse.Namespace) -> int:
@@ -57,26 +74,33 @@ def run(options: argparse.Namespace) -> int:
     movie = options.output.suffix.lower() in (".gif", ".mp4")
     if movie:
         movie_format(options.output)
-    elif picture_format(options.output) != "png":
-        raise ScriptError("view draws .png", expected="a file name ending in .png, .gif or .mp4")
+    else:
+        picture_format(options.output)
     frames = Frames(options.fps)
     # Named by number, 1000 comes after 999.
     files = sorted(_matching(options.files), key=lambda path: (_number(path), path.name))
     drawn = 0
     with unwarned():
-        picture = None
+        picture = look = None
         for snapshot in chain.from_iterable(map(read, files)):
-            picture = picture or _picture(snapshot, files, options)
+            look = look or _look(snapshot, options)
+            snapshot = _chosen(snapshot, look["only"])
+            picture = picture or _picture(snapshot, files, options, look)
             time = "" if np.isnan(snapshot.time) else f", time {snapshot.time:.6g}"
             # As they stand in the file, whatever their ids.
             snapshot.columns["id"] = np.arange(len(snapshot.columns["x"]))
-            picture.show(snapshot, picture.side, f"step {snapshot.step}{time}")
+            title = f"{look['title']}: " if look["title"] else ""
+            picture.show(snapshot, picture.side, f"{title}step {snapshot.step}{time}")
             drawn += 1
             if movie:
                 frames.add(lambda file, picture=picture: picture.save_png(file, 1))
                 continue
             name = options.output.name.replace("*", str(snapshot.step), 1)
-            with whole(options.output.with_name(name)) as file:
+            path = options.output.with_name(name)
+            if picture_format(path) != "png":
+                savefig(picture.figure, path)
+                continue
+            with whole(path) as file:
                 picture.save_png(file, 1)
     if not drawn:
         raise ScriptError("there is no snapshot in these files")
@@ -120,10 +144,37 @@ def _number(path: Path) -> int:
     return int(digits[-1]) if digits else -1
 
 
-def _picture(first: Snapshot, files: Iterable[Path], options: argparse.Namespace) -> Any:
+def _look(first: Snapshot, options: argparse.Namespace) -> dict[str, Any]:
+    """Read the words of dump pyplot as a script's."""
+    names = SimpleNamespace(particle_names=lambda: list(first.columns))
+    script = Interpreter(Hub())
+    hub = SimpleNamespace(fields=names, values=script.hub.values)
+    look = {}
+    for word in _look_words():
+        look[word.name] = word.default
+        if (given := getattr(options, word.name)) is not None:
+            if word.kind.text.startswith("a word"):
+                look[word.name] = given
+                continue
+            (call,) = parse(f"view({given})", f"--{word.name}")
+            argument = Argument(call.arguments[0], script)
+            look[word.name] = signature.convert(hub, word, argument)
+    return look
+
+
+def _chosen(snapshot: Snapshot, only: ColumnFormula | None) -> Snapshot:
+    """The points that a condition of columns holds for."""
+    if only is None:
+        return snapshot
+    held = only.holds(SimpleNamespace(particle=snapshot.columns.__getitem__))
+    return snapshot._replace(columns={name: of[held] for name, of in snapshot.columns.items()})
+
+
+def _picture(
+    first: Snapshot, files: Iterable[Path], options: argparse.Namespace, look: dict[str, Any]
+) -> Any:
     """Make the empty picture that suits the first snapshot; place and colours suit all of them."""
     from karamelo_py.output import pictures
-    from karamelo_py.styles.dumps.pyplot import colours_of
 
     if options.column is not None and options.column not in first.columns:
         said = f"the dump has no column '{options.column}'"
@@ -131,33 +182,33 @@ def _picture(first: Snapshot, files: Iterable[Path], options: argparse.Namespace
     # A dump holds zeros where the scene has no direction.
     dimension = 3 if first.columns["z"].any() else 2 if first.columns["y"].any() else 1
     column = options.column or ("type" if dimension > 1 else "x")
-    limits = (options.vmin, options.vmax)
     types = np.unique(first.columns["type"]).astype(int) if column == "type" else []
-    look = pictures.Options(
-        column,
-        column,
-        tuple(f"solid {k}" for k in range(1, max(types, default=0) + 1)),
-        limits,
-        *colours_of(column, limits, options.cmap),
-        azimuth=options.azimuth,
-        elevation=options.elevation,
-    )
-    lo, hi, span = _all(files, column)
+    words = {name: value for name, value in look.items() if name not in ("only", "title", "dpi")}
+    words["window"] = tuple((words.pop(f"{x}min"), words.pop(f"{x}max")) for x in "xyz")
+    made_look = {"label": column} | look_of(column, **words)
+    solids = tuple(f"solid {k}" for k in range(1, max(types, default=0) + 1))
+    lo, hi, span = _all(files, column, look["only"])
     domain = SimpleNamespace(dimension=dimension, lo=lo, hi=hi)
     size = tuple(pixels / DPI for pixels in options.size)
-    made = pictures.make(domain, size, DPI, look)
-    made.begin_with(span)
+    made = pictures.make(
+        domain, size, look["dpi"], pictures.Options(column, solids=solids, **made_look)
+    )
+    if not made_look["log"] and not made_look["quantile"]:
+        made.begin_with(span)
     made.side = _side(np.column_stack([first.columns[name] for name in "xyz"]))
     return made
 
 
-def _all(files: Iterable[Path], column: str) -> tuple[np.ndarray, np.ndarray, Any]:
+def _all(
+    files: Iterable[Path], column: str, only: ColumnFormula | None = None
+) -> tuple[np.ndarray, np.ndarray, Any]:
     """Find corners around all snapshots, and limits of the values of a column in them."""
     from karamelo_py.output.pictures import grown
 
     corners, ends = [], []
     for snapshot in chain.from_iterable(map(read, files)):
         corners.append((snapshot.lo, snapshot.hi))
+        snapshot = _chosen(snapshot, only)
         values = snapshot.columns.get(column, np.empty(0))
         values = values[np.isfinite(values)]
         ends += [values.min(), values.max()] if len(values) else []

@@ -5,8 +5,9 @@ Axes, labels and the bar of colours are a background that is drawn once and then
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import product
+from types import SimpleNamespace
 from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
@@ -51,6 +52,11 @@ class Options(NamedTuple):
     elevation: float = 30.0
     axes: bool = True
     lengths: str = ""  # text behind the names of the axes: the unit
+    window: tuple[tuple[float | None, float | None], ...] = ()  # of x, y, z; None: of the domain
+    log: bool = False  # colours go by the logarithm; what is not above 0 has the lowest
+    quantile: float = 0.0  # share of the values, at each end, for which limits do not grow
+    fontsize: float = 9.0
+    pointsize: float = 1.0  # of points, over that of the material they stand for
 
 
 class DrawnPoints(Artist):
@@ -83,8 +89,9 @@ class Picture:
     """
 
     def __init__(self, domain: Any, size: tuple[float, float], dpi: int, options: Options):
-        self.domain = domain
+        self.domain = _zoomed(domain, options.window)
         self.options = options
+        self.small = options.fontsize - 1  # numbers beside the ticks
         self.figure = Figure(figsize=size, dpi=dpi, layout="constrained")
         self.canvas = FigureCanvasAgg(self.figure)
         self.axes = self.figure.add_subplot()
@@ -95,8 +102,8 @@ class Picture:
         self._laid_out = False
         self._widest = 0.0  # of the titles, in pixels
         self._background: Any = None
-        self.axes.tick_params(labelsize=8)
-        self.title = self.axes.set_title("step 0, time 0", fontsize=9)
+        self.axes.tick_params(labelsize=self.small)
+        self.title = self.axes.set_title("step 0, time 0", fontsize=options.fontsize)
         self.artist = self._prepare()
         self.marks = DrawnPoints(self)
         self.axes.add_artist(self.marks)
@@ -113,6 +120,18 @@ class Picture:
     def _apply_beyond(self, below: bool, above: bool) -> None:
         """Mark the ends of the colours beyond which there are values."""
 
+    def _name_lengths(self, axis: Any, name: str) -> None:
+        """Label an axis of lengths; small and large ones count in powers of a thousand."""
+        size = max(map(abs, (*self.domain.lo, *self.domain.hi)), default=1.0)
+        if 0 < size < 1e-2 or size >= 1e5:
+            power = 3 * int(np.floor(np.log10(size) / 3))
+            axis.set_major_formatter(FuncFormatter(lambda value, _: _number(value / 10.0**power)))
+            unit = self.options.lengths.strip(" []")
+            name += f" [1e{power} {unit}]" if unit else f" / 1e{power}"
+        else:
+            name += self.options.lengths
+        axis.set_label_text(name, fontsize=self.options.fontsize)
+
     def _add_legend(self) -> None:
         """Write names of the solids, beside the picture."""
         names = self.options.solids[:MOST_IN_LEGEND]
@@ -122,14 +141,23 @@ class Picture:
             Line2D([], [], marker="o", linestyle="", color=SOLIDS[k % len(SOLIDS)], label=name)
             for k, name in enumerate(names)
         ]
-        self.figure.legend(handles=dots, loc="outside right upper", frameon=False, fontsize=8)
+        self.figure.legend(
+            handles=dots, loc="outside right upper", frameon=False, fontsize=self.small
+        )
 
     def show(self, snapshot: Snapshot, side: float, title: str) -> None:
         """Set the points and the title to draw; `side` is the length of a typical point."""
         if not self._laid_out:
             self._lay_out()
         columns = snapshot.columns
+        if self.options.window:
+            corners = zip("xyz", self.domain.lo, self.domain.hi, strict=False)
+            seen = [(columns[name] >= lo) & (columns[name] <= hi) for name, lo, hi in corners]
+            columns = {name: of[np.all(seen, axis=0)] for name, of in columns.items()}
         values = columns[self.options.column]
+        if self.options.log:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                values = np.log10(values)
         if not self.options.solids:
             limits = self._limits(values)
             if limits != self.limits:
@@ -143,6 +171,7 @@ class Picture:
                 self._apply_beyond(*beyond)
                 self._background = None
         self._entitle(title)
+        values = np.where(values == -np.inf, self.limits[0], values) if self.limits else values
         x = np.column_stack([columns[name] for name in "xyz"])
         self.marks.rows = self._rows(columns["id"], x, values, side)
 
@@ -169,12 +198,15 @@ class Picture:
             self._background = None
 
     def _limits(self, values: np.ndarray) -> tuple[float, float]:
+        if share := self.options.quantile:
+            finite = values[np.isfinite(values)]
+            values = np.quantile(finite, [share, 1 - share]) if len(finite) else finite
         grown_to = grown(self.limits, values)
         if self.options.symmetric:
             furthest = max(-grown_to[0], grown_to[1])
             grown_to = -furthest, furthest
         lo, hi = (
-            own if fixed is None else fixed
+            own if fixed is None else np.log10(fixed) if self.options.log else fixed
             for own, fixed in zip(grown_to, self.options.limits, strict=True)
         )
         return (lo, hi) if hi > lo else (min(lo, hi), min(lo, hi) + (abs(lo) or 1.0))
@@ -251,6 +283,18 @@ def grown(limits: tuple[float, float] | None, values: np.ndarray) -> tuple[float
     return float(lo), float(hi if hi > lo else lo + unit)
 
 
+def _zoomed(domain: Any, window: Sequence[tuple[float | None, float | None]]) -> Any:
+    """The part of a domain that is shown."""
+    if not window:
+        return domain
+    lo, hi = np.array(domain.lo, float), np.array(domain.hi, float)
+    for k, ends in zip(range(len(lo)), window, strict=False):
+        lo[k], hi[k] = (
+            own if given is None else given for own, given in zip((lo[k], hi[k]), ends, strict=True)
+        )
+    return SimpleNamespace(dimension=domain.dimension, lo=lo, hi=hi)
+
+
 def make(domain: Any, size: tuple[float, float], dpi: int, options: Options) -> Picture:
     """Make the picture that suits the domain's dimension."""
     kind = {1: LinePicture, 2: PlanePicture, 3: SpacePicture}[domain.dimension]
@@ -259,6 +303,11 @@ def make(domain: Any, size: tuple[float, float], dpi: int, options: Options) -> 
 
 def _number(value: float, _: Any = None) -> str:
     return f"{value:.8g}"
+
+
+def _power(value: float, _: Any = None) -> str:
+    """What a number on a logarithmic scale stands for."""
+    return f"{10.0**value:.3g}"
 
 
 def _arrows(shown: ScalarMappable, of_bar: Transform) -> list[Polygon]:
@@ -283,8 +332,8 @@ class PlanePicture(Picture):
         self.axes.set_xlim(lo[0], hi[0])
         self.axes.set_ylim(lo[1], hi[1])
         self.axes.set_aspect("equal")
-        self.axes.set_xlabel("x" + self.options.lengths, fontsize=9)
-        self.axes.set_ylabel("y" + self.options.lengths, fontsize=9)
+        self._name_lengths(self.axes.xaxis, "x")
+        self._name_lengths(self.axes.yaxis, "y")
         return self._scatter()
 
     def _scatter(self) -> Any:
@@ -296,17 +345,21 @@ class PlanePicture(Picture):
                 shown,
                 ax=self.axes,
                 shrink=0.8,
-                label=self.options.label,
                 ticks=MaxNLocator(7, steps=STEPS),
-                format=FuncFormatter(_number),
+                format=FuncFormatter(_power if self.options.log else _number),
             )
-            bar.ax.tick_params(labelsize=8)
+            bar.set_label(self.options.label, fontsize=self.options.fontsize)
+            bar.ax.tick_params(labelsize=self.small)
             self.scale = bar.ax.yaxis
             self.arrows = [bar.ax.add_patch(arrow) for arrow in _arrows(shown, bar.ax.transAxes)]
         return self.axes.scatter([], [], lw=0)
 
     def _apply_limits(self, lo: float, hi: float) -> None:
-        self.norm.vmin, self.norm.vmax = lo, hi
+        # The bar looks at each end as it is set, and mends ends that are the wrong way round.
+        if hi > self.norm.vmin:
+            self.norm.vmax, self.norm.vmin = hi, lo
+        else:
+            self.norm.vmin, self.norm.vmax = lo, hi
 
     def _apply_beyond(self, below: bool, above: bool) -> None:
         for arrow, shows in zip(self.arrows, (below, above), strict=True):
@@ -315,7 +368,7 @@ class PlanePicture(Picture):
     def _rows(self, ids: np.ndarray, x: np.ndarray, values: np.ndarray, side: float) -> np.ndarray:
         # As large as the material it stands for, and never invisible: least where they are few.
         least = 0.8 + 4 / np.sqrt(max(len(x), 1))
-        size = max(ROUND * side * self._pixels_per_unit(), least)
+        size = max(ROUND * side * self._pixels_per_unit(), least) * self.options.pointsize
         self.artist.set_sizes([size**2])
         if not self.options.solids:
             values = (values - self.limits[0]) / (self.limits[1] - self.limits[0])
@@ -376,7 +429,7 @@ class SpacePicture(PlanePicture):
             "ha": "right" if outward[0] < -0.4 else "left" if outward[0] > 0.4 else "center",
             "va": "top" if outward[1] < -0.4 else "bottom" if outward[1] > 0.4 else "center",
             "textcoords": "offset points",
-            "fontsize": 8,
+            "fontsize": self.small,
         }
         lo, hi = self.lo[axis], self.hi[axis]
         ticks = MaxNLocator(4, steps=STEPS).tick_values(lo, hi)
@@ -439,10 +492,10 @@ class LinePicture(Picture):
 
     def _prepare(self) -> Any:
         self.axes.set_xlim(self.domain.lo[0], self.domain.hi[0])
-        self.axes.set_xlabel("x" + self.options.lengths, fontsize=9)
-        self.axes.set_ylabel(self.options.label, fontsize=9)
+        self._name_lengths(self.axes.xaxis, "x")
+        self.axes.set_ylabel(self.options.label, fontsize=self.options.fontsize)
         self.scale = self.axes.yaxis
-        self.scale.set_major_formatter(FuncFormatter(_number))
+        self.scale.set_major_formatter(FuncFormatter(_power if self.options.log else _number))
         self.axes.grid(True, color="0.9", linewidth=0.7)
         (artist,) = self.axes.plot([], [], ".", color=SOLIDS[0], markersize=3)
         return artist

@@ -1,15 +1,18 @@
 """dump pyplot and movie: pictures of the points, drawn with Matplotlib."""
 
 import re
+from collections.abc import Iterable
 from functools import cached_property
-from typing import Annotated, Any, BinaryIO
+from pathlib import Path
+from typing import Annotated, Any, BinaryIO, Literal
 
 import numpy as np
 
 from karamelo_py.language.kinds import In
 from karamelo_py.language.signature import OutputFile, Positive
-from karamelo_py.output.fields import check_columns
+from karamelo_py.output.fields import ColumnFormula, check_columns
 from karamelo_py.output.files import Frames, movie_format, picture_format, savefig, unwarned, whole
+from karamelo_py.output.point_table import PointTable
 from karamelo_py.output.rhythm import Every
 from karamelo_py.output.snapshots import Snapshot
 from karamelo_py.output.units import labelled
@@ -26,6 +29,7 @@ PNG_COMPRESSION = 1
 # Components have either sign: their colours are of two kinds, with grey at 0.
 SIGNED = re.compile(r"[vfb][xyz](_update)?|[se][123]{2}")
 MAP, SIGNED_MAP = "viridis", "coolwarm"
+EDGES = ("xmin", "ymin", "zmin"), ("xmax", "ymax", "zmax")
 SAMPLE = 1 << 16  # points, about, that say how large one is
 
 
@@ -60,10 +64,29 @@ class PyPlot(Dump):
         false: without axes and numbers.
     title
         What is written above, in front of step and time.
+    label
+        What is written beside the colours, such as "stress (MPa)"; the column when left out.
+    only
+        A condition of columns of dump particle: other points are left out. It slices a body and
+        leaves solids out, which `type` counts from 1.
+    xmin, xmax, ymin, ymax, zmin, zmax
+        Ends of what is shown; those of the domain when left out.
+    scale
+        log: colours go by the logarithm of the column.
+    quantile
+        Share of the values that may lie beyond either end of the colours, such as 0.01: single
+        points with large values do not take all colours.
+    dpi
+        Pixels per inch. A picture of 600 pixels is 6 inches wide, and has 1800 with 300.
+    fontsize
+        Size of letters in points.
+    pointsize
+        Size of the points over that of the material they stand for; 1.4 fills all gaps.
 
     Example
     -------
     dump(d3, all, pyplot, 100, picture.*.png, 500, 500, seq, vmin=0, vmax=2e5)
+    dump(d4, all, pyplot, 100, paper.*.pdf, 5, 4, seq, only=type == 1 && x > 0, quantile=0.01)
 
     See Also
     --------
@@ -89,25 +112,35 @@ class PyPlot(Dump):
         elevation: Annotated[float, In(-90, 90)] = 30.0,
         axes: bool = True,
         title: str | None = None,
+        label: str | None = None,
+        only: ColumnFormula | None = None,
+        xmin: float | None = None,
+        xmax: float | None = None,
+        ymin: float | None = None,
+        ymax: float | None = None,
+        zmin: float | None = None,
+        zmax: float | None = None,
+        scale: Literal["linear", "log"] = "linear",
+        quantile: Annotated[float, In(0, 0.4)] = 0.0,
+        dpi: Annotated[int, In(20, 2400)] = DPI,
+        fontsize: Annotated[float, In(1, 100)] = 9.0,
+        pointsize: Annotated[float, Positive] = 1.0,
     ):
         if field is not None:
             check_columns([field], hub.fields.particle_names(), first=4)
         super().__init__(hub, every, file, *([] if field is None else [field]))
-        self.format = self.format_of(self.file)
-        self.size = (_inches("width", width), _inches("height", height))
+        self.format_of(self.file)
+        self.size = (_inches("width", width, dpi), _inches("height", height, dpi))
         if field is not None:
             self.warn_of_absent([field], hub.fields.absent_at_points(), "points")
-        if vmin is not None and vmax is not None and vmin >= vmax:
-            raise ScriptError(
-                f"the colours cannot go from {vmin:g} to {vmax:g}",
-                argument="vmax",
-                expected="a number above vmin",
-            )
-        self.field = field
-        self.limits = (vmin, vmax)
-        self.title = title
-        self.look = {"azimuth": azimuth, "elevation": elevation, "axes": axes}
-        self.symmetric, self.cmap = colours_of(field or "vx", self.limits, cmap)
+        self.field, self.title, self.only, self.dpi = field, title, only, dpi
+        self.look = look_of(
+            field or "vx",
+            vmin=vmin, vmax=vmax, cmap=cmap, azimuth=azimuth, elevation=elevation, axes=axes,
+            label=label, window=((xmin, xmax), (ymin, ymax), (zmin, zmax)), scale=scale,
+            quantile=quantile, fontsize=fontsize, pointsize=pointsize,
+        )  # fmt: skip
+        self.limits = self.look["limits"]
         self._picture: Any = None
         self._limits: tuple[float, float] | None = None
 
@@ -115,24 +148,33 @@ class PyPlot(Dump):
     def seen(self) -> tuple[Any, ...]:
         """Limits of the field so far, and what they are those of."""
         limits = self._picture.limits if self._picture is not None else self._limits
-        return limits, self._label(), *self.limits
+        return limits, self._label(), *self._marks()
 
     @seen.setter
     def seen(self, seen: tuple[Any, ...] | None) -> None:
         limits, *of = seen or (None,)
-        if of == [self._label(), *self.limits]:  # a script that goes on may show something else
+        if of == [self._label(), *self._marks()]:  # a script that goes on may show something else
             self._limits = limits
             if self._picture is not None:
                 self._picture.begin_with(limits)
 
+    def _marks(self) -> list[Any]:
+        """What the limits of the colours belong to."""
+        more = [self.look[name] for name in ("log", "quantile") if self.look[name]]
+        return [*self.limits, *more]
+
     def write(self) -> None:
+        self.save(self.path())
+
+    def save(self, path: Path) -> None:
+        """Draw the present state to a file, in the format that its name asks for."""
         with unwarned():
-            if self.format == "png":
-                with whole(self.path()) as file:
+            if picture_format(path) == "png":
+                with whole(path) as file:
                     self.draw(file)
             else:
                 self._draw()
-                savefig(self._picture.figure, self.path())
+                savefig(self._picture.figure, path)
 
     def draw(self, file: BinaryIO) -> None:
         """Draw the present state as PNG into an open file."""
@@ -158,17 +200,14 @@ class PyPlot(Dump):
 
         units = self.hub.output.units
         label = self._label()
+        look = {"label": labelled(label, units.of_column(label)) if units else label}
         options = pictures.Options(
             label,
-            labelled(label, units.of_column(label)) if units else label,
-            tuple(self.hub.solids) if label == "type" else (),
-            self.limits,
-            self.symmetric,
-            self.cmap,
+            solids=tuple(self.hub.solids) if label == "type" else (),
             lengths=f" [{units.length}]" if units else "",
-            **self.look,
+            **(look | self.look),
         )
-        made = pictures.make(self.hub.domain, self.size, DPI, options)
+        made = pictures.make(self.hub.domain, self.size, self.dpi, options)
         made.begin_with(self._limits)
         return made
 
@@ -177,9 +216,14 @@ class PyPlot(Dump):
         label, domain, update = self._label(), self.hub.domain, self.hub.update
         names = dict.fromkeys(["id", "x", "y", "z", "volume", label])
         tables = self.hub.fields.pieces(to_first=True)
-        pieces = [[table.particle(name) for name in names] for table in tables]
+        pieces = [self._chosen(table, names) for table in tables]
         columns = dict(zip(names, map(np.concatenate, zip(*pieces, strict=True)), strict=True))
         return Snapshot(update.step, update.time, columns, domain.lo, domain.hi)
+
+    def _chosen(self, table: PointTable, names: Iterable[str]) -> list[np.ndarray]:
+        """Take columns of the points of a table that are drawn."""
+        columns = [table.particle(name) for name in names]
+        return columns if self.only is None else [c[self.only.holds(table)] for c in columns]
 
     def take_part(self) -> None:
         for _ in self.hub.fields.pieces(to_first=True):
@@ -201,11 +245,34 @@ class PyPlot(Dump):
         return "vx" if self.hub.domain.dimension == 1 else "type"
 
 
-def colours_of(
-    column: str, limits: tuple[float | None, float | None], cmap: str | None
-) -> tuple[bool, str]:
-    """Choose for a column if limits that grow lie about 0, and the colour map."""
-    signed = SIGNED.fullmatch(column) is not None
+def look_of(
+    column: str,
+    *,
+    vmin: float | None,
+    vmax: float | None,
+    cmap: str | None,
+    label: str | None,
+    window: tuple[tuple[float | None, float | None], ...],
+    scale: str,
+    **look: Any,
+) -> dict[str, Any]:
+    """Options of a picture (`output.pictures`) from the words of a script or a command line."""
+    for ends, low, high in (((vmin, vmax), "vmin", "vmax"), *zip(window, *EDGES, strict=True)):
+        if None not in ends and ends[0] >= ends[1]:
+            what = "colours" if low == "vmin" else "picture"
+            raise ScriptError(
+                f"the {what} cannot go from {ends[0]:g} to {ends[1]:g}",
+                argument=high,
+                expected=f"a number above {low}",
+            )
+    log = scale == "log"
+    if log and min((end for end in (vmin, vmax) if end is not None), default=1.0) <= 0:
+        raise ScriptError(
+            "a logarithm has no colours for 0 and less",
+            argument="vmin",
+            expected="ends of the colours above 0",
+        )
+    signed = SIGNED.fullmatch(column) is not None and not log
     if cmap is not None:
         from matplotlib import colormaps
 
@@ -217,14 +284,18 @@ def colours_of(
                 hint=meant(cmap, colormaps),
             )
     # Where the user says about what the colours lie, they do not lie about 0.
-    return signed and limits == (None, None), cmap or (SIGNED_MAP if signed else MAP)
+    symmetric = signed and (vmin, vmax) == (None, None)
+    look |= {"limits": (vmin, vmax), "symmetric": symmetric, "log": log}
+    look |= {"cmap": cmap or (SIGNED_MAP if signed else MAP)}
+    look |= {"window": window if any(end is not None for ends in window for end in ends) else ()}
+    return look if label is None else look | {"label": label}
 
 
-def _inches(argument: str, value: float) -> float:
+def _inches(argument: str, value: float, dpi: int) -> float:
     inches = value if value <= MOST_INCHES else value / DPI
-    if not LEAST_PIXELS <= inches * DPI <= MOST_PIXELS:
+    if not LEAST_PIXELS <= inches * dpi <= MOST_PIXELS:
         raise ScriptError(
-            f"a {argument} of {inches * DPI:g} pixels cannot be drawn",
+            f"a {argument} of {inches * dpi:g} pixels cannot be drawn",
             argument=argument,
             expected=f"up to {MOST_INCHES} in inches (of {DPI} pixels), above that in pixels; "
             f"from {LEAST_PIXELS} to {MOST_PIXELS} pixels",
