@@ -22,4 +22,4 @@ def compare(run, axes, full):
     yield Row("error with 64 cells", 0.0, errors[-1], 3e-4, "equilibrium (exact)")
     axes.loglog(cells, errors, "o-", label="CPDI Q4")
     axes.loglog(cells, errors[0] * (16 / np.array(cells)) ** 2, "k--", lw=0.8, label="second order")
-    axes.set(xlabel="cells", ylabel="mean error of the stress / (rho g l0)")
+    axes.set(xlabel="cells (1)", ylabel="mean error of the stress / (rho g l0) (1)")

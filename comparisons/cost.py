@@ -21,5 +21,5 @@ def chart(
     for name, results in runs.items():
         found[name] = [(processor_seconds(result), error(result)) for result in results]
         axes.loglog(*zip(*found[name], strict=True), "o-", label=name)
-    axes.set(xlabel="processor time of the steps (s)", ylabel="error")
+    axes.set(xlabel="processor time of the steps (s)", ylabel="relative error (1)")
     return found

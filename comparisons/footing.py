@@ -21,7 +21,7 @@ def compare(run, axes, full):
         late = (log.Time > 0.7) & (log.Time < 0.99)
         source = "locks" if "bar" in words else "Prandtl 1920 (exact)"
         yield Row(f"load / c, {name}", load, log.load[late].mean(), within, source)
-        axes.plot(log.Time, log.load, lw=1, label=name)
+        (line,) = axes.plot(log.Time, log.load, lw=1.2, label=name)
         if "bar" not in words:
-            axes.axhline(load, color="k", lw=1, ls="--", label=f"exact, {name}")
-    axes.set(xlabel="time (s)", ylabel="load / c")
+            axes.axhline(load, color=line.get_color(), lw=0.9, ls=":", label=f"exact, {name}")
+    axes.set(xlabel="time (s)", ylabel="load / cohesion (1)")

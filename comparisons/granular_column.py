@@ -29,4 +29,4 @@ def compare(run, axes, full):
         bulk = (last.volume / last.mass * 1600).mean()
         yield Row(f"volume after / before, aspect {a}", 1.0, bulk, 0.05, "no dilatancy")
         axes.plot(x / WIDTH, height / WIDTH, lw=1, label=f"aspect {a}")
-    axes.set(xlabel="x / l0", ylabel="height / l0")
+    axes.set(xlabel="x / l0 (1)", ylabel="height / l0 (1)")

@@ -34,7 +34,7 @@ def compare(run, axes, full):
         cases = [("linear", 2, "cut", (16, 32, 64))]
         cases.append(("quadratic-spline", 2, "cut", (16, 32, 64, 128)))
         cases += [("linear", 2, "regular", (16, 32, 64)), ("linear", 4, "regular", (32,))]
-    for basis, ppc, rim, sizes in cases:
+    for (basis, ppc, rim, sizes), mark in zip(cases, "os^D", strict=False):
         errors = []
         for cells in sizes:
             result = run(refine=cells / 32, basis=basis, ppc=ppc, rim=rim)
@@ -51,11 +51,13 @@ def compare(run, axes, full):
                       4 / cells, HERTZ)  # fmt: skip
         label = f"{basis}, {ppc} x {ppc}, {rim}, {cells}"
         near = (last.y0 > 0.25) & (last.x < 1.5 * HALF) & (last.y - SURFACE < 0.3 * HALF)
-        axes.plot(last.x[near] / HALF, -last.s22[near] / LARGEST, ".", ms=2, label=label)
+        axes.plot(
+            last.x[near] / HALF, -last.s22[near] / LARGEST, mark, ms=3, mfc="none", label=label
+        )
         if len(sizes) > 1:
             slope = -np.polyfit(np.log(sizes), np.log(errors), 1)[0]
             of = f"{basis}, {rim}, {sizes[0]} to {sizes[-1]} cells"
             yield Row(f"order of that error, {of}", 1.0, slope, 0.3, "steps of the rim")
     x = np.linspace(0, 1, 100)
     axes.plot(x, np.sqrt(1 - x**2), "k--", lw=0.8, label="Hertz, at the surface")
-    axes.set(xlabel="x / half width", ylabel="stress / largest pressure")
+    axes.set(xlabel="x / half width (1)", ylabel="stress / largest pressure (1)")

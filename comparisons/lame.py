@@ -34,8 +34,8 @@ def compare(run, axes, full):
     for k, (name, (found, exact)) in enumerate(stresses.items()):
         off = abs(found - exact).max() / PRESSURE
         yield Row(f"largest error of the {name}, in pressures", 0.0, off, 0.01, SOURCE)
-        axes.plot(r, found / PRESSURE, f"C{k}.", ms=4, label=name)
+        axes.plot(r, found / PRESSURE, "os^"[k], ms=4, mfc="none", label=name)
     for exact in (1 - B**2 / fine**2, 1 + B**2 / fine**2, np.full_like(fine, 2 * NU)):
         axes.plot(fine, exact * share / PRESSURE, "k-", lw=0.7)
     axes.plot([], [], "k-", lw=0.7, label="exact")
-    axes.set(xlabel="radius", ylabel="stress over the pressure inside")
+    axes.set(xlabel="radius / inner radius (1)", ylabel="stress / pressure inside (1)")

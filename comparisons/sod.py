@@ -32,13 +32,13 @@ def compare(run, axes, full):
     lost = abs(log.total).max() / log.Ek[-1]
     # What is left is of the order of the step; without the heat of what TPIC takes it is 3 %.
     yield Row("energy lost over kinetic energy", 0.0, lost, 0.01, "conservation of energy")
-    axes.plot(last.x, density, ".", ms=2, label="density")
-    axes.plot(last.x, p, ".", ms=2, label="pressure")
+    axes.plot(last.x, density, "o", ms=2.5, mfc="none", label="density")
+    axes.plot(last.x, p, "s", ms=2.5, mfc="none", label="pressure")
     x = np.linspace(0.25, 0.85, 2000)
     for quantity in profiles((x - 0.5) / TIME):
         axes.plot(x, quantity, "k-", lw=0.7)
     axes.plot([], [], "k-", lw=0.7, label="exact")
-    axes.set(xlabel="x", ylabel="density, pressure", xlim=(0.25, 0.85))
+    axes.set(xlabel="x / length of the tube (1)", ylabel="density, pressure (1)", xlim=(0.25, 0.85))
 
 
 def profiles(s):

@@ -37,7 +37,7 @@ def compare(run, axes, full):
         yield Row(f"diameter at 0.2 L0, {kind} (mm)", WAIST, waist, 0.1, SOURCE)
         side = 1 if kind == "tlmpm" else -1
         axes.plot(
-            side * radius, height, ".", ms=0.5, label=f"{kind}, {'right' if side > 0 else 'left'}"
+            side * radius, height, ".", ms=2, label=f"{kind}, {'right' if side > 0 else 'left'}"
         )
     if full:
         for what, a, b in zip(("length", "foot"), found["tlmpm"], found["ulmpm"], strict=True):

@@ -32,7 +32,8 @@ def compare(run, axes, full):
         yield Row(f"energy spent on plastic flow, {kind}", (0.88, 1), spent, 0.0, "at rest")
         yield Row(f"kinetic energy left, {kind}", 0.0, left, 0.01, "at rest")
         found.append((log.length[-1], log.diameter[-1]))
-        axes.plot(1e3 * last.x, 1e3 * last.y, ".", ms=1, label=kind)
+        side = -1 if found[1:] else 1  # one method beside the other
+        axes.plot(side * 1e3 * last.x, 1e3 * last.y, ".", ms=2.5, label=kind)
     if full:
         free = run(mu=0).log
         name = "diameter of the foot without friction (mm)"
@@ -47,4 +48,4 @@ def compare(run, axes, full):
         name = "foot with 5 cells, volumes not averaged / averaged"
         yield Row(name, (0.5, 0.9), locked / free, 0.0, "locking")
     axes.plot([DIAMETER / 2, 0], [0, LENGTH], "k+", ms=12, label="experiment")
-    axes.set(xlabel="radius (mm)", ylabel="height (mm)", aspect="equal")
+    axes.set(xlabel="radius (mm)", ylabel="height (mm)", aspect="equal", xlim=(-9, 9))

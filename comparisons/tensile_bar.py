@@ -73,7 +73,7 @@ def compare(run, axes, full):
     axes.plot(fem_strain, fem_stress, "k--", lw=1, label="finite elements")
     axes.plot(even_strain, even_stress, "r:", lw=1, label="without a neck")
     axes.plot(strain, stress, lw=1, label="computed")
-    axes.set(xlabel="engineering strain", ylabel="engineering stress (MPa)", ylim=(0, 700))
+    axes.set(xlabel="engineering strain (1)", ylabel="engineering stress (MPa)", ylim=(0, 700))
     inset = axes.inset_axes([0.05, 0.06, 0.33, 0.55])
     coloured(inset, last.x, last.y, last.damage, "damage", bar=0.3, s=1)
     inset.set(aspect="equal", xticks=[], yticks=[])

@@ -31,5 +31,5 @@ def compare(run, axes, full):
     first, last = energy[log.Time < 10].mean(), energy[log.Time > 90].mean()
     yield Row("energy kept", (0.98, 1.002), last / first, 0.0, "exact; lumped masses cost a little")
     axes.plot(log.Time, log.exact, "k-", lw=1, label="exact")
-    axes.plot(log.Time, log.v_x, ".", ms=2, label="computed")
-    axes.set(xlabel="time", ylabel="mean velocity")
+    axes.plot(log.Time, log.v_x, "--", lw=1.4, label="computed")
+    axes.set(xlabel="time (s)", ylabel="mean velocity (m/s)")

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import matplotlib
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from comparisons.pictures import STYLE
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
@@ -36,20 +41,27 @@ def slope(axes, h: list[float], error: float) -> None:
 
 def main() -> None:
     """Convergence of the bases on in.axis_aligned, and of domains on in.column."""
-    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
+    plt.rcParams.update({**STYLE, "font.size": 9})
+    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 5), layout="constrained")
     h = [1 / 8, 1 / 16, 1 / 32]
     for name, _, _, two, _, four, _ in rows("| basis | G = 1e-4"):
         left.loglog(h, numbers(four or two), "o-", ms=3, label=name)
     slope(left, h, 4e-3)
-    left.set(title="in.axis_aligned, G = 0.1", xlabel="cell", ylabel="relative error")
+    left.set(
+        title="in.axis_aligned, G = 0.1", xlabel="cell / side (1)", ylabel="relative error (1)"
+    )
     left.set_ylim(top=50)
-    left.legend(fontsize=6, loc="upper left", ncols=2)
+    left.legend(loc="upper left", ncols=2)
     for name, *errors in rows("| cells | 1 | 2"):
         found = [(1 / 2**k, float(e)) for k, e in enumerate(errors) if e]
         right.loglog(*zip(*found, strict=True), "o-", ms=3, label=name)
     slope(right, [1 / 4, 1 / 256], 1e-5)
-    right.set(title="in.column", xlabel="cell / height", ylabel="mean error of the stress")
-    right.legend(fontsize=7)
+    right.set(
+        title="in.column",
+        xlabel="cell / height (1)",
+        ylabel="mean error of the stress / (rho g l0) (1)",
+    )
+    right.legend()
     figure.savefig(DOCS / "_static" / "convergence.png", dpi=110)
 
 

@@ -1,10 +1,16 @@
 """Every scene that has a published number meets it, at a small size (``-m full``: at its own)."""
 
+import re
+import tomllib
+from pathlib import Path
+
 import matplotlib.pyplot as plt
 import pytest
+from charts import contrast, faults
 from verification import run_scene
 
 from comparisons.__main__ import scene, scenes
+from comparisons.pictures import STYLE, finish
 from comparisons.row import Row
 
 
@@ -16,9 +22,13 @@ def found(run_script, name: str, full: bool) -> list[Row]:
     def run(scene=name, **variables):
         return run_scene(run_script, scene, None, **{**size, **variables})
 
-    figure, axes = plt.subplots()
-    rows = list(comparison.compare(run, axes, full))
+    with plt.rc_context(STYLE):
+        figure, axes = plt.subplots(figsize=(6, 4), layout="constrained")
+        rows = list(comparison.compare(run, axes, full))
+        finish(axes, f"in.{name}")
+    wrong = faults(figure)
     plt.close(figure)
+    assert wrong == []
     return rows
 
 
@@ -58,3 +68,36 @@ def test_differences():
     assert Row("", (2.0, 3.0), 3.3, 0.2, "").difference == pytest.approx(0.1)
     assert Row("", 0.0, 0.01, 0.02, "").agrees
     assert not Row("", 1.0, float("nan"), 1e9, "").agrees
+
+
+ROOT = Path(__file__).parent.parent
+
+
+def test_charts_name_their_units():
+    """Those of the comparisons that take too long for a test, and those of the atlas."""
+    texts = [path.read_text("utf-8") for path in (ROOT / "comparisons").glob("*.py")]
+    texts += [(ROOT / "docs" / name).read_text("utf-8") for name in ("conf.py", "pictures.py")]
+    labels = [one for text in texts for one in re.findall(r'[xy]label="([^"]+)"', text)]
+    entries = tomllib.loads((ROOT / "docs" / "atlas.toml").read_text("utf-8"))["entry"]
+    commands = [line for entry in entries for line in entry["commands"]]
+    axes = [one for line in commands for one in re.findall(r'-axes "([^"]+)"', line)]
+    labels += [label for pair in axes for label in pair.split(",") if label]
+    assert len(labels) > 100
+    assert [label for label in labels if not re.search(r"\([^()]+\)$", label)] == []
+
+
+def test_faults_of_charts_are_found():
+    """A chart without units, one with pale letters, and one with labels on each other."""
+    figure, axes = plt.subplots(figsize=(6, 4), layout="constrained")
+    axes.plot([0, 1])
+    axes.set(xlabel="time (s)", ylabel="share (1)")
+    assert faults(figure) == []
+    axes.set_xlabel("time")
+    assert faults(figure) == ["no unit: 'time'"]
+    axes.set_xlabel("time (s)", color="0.7")
+    assert ["little contrast" in one for one in faults(figure)] == [True]
+    axes.set_xlabel("time (s)", color="black")
+    axes.set_xticks([0, 0.01], ["a long name", "another name"])
+    assert any("lies on" in one for one in faults(figure))
+    assert contrast("white", "black") == pytest.approx(21)
+    plt.close(figure)
