@@ -16,7 +16,18 @@ author = "the authors of karamelo-py"
 release = version = __version__
 copyright = author
 
-extensions = ["myst_nb", "sphinx.ext.mathjax", "reference_pages", "gallery", "script_lexer"]
+extensions = [
+    "myst_nb",
+    "sphinx.ext.mathjax",
+    "sphinx_copybutton",
+    "sphinx_design",
+    "reference_pages",
+    "gallery",
+    "messages",
+    "script_lexer",
+    "source_links",
+    "synonyms",
+]
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath", "amsmath"]
 myst_heading_anchors = 3
 exclude_patterns = ["_build", "_ext"]
@@ -30,6 +41,8 @@ nb_merge_streams = True
 html_theme = "furo"
 html_title = f"karamelo-py {release}"
 html_static_path = ["_static"]
+html_css_files = ["site.css"]
+copybutton_exclude = ".linenos, .gp, .go"
 
 
 def draw_reference_step(app):
@@ -44,7 +57,7 @@ def draw_reference_step(app):
     figure, axes = plt.subplots(figsize=(6, 3), layout="constrained")
     axes.plot(times, cos(10 * pi * times), "k-", lw=1, label="exact")
     axes.plot(times, shares, ".", ms=3, label="reference step")
-    axes.set(xlabel="time", ylabel="share of the first mode")
+    axes.set(xlabel="time (s)", ylabel="share of the first mode (1)")
     axes.legend()
     figure.savefig(HERE / "reference" / "generated" / "reference-step.svg")
     plt.close(figure)

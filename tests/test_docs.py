@@ -26,7 +26,8 @@ from karamelo_py.script.parser import parse
 
 ROOT = Path(__file__).parent.parent
 ROOMS = [ROOT / "docs" / "house.md", *sorted((ROOT / "docs" / "house").glob("*.md"))]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), *ROOMS[1:]]
+SITE = [*(ROOT / "docs" / "howto").glob("*.md"), ROOT / "docs" / "messages" / "index.md"]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), *ROOMS[1:], *sorted(SITE)]
 STYLES = [(f, n) for f in catalogue.families() for n in registry.names(f)]
 # Scenes on which the examples of docstrings are tried: domain, the region "disk", a wall.
 STAGES = {
@@ -382,16 +383,43 @@ def test_the_tutorial_runs(tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
-def test_the_gallery_shows_every_scene(tmp_path):
-    """A page for each script of inputs/, with what its head says."""
+def test_the_gallery_shows_every_scene():
+    """A page for each script of inputs/, with what its head says; cards have a picture."""
     sys.path.insert(0, str(ROOT / "docs" / "_ext"))
     try:
-        from gallery import head_of, picture_of
+        from gallery import chart_of, head_of, write_gallery
     finally:
         sys.path.pop(0)
-    static = ROOT / "docs" / "_static"
-    for path in (ROOT / "inputs").glob("in.*"):
+    docs = ROOT / "docs"
+    scenes = {path.name.removeprefix("in."): path for path in (ROOT / "inputs").glob("in.*")}
+    for path in scenes.values():
         title, _ = head_of(path.read_text("utf-8"))
         assert title, f"{path.name} says nothing of itself in its first lines"
-    assert picture_of("two_disks_2020", static) == picture_of("two_disks", static)
-    assert picture_of("nothing_like_it", static) is None
+    assert chart_of("two_disks_2020", docs / "_static") == chart_of("two_disks", docs / "_static")
+    assert chart_of("nothing_like_it", docs / "_static") is None
+    write_gallery(docs)
+    pages = {path.stem for path in (docs / "gallery" / "generated").glob("*.md")}
+    assert pages == {*scenes, "index"}
+    shown = tomllib.loads((docs / "films.toml").read_text("utf-8"))
+    told = json.loads((docs / "films.json").read_text("utf-8"))
+    assert set(shown) == set(told) <= set(scenes) and len(shown) > 12
+    for name, how in shown.items():
+        assert (docs / "_static" / "gallery" / f"{name}.png").exists(), name
+        assert how["tags"] and told[name]["points"] > 0
+        text = scenes[name].read_text("utf-8")
+        for variable in how.get("var", {}):
+            assert re.search(rf"^{variable} *=", text, re.M), (name, variable)
+
+
+def test_equations_link_to_functions_that_exist():
+    """Each by its file and its name; every scheme and the stable step have theirs."""
+    sys.path.insert(0, str(ROOT / "docs" / "_ext"))
+    try:
+        from source_links import named_in
+    finally:
+        sys.path.pop(0)
+    named = named_in((ROOT / "docs" / "formulas.md").read_text("utf-8"))
+    assert len(named) > 25
+    for file, name in named:
+        text = (ROOT / "karamelo_py" / file).read_text("utf-8")
+        assert re.search(rf"^(def|class) {name}\b", text, re.M), (file, name)

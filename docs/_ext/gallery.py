@@ -1,17 +1,31 @@
-"""The gallery: a page for each scene of inputs/, with picture, what its head says, and the script.
+"""The gallery: a card for each scene with a picture of its bodies, and a page for every scene.
 
-Pages are written to docs/gallery/generated before Sphinx reads its sources. A scene without a
-picture of its own shows that of the scene whose name its own begins with.
+Pages are written to docs/gallery/generated before Sphinx reads its sources. docs/films.toml says
+what a card shows, docs/films.json how large and how long the run of its picture was. A scene of a
+kind (`lame_quarter`) without a chart of its own shows that of the scene whose name its own begins
+with.
 """
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
+import tomllib
 from pathlib import Path
 
-FOLDERS = ("gallery", "comparison")  # of pictures, below docs/_static
 TOC = "```{toctree}\n:hidden:\n:maxdepth: 1\n\n%s\n```"
+CARD = """````{{grid-item-card}} {title}
+:img-top: /_static/gallery/{name}.png
+:link: {name}
+:link-type: doc
+
+{shows}
+
+{size}
+
+{tags}
+````"""
 
 
 def write_gallery(docs: Path) -> None:
@@ -19,29 +33,63 @@ def write_gallery(docs: Path) -> None:
     folder = docs / "gallery" / "generated"
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    scenes = sorted((docs.parent / "inputs").glob("in.*"))
-    names = [path.name.removeprefix("in.") for path in scenes]
-    rows = []
-    for name, path in zip(names, scenes, strict=True):
-        title, text = head_of(path.read_text(encoding="utf-8"))
-        shown = picture_of(name, docs / "_static")
-        image = f"/_static/{shown.relative_to(docs / '_static')}" if shown else ""
-        page = [f"# {name}", title]
-        if image:
-            page.append(f"```{{image}} {image}\n:alt: {title}\n:width: 600px\n```")
-        page.append(f"```text\n{text}\n```" if text else "")
-        page.append(f"```{{literalinclude}} ../../../inputs/in.{name}\n:language: karamelo\n```")
-        content = "\n\n".join(part for part in page if part) + "\n"
-        (folder / f"{name}.md").write_text(content, encoding="utf-8")
-        cell = f"[![{name}]({image})](generated/{name}.md)" if image else ""
-        rows.append(f"| {cell} | [`in.{name}`](generated/{name}.md): {title} |")
-    table = "\n".join(["| | |", "|---|---|", *rows])
-    toc = TOC % "\n".join(f"{name}" for name in names)
-    (folder / "index.md").write_text(
-        f"# Gallery\n\nThe scenes of `inputs/`; numbers beside those of others are in "
-        f"[Comparison](../../comparison.md).\n\n{table.replace('(generated/', '(')}\n\n{toc}\n",
-        encoding="utf-8",
-    )
+    static = docs / "_static"
+    shown = tomllib.loads((docs / "films.toml").read_text(encoding="utf-8"))
+    told = json.loads((docs / "films.json").read_text(encoding="utf-8"))
+    scenes = {
+        path.name.removeprefix("in."): head_of(path.read_text(encoding="utf-8"))
+        for path in sorted((docs.parent / "inputs").glob("in.*"))
+    }
+    for name, (title, text) in scenes.items():
+        page = _page(name, title, text, told.get(name), static)
+        (folder / f"{name}.md").write_text(page, encoding="utf-8")
+    cards = [_card(name, how, told[name]) for name, how in shown.items()]
+    others = {name: title for name, (title, _) in scenes.items() if name not in shown}
+    rest = [f"| [`in.{name}`]({name}.md) | {title} |" for name, title in others.items()]
+    parts = [
+        "# Gallery",
+        "Choose a card for the script, its pictures and its numbers. Times are those of one thread "
+        "of a shared machine, with compilation, for the picture on the card. Numbers beside those "
+        "of others are in [Comparison](../../comparison.md).",
+        "`````{grid} 1 2 3 3\n:gutter: 3\n\n" + "\n\n".join(cards) + "\n`````",
+        "## More scenes",
+        "\n".join(["| script | what it is |", "|---|---|", *rest]),
+        TOC % "\n".join(scenes),
+    ]
+    (folder / "index.md").write_text("\n\n".join(parts) + "\n", encoding="utf-8")
+
+
+def _card(name: str, how: dict, told: dict) -> str:
+    tags = " ".join(f"{{bdg-secondary-line}}`{tag}`" for tag in how["tags"])
+    title = name.replace("_", " ").capitalize()
+    return CARD.format(name=name, title=title, shows=how["shows"], size=_size(told), tags=tags)
+
+
+def _size(told: dict) -> str:
+    points = f"{told['points']:,}".replace(",", " ")
+    return f"{points} points, {told['seconds']:.0f} s"
+
+
+def _page(name: str, title: str, text: str, told: dict | None, static: Path) -> str:
+    """A scene: what it is, its bodies, how to run it, its chart, its script."""
+    parts = [f"# {name.replace('_', ' ').capitalize()}", title]
+    words = ""
+    if told:
+        words = "".join(f" -var {key} {value}" for key, value in told["var"].items())
+        parts.append(
+            f"```{{image}} /_static/gallery/{name}.png\n:alt: {told['text']}\n:width: 560px\n```"
+        )
+        parts.append(f"{told['text']} The picture: {_size(told)}.")
+    parts.append(f"```sh\nkaramelo-py inputs/in.{name}{words}\n```")
+    parts.append(f"{{download}}`Download the script <../../../inputs/in.{name}>`")
+    if chart := chart_of(name, static):
+        image = f"/_static/{chart.relative_to(static)}"
+        parts.append("## Beside the reference")
+        parts.append(f"```{{image}} {image}\n:alt: {title}\n:width: 600px\n```")
+    parts += ["## Script"]
+    parts += [f"```text\n{text}\n```"] if text else []
+    parts.append(f"```{{literalinclude}} ../../../inputs/in.{name}\n:language: karamelo\n```")
+    return "\n\n".join(parts) + "\n"
 
 
 def head_of(text: str) -> tuple[str, str]:
@@ -52,12 +100,11 @@ def head_of(text: str) -> tuple[str, str]:
     return " ".join(plain[:end]), "\n".join(plain[end:]).strip("\n")
 
 
-def picture_of(name: str, static: Path) -> Path | None:
-    """The picture of a scene, or of the one that it is a kind of."""
+def chart_of(name: str, static: Path) -> Path | None:
+    """The chart of a scene beside its reference, or of the one that it is a kind of."""
     while name:
-        for folder in FOLDERS:
-            if (path := static / folder / f"{name}.png").is_file():
-                return path
+        if (path := static / "comparison" / f"{name}.png").is_file():
+            return path
         name = name.rpartition("_")[0]
     return None
 

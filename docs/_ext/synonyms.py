@@ -1,0 +1,68 @@
+"""Words of other programs, under which the search finds the pages of this one."""
+
+from __future__ import annotations
+
+from docutils import nodes
+
+WORDS = {
+    "getting-started": "install pip conda Windows quick start Jupyter resume exit status cache",
+    "tutorial": "Jupyter notebook Python API interface numpy pandas interactive script",
+    "choose": "recommendation best method landslide slope impact crash fluid soil which method",
+    "methods": "shape functions kernel particle grid transfer APIC MLS FLIP PIC time step",
+    "materials": "constitutive model law plasticity elasticity soil metal fluid hyperelastic UMAT",
+    "many-processes": "MPI parallel cluster Slurm srun mpiexec OpenMP threads GPU scaling resume",
+    "needs": "dry run validate preview memory estimate time step check",
+    "studies": "parameter sweep optimisation convergence study sensitivity batch calibrate",
+    "energy": "conservation drift energy error instability blow up hourglass gain loss",
+    "failures": "instability blow up numerical fracture locking hourglass cell crossing null space",
+    "implicit": "static quasi-static Newton solver load step equilibrium Newmark large time step",
+    "script": "input file syntax variable loop if include language deck",
+    "plugins": "extension user subroutine UMAT VUMAT custom Python hook",
+    "reference/columns": "output field variable stress strain velocity history von Mises",
+    "reference/generated/command/restart": "resume continue checkpoint save state crash recover",
+    "reference/generated/command/read_restart": "resume continue checkpoint load state initial",
+    "reference/generated/command/write_restart": "resume continue checkpoint save state",
+    "reference/generated/command/dt_factor": "time step too large Courant CFL unstable smaller",
+    "reference/generated/command/set_dt": "time step too large Courant CFL fixed constant timestep",
+    "reference/generated/command/boundary": "boundary condition edge of domain outflow periodic",
+    "reference/generated/command/units": "units SI mm unit system conversion",
+    "reference/generated/command/anti_volumetric_locking": "B-bar F-bar locking incompressible",
+    "reference/generated/command/dump": "output export save results VTK ParaView OVITO HDF5",
+    "reference/generated/command/set_output": "thermo log interval print frequency",
+    "reference/generated/command/delete_particles": "remove hole excavation construction stage",
+    "reference/generated/fix/velocity_nodes": "boundary condition wall support clamp Dirichlet",
+    "reference/generated/fix/body_force": "gravity weight acceleration centrifugal load",
+    "reference/generated/fix/edge_traction": "boundary condition Neumann surface load traction",
+    "reference/generated/fix/edge_pressure": "boundary condition Neumann pressure surface load",
+    "reference/generated/fix/local_damping": "damping dynamic relaxation rest equilibrium viscous",
+    "reference/generated/fix/erosion": "element deletion damage remove broken failure",
+    "reference/generated/fix/python": "user subroutine callback function hook",
+    "reference/generated/dump/vtk": "VTK export ParaView VTU PVD visualisation",
+    "reference/generated/dump/grid-vtk": "VTK export ParaView grid nodes visualisation",
+    "reference/generated/dump/movie": "animation film video gif mp4 visualisation",
+    "reference/generated/dump/pyplot": "figure image picture plot png visualisation",
+    "reference/generated/material/rigid": "rigid body tool indenter obstacle",
+    "reference/generated/scheme/quasi-static": "static equilibrium Newton implicit load step",
+}
+
+
+def add_words(app, doctree) -> None:
+    """Put the words of a page where the search indexes them, and nobody sees them."""
+    words = WORDS.get(app.env.docname)
+    if words:
+        doctree.insert(0, nodes.meta(name="keywords", content=words))
+
+
+def check_pages(app, env) -> list[str]:
+    """Refuse words for a page that does not exist."""
+    missing = sorted(set(WORDS) - env.found_docs)
+    if missing:
+        raise ValueError(f"docs/_ext/synonyms.py names pages that do not exist: {missing}")
+    return []
+
+
+def setup(app):
+    """Add the words after a page is read."""
+    app.connect("doctree-read", add_words)
+    app.connect("env-updated", check_pages)
+    return {"parallel_read_safe": True}

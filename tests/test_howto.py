@@ -1,0 +1,43 @@
+"""Every script of the how-tos runs, with the files that its page shows."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+HOWTO = Path(__file__).parent.parent / "docs" / "howto"
+FENCE = re.compile(r"^```(\w+)\n(.*?)^```", re.S | re.M)
+PAGES = sorted(path for path in HOWTO.glob("*.md") if path.name != "index.md")
+SCRIPTS = [
+    (page, body)
+    for page in [*PAGES, HOWTO.parent / "index.md"]
+    for language, body in FENCE.findall(page.read_text("utf-8"))
+    if language == "karamelo"
+]
+
+
+def test_each_page_has_a_script():
+    assert {page for page, _ in SCRIPTS} >= set(PAGES) and len(PAGES) > 12
+
+
+def files_of(page):
+    """Files that a page shows: the block after a name in back quotes, and modules of Python."""
+    text = page.read_text("utf-8")
+    shown = re.findall(r"`([\w.]+\.(?:geo|inp|csv))`[^`]*?```text\n(.*?)^```", text, re.S | re.M)
+    modules = re.findall(r"^```python\n# (\w+\.py)\n(.*?)^```", text, re.S | re.M)
+    return dict([*shown, *modules])
+
+
+@pytest.mark.parametrize(
+    ("page", "script"), SCRIPTS, ids=[f"{page.stem}-{k}" for k, (page, _) in enumerate(SCRIPTS)]
+)
+def test_scripts_of_how_tos_run(run_interpreted, tmp_path, page, script):
+    (tmp_path / "run").mkdir()
+    for name, text in files_of(page).items():
+        (tmp_path / "run" / name).write_text(text, encoding="utf-8")
+    # As far as an interpreted run goes within a second.
+    short = re.sub(r"^run_time\(.*\)$", "run(2)", script, flags=re.M)
+    short = re.sub(r"^run\((\d+)\)$", "run(3)", short, flags=re.M)
+    done = run_interpreted(short)
+    told = [line for line in done.err.splitlines() if "warning" in line]
+    assert told == []
