@@ -30,7 +30,18 @@ HERE = Path(__file__).parent
 DOCS = HERE.parent / "docs"
 PICTURES = DOCS / "_static" / "comparison"
 INPUTS = HERE.parent / "inputs"
-TOOLS = ("__main__", "cost", "defaults", "exact", "lines", "pictures", "results", "row", "slopes")
+TOOLS = (
+    "__main__",
+    "cost",
+    "defaults",
+    "exact",
+    "faces",
+    "lines",
+    "pictures",
+    "results",
+    "row",
+    "slopes",
+)
 
 
 def scenes() -> list[str]:

@@ -15,8 +15,7 @@ Fields meet at nodes up to two cells before the bodies do (the reach of the func
 the gap between the surfaces is measured, from the mean places of the points of each body that a
 node sees (`karamelo_py.points.basis.surface`). Bodies may approach until the gap is closed, and are
 stopped where it would be less than nothing at the end of the step. Convex bodies are apart if they
-are along one direction: of the directions out of the two that one is the normal along which the gap
-is the largest, so that the corner of a body does not plough through the face of the other one.
+are along one direction: the axes of the grid are tried, too, since normals lean where faces end.
 """
 
 from math import sqrt
@@ -45,6 +44,9 @@ from karamelo_py.points.basis.surface import ENTRIES
 from karamelo_py.points.grid import node_position
 from karamelo_py.points.kinematics import Axisymmetric, dot, vector, zero_vector
 
+# Squared sines of angles about the mean direction out of a body:
+SCATTER = 0.003  # to which that of a plane face is known
+EDGE = 0.03  # beyond which a face ends, or is round
 REPEATS = 16  # at most, where more than two fields meet; what remains falls by a half or more
 
 
@@ -56,6 +58,7 @@ class SeparateFields(NamedTuple):
 
     stride: int  # from a node to the same place in the next field
     beside: np.ndarray  # (d, 2) step from a node to the next one along each axis, number of nodes
+    per_mass: np.ndarray  # (F,) specific volume over h^(d - 1)
     friction: np.ndarray  # (F, F) coefficient of each pair of fields; infinite: no slip
     warmth: np.ndarray  # (F, F) share of the heat of friction that goes to the first of two fields
     pair: np.ndarray  # (F, F) slot of the published force of a pair on its first field, or -1
@@ -99,6 +102,7 @@ class NodePair(NamedTuple):
     per_n: float  # 1 / mass
     per_m: float
     outward: tuple  # common normal, not normalised, from the first body to the second
+    scatter: float  # the lesser of the two directions out of the bodies
     yielding: tuple  # change of the relative velocity with an impulse along each direction
     relative: tuple  # velocity of the first body as the second one sees it
 
@@ -115,24 +119,12 @@ def _yielding(contact, n, k, per_mass):
 
 
 @noinline
-def _shares(contact, kin, n, m, of_n, of_m):
-    """Weights of the two bodies' outward sums in their common normal.
-
-    The sum of m grad N points out of a body. Where a body has little mass or ends in an edge it
-    says little about the direction: the larger sum decides (after Lemiale, Nairn & Hurmane 2010),
-    equal ones are averaged. A body with a prescribed velocity knows its surface best.
-    """
-    of_n, of_m = dot(of_n, of_n), dot(of_m, of_m)
-    prescribed_n = prescribed_m = False
+def _led(contact, kin, n):
+    """Return True if the velocity of a body is prescribed: its faces keep their directions."""
+    led = False
     for k in range(kin.dimension):
-        prescribed_n = prescribed_n or _immovable(contact, n, k)
-        prescribed_m = prescribed_m or _immovable(contact, m, k)
-    if not of_n + of_m > 0:
-        return 0.0, 0.0
-    if prescribed_n != prescribed_m and (of_n if prescribed_n else of_m) > 0:
-        return (1.0, 0.0) if prescribed_n else (0.0, 1.0)
-    share = of_n / (of_n + of_m)
-    return share**4, (1 - share) ** 4
+        led = led or _immovable(contact, n, k)
+    return led
 
 
 @noinline
@@ -149,15 +141,21 @@ def _kept(contact, n, k):
 
 @noinline
 def _normal(contact, kin, nodes, n):
-    """Return the direction out of a body: the mean of the sums of m grad N of nodes around `n`.
+    """Return the direction out of a body, and the squared sine of the angle by which it scatters.
 
-    Those of one node turn by tens of degrees as points that lean to the grid pass it. With the
-    weights 1/4, 1/2, 1/4 along each axis a plane face keeps its direction to two degrees.
+    It is the mean of the sums of m grad N, which point out of a body, of nodes around `n`. Those of
+    one node turn by tens of degrees as points that lean to the grid pass it. With the weights 1/4,
+    1/2, 1/4 along each axis a plane face keeps its direction to two degrees.
+
+    Its length is its weight beside the direction out of another body. It grows with the surface
+    that the nodes see, and falls where their directions differ, as at edges and corners. (Lemiale,
+    Nairn & Hurmane 2010 take the larger sum of m grad N: at the edge of a block on a base of its
+    density both are as large, and that of the block leans by 15 degrees.)
     """
     gradients, like = field(nodes.fields, Normal), zero_vector(kin, 0.0)
-    total = like
+    total, lengths = like, 0.0
     for which in range(3**kin.dimension):
-        beside, weight, left = n, 1.0, which
+        beside, weight, left = n, contact.per_mass[n // contact.stride], which
         for k in range(kin.dimension):
             way = left % 3 - 1
             left //= 3
@@ -167,24 +165,36 @@ def _normal(contact, kin, nodes, n):
         if weight > 0:
             gradient = vector_at(kin, gradients, beside, 0, like)
             kept = [_kept(contact, beside, k) * of_axis for k, of_axis in enumerate(gradient)]
-            total = total + weight * vector(kin, kept)
+            part = weight * vector(kin, kept)
+            total = total + part
+            lengths += sqrt(dot(part, part))
+    square, scatter = dot(total, total), 1.0
+    if square > 0:
+        scatter = max(1.0 - square / (lengths * lengths), 0.0) + SCATTER
+        total = square / (scatter * scatter) * total
     if isinstance(kin, Axisymmetric):  # on the axis bodies push along it
         total = vector(kin, [_kept(contact, n, 0) * total[0], *total[1:]])
-    return total
+    return total, scatter
 
 
 @noinline
 def _pair_of(contact, kin, nodes, records, n, m):
     """The two bodies with nodes `n` and `m`; velocities are the first components of `records`."""
     per_n, per_m = 1.0 / nodes.sums[n, MASS], 1.0 / nodes.sums[m, MASS]
-    of_n, of_m = _normal(contact, kin, nodes, n), _normal(contact, kin, nodes, m)
-    share_n, share_m = _shares(contact, kin, n, m, of_n, of_m)
-    outward = share_n * of_n - share_m * of_m
+    # Opposite faces that end beside each other lean to opposite sides: the difference does not.
+    of_n, scatter_n = _normal(contact, kin, nodes, n)
+    of_m, scatter_m = _normal(contact, kin, nodes, m)
+    led_n, led_m = _led(contact, kin, n), _led(contact, kin, m)
+    if led_n and not led_m and scatter_n < EDGE:
+        of_m = 0.0 * of_m
+    elif led_m and not led_n and scatter_m < EDGE:
+        of_n = 0.0 * of_n
     axes = range(kin.dimension)
     yielding = [_yielding(contact, n, k, per_n) + _yielding(contact, m, k, per_m) for k in axes]
     like = zero_vector(kin, 0.0)
     relative = vector_at(kin, records, n, 0, like) - vector_at(kin, records, m, 0, like)
-    return NodePair(n, m, per_n, per_m, outward, vector(kin, yielding), relative)
+    scatter = min(scatter_n, scatter_m)
+    return NodePair(n, m, per_n, per_m, of_n - of_m, scatter, vector(kin, yielding), relative)
 
 
 @shared
@@ -218,29 +228,35 @@ def _gap(contact, nodes, outward, n, m, where):
     return gap - _reach(contact, nodes, outward, m, where, -1)
 
 
-@noinline
-def _parted(contact, kin, nodes, pair, where):
-    """The pair with that direction out of a body as normal along which they are furthest apart.
+@shared
+def _directions(contact, kin, nodes, pair):
+    """Return directions along which bodies may be apart, beside their normal; zeros for none.
 
-    At the corner of one body it is that of the other one's face.
+    Functions are products of those along the axes of the grid: there the gap does not depend on
+    where faces end. Where the faces of both bodies end, the way from the mean place of the one's
+    points to that of the other's leads across the gap. Beside a plane face it does not.
     """
-    n, m, outward = pair.n, pair.m, pair.outward
-    of_n, of_m = _normal(contact, kin, nodes, n), _normal(contact, kin, nodes, m)
-    share_n, share_m = _shares(contact, kin, n, m, of_n, of_m)
-    if share_n * share_m * dot(outward, outward) > 0:
-        gap = _gap(contact, nodes, outward, n, m, where)
-        gap_n = _gap(contact, nodes, of_n, n, m, where)
-        gap_m = _gap(contact, nodes, -1.0 * of_m, n, m, where)
-        if gap_n > max(gap, gap_m):
-            outward = of_n
-        elif gap_m > max(gap, gap_n):
-            outward = -1.0 * of_m
-    return pair._replace(outward=outward)
+    centre, like = field(nodes.fields, Centre), zero_vector(kin, 0.0)
+    between = pair.per_m * vector_at(kin, centre, pair.m, 0, like)
+    between = between - pair.per_n * vector_at(kin, centre, pair.n, 0, like)
+    axes = range(kin.dimension)
+    along = [[c if i == k else 0.0 for i, c in enumerate(between)] for k in axes]
+    across = (1.0 if pair.scatter > EDGE else 0.0) * between
+    return across, *[vector(kin, components) for components in along]
 
 
 @noinline
-def _excess_of(contact, nodes, pair, where):
-    """Return the excess of the approach velocity over the one that closes the gap in a step."""
+def _excess_of(contact, kin, nodes, pair, where):
+    """Return the excess of the approach velocity over the one that closes the gap in a step.
+
+    It is 0 for bodies that stay apart along any other direction.
+    """
+    for direction in _directions(contact, kin, nodes, pair):
+        length = sqrt(dot(direction, direction))
+        if length > 0:
+            gap = _gap(contact, nodes, direction, pair.n, pair.m, where)
+            if gap > 0 and dot(direction, pair.relative) * where.dt <= gap * length:
+                return 0.0
     size = sqrt(dot(pair.outward, pair.outward))
     if not size > 0:
         return 0.0
@@ -307,8 +323,7 @@ def _count_partners(which, contact, kin, nodes, place, count):
             else:
                 m = _node(contact, place, j)
                 pair = _pair_of(contact, kin, nodes, nodes.update, n, m)
-                pair = _parted(contact, kin, nodes, pair, which)
-                belongs = _excess_of(contact, nodes, pair, which) > 0
+                belongs = _excess_of(contact, kin, nodes, pair, which) > 0
             if belongs:
                 contact.partners[i] += 1
                 contact.partners[j] += 1
@@ -353,8 +368,7 @@ def _touch_pair(contact, kin, nodes, control, i, j, place, share, where):
     a, b = contact.meeting[i], contact.meeting[j]
     n, m = _node(contact, place, i), _node(contact, place, j)
     pair = _pair_of(contact, kin, nodes, nodes.update, n, m)
-    pair = _parted(contact, kin, nodes, pair, where)
-    excess = _excess_of(contact, nodes, pair, where)
+    excess = _excess_of(contact, kin, nodes, pair, where)
     if not excess > 0:
         return
     size = sqrt(dot(pair.outward, pair.outward))
@@ -486,7 +500,11 @@ def list_pairs(contact, kin, grids, nodes, spans, pairs, normals, gaps):
                         pairs[found, 0], pairs[found, 1] = n, m
                         for k in range(kin.dimension):
                             normals[found, k] = pair.outward[k] / size
-                        gaps[found] = _gap(contact, nodes, pair.outward, pair.n, pair.m, where)
+                        gap = _gap(contact, nodes, pair.outward, n, m, where)
+                        for direction in _directions(contact, kin, nodes, pair):
+                            if dot(direction, direction) > 0:
+                                gap = max(gap, _gap(contact, nodes, direction, n, m, where))
+                        gaps[found] = gap
                         found += 1
     return found
 

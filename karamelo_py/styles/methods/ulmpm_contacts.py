@@ -85,9 +85,10 @@ class ULMPMContacts(Method):
 
     The normal at a node is one for both solids, so that they get opposite impulses and momentum is
     kept: from the sums of m grad N of the two, averaged over the nodes around with the weights 1/4,
-    1/2, 1/4 along each axis; that of the solid with a prescribed velocity, else mostly the larger
-    one, or that of one solid if along it the two are further apart (the corner of one on the face
-    of the other). Where more than two solids meet at a node, every pair that approaches
+    1/2, 1/4 along each axis; mostly that of the solid whose sums scatter less, which is the face
+    where the corner of one lies on the face of the other, and that alone of a solid with a
+    prescribed velocity, but where its face ends. Solids are apart, too, if they are along an axis
+    of the grid. Where more than two solids meet at a node, every pair that approaches
     takes its impulse from the same velocities, reduced where a solid is in several pairs, and what
     remains is taken again, up to 16 times: the order in which solids are defined does not matter,
     and momentum is kept. Nodes that fix velocity_nodes holds are not moved by contact; what they
@@ -150,6 +151,7 @@ class ULMPMContacts(Method):
         return SeparateFields(
             stride=lattices[0].node_count,
             beside=np.array([(prod(shape[k + 1 :]), shape[k]) for k in range(d)]),
+            per_mass=np.array([specific_volume(law) for law in laws]) / h ** (d - 1),
             friction=np.zeros((count, count)),
             warmth=heat_shares(laws, conducting=hub.update.thermal),
             pair=np.full((count, count), -1, np.int64),
