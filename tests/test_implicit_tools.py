@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from comparisons import hertz
+from tests.test_implicit import HELD, patch
 
 PRESS = """
     basis = "linear"
@@ -127,7 +128,10 @@ def test_a_block_lies_on_a_plane(run_script):
 @pytest.mark.parametrize(
     ("line", "name"),
     [
-        ("fix(wall, impenetrablesurface, all, 1, 0, 0.6, 0, 0, 1, 0)", "impenetrablesurface"),
+        (
+            "fix(wall, contact/minimize_penetration/plane, block, 0, 0.6, 0, 0, 1, 0, 0)",
+            "contact/minimize_penetration/plane",
+        ),
         ("fix(h, contact/hertz, block, ground)", "contact/hertz"),
     ],
 )
@@ -135,6 +139,32 @@ def test_forces_that_follow_points_are_refused(run_script, line, name):
     text = LYING.format(lines=line).replace("rock, rigid, 1", "rock, linear, 1, 1, 0")
     result = run_script(text, status=1)
     assert f"fix {name}" in result.err and "ulmpm/contacts" in result.err
+
+
+def test_a_wall_presses_as_far_as_its_force_is_borne(run_script):
+    """Springs in a row: K G of the wall, and M over 0.95625 of the bar between points and base.
+
+    The outermost points share their force out to two nodes, 3/4 of it to the one at the end.
+    """
+    wall = "fix(pull, impenetrablesurface, all, 10, 0.975 - 1e-5*time, 0, 0, -1, 0, 0)"
+    lines = HELD.replace("fix(pull, velocity_nodes, right, 1e-4, NULL)", wall)
+    log_of = run_script(patch(lines, ", hold_x")).log
+    G, M = 400, 1200
+    force = 10 * G * 1e-5 * np.arange(5) / (1 + 0.95625 * 10 * G / M)
+    assert np.allclose(log_of["pull_x"], -force, rtol=2e-4)
+    assert np.allclose(log_of["hold_x"], force, rtol=2e-4)
+    assert max(log_of["iterations"]) <= 4 and max(log_of["parts"]) == 1
+
+
+@pytest.mark.parametrize("scheme", ["quasi-static", "newmark"])
+def test_a_ball_is_pressed_in(run_script, scheme):
+    """Newton's method squares errors with a force that turns as points move, too."""
+    ball = "fix(pull, indent, all, sphere, 1e5, 0.4, 1.3 - 0.02*time, 0.5, 0)"
+    lines = "fix(hold, velocity_nodes, left, 0, 0)\n    " + ball + "\n    set_dt(1)"
+    log_of = run_script(patch(lines, ", hold_x").replace("quasi-static", scheme)).log
+    assert log_of["pull_x"][-1] < -0.1 and max(log_of["iterations"]) <= 6
+    if scheme == "quasi-static":
+        assert np.allclose(log_of["hold_x"], -log_of["pull_x"], rtol=1e-8)
 
 
 def test_a_pressed_disk(run_script):

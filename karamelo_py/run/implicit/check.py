@@ -111,10 +111,11 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
                 f"method ulmpm/contacts, or {_EXPLICIT}",
                 fix.place,
             )
-        elif fix.follows_points:
+        elif fix.follows_points and fix.impulsive:
             yield (
-                f"knows no fix {fix.style}, whose force changes as points move in a step",
-                f"a solid of material rigid in method ulmpm/contacts, or {_EXPLICIT}",
+                f"knows no fix {fix.style}, whose force is what stops a point within a step",
+                "fix impenetrablesurface or indent, or a solid of material rigid in method "
+                f"ulmpm/contacts; or {_EXPLICIT}",
                 fix.place,
             )
 

@@ -22,6 +22,7 @@ from karamelo_py.run.implicit.inertia import Motion, Rest
 from karamelo_py.run.implicit.newton import Broken, Failed, Loose, Newton, TooFar, Wrong, counted
 from karamelo_py.run.implicit.prescribed import prescribed
 from karamelo_py.run.implicit.solvers import Singular
+from karamelo_py.run.implicit.tools import Tool, tools_of
 from karamelo_py.schemes.quasi_static import PUBLISHED
 from karamelo_py.script.errors import Place, ScriptError
 
@@ -236,7 +237,9 @@ class LoadSteps:
         else:
             held = given, velocities
             inertia = Motion(equations, self.scheme, dt, before[nodes], *held, contact)
-        newton = Newton(self.scheme, equations, inertia, contact, external, dt, self.seconds)
+        tools = tools_of(equations, simulation)
+        pushing = [*([] if contact is None else [contact]), *tools]
+        newton = Newton(self.scheme, equations, inertia, pushing, external, dt, self.seconds)
         newton.scale(self.moduli, self.scheme.stabilisation)
         try:
             jump = np.where(given, velocities * dt, 0.0)
@@ -258,7 +261,7 @@ class LoadSteps:
         self.unknowns = int(np.count_nonzero(~given))
         self.corrections += iterations
         reaction = newton.reaction(u)
-        found = equations, inertia, contact, u, fixed, reaction, iterations, residual
+        found = equations, inertia, pushing, u, fixed, reaction, iterations, residual
         return Equilibrium(*found)
 
     def _prescribed(self, equations: Equations, hooks: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -314,8 +317,8 @@ class LoadSteps:
         carry(s.control.totals[WORK])
         update[nodes, :d] = s.nodes.velocity[nodes, :d] = v
         update[nodes, change : change + d] = 0
-        if found.contact is not None:
-            found.contact.publish()
+        for one in found.pushing:
+            one.publish()
         if isinstance(s.contact, RigidBodies):
             forces = np.where(found.fixed, 0.0, -found.reaction)
             led = found.equations.led
@@ -377,7 +380,7 @@ class Equilibrium(NamedTuple):
 
     equations: Equations
     inertia: Rest | Motion
-    contact: Contact | None
+    pushing: list[Contact | Tool]
     u: np.ndarray
     fixed: np.ndarray  # which components fixes hold
     reaction: np.ndarray

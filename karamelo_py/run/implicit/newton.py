@@ -11,6 +11,7 @@ import scipy.sparse as sp
 from karamelo_py.run.implicit.contact import Contact
 from karamelo_py.run.implicit.equations import Equations, Moduli
 from karamelo_py.run.implicit.solvers import Singular, Unconverged, changed_sign, direct, solve
+from karamelo_py.run.implicit.tools import Tool
 
 ASTRAY = 1e4  # times as far as points may go: nothing holds them
 FAR = 0.5  # cells that points may go at once, where weights follow them; else less than one
@@ -69,8 +70,8 @@ class Newton:
         Forces and stiffness, with numbered unknowns.
     inertia
         What moving bodies add.
-    contact
-        Forces between bodies, or None.
+    pushing
+        What pushes by where bodies are: contact, tools.
     external
         (m, d) forces that are not those of stress.
     dt
@@ -89,13 +90,13 @@ class Newton:
         scheme: Any,
         equations: Equations,
         inertia: Any,
-        contact: Contact | None,
+        pushing: list[Contact | Tool],
         external: np.ndarray,
         dt: float,
         seconds: dict[str, float],
     ):
         self.scheme, self.equations, self.inertia = scheme, equations, inertia
-        self.contact, self.external = contact, external
+        self.pushing, self.external = pushing, external
         self.dt, self.seconds = dt, seconds
         self.free = equations.free
         self.spacing = float(np.min(equations.s.grids.spacing))
@@ -105,8 +106,8 @@ class Newton:
         self.kept: dict = {}  # what a solver keeps from one correction to the next
         with counted(seconds, "stress"):
             self.inner = equations.respond(np.zeros_like(external), dt)
-        if contact is not None:
-            contact.respond(np.zeros_like(external))
+        for one in pushing:
+            one.respond(np.zeros_like(external))
 
     def scale(self, moduli: Moduli, stabilisation: float) -> None:
         """Tell the stiffness of the bodies; a share of it penalises jumps at their border."""
@@ -152,8 +153,8 @@ class Newton:
     def balance(self, u: np.ndarray) -> np.ndarray:
         """Find what the forces leave (m, d)."""
         forces = self.external - self.inner
-        if self.contact is not None:
-            forces += self.contact.forces()
+        for one in self.pushing:
+            forces += one.forces()
         if self.ghost is not None:
             forces -= self.ghost @ u
         return self.inertia.balance(u, forces)
@@ -185,8 +186,8 @@ class Newton:
         if self.ghost is not None:
             A = A + self.ghost_of_free
             b -= (self.ghost @ jump)[free]
-        if self.contact is not None:
-            every = self.contact.matrix()
+        for one in self.pushing:
+            every = one.matrix()
             A = A + every[free.ravel()][:, free.ravel()]
             b -= (every @ jump.ravel())[free.ravel()]
         if inertia.diagonal:
@@ -237,8 +238,8 @@ class Newton:
         equations = self.equations
         with counted(self.seconds, "stress"):
             self.inner = equations.respond(u, self.dt)
-        if self.contact is not None:
-            self.contact.respond(u)
+        for one in self.pushing:
+            one.respond(u)
         if not np.all(np.isfinite(self.inner)):
             raise self._wrong(u)
         far = equations.furthest() / self.spacing

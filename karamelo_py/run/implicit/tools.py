@@ -1,0 +1,80 @@
+"""Forces of tools on points, which change as points move, within Newton's method."""
+
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from karamelo_py.run.implicit.equations import Equations
+from karamelo_py.scene.modify import Fix, PointsView
+
+NEAR = 1e-6  # cells, over which forces are compared
+
+
+class Displaced:
+    """Points of a view, further on by a way (n, d); volume and damage are those of before."""
+
+    def __init__(self, view: Any, way: np.ndarray):
+        self.view, self.position = view, view.position + way
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.view, name)
+
+
+class Tool:
+    """The force of a fix on the points of its group, by where they are."""
+
+    def __init__(self, fix: Fix, equations: Equations, simulation: Any):
+        self.fix, self.d = fix, equations.d
+        self.near = NEAR * float(np.min(equations.s.grids.spacing))
+        self.view = PointsView(simulation, simulation.points.members(fix.group), then=False)
+        rows, columns, weights = [], [], []
+        pairs = zip(equations.blocks, equations.parts, strict=True)
+        seen_by = {id(block): seen for block, (seen, _) in pairs}
+        for part in self.view._rows.parts:
+            if id(part.block) in seen_by:  # others are rigid
+                seen = seen_by[id(part.block)]
+                rows.append(np.repeat(part.places, seen.nodes.shape[1]))
+                columns.append(seen.nodes[part.rows].ravel())
+                weights.append(seen.weights[part.rows].ravel())
+        at = np.concatenate(rows), np.concatenate(columns)
+        shape = len(self.view.ids), len(equations.nodes)
+        self.gather = sp.csr_matrix((np.concatenate(weights), at), shape)
+        self.gather_all = equations.for_all_components(self.gather)
+        self.way = np.zeros((shape[0], self.d))
+        self.known = self.force = self.at(self.way)  # that the forces of the step have already
+
+    def at(self, way: np.ndarray) -> np.ndarray:
+        """Find the forces (n, d) on points that are further on by a `way` (n, d)."""
+        return self.fix.forces(Displaced(self.view, way))
+
+    def respond(self, u: np.ndarray) -> None:
+        """Find the forces after displacements (m, d) of the nodes."""
+        self.way = self.gather @ u
+        self.force = self.at(self.way)
+
+    def forces(self) -> np.ndarray:
+        """Find what the forces at the nodes (m, d) have changed by."""
+        return self.gather.T @ (self.force - self.known)
+
+    def matrix(self) -> sp.csr_matrix:
+        """Find how the forces resist displacements (m d, m d), by central differences."""
+        n = len(self.way)
+        slopes = np.empty((n, self.d, self.d))
+        for j, step in enumerate(self.near * np.eye(self.d)):
+            slopes[:, :, j] = (self.at(self.way - step) - self.at(self.way + step)) / 2 / self.near
+        blocks = sp.bsr_matrix((slopes, np.arange(n), np.arange(n + 1)))
+        return (self.gather_all.T @ blocks @ self.gather_all).tocsr()
+
+    def publish(self) -> None:
+        """Publish the force, and leave to the points the mean that has done the work."""
+        self.force = self.at(self.way)
+        self.view.force = self.view.force + (self.force - self.known) / 2
+        self.view.write_back()
+        self.fix.publish_components(self.view.total(self.force))
+
+
+def tools_of(equations: Equations, simulation: Any) -> list[Tool]:
+    """Find the tools of a scene."""
+    fixes = simulation.hub.fixes.values()
+    return [Tool(fix, equations, simulation) for fix in fixes if fix.follows_points]
