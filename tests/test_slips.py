@@ -10,6 +10,12 @@ from karamelo_py.scene.placement import SAMPLE, fill
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.regions import Cylinder
 
+METAL = (
+    "eos(e, linear, 8000, 160e9)\n"
+    "strength(s, johnson_cook, 80e9, 4e8, 5e8, 0.3, 1, 0.01, 1, 300, 1300)\n"
+)
+OF = "material(rubber, eos-strength, e, s"
+
 
 @pytest.mark.parametrize(
     ("lines", "material", "says", "hint"),
@@ -43,6 +49,42 @@ from karamelo_py.styles.regions import Cylinder
             [], "material(rubber, linear, 2.1e11, 7800, 0.3)",
             "waves of it move at 0.000224, since its density 2.1e+11", "before the modulus",
         ),
+        (
+            ["fix(e, erosion, all, ep > 0.1 && x > 0)"], "",
+            "ep will be 0: points have no such field", "",
+        ),
+        (
+            [], f"{METAL}damage(d, damage_johnson_cook, 54, 489, -3, 0, 0, 1, 300, 1300)\n{OF}, d)",
+            "it fails in shear at a plastic strain of 543", "no per cent",
+        ),
+        (
+            [], f"{METAL}damage(d, damage_johnson_cook, 0.1, 3, 2.1, 0, 0, 1, 300, 1300)\n{OF}, d)",
+            "with d3 = 2.1 it bears more plastic strain in tension", "below 0 here",
+        ),
+        (
+            [], f"{METAL}temperature(w, plastic_work, 0.9, 500, 0, 0, 20, 1300)\n{OF}, w)",
+            "T0 of the temperature is 20, Tr of the strength is 300", "degrees Celsius",
+        ),
+        (
+            [], f"{METAL}temperature(w, plastic_work, 0.9, 0.5, 0, 0, 300, 1300)\n{OF}, w)",
+            "a plastic strain of 1 warms it by 9e+04 kelvin", "500 of steel",
+        ),
+        (
+            [], f"{METAL}temperature(w, plastic_work, 0.9, 500, 0, 12e-6, 300, 1300)\n{OF}, w)",
+            "it expands by 2.5e-17 a kelvin", "alpha is 3 K = 4.8e+11 times",
+        ),
+        (
+            [], "material(rubber, linear, 7850, 2e11, 0.3, 460, 45, 12)",
+            "it expands by 12 a kelvin", "1.2e-5",
+        ),
+        (
+            [], "eos(e, shock, 8930, 1e11, 3940, 1490, 2, 385, 294, 150, 60)\n"
+            "strength(s, plastic, 43e9, 4e8)", "the slope S of its shock speed is 1490", "no unit",
+        ),
+        (
+            [], "eos(e, shock, 8930, 1e11, 3940, 1.49, 2, 385, 294, 150, 60)\n"
+            "strength(s, plastic, 43e9, 4e8)", "has the coefficients 150 and 60", "1.5 and 0.06",
+        ),
     ],
 )  # fmt: skip
 def test_told(run_interpreted, lines, material, says, hint):
@@ -56,6 +98,44 @@ def test_told(run_interpreted, lines, material, says, hint):
     said = run_interpreted(text).err
     assert said.count(says) == 1, said
     assert hint in said
+
+
+def warm_block(T0, *fixes):
+    """A block in which heat flows, at T0 at first."""
+    text = block(2, *fixes, "set_dt(1e-9)", "run(1)")
+    text = text.replace("FLIP, linear, 1", "FLIP, linear, 1, thermo-mechanical")
+    lines = text.splitlines()
+    (k,) = [k for k, line in enumerate(lines) if line.startswith("material(")]
+    lines[k] = f"{METAL}temperature(w, plastic_work, 0.9, 500, 50, 0, 300, 1300)\n{OF}, w)"
+    return "\n".join(lines).replace("rubber, 0.1, 0)", f"rubber, 0.1, {T0})")
+
+
+@pytest.mark.parametrize(
+    ("T0", "fix", "says"),
+    [
+        (20, "", "T0 = 20, and the material counts temperatures from 300"),
+        (
+            300,
+            "fix(f, temperature_nodes, near, -20)",
+            "the temperature is -20, and bodies begin at 3",
+        ),
+        (
+            300,
+            "fix(f, convection_particles, top, 25, 20)",
+            "the temperature is 20, and bodies begin",
+        ),
+        (300, "fix(f, heat_flux_particles, all, 1e3)", "all points of solid 'body' get heat as if"),
+        (300, "fix(f, temperature_nodes, far, 400)", "'f' acts on nodes that no point reaches"),
+    ],
+)
+def test_slips_of_heat(run_interpreted, T0, fix, says):
+    lines = [
+        "region(near, block, 0.25, 0.35, 0.2, 0.6)", "group(near, nodes, region, near, all)",
+        "region(far, block, 1, 1.2, 1, 1.2)", "group(far, nodes, region, far, all)",
+        "region(top, block, -INF, INF, 0.45, INF)", "group(top, particles, region, top, all)",
+    ]  # fmt: skip
+    said = run_interpreted(warm_block(T0, *lines, fix)).err
+    assert said.count("warning") == 1 and says in said, said
 
 
 def test_two_methods(run_interpreted):

@@ -75,6 +75,7 @@ def take_away(hub: Scene, ids: np.ndarray, place: Any) -> tuple[float, float]:
         raise ScriptError(
             f"step {simulation.step}, time {simulation.time:.6g}: no point would be left",
             place=place,
+            hint="a condition that some points do not meet, or another group",
         )
     return simulation.remove(ids)
 

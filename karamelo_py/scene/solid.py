@@ -11,6 +11,7 @@ from karamelo_py.language.arguments import Named
 from karamelo_py.language.by_dimension import finite
 from karamelo_py.language.scene import Scene
 from karamelo_py.points.laws import can, law_kind, specific_volume
+from karamelo_py.points.laws.doubts import reference_temperatures
 from karamelo_py.points.laws.temperatures import initial_heat
 from karamelo_py.scene.domain import Domain, require_domain
 from karamelo_py.scene.lattice import CHUNK
@@ -19,6 +20,7 @@ from karamelo_py.scene.placement import MAX_POINTS, Placement
 from karamelo_py.script.errors import ScriptError, plural
 
 _SAMPLE = 5000
+COLD, WARM = 60.0, 200.0  # what is below the one, and so far below others, is in degrees Celsius
 
 
 class Solid(Named):
@@ -89,6 +91,12 @@ class Solid(Named):
                 f"T0 = {T0:g} is not below the melting temperature {Tm:g}: "
                 "the solid has no strength from the start",
                 hint="all temperatures counted from the same point",
+            )
+        first = max(reference_temperatures(self.material.law).values(), default=-math.inf)
+        if T0 is not None and 0 <= T0 < COLD and first - T0 > WARM:
+            hub.warn(
+                f"T0 = {T0:g}, and the material counts temperatures from {first:g}",
+                hint="kelvin throughout, or degrees Celsius throughout",
             )
         kinds = law_kind(self.material.law)
         if self.T0 is None and any("initial_temperature" in kind._fields for kind in kinds):

@@ -18,6 +18,11 @@ from karamelo_py.points.laws.strengths.hardening import flow_stress, precompute
 
 SLOW = 0.01  # of a body whose density and modulus have changed places, in m/s as in mm/ms
 SMALL = 2.0  # degrees: angles of friction are larger, and those in radians are not
+EXPANSION = 1e-10, 1e-3  # a kelvin, from quartz to polymers, and far beyond
+TOUGH = 50.0  # of a failure strain in shear that was given in percent
+APART = 100.0  # kelvin between reference temperatures that are counted from one point
+MELTS = 0.1  # a plastic strain by whose heat nothing melts
+STEEP, THICK = 10.0, 20.0  # slopes of Hugoniot curves and coefficients of viscosity, far beyond
 
 
 def doubts(law: Any) -> Iterator[tuple[str, str]]:
@@ -35,6 +40,8 @@ def doubts(law: Any) -> Iterator[tuple[str, str]]:
             f"{1 / squared:.2g} times its modulus {squared * density:.3g}",
             "the density comes before the modulus",
         )
+    if alpha := getattr(getattr(law, "heat", None), "alpha", 0.0):
+        yield from _doubts_of_expansion(alpha, "the coefficient of linear expansion")
     if isinstance(law, EosStrength):
         yield from _doubts_of_parts(law, state)
 
@@ -64,3 +71,69 @@ def _doubts_of_parts(law: Any, state: Any) -> Iterator[tuple[str, str]]:
             f"its angle of friction is about {degrees(asin(friction)):.2g} degrees",
             "angles are in degrees, not in radians",
         )
+    yield from _doubts_of_heat(law, K, flow)
+    damage, eos = law.damage, law.eos
+    shear = getattr(damage, "d1", 0.0) + getattr(damage, "d2", 0.0)
+    if shear > TOUGH:
+        yield f"it fails in shear at a plastic strain of {shear:.3g}", "strains are no per cent"
+    if getattr(damage, "d3", 0.0) > 0:
+        yield (
+            f"with d3 = {damage.d3:g} it bears more plastic strain in tension than in compression",
+            "d3 of metals is below 0 here: some programs have exp(-d3 t)",
+        )
+    if getattr(eos, "S", 0.0) > STEEP:
+        yield (
+            f"the slope S of its shock speed is {eos.S:g}",
+            "S has no unit: 1 to 2 of metals, and c0 stands before it",
+        )
+    coefficients = [getattr(law.viscosity, name, 0.0) for name in ("Q1", "Q2")]
+    if max(coefficients) > THICK:
+        yield (
+            f"its artificial viscosity has the coefficients {coefficients[0]:g} and "
+            f"{coefficients[1]:g}",
+            "1.5 and 0.06 smear a shock over some cells",
+        )
+
+
+def reference_temperatures(law: Any) -> dict[str, float]:
+    """Name the temperatures from which parts of a law count, as far as it has a temperature."""
+    heat, softening = getattr(law, "temperature", None), getattr(law, "strength", None)
+    if not hasattr(heat, "T0"):
+        return {}
+    found = {"T0 of the temperature": heat.T0}
+    for name, part, counts in (
+        ("Tr of the strength", getattr(softening, "softening", None), 1.0),
+        ("Tr of the damage", law.damage, getattr(law.damage, "d5", 0.0)),
+        ("Tr of the eos", law.eos, getattr(law.eos, "thermal", 0.0)),
+    ):
+        if hasattr(part, "Tr") and counts:
+            found[name] = part.Tr
+    return found
+
+
+def _doubts_of_heat(law: Any, K: float, flow: float) -> Iterator[tuple[str, str]]:
+    """Yield what is strange about the temperature of a law that yields at `flow`."""
+    heat, counted = law.temperature, reference_temperatures(law)
+    if counted and max(counted.values()) - min(counted.values()) > APART:
+        yield (
+            "temperatures are counted from several points: "
+            + ", ".join(f"{name} is {T:g}" for name, T in counted.items()),
+            "kelvin throughout, or degrees Celsius throughout",
+        )
+    if K > 0 and getattr(heat, "alpha", 0.0):
+        yield from _doubts_of_expansion(
+            heat.alpha / (3 * K), f"alpha is 3 K = {3 * K:.3g} times the coefficient of expansion"
+        )
+    if hasattr(heat, "chi") and heat.Tm < inf:
+        warmer = heat.chi * flow * specific_volume(law) / heat.cp
+        if MELTS * warmer > heat.Tm - heat.T0:
+            yield (
+                f"a plastic strain of 1 warms it by {warmer:.2g} kelvin",
+                "the heat capacity cp is per mass and kelvin, in the units of the stresses: "
+                "500 of steel in m, kg, s; 5e8 in mm, t, s",
+            )
+
+
+def _doubts_of_expansion(alpha: float, what: str) -> Iterator[tuple[str, str]]:
+    if not EXPANSION[0] < abs(alpha) < EXPANSION[1]:
+        yield f"it expands by {alpha:.3g} a kelvin", f"{what}; that of steel is 1.2e-5"

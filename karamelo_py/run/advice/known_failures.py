@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from karamelo_py.kernels.hooks import HEAT_STAGES, CompiledHook
 from karamelo_py.kernels.watch import BORNE
 from karamelo_py.language.rules import Advice
 from karamelo_py.output.node_columns import places_of
@@ -287,7 +288,11 @@ def _out_of_reach(hub: Hub, simulation: Simulation, fix: Any) -> bool:
 def _warn_about_groups(hub: Hub, simulation: Simulation) -> None:
     """Say so, once, where groups of nodes that were to have some, or a body, have none."""
     for fix in hub.fixes.values():
-        of_mass = any(getattr(hook, "uses_share", False) for hook in fix.hooks().values())
+        of_mass = any(
+            getattr(hook, "uses_share", False) or moment in HEAT_STAGES
+            for moment, hook in fix.hooks().items()
+            if isinstance(hook, CompiledHook) and hook.on_nodes
+        )
         far = (
             of_mass and not fix.group.all and len(fix.group) and _out_of_reach(hub, simulation, fix)
         )

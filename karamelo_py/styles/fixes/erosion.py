@@ -58,6 +58,8 @@ class Erosion(Fix):
     ):
         super().__init__(hub, group)
         self.condition, self.every = condition, every
+        if empty := [name for name in condition.columns if name in hub.fields.absent_at_points()]:
+            hub.warn(f"{', '.join(empty)} will be 0: points have no such field")
 
     def between_steps(self) -> bool:
         """Take points away that meet the condition; whether there were any."""

@@ -1,10 +1,14 @@
 """Fixes of heat."""
 
+from math import inf
 from typing import Any
+
+import numpy as np
 
 from karamelo_py.scene.group import NodeGroup, ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix, heat_hook, node_hook
+from karamelo_py.scene.solid import COLD, WARM
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
 
@@ -22,6 +26,32 @@ class HeatFix(Fix):
                 expected="method(..., thermo-mechanical)",
             )
         self.formulas = formulas
+
+    def _compare(self, T: Expression) -> None:
+        """Tell of a temperature in degrees Celsius among others in kelvin."""
+        begins = (solid.T0 for solid in self.hub.solids.values() if solid.T0 is not None)
+        warmest = max(begins, default=-inf)
+        if T.is_constant and T.constant < COLD and warmest - T.constant > WARM:
+            self.hub.warn(
+                f"the temperature is {T.constant:g}, and bodies begin at {warmest:g}",
+                hint="kelvin throughout, or degrees Celsius throughout",
+            )
+
+    def _look_inside(self) -> None:
+        """Tell of groups that are no layer along a surface: points inside have no face outside."""
+        for solid in self.hub.solids.values():
+            if not 0 < solid.count < MANY:
+                continue
+            numbers = np.arange(solid.count)
+            deep = np.ptp(solid.x0_of(numbers), axis=0) > 5 * solid.half_size.max(axis=0)
+            if deep.all() and self.group.has(numbers + solid.first_id).all():
+                self.hub.warn(
+                    f"all points of solid '{solid.id}' get heat as if each had a face outside",
+                    hint="a group of one layer of points along the surface",
+                )
+
+
+MANY = 1_000_000  # points of a solid, which are not looked at
 
 
 def hold_node(capacity, T, T_star, flow, value, before, dt, share):
@@ -62,6 +92,7 @@ class TemperatureNodes(HeatFix):
 
     def __init__(self, hub: Hub, group: NodeGroup, T: Expression):
         super().__init__(hub, group, T)
+        self._compare(T)
 
 
 def hold_point(capacity, T, face, supply, value, other, dt):
@@ -95,6 +126,7 @@ class TemperatureParticles(HeatFix):
 
     def __init__(self, hub: Hub, group: ParticleGroup, T: Expression):
         super().__init__(hub, group, T)
+        self._compare(T)
 
 
 def heat(capacity, T, face, supply, value, other, dt):
@@ -134,6 +166,7 @@ class HeatFluxParticles(HeatFix):
 
     def __init__(self, hub: Hub, group: ParticleGroup, q: Expression):
         super().__init__(hub, group, q)
+        self._look_inside()
 
 
 def exchange(capacity, T, face, supply, value, other, dt):
@@ -179,6 +212,8 @@ class ConvectionParticles(HeatFix):
 
     def __init__(self, hub: Hub, group: ParticleGroup, h: Expression, T_inf: Expression):
         super().__init__(hub, group, h, T_inf)
+        self._compare(T_inf)
+        self._look_inside()
         if h.is_constant and not h.constant >= 0:
             raise ScriptError(
                 f"the heat transfer coefficient is {h.constant:g}",
