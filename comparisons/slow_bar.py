@@ -20,4 +20,4 @@ def compare(run, axes, full):
                   "exact")  # fmt: skip
         axes.plot(log.Time, log.v_x, mark, ms=3, lw=0.8, label=name)
     axes.plot(log.Time, log.exact, "k-", lw=0.7, label="trapezoidal rule, 100 h/c")
-    axes.set(xlabel="time", ylabel="mean velocity")
+    axes.set(xlabel="time (s)", ylabel="mean velocity (m/s)")

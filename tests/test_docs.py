@@ -423,3 +423,26 @@ def test_equations_link_to_functions_that_exist():
     for file, name in named:
         text = (ROOT / "karamelo_py" / file).read_text("utf-8")
         assert re.search(rf"^(def|class) {name}\b", text, re.M), (file, name)
+
+
+@pytest.mark.parametrize(
+    ("asked", "page"),
+    [
+        ("resume", "reference/generated/command/restart"),
+        ("Jupyter", "tutorial"),
+        ("VTK export", "reference/generated/dump/vtk"),
+        ("ParaView", "reference/generated/dump/vtk"),
+        ("boundary condition", "reference/generated/fix/velocity_nodes"),
+        ("time step too large", "reference/generated/command/dt_factor"),
+        ("gravity", "reference/generated/fix/body_force"),
+        ("units", "reference/generated/command/units"),
+        ("landslide", "choose"),
+    ],
+)
+def test_words_of_other_programs_lead_to_a_page(asked, page):
+    sys.path.insert(0, str(ROOT / "docs" / "_ext"))
+    try:
+        from synonyms import WORDS
+    finally:
+        sys.path.pop(0)
+    assert set(asked.lower().split()) <= set(WORDS[page].lower().split())

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 import shutil
+from collections.abc import Iterable
 from pathlib import Path
 
 from karamelo_py.app.catalogue import COMMAND, describe_parameter, families, help_of
@@ -46,11 +47,7 @@ def write_pages(folder: Path) -> None:
         for name in names:
             _write(folder / family / f"{_file(name)}.md", _page(family, name, own))
         _write(folder / f"{family}.md", _index(family, names))
-    listed = "\n".join(own)
-    _write(
-        folder / "index.md",
-        f"# Commands and styles\n\n```{{toctree}}\n:maxdepth: 2\n\n{listed}\n```\n",
-    )
+    _write(folder / "index.md", _all(own))
 
 
 def _own(family: str) -> list[str]:
@@ -66,16 +63,32 @@ def _write(path: Path, text: str) -> None:
     path.write_text(text, encoding="utf-8")
 
 
+def _all(own: dict[str, list[str]]) -> str:
+    """All commands and styles on one page, each with a line."""
+    parts = ["# Commands and styles", "Each name has a page with its arguments and an example."]
+    for family, names in own.items():
+        title, text = TITLES.get(family, (family.capitalize(), ""))
+        parts += [f"## {title}", text, _table(family, names)]
+    return "\n\n".join([*parts, _toctree(own)]) + "\n"
+
+
 def _index(family: str, names: list[str]) -> str:
     title, text = TITLES.get(family, (family.capitalize(), ""))
+    toctree = _toctree(f"{family}/{_file(name)}" for name in names)
+    return f"# {title}\n\n{text}\n\n{_table(family, names)}\n\n{toctree}\n"
+
+
+def _table(family: str, names: list[str]) -> str:
     rows = [
         f"| [`{name}`]({family}/{_file(name)}.md) | {escaped(help_of(family, name).summary)} |"
         for name in names
     ]
-    toctree = "\n".join(f"{family}/{_file(name)}" for name in names)
-    table = "\n".join(["| | |", "|---|---|", *rows])
-    toctree = f"```{{toctree}}\n:hidden:\n:maxdepth: 1\n\n{toctree}\n```"
-    return f"# {title}\n\n{text}\n\n{table}\n\n{toctree}\n"
+    return "\n".join(["| | |", "|---|---|", *rows])
+
+
+def _toctree(names: Iterable[str]) -> str:
+    listed = "\n".join(names)
+    return f"```{{toctree}}\n:hidden:\n:maxdepth: 1\n\n{listed}\n```"
 
 
 def _page(family: str, name: str, own: dict[str, list[str]]) -> str:

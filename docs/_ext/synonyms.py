@@ -47,10 +47,16 @@ WORDS = {
 
 
 def add_words(app, doctree) -> None:
-    """Put the words of a page where the search indexes them, and nobody sees them."""
+    """Put the words of a page where the search indexes them, and nobody sees them.
+
+    The search takes what stands between commas as one word; those of the head of a page, too.
+    """
     words = WORDS.get(app.env.docname)
     if words:
         doctree.insert(0, nodes.meta(name="keywords", content=words))
+    for node in doctree.findall(nodes.meta):
+        if node.get("name") == "keywords":
+            node["content"] = ", ".join(node["content"].lower().replace(",", " ").split())
 
 
 def check_pages(app, env) -> list[str]:

@@ -3,7 +3,7 @@ const words = (text) => text.toLowerCase().match(/[a-z]{2,}/g) || [];
 const commonness = new Map();
 const entries = MESSAGES.map(([target, text, kind]) => ({ target, text, kind, words: new Set(words(text)) }));
 for (const entry of entries) for (const word of entry.words) commonness.set(word, (commonness.get(word) || 0) + 1);
-const weight = (word) => 1 / commonness.get(word);
+const weight = (word) => Math.log(1 + entries.length / commonness.get(word));
 const field = document.getElementById("message-words");
 const list = document.getElementById("message-found");
 
@@ -15,7 +15,7 @@ function find() {
       all += weight(word);
       if (given.has(word)) shared += weight(word);
     }
-    return { entry, score: shared * (0.5 + shared / all) };
+    return { entry, score: all ? shared * (shared / all) ** 2 : 0 };
   });
   scored.sort((a, b) => b.score - a.score);
   list.replaceChildren(...scored.slice(0, 6).filter((one) => one.score > 0).map(({ entry }) => {
