@@ -324,7 +324,7 @@ def test_energy_that_a_step_loses_is_told(run_script):
         for rho in ("1", "0.8")
     )
     assert "energy is lost" in told.err and "dt_factor" not in told.err
-    assert energy_told(told.out) < -25
+    assert energy_told(told.out) < -20
     assert "energy is lost" not in damped.err and energy_told(damped.out) < -45
     assert "scheme newmark with rho 0.8 takes some" in damped.out
 
@@ -437,11 +437,11 @@ def test_refused_choices(run_script, line, wrong, message):
 
 
 def test_steps_that_are_too_large_are_done_in_parts(run_script):
-    """A stretch by half in one step: no point goes further than half a cell at once."""
-    fast = HELD.replace("1e-4", "0.08")
-    log_of = run_script(patch(fast)).log
+    """A stretch by one in one step: the end would go to nodes that are held, and nothing saw."""
+    fast = patch(HELD).replace("1e-4", "0.16").replace("run(4)", "run(2)")
+    log_of = run_script(fast).log
     assert max(log_of["parts"]) > 1
-    assert log_of["Time"][-1] == 4 and len(log_of["Time"]) == 5
+    assert log_of["Time"][-1] == 2 and len(log_of["Time"]) == 3
     assert np.all(np.diff(log_of["pull_x"]) > 0)
 
 

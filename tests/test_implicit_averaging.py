@@ -58,7 +58,7 @@ def test_derivatives_are_exact(run_script, monkeypatch, axis, kind):
 
     def compared(self, left, jump, residual):
         equations = self.equations
-        equations.linearise()
+        equations.linearise(self.dt)
         du = np.random.default_rng(1).standard_normal(jump.shape)
         h = 1e-6 * self.spacing
         forward, back = (equations.respond(self.at + h * s * du, self.dt) for s in (1, -1))

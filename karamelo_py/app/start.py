@@ -1,6 +1,7 @@
 """The start of the program."""
 
 import gc
+import os
 import sys
 
 from karamelo_py.app.leaving import leaving_at_once
@@ -13,6 +14,8 @@ def main() -> int:
     went through all modules again and again, half of what a small scene takes.
     """
     gc.disable()
+    # Threads of OpenBLAS, in load steps, wait for each other more than they do.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     with leaving_at_once():
         from karamelo_py.app.cli import main as command
     return command()

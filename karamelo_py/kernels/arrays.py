@@ -281,6 +281,7 @@ CLOCK = np.dtype(
         ("new_rate", np.float64),  # of the last sweep
         ("move", np.float64),  # of the point that went furthest in this step, in cells
         ("new_move", np.float64),
+        ("stride", np.float64),  # cells that a point may go in a step
         ("drift", np.float64),  # since the points were sorted, in cells
         ("drift_limit", np.float64),
         ("pace", np.float64),  # of the point that went furthest in a step since then

@@ -155,7 +155,7 @@ def all_well(s: Setup) -> bool:
 
 
 @noinline
-def _check_share(frame, kin, grids, points, tiling, now, k):
+def _check_share(frame, kin, grids, points, tiling, now, stride, k):
     """Report the largest move of the points of the k-th share, and the point that went wrong."""
     grids, points, tiling = at_hand(grids), at_hand(points), at_hand(tiling)
     for place in range(tiling.share[k], tiling.share[k + 1]):
@@ -168,7 +168,7 @@ def _check_share(frame, kin, grids, points, tiling, now, k):
             step = (y - load_vector(kin, points.x[now], p)).largest()
             cells = float(step * grid.inv_h)
             furthest = max(furthest, cells)
-            if not (cells <= 1 and (inside(grid, kin, y) or not frame.moves)):
+            if not (cells <= stride and (inside(grid, kin, y) or not frame.moves)):
                 wrong = p + 1
         tiling.report[t, 0] = furthest
         tiling.report[t, 2] = wrong
@@ -178,8 +178,8 @@ _check_shares = shared_out(_check_share)
 
 
 @kernel
-def _check_points(mode, frame, kin, grids, points, tiling, now):
-    _check_shares(mode, tiling.count[1], frame, kin, grids, points, tiling, now)
+def _check_points(mode, frame, kin, grids, points, tiling, now, stride):
+    _check_shares(mode, tiling.count[1], frame, kin, grids, points, tiling, now, stride)
 
 
 @shared
@@ -187,7 +187,8 @@ def check_moves(s: Setup, mode: Tag) -> bool:
     """Look at the new positions again, after hooks that may have changed them."""
     clock = s.control.clock[0]
     for block in s.blocks:
-        _check_points(mode, s.frame, s.kin, s.grids, block.points, block.tiling, clock.now)
+        points, tiling = block.points, block.tiling
+        _check_points(mode, s.frame, s.kin, s.grids, points, tiling, clock.now, clock.stride)
     read_reports(s)
     clock.move = max(clock.move, clock.new_move)
     return clock.wrong == 0

@@ -25,6 +25,7 @@ from karamelo_py.kernels.lanes import lanes_with, points_from
 from karamelo_py.kernels.sweep import by_threads, places_of
 from karamelo_py.kernels.visit import deformation_of, place_at
 from karamelo_py.points.basis import entry, locate, support
+from karamelo_py.points.basis.cpdi import AtCorners
 from karamelo_py.points.kinematics import (
     I,
     gradient,
@@ -50,13 +51,14 @@ GROUP = 8
 
 
 class Seen(NamedTuple):
-    """Nodes that the points of a block see: the k-th of each."""
+    """Nodes that the points of a block see: the k-th of each, of those that give it something."""
 
-    nodes: np.ndarray  # (n, s) int64: numbers among the unknown nodes
+    count: np.ndarray  # (n,) int32: how many; further ones are the first with weights of 0
+    nodes: np.ndarray  # (n, s) int32: numbers among the unknown nodes (int64: in the grid)
     weights: np.ndarray  # (n, s)
     gradients: np.ndarray  # (n, s, c) in the places before the step
     starts: np.ndarray  # (m + 1,) int64: where what sees each node begins in `entries`
-    entries: np.ndarray  # (n s,) int64: p s + k, of the points that see a node, in their order
+    entries: np.ndarray  # int64: p s + k, of the points that see a node, in their order
 
 
 class Pairs(NamedTuple):
@@ -69,11 +71,10 @@ class Pairs(NamedTuple):
 
 
 class Response(NamedTuple):
-    """Stress and tangent of points after trial displacements; t components of a tensor."""
+    """Stress of points after trial displacements; t components of a tensor."""
 
     increment: np.ndarray  # (t, n) H
     stress: np.ndarray  # (t, n) V0 P
-    tangent: np.ndarray  # (t t, n) V0 dP/dH, a row of P after another
     furthest: np.ndarray  # (PARTS,) the largest component of a displacement in each part
 
 
@@ -83,13 +84,14 @@ def nothing_seen(s: Setup, block: Block) -> tuple[Seen, Response]:
     count, width = support(s.basis, s.kin), len(s.kin.Gradient._fields)
     none = np.zeros(0, np.int64)
     seen = Seen(
+        np.zeros(n, np.int32),
         np.zeros((n, count), np.int64),
         np.zeros((n, count)),
         np.zeros((n, count, width)),
         none,
         none,
     )
-    rows = (rows_of_points((k, n), np.float64) for k in (t, t, t * t))
+    rows = (rows_of_points((t, n), np.float64) for _ in range(2))
     return seen, Response(*rows, np.zeros(PARTS))
 
 
@@ -108,12 +110,25 @@ def _see(frame, kin, basis, grids, points, laws, now, seen, part):
     for p in range(points_of(points.mass.size, part), points_of(points.mass.size, part + 1)):
         grid = record(grids, points.grid[p])
         stencil = locate(basis, kin, grid, place_at(basis, kin, where, p))
+        count = 0
         for k in range(support(basis, kin)):
             node, weight, slope = entry(basis, kin, grid, stencil, k)
-            seen.nodes[p, k] = node
-            seen.weights[p, k] = weight
-            for j, g in enumerate(slope):
-                seen.gradients[p, k, j] = g
+            gives = weight != 0
+            for g in slope:
+                gives = gives | (g != 0)
+            if gives:
+                at = count
+                if isinstance(basis, AtCorners):  # several may see the same node
+                    for other in range(count):
+                        if seen.nodes[p, other] == node:
+                            at = other
+                seen.nodes[p, at] = node
+                seen.weights[p, at] += weight
+                for j, g in enumerate(slope):
+                    seen.gradients[p, at, j] += g
+                if at == count:
+                    count += 1
+        seen.count[p] = count
         if not frame.moves:
             law = record(laws, index(points.material[p]))
             state = load(points.state, p, initial_state(law, kin, points.mass[p]))
@@ -142,7 +157,7 @@ def _strain(kin, seen, u, response, part):
     for p in range(points_of(count, part), points_of(count, part + 1)):
         H = zero(kin, u[0, 0])
         own = zero_vector(kin, u[0, 0])
-        for k in range(seen.nodes.shape[1]):
+        for k in range(seen.count[p]):
             node = seen.nodes[p, k]
             moved = vector(kin, [u[node, i] for i in range(kin.dimension)])
             H = H + outer(moved, gradient_at(kin, seen, p, k))
@@ -172,7 +187,7 @@ if config.DISABLE_JIT:  # type: ignore[attr-defined]
 
 @noinline
 def _respond(kin, points, laws, dt, response, part):
-    """Stress and tangent of each point after its increment."""
+    """Stress of each point after its increment."""
     points, laws, response = at_hand(points), at_hand(laws), at_hand(response)
     lanes = lanes_with((), laws, points.mass)
     end = points_of(points.mass.size, part + 1)
@@ -183,9 +198,26 @@ def _respond(kin, points, laws, dt, response, part):
         state = load(points.state, p, initial_state(law, kin, mass))
         H = load(response.increment, p, zero(kin, mass))
         volume = mass * specific_volume(law)
-        P, slopes = stress_and_tangent(law, kin, state, H, dt)
-        store(response.stress, p, volume * P)
-        store(response.tangent, p, tuple([volume * s for row in slopes for s in row]))
+        store(response.stress, p, volume * nominal_stress(law, kin, state, H, dt))
+
+
+@noinline
+def _respond_to_changes(kin, points, laws, dt, response, first, end, tangent, part):
+    """V0 dP/dH (t t, c) of c points from the `first` on, a row of P after another."""
+    points, laws, response = at_hand(points), at_hand(laws), at_hand(response)
+    lanes = lanes_with((), laws, points.mass)
+    count = end - first
+    last = points_of(count, part + 1)
+    for q in range(points_of(count, part), last, lanes.width):
+        p = points_from(lanes, first + q, first + last)
+        law = record(laws, index(points.material[p]))
+        mass = points.mass[p]
+        state = load(points.state, p, initial_state(law, kin, mass))
+        H = load(response.increment, p, zero(kin, mass))
+        volume = mass * specific_volume(law)
+        _, slopes = stress_and_tangent(law, kin, state, H, dt)
+        own = points_from(lanes, q, last)
+        store(tangent, own, tuple([volume * s for row in slopes for s in row]))
 
 
 @kernel
@@ -210,12 +242,12 @@ def list_points(seen):
     starts, entries = seen.starts, seen.entries
     m, count, width = starts.size - 1, seen.nodes.shape[0], seen.nodes.shape[1]
     for p in range(count):
-        for k in range(width):
+        for k in range(seen.count[p]):
             starts[seen.nodes[p, k] + 1] += 1
     for a in range(m):
         starts[a + 1] += starts[a]
     for p in range(count):
-        for k in range(width):
+        for k in range(seen.count[p]):
             node = seen.nodes[p, k]
             entries[starts[node]] = p * width + k
             starts[node] += 1
@@ -246,7 +278,7 @@ def _mark_pairs(seen, pairs, part):
     for a in range(m * part // PARTS, m * (part + 1) // PARTS):
         for e in range(seen.starts[a], seen.starts[a + 1]):
             p = seen.entries[e] // width
-            for k in range(width):
+            for k in range(seen.count[p]):
                 pairs.rank[a, pairs.middle + pairs.codes[seen.nodes[p, k]] - pairs.codes[a]] = 0
 
 
@@ -301,29 +333,34 @@ def by_displacement(kin, D, g):
 
 
 @noinline
-def _add_stiffness(kin, seen, tangent, pairs, K, part):
-    """Add derivatives of the forces of points to K, the rows of components one after another."""
+def _add_stiffness(kin, seen, tangent, first, end, done, pairs, K, part):
+    """Add derivatives of the forces of points from the `first` to the `end` to blocks K (b, d d).
+
+    `done` (m,) are how many entries of each node were taken before, and are now.
+    """
     seen, pairs = at_hand(seen), at_hand(pairs)
-    d, t = kin.dimension, kin.tensor_size
+    t = kin.tensor_size
     m, width = pairs.codes.size, seen.nodes.shape[1]
     for a in range(m * part // PARTS, m * (part + 1) // PARTS):
-        row = d * (pairs.first[a + 1] - pairs.first[a])
-        begin = d * d * pairs.first[a]
-        for e in range(seen.starts[a], seen.starts[a + 1]):
+        e = seen.starts[a] + done[a]
+        while e < seen.starts[a + 1] and seen.entries[e] < end * width:
             p, k = seen.entries[e] // width, seen.entries[e] % width
-            C = tuple([tangent[c, p] for c in range(t * t)])
+            C = tuple([tangent[c, p - first] for c in range(t * t)])
             D = by_gradient(kin, gradient_at(kin, seen, p, k), C)
-            for other in range(width):
+            for other in range(seen.count[p]):
                 code = pairs.codes[seen.nodes[p, other]] - pairs.codes[a]
-                at = begin + d * pairs.rank[a, pairs.middle + code]
+                at = pairs.first[a] + pairs.rank[a, pairs.middle + code]
                 made = by_displacement(kin, D, gradient_at(kin, seen, p, other))
                 for c, x in enumerate(made):
-                    K[at + c // d * row + c % d] += x
+                    K[at, c] += x
+            e += 1
+        done[a] = e - seen.starts[a]
 
 
 see = by_threads(_see)
 strain = by_threads(_strain)
 respond = by_threads(_respond)
+respond_to_changes = by_threads(_respond_to_changes)
 mark_pairs = by_threads(_mark_pairs)
 add_forces = by_threads(_add_forces)
 add_stiffness = by_threads(_add_stiffness)
@@ -336,7 +373,7 @@ def add_conductance(kin, seen, conductance, pairs, C):
         for e in range(seen.starts[a], seen.starts[a + 1]):
             p, k = seen.entries[e] // seen.nodes.shape[1], seen.entries[e] % seen.nodes.shape[1]
             g = gradient_at(kin, seen, p, k).planar()
-            for other in range(seen.nodes.shape[1]):
+            for other in range(seen.count[p]):
                 code = pairs.codes[seen.nodes[p, other]] - pairs.codes[a]
                 h = gradient_at(kin, seen, p, other).planar()
                 along = total([x * y for x, y in zip(g, h, strict=True)])
@@ -347,7 +384,7 @@ def add_conductance(kin, seen, conductance, pairs, C):
 def scatter(seen, mass, values, nodes):
     """Add mass times values (d, n) of points to nodes (m, d)."""
     for p in range(seen.nodes.shape[0]):
-        for k in range(seen.nodes.shape[1]):
+        for k in range(seen.count[p]):
             share = mass[p] * seen.weights[p, k]
             for i in range(nodes.shape[1]):
                 nodes[seen.nodes[p, k], i] += share * values[i, p]
@@ -357,6 +394,6 @@ def scatter(seen, mass, values, nodes):
 def gather(seen, nodes, values):
     """Add values of nodes (m, d) to points (d, n)."""
     for p in range(seen.nodes.shape[0]):
-        for k in range(seen.nodes.shape[1]):
+        for k in range(seen.count[p]):
             for i in range(nodes.shape[1]):
                 values[i, p] += seen.weights[p, k] * nodes[seen.nodes[p, k], i]

@@ -51,6 +51,7 @@ class Averages(NamedTuple):
     ratio: np.ndarray  # (1, n) r
     pressure: np.ndarray  # (1, n) q
     mean: np.ndarray  # (1, n) the average of q
+    tangent: np.ndarray  # (t t, n) dP/dA, a row of P after another
     by_ratio: np.ndarray  # (t, n) dP/dr
     of_pressure: np.ndarray  # (t, n) dq/dA
     stiffness: np.ndarray  # (1, n) dq/dr
@@ -59,7 +60,9 @@ class Averages(NamedTuple):
 def nothing_averaged(kin: Any, block: Block) -> Averages:
     """Make the arrays of the points of a block."""
     n, t = block.points.mass.size, kin.tensor_size
-    return Averages(*(rows_of_points((k, n), np.float64) for k in (1, 1, t, 1, 1, 1, t, t, 1)))
+    return Averages(
+        *(rows_of_points((k, n), np.float64) for k in (1, 1, t, 1, 1, 1, t * t, t, t, 1))
+    )
 
 
 @shared
@@ -118,7 +121,7 @@ def _respond(kin, points, laws, dt, response, averages, part):
         volume = mass * specific_volume(law)
         slopes = [slopes_of(x, t + 1) for x in P]
         store(response.stress, p, volume * value_of(P))
-        store(response.tangent, p, tuple([volume * s for row in slopes for s in row[:t]]))
+        store(averages.tangent, p, tuple([volume * s for row in slopes for s in row[:t]]))
         store(averages.by_ratio, p, tuple([volume * row[t] for row in slopes]))
         of_pressure = slopes_of(pressure, t + 1)
         store(averages.pressure, p, (volume * value_of(pressure),))
@@ -157,7 +160,7 @@ def _bring_mean(kin, response, averages, part):
         for c, x in enumerate(made):
             response.stress[c, p] += scale * value_of(x)
             for b, slope in enumerate(slopes_of(x, t)):
-                response.tangent[c * t + b, p] += scale * slope
+                averages.tangent[c * t + b, p] += scale * slope
 
 
 # --- at the nodes -----------------------------------------------------------------------------
@@ -181,7 +184,7 @@ def _average(seen, nodes, values, part):
     count = seen.nodes.shape[0]
     for p in range(points_of(count, part), points_of(count, part + 1)):
         sum_of = 0.0
-        for k in range(seen.nodes.shape[1]):
+        for k in range(seen.count[p]):
             sum_of += seen.weights[p, k] * nodes[seen.nodes[p, k]]
         values[0, p] = sum_of
 
@@ -197,7 +200,7 @@ def _add_slopes(kin, seen, tensors, pairs, out, part):
             p, k = seen.entries[e] // width, seen.entries[e] % width
             weight = seen.weights[p, k]
             T = load(tensors, p, zero(kin, weight))
-            for other in range(width):
+            for other in range(seen.count[p]):
                 code = pairs.codes[seen.nodes[p, other]] - pairs.codes[a]
                 at = d * (pairs.first[a] + pairs.rank[a, pairs.middle + code])
                 made = vector(kin, T.dot(gradient_at(kin, seen, p, other)))
@@ -214,7 +217,7 @@ def _add_products(seen, values, pairs, out, part):
         for e in range(seen.starts[a], seen.starts[a + 1]):
             p, k = seen.entries[e] // width, seen.entries[e] % width
             scale = seen.weights[p, k] * values[0, p]
-            for other in range(width):
+            for other in range(seen.count[p]):
                 code = pairs.codes[seen.nodes[p, other]] - pairs.codes[a]
                 at = pairs.first[a] + pairs.rank[a, pairs.middle + code]
                 out[at] += scale * seen.weights[p, other]

@@ -82,6 +82,7 @@ class Context(NamedTuple):
     buffers: Nodes  # nodes that are given to
     now: int
     room: Number  # cells that points may still go before their tile's box does not hold them
+    stride: Number  # cells that they may go at all
     common: tuple  # (d,) velocity that speeds are measured from
     then: int  # which of the two arrays of places takes the new ones
     gathers: bool  # whether the tasks of the visit are done
@@ -212,7 +213,7 @@ def visit_tile(visit: Visit, s: Context, block: Block, t: int) -> None:
                 moved, rate = updated_all(visit.tasks, w, stencil, p, dt, totals, fastest)
             elif s.frame.moves:
                 moved = where(inside(grid, s.kin, position_of(w, p)), moved, real(inf, moved))
-            good = (moved <= 1) & (rate < 1e300)  # so written, NaN counts as wrong too
+            good = (moved <= s.stride) & (rate < 1e300)  # so written, NaN counts as wrong too
             if not all_lanes(good):
                 wrong = q + 1 + first_false_lane(good)
                 continue
@@ -281,7 +282,8 @@ def context_of(s: Setup, dt: Number, gathers: bool, scatters: bool, moves: bool)
     room = clock.drift_limit - clock.drift - clock.move + 0.5 * ROUNDING
     return Context(
         s.frame, s.kin, s.basis, in_step(s.transfer, clock.kept), s.averaging, s.grids, s.nodes,
-        s.buffers.nodes, clock.now, real(room, dt), common_velocity(s.kin, clock, dt),
+        s.buffers.nodes, clock.now, real(room, dt), real(clock.stride, dt),
+        common_velocity(s.kin, clock, dt),
         1 - clock.now if moves else clock.now, gathers, scatters, dt,
         real(clock.kick, dt),
     )  # fmt: skip

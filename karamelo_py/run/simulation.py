@@ -24,6 +24,8 @@ from karamelo_py.run.scene_arrays import SceneArrays
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
+FAR = 1e9  # cells, further than points ever go
+
 
 class Simulation(SceneArrays):
     """Take the steps of a scene, or of the share of a process, beside others that do the same."""
@@ -110,6 +112,7 @@ class Simulation(SceneArrays):
             "courant": now[0],
             "courant_moving": moving[0],
             "fixed_dt": (update.fixed_dt or float(self.implicit)) * share,  # load steps of 1
+            "stride": FAR if self.implicit else 1.0,
             "heat_factor": (update.dt_factor or timestep.USUAL) * share,
             "dt_factor": now[1] * share,
             "dt_factor_moving": moving[1] * share,

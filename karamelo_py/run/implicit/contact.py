@@ -78,7 +78,7 @@ class Contact:
         self.jump = sp.csr_matrix((ones, (at, self.first)), (count, m)) - sp.csr_matrix(
             (ones, (at, self.second)), (count, m)
         )
-        self.jumps = equations.for_all_components(self.jump)
+        self.jumps = equations.for_all_components(self.jump).tocsr()
         self.begun = False
 
     def _shares(self) -> np.ndarray:
@@ -149,13 +149,13 @@ class Contact:
         """Give the forces (m, d) on the nodes."""
         return -(self.jump.T @ self.on_second)
 
-    def matrix(self) -> sp.csr_matrix:
+    def matrix(self) -> sp.bsr_matrix:
         """Give the derivatives (m d, m d) of the forces, with the sign of a stiffness."""
         c, d = len(self.first), self.d
         row = np.arange(c * d).reshape(c, d)
         i, j = (np.broadcast_to(x, (c, d, d)).ravel() for x in (row[:, :, None], row[:, None, :]))
         C = sp.csr_matrix((self.tangent.ravel(), (i, j)), (c * d, c * d))
-        return (self.jumps.T @ C @ self.jumps).tocsr()
+        return (self.jumps.T @ C @ self.jumps).tobsr((d, d))
 
     def held(self, motions: np.ndarray, own: np.ndarray) -> np.ndarray:
         """Give how pairs that touch hold rigid `motions` (m, d, k) of some nodes (m,): (r, k)."""

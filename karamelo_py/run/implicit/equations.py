@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from karamelo_py.compiler.algebra import on_numbers
-from karamelo_py.compiler.fields import field
+from karamelo_py.compiler.fields import field, rows_of_points
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import MASS, Setup, known_to_laws
 from karamelo_py.kernels.heat import Conductance
@@ -25,6 +25,7 @@ from karamelo_py.kernels.implicit import (
     mark_pairs,
     nothing_seen,
     respond,
+    respond_to_changes,
     scatter,
     see,
     spread,
@@ -37,8 +38,15 @@ from karamelo_py.points.laws import can, constrained_velocity, initial_state, sp
 from karamelo_py.run.implicit.averaging import AveragedVolumes
 from karamelo_py.run.implicit.solvers import rigid_motions
 
+AT_ONCE = 8192  # points whose derivatives are kept until they are in the matrix
+FAR = 0.5  # cells that nodes may go at once towards others, and that for each cell between them
 # What is known of a step before where the first are the same.
 FOLLOWED, FOLLOWING = ("nodes", "deforming"), ("positions", "rigid_motions", "differences")
+
+
+def valid(seen: Seen) -> np.ndarray:
+    """Tell which nodes (n, s) points have something of."""
+    return np.arange(seen.nodes.shape[1]) < seen.count[:, None]
 
 
 def distinct(numbers: list[np.ndarray]) -> np.ndarray:
@@ -60,18 +68,10 @@ class Moduli(NamedTuple):
     of_grids: np.ndarray  # (g,) the means of each grid, 0 where nothing deforms
     of_laws: list[np.ndarray]  # (2, k) those of the laws of each block; their specific volumes
 
-    def _every(self) -> np.ndarray:
-        none = np.zeros(0)
-        return np.concatenate([none, *(own[0, own[1] > 0] for own in self.of_laws)])
-
     def alike(self) -> bool:
         """Tell whether all bodies have the same modulus."""
-        return len(np.unique(self._every())) <= 1
-
-    def least(self) -> float:
-        """Find the smallest modulus of a body that bears shear."""
-        every = self._every()
-        return self.mean if self.alike() else float(every[every > 0].min())
+        every = (own[0, own[1] > 0] for own in self.of_laws)
+        return len(np.unique(np.concatenate([np.zeros(0), *every]))) <= 1
 
 
 class Equations:
@@ -85,6 +85,8 @@ class Equations:
         One thread, or several.
     known
         What those of the step before give (`known`), or nothing.
+    stabilised
+        Whether there is a ghost stabilisation.
 
     Attributes
     ----------
@@ -100,17 +102,14 @@ class Equations:
         (m,) which of them deforming points give something to.
     led, velocity_of_rigid
         (m,) which of them see rigid points, and the velocities (m, d) that they have from these.
-    fastest_tool
-        The largest component of a velocity of rigid points.
     """
 
-    def __init__(self, s: Setup, mode: Any, known: dict[str, Any]):
+    def __init__(self, s: Setup, mode: Any, known: dict[str, Any], stabilised: bool):
         self.s, self.mode, self.d = s, mode, s.kin.dimension
         self.blocks = [block for block in s.blocks if not can(block.laws, constrained_velocity)]
         self.parts = [self._seen(block) for block in self.blocks]
         # Gradients of points on a line between cells reach nodes where they have no weight.
-        given = [self._counts(seen) for seen, _ in self.parts]
-        counts = [seen.nodes[own] for (seen, _), own in zip(self.parts, given, strict=True)]
+        counts = [seen.nodes[valid(seen)] for seen, _ in self.parts]
         soft = distinct(counts)
         tools = [(b, self._seen(b)[0]) for b in s.blocks if can(b.laws, constrained_velocity)]
         counts += [seen.nodes[seen.weights > 0] for _, seen in tools]
@@ -119,19 +118,14 @@ class Equations:
         self.numbers[self.nodes - self.nodes[0]] = np.arange(len(self.nodes))
         self.mass = s.nodes.sums[self.nodes, MASS].astype(float)
         self.places = self._places()
-        self.parts = [
-            (self._numbered(seen, own), response)
-            for (seen, response), own in zip(self.parts, given, strict=True)
-        ]
-        tools = [(block, self._numbered(seen, seen.weights > 0)) for block, seen in tools]
+        self.parts = [(self._numbered(seen), response) for seen, response in self.parts]
+        tools = [(block, self._numbered(seen)) for block, seen in tools]
         self.deforming = np.isin(self.nodes, soft)
         self.led, self.velocity_of_rigid = self._led(tools)
-        speeds = [np.abs(b.points.v).max(initial=0.0) for b, _ in tools]
-        self.fastest_tool = float(max(speeds, default=0.0))
-        self._find_pairs()
-        self.averaged = AveragedVolumes(self) if isinstance(s.averaging, FBar) else None
         if all(np.array_equal(vars(self)[name], known.get(name)) for name in FOLLOWED):
             vars(self).update(known)
+        self._find_pairs(stabilised)
+        self.averaged = AveragedVolumes(self) if isinstance(s.averaging, FBar) else None
 
     def known(self) -> dict[str, Any]:
         """Give what follows from the nodes alone, and what it follows from, for steps to come."""
@@ -157,10 +151,6 @@ class Equations:
         see(self.mode, PARTS, s.frame, s.kin, s.basis, s.grids, block.points, block.laws, now, seen)
         return seen, response
 
-    def _counts(self, seen: Seen) -> np.ndarray:
-        """Tell which nodes (n, s) of points have something of them."""
-        return (seen.weights != 0) | (seen.gradients != 0).any(2)
-
     def _led(self, tools: list[tuple[Any, Seen]]) -> tuple[np.ndarray, np.ndarray]:
         """Find the nodes (m,) that see rigid points, and the velocities (m, d) these have there."""
         mass, momentum = np.zeros((len(self.nodes), 1)), np.zeros((len(self.nodes), self.d))
@@ -170,21 +160,27 @@ class Equations:
         led = mass[:, 0] > 0
         return led, np.divide(momentum, mass, out=momentum, where=led[:, None])
 
-    def _numbered(self, seen: Seen, counts: np.ndarray) -> Seen:
-        """Put numbers of nodes among the unknown ones in the place of those in the grid.
-
-        `counts` (n, s) tells which of them points have something of.
-        """
-        number = self.number_of(seen.nodes)
-        first = number[np.arange(len(number)), counts.argmax(1)]
-        seen.nodes[:] = np.where(counts, number, first[:, None])
-        starts = np.zeros(len(self.nodes) + 1, np.int64)
-        seen = seen._replace(starts=starts, entries=np.zeros(seen.nodes.size, np.int64))
+    def _numbered(self, seen: Seen) -> Seen:
+        """Put numbers of nodes among the unknown ones in the place of those in the grid."""
+        most = int(seen.count.max(initial=1))
+        number = self.number_of(seen.nodes[:, :most])
+        own = valid(seen)[:, :most] & (number >= 0)
+        first = number[np.arange(len(number)), own.argmax(1)]
+        seen = seen._replace(
+            nodes=np.where(own, number, first[:, None]).astype(np.int32),
+            weights=seen.weights[:, :most].copy(),
+            gradients=seen.gradients[:, :most].copy(),
+            starts=np.zeros(len(self.nodes) + 1, np.int64),
+            entries=np.zeros(int(seen.count.sum()), np.int64),
+        )
         list_points(seen)
         return seen
 
-    def _find_pairs(self) -> None:
-        """Find the pairs of nodes that points see both of, and lay out K for all components."""
+    def _find_pairs(self, stabilised: bool) -> None:
+        """Find the pairs of nodes that points see both of, and lay out K, a block for each.
+
+        Those of the ghost stabilisation are among them, and each node with itself.
+        """
         d, m = self.d, len(self.nodes)
         reach = max((spread(seen, self.places) for seen, _ in self.parts), default=0)
         row = 2 * reach + 1
@@ -192,25 +188,24 @@ class Equations:
         rank = np.full((m, row**d), -1, np.int32)
         middle = int(reach * weights.sum())
         self.layout = Pairs(self.places @ weights, middle, rank, np.zeros(m + 1, np.int64))
+        rank[:, middle] = 0
         for seen, _ in self.parts:
             mark_pairs(self.mode, PARTS, seen, self.layout)
         rows, offsets = np.nonzero(rank == 0)
-        counts = np.bincount(rows, minlength=m)
-        first = self.layout.first
-        np.cumsum(counts, out=first[1:])
-        own = np.arange(len(rows)) - first[rows]
-        rank[rows, offsets] = own
         shift = np.stack(np.unravel_index(offsets, (row,) * d), 1) - reach
         columns = self.number_of(self.nodes[rows] + (shift * self.steps[rows]).sum(1))
-        self.pairs = rows, columns
-        # A row of K has the components of all other nodes one after another.
-        starts = np.append((d * d * first[:-1, None] + d * np.outer(counts, np.arange(d))).ravel(),
-                           d * d * first[-1])  # fmt: skip
-        at = (starts.reshape(-1)[rows * d] + d * own)[:, None] + np.arange(d)
-        indices = np.empty(d * d * len(rows), np.int32)
-        for i in range(d):
-            indices[at + i * d * counts[rows][:, None]] = columns[:, None] * d + np.arange(d)
-        self.K = sp.csr_matrix((np.zeros(len(indices)), indices, starts), shape=(m * d, m * d))
+        self.joined = rows.astype(np.int32), columns.astype(np.int32)
+        own = every = rows * m + columns
+        if stabilised:
+            lines = self.differences[0]
+            ghosts = lines[:, np.repeat(range(3), 3)] * m + lines[:, np.tile(range(3), 3)]
+            every = np.union1d(own, ghosts)
+        self.pairs = tuple(one.astype(np.int32) for one in np.divmod(every, m))
+        np.cumsum(np.bincount(self.pairs[0], minlength=m), out=self.layout.first[1:])
+        rank[rows, offsets] = np.searchsorted(every, own) - self.layout.first[rows]
+        self.K = sp.bsr_matrix(
+            (np.zeros((len(every), d, d)), self.pairs[1], self.layout.first), (m * d, m * d)
+        )
 
     def number_of(self, nodes: np.ndarray) -> np.ndarray:
         """Find the numbers of nodes among the unknown ones; -1 of others."""
@@ -220,24 +215,10 @@ class Equations:
 
     def bodies(self) -> np.ndarray:
         """Number (m,) the bodies that nodes belong to: pieces that points connect."""
-        rows, columns = self.pairs
+        rows, columns = self.joined
         m = len(self.nodes)
         graph = sp.csr_matrix((np.ones(len(rows), bool), (rows, columns)), (m, m))
         return connected_components(graph, directed=False)[1]
-
-    def unknowns(self, free: np.ndarray) -> None:
-        """Number the free components (m, d), and lay out the sparse matrix of their equations."""
-        self.free = free
-        chosen = free.ravel()
-        number = np.cumsum(chosen, dtype=np.int32) - np.int32(1)
-        indices, starts = self.K.indices, self.K.indptr
-        kept = np.repeat(chosen, np.diff(starts)) & chosen[indices]
-        self.taken = np.flatnonzero(kept).astype(np.int32)
-        ends = np.append(0, np.cumsum(kept, dtype=np.int32))[starts]
-        rows = np.append(0, ends[1:][chosen])
-        count = np.count_nonzero(chosen)
-        data = np.zeros(len(self.taken))
-        self.matrix = sp.csr_matrix((data, number[indices[self.taken]], rows), (count, count))
 
     def respond(self, u: np.ndarray, dt: float) -> np.ndarray:
         """Find the nodal forces (m, d) of displacements (m, d); not finite where a point fails."""
@@ -263,6 +244,28 @@ class Equations:
         """Find the largest component of a displacement of a point, at the last response."""
         return max((float(response.furthest.max()) for _, response in self.parts), default=0.0)
 
+    def furthest_into(self, u: np.ndarray, held: np.ndarray) -> float:
+        """Find how many cells a node goes at most to where it may meet what goes elsewhere.
+
+        It is there beside nodes whose displacements (m, d) are others, by more than bodies turn or
+        strain in a step, or which nothing saw, and which fixes hold (nodes, d).
+        """
+        cells = u / self.s.grids.spacing[self.grid][:, None]
+        far, k = np.nonzero(np.abs(cells) > FAR)
+        g, start, way, most = self.grid[far], self.places[far], cells[far, k], 0.0
+        ends = np.stack([self.s.grids.nx[g], self.s.grids.ny[g], self.s.grids.nz[g]], 1)[
+            :, : self.d
+        ]
+        for side in np.ndindex(*(2,) * self.d):
+            shift = np.clip(np.floor(start + cells[far]).astype(int) + side, 0, ends) - start
+            node = self.nodes[far] + (shift * self.steps[far]).sum(1)
+            number = self.number_of(node)
+            other = np.where(number >= 0, cells[number, k], 0.0)
+            meets = np.abs(way - other) > FAR * (1 + np.abs(shift).max(1))
+            meets &= (number >= 0) | held[node, k]
+            most = max(most, float(np.abs(way[meets]).max(initial=0.0)))
+        return most
+
     def present_forces(self) -> np.ndarray:
         """Find the nodal forces (m, d) of the present stress."""
         if self.averaged is not None:
@@ -284,28 +287,42 @@ class Equations:
         """Rigid motions (m, d, k) of the nodes."""
         return rigid_motions(self.positions, isinstance(self.s.kin, Axisymmetric))
 
-    def for_all_components(self, matrix: sp.csr_matrix) -> sp.csr_matrix:
+    def for_all_components(self, matrix: sp.csr_matrix) -> sp.bsr_matrix:
         """Make of a matrix (m, m) that of all components (m d, m d), each by itself."""
-        return sp.kron(matrix, sp.eye(self.d), "csr")
+        blocks = matrix.data[:, None, None] * np.eye(self.d)
+        shape = tuple(self.d * size for size in matrix.shape)
+        return sp.bsr_matrix((blocks, matrix.indices, matrix.indptr), shape)
 
-    def linearise(self) -> None:
-        """Assemble the derivatives of the last forces."""
-        self.K.data[:] = 0
-        for seen, response in self.parts:
-            add_stiffness(
-                self.mode, PARTS, self.s.kin, seen, response.tangent, self.layout, self.K.data
-            )
+    def linearise(self, dt: float, ghost: sp.csr_matrix | None = None) -> None:
+        """Assemble the derivatives of the last forces, and of those of a stabilisation (m, m)."""
+        d, t, kin = self.d, self.s.kin.tensor_size, self.s.kin
+        blocks = self.K.data
+        blocks[:] = 0
+        alone = ~self.deforming[self.pairs[0]] & (self.pairs[0] == self.pairs[1])
+        blocks[alone] = np.eye(d)  # sums of matrices keep no blocks of zeros
+        into = self.layout, blocks.reshape(-1, d * d)
+        for k, (block, (seen, response)) in enumerate(zip(self.blocks, self.parts, strict=True)):
+            n, done = block.points.mass.size, np.zeros(len(self.nodes), np.int64)
+            if self.averaged is not None:
+                tangent = self.averaged.averages[k].tangent
+                add_stiffness(self.mode, PARTS, kin, seen, tangent, 0, n, done, *into)
+                continue
+            points = known_to_laws(block.points)
+            tangent = rows_of_points((t * t, min(n, AT_ONCE)), np.float64)
+            for first in range(0, n, AT_ONCE):
+                some = first, min(first + AT_ONCE, n)
+                of = points, block.laws, dt, response, *some, tangent
+                respond_to_changes(self.mode, PARTS, kin, *of)
+                add_stiffness(self.mode, PARTS, kin, seen, tangent, *some, done, *into)
+        if ghost is not None:
+            m = len(self.nodes)
+            rows = np.repeat(np.arange(m), np.diff(ghost.indptr))
+            every = self.pairs[0] * np.int64(m) + self.pairs[1]
+            at = np.searchsorted(every, rows * m + ghost.indices)
+            blocks[at] += ghost.data[:, None, None] * np.eye(d)
         self.whole = self.K
-        if self.averaged is None:
-            np.take(self.K.data, self.taken, out=self.matrix.data)
-        else:
-            self.whole = self.K + self.averaged.stiffness()
-            free = self.free.ravel()
-            self.matrix = self.whole[free][:, free]
-
-    def of_prescribed(self, change: np.ndarray) -> np.ndarray:
-        """Find the forces at the free components of changes (m, d) of the others."""
-        return (self.whole @ change.ravel())[self.free.ravel()]
+        if self.averaged is not None:
+            self.whole = (self.K.tocsr() + self.averaged.stiffness()).tobsr((d, d))
 
     def conduction(self) -> sp.csr_matrix:
         """Assemble the heat that flows out of nodes (m, m) by their temperatures.

@@ -76,6 +76,17 @@ class LoadSteps:
                 return SORT
         return DONE
 
+    def held(self) -> np.ndarray:
+        """Find which components (nodes, d) of all nodes fixes hold."""
+        found = np.zeros(
+            (self.simulation.hub.fields.node_count, self.simulation.setup.kin.dimension), bool
+        )
+        for fix in self.simulation.hub.fixes.values():
+            if "post_update_grid_state" in fix.hooks() and not fix.first_step_only:
+                for k in fix.held_directions or range(found.shape[1]):
+                    found[fix.nodes, k] = True
+        return found
+
     def _step(self, hooks: Any) -> None:
         """Take a load step, in parts where it has to be."""
         control = self.simulation.setup.control
@@ -217,7 +228,8 @@ class LoadSteps:
         simulation = self.simulation
         s = simulation.setup
         with counted(self.seconds, "layout"):
-            equations = Equations(s, simulation.mode, self.known)
+            stabilised = self.scheme.stabilisation > 0
+            equations = Equations(s, simulation.mode, self.known, stabilised)
         nodes = equations.nodes
         external = after[nodes] + equations.present_forces()
         self._check_numbers(external, "a node gets a force that is not a number")
@@ -230,8 +242,6 @@ class LoadSteps:
         contact = contact_of(equations, self.moduli.of_grids)
         if not self.dynamic:
             self._check_held(equations, given, contact)
-        with counted(self.seconds, "layout"):
-            equations.unknowns(~given)
         if before is None:
             inertia: Rest | Motion = Rest(equations)
         else:
@@ -239,7 +249,8 @@ class LoadSteps:
             inertia = Motion(equations, self.scheme, dt, before[nodes], *held, contact)
         tools = tools_of(equations, simulation)
         pushing = [*([] if contact is None else [contact]), *tools]
-        newton = Newton(self.scheme, equations, inertia, pushing, external, dt, self.seconds)
+        more = self.seconds, self.held
+        newton = Newton(self.scheme, equations, ~given, inertia, pushing, external, dt, *more)
         newton.scale(self.moduli, self.scheme.stabilisation)
         try:
             jump = np.where(given, velocities * dt, 0.0)

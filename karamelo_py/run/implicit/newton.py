@@ -9,12 +9,19 @@ import numpy as np
 import scipy.sparse as sp
 
 from karamelo_py.run.implicit.contact import Contact
-from karamelo_py.run.implicit.equations import Equations, Moduli
-from karamelo_py.run.implicit.solvers import Singular, Unconverged, changed_sign, direct, solve
+from karamelo_py.run.implicit.equations import FAR, Equations, Moduli
+from karamelo_py.run.implicit.solvers import (
+    Singular,
+    Unconverged,
+    changed_sign,
+    direct,
+    hold,
+    solve,
+)
 from karamelo_py.run.implicit.tools import Tool
 
+ROUNDING = 50 * float(np.finfo(float).eps)  # of sums of some dozens of terms
 ASTRAY = 1e4  # times as far as points may go: nothing holds them
-FAR = 0.5  # cells that points may go at once, where weights follow them; else less than one
 
 
 @contextmanager
@@ -67,7 +74,9 @@ class Newton:
     scheme
         A tag with ``tolerance``, ``iterations`` and ``solver``.
     equations
-        Forces and stiffness, with numbered unknowns.
+        Forces and stiffness.
+    free
+        (m, d) which components are unknown.
     inertia
         What moving bodies add.
     pushing
@@ -78,31 +87,29 @@ class Newton:
         The step.
     seconds
         Takes the time of stages: of stress and tangent, assembly, and solution.
-
-    Attributes
-    ----------
-    floor
-        A force that is next to nothing: residuals are relative to it at least.
+    held
+        Tells which components (nodes, d) of all nodes fixes hold.
     """
 
     def __init__(
         self,
         scheme: Any,
         equations: Equations,
+        free: np.ndarray,
         inertia: Any,
         pushing: list[Contact | Tool],
         external: np.ndarray,
         dt: float,
         seconds: dict[str, float],
+        held: Callable[[], np.ndarray],
     ):
         self.scheme, self.equations, self.inertia = scheme, equations, inertia
         self.pushing, self.external = pushing, external
-        self.dt, self.seconds = dt, seconds
-        self.free = equations.free
+        self.dt, self.seconds, self.held = dt, seconds, held
+        self.free = free
         self.spacing = float(np.min(equations.s.grids.spacing))
         self.ghost: sp.csr_matrix | None = None
-        self.ghost_of_free: sp.csr_matrix | None = None
-        self.floor = 0.0
+        self.stiff = np.zeros_like(external)  # diagonal of the last matrix
         self.kept: dict = {}  # what a solver keeps from one correction to the next
         with counted(seconds, "stress"):
             self.inner = equations.respond(np.zeros_like(external), dt)
@@ -110,12 +117,9 @@ class Newton:
             one.respond(np.zeros_like(external))
 
     def scale(self, moduli: Moduli, stabilisation: float) -> None:
-        """Tell the stiffness of the bodies; a share of it penalises jumps at their border."""
-        self.floor = 1e-9 * moduli.least() * self.spacing ** (self.equations.d - 1)
+        """Tell the stiffness of the bodies, a share of which penalises jumps at their border."""
         if stabilisation * moduli.mean:
             self.ghost = stabilisation * moduli.mean * self.equations.ghost(moduli)
-            free = self.free.ravel()
-            self.ghost_of_free = self.equations.for_all_components(self.ghost)[free][:, free]
 
     def solve(
         self, jump: np.ndarray, interrupted: Callable[[], bool]
@@ -132,12 +136,10 @@ class Newton:
         """
         scheme, free = self.scheme, self.free
         u = np.zeros_like(jump)
-        settled = False
         for iteration in range(scheme.iterations + 1):
             balance = self.balance(u)
             residual = float(np.linalg.norm(balance[free]) / self._size(u))
-            done = residual <= scheme.tolerance or (settled and residual <= 1e-6)
-            if done and not (iteration == 0 and np.any(jump)):
+            if residual <= scheme.tolerance and not (iteration == 0 and np.any(jump)):
                 return u, iteration, residual
             if interrupted():
                 raise Broken
@@ -146,8 +148,6 @@ class Newton:
                 u += change
                 jump = np.zeros_like(jump)
                 self._respond(u)
-                # Where forces are small beside what they are rounded to, displacements tell.
-                settled = np.linalg.norm(change) <= scheme.tolerance * np.linalg.norm(u)
         raise Failed(f"after {scheme.iterations} corrections {residual:.1e} of the forces are left")
 
     def balance(self, u: np.ndarray) -> np.ndarray:
@@ -170,40 +170,43 @@ class Newton:
 
     def _size(self, u: np.ndarray) -> float:
         norms = np.linalg.norm(self.external), np.linalg.norm(self.inner), self.inertia.size(u)
-        return max(*norms, self.floor, 1e-300)
+        return max(*norms, self._rounding(u) / self.scheme.tolerance, 1e-300)
+
+    def _rounding(self, u: np.ndarray) -> float:
+        """Estimate what forces are rounded to: those of strains to the digits of 1, and of u."""
+        far = np.abs(u) + self.spacing
+        return ROUNDING * float(np.linalg.norm((self.stiff * far)[self.free]))
 
     def _correction(self, balance: np.ndarray, jump: np.ndarray, residual: float) -> np.ndarray:
         """Solve the linear equations for the change of all displacements (m, d).
 
         As accurate as keeps Newton's method quadratic (Eisenstat & Walker 1996).
         """
-        equations, inertia, free = self.equations, self.inertia, self.free
-        change = jump.copy()
+        equations, free = self.equations, self.free
         with counted(self.seconds, "assembly"):
-            equations.linearise()
-        A = equations.matrix
-        b = balance[free] - equations.of_prescribed(jump)
-        if self.ghost is not None:
-            A = A + self.ghost_of_free
-            b -= (self.ghost @ jump)[free]
-        for one in self.pushing:
-            every = one.matrix()
-            A = A + every[free.ravel()][:, free.ravel()]
-            b -= (every @ jump.ravel())[free.ravel()]
-        if inertia.diagonal:
-            mass = np.broadcast_to(equations.mass[:, None], free.shape)[free]
-            A = A + sp.diags(inertia.diagonal * mass)
-        if len(b):
-            try:
-                accuracy = max(1e-10, min(1e-4, 0.1 * residual))
-                rigid = equations.rigid_motions[free]
-                with counted(self.seconds, "solution"):
-                    change[free] = solve(self.scheme.solver, A, b, rigid, accuracy, self.kept)
-            except Singular:
-                raise Loose(self._loosest(A)) from None
-            except Unconverged:
-                raise Failed("multigrid did not converge: take solver=direct") from None
-        return change
+            equations.linearise(self.dt, self.ghost)
+            A, b = equations.whole, balance.ravel() - equations.whole @ jump.ravel()
+            hold(A, ~free, self.inertia.diagonal * equations.mass)
+            for one in self.pushing:
+                more = one.matrix()
+                b -= more @ jump.ravel()
+                hold(more, ~free, np.zeros(len(free)))
+                A = A + more
+            b[~free.ravel()] = 0
+            self.stiff = np.abs(A.diagonal()).reshape(free.shape)
+        if not np.any(free):
+            return jump
+        rigid = np.where(free[:, :, None], equations.rigid_motions, 0.0)
+        accuracy = max(1e-10, min(1e-4, 0.1 * residual))
+        try:
+            with counted(self.seconds, "solution"):
+                own = rigid.reshape(len(b), -1), accuracy, self.kept
+                x = solve(self.scheme.solver, A, b, *own).reshape(free.shape)
+        except Singular:
+            raise Loose(self._loosest(A)) from None
+        except Unconverged:
+            raise Failed("multigrid did not converge: take solver=direct") from None
+        return np.where(free, x, jump)
 
     def _wrong(self, u: np.ndarray) -> Failed:
         """Tell why forces of stress after displacements (m, d) are no numbers."""
@@ -222,16 +225,16 @@ class Newton:
                 return Wrong(f"point {point} turns inside out", point)
         return Failed("forces of stress are no finite numbers")
 
-    def _loosest(self, A: sp.csr_matrix) -> int:
+    def _loosest(self, A: sp.bsr_matrix) -> int:
         """Find the node that moves most in the softest motion, by inverse iteration."""
         size = np.abs(A.diagonal()) + 1e-12 * np.abs(A.data).max(initial=1e-300)
         B = A + sp.diags(1e-9 * size)
-        x = np.random.default_rng(0).standard_normal(A.shape[0])
+        x = np.where(self.free.ravel(), np.random.default_rng(0).standard_normal(A.shape[0]), 0)
         with suppress(Singular):
             for _ in range(2):
                 x = direct(B.tocsr(), x * size)
                 x /= np.abs(x).max()
-        return int(np.argwhere(self.free)[np.abs(x).argmax(), 0])
+        return int(np.abs(x).argmax() // self.free.shape[1])
 
     def _respond(self, u: np.ndarray) -> None:
         """Find the forces of stress after displacements (m, d), if points can follow."""
@@ -243,9 +246,12 @@ class Newton:
         if not np.all(np.isfinite(self.inner)):
             raise self._wrong(u)
         far = equations.furthest() / self.spacing
-        most = FAR if equations.s.frame.moves else 0.95
-        if far > ASTRAY * most:
+        if far > ASTRAY * FAR:
             raise Loose(int(np.abs(u).max(1).argmax()))
-        far = max(far, equations.fastest_tool * self.dt / self.spacing)
-        if not far <= most:
-            raise TooFar(f"points would go {far:.3g} cells at once", far / most)
+        far = max(far, np.abs(u[equations.led]).max(initial=0.0) / self.spacing)
+        if far <= FAR or not equations.s.frame.moves:
+            return
+        if not self.pushing:  # contact knows nothing beyond the surfaces of now
+            far = min(far, equations.furthest_into(u, self.held()))
+        if far > FAR:
+            raise TooFar(f"points would go {far:.3g} cells at once", far / FAR)

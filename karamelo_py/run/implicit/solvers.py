@@ -24,8 +24,21 @@ class Unconverged(Exception):
     """Multigrid leaves more than a hundredth of the residual."""
 
 
-def scaled(A: sp.csr_matrix, s: np.ndarray | None = None) -> tuple[sp.csr_matrix, np.ndarray]:
+def hold(A: sp.bsr_matrix, given: np.ndarray, more: np.ndarray) -> None:
+    """Make the given components (m, d) of a matrix stand alone; add `more` (m,) to the others."""
+    rows = np.repeat(np.arange(len(given)), np.diff(A.indptr))
+    some = given.any(1)
+    at = np.flatnonzero(some[rows] | some[A.indices])
+    A.data[at] *= ~(given[rows[at]][:, :, None] | given[A.indices[at]][:, None, :])
+    own, i = np.flatnonzero(rows == A.indices), np.arange(given.shape[1])
+    A.data[own[:, None], i, i] += np.where(given, 1.0, more[:, None])[rows[own]]
+
+
+def scaled(A: sp.spmatrix, s: np.ndarray | None = None) -> tuple[sp.csr_matrix, np.ndarray]:
     """Scale rows and columns such that the diagonal is 1, or by given factors (n,)."""
+    if A.format == "bsr":
+        A = A.tocsr()
+        A.eliminate_zeros()  # of components that stand alone, of which there may be many
     if s is None:
         diagonal = np.abs(A.diagonal())
         if not np.all(diagonal > 0):
@@ -36,7 +49,7 @@ def scaled(A: sp.csr_matrix, s: np.ndarray | None = None) -> tuple[sp.csr_matrix
     return sp.csr_matrix((data, A.indices, A.indptr), A.shape), s
 
 
-def direct(A: sp.csr_matrix, b: np.ndarray, kept: dict | None = None) -> np.ndarray:
+def direct(A: sp.spmatrix, b: np.ndarray, kept: dict | None = None) -> np.ndarray:
     """Solve by SuperLU; the factors are `kept`."""
     B, s = scaled(A)
     kept = {} if kept is None else kept
@@ -63,14 +76,15 @@ def changed_sign(factors: Any) -> bool:
 
 
 def amg(
-    A: sp.csr_matrix, b: np.ndarray, rigid: np.ndarray, accuracy: float, kept: dict
+    A: sp.spmatrix, b: np.ndarray, rigid: np.ndarray, accuracy: float, kept: dict
 ) -> np.ndarray:
     """Solve by conjugate gradients (GMRES where A is not symmetric) with algebraic multigrid.
 
-    `rigid` are the rigid motions (n, k) of the unknowns: smoothed aggregation takes them for what
-    hardly meets a resistance (Vanek, Mandel & Brezina 1996). `accuracy` is the residual that is
-    left, as a share of b. The coarse equations are `kept` for matrices to come, which differ
-    little, as long as these are solved in a few iterations: to make them takes most of the time.
+    `rigid` are the rigid motions (n, k) of the unknowns, 0 of what stands alone: smoothed
+    aggregation takes them for what hardly meets a resistance (Vanek, Mandel & Brezina 1996).
+    `accuracy` is the residual that is left, as a share of b. The coarse equations are `kept` for
+    matrices to come, which differ little, as long as these are solved in a few iterations: to make
+    them takes most of the time.
     """
     import pyamg
 
@@ -85,7 +99,9 @@ def amg(
         else:
             kept["scale"] = s
             kept["multigrid"] = pyamg.smoothed_aggregation_solver(
-                B, B=rigid / s[:, None], symmetry="symmetric" if symmetric else "nonsymmetric"
+                B,
+                B=rigid / s[:, None],
+                symmetry="symmetric" if symmetric else "nonsymmetric",
             )
         x = kept["multigrid"].solve(
             s * b,
@@ -101,7 +117,7 @@ def amg(
     return s * x
 
 
-def is_symmetric(A: sp.csr_matrix) -> bool:
+def is_symmetric(A: sp.spmatrix) -> bool:
     """Tell whether a matrix is symmetric, but for rounding: whether A x = A^T x of a random x."""
     x = np.random.default_rng(0).uniform(0.5, 1.5, A.shape[0])
     y = A @ x
@@ -120,11 +136,11 @@ def from_one_seed() -> Iterator[None]:
 
 
 def solve(
-    name: str, A: sp.csr_matrix, b: np.ndarray, rigid: np.ndarray, accuracy: float, kept: dict
+    name: str, A: sp.spmatrix, b: np.ndarray, rigid: np.ndarray, accuracy: float, kept: dict
 ) -> np.ndarray:
     """Solve by the solver of a `name`: direct, amg or auto; `kept` is what it keeps."""
     in_space = rigid.shape[1] == 6
-    large = A.shape[0] >= (MANY_IN_SPACE if in_space else MANY)
+    large = np.count_nonzero(rigid.any(1)) >= (MANY_IN_SPACE if in_space else MANY)
     if name == "auto" and large and (in_space or is_symmetric(A)) and find_spec("pyamg"):
         try:
             return solve("amg", A, b, rigid, accuracy, kept)

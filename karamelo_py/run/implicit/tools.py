@@ -57,14 +57,14 @@ class Tool:
         """Find what the forces at the nodes (m, d) have changed by."""
         return self.gather.T @ (self.force - self.known)
 
-    def matrix(self) -> sp.csr_matrix:
+    def matrix(self) -> sp.bsr_matrix:
         """Find how the forces resist displacements (m d, m d), by central differences."""
         n = len(self.way)
         slopes = np.empty((n, self.d, self.d))
         for j, step in enumerate(self.near * np.eye(self.d)):
             slopes[:, :, j] = (self.at(self.way - step) - self.at(self.way + step)) / 2 / self.near
         blocks = sp.bsr_matrix((slopes, np.arange(n), np.arange(n + 1)))
-        return (self.gather_all.T @ blocks @ self.gather_all).tocsr()
+        return (self.gather_all.T @ blocks @ self.gather_all).tobsr((self.d, self.d))
 
     def publish(self) -> None:
         """Publish the force, and leave to the points the mean that has done the work."""
