@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
+from karamelo_py.output import console
 from karamelo_py.points.kinematics import PlaneStrain
 from karamelo_py.run.implicit import check, solvers
 from karamelo_py.run.implicit.load_steps import LoadSteps
-from karamelo_py.run.implicit.newton import Newton
+from karamelo_py.run.implicit.newton import Broken, Newton
 from karamelo_py.script.errors import ScriptError
 from tests.test_implicit import HELD, coarse, patch
 
@@ -121,6 +122,34 @@ def test_a_step_can_be_left(run_script, monkeypatch):
     )
     assert len(result.log["pull_x"]) == 3
     assert len({id(newton) for newton in steps}) == 3
+
+
+def test_a_step_that_is_done_in_part_can_be_left(run_script, monkeypatch):
+    """Ctrl-C between its parts: the points are where they were before it; progress tells of it."""
+    step, interrupted, left = LoadSteps._step, LoadSteps._interrupted, []
+
+    def places(self):
+        block = self.simulation.setup.blocks[0]
+        order = np.argsort(block.points.id)
+        return block.points.x[self.simulation.control.clock[0].now][:, order].copy()
+
+    def stepping(self, hooks):
+        before = places(self)
+        try:
+            step(self, hooks)
+        except Broken:
+            left.append(np.array_equal(places(self), before))
+            raise
+
+    def interrupting(self, *arguments):
+        self.simulation.hub.running.signal = 2 if self.parts == 1 else 0
+        return interrupted(self, *arguments)
+
+    monkeypatch.setattr(console, "REPORT", 0.0)
+    monkeypatch.setattr(LoadSteps, "_step", stepping)
+    monkeypatch.setattr(LoadSteps, "_interrupted", interrupting)
+    result = run_script(patch(HELD).replace("1e-4", "0.16"), status=None)
+    assert left == [True] and "; part 2, correction 0, residual" in result.out
 
 
 BESIDE = """

@@ -142,8 +142,10 @@ class Console:
             self._progress.add_task("", total=1.0, completed=fraction)
             self._progress.start()
 
-    def progress(self, step: int, time_: float, fraction: float | None = None) -> None:
-        """Show how far the run is: cheap enough to call at every step.
+    def progress(
+        self, step: int, time_: float, fraction: float | None = None, within: str = ""
+    ) -> None:
+        """Show how far the run is, and what happens `within` a step: cheap enough for every step.
 
         The `fraction` done is None where nobody knows (run_until, run_while).
         """
@@ -153,7 +155,7 @@ class Console:
             return
         self._shown = now
         self._release()
-        text = self._describe(step, time_, fraction, now)
+        text = self._describe(step, time_, fraction, now) + (within and f"; {within}")
         if self._progress is not None:
             (task,) = self._progress.tasks
             task.total = 1.0 if fraction is not None else None

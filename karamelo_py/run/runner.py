@@ -277,7 +277,7 @@ class Runner:
                 if self._steps_left(simulation):
                     hub.output.write()
                 anew = timings.passed("compilation") > before["compilation"]
-                self._show_progress(simulation, anew=anew)
+                self.show_progress(simulation, anew=anew)
 
     def _goes_on(self, simulation: Simulation) -> bool:
         if not self._steps_left(simulation):
@@ -322,8 +322,10 @@ class Runner:
             )
         return bool(holds) != self.until
 
-    def _show_progress(self, simulation: Simulation, *, anew: bool) -> None:
-        """Show how far the run is, `anew` where a rate would count compilation, too."""
+    def show_progress(
+        self, simulation: Simulation, within: str = "", *, anew: bool = False
+    ) -> None:
+        """Show how far the run is, and a step; `anew` where a rate would count compilation."""
         console, fraction = self.hub.console, None
         if self.steps:
             fraction = (simulation.step - self.first_step) / self.steps
@@ -332,7 +334,7 @@ class Runner:
         if anew:
             console.end_run()
             console.begin_run(simulation.step, fraction or 0.0)
-        console.progress(simulation.step, simulation.time, fraction)
+        console.progress(simulation.step, simulation.time, fraction, within)
 
     def _note(self, number: int, _: Any = None) -> None:
         """Note a signal: it ends the run after the present chunk; a second one at once."""

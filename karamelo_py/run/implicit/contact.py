@@ -79,7 +79,7 @@ class Contact:
             (ones, (at, self.second)), (count, m)
         )
         self.jumps = equations.for_all_components(self.jump).tocsr()
-        self.begun = False
+        self.respond(np.zeros((m, self.d)), supposed=True)
 
     def _shares(self) -> np.ndarray:
         """Find what share (m,) nodes have of the mass of one within the body."""
@@ -108,28 +108,30 @@ class Contact:
         last = sign * last if sign else np.abs(last)
         return (last > 0) & (last >= step)
 
-    def respond(self, u: np.ndarray) -> None:
-        """Find forces after displacements (m, d) of the nodes, and their derivatives."""
+    def respond(self, u: np.ndarray, *, supposed: bool = False) -> None:
+        """Find forces after displacements (m, d) of the nodes, and their derivatives.
+
+        Where bodies touch, and that they stick, may be `supposed`: before there are displacements
+        nothing but the last step tells.
+        """
         k, N = self.stiffness, self.normal
         glued = np.isinf(self.mu)
         mu = np.where(glued, 0.0, self.mu)
         x = self.jump @ u
         across = (N * x).sum(1)
         push = k * (across - self.gap)
-        # Before there are displacements nothing but the last step tells where bodies touch.
-        self.pressed = pressed = push >= 0 if self.begun else self.close
+        self.pressed = pressed = self.close if supposed else push >= 0
         self.push = push = np.where(pressed, push, 0.0)
         slip = x - across[:, None] * N
         size = np.linalg.norm(slip, axis=1)
         bound = mu * np.maximum(push, 0.0)
         rubs = pressed & (self.mu > 0)
-        self.sticks = sticks = rubs & (glued | (k * size <= bound) | (not self.begun))
+        self.sticks = sticks = rubs & (glued | (k * size <= bound) | supposed)
         slides = rubs & ~sticks
         way = slip / np.where(size > 0, size, 1.0)[:, None]
         bound = np.where(slides, bound, 0.0)
         self.drag = np.where(sticks[:, None], k[:, None] * slip, bound[:, None] * way)
         self.slip = slip
-        self.begun = True
         NN = N[:, :, None] * N[:, None, :]
         along = np.eye(self.d) - NN
         C = np.where(pressed, k, 0.0)[:, None, None] * NN

@@ -46,7 +46,7 @@ class LoadSteps:
         self.dynamic = self.scheme.inertia
         self.moduli: Moduli | None = None
         self.known: dict[str, Any] = {}  # of the last equations
-        self.within = False  # whether a part of a step has been done
+        self.parts = 0  # of the present step that have been done
         self.failure = ""  # why a step has no equilibrium
         self.unknowns = self.corrections = 0  # of the last equilibrium; so far
         self.seconds: dict[str, float] = {}  # in stages of the steps so far
@@ -96,14 +96,19 @@ class LoadSteps:
             end = float(control.clock[0].end_time)
         if not self.dynamic and step == 0:
             self._check_at_rest()
-        left, part, most, parts, iterations, residual = 1.0, 1.0, 1.0, 0, 0, 0.0
+        left, part, most, iterations, residual = 1.0, 1.0, 1.0, 0, 0.0
+        self.parts, before = 0, None
         while left > 1e-9:
             part = min(part, left)
             try:
                 taken, residual = self._part(hooks, part * whole)
             except Broken:
+                if self.parts:
+                    self.simulation.restore(before)
                 raise
             except Failed as reason:
+                if before is None:  # the user may want to leave the step between parts
+                    before = self.simulation.snapshot()
                 if part <= 2.0**-HALVINGS:
                     if self.scheme.limit == "error":
                         share = f" even in 1/{round(1 / part)} of the load step"
@@ -117,15 +122,14 @@ class LoadSteps:
                 continue
             left -= part
             control.values[TIMESTEP] = step
-            parts, iterations = parts + 1, iterations + taken
-            self.within = left > 1e-9
+            self.parts, iterations = self.parts + 1, iterations + taken
             if left > 1e-9:
                 part = min(2 * part, most) if taken <= self.scheme.iterations // 2 else part
                 if control.clock[0].drift > control.clock[0].drift_limit:
                     self.simulation.sort_if_due()
-        for name, value in zip(PUBLISHED, (iterations, residual, parts), strict=True):
+        for name, value in zip(PUBLISHED, (iterations, residual, self.parts), strict=True):
             self.simulation.hub.values.set(name, float(value))
-        control.values[TIME], control.values[TIMESTEP] = end, step + (parts > 0)
+        control.values[TIME], control.values[TIMESTEP] = end, step + (self.parts > 0)
 
     def _check_at_rest(self) -> None:
         """Refuse initial velocities of points: nothing is done with them without inertia."""
@@ -138,11 +142,15 @@ class LoadSteps:
                     "scheme(newmark), or none",
                 )
 
-    def _interrupted(self) -> bool:
-        """Tell whether the user wants the run to end, where a step can be left out."""
+    def _interrupted(self, correction: int, residual: float) -> bool:
+        """Show how far a step is; tell whether the user wants the run to end before it."""
         simulation = self.simulation
-        signal = getattr(simulation.hub.running, "signal", 0)
-        return bool(signal) and not self.within and not simulation.begins
+        running = simulation.hub.running
+        if running is None:
+            return False
+        within = f"part {self.parts + 1}, correction {correction}, residual {residual:.1e}"
+        running.show_progress(simulation, within)
+        return bool(running.signal) and not simulation.begins
 
     def _limit_reached(self, reason: Failed) -> float:
         """End the run at the load that was reached; return its time."""

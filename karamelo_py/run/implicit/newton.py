@@ -113,8 +113,6 @@ class Newton:
         self.kept: dict = {}  # what a solver keeps from one correction to the next
         with counted(seconds, "stress"):
             self.inner = equations.respond(np.zeros_like(external), dt)
-        for one in pushing:
-            one.respond(np.zeros_like(external))
 
     def scale(self, moduli: Moduli, stabilisation: float) -> None:
         """Tell the stiffness of the bodies, a share of which penalises jumps at their border."""
@@ -122,7 +120,7 @@ class Newton:
             self.ghost = stabilisation * moduli.mean * self.equations.ghost(moduli)
 
     def solve(
-        self, jump: np.ndarray, interrupted: Callable[[], bool]
+        self, jump: np.ndarray, interrupted: Callable[[int, float], bool]
     ) -> tuple[np.ndarray, int, float]:
         """Find displacements (m, d); `jump` (m, d) are those of the components that are given.
 
@@ -132,7 +130,7 @@ class Newton:
         ------
         Failed
             If there are none within the iterations allowed; `Broken` if the user has `interrupted`
-            them.
+            them, which is asked with the number of corrections and the residual.
         """
         scheme, free = self.scheme, self.free
         u = np.zeros_like(jump)
@@ -141,7 +139,7 @@ class Newton:
             residual = float(np.linalg.norm(balance[free]) / self._size(u))
             if residual <= scheme.tolerance and not (iteration == 0 and np.any(jump)):
                 return u, iteration, residual
-            if interrupted():
+            if interrupted(iteration, residual):
                 raise Broken
             if iteration < scheme.iterations:
                 change = self._correction(balance, jump, residual)
