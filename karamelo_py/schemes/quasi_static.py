@@ -79,8 +79,8 @@ class QuasiStatic(NamedTuple):
     `residual` and `parts` of the last step: corrections, the share of the forces that was left,
     and how many parts the step was done in.
 
-    Points should not go further than half a cell in a step; one that takes them further is done
-    in parts.
+    A step is done in parts where points would go further than half a cell to nodes that move
+    otherwise, or that fixes hold and nothing saw.
     """
 
     implicit = True
