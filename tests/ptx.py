@@ -66,7 +66,7 @@ def visit_point(visit, s, block, p, report):
     moved, rate = updated_all(visit.tasks, w, stencil, p, dt, totals, zero_of(width, dt))
     report[p, 0] = moved
     report[p, 1] = rate
-    if not (moved <= 1 and rate < 1e300):
+    if not (moved <= s.stride and rate < 1e300):
         return
     stencil = recompute_stencil(visit.weights, w, stencil, p)
     loads = load_all(visit.quantities, w, p, dt)
@@ -166,7 +166,7 @@ def compiled_visit(visit: Visit, setup: Setup) -> Compiled:
     real = s.nodes.sums.dtype.type
     context = Context(
         s.frame, s.kin, s.basis, s.transfer, s.averaging, s.grids, nodes, nodes, 0, real(0),
-        (real(0),) * s.kin.dimension, 0, True, True, real(1),
+        real(1), (real(0),) * s.kin.dimension, 0, True, True, real(1),
     )  # fmt: skip
     report = np.zeros((1, 2), real)
     return compiled(visit_point, visit, context, s.blocks[0], 0, report)

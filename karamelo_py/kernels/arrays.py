@@ -358,7 +358,7 @@ class Control(NamedTuple):
 def new_control(values: np.ndarray, firsts: Sequence[int] = (), d: int = 0) -> Control:
     """A control of these published values, its clock at zero, of solids in `d` dimensions."""
     clock = np.zeros(1, CLOCK).view(np.recarray)
-    clock[0].weight = 1.0
+    clock[0].weight = clock[0].stride = 1.0
     more = (1 + d) * len(firsts)
     totals = np.zeros((len(values) + more, LIMBS), np.int64)
     digits, answer = np.zeros(LIMBS, np.int64), np.zeros(max(16, more))

@@ -58,7 +58,7 @@ class Seen(NamedTuple):
     weights: np.ndarray  # (n, s)
     gradients: np.ndarray  # (n, s, c) in the places before the step
     starts: np.ndarray  # (m + 1,) int64: where what sees each node begins in `entries`
-    entries: np.ndarray  # int64: p s + k, of the points that see a node, in their order
+    entries: np.ndarray  # int32 or int64: p s + k, of the points that see a node, in their order
 
 
 class Pairs(NamedTuple):

@@ -166,12 +166,13 @@ class Equations:
         number = self.number_of(seen.nodes[:, :most])
         own = valid(seen)[:, :most] & (number >= 0)
         first = number[np.arange(len(number)), own.argmax(1)]
+        small = np.int32 if number.size < 2**31 else np.int64
         seen = seen._replace(
             nodes=np.where(own, number, first[:, None]).astype(np.int32),
             weights=seen.weights[:, :most].copy(),
             gradients=seen.gradients[:, :most].copy(),
             starts=np.zeros(len(self.nodes) + 1, np.int64),
-            entries=np.zeros(int(seen.count.sum()), np.int64),
+            entries=np.zeros(int(seen.count.sum()), small),
         )
         list_points(seen)
         return seen
