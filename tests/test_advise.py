@@ -1,6 +1,7 @@
 """Advice: the cheapest variant that is accurate enough, on laws whose cheapest variant is known."""
 
 import re
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,8 @@ from karamelo_py.app.studies import records
 from karamelo_py.app.studies.advise import Adviser, ChoiceRuns, carry_out, forecast, sureness
 from karamelo_py.app.studies.curves import CHANCES, by_chance, credible, reached
 
-INPUTS = Path(__file__).parent.parent / "inputs"
+ROOT = Path(__file__).parent.parent
+INPUTS = ROOT / "inputs"
 # A block in slow flight. Its "error" is a law of N and of the choice, its steps are the cost.
 SCRIPT = """
 N = 10
@@ -222,6 +224,9 @@ def test_doubts_of_a_forecast():
     assert adviser.doubts(best) == ["its runs are warned of: points cross cells"]
     assert sureness(adviser, best).startswith("not sure: expected")
     best.choice.warnings = ()
+    best.choice.values["kind"] = "ulmpm"
+    assert "gradients of linear functions jump" in adviser.doubts(best)[0]
+    best.choice.values["kind"] = "tlmpm"
     adviser.choices[0].values["kind"] = "tlmpm"  # what turns round is of its kind
     (doubt,) = adviser.doubts(best)
     assert doubt.endswith("kind = tlmpm, basis = linear did not stay below 0.0194")
@@ -308,6 +313,38 @@ def test_advice_on_recorded_scenes_meets_the_target_at_little_more_than_the_leas
         tried += len(asked)
     # It is for fewer runs than the sweep.
     assert tried < 0.9 * len(rows) * (len(errors) + 1)
+
+
+def verdicts():
+    """The script that makes the table of verdicts in docs/studies.md."""
+    spec = spec_from_file_location("study_verdicts", ROOT / "docs" / "study_verdicts.py")
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_verdicts_are_held_against_all_variants(folder):
+    """Order 2 and a floor of 0.01: what is likely is run, and what is below the floor is none."""
+    held = verdicts()
+    scene = held.Scene(
+        str(folder / "in.law"), "-var N=10,20,40,80 -var least=0.01", "err", (0.02, 0.005), ""
+    )
+    first, second = held.judge("law", scene)
+    assert (first.word, first.choice, first.right) == ("likely", "80", True)
+    assert first.error == pytest.approx(1 / 64) and first.excess == 1
+    assert (second.word, second.right) == ("none", True)
+    # A floor that no run has shown is foreseen by nobody: order 2 goes on to 0.0039 at N = 160.
+    wider = scene._replace(words=scene.words.replace("80", "80,160"), targets=(0.0095,))
+    (verdict,) = held.judge("wider", wider)
+    assert (verdict.word, verdict.right) == ("almost sure", False)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("name", verdicts().SCENES)
+def test_verdicts_on_hard_scenes_are_right_or_not_sure(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    held = verdicts()
+    assert all(verdict.right for verdict in held.judge(name, held.SCENES[name]))
 
 
 @pytest.mark.full

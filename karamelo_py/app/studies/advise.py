@@ -51,6 +51,9 @@ its functions, or a finer run is worse; a finer run is made to see it. With -run
 and it is told whether it met the target."""
 
 
+# Functions whose gradients jump between cells, and methods whose points cross these.
+JUMPING, CROSSED = ("linear", "Bernstein-quadratic"), ("ulmpm", "ulmpm/contacts")
+ALONE = "no finer run is known"
 SECOND = 2.0  # the order that all methods here may reach
 
 
@@ -212,6 +215,8 @@ class Adviser:
         signed = errors(choice.rows, self.accuracy)
         costs = column(choice.rows, self.cost)
         why = by_chance(self.xs[: len(signed)], signed, choice.highest)
+        if len(why) == 1 < len(self.values):
+            why = [ALONE]
         return [
             Candidate(choice, k, cost, abs(error), None, chance)
             for k, (cost, error, chance) in enumerate(zip(costs, signed, why, strict=True))
@@ -282,6 +287,12 @@ class Adviser:
     def doubts(self, best: Candidate) -> list[str]:
         """Tell what the error of a forecast may end at: what is known of its kind."""
         found = [f"its runs are warned of: {text}" for text in best.choice.warnings[:1]]
+        jumping = best.choice.kind & {*JUMPING}
+        if jumping and best.choice.kind & {*CROSSED}:
+            found.append(
+                f"gradients of {', '.join(jumping)} functions jump between cells: errors grow once "
+                "points cross them, and on finer grids they cross more"
+            )
         for other in self.choices:
             if other.kind != best.choice.kind:
                 continue

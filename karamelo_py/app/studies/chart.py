@@ -268,7 +268,7 @@ def write_page(family: Family, path: Path, words: tuple[str, str], title: str) -
         )  # fmt: skip
     styles = look.styles([line.choice for line in family.lines])
     for line, (colour, marker, dash) in zip(family.lines, styles, strict=True):
-        shown = np.flatnonzero(line.shown)
+        shown = np.flatnonzero(line.shown).tolist()
         figure.add_scatter(
             x=line.across[shown], y=line.error[shown], mode="lines+markers", name=line.label,
             customdata=[number_of[id(line.rows[k])] for k in shown],
