@@ -314,7 +314,7 @@ def test_columns_of_load_steps_in_explicit_ones(run_interpreted):
 @pytest.mark.parametrize("scheme", ["quasi-static", "newmark"])
 def test_a_tolerance_that_is_none(run_interpreted, scheme):
     text = patch().replace("quasi-static", f"{scheme}, tolerance=0.1")
-    assert "above 0 and at most 0.01, not 0.1" in run_interpreted(text, status=1).err
+    assert "from 1e-14 to 0.01, not 0.1" in run_interpreted(text, status=1).err
 
 
 @pytest.mark.parametrize(
@@ -399,3 +399,14 @@ def test_a_column_that_could_buckle_is_told(run_script):
     """Beyond pi^2 E I/(4 L^2) (Euler 1744), where the straight column is no stable equilibrium."""
     said = run_script(EULER).err
     assert said.count("an equilibrium that is not stable") == 1 and "step 2, time 2" in said
+
+
+@pytest.mark.parametrize(
+    ("load", "run", "told"),
+    [("-1", 3, True), ("-1", 1, False), ("-time/3", 3, False), ("0", 3, False)],
+)
+def test_loads_that_do_not_grow_are_told(run_interpreted, load, run, told):
+    """They act in the first load step; the others change nothing."""
+    lines = f"fix(hold, velocity_nodes, left, 0, 0)\n    fix(pull, body_force, all, 0, {load})"
+    said = run_interpreted(patch(lines).replace("run(4)", f"run({run})"), command="check").err
+    assert ("'pull' does not depend on time" in said) == told, said

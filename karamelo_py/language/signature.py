@@ -268,7 +268,9 @@ def _unknown_keyword(
 ) -> ScriptError:
     longer = next((f"did you mean '{name}'?" for name in by_name if name.startswith(word)), None)
     turned = next((f"did you mean '{n}'?" for n in by_name if n == word[:1] + word[:0:-1]), None)
-    hint = turned or meant(word, by_name) or longer or f"leave out '{word} ='; == compares"
+    hint = turned or meant(word, by_name) or longer
+    if not hint and not all(p.keyword for p in expected):
+        hint = f"leave out '{word} ='; == compares"
     if any(p.name == word for p in expected):
         hint = f"arguments are given by position: leave out '{word} ='"
     known = ", ".join(f"{name}=..." for name in by_name)

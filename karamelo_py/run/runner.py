@@ -185,6 +185,7 @@ class Runner:
         duration = min(self.end_time - simulation.time, steps)
         if simulation.implicit:
             known_failures.warn_about_factor(self.hub)
+            known_failures.warn_about_loads(self.hub, inf if self.steps is None else self.steps)
             known_failures.warn_about_laws(self.hub, simulation, duration)
             return
         known_failures.warn(self.hub, simulation, duration, self.rollback.halve)

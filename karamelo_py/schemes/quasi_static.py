@@ -37,8 +37,8 @@ CLOSE = (WORK_OF_LOADS, *MOVE, Gather(StrainOfLoadStep()), AtPoints(FINAL_INTEGR
 PUBLISHED = "iterations", "residual", "parts"
 
 
-# Above that a first correction is taken as it is, and a step is no equilibrium.
-Tolerance = Constraint("above 0 and at most 0.01", lambda value: 0 < value <= 0.01)
+# Above that a first correction is taken as it is, and a step is no equilibrium; below is rounding.
+Tolerance = Constraint("from 1e-14 to 0.01", lambda value: 1e-14 <= value <= 0.01)
 
 
 class QuasiStatic(NamedTuple):
@@ -51,7 +51,7 @@ class QuasiStatic(NamedTuple):
     Parameters
     ----------
     tolerance
-        What is left of the nodal forces when a step ends, as a share of them; at most 0.01.
+        What is left of the nodal forces when a step ends, as a share of them: from 1e-14 to 0.01.
     iterations
         How often a step is corrected before it is done in halves.
     solver

@@ -243,8 +243,8 @@ known_failure(
     "locking",
     when=_locks,
     reason="plastic flow of material '{owner.id}' keeps its volume, and {scene.basis_name} "
-    "functions without averaged volumes cannot where a body flows around a corner: the load goes "
-    "on rising beyond the limit load (a footing bears 6.6 c B in the place of 5.1)",
+    "functions without averaged volumes cannot follow it around a corner: the load goes on rising "
+    "beyond the limit load (a footing bears 6.6 c B in the place of 5.1)",
     cure="anti_volumetric_locking(true), or quadratic-spline in the place of the basis",
 )
 

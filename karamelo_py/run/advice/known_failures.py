@@ -20,7 +20,7 @@ from karamelo_py.output.units import DENSITY, STRESS, VELOCITY
 from karamelo_py.points.laws import can, constrained_velocity, law_kind, specific_volume
 from karamelo_py.run import timestep
 from karamelo_py.run.advice.facts import SceneFacts, is_zero
-from karamelo_py.run.diagnosis.explain import no_number
+from karamelo_py.run.diagnosis.explain import formulas_of, no_number
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.group import NOTHING_THERE, NodeGroup
 from karamelo_py.scene.hub import Hub
@@ -215,6 +215,30 @@ def warn_about_factor(hub: Hub) -> None:
             "dt_factor has no effect: load steps are those of set_dt, or 1",
             place=update.dt_place,
             hint="set_dt(...) in its place",
+        )
+
+
+def warn_about_loads(hub: Hub, steps: float) -> None:
+    """Tell, once, that loads which do not grow act at once, in the first of several load steps."""
+    acting = [fix for fix in hub.fixes.values() if fix.hooks() and not fix.first_step_only]
+    given = {fix: list(formulas_of(tuple(vars(fix).values()))) for fix in acting}
+    change = any(not formula.is_constant for formulas in given.values() for formula in formulas)
+    if hub.update.scheme.inertia or hub.update.thermal or steps < 2 or change:
+        return
+    loads, moves = [], False
+    for fix, formulas in given.items():
+        some = not all(map(is_zero, formulas))
+        if fix.prescribes_velocity or fix.leads_points or "velocity" in fix.style:
+            moves |= some
+        elif some:
+            loads.append(fix)
+    if loads and not moves and hub.update.first_time("loads at once"):
+        hub.warn(
+            f"fix {loads[0].style} '{loads[0].id}' does not depend on time: all of its load acts "
+            "in the first load step, and nothing changes it in the others",
+            place=loads[0].place,
+            hint="a formula of time, which each load step adds set_dt or 1 to: times time/40 in "
+            "run(40); or run(1)",
         )
 
 

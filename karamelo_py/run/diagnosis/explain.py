@@ -237,7 +237,7 @@ def _first_bad(simulation: Any) -> tuple | None:
         over = simulation.step > 0 and fix in simulation.begun
         if over or not fix.hooks():
             continue
-        for k, formula in enumerate(_formulas(tuple(vars(fix).values()))):
+        for k, formula in enumerate(formulas_of(tuple(vars(fix).values()))):
             # What reads a NaN shows the damage, and not where it comes from.
             read = formula.names.difference(POINT_SEEDS)
             readable = all(n in values and np.isfinite(values.get(n)) for n in read)
@@ -256,13 +256,13 @@ def _first_bad(simulation: Any) -> tuple | None:
     return None
 
 
-def _formulas(value: Any) -> Iterator[Expression]:
+def formulas_of(value: Any) -> Iterator[Expression]:
     """The formulas among the attributes of a fix, and in tuples and lists of these."""
     if isinstance(value, Expression):
         yield value
     elif isinstance(value, (tuple, list)):
         for one in value:
-            yield from _formulas(one)
+            yield from formulas_of(one)
 
 
 def _places(simulation: Any, group: Any, formula: Expression) -> Iterator[tuple]:
@@ -287,7 +287,7 @@ def no_number(hub: Hub, simulation: Any, message: str, hint: str) -> Trouble:
         return Trouble(message, hint)
     (which, k, _), value, x = min(found, key=lambda one: one[0])
     fix = list(hub.fixes.values())[which]
-    formula = list(_formulas(tuple(vars(fix).values())))[k]
+    formula = list(formulas_of(tuple(vars(fix).values())))[k]
     what = "NaN" if np.isnan(value) else f"{value:g}"
     where = "" if x is None else f" at {_place(x[: hub.domain.dimension])}"
     return Trouble(
