@@ -293,7 +293,7 @@ def test_contact_is_felt_early_in_proportion_to_the_cells(run_script, way, suppo
     assert "method(ulmpm, FLIP, linear, 1)" in text
     text = text.replace("method(ulmpm, FLIP, linear, 1)", method).replace("output(50)", "output(5)")
     leads = []
-    for cells in (20, 40, 80):
+    for cells in (20, 40):
         options = ["-var", "N", str(cells), "-var", "ppc", "2"]
         result = run_script(
             text.replace("run_time(3.5)", "run_time(1.7)"), *options, folder=str(cells)
@@ -304,4 +304,4 @@ def test_contact_is_felt_early_in_proportion_to_the_cells(run_script, way, suppo
         assert -0.02 < lead < support / cells / 0.2, (cells, lead)
         leads.append(lead)
     # The lead is of first order; the staircase of points blurs it.
-    assert 0.5 < order([4, 2, 1], leads) < 1.6, leads
+    assert 0.5 < order([2, 1], leads) < 1.6, leads
