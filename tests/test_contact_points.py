@@ -115,7 +115,11 @@ def test_friction_of_two_points(run_interpreted, slip, share):
 # --- bodies -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("d", [1, 2, 3])
+FULL = pytest.mark.full
+
+
+# The forces of pairs are looked at in every dimension above.
+@pytest.mark.parametrize("d", [pytest.param(1, marks=FULL), 2, pytest.param(3, marks=FULL)])
 def test_collision(run_script, d):
     """Momentum is kept in every step, energy nearly; contact begins when the faces meet.
 
