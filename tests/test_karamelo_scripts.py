@@ -204,13 +204,13 @@ def test_a_wall_that_lets_go(run_interpreted):
         fix(v, initial_velocity_particles, all, 0, -1)
         fix(bc, velocity_nodes, gwall, NULL, geq0)
         y0_ = evaluate(xcm(all, y))
-        set_dt(0.001)
+        set_dt(0.004)
         log_modify(custom, step, time, bc_y)
         run_until(bc_y > 0)
         print(y0_)
         """,
     ).log
-    assert log.Time[-1] == pytest.approx(0.225, abs=0.0021)
+    assert log.Time[-1] == pytest.approx(0.225, abs=0.0081)  # two steps
 
 
 def test_formulas_of_the_kokkos_branch(run_interpreted):
