@@ -38,6 +38,9 @@ nb_execution_raise_on_error = True
 nb_execution_timeout = 600
 nb_merge_streams = True
 
+# Words of the program stay as they are written: --threads, "text".
+smartquotes = False
+
 html_theme = "furo"
 html_title = f"karamelo-py {release}"
 html_static_path = ["_static"]

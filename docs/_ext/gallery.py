@@ -28,9 +28,8 @@ CARD = """````{{grid-item-card}} {title}
 ````"""
 
 
-def write_gallery(docs: Path) -> None:
-    """Write a page for each scene, and the gallery of all."""
-    folder = docs / "gallery" / "generated"
+def write_gallery(docs: Path, folder: Path) -> None:
+    """Write a page for each scene, and the gallery of all, to `folder`, which is emptied before."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     static = docs / "_static"
@@ -111,5 +110,10 @@ def chart_of(name: str, static: Path) -> Path | None:
 
 def setup(app):
     """Write the pages when a build begins."""
-    app.connect("builder-inited", lambda app: write_gallery(Path(app.srcdir)), priority=800)
+
+    def write(app) -> None:
+        docs = Path(app.srcdir)
+        write_gallery(docs, docs / "gallery" / "generated")
+
+    app.connect("builder-inited", write, priority=800)
     return {"parallel_read_safe": True}

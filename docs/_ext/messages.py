@@ -50,6 +50,14 @@ CALLS = {
 }
 # Functions that return a message and a hint.
 PAIRS = re.compile(r"^run/(diagnosis/|recovery|timestep)")
+# Those whose messages are no errors, or a part of another message.
+CAUSES = {
+    "words_of_growth": "warning",
+    "words_of_loss": "warning",
+    "cause_of_gain": "cause of a gain of energy",
+    "_gain_of_implicit_steps": "cause of a gain of energy",
+    "_cause_of_loss": "cause of a loss of energy",
+}
 # Page, its title, what it is about, and the modules whose messages it has: the first that fits.
 PAGES = (
     ("known-failures", "Known failures", "Warnings before the first step: a combination that is "
@@ -113,7 +121,9 @@ class _Reader:
             elif isinstance(node, ast.Return) and PAIRS.search(self.module):
                 pair = node.value
                 if isinstance(pair, ast.Tuple) and len(pair.elts) == 2:
-                    yield from self._made(node, "error", pair.elts[0], None, pair.elts[1])
+                    inside = next(n for n in self._above(node) if isinstance(n, ast.FunctionDef))
+                    kind = CAUSES.get(inside.name, "error")
+                    yield from self._made(node, kind, pair.elts[0], None, pair.elts[1])
 
     def _of_call(self, node: ast.Call) -> Iterator[Message]:
         kind, *where = CALLS[self._name(node.func)]
@@ -354,6 +364,8 @@ def write_pages(folder: Path, list_file: Path) -> None:
             parts += [f"({page}-{number})=", *_entry(message)]
             listed.append([f"generated/{page}.html#{page}-{number}", message.text, _kind(message)])
         head = "---\ntocdepth: 1\n---\n\n"
+        style = "<style>article h2 { font-size: 1rem; margin: 1.6em 0 0.2em; }</style>"
+        parts.insert(1, f"```{{raw}} html\n{style}\n```")
         (folder / f"{page}.md").write_text(head + "\n\n".join(parts) + "\n", encoding="utf-8")
     text = f"const MESSAGES = {json.dumps(listed, ensure_ascii=False, indent=0)};\n"
     list_file.parent.mkdir(parents=True, exist_ok=True)
