@@ -7,7 +7,7 @@ from comparisons.row import Row
 SOURCE = "Johnson & Holmquist 1988 (experiment)"
 LENGTH, DIAMETER, WAIST = 16.2, 13.5, 10.1  # mm; the waist is a fifth of L0 above the wall
 L0, R0 = 25.4, 3.8  # mm
-SMALL = {"refine": 1 / 3}
+SMALL = {"refine": 1 / 4}
 
 
 def shape(snapshots):
