@@ -217,13 +217,13 @@ def test_a_scene_that_does_not_fit_is_refused_in_one_message(small, tmp_path, ca
 def test_what_is_not_free_but_there_is_warned_of(small, tmp_path, capsys, monkeypatch):
     """What the system gives back when it has to it does not always tell."""
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "in.large").write_text(block(3, "run(1)"), encoding="utf-8")
-    small(10_000, 20_000)
+    (tmp_path / "in.large").write_text(block(2, "run(1)"), encoding="utf-8")
+    small(3_000, 20_000)
     assert main(["in.large"]) == 0
     said = capsys.readouterr().err
-    assert said.startswith("in.large:6:1: warning: the scene has 48 points, which take at least ")
-    assert said.count("warning") == 1 and "cells 1.2 times as large" in said
-    assert "this machine has 9.31e-06 GiB free: it may not fit" in said
+    assert said.startswith("in.large:6:1: warning: the scene has 24 points, which take at least ")
+    assert said.count("warning") == 1 and "cells 1.4 times as large" in said
+    assert "this machine has 2.79e-06 GiB free: it may not fit" in said
 
 
 def test_scenes_of_before_that_nobody_holds_are_let_go(tmp_path, capsys, monkeypatch):
