@@ -21,7 +21,7 @@ from karamelo_py.run.implicit.equations import Equations, Moduli
 from karamelo_py.run.implicit.inertia import Motion, Rest
 from karamelo_py.run.implicit.newton import Broken, Failed, Loose, Newton, TooFar, Wrong, counted
 from karamelo_py.run.implicit.prescribed import prescribed
-from karamelo_py.run.implicit.solvers import Singular
+from karamelo_py.run.implicit.solvers import Singular, release
 from karamelo_py.run.implicit.tools import Tool, tools_of
 from karamelo_py.schemes.quasi_static import PUBLISHED
 from karamelo_py.script.errors import Place, ScriptError
@@ -276,6 +276,7 @@ class LoadSteps:
                 "stiffness is negative): the body has a way to buckle, or is beyond a limit load",
                 hint="a small imperfection, or scheme(newmark), shows where it goes",
             )
+        release(newton.kept)
         self.known = equations.known()
         self.unknowns = int(np.count_nonzero(~given))
         self.corrections += iterations

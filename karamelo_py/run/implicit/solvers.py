@@ -53,7 +53,7 @@ def direct(A: sp.spmatrix, b: np.ndarray, kept: dict | None = None) -> np.ndarra
     """Solve by SuperLU; the factors are `kept`."""
     B, s = scaled(A)
     kept = {} if kept is None else kept
-    kept.clear()  # before there are others: they take most of the memory
+    release(kept)  # before there are others: they take most of the memory
     with warnings.catch_warnings():
         warnings.simplefilter("error", MatrixRankWarning)
         try:
@@ -63,6 +63,13 @@ def direct(A: sp.spmatrix, b: np.ndarray, kept: dict | None = None) -> np.ndarra
             raise Singular from None
     kept["factors"] = factors
     return s * factors.solve(s * b, trans="T")
+
+
+def release(kept: dict) -> None:
+    """Give the memory back that a solver keeps things in."""
+    for level in getattr(kept.get("multigrid"), "levels", ()):
+        vars(level).clear()  # levels know themselves, and would wait to be found
+    kept.clear()
 
 
 def changed_sign(factors: Any) -> bool:
@@ -88,22 +95,23 @@ def amg(
     """
     import pyamg
 
-    s = kept.get("scale")
-    B, s = scaled(A, s)
+    grids = kept.get("multigrid")
+    if grids is None:
+        release(kept)
+    else:
+        grids.levels[0].A = None  # the last matrix, before there is another
+    B, s = scaled(A, kept.get("scale"))
     symmetric = is_symmetric(B)
     left: list[float] = []
     # pyamg has its warnings shown whatever filters say: they are taken, and residuals tell.
     with from_one_seed(), warnings.catch_warnings(record=True):
-        if "multigrid" in kept:
-            kept["multigrid"].levels[0].A = B
+        if grids is None:
+            symmetry = "symmetric" if symmetric else "nonsymmetric"
+            grids = pyamg.smoothed_aggregation_solver(B, B=rigid / s[:, None], symmetry=symmetry)
+            kept["scale"], kept["multigrid"] = s, grids
         else:
-            kept["scale"] = s
-            kept["multigrid"] = pyamg.smoothed_aggregation_solver(
-                B,
-                B=rigid / s[:, None],
-                symmetry="symmetric" if symmetric else "nonsymmetric",
-            )
-        x = kept["multigrid"].solve(
+            grids.levels[0].A = B
+        x = grids.solve(
             s * b,
             tol=accuracy,
             accel="cg" if symmetric else "gmres",
@@ -111,7 +119,7 @@ def amg(
             residuals=left,
         )
     if len(left) > MANY_ITERATIONS:
-        kept.clear()
+        release(kept)
     if not np.all(np.isfinite(x)) or left[-1] > 1e-2 * max(left[0], 1e-300):
         raise Unconverged
     return s * x
@@ -145,7 +153,7 @@ def solve(
         try:
             return solve("amg", A, b, rigid, accuracy, kept)
         except (Singular, Unconverged):  # multigrid is not made for all matrices
-            kept.clear()
+            release(kept)
     x = amg(A, b, rigid, accuracy, kept) if name == "amg" else direct(A, b, kept)
     if not np.all(np.isfinite(x)):
         raise Singular
