@@ -85,7 +85,7 @@ def by_chance(x: Sequence[float], values: Sequence[float], highest: float) -> li
     found, size = [], np.abs(np.asarray(values, float))
     for k, own in enumerate(size):
         why, finer = "", size[k + 1 :]
-        if k and not (np.isfinite(finer[:1]) & (finer[:1] <= own)).any():
+        if k and not (finer[:1] <= WORSE * own).any():
             ratio = abs(np.log(x[k] / x[k - 1]))
             if values[k] * values[k - 1] < 0:
                 why = CHANCES["sign"]
