@@ -1,11 +1,13 @@
 """Numbers with slopes go through all laws as they are: their tangents are those of differences."""
 
 import math
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 from numba import config
+from selection import parameters
 
 from karamelo_py.compiler.algebra import on_numbers
 from karamelo_py.compiler.compile import shared
@@ -139,11 +141,16 @@ def in_floats(thing):
     return thing._make(items) if hasattr(thing, "_make") else items
 
 
+# Each law in the plane and in one of the others; interpreted, above, in all.
+ELSEWHERE = ("line", "axis", "space")
+COMPILED = [(n, k) for j, n in enumerate(LAWS) for k in ("plane", ELSEWHERE[j % 3])]
+OTHERS = [way for way in product(LAWS, KINEMATICS) if way not in COMPILED]
+
+
 @pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
-@pytest.mark.parametrize("kin", KINEMATICS.values(), ids=KINEMATICS)
-@pytest.mark.parametrize("name", LAWS)
-def test_kernels_know_them(name, kin):
-    law, _ = LAWS[name]
+@pytest.mark.parametrize("name, kind", parameters(COMPILED, OTHERS))
+def test_kernels_know_them(name, kind):
+    (law, _), kin = LAWS[name], KINEMATICS[kind]
 
     @kernel
     def compiled(law, kin, state, dl, dt):

@@ -162,8 +162,8 @@ def test_the_last_reaction_of_a_run(run_interpreted):
         fix(press, velocity_nodes, top, -0.01*min(time/0.5, 1))
         log_modify(custom, step, time, press_x, hold_x)
         set_output(1)
-        set_dt(0.004)
-        run_time(1.20008)
+        set_dt(0.008)
+        run_time(1.20016)
     """
     log = run_interpreted(script).log
     for reaction in (log.press_x, log.hold_x):

@@ -22,8 +22,8 @@ method({method})
 scheme({scheme})
 {more}
 dimension(2, 0, 2, 0, 1, 0.1)
-region(left, block, 0.2, 0.5, 0.2, 0.4)
-region(right, block, 1.5, 1.8, 0.5, 0.7)
+region(left, block, 0.2, 0.5, 0.2, 0.3)
+region(right, block, 1.5, 1.8, 0.5, 0.6)
 material(a, {law})
 material(b, {other})
 solid(left, region, left, 2, a, 0.1, {T})
@@ -58,8 +58,8 @@ KINDS = {
 
 IN_SPACE = {
     "dimension(2, 0, 2, 0, 1": "dimension(3, 0, 2, 0, 1, 0, 4",
-    "0.2, 0.4)": "0.2, 0.4, 3, 3.4)",
-    "0.5, 0.7)": "0.5, 0.7, 3, 3.4)",
+    "0.2, 0.3)": "0.2, 0.3, 3, 3.4)",
+    "0.5, 0.6)": "0.5, 0.6, 3, 3.4)",
     "left, 2, a": "left, 1, a",
     "right, 2, b": "right, 1, b",
     "y0), 20)": "y0), 20, 9*cos(30*z0))",
