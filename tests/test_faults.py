@@ -353,7 +353,9 @@ class View(PointsView):
     @property
     def _rows(self):
         return SimpleNamespace(
-            take=lambda _: self._v, put=lambda _, value: np.copyto(self._v, value)
+            take=lambda _: self._v,
+            put=lambda _, value: np.copyto(self._v, value),
+            declared=lambda _: None,
         )
 
 

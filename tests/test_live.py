@@ -15,7 +15,7 @@ from karamelo_py import Simulation
 from karamelo_py.app.cli import main
 from karamelo_py.app.live import frames
 from karamelo_py.app.live.folder import FolderPage
-from karamelo_py.app.live.frames import Frame, Frames
+from karamelo_py.app.live.frames import Frame, KeptFrames
 from karamelo_py.app.live.study import StudyPage
 from karamelo_py.app.studies import study as studies
 
@@ -181,7 +181,7 @@ def test_frames_are_thinned_and_bounded(monkeypatch):
     monkeypatch.setattr(frames, "POINTS", 10)
     monkeypatch.setattr(frames, "COUNT", 8)
     columns = {name: np.arange(25.0) for name in ("x", "y", "seq")}
-    kept = Frames()
+    kept = KeptFrames()
     for step in range(30):
         kept.add(Frame.of_columns(step, 0.1 * step, "xy", "seq", columns.__getitem__))
     listed = kept.listed()

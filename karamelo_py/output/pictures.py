@@ -306,7 +306,7 @@ def _number(value: float, _: Any = None) -> str:
 
 
 def _power(value: float, _: Any = None) -> str:
-    """What a number on a logarithmic scale stands for."""
+    """Write the number that a place on a logarithmic scale stands for."""
     return f"{10.0**value:.3g}"
 
 

@@ -37,8 +37,8 @@ class Frame(NamedTuple):
         )
 
 
-class Frames:
-    """Frames by number; where there are too many, every second goes."""
+class KeptFrames:
+    """KeptFrames by number; where there are too many, every second goes."""
 
     def __init__(self) -> None:
         self._kept: dict[int, Frame] = {}

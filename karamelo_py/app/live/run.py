@@ -10,7 +10,7 @@ from contextlib import suppress
 from typing import Any, NamedTuple
 
 from karamelo_py.app.live import frames
-from karamelo_py.app.live.frames import Frame, Frames, plain
+from karamelo_py.app.live.frames import Frame, KeptFrames, plain
 from karamelo_py.app.live.server import Server
 from karamelo_py.output.rhythm import Rhythmic
 from karamelo_py.run.diagnosis import energy
@@ -45,7 +45,7 @@ class RunPage(Rhythmic):
 
     def __init__(self, hub: Hub, title: str):
         self.hub, self.title = hub, title
-        self.frames = Frames()
+        self.frames = KeptFrames()
         if hub.output.log.rows is None:
             hub.output.log.rows = []
         self._rows: list[Row] = []

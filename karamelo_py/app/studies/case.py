@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import karamelo_py
-from karamelo_py.app.studies.warm import Warm
+from karamelo_py.app.studies.warm import WarmProcesses
 from karamelo_py.output.files import write_whole
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.terms import number_of
@@ -126,7 +126,7 @@ class Launch:
     limit: float | None = None  # seconds after which a run is given up
     texts: tuple[str, ...] = ()  # of the script and those that it includes
     stop: threading.Event = field(default_factory=threading.Event)  # set when the study is to end
-    warm: Warm = field(default_factory=lambda: Warm(environment()))
+    warm: WarmProcesses = field(default_factory=lambda: WarmProcesses(environment()))
 
     def key(self, case: Mapping[str, str]) -> str:
         """Hash what a result belongs to: it is used again only for the very same."""

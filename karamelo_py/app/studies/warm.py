@@ -31,7 +31,7 @@ BEGIN = "from karamelo_py.app.studies.warm import begin; begin()"
 NOT_OURS = "karamelo_py.styles.fixes.python"
 
 
-class Keeper:
+class WarmProcess:
     """A warm process; without a pid, a run that may leave one."""
 
     def __init__(self, link: socket.socket, pid: int | None = None):
@@ -55,14 +55,14 @@ class Keeper:
                 os.waitpid(self.pid, 0)
 
 
-class Warm:
+class WarmProcesses:
     """The warm processes of a study, which end with it."""
 
     def __init__(self, environment: Mapping[str, str]):
         self.environment = environment
         self.tries = TRIES if sys.platform == "linux" else 0
         self.lock = threading.Lock()
-        self.keepers: dict[tuple[str, ...], Keeper] = {}
+        self.keepers: dict[tuple[str, ...], WarmProcess] = {}
         self.finalizer = weakref.finalize(self, _end, self.keepers)
 
     def start(
@@ -108,8 +108,8 @@ class Warm:
                 [sys.executable, "-c", BEGIN], stdin=theirs.fileno(), stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL, env=self.environment, start_new_session=True,
             )  # fmt: skip
-        process.returncode = 0  # `Keeper.end` waits for it
-        self.keepers[()] = Keeper(mine, process.pid)
+        process.returncode = 0  # `WarmProcess.end` waits for it
+        self.keepers[()] = WarmProcess(mine, process.pid)
 
     def _awaited(self, key: tuple[str, ...]) -> socket.socket | None:
         """Make the link of the process that a run is to leave; none where there is one."""
@@ -118,7 +118,7 @@ class Warm:
         if len(self.keepers) > MOST:
             self._forget(next(each for each in self.keepers if each))
         mine, theirs = _pair()
-        self.keepers[key] = Keeper(mine)
+        self.keepers[key] = WarmProcess(mine)
         return theirs
 
     def _forget(self, key: tuple[str, ...]) -> None:
@@ -130,7 +130,7 @@ def _pair() -> tuple[socket.socket, socket.socket]:
     return socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
 
 
-def _end(keepers: dict[Any, Keeper]) -> None:
+def _end(keepers: dict[Any, WarmProcess]) -> None:
     while keepers:
         keepers.popitem()[1].end()
 

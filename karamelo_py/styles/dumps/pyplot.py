@@ -159,7 +159,7 @@ class PyPlot(Dump):
                 self._picture.begin_with(limits)
 
     def _marks(self) -> list[Any]:
-        """What the limits of the colours belong to."""
+        """Name what the limits of the colours belong to."""
         more = [self.look[name] for name in ("log", "quantile") if self.look[name]]
         return [*self.limits, *more]
 
