@@ -299,7 +299,7 @@ def _no_file(path: Path) -> ScriptError:
 def described(hub: Hub) -> dict[str, str]:
     """Describe what has to be the same for a state to fit."""
     update, domain = hub.update, hub.domain
-    box = zip(domain.lo, domain.hi, strict=True)
+    box = zip(domain.lo.tolist(), domain.hi.tolist(), strict=True)
     words = {
         "method": update.words_of_state + " thermo-mechanical" * update.thermal,
         "domain": f"{domain.dimension}, {', '.join(f'{a!r}, {b!r}' for a, b in box)}, {domain.h!r}",
