@@ -50,6 +50,19 @@ OF = "material(rubber, eos-strength, e, s"
             "waves of it move at 0.000224, since its density 2.1e+11", "before the modulus",
         ),
         (
+            [], "eos(e, linear, 8000, 160e9)\nstrength(s, plastic, 80e9, 4e8, 5e12)",
+            "at a plastic strain of 1 it bears 5e+12, above its shear modulus", "in the units of",
+        ),
+        (
+            [], "eos(e, linear, 8000, 160e9)\n"
+            "strength(s, johnson_cook, 80e9, 4e8, 5e8, 0.3, 1, 10, 0, 300, 1300)",
+            "rises by 10 times itself for e times the rate", "0.01",
+        ),
+        (
+            [], "eos(e, linear, 2000, 1e8)\nstrength(s, mu-i, 1e7, 20, 38, 0.279, 5e-4, 2450)",
+            "its coefficient of friction is 20", "tangents",
+        ),
+        (
             ["fix(e, erosion, all, ep > 0.1 && x > 0)"], "",
             "ep will be 0: points have no such field", "",
         ),
@@ -136,6 +149,17 @@ def test_slips_of_heat(run_interpreted, T0, fix, says):
     ]  # fmt: skip
     said = run_interpreted(warm_block(T0, *lines, fix)).err
     assert said.count("warning") == 1 and says in said, said
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["fix(p, force_particles, all, 0, 1e30)", "fix(p, initial_stress, all, 1e20, 0, 0, 0, 0, 0)"],
+)
+def test_loads_in_other_units(run_interpreted, line):
+    """No larger domain holds what they drive out of it."""
+    said = run_interpreted(block(2, line, "run(1)"), status=1).err
+    assert "cells in one step, out of the domain" in said and "larger" not in said
+    assert "look at loads, stresses and velocities, and at their units" in said
 
 
 def test_two_methods(run_interpreted):

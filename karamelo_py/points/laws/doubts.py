@@ -22,6 +22,7 @@ EXPANSION = 1e-10, 1e-3  # a kelvin, from quartz to polymers, and far beyond
 TOUGH = 50.0  # of a failure strain in shear that was given in percent
 APART = 100.0  # kelvin between reference temperatures that are counted from one point
 MELTS = 0.1  # a plastic strain by whose heat nothing melts
+COEFFICIENT = 2.0  # of friction between grains, far beyond
 STEEP, THICK = 10.0, 20.0  # slopes of Hugoniot curves and coefficients of viscosity, far beyond
 
 
@@ -56,14 +57,31 @@ def _doubts_of_parts(law: Any, state: Any) -> Iterator[tuple[str, str]]:
             f"for nu = 0.3 a bulk modulus of {2.167 * G:.3g}, by density and speed of the eos",
         )
     flow = getattr(strength, "yield_stress", 0.0)
+    hard = flow + getattr(strength, "H", 0.0)
     if flow_stress.defined(type(strength)):
         known = precompute(strength, memory, state.m.heat)
         flow, _ = flow_stress(strength, memory, known, 0.0, state.m.heat, 1.0)
+        hard, _ = flow_stress(strength, memory, known, 1.0, state.m.heat, 1.0)
     if flow > G > 0:
         yield (
             f"it yields at {flow:.3g}, above its shear modulus {G:.3g}: at a strain that no solid "
             "bears without yielding",
             "the shear modulus stands first, then the yield stress",
+        )
+    elif hard > G > 0:
+        yield (
+            f"at a plastic strain of 1 it bears {hard:.3g}, above its shear modulus {G:.3g}",
+            "the modulus of hardening in the units of the others",
+        )
+    if (rate := getattr(getattr(strength, "rate", None), "C", 0.0)) > 1:
+        yield (
+            f"its flow stress rises by {rate:g} times itself for e times the rate",
+            "C of metals is 0.01",
+        )
+    if getattr(strength, "mu_s", 0.0) > COEFFICIENT:
+        yield (
+            f"its coefficient of friction is {strength.mu_s:g}",
+            "coefficients are tangents of angles: 0.38 of glass beads",
         )
     friction = getattr(strength, "friction", 0.0)
     if isinstance(friction, float) and 0 < friction < sin(radians(SMALL)):

@@ -18,6 +18,7 @@ from karamelo_py.scene.solid import named, solid_with
 from karamelo_py.script.errors import Place
 from karamelo_py.script.expressions import POINT_SEEDS, Expression
 
+ABSURD = 10.0  # cells in one step: no smaller one mends that
 LOOSE = 1.5  # cells: points of an unstrained solid are at most one apart
 APART = "no other point of it within a cell"
 
@@ -152,7 +153,16 @@ def _wrong_point(hub: Hub, simulation: Any) -> tuple:
         hint = f"look for a formula that gives NaN, such as a division by zero; else {smaller}"
         return no_number(hub, simulation, what, hint)
     lo, hi = hub.domain.lo[:d], hub.domain.hi[:d]
+    move = float(np.abs(new - old).max()) / h
+    unstable = f"the run is unstable: {smaller}"
+    if move > ABSURD:
+        unstable = f"look at loads, stresses and velocities, and at their units; else {smaller}"
     if hub.update.method.frame.moves and ((new < lo).any() or (new > hi).any()):
+        if move > ABSURD:
+            what = (
+                f"{name} at {_place(old)} moves by {move:.3g} cells in one step, out of the domain"
+            )
+            return what, unstable
         side = next(k for k in range(d) if new[k] < lo[k] or new[k] > hi[k])
         if simulation.above_limit():
             return f"{name} at {_place(old)} is thrown out of the domain", smaller
@@ -165,10 +175,8 @@ def _wrong_point(hub: Hub, simulation: Any) -> tuple:
             "make the domain larger, hold the point back with fix velocity_nodes at the wall, let "
             f"it go with boundary(delete), or, if it should not have got there, {smaller}{keep}",
         )
-    move = float(np.abs(new - old).max()) / h
     if move > 1:
-        what = f"{name} at {_place(old)} moves by {move:.3g} cells in one step"
-        return what, f"the run is unstable: {smaller}"
+        return f"{name} at {_place(old)} moves by {move:.3g} cells in one step", unstable
     if any(simulation.points.seen(_is_tangled, place, grid)):
         tangled, plain = type(hub.update.method.basis).__name__, "R4" if d == 2 else "R8"
         instead = f", {plain} in the place of {tangled}" if tangled in ("Q4", "H8") else ""
