@@ -18,6 +18,7 @@ from test_laws_scripts import ALL, pulled
 from test_walls import scene as rubbed
 
 EVERY = "restart(2, r.*.h5)\n"
+SIZE = (0.3, 0.1)
 
 
 def arrays(path: Path) -> dict[str, np.ndarray]:
@@ -201,17 +202,19 @@ SWAYS = (
     "log_modify(custom, step, dt, time)", "run(6)",
 )  # fmt: skip
 SERIAL = {  # scenes that one process takes
-    "load steps": block(2, "scheme(quasi-static)", *IMPLICIT),
-    "large steps": block(2, "scheme(newmark)", *IMPLICIT),
-    "logarithmic strains": block(2, *SWAYS).replace("rubber, linear,", "rubber, hencky,"),
-    "clay": block(2, *SWAYS).replace(
+    "load steps": block(2, "scheme(quasi-static)", *IMPLICIT, size=SIZE),
+    "large steps": block(2, "scheme(newmark)", *IMPLICIT, size=SIZE),
+    "logarithmic strains": block(2, *SWAYS, size=SIZE).replace(
+        "rubber, linear,", "rubber, hencky,"
+    ),
+    "clay": block(2, *SWAYS, size=SIZE).replace(
         "rubber, linear, 2, 100, 0.3", "rubber, cam-clay, 2, 40, 1, 0.1, 0.02, 1"
     ),
-    "points that go": block(2, "fix(e, erosion, all, x > 0.55, every=2)", *SWAYS),
+    "points that go": block(2, "fix(e, erosion, all, x > 0.55, every=2)", *SWAYS, size=SIZE),
 }
 SCENES = {
-    "loads": block(2, *LOADS),
-    "loads in the total frame": block(2, *LOADS).replace("ulmpm", "tlmpm"),
+    "loads": block(2, *LOADS, size=SIZE),
+    "loads in the total frame": block(2, *LOADS, size=SIZE).replace("ulmpm", "tlmpm"),
     "wall that rubs": rubbed().replace("run_time(0.2)", "run(6)"),
     "rigid": pushed().replace("run_time(3)", "set_dt(0.02)\nrun(40)"),
     "rigid by a formula": pushed("ulmpm/contacts").replace("initial_velocity_particles, tool, 0.5",
@@ -239,16 +242,16 @@ SCENES = {
     "metal": pulled(ALL).replace("run(50)", "run(6)"),
     "anti locking": block(
         2, "anti_volumetric_locking(true)", "fix(v, initial_velocity_particles, all, sin(9*x0), 0)",
-        "run(6)",
+        "run(6)", size=SIZE,
     ),
     "single": "precision(single)\n" + block(
-        2, "fix(v, initial_velocity_particles, all, sin(9*x0), 0)", "run(6)"
+        2, "fix(v, initial_velocity_particles, all, sin(9*x0), 0)", "run(6)", size=SIZE
     ),
     "deleted": thrown(2, "delete", "run(8)", "run(12)"),
     "reflected": thrown(2, "reflect", "run(8)", "run(12)"),
     "tools": block(2, *TOOLS),
-    "groups": block(2, GROUPS, "run(7)"),
-    "functions in Python": block(2, PYTHON, "run(5)"),
+    "groups": block(2, GROUPS, "run(7)", size=SIZE),
+    "functions in Python": block(2, PYTHON, "run(5)", size=SIZE),
     "bench": block(3, BENCH, size=(0.2, 0.1, 0.1)),
     "faces with heat": slab(FACE, ", lamp_s, air_s", "run(6)"),
     "fluids": FLUIDS,
