@@ -7,7 +7,7 @@ import signal
 import time
 from collections.abc import Mapping
 from contextlib import suppress
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from karamelo_py.app.live import frames
 from karamelo_py.app.live.frames import Frame, KeptFrames, plain
@@ -44,7 +44,7 @@ class RunPage(Rhythmic):
     id, place = "live", None
 
     def __init__(self, hub: Hub, title: str):
-        self.hub, self.title = hub, title
+        self.hub, self.title, self.every = hub, title, 1
         self.frames = KeptFrames()
         if hub.output.log.rows is None:
             hub.output.log.rows = []
@@ -58,16 +58,12 @@ class RunPage(Rhythmic):
         )  # fmt: skip
         hub.output.pages.append(self)
 
-    @property
-    def every(self) -> Any:
-        """The rhythm of the log."""
-        return self.hub.output.log.every
-
     # ---- in the run's own thread ----------------------------------------------------------------
 
     def write(self) -> None:
         """Show the present state; wait here while the page holds the run."""
         hub, simulation = self.hub, self.hub.simulation
+        self.every = hub.output.log.every  # each run begins with an output
         names, numbers = hub.output.log.rows[-1] if hub.output.log.rows else ([], [])
         log = {name: n for name, n in zip(names, numbers, strict=True) if not isinstance(n, str)}
         share = energy.share_lost(simulation) if simulation.control.clock[0].watch_energy else None
