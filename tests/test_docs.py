@@ -446,3 +446,16 @@ def test_words_of_other_programs_lead_to_a_page(asked, page):
     finally:
         sys.path.pop(0)
     assert set(asked.lower().split()) <= set(WORDS[page].lower().split())
+
+
+def test_claims_of_the_front_page():
+    """Their numbers are those of the pages that they link to."""
+    front = (ROOT / "docs" / "index.md").read_text("utf-8")
+    speed = (ROOT / "docs" / "accuracy.md").read_text("utf-8")
+    scenes = (ROOT / "docs" / "comparison.md").read_text("utf-8").count("\n## `in.")
+    assert int(re.search(r"(\d+) scenes beside", front)[1]) == scenes
+    (own,) = re.findall(r"^\| `disks-320` \(.*?\| 102936 \| [\d.]+ \| ([\d.]+) \|", speed, re.M)
+    assert re.search(r"(\d+) million point-steps", front)[1] == f"{float(own):.0f}"
+    for program in ("Taichi", "NairnMPM", "Karamelo"):
+        row = re.search(rf"^\| {program}[^|]*\|[^|]*\| ([\d.]+) \|$", speed, re.M)
+        assert f"{program} {row[1]}" in front
