@@ -146,7 +146,7 @@ def _bodies(s: Any) -> list[tuple[BodyMotion, Any]]:
 
 def drift_of(s: Any) -> Noise | None:
     """Measure what the drift in the scene `s` (SceneFacts) feeds, also where that is borne."""
-    if not (hasattr(s.scheme, "keeping") and s.moves and s.kept > 0.9):
+    if not (hasattr(s.scheme, "keeping") and s.moves and s.kept > 0.9) or _thrown(s):
         return None
     known, spacing = borne(s.basis), float(s.simulation.control.clock[0].spacing)
     averages = getattr(s.scheme, "bears_drift", False)
@@ -164,6 +164,24 @@ def drift_of(s: Any) -> Noise | None:
     if not cells:
         return None
     return Noise(cells * s.simulation.dt * s.waves / spacing / bound, speed, cells)
+
+
+def _thrown(s: Any) -> bool:
+    """Tell whether nothing strains the only body: it has one velocity, weight, and no stress."""
+    return (
+        len(s.motions) == 1
+        and bool((s.motions[0].fast == s.motions[0].slow).all())
+        and s.hub.update.boundary != "reflect"
+        and s.simulation.points.total("stored") == 0
+        and all(
+            fix.first_step_only or (fix.accelerates and all(map(_is_constant, fix.formulas)))
+            for fix in s.hub.fixes.values()
+        )
+    )
+
+
+def _is_constant(formula: Any) -> bool:
+    return formula is None or getattr(formula, "is_constant", False)
 
 
 def turn_of(s: Any) -> Noise | None:
