@@ -313,8 +313,8 @@ def test_a_scene_in_several_runs_is_told(run_interpreted, runs, told):
 
 @pytest.mark.parametrize(("v", "told"), [("0, 6", False), ("0.01*x0, 6", True)])
 def test_a_body_that_is_merely_thrown_is_not_told(run_interpreted, v, told):
-    """Nothing strains it, so that there is nothing to grow: its fall is right (docs/defaults.md)."""
-    text = (INPUTS / "defaults" / "in.throw").read_text(encoding="utf-8").replace("0, 6)", f"{v})")
+    """Nothing strains it, so that there is nothing to grow."""
+    text = (INPUTS / "defaults" / "in.throw").read_text("utf-8").replace("0, 6)", f"{v})")
     assert ("noise of a drift" in run_interpreted(text, command="check").err) == told
 
 

@@ -184,7 +184,7 @@ def words_of_loss(hub: Hub, simulation: Any, within: float) -> tuple[str, str] |
     lost = share_lost(simulation)
     if lost <= within or taken_by(hub):
         return None
-    cause, cure = _cause_of_loss(hub)
+    cause, cure = cause_of_loss(hub)
     message = (
         f"step {simulation.step}, time {simulation.time:.6g}: energy is lost, {100 * lost:.2g} % "
         f"of the largest so far since the start (kinetic + stored + dissipated - work). Known to "
@@ -193,7 +193,7 @@ def words_of_loss(hub: Hub, simulation: Any, within: float) -> tuple[str, str] |
     return message, cure
 
 
-def _cause_of_loss(hub: Hub) -> tuple[str, str]:
+def cause_of_loss(hub: Hub) -> tuple[str, str]:
     update, method = hub.update, hub.update.method
     if getattr(update.scheme, "damps", False):
         name = registry.name_of("scheme", type(update.scheme))
