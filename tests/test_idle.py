@@ -12,7 +12,8 @@ GAS = "eos(e, ideal-gas, 1, 1.4, p=1)\nstrength(f, fluid, 0)\nmaterial(rubber, e
 def test_a_run_at_rest_is_told_once(run_interpreted):
     """What only measures does not act, and short runs look at a scene."""
     quiet = ("compute(Ek, kinetic_energy, all)", "fix(E, kinetic_energy, all)")
-    said = run_interpreted(block(2, *quiet, "run(99)", "run(100)", "run_until(time > 1)")).err
+    runs = "run(99)", "run(100)", "run_until(time > 1)"
+    said = run_interpreted(block(2, *quiet, *runs, size=(0.1, 0.1))).err
     assert said.count(RESTS) == 1 and "run(100)" in said
     assert RESTS in run_interpreted(block(2, "run_time(9)"), command="check").err
 
@@ -40,7 +41,7 @@ def test_walls_and_loads_that_are_none_move_nothing(run_interpreted, fix):
 )
 def test_what_may_move_is_not(run_interpreted, lines):
     assert RESTS not in run_interpreted(block(2, *lines), command="check").err
-    assert RESTS not in run_interpreted(block(2, *lines)).err
+    assert RESTS not in run_interpreted(block(2, *lines, size=(0.1, 0.1))).err
 
 
 def test_a_gas_is_not_at_rest(run_interpreted):
@@ -51,7 +52,7 @@ def test_a_gas_is_not_at_rest(run_interpreted):
 def test_a_run_that_hardly_ends_says_how_many_steps(run_interpreted):
     """By the step that is set; or by that of waves in water of 1e-9 t/mm^3, in m and Pa."""
     lines = ("fix(v, initial_velocity_particles, all, 10, 0)", "set_dt(0.001)", "run_time(1.1e5)")
-    said = run_interpreted(block(2, *lines), status=1).err
+    said = run_interpreted(block(2, *lines, size=(0.1, 0.1)), status=1).err
     assert "about 1.1e+08 steps of 0.001 from here to time 110000" in said
     assert said.index("a larger step") < said.index("leaves the domain")
     short = block(2, *lines).replace("1.1e5", "0.9e5")
