@@ -440,6 +440,15 @@ def test_the_work_of_loads_on_points_is_known(run_interpreted, fix):
     assert abs(float(share)) < 1
 
 
+def test_gravity_beside_a_fix_in_python(run_interpreted):
+    """The work of loads on nodes is added up where the step comes back to Python, too."""
+    lines = "fix(g, body_force, all, 0, -2)", "fix(F, force_particles, all, 0, 0.03)"
+    text = block(2, *lines, "set_dt(0.002)", "run(40)", size=(0.3, 0.1))
+    done = run_interpreted(text.replace("method(ulmpm", "method(tlmpm"))
+    (share,) = re.findall(r"  energy +(\S+) % of the largest", done.out)
+    assert abs(float(share)) < 0.1
+
+
 def test_what_impulses_of_contact_lose_is_told(run_interpreted):
     fix = "contact/minimize_penetration/plane, body, 0.28, 0, 0, 1, 0, 0, 0"
     (share,), said = balance(run_interpreted, fix)

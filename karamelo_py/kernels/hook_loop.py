@@ -532,11 +532,14 @@ def _at_nodes_hooks(hooks, stage, target, s):
     clock.set_low = clock.set_high = 0.0  # of temperatures only
 
 
-@shared
+@point_function(otherwise=True)
 def add_work(hooks, s):
     """Add up the work of the loads on nodes."""
-    if isinstance(hooks, arrays.Hooks):
-        node_hooks(NONE, LOADS, s.kin, s.grids, s.nodes, s.ranges, hooks, s.control, kick(s), 0.0)
+
+
+@add_work.on(arrays.Hooks)
+def _add_work_hooks(hooks, s):
+    node_hooks(NONE, LOADS, s.kin, s.grids, s.nodes, s.ranges, hooks, s.control, kick(s), 0.0)
 
 
 # --- points -----------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ from karamelo_py.compiler.threads import Serial
 from karamelo_py.kernels import arrays
 from karamelo_py.kernels.arrays import INITIAL_INTEGRATE, ON_VELOCITY, SUPPLY_HEAT, Setup
 from karamelo_py.kernels.heat import at_heat_nodes, at_heated_points
-from karamelo_py.kernels.hook_loop import at_nodes, at_points
+from karamelo_py.kernels.hook_loop import add_work, at_nodes, at_points
 from karamelo_py.kernels.hooks import STAGES, CompiledHook
 from karamelo_py.kernels.totals import LIMBS
 from karamelo_py.kernels.walls import FRICTION
@@ -233,6 +233,11 @@ def _at_nodes_python_hooks(hooks, stage, target, s):
     at_nodes(hooks.compiled, stage, target, s)
     if stage in hooks.by_stage:
         hooks.act(_on_nodes, s, stage, target)
+
+
+@add_work.on(PythonHooks)
+def _add_work_python_hooks(hooks, s):
+    add_work(hooks.compiled, s)
 
 
 @at_points.on(PythonHooks)
