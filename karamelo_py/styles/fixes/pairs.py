@@ -196,8 +196,9 @@ class ContactMinimizePenetration(PairContact):
                 f"bodies that slide do not feel the friction {mu:g}: their surfaces are made of "
                 "balls, which brake by about 0.2 of the pressing force for a coefficient of 0, "
                 "by half of it for all from 0.3 on, and by more where faces lean to the grid",
-                hint="method(ulmpm/contacts, ...) with fix contact/friction has smooth surfaces; "
-                "leave mu out where nothing slides",
+                hint="method(ulmpm/contacts, ...) with fix contact/friction has smooth surfaces, "
+                "and fix contact/surface where one of the two is rigid; leave mu out where "
+                "nothing slides",
             )
 
 

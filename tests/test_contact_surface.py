@@ -1,0 +1,88 @@
+"""Fix contact/surface: points touch the surface of a region."""
+
+from math import cos, radians, sin
+
+import meshio
+import numpy as np
+import pytest
+from scenes import block
+
+SLOPE = """
+    method({method}, FLIP, linear, 1)
+    dimension(2, 0, 3, 0, 3, 0.1)
+    c = cos(radians(20))
+    s = sin(radians(20))
+    X = 0.7
+    Y = 0.3 + 2.3*s/c
+    region(slope, plane, X, Y, -s, -c)
+    region(above, plane, X, Y, s, c)
+    region(below, plane, X + 0.4*s, Y + 0.4*c, -s, -c)
+    region(ahead, plane, X, Y, c, -s)
+    region(behind, plane, X + 0.6*c, Y - 0.6*s, -c, s)
+    region(block, intersection, above, below, ahead, behind)
+    material(rubber, linear, 1000, 1e6, 0.3)
+    solid(block, region, block, 2, rubber, 0.1, 0, points=cut)
+    fix(rub, contact/surface, all, slope, {mu}{way})
+    fix(g, body_force, all, 0, -10)
+    compute(v, average_velocity, all)
+    along = v_x*c - v_y*s
+    set_output(time(0.01))
+    log_modify(custom, step, time, along)
+    run_time(0.4)
+"""
+
+
+@pytest.mark.parametrize(
+    ("mu", "way", "share"),
+    [(0.2, "", 1), (0, "", 0), (0.2, ", 9*time*c, -9*time*s", -1)],
+    ids=["rough", "smooth", "belt"],
+)
+def test_a_block_slides_down(run_script, mu, way, share):
+    """With g (sin - mu cos), Coulomb, and g (sin + mu cos) on a belt that runs ahead of it.
+
+    What errs by up to 2 % of g sin is the noise of a block that was set down at once.
+    """
+    done = run_script(SLOPE.format(method="tlmpm", mu=mu, way=way))
+    late = done.log.Time > 0.1
+    found = np.polyfit(done.log.Time[late], done.log.along[late], 1)[0]
+    exact = 10 * (sin(radians(20)) - share * mu * cos(radians(20)))
+    assert found == pytest.approx(exact, abs=0.02 * 10 * sin(radians(20)))
+    assert "energy comes from nowhere" not in done.err
+
+
+def pushed(run_interpreted, d: int, die: str, *lines: str, folder: str) -> list[float]:
+    """The force on a block from 0.3 on whose lowest points overlap a region below it."""
+    names = [f"F_{axis}" for axis in "xyz"[:d]]
+    text = block(
+        d, *lines, die, "fix(F, contact/surface, all, die)",
+        f"log_modify(custom, step, {', '.join(names)})", "set_dt(0.001)", "run(1)",
+    )  # fmt: skip
+    log = run_interpreted(text, folder=folder).log
+    return [float(log[name][-1]) for name in names]
+
+
+def test_any_region_pushes(run_interpreted, tmp_path):
+    """The mould that is all but a block, the block, and a mesh of it: the same forces."""
+    corners = np.array([[0.0, 0.0], [0.9, 0.0], [0.9, 0.31], [0.0, 0.31]])
+    meshio.Mesh(corners, {"triangle": [[0, 1, 2], [0, 2, 3]]}).write(tmp_path / "die.vtk")
+    styles = {
+        "block": "region(die, block, 0, 0.9, 0, 0.31)",
+        "plane": "region(die, plane, 0, 0.31, 0, -1)",
+        "mould": "region(die, block, 0, 0.9, 0.31, 0.9, exterior)",
+        "mesh": f"region(die, mesh, {tmp_path}/die.vtk)",
+    }
+    forces = {n: pushed(run_interpreted, 2, die, folder=n) for n, die in styles.items()}
+    assert forces["plane"][1] > 0
+    for name, found in forces.items():
+        assert found == pytest.approx(forces["plane"], rel=1e-6, abs=1e-9), name
+
+
+def test_a_body_that_begins_in_a_region_is_told(run_interpreted):
+    lines = "region(die, block, 0, 0.9, 0, 0.9)", "fix(F, contact/surface, all, die, 0.1)"
+    said = run_interpreted(block(2, *lines, "set_dt(1e-9)", "run(1)"), status=None).err
+    assert "points in the region of fix 'F': all points of its group begin there" in said
+
+
+def test_friction_is_not_below_0(run_interpreted):
+    lines = "region(die, block, 0, 0.9, 0, 0.2)", "fix(F, contact/surface, all, die, -0.1)"
+    assert "at least 0" in run_interpreted(block(2, *lines), status=1).err
