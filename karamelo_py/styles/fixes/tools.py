@@ -301,8 +301,8 @@ class ContactSurface(ToolFix):
 
     Example
     -------
-    region(die, stl, die.stl)
-    fix(press, contact/surface, all, die, 0.1, 0, 0, -0.5*time)
+    fix(ground, contact/surface, all, wall, 0.2)
+    fix(press, contact/surface, all, disk, 0.1, 0, -0.5*time, 0)
 
     Notes
     -----
