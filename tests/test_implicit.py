@@ -120,7 +120,9 @@ def test_elastica(run_script, law, steps):
     """
     # Cells of a quarter of the height: 1 % of the length, as AMPLE has it (tip 0.813 to 0.821).
     words = "-var", "law", law, "-var", "steps", steps, "-var", "ppc", "2"
-    result = run_script(INPUTS / "in.elastica", *words)
+    text = (INPUTS / "in.elastica").read_text().replace("pin_y, Es", "pin_y, parts")
+    result = run_script(text, *words)
+    assert max(result.log["parts"]) == 1  # though its end goes over several cells at once
     assert result.log["down"][-1] == pytest.approx(0.8106, abs=0.012)
     assert result.log["back"][-1] == pytest.approx(0.5550, abs=0.012)
     assert result.log["pin_y"][-1] == pytest.approx(100e3, rel=1e-8)
@@ -352,6 +354,17 @@ def test_a_body_flies(run_script):
     """Points on lines between cells, which they cross by quarters of a cell: nothing happens."""
     log_of = run_script(FLIGHT.format(lines="", columns="")).log
     assert np.allclose(log_of["Ek"], 0.125, rtol=1e-9) and max(log_of["Es"]) < 1e-12
+
+
+def test_forces_that_are_rounding_are_none(run_interpreted):
+    """A body that nothing strains flies on: what its inertia is rounded to is no force."""
+    text = FLIGHT.format(lines="", columns=", iterations, residual").replace("0.0625", "0.01")
+    text = text.replace(", all, 1, 0", ", all, 0.3, 0.1").replace(
+        "linear, 1, 1000", "linear, 1e6, 1"
+    )
+    log_of = run_interpreted(text).log
+    assert np.allclose(log_of["Ek"], 12500, rtol=1e-9)
+    assert max(log_of["iterations"]) <= 2 and max(log_of["residual"]) <= 1e-10
 
 
 AT_REST = FLIGHT.replace(", all, 1, 0", ", all, 0, 0")
