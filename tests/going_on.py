@@ -73,7 +73,9 @@ TOOLS = (
     "fix(W, contact/minimize_penetration/plane, body, 0.32, 0, 0, 1, 0, 0, 0.3)",
     "fix(I, indent, all, sphere, 500, 0.13, 0.45, 0.55, 0)",
     "fix(C, cuttingtool, all, 0.1, 0.35 + time, 0.36, 0, -1, 0, 0, 0.4, 0.5, 0.6, 0.36)",
-    "log_modify(custom, step, F_x, W_x, I_y, C_x)", "set_dt(0.001)", "run(6)",
+    "region(low, block, 0, 1, 0, 0.32)",
+    "fix(S, contact/surface, all, low, 0.3, 9*time^2, 0)",
+    "log_modify(custom, step, F_x, W_x, I_y, C_x, S_x)", "set_dt(0.001)", "run(6)",
 )  # fmt: skip
 GROUPS = """\
 region(low, block, 0.3, 0.3, 0.3, 0.5)

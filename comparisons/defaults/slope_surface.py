@@ -1,0 +1,5 @@
+"""A block slides down a region that leans by 20 degrees and holds no points."""
+
+from comparisons.slopes import slope
+
+CASE = slope(angle=20, mu=0.2)
