@@ -174,8 +174,9 @@ def test_outputs_go_on_in_their_files(run_interpreted):
     same_files(whole, again)
 
 
+@pytest.mark.full
 def test_another_number_of_threads(tmp_path):
-    """One thread writes, two go on; compiled, with the loops of test_identical.py."""
+    """One thread writes, two go on; compiled. Threads alone: test_identical.py."""
     from test_identical import crossing
 
     script = tmp_path / "in.script"
@@ -194,11 +195,6 @@ def test_another_number_of_threads(tmp_path):
              str(threads), *restart], cwd=folder, check=True, capture_output=True,
         )  # fmt: skip
     same_files(*folders)
-
-
-test_another_number_of_threads = pytest.mark.xdist_group("identical")(
-    test_another_number_of_threads
-)
 
 
 # --- scripts ------------------------------------------------------------------------------------
