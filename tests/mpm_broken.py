@@ -134,6 +134,18 @@ class Slim(Group):
     final_integrate = vector_hook(laid, reads=("mass", "velocity"), writes=("velocity",))
 
 
+class Nodeless(Group):
+    post_particles_to_grid = vector_hook(laid, reads=("position",), writes=("force",), nodes=True)
+
+
+class Early(Group):
+    post_update_grid_state = vector_hook(laid, reads=("force",), writes=("force",), nodes=True)
+
+
+class Elsewhere(Group):
+    final_integrate = vector_hook(laid, reads=("force",), writes=("force",), nodes=True)
+
+
 class Lawless(Group):
     initial_integrate = vector_hook(laid, reads=(heat_content,), writes=("velocity",))
 

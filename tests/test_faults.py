@@ -26,7 +26,8 @@ pytestmark = pytest.mark.xdist_group("faults")
 FAMILIES = {
     "fix": "spring light misplaced swapped cold hot many few undirected viewless idle misspelt "
     "silent stop ids weigh bare formless oneword clashing nodal first again doubled lost leaving "
-    "silenced orphan wholly heavily fixing homeless late slim lawless dark",
+    "silenced orphan wholly heavily fixing homeless late slim lawless dark "
+    "nodeless early elsewhere",
     "compute": "gauge mute",
     "material": "motionless growing raising short uncompiled hiding double",
     "strength": "forgetful endless uncountable",
@@ -94,6 +95,12 @@ def test_init(hub):
         ("fixing", "initial_integrate writes 'mass': 'velocity' or a class of a field"),
         ("homeless", "initial_integrate: points have no Force because of this fix: its author nam"),
         ("late", "final_integrate: forces on points are those of initial_integrate"),
+        (
+            "nodeless",
+            "post_particles_to_grid reads 'position': 'mass', 'velocity', 'velocity_updat",
+        ),
+        ("early", "post_update_grid_state writes 'force': 'velocity_update' or a class of a field"),
+        ("elsewhere", "final_integrate is a moment of points, and its hook was made for whole nod"),
         ("slim", "final_integrate: laid has to take the 4 arguments of a hook on whole points: v"),
         ("undirected", "it has no formulas, so post_particles_to_grid would act in no direction"),
         ("viewless", "initial_integrate has to take one argument, the view of the group"),

@@ -103,7 +103,7 @@ def test_pip_installs_it_and_styles_and_help_tell_of_it(tmp_path):
     lines = [line for line in done.stdout.splitlines() if "mpm-examples 0.1.0" in line]
     listed = {line.split()[0]: line for line in lines}
     page = (PLUGIN / "README.md").read_text("utf-8")
-    assert len(listed) == 21
+    assert len(listed) == 22
     assert all(name in page for name in listed)
     assert "Slow points down" in listed["drag"]
     done = karamelo_py(tmp_path / "site", tmp_path, "help", "drag")
@@ -262,16 +262,17 @@ run({steps})
 """
 
 
-@pytest.mark.parametrize("threads", [1, 2])
-def test_a_force_by_the_whole_velocity(site, tmp_path, run_interpreted, threads):
+@pytest.mark.parametrize(("threads", "style"), [(1, "air_drag"), (2, "air_drag"), (2, "node_drag")])
+def test_a_force_by_the_whole_velocity(site, tmp_path, run_interpreted, threads, style):
     """dv/dt = -c |v| v: v = v0/(1 + c |v0| t), of first order in dt; compiled as interpreted."""
-    done = run_interpreted(AIR.format(steps=200))
+    scene = AIR.format(steps=200).replace("air_drag", style)
+    done = run_interpreted(scene)
     _, time, *p, fx, fy = read_log(done.folder)
     assert "energy" in done.out + done.err  # the work of the force is added up
     slower = 1 / (1 + 0.1 * 5 * time)
     np.testing.assert_allclose(p, 4 * np.outer([3, 4], slower), rtol=1e-3)
     np.testing.assert_allclose(np.hypot(fx, fy)[1:], (4 * 0.1 * 25 * slower**2)[1:], rtol=3e-3)
-    (tmp_path / "in.air").write_text(AIR.format(steps=200))
+    (tmp_path / "in.air").write_text(scene)
     done = karamelo_py(site, tmp_path, "in.air", "--threads", str(threads), compiled=True)
     assert done.returncode == 0, done.stderr
     np.testing.assert_array_equal(read_log(tmp_path)[1:4], [time, *p])

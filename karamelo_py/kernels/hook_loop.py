@@ -58,6 +58,18 @@ class HookedNodes(NamedTuple):
     kept: float
 
 
+class WholeNodes(NamedTuple):
+    """Nodes that functions of whole nodes change."""
+
+    tag: NamedTuple  # the function, and what it reads and writes: see `kinds.vector_hook`
+    kin: NamedTuple
+    grids: np.ndarray
+    nodes: NamedTuple
+    ranges: np.ndarray
+    before_update: bool  # else behind it
+    target: int
+
+
 class MovingPoints(NamedTuple):
     """Points whose velocity point functions change, and the places y that follow from x.
 
@@ -105,7 +117,7 @@ class HeatedPoints(NamedTuple):
 @shared
 def _turns(what, k, parts):
     """Return where the turns of thread `k` of so many begin and end, and the step between them."""
-    if isinstance(what, HookedNodes):
+    if isinstance(what, (HookedNodes, WholeNodes)):
         shares = what.ranges[0, 0]
         return shares * k // parts, shares * (k + 1) // parts, NONE + 1
     # By turns: members may lie beside each other.
@@ -116,7 +128,7 @@ def _turns(what, k, parts):
 @shared
 def _bounds(what, turn, parts):
     """Return from where to before where members are chosen in a turn."""
-    if isinstance(what, HookedNodes):
+    if isinstance(what, (HookedNodes, WholeNodes)):
         return what.ranges[turn, 0], what.ranges[turn, 1]
     return turn, min(turn + TURN, what.ids.size) if parts > 1 else what.ids.size
 
@@ -136,7 +148,7 @@ def _act_on_part(what, task, hooks, control, dt, h, share, k, parts):
         place, end = _bounds(what, turn, parts)
         count, member = BLOCK, NONE
         while count == BLOCK:
-            if isinstance(what, HookedNodes):
+            if isinstance(what, (HookedNodes, WholeNodes)):
                 count, place, member = _choose_nodes(what, hooks, h, place, end, member)
             else:
                 count, place = _choose_points(what, hooks, h, place, end)
@@ -461,6 +473,38 @@ def _work_at_nodes(what, hooks, control, dt, count):
         totals.add_many(control.totals, totals.WORK, terms, count)
 
 
+@act.on(WholeNodes)
+def _act_on_whole_nodes(what, task, hooks, control, dt, h, count, share):
+    tag, nodes, kin = what.tag, what.nodes, what.kin
+    if hooks.table[h].uses_place:
+        _locate_nodes(what.grids, hooks, count)
+    rows, first, change = (VALUE, BEFORE, THIRD), arrays.of_force(kin), arrays.of_change(kin)
+    for c in range(len(tag.values)):
+        evaluate(hooks, h, c, count, control, rows[c], 0.0)
+    for q in range(count):
+        n = hooks.chosen[q]
+        values = tuple([hooks.scratch[rows[c], q] for c in range(len(tag.values))])
+        force = tuple([nodes.sums[n, first + c] for c in range(kin.dimension)])
+        star = tuple([nodes.update[n, c] for c in range(kin.dimension)])
+        found = kinds.results(tag, what, kin, kin, n, values, dt)
+        numbers = kinds.written(tag, what, n, found)
+        own = totals.counts(control.ranks, n)
+        work = 0.0
+        for c in range(kin.dimension):
+            if what.before_update:
+                hooks.loads[n, c] += nodes.sums[n, first + c] - force[c]  # see _work_at_nodes
+            else:
+                new = nodes.update[n, c]
+                half = 0.5 * nodes.sums[n, arrays.MASS] * (new - star[c])
+                work += float(half * (2 * new - nodes.update[n, change + c]))
+        if own:
+            totals.add_to(control.totals, totals.WORK, work)
+        if own and hooks.table[h].slot >= 0:
+            for c in range(len(numbers)):
+                totals.add_to(control.totals, hooks.table[h].slot + c, float(numbers[c]))
+    return 0
+
+
 class _NoWhole(NamedTuple):
     """Take the place of the functions of whole points in loops that know none."""
 
@@ -482,13 +526,21 @@ def node_hooks(stage, target, kin, grids, nodes, ranges, hooks, control, dt, kep
     """
     # Of declared fields walls know one; others would have all this compiled anew.
     fields = tuple([one for one in nodes.fields if type(one) is FrictionalHeat])
+    early, flat = stage == arrays.POST_PARTICLES_TO_GRID, planar(kin)
+    whole = tuple(
+        [
+            WholeNodes(tag, flat, grids, nodes, ranges, early, target)
+            for tag in hooks.whole
+            if tag.of_nodes
+        ]
+    )
     nodes = arrays.Nodes(nodes.sums, nodes.update, nodes.velocity, fields)
     kin, dt, hooks = planar(kin), float(dt), without_whole(hooks)
-    _node_hooks(stage, target, kin, grids, nodes, ranges, hooks, control, dt, kept)
+    _node_hooks(stage, target, kin, grids, nodes, ranges, whole, hooks, control, dt, kept)
 
 
 @kernel
-def _node_hooks(stage, target, kin, grids, nodes, ranges, hooks, control, dt, kept):
+def _node_hooks(stage, target, kin, grids, nodes, ranges, whole, hooks, control, dt, kept):
     what = hold(HookedNodes(target, kin, grids, nodes, ranges, kept))
     if target == LOADS:
         if hooks.loads.size > 0:
@@ -505,7 +557,13 @@ def _node_hooks(stage, target, kin, grids, nodes, ranges, hooks, control, dt, ke
         if hooks.table[h].uses_share:
             heavy = _act_on_part(what, COUNT, hooks, control, dt, h, share, NONE, NONE + 1)
             share = 1.0 / max(totals.number_of_all(control.ranks, control, heavy), 1)
-        _act_on_all(what, ACT, hooks, control, dt, h, share)
+        if hooks.table[h].address == arrays.WHOLE:
+            for one in whole:
+                # Before the forces (usf) v* is that of the step before.
+                if one.tag.row == h and target != arrays.ON_VELOCITY:
+                    _act_on_all(one, ACT, hooks, control, dt, h, share)
+        else:
+            _act_on_all(what, ACT, hooks, control, dt, h, share)
         _publish_total(hooks, h, control)
     # Walls rub when it is known which of them hold a node.
     for h in range(len(hooks.table)):
@@ -695,7 +753,13 @@ def point_hooks(stage, blocks, hooks, control, dt):
 @shared
 def whole_points(hooks, kin, points, laws, x, heat):
     """Give what each of the functions of whole points acts on."""
-    return tuple([WholePoints(tag, points.id, kin, points, laws, x, heat) for tag in hooks.whole])
+    return tuple(
+        [
+            WholePoints(tag, points.id, kin, points, laws, x, heat)
+            for tag in hooks.whole
+            if not tag.of_nodes
+        ]
+    )
 
 
 @shared

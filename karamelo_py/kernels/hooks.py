@@ -81,7 +81,7 @@ class CompiledHook(NamedTuple):
     @property
     def on_nodes(self) -> bool:
         """True where it acts on nodes."""
-        return self.where == "nodes"
+        return self.where in ("nodes", WHOLE_NODES)
 
     @property
     def signature(self) -> Any:
@@ -89,7 +89,7 @@ class CompiledHook(NamedTuple):
         return FUNCTIONS[self.where]
 
 
-WHOLE_POINTS = "whole points"
+WHOLE_POINTS, WHOLE_NODES = "whole points", "whole nodes"
 # What a compiled hook acts on at each moment; those on whole points act where any on points does.
 ACTS_ON = {
     **dict.fromkeys([*NODE_STAGES, "post_heat_to_grid", "post_update_grid_heat"], "nodes"),
@@ -151,6 +151,78 @@ def _volume(what, law, state, p):
 WORDS = {"mass": _mass, "velocity": _velocity, "position": _position, "volume": _volume}
 
 
+def _node_mass(what, law, state, n):
+    return what.nodes.sums[n, arrays.MASS]
+
+
+def _node_velocity(what, law, state, n):
+    nodes, kin = what.nodes, what.kin
+    if what.before_update:
+        first, mass = arrays.of_momentum(kin), nodes.sums[n, arrays.MASS]
+        return kin.Vector._make([nodes.sums[n, first + c] / mass for c in range(kin.dimension)])
+    change = arrays.of_change(kin)
+    numbers = [nodes.update[n, c] - nodes.update[n, change + c] for c in range(kin.dimension)]
+    return kin.Vector._make(numbers)
+
+
+def _node_update(what, law, state, n):
+    return what.kin.Vector._make([what.nodes.update[n, c] for c in range(what.kin.dimension)])
+
+
+def _node_force(what, law, state, n):
+    first, kin = arrays.of_force(what.kin), what.kin
+    return kin.Vector._make([what.nodes.sums[n, first + c] for c in range(kin.dimension)])
+
+
+NODE_WORDS = {
+    "mass": _node_mass, "velocity": _node_velocity, "velocity_update": _node_update,
+    "force": _node_force,
+}  # fmt: skip
+# The moments of hooks on whole nodes, and what they can change beside fields.
+NODE_WRITES = {"post_particles_to_grid": "force", "post_update_grid_state": "velocity_update"}
+
+
+def _node_reader(item: Any) -> Callable:
+    """Return what reads an item of a node."""
+    if not isinstance(item, type):
+        return NODE_WORDS.get(item, _node_mass)  # others are refused before that
+    kind: Any = item
+    shape = kind.shape
+    as_vector = shape is vector
+
+    def of_field(what, law, state, n):
+        array = field(what.nodes.fields, item)
+        numbers = tuple([array[n, k] for k in range(shape(what.kin))])
+        if as_vector:
+            return what.kin.Vector._make(numbers)
+        return numbers[0] if len(numbers) == 1 else numbers
+
+    return of_field
+
+
+def _node_writer(item: Any) -> Callable:
+    """Return what writes an item of a node."""
+
+    def force(what, n, new):
+        for c in range(what.kin.dimension):
+            what.nodes.sums[n, arrays.of_force(what.kin) + c] = new[c]
+
+    def velocity_update(what, n, new):
+        change = arrays.of_change(what.kin)
+        for c in range(what.kin.dimension):
+            what.nodes.update[n, change + c] += new[c] - what.nodes.update[n, c]
+            what.nodes.update[n, c] = new[c]
+
+    def of_field(what, n, new):
+        array = field(what.nodes.fields, item)
+        for k, number in enumerate(flat((new,))):
+            array[n, k] = number
+
+    if isinstance(item, type):
+        return of_field
+    return force if item == "force" else velocity_update
+
+
 def _reader(item: Any) -> Callable:
     """Return what reads an item of a point."""
     if isinstance(item, type):
@@ -177,9 +249,16 @@ def _writer(item: Any) -> Callable:
 
 
 def vector_hook(
-    function: Callable, *, reads: tuple, writes: tuple, publishes: bool = False
+    function: Callable,
+    *,
+    reads: tuple,
+    writes: tuple,
+    publishes: bool = False,
+    nodes: bool = False,
 ) -> CompiledHook:
     """Make a compiled hook on points that sees vectors, declared fields, and the state of the law.
+
+    With `nodes` one on nodes, which sees vectors and declared fields of nodes, `NODE_WORDS`.
 
     Parameters
     ----------
@@ -197,9 +276,11 @@ def vector_hook(
     name, module = f"{function.__name__}_at_points", sys.modules[function.__module__]
     while hasattr(module, name):  # it serves another hook, too
         name += "_"
-    made = namedtuple(name, ("row", "values"), module=function.__module__)
+    made: Any = namedtuple(name, ("row", "values"), module=function.__module__)
     setattr(module, name, made)
-    readers, writers = tuple(map(_reader, reads)), tuple(map(_writer, writes))
+    reader, writer = (_node_reader, _node_writer) if nodes else (_reader, _writer)
+    readers, writers = tuple(map(reader, reads)), tuple(map(writer, writes))
+    made.of_nodes = nodes
     alone = len(writes) + publishes == 1
 
     def results_of(tag, what, law, state, p, values, dt):
@@ -214,4 +295,5 @@ def vector_hook(
 
     results.on(made)(results_of)
     written.on(made)(written_of)
-    return CompiledHook(function, WHOLE_POINTS, publishes, False, False, False, made, reads, writes)
+    where = WHOLE_NODES if nodes else WHOLE_POINTS
+    return CompiledHook(function, where, publishes, False, False, False, made, reads, writes)

@@ -15,7 +15,15 @@ from karamelo_py.compiler.fields import columns_of
 from karamelo_py.compiler.trace import Undefined, places_of
 from karamelo_py.kernels import table
 from karamelo_py.kernels.heat import Conducting, Supply
-from karamelo_py.kernels.hooks import ACTS_ON, STAGES, WORDS, CompiledHook
+from karamelo_py.kernels.hooks import (
+    ACTS_ON,
+    NODE_WORDS,
+    NODE_WRITES,
+    STAGES,
+    WHOLE_NODES,
+    WORDS,
+    CompiledHook,
+)
 from karamelo_py.kernels.p2g import Force, WorkOfForces
 from karamelo_py.language import faults, registry
 from karamelo_py.language.scene import Scene
@@ -100,7 +108,8 @@ def _wrong_hooks(fix: Fix) -> Iterator[str]:
             yield f"{moment} has to take one argument, the view of the group"
     for moment, hook in compiled.items():
         own, whole = ACTS_ON[moment], hook.tag is not None
-        if hook.where != own and not (whole and own != "nodes"):
+        at_own = moment in NODE_WRITES if hook.where == WHOLE_NODES else own != "nodes"
+        if hook.where != own and not (whole and at_own):
             yield f"{moment} is a moment of {own}, and its hook was made for {hook.where}"
         function = hook.function
         takes = len(hook.reads) + 2 if whole else len(hook.signature.args)
@@ -133,14 +142,21 @@ def _wrong_hooks(fix: Fix) -> Iterator[str]:
 
 def _wrong_items(fix: Fix, moment: str, hook: CompiledHook) -> Iterator[str]:
     """Say what a hook on whole points cannot read or write."""
-    words = ", ".join(repr(word) for word in WORDS)
+    known, fields, written_too = WORDS, fix.point_fields, "velocity"
+    if hook.on_nodes:
+        known, fields = NODE_WORDS, fix.node_fields
+        written_too = NODE_WRITES.get(moment, "force")
+    else:
+        fields = (*fields, *Conducting.point_fields)
+    words = ", ".join(repr(word) for word in known)
     for item in (*hook.reads, *hook.writes):
         written = item in hook.writes
         if isinstance(item, type):
-            if item not in (*fix.point_fields, *Conducting.point_fields):
+            if item not in fields:
+                of = "node" if hook.on_nodes else "point"
                 yield (
-                    f"{moment}: points have no {_shown(item)} because of this fix: its author "
-                    "names it in point_fields"
+                    f"{moment}: {of}s have no {_shown(item)} because of this fix: its author "
+                    f"names it in {of}_fields"
                 )
             if written and item is Force and moment != "initial_integrate":
                 yield f"{moment}: forces on points are those of initial_integrate"
@@ -148,10 +164,11 @@ def _wrong_items(fix: Fix, moment: str, hook: CompiledHook) -> Iterator[str]:
                 yield f"{moment}: heat is supplied in supply_heat"
             if written and item is Force and WorkOfForces not in fix.point_fields:
                 yield f"{moment}: point_fields has to have Force and WorkOfForces"
-        elif written and item != "velocity":
-            yield f"{moment} writes {item!r}: 'velocity' or a class of a field"
-        elif item not in WORDS and not callable(item):
-            yield f"{moment} reads {item!r}: {words}, a class of a field, or a function of laws"
+        elif written and item != written_too:
+            yield f"{moment} writes {item!r}: '{written_too}' or a class of a field"
+        elif item not in known and (hook.on_nodes or not callable(item)):
+            laws = "" if hook.on_nodes else ", or a function of laws"
+            yield f"{moment} reads {item!r}: {words}, a class of a field{laws}"
 
 
 def misfit(function: Callable, count: int) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.compiler.tuples import flat, record
-from karamelo_py.kernels.hook_loop import WholePoints
+from karamelo_py.kernels.hook_loop import WholeNodes, WholePoints
 from karamelo_py.kernels.hooks import CompiledHook, results
 from karamelo_py.kernels.laws import law_in, law_on
 from karamelo_py.kernels.visit import place_at, state_at
@@ -19,7 +19,7 @@ from karamelo_py.language.faults import as_script_error, fault
 from karamelo_py.points import laws
 from karamelo_py.points.basis import entry, locate, support
 from karamelo_py.points.basis.product import Along, along
-from karamelo_py.points.kinematics import tensor, vector
+from karamelo_py.points.kinematics import planar, tensor, vector
 from karamelo_py.points.laws.strengths.hardening import flow_stress, precompute
 from karamelo_py.points.transfers import updated_velocity
 from karamelo_py.scene.hub import Hub
@@ -52,24 +52,37 @@ def try_parts(hub: Hub, setup: Any) -> None:
                 _try_hook(setup, fix, moment, hook)
 
 
-def _try_hook(setup: Any, fix: Any, moment: str, hook: Any) -> None:
-    """Try a function of whole points on a point of each law that has points in its group."""
-    part, tag = PartInUse(f"fix {fix.style}", type(fix), fix.place), hook.tag(0, ())
-    says = f"{moment}: {hook.function.__name__} has to return "
+def _samples(setup: Any, fix: Any, hook: Any) -> Iterator[tuple]:
+    """Yield what `results` is called with for a node, or for a point of each law in the group."""
+    tag, kin = hook.tag(0, ()), setup.kin
+    if hook.on_nodes:
+        yield WholeNodes(tag, planar(kin), None, _one_node(setup), None, True, 0), kin, kin, 0
+        return
     for points, table, _ in setup.blocks:
-        members = np.flatnonzero(fix.group.has(points.id))
-        if not len(members):
-            continue
-        p = members[0]
-        what = WholePoints(tag, points.id, setup.kin, points, table, points.x[0], ())
-        law, state = state_at(setup.kin, points, table, p)
-        values = (1.0,) * len(fix.formulas)
+        for p in np.flatnonzero(fix.group.has(points.id))[:1]:
+            what = WholePoints(tag, points.id, kin, points, table, points.x[0], ())
+            yield what, *state_at(kin, points, table, p), p
+
+
+def _one_node(setup: Any) -> Any:
+    """A node of mass 1 with what the nodes of a setup have."""
+    fields = tuple(type(one)(one.array[:1].copy()) for one in setup.nodes.fields)
+    arrays = (np.ones_like(a[:1]) for a in setup.nodes[:3])
+    return type(setup.nodes)(*arrays, fields)
+
+
+def _try_hook(setup: Any, fix: Any, moment: str, hook: Any) -> None:
+    """Try a function of whole points or nodes."""
+    part = PartInUse(f"fix {fix.style}", type(fix), fix.place)
+    says = f"{moment}: {hook.function.__name__} has to return "
+    values = (1.0,) * len(fix.formulas)
+    for what, law, state, p in _samples(setup, fix, hook):
         with (
             as_script_error(part.name, moment, hook.function, fix.place),
             np.errstate(all="ignore"),
         ):
             try:
-                found = results(tag, what, law, state, p, values, 1.0)
+                found = results(what.tag, what, law, state, p, values, 1.0)
             except ArithmeticError:  # of numbers that this is not about
                 continue
         wanted = len(hook.writes) + hook.publishes
