@@ -50,7 +50,7 @@ true: that they do is what it shows."""
 KEPT = "entry.json"
 SAID = "said.txt"
 PICTURES = (".png", ".svg")
-_RUN = re.compile(r"\d+/\d+  |note: |drawn: ")
+_RUN = re.compile(r"\d+/\d+  |run \d+ of at most |note: |drawn: ")
 
 
 @dataclass

@@ -284,7 +284,7 @@ class Map:
         """Find in each row where the first step is that of this column; None where none is.
 
         Beyond the runs of a row the ratio of the steps goes on as a power of the first variable.
-        Rows of numbers without runs lie between their neighbours.
+        Rows of numbers with fewer than two runs lie between their neighbours.
         """
         points: list[list[tuple[float, float]]] = [[] for _ in self.y]
         for (i, j), row in sorted(self.found.items()):
@@ -295,7 +295,7 @@ class Map:
         found: list[float | None] = [known.get(j) for j in range(len(self.y))]
         for (before, low), (after, high) in pairwise(sorted(known.items())):
             for j in range(before + 1, after):
-                if not points[j] and not self.words[-1]:
+                if len(points[j]) < 2 and not self.words[-1]:
                     share = (self.y[j] - self.y[before]) / (self.y[after] - self.y[before])
                     found[j] = low + share * (high - low)
         return found

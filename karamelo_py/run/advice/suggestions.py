@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.language.rules import Advice
+from karamelo_py.output.rhythm import ByTime
 from karamelo_py.run.advice.facts import SceneFacts, is_zero, script_text
 from karamelo_py.run.timestep import own_step
 from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
+from karamelo_py.script.errors import plural
 
 Words = Iterator[tuple[str, str]]  # the cost, and what to write instead
 
@@ -23,6 +25,10 @@ LARGE = 100_000  # points from where on their numbers are read from memory
 RESOLVED = 1000  # times the distance of neighbouring singles: what a step moves points by, at least
 # Errors of inputs/in.sod: 3.18 % with 0.3 of the stable step and 4 points a cell, 3.50 % with 0.9
 # of it, 4.05 % with 2 points as well.
+# Seconds of a core (AMD EPYC): a point in a step of linear functions, a line of the log, a picture
+# and the first one, a file of points and a number in it.
+POINT, LINE, PICTURE, DRAWING, FILE, NUMBER = 1e-7, 5e-4, 0.02, 0.5, 3e-4, 3e-7
+LONG = 0.5  # seconds of output that count
 OF_STEPS = "longer steps move results, those of a shock tube by a tenth"
 OF_POINTS = "fewer points move results, those of a shock tube by a sixth with half of them"
 
@@ -31,7 +37,7 @@ def suggestions(hub: Hub, simulation: Any) -> list[Advice]:
     """Find all that is known to be paid for without need, before anything has run."""
     rules = (
         *(_step, _unread, _unused, _of_parts, _averaging, _flat, _round, _mirrored, _points),
-        _precision,
+        *(_precision, _output),
     )
     return [Advice("", *words) for rule in rules for words in rule(hub, simulation)]
 
@@ -326,6 +332,34 @@ def _precision(hub: Hub, simulation: Any) -> Words:
             "double precision: points in single precision take 0.6 of the memory; errors of scenes "
             "with an exact solution change by less than a twentieth or 2e-4",
             "precision(single)",
+        )
+
+
+def _output(hub: Hub, simulation: Any) -> Words:
+    """Output that takes longer than the steps, by rough times of one core."""
+    span = getattr(simulation.control.clock[0], "end_time", inf) - hub.update.time
+    steps = span / simulation.dt
+    if not np.isfinite(steps):
+        return
+    count = sum(solid.count for solid in hub.solids.values())
+
+    def times(item: Any) -> float:
+        every = item.every
+        return span / every.span if isinstance(every, ByTime) else steps / every
+
+    drawn = [dump for dump in hub.dumps.values() if dump.style == "pyplot"]
+    files = [dump for dump in hub.dumps.values() if dump not in drawn]
+    pictures = sum(map(times, drawn)) + (hub.output.plots.file is not None)
+    output = LINE * times(hub.output.log) + PICTURE * pictures + DRAWING * (pictures > 0)
+    output += sum(times(dump) * (FILE + NUMBER * count * len(dump.columns)) for dump in files)
+    stepping = POINT * steps * count
+    if output > max(LONG, stepping):
+        lines, tables = round(times(hub.output.log)), round(sum(map(times, files)))
+        yield (
+            f"output takes some {output:.1g} s of a core, and the steps {stepping:.1g} s: "
+            f"{plural(lines, 'line')} of the log, {plural(tables, 'table')} of points, "
+            f"{plural(round(pictures), 'picture')}",
+            "less often, or none of it where a study runs the scene many times",
         )
 
 
