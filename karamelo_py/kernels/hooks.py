@@ -276,11 +276,11 @@ def vector_hook(
     name, module = f"{function.__name__}_at_points", sys.modules[function.__module__]
     while hasattr(module, name):  # it serves another hook, too
         name += "_"
-    made: Any = namedtuple(name, ("row", "values"), module=function.__module__)
+    made = namedtuple(name, ("row", "values"), module=function.__module__)
     setattr(module, name, made)
     reader, writer = (_node_reader, _node_writer) if nodes else (_reader, _writer)
     readers, writers = tuple(map(reader, reads)), tuple(map(writer, writes))
-    made.of_nodes = nodes
+    made.of_nodes = nodes  # type: ignore[attr-defined]
     alone = len(writes) + publishes == 1
 
     def results_of(tag, what, law, state, p, values, dt):
