@@ -187,12 +187,7 @@ class Kernel:
 
     def __call__(self, *arguments: Any) -> Any:
         written = ArgumentBuffer(arguments)
-        kinds = tuple(written.kinds)
-        if kinds not in self._plans:
-            plan = plan_for(arguments)
-            unit = self.unit(plan.types)
-            self._plans[kinds] = plan, _CALL(load(unit)[1]), *reader(unit.result)
-        plan, entry, size, read = self._plans[kinds]
+        plan, entry, size, read = self._planned(written, arguments)
         _memory, address = written.in_memory(plan)
         result = bytearray(size)
         entry(address, ctypes.addressof(ctypes.c_char.from_buffer(result)))
@@ -200,8 +195,17 @@ class Kernel:
         return read(result)
 
     def compile(self, *arguments: Any) -> None:
-        """Have it compiled for arguments of these types."""
-        load(self.unit(plan_for(arguments).types))
+        """Have it compiled for arguments of these types, and all ready for a call with them."""
+        self._planned(ArgumentBuffer(arguments), arguments)
+
+    def _planned(self, written: ArgumentBuffer, arguments: tuple) -> tuple:
+        """Say how arguments are passed, the entry, and the size and the reader of the result."""
+        kinds = tuple(written.kinds)
+        if kinds not in self._plans:
+            plan = plan_for(arguments)
+            unit = self.unit(plan.types)
+            self._plans[kinds] = plan, _CALL(load(unit)[1]), *reader(unit.result)
+        return self._plans[kinds]
 
     def in_kernel(self, lowering: Any, *arguments: Any) -> Any:
         """Write a call from another kernel."""
