@@ -86,7 +86,7 @@ class Newton:
     dt
         The step.
     seconds
-        Takes the time of stages: of stress and tangent, assembly, and solution.
+        Takes the time of stages: of stress, assembly with tangents, and solution.
     held
         Tells which components (nodes, d) of all nodes fixes hold.
     """
