@@ -93,7 +93,7 @@ class Solid(Named):
                 hint="all temperatures counted from the same point",
             )
         first = max(reference_temperatures(self.material.law).values(), default=-math.inf)
-        if T0 is not None and 0 <= T0 < COLD and first - T0 > WARM:
+        if T0 is not None and 0 < T0 < COLD and first - T0 > WARM:
             hub.warn(
                 f"T0 = {T0:g}, and the material counts temperatures from {first:g}",
                 hint="kelvin throughout, or degrees Celsius throughout",
