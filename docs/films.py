@@ -47,7 +47,7 @@ def draw(name: str, how: dict) -> dict:
     last = how.get("run", text[run:])
     # The scene's own pictures are not needed; axes have units.
     before = re.sub(r"^dump\(.*\n", "", text[:run], flags=re.M)
-    if how.get("units", True) and not re.search(r"^units\(", before, re.M):
+    if not re.search(r"^units\(", before, re.M):
         before = "units(m, kg, s)\n" + before
     with tempfile.TemporaryDirectory() as folder:
         script = INPUTS / f".films.{name}"

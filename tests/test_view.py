@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from charts import faults
 from fakes import FakeHub
 from PIL import Image
 from scenes import block
@@ -318,3 +319,15 @@ def test_small_lengths_count_in_powers_of_a_thousand():
     picture = pictures.make(domain, (3, 3), 100, options)
     assert picture.axes.get_xlabel() == "x [1e-6 m]"
     assert picture.axes.yaxis.get_major_formatter()(1e-5, 0) == "10"
+
+
+@pytest.mark.parametrize("high", [7e-6, 0.026, 1.0, 3e6])
+def test_pictures_with_units_are_fit_for_print(high):
+    """Units, numbers and contrast; no label lies on another, however small the scene."""
+    options = pictures.Options("seq", "von Mises stress (Pa)", lengths=" [m]")
+    domain = SimpleNamespace(dimension=2, lo=np.zeros(2), hi=np.array([high / 2, high]))
+    picture = pictures.make(domain, (4.8, 6), 100, options)
+    x = np.linspace(0, high / 2, 50)
+    columns = {"id": np.arange(50), "x": x, "y": x, "z": 0 * x, "seq": 1e5 * x / high}
+    picture.show(Snapshot(0, 0.0, columns, domain.lo, domain.hi), high / 50, "step 0, time 0")
+    assert faults(picture.figure) == []
