@@ -11,6 +11,7 @@ import ctypes
 import gc
 import json
 import os
+import signal
 import socket
 import subprocess
 import sys
@@ -52,6 +53,7 @@ class WarmProcess:
         self.link.close()
         if self.pid is not None:
             with suppress(OSError):
+                os.kill(self.pid, signal.SIGKILL)  # it has nothing to lose
                 os.waitpid(self.pid, 0)
 
 
