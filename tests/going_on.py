@@ -227,8 +227,8 @@ SCENES = {
     "step that varies": block(
         2, "fix(v, initial_velocity_particles, all, 5*sin(9*x0), 3)", "set_output(1)",
         "fix(g, body_force, all, 100*time, 0)", "log_modify(custom, step, dt, time, limit)",
-        "run(3)", "run_time(0.02)",
-    ),
+        "run(3)", "run_time(0.02)", scheme="usf, start=half",
+    ).replace("FLIP, linear, 1", "FLIP/per-time, linear, 0.9"),
     "friction": RUBBING,
     "points that touch": bodies(
         -0.01, "contact/minimize_penetration, a, b, 0.2", "log_modify(custom, step, c_x)", "run(6)",
