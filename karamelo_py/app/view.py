@@ -163,7 +163,7 @@ def _look(first: Snapshot, options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _chosen(snapshot: Snapshot, only: ColumnFormula | None) -> Snapshot:
-    """The points that a condition of columns holds for."""
+    """Choose the points that a condition of columns holds for."""
     if only is None:
         return snapshot
     held = only.holds(SimpleNamespace(particle=snapshot.columns.__getitem__))
