@@ -13,11 +13,12 @@ def compare(run, axes, full):
     """The column of Wyser et al. 2020 by in.column and in load steps."""
     explicit = {"scene": "column", "kind": "ulcpdi", "domains": "Q4"}
     runs = {
-        "implicit, 40 load steps": [run(**TWIN, N=n) for n in CELLS],
+        # The end of the column sinks by a fifth: by half a cell in each of so many steps, at most.
+        "implicit, steps of half a cell": [run(**TWIN, N=n, steps=max(40, n // 2)) for n in CELLS],
         "explicit, 40 transits": [run(**explicit, refine=n / 16) for n in CELLS],
     }
     found = chart(axes, runs, lambda result: result.log.share[-1])
     axes.set(ylabel="mean error of the stress / (rho g H) (1)")
     source = "equilibrium (exact)"
-    for name, within in (("implicit, 40 load steps", 2e-5), ("explicit, 40 transits", 2e-5)):
+    for name, within in (("implicit, steps of half a cell", 6e-6), ("explicit, 40 transits", 2e-5)):
         yield Row(f"error with 512 cells, {name}", 0.0, found[name][-1][1], within, source)
