@@ -270,7 +270,7 @@ def test_small_errors_by_chance_are_hollow_and_off_the_front(monkeypatch):
         if line.get_markerfacecolor() == "white" and len(line.get_xdata())
     ]  # fmt: skip
     assert list(hollow.get_ydata()) == [0.2, 3]
-    assert "hollow: small by chance" in drawn[0].get_supxlabel()
+    assert "hollow: may be small by chance" in drawn[0].get_supxlabel()
     bars = [each for each in axes.collections if len(each.get_segments())]
     ends = bars[0].get_segments()[0][:, 0]
     assert ends == pytest.approx([0.095, 0.105])  # the spread of 10 % about 0.1 s

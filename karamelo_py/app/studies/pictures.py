@@ -142,7 +142,7 @@ def _footnote(figure: Any, family: Family) -> None:
     if not family.convergence and family.front():
         said.append("grey band: Pareto front, no run is both cheaper and more accurate")
     if any(line.lucky.any() for line in family.lines):
-        said.append("hollow: small by chance, a finer run is worse or the sign changes")
+        said.append("hollow: may be small by chance")
     if family.without:
         missing = f"not shown: {plural(len(family.without), 'run')} without a value"
         said.append("× at the top: no value (failed)" if family.convergence else missing)
