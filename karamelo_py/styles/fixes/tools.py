@@ -341,7 +341,7 @@ class ContactSurface(ToolFix):
         self.way = per_direction(hub, "u", way) if way else ()
 
     def moved(self, dt: float) -> tuple[np.ndarray, np.ndarray]:
-        """How far (d,) the region has moved, and its mean velocity (d,) in the step to come."""
+        """Find the way (d,) of the region so far, and its mean velocity (d,) in the next step."""
         values, times = self.hub.values, {"time": self.hub.update.time + np.array([0.0, dt])}
         ways = np.zeros((self.hub.domain.dimension, 2))
         for k, formula in enumerate(self.way):
