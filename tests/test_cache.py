@@ -439,7 +439,7 @@ def test_the_wait_is_told_once_before_the_banner(tmp_path, monkeypatch):
     monkeypatch.setenv("KARAMELO_PY_CACHE", str(tmp_path))
     out = io.StringIO()
     hub = Hub(Console(out))
-    hub.domain, hub.update = SimpleNamespace(dimension=2), SimpleNamespace(words="ulmpm")
+    hub.domain, hub.update = SimpleNamespace(dimension=2), SimpleNamespace(words="ulmpm", time=0.0)
     wait = Timings(hub).telling_of_compilation
     monkeypatch.setattr(os, "cpu_count", lambda: 4)
     monkeypatch.setattr(os, "getloadavg", lambda: (2.0, 0, 0), raising=False)
@@ -471,7 +471,7 @@ def test_a_folder_that_cannot_be_used_is_warned_of_in_a_run(tmp_path, monkeypatc
     (tmp_path / "file").write_text("")
     err = io.StringIO()
     hub = Hub(Console(io.StringIO(), err))
-    hub.domain, hub.update = SimpleNamespace(dimension=2), SimpleNamespace(words="ulmpm")
+    hub.domain, hub.update = SimpleNamespace(dimension=2), SimpleNamespace(words="ulmpm", time=0.0)
     with Timings(hub).telling_of_compilation():
         assert fresh()(Tag()) == 42
         assert fresh()(Tag()) == 42
