@@ -35,9 +35,12 @@ run(50)
 
 
 def pulled(material, rate=0.05, method="ulmpm, FLIP, linear, 1", more=""):
+    pull = PULL.replace("RATE", str(rate))
+    if "warm" not in material + more:  # nothing of the scene has a temperature
+        pull = pull.replace("compute(heat, average_temperature, all)\n", "").replace(" heat,", "")
     return (
         f"method({method})\n{HEAD}{COPPER}{material}\n{more}"
-        f"solid(s, region, box, 1, m, 0.5)\n{PULL.replace('RATE', str(rate))}"
+        f"solid(s, region, box, 1, m, 0.5)\n{pull}"
     )
 
 
