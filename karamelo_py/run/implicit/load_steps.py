@@ -27,6 +27,7 @@ from karamelo_py.schemes.quasi_static import PUBLISHED
 from karamelo_py.script.errors import Place, ScriptError
 
 HALVINGS = 10  # of a load step, at most
+LONG = 1.0  # cells
 
 
 class PointsWrong(Exception):
@@ -131,6 +132,18 @@ class LoadSteps:
             self.simulation.hub.values.set(name, float(value))
         control.values[TIME], control.values[TIMESTEP] = end, step + (self.parts > 0)
 
+    def _tell_of_long_way(self, found: Any) -> None:
+        """Tell, once, of points that cross cells within a load step: that costs accuracy."""
+        far = found.equations.furthest() / float(np.min(self.simulation.setup.grids.spacing))
+        if far <= LONG or self.dynamic or not self.simulation.setup.frame.moves:
+            return
+        if self.simulation.hub.update.first_time("a long way in a load step"):
+            self.simulation.hub.console.say(
+                f"note: points go through {far:.2g} cells in a load step; where it matters when "
+                "they change cells, the error falls in proportion to the step: compare with more "
+                "load steps"
+            )
+
     def _check_at_rest(self) -> None:
         """Refuse initial velocities of points: nothing is done with them without inertia."""
         for block in self.simulation.setup.blocks:
@@ -189,6 +202,7 @@ class LoadSteps:
                 # Their work is that of the mean of both, as Newmark's velocities are.
                 own.loads[:] = 0.5 * (loads + own.loads)
             found = self._equilibrium(hooks, dt, before, after)
+            self._tell_of_long_way(found)
             self._publish(found, hooks, dt)
             if not take_rows(self.scheme.close, s, simulation.mode, hooks):
                 raise PointsWrong
