@@ -14,6 +14,7 @@ import pytest
 from karamelo_py import Simulation
 from karamelo_py.app.cli import main
 from karamelo_py.app.live import frames
+from karamelo_py.app.live import run as run_pages
 from karamelo_py.app.live.folder import FolderPage
 from karamelo_py.app.live.frames import Frame, KeptFrames
 from karamelo_py.app.live.study import StudyPage
@@ -91,7 +92,10 @@ def test_a_page_answers_only_behind_its_secret_word(simulation):
         with pytest.raises(urllib.error.HTTPError, match="404"):
             get(wrong)
     with pytest.raises(urllib.error.HTTPError, match="404"):
+        get(page.address, "frame", k="abc")
+    with pytest.raises(urllib.error.HTTPError, match="404"):
         post(page.address, "rm")
+    post(page.address, "stop")  # no run goes on
     assert page.address in page._repr_html_()
     page.close()
     with pytest.raises(urllib.error.URLError):
@@ -143,6 +147,28 @@ def test_a_run_is_held_taken_on_and_coloured_anew(simulation):
         post(page.address, "go")
     assert simulation.step == 6
     page.close()
+
+
+def test_a_page_that_is_closed_holds_no_run(simulation, monkeypatch):
+    monkeypatch.setattr(run_pages, "GRACE", 0.1)
+    page = simulation.live()
+    post(page.address, "pause")
+    simulation.run(4)
+    assert simulation.step == 4
+    page.close()
+
+
+def test_dumps_without_points_are_passed_over(tmp_path):
+    (tmp_path / "d.0.txt").write_text(
+        "ITEM: TIMESTEP\n0\nITEM: NUMBER OF ATOMS\n0\nITEM: BOX BOUNDS sm sm sm\n0 1\n0 1\n0 1\n"
+        "ITEM: ATOMS id x y z\n",
+        encoding="utf-8",
+    )
+    (tmp_path / "log.mpm").write_text("Step Time Ek\n0 0 1\n", encoding="utf-8")
+    page = FolderPage(tmp_path)
+    told = Events(page.server.address).next()
+    assert told["frames"] == [] and len(told["rows"]) == 1
+    page.server.close()
 
 
 def test_a_warning_is_a_flag(simulation):
@@ -219,9 +245,10 @@ def test_a_study_is_followed_and_stopped(tmp_path):
     folder.mkdir()
     (folder / "err.txt").write_text("warning: much\n", encoding="utf-8")
     (folder / "log.mpm").write_text("Step Time Ek\n0 0 1\n1 0.5 0.25\n", encoding="utf-8")
-    page = StudyPage(tmp_path / "in.bar", ["N"], ["Ek"])
+    page = StudyPage(tmp_path / "in.bar", ["N"], ["Ek"], beside=tmp_path)
     address = page.server.address
     row = {"N": "10", "Ek": 0.5, "seconds": float("nan"), "status": "done", "reason": ""}
+    row["folder"] = folder.name
     page.follow([], [({"N": "20"}, folder)], [({"N": "10"}, tmp_path, 1.0)], of=2, left=None)
     page.follow([row], [], [({"N": "20"}, folder, 0.5)], of=2, left=3.0)
     told = Events(address).next()
@@ -229,6 +256,9 @@ def test_a_study_is_followed_and_stopped(tmp_path):
     assert told["running"] == [["N = 20", 0.5]]
     assert told["rows"][0]["command"].endswith("in.bar -var N 10")
     assert told["rows"][0]["seconds"] is None  # which JSON has not
+    assert told["cases"] == {"N = 20": {"N": "20"}, "N = 10": {"N": "10"}}
+    known = json.loads(get(address, "run", title="N%20=%2010"))  # of an earlier study
+    assert known["said"] == ["warning: much"]
     run = json.loads(get(address, "run", title="N%20=%2020"))
     assert run["said"] == ["warning: much"] and run["columns"]["Ek"] == [1, 0.25]
     with pytest.raises(urllib.error.HTTPError):
@@ -273,6 +303,7 @@ def test_pages_in_a_browser(simulation):
     page = simulation.live()
     study = StudyPage(simulation.hub.folder / "in.bar", ["N"], ["Ek"])
     row = {"N": "10", "Ek": 0.5, "seconds": 1.0, "status": "failed", "reason": "it broke"}
+    row["folder"] = "N=10"
     study.follow([row], [], [], of=1)
     simulation.run(4)
     with sync.sync_playwright() as started:

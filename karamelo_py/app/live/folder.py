@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.app.live import frames
-from karamelo_py.app.live.frames import Frame, plain
+from karamelo_py.app.live.frames import Frame, number_in, plain
 from karamelo_py.app.live.server import Server
 from karamelo_py.app.plot import read_log
 from karamelo_py.output.snapshots import Snapshot, read
@@ -36,6 +36,7 @@ class FolderPage:
         self.folder = folder
         self._states: list[tuple[Path, int, int, float, int]] = []  # file, place, step, time, count
         self._seen: dict[Path, float] = {}
+        self._widths: dict[str, int] = {}  # columns, by names of dumps
         self._log: dict[str, np.ndarray] = {}
         self._columns: list[str] = []
         self._dimension, self._column = 2, ""
@@ -62,16 +63,16 @@ class FolderPage:
         grown = len(next(iter(log.values()), ())) != len(next(iter(self._log.values()), ()))
         self._log = log
         for path in self._dumps():
-            changed = path.stat().st_mtime
-            if self._seen.get(path) == changed:
-                continue
             known = sum(file == path for file, *_ in self._states)
             try:
+                changed = path.stat().st_mtime
+                if self._seen.get(path) == changed:
+                    continue
                 for place, snapshot in enumerate(read(path)):
                     if place >= known:
                         self._add(path, place, snapshot)
                 self._seen[path] = changed
-            except (ScriptError, FileNotFoundError):  # it is being written
+            except (ScriptError, OSError):  # it is being written, or has gone
                 continue
         self._states.sort(key=lambda state: state[2])
         return grown or len(self._states) > before
@@ -82,13 +83,18 @@ class FolderPage:
         for path in sorted(self.folder.iterdir()):
             if path.suffix in WHOLE or _is_text_dump(path):
                 kinds.setdefault(re.sub(r"\d+", "#", path.name), []).append(path)
-        return max(kinds.values(), key=lambda paths: _width(paths[0]), default=[])
+        for kind, paths in kinds.items():
+            if not self._widths.get(kind):
+                self._widths[kind] = _width(paths[0])
+        return kinds[max(kinds, key=self._widths.__getitem__)] if kinds else []
 
     def _add(self, path: Path, place: int, snapshot: Snapshot) -> None:
         columns = snapshot.columns
+        if not len(columns.get("x", ())):  # no points, or no places of theirs
+            return
         self._columns = self._columns or [name for name in columns if name not in "xyz"]
         if not self._states:
-            directions = [axis for axis in "yz" if np.ptp(columns[axis]) > 0]
+            directions = [axis for axis in "yz" if np.ptp(columns.get(axis, 0.0)) > 0]
             self._dimension = 3 if "z" in directions else 1 + len(directions)
             known = [name for name in ("seq", "type") if name in columns]
             self._column = [*known, *self._columns][0]
@@ -123,7 +129,7 @@ class FolderPage:
 
     def _frame(self, words: Mapping[str, str]) -> bytes | None:
         """Read a state again; its column is the one that the page shows now."""
-        k = int(words.get("k", "-1"))
+        k = number_in(words)
         if not 0 <= k < len(self._states):
             return None
         path, place, step, moment, _ = self._states[k]

@@ -38,7 +38,7 @@ class Frame(NamedTuple):
 
 
 class KeptFrames:
-    """KeptFrames by number; where there are too many, every second goes."""
+    """States of points by number; where there are too many, every second goes."""
 
     def __init__(self) -> None:
         self._kept: dict[int, Frame] = {}
@@ -68,8 +68,14 @@ class KeptFrames:
     def answer(self, words: Mapping[str, str]) -> bytes | None:
         """Give the numbers of a frame, position by position, then the column."""
         with self._lock:
-            frame = self._kept.get(int(words.get("k", "-1")))
+            frame = self._kept.get(number_in(words))
         return None if frame is None else frame.numbers.tobytes()
+
+
+def number_in(words: Mapping[str, str]) -> int:
+    """Read the number of a frame; -1 where there is none."""
+    text = words.get("k", "")
+    return int(text) if text.isdecimal() else -1
 
 
 def plain(value: Any) -> Any:

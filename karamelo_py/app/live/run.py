@@ -17,6 +17,8 @@ from karamelo_py.run.diagnosis import energy
 from karamelo_py.run.timestep import ruling_limit
 from karamelo_py.scene.hub import Hub
 
+GRACE = 10.0  # seconds that a run is held while no page is open, which may be loaded anew
+
 
 class Row(NamedTuple):
     """State of a run at an output."""
@@ -98,9 +100,13 @@ class RunPage(Rhythmic):
         self.frames.add(Frame.of_columns(update.step, update.time, axes, column, read))
 
     def _wait(self) -> None:
-        shown = self._column
+        shown, left = self._column, time.perf_counter()
         while self._paused and not self._once:
             time.sleep(0.05)
+            left = time.perf_counter() if self.server.watched else left
+            if time.perf_counter() - left > GRACE:
+                self._paused = False
+                self.hub.console.say("the live page that held the run is closed: it goes on")
             if self.hub.running is not None and self.hub.running.signal:
                 self._paused = False
             if shown != self._column:
@@ -152,5 +158,6 @@ class RunPage(Rhythmic):
         self._once = True
 
     def _stop(self, _: Mapping[str, str]) -> None:
-        """Interrupt the run as Ctrl-C does: the last state is written."""
-        os.kill(os.getpid(), signal.SIGINT)
+        """Interrupt the run, if one goes on, as Ctrl-C does: the last state is written."""
+        if self.hub.running is not None:
+            os.kill(os.getpid(), signal.SIGINT)

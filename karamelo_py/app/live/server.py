@@ -58,8 +58,7 @@ class Server:
         self._changed = threading.Condition()
         self._shown: dict[int, int] = {}  # the version that each open page has
         self.token = secrets.token_urlsafe(16)
-        self._http = ThreadingHTTPServer(("127.0.0.1", 0), _handler(self))
-        self._http.daemon_threads = True
+        self._http = _Quiet(("127.0.0.1", 0), _handler(self))
         self.address = f"http://127.0.0.1:{self._http.server_address[1]}/{self.token}/"
         threading.Thread(target=self._http.serve_forever, daemon=True).start()
 
@@ -119,6 +118,15 @@ def require_plotly() -> None:
             "a page needs the package plotly",
             hint="pip install '.[studies]' in the folder of karamelo-py",
         )
+
+
+class _Quiet(ThreadingHTTPServer):
+    """Says nothing of pages that are closed while they load."""
+
+    daemon_threads = True
+
+    def handle_error(self, *_: Any) -> None:
+        """The terminal is that of the run."""
 
 
 def _plotly(_: Mapping[str, str]) -> bytes:

@@ -32,13 +32,20 @@ class StudyPage:
         Names of what is recorded of each run.
     axes
         What the chart shows at first; empty: what suits the names.
+    beside
+        The folder that folders of rows are relative to.
     """
 
     def __init__(
-        self, script: Path, names: Sequence[str], recorded: Sequence[str], axes: Sequence[str] = ()
+        self,
+        script: Path,
+        names: Sequence[str],
+        recorded: Sequence[str],
+        axes: Sequence[str] = (),
+        beside: Path = Path(),
     ):
         self.stopped = threading.Event()
-        self._script, self._names = script, [*names]
+        self._script, self._names, self._beside = script, [*names], beside
         self._about = {
             "title": str(script), "names": self._names, "recorded": [*recorded],
             "facts": [name for name in COLUMNS if name != "seconds_spread"], "axes": [*axes],
@@ -48,6 +55,7 @@ class StudyPage:
         self._running: list[tuple[str, float]] = []
         self._progress: dict[str, Any] = {}
         self._folders: dict[str, Path] = {}
+        self._cases: dict[str, dict[str, str]] = {}
         self.server = Server(
             Path(__file__).with_name("study.html"), self._news, {"run": self._run},
             {"stop": lambda words: self.stopped.set()},
@@ -72,8 +80,11 @@ class StudyPage:
             case = {name: row[name] for name in self._names}
             command = f"karamelo-py {self._script} {' '.join(options_of(case))}"
             self._rows.append({**row, "title": worded(case), "command": command})
-        cases = [*waiting, *((case, folder) for case, folder, _ in running)]
-        self._folders.update((worded(case), folder) for case, folder in cases)
+            self._cases[worded(case)] = case
+            self._folders[worded(case)] = self._beside / row["folder"]
+        for case, folder in (*waiting, *((case, folder) for case, folder, _ in running)):
+            self._folders[worded(case)] = folder
+            self._cases[worded(case)] = dict(case)
         self._waiting = [worded(case) for case, _ in waiting]
         self._running = [(worded(case), since) for case, _, since in running]
         self._progress = progress
@@ -82,7 +93,7 @@ class StudyPage:
     def _news(self, seen: int) -> tuple[int, dict]:
         rows = self._rows[seen:]
         told = {
-            "waiting": self._waiting, "running": self._running,
+            "waiting": self._waiting, "running": self._running, "cases": self._cases,
             "rows": [{name: plain(value) for name, value in row.items()} for row in rows],
             **self._progress,
         }  # fmt: skip

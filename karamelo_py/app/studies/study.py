@@ -324,7 +324,8 @@ def live_page(options: Any, study: Study, axes: Sequence[str] = ()) -> Any:
         return None
     from karamelo_py.app.live.study import StudyPage
 
-    page = StudyPage(options.script, study.names, [item.word for item in study.items], axes)
+    recorded = [item.word for item in study.items]
+    page = StudyPage(options.script, study.names, recorded, axes, study.folder.parent)
     print(f"live: {page.server.address}", flush=True)
     return page
 
