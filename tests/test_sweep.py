@@ -15,7 +15,7 @@ import pytest
 
 from karamelo_py.app.cli import main
 from karamelo_py.app.plot import read_log
-from karamelo_py.app.studies import case, records, study, variables
+from karamelo_py.app.studies import case, records, study, variables, warm
 from karamelo_py.script.errors import ScriptError
 
 # A block in free flight: its velocity is 3 times the word's factor, and it leaves where it is told.
@@ -367,6 +367,23 @@ def test_runs_are_copies_of_warm_processes_and_write_what_others_do(folder):
     pids = [keeper.pid for keeper in launch.warm.keepers.values() if keeper.is_ready()]
     launch.warm.finalizer()
     assert len(pids) == 2 and not any(os.path.exists(f"/proc/{pid}") for pid in pids)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="runs are copies on Linux alone")
+def test_a_warm_process_that_hangs_is_killed_and_its_run_starts_from_nothing(folder, monkeypatch):
+    monkeypatch.setattr(warm, "PATIENCE", 0.2)
+    monkeypatch.setattr(warm, "BEGIN", "import os; os.kill(os.getpid(), 19)")  # SIGSTOP
+    begun, popen = [], subprocess.Popen
+    monkeypatch.setattr(
+        warm.subprocess,
+        "Popen",
+        lambda *args, **more: begun.append(popen(*args, **more)) or begun[-1],
+    )
+    processes = warm.WarmProcesses(case.environment())
+    with (folder / "out.txt").open("wb") as out:
+        assert processes.start((), [], folder, out, out) is None
+    assert len(begun) == warm.TRIES
+    assert not any(os.path.exists(f"/proc/{process.pid}") for process in begun)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="runs are copies on Linux alone")

@@ -16,6 +16,7 @@ import socket
 import subprocess
 import sys
 import threading
+import time
 import traceback
 import weakref
 from collections.abc import Mapping
@@ -25,6 +26,7 @@ from typing import Any, BinaryIO, NoReturn
 
 MOST = 8  # kinds whose kernels are held
 TRIES = 3  # to start the first
+PATIENCE = 20.0  # seconds for an answer: a start takes some hundredths, the import two or so
 SUBREAPER = 36  # of Linux's prctl: adopts processes whose parents have ended
 LONGEST = 1 << 16  # bytes of a request
 BEGIN = "from karamelo_py.app.studies.warm import begin; begin()"
@@ -54,7 +56,10 @@ class WarmProcess:
         if self.pid is not None:
             with suppress(OSError):
                 os.kill(self.pid, signal.SIGKILL)  # it has nothing to lose
-                os.waitpid(self.pid, 0)
+                for _ in range(100):  # at most a second: the system may hold it
+                    if os.waitpid(self.pid, os.WNOHANG)[0]:
+                        break
+                    time.sleep(0.01)
 
 
 class WarmProcesses:
@@ -76,12 +81,14 @@ class WarmProcesses:
                 key: tuple[str, ...] = ()
                 try:
                     key = self._chosen(("kind", *kind))
+                    link = self.keepers[key].link
+                    link.settimeout(PATIENCE)  # TimeoutError is an OSError
                     stays = self._awaited(("kind", *kind))
                     said = json.dumps([str(folder.absolute()), *words]).encode()
                     files = [out.fileno(), err.fileno(), *([stays.fileno()] if stays else [])]
                     with stays or nullcontext():
-                        socket.send_fds(self.keepers[key].link, [said], files)
-                    return int(self.keepers[key].link.recv(32))
+                        socket.send_fds(link, [said], files)
+                    return int(link.recv(32))
                 except (OSError, ValueError):
                     self._forget(key)
                     self.tries -= key == ()
