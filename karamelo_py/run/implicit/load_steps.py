@@ -284,7 +284,9 @@ class LoadSteps:
             raise Failed(f"{reason}: nothing holds solid '{solid}' near ({where})") from None
         except Wrong as reason:
             raise Failed(f"{reason} (solid '{self._solid_of(reason.point)}')") from None
-        if not self.dynamic and newton.unstable and simulation.hub.update.first_time("unstable"):
+        update = simulation.hub.update
+        if not self.dynamic and "unstable" not in update.warned_of and newton.unstable:
+            update.first_time("unstable")
             simulation.hub.warn(
                 f"{self._now()}: an equilibrium that is not stable (the determinant of the "
                 "stiffness is negative): the body has a way to buckle, or is beyond a limit load",
