@@ -1,6 +1,7 @@
 """A package of styles that are wrong, each in its way; scripts call them in small letters."""
 
 import sys
+from functools import partial
 from math import inf, nan
 from typing import Any, NamedTuple
 
@@ -115,6 +116,22 @@ class Wholly(Group):
 
 class Heavily(Group):
     initial_integrate = vector_hook(laid, reads=("weight",), writes=("velocity",))
+
+
+class Unnamed(Group):
+    initial_integrate = vector_hook(
+        lambda v, values, dt: v, reads=("velocity",), writes=("velocity",)
+    )
+
+
+class Partly(Group):
+    post_particles_to_grid = vector_hook(
+        partial(laid, dt=0.0), reads=("force",), writes=("force",), nodes=True
+    )
+
+
+class Slightly(Group):
+    initial_integrate = point_hook(partial(laid, dt=0.0))
 
 
 class Fixing(Group):

@@ -27,7 +27,7 @@ FAMILIES = {
     "fix": "spring light misplaced swapped cold hot many few undirected viewless idle misspelt "
     "silent stop ids weigh bare formless oneword clashing nodal first again doubled lost leaving "
     "silenced orphan wholly heavily fixing homeless late slim lawless dark "
-    "nodeless early elsewhere",
+    "nodeless early elsewhere unnamed partly slightly",
     "compute": "gauge mute",
     "material": "motionless growing raising short uncompiled hiding double",
     "strength": "forgetful endless uncountable",
@@ -102,6 +102,18 @@ def test_init(hub):
         ("early", "post_update_grid_state writes 'force': 'velocity_update' or a class of a field"),
         ("elsewhere", "final_integrate is a moment of points, and its hook was made for whole nod"),
         ("slim", "final_integrate: laid has to take the 4 arguments of a hook on whole points: v"),
+        (
+            "unnamed",
+            "initial_integrate takes a function with a name (def name(...): ...), not a <la",
+        ),
+        (
+            "partly",
+            "post_particles_to_grid takes a function with a name (def name(...): ...), not ",
+        ),
+        (
+            "slightly",
+            "initial_integrate takes a function with a name (def name(...): ...), not a p",
+        ),
         ("undirected", "it has no formulas, so post_particles_to_grid would act in no direction"),
         ("viewless", "initial_integrate has to take one argument, the view of the group"),
         ("bare", "point_fields has to be a tuple of classes, as in (Other,)"),

@@ -272,8 +272,12 @@ def vector_hook(
     writes
         ``"velocity"`` or classes of declared fields.
     """
+    where = WHOLE_NODES if nodes else WHOLE_POINTS
+    if not getattr(function, "__name__", "").isidentifier():  # the fix is refused
+        return CompiledHook(function, where, publishes, False, False, False, None, reads, writes)
     # Beside the function, so that it can be imported, and kernels with it be cached.
-    name, module = f"{function.__name__}_at_points", sys.modules[function.__module__]
+    name = f"{function.__name__}_at_{'nodes' if nodes else 'points'}"
+    module = sys.modules[function.__module__]
     while hasattr(module, name):  # it serves another hook, too
         name += "_"
     made = namedtuple(name, ("row", "values"), module=function.__module__)
@@ -295,5 +299,4 @@ def vector_hook(
 
     results.on(made)(results_of)
     written.on(made)(written_of)
-    where = WHOLE_NODES if nodes else WHOLE_POINTS
     return CompiledHook(function, where, publishes, False, False, False, made, reads, writes)

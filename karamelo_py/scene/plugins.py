@@ -21,6 +21,7 @@ from karamelo_py.kernels.hooks import (
     NODE_WRITES,
     STAGES,
     WHOLE_NODES,
+    WHOLE_POINTS,
     WORDS,
     CompiledHook,
 )
@@ -107,7 +108,12 @@ def _wrong_hooks(fix: Fix) -> Iterator[str]:
         elif misfit(hook, 1):
             yield f"{moment} has to take one argument, the view of the group"
     for moment, hook in compiled.items():
-        own, whole = ACTS_ON[moment], hook.tag is not None
+        own, whole = ACTS_ON[moment], hook.where in (WHOLE_NODES, WHOLE_POINTS)
+        name = getattr(hook.function, "__name__", "")
+        if not name or (whole and hook.tag is None):
+            given = name or type(hook.function).__name__
+            yield f"{moment} takes a function with a name (def name(...): ...), not a {given}"
+            continue
         at_own = moment in NODE_WRITES if hook.where == WHOLE_NODES else own != "nodes"
         if hook.where != own and not (whole and at_own):
             yield f"{moment} is a moment of {own}, and its hook was made for {hook.where}"
