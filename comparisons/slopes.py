@@ -24,5 +24,4 @@ def slope(angle: float, mu: float) -> Case:
         exact=G * (sin(radians(angle)) - mu * cos(radians(angle))),
         measure=acceleration,
         source="Coulomb",
-        scale=G * sin(radians(angle)),
     )

@@ -3,6 +3,7 @@
 import pytest
 
 from comparisons import defaults
+from comparisons.defaults.__main__ import PAGE
 
 
 @pytest.mark.parametrize("name", defaults.names())
@@ -12,6 +13,17 @@ def test_script_is_whole(run_interpreted, name):
     result = run_interpreted(defaults.INPUTS / f"in.{name}", command="check")
     assert "first step" in result.out or "dt" in result.out
     assert case.exact == case.exact and case.within > 0
+
+
+def test_errors_of_the_page_are_shares_of_the_exact_numbers():
+    """As far as numbers of four digits tell."""
+    rows = [line.split(" | ") for line in PAGE.read_text("utf-8").splitlines() if "`in." in line]
+    assert len(rows) == len(defaults.names())
+    for scene, _, exact, default, error, *_ in rows:
+        case = defaults.case(scene.strip("| `").removeprefix("in."))
+        assert float(exact) == pytest.approx(case.exact, rel=5e-4)
+        shown = float(error.removesuffix(" %")) / 100
+        assert shown == pytest.approx(case.error(float(default)), abs=6e-4)
 
 
 @pytest.mark.parametrize("name", ["faces", "punch"])

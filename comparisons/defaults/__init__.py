@@ -24,7 +24,7 @@ class Case(NamedTuple):
     """A scene with an exact answer.
 
     `measure` finds the number of a finished run that should be `exact`; `source` says whose that
-    is. `within` is the error that is allowed in silence, as a share of `scale` (else of `exact`).
+    is. `within` is the error that is allowed in silence.
     The scene is run with each of `refine`, coarsest first, the last of which is judged; and that
     one with half the step. `advice` names what the scene should be told where it errs by more: a
     part of a warning.
@@ -36,13 +36,12 @@ class Case(NamedTuple):
     source: str
     refine: tuple[float, ...] = (1, 2)
     within: float = 0.05
-    scale: float = 0.0
     advice: str = ""
     half_step: bool = True
 
     def error(self, computed: float) -> float:
-        """The error as a share of the exact number, or of `scale`."""
-        return (computed - self.exact) / (self.scale or abs(self.exact))
+        """The error as a share of the exact number; the number itself where that is 0."""
+        return (computed - self.exact) / (abs(self.exact) or 1.0)
 
 
 def names() -> list[str]:

@@ -14,9 +14,10 @@ PAGE = Path(__file__).parent.parent.parent / "docs" / "defaults.md"
 HEAD = """# What the defaults do
 
 Scenes with exact answers, run with the program's own choices of step, scheme and averaging. This
-page is written by `python -m comparisons.defaults`. The order in h tells how fast the error falls
-with smaller cells; "exact" stands for errors below 0.1 %. A scene that errs by more than 5 % (1 %
-where that is easy) has to be told; the last column quotes what the program says.
+page is written by `python -m comparisons.defaults`. Errors are shares of the exact number; where
+that is 0, the number itself. The order in h tells how fast the error falls with smaller cells;
+"exact" stands for errors below 0.1 %. A scene that errs by more than 5 % (1 % where that is easy)
+has to be told; the last column quotes what the program says.
 
 | scene | quantity | exact | default | error | order in h | at half the step | what is said |
 |---|---|---|---|---|---|---|---|

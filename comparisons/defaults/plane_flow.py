@@ -27,6 +27,5 @@ CASE = Case(
     measure=scatter,
     source="equilibrium",
     refine=(1,),
-    scale=1.0,
     advice="pressure of grains",
 )
