@@ -127,7 +127,7 @@ def _dispatch(arguments: list[str]) -> int:
     except SystemExit:  # argparse has shown what was asked for
         return 0
     if surplus:
-        raise _surplus(surplus, arguments[0], commands.choices.get(arguments[0], parser))
+        raise _surplus(arguments, surplus, commands.choices.get(arguments[0], parser))
     size, rank = launched()
     if size > 1 and arguments[0] != "run" and (rank or arguments[0] != "check"):
         if rank == 0:
@@ -167,8 +167,9 @@ def _one_file(arguments: list[str]) -> list[str]:
     return chosen
 
 
-def _surplus(words: list[str], command: str, parser: CommandLine) -> ScriptError:
+def _surplus(arguments: list[str], words: list[str], parser: CommandLine) -> ScriptError:
     """Make the error for words that a command line has no use for."""
+    command = arguments[0]
     option = next((word.partition("=")[0] for word in words if word.startswith("-")), None)
     if option == "--ranks":
         return ScriptError(
@@ -178,11 +179,23 @@ def _surplus(words: list[str], command: str, parser: CommandLine) -> ScriptError
     close = nearest(option, parser.options()) if option else None
     if (same := MPI_OPTIONS.get((option or "").rstrip("0123456789"))) in parser.options():
         close = f"{same} N"
+    hint = f"did you mean {close}?" if close else None
+    value = words[words.index(option) + 1 :] if option in words else []
+    if (
+        same is None
+        and option
+        and option[1:].isidentifier()
+        and value
+        and re.fullmatch(r"[-+.\deE]+", value[0])
+    ):
+        hint = f"-var {option[1:]} {value[0]} sets a variable"
+    elif not option and VARIABLE[0] in arguments and "-jobs" in parser.options():
+        hint = f"-var NAME={words[0]}, in one word"
     usage = USAGE if command == "run" else parser.plain_usage()
     return ScriptError(
         f"there is no option {option}" if option else f"one word too many: {words[0]}",
         expected=usage,
-        hint=f"did you mean {close}?" if close else None,
+        hint=hint,
     )
 
 

@@ -237,7 +237,9 @@ def tell(family: Family, *, costs: bool) -> None:
                 fits.append(fit.of_fall if turned else fit)
             orders.add_row(line.label, *map(str, fits))
         console.print(orders)
-    if costs and family.cost in ("seconds", "wall_s") and family.table.made.get("timed") is False:
+    made = family.table.made
+    together = made.get("timed") is False and made.get("jobs") != 1
+    if costs and family.cost in ("seconds", "wall_s") and together:
         print(
             "note: these runs went side by side, their times disturb each other; "
             "sweep -time measures"

@@ -30,7 +30,7 @@ def tell_of_locking(law: type) -> None:
         law,
         "locking",
         when=keeps_volume,
-        reason="Poisson's ratio of material '{owner.id}' is {nu:.6g}, and {scene.basis_name} "
+        reason="Poisson's ratio of material '{owner.id}' is {nu:.9g}, and {scene.basis_name} "
         "functions without averaged volumes cannot bend or spread and keep the volume of all "
         "points: bodies are too stiff (a strip of 8 cells on a block by 19 % with 0.49, 87 % with "
         "0.499)",
