@@ -250,6 +250,11 @@ def test_computes_by_shares(state_interpreted, tmp_path):
     (tmp_path / "curve.csv").write_text(CURVE, encoding="utf-8")
     script = block(2, COMPUTES.replace("&\n", ""), MOVING[0], *MOVING[3:], "run(6)",
                    transfer="APIC", size=(0.3, 0.2))  # fmt: skip
+    # With a temperature, whose mean is shown.
+    script = script.replace(
+        "material(rubber, linear, 2, 100, 0.3)", "material(rubber, linear, 2, 100, 0.3, 1, 0.1)"
+    )
+    assert "0.3, 1, 0.1" in script
     assert shared(state_interpreted, tmp_path, script, ranks=3)
     log = (tmp_path / "parts" / "log.mpm").read_text(encoding="utf-8")
     assert "nan" not in log and len(log.split()) > 100
