@@ -285,6 +285,16 @@ def test_energies_of_one_time(run_interpreted):
     assert first < 0.2 * swing(0.003, "") and second < 0.4 * first
 
 
+def test_a_half_start_shows_no_more_than_the_speed_at_a_wall(run_interpreted):
+    """A free point keeps its kinetic energy 1/2 m v^2 where the edge of the domain reflects it."""
+    text = block(1, "boundary(reflect)", "fix(v, initial_velocity_particles, all, 1)",
+                 "compute(Ek, kinetic_energy, all)", "log_modify(custom, step, Ek)",
+                 "set_output(1)", "set_dt(0.05)", "run(20)", scheme="musl, start=half", ppc=1,
+                 size=(0.1,))  # fmt: skip
+    done = run_interpreted(text)
+    assert len(done.log.Ek) > 20 and pytest.approx(0.5 * 2 * 0.1) == done.log.Ek
+
+
 def test_where_there_is_no_half_start(run_interpreted):
     said = run_interpreted(block(1, "run(1)", scheme="newmark, start=half"), status=1).err
     assert "implicit steps take velocities at their ends" in said

@@ -115,7 +115,8 @@ def scheme(
     ``full`` the velocities that a run starts from are taken for those of half a step before, and
     those that are shown are as they are: a thrown body is g dt t/2 further than it should be, and
     kinetic energies lag by half a step. With ``half`` both are of the time that is shown, to second
-    order in the step. Points then carry their last velocity, too.
+    order in the step. Points then carry their last velocity, too. Velocities that are set after the
+    first step, such as ``sim.points["vx"] = values``, are taken for those of half a step before.
 
     See Also
     --------

@@ -29,7 +29,7 @@ A part names its fields in ``point_fields`` or ``node_fields``. Arrays of points
 import ctypes
 import re
 from collections.abc import Iterable
-from math import prod
+from math import nan, prod
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -37,7 +37,7 @@ from numba import types
 
 from karamelo_py.compiler import code
 from karamelo_py.compiler.code import I64
-from karamelo_py.compiler.compile import implements, index, shared
+from karamelo_py.compiler.compile import implements, index, real, shared, where
 from karamelo_py.compiler.tuples import count_in, flat, nested_as
 from karamelo_py.compiler.values import intrinsic
 
@@ -240,6 +240,15 @@ def increase(array, p, values):
     if array is not None:
         for k, value in enumerate(values):
             array[k, p] += value
+
+
+@shared
+def forget(array, p, which):
+    """Make the components of point `p` unknown (NaN) that are above 0 in `which`."""
+    if array is not None:
+        for k, chosen in enumerate(which):
+            value = array[k, p]
+            array[k, p] = where(chosen > 0, real(nan, value), value)
 
 
 @shared

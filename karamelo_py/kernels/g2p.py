@@ -8,7 +8,7 @@ from math import inf, sqrt
 from typing import NamedTuple
 
 from karamelo_py.compiler.compile import all_lanes, fma, point_function, real, shared, where
-from karamelo_py.compiler.fields import field, increase, load_vector, store, store_from
+from karamelo_py.compiler.fields import field, forget, increase, load_vector, store, store_from
 from karamelo_py.compiler.tuples import row
 from karamelo_py.kernels import visit
 from karamelo_py.kernels.arrays import Index, Nodes, Number, Tag, of_change, vector_at
@@ -331,6 +331,7 @@ def _updated_move(task, w, stencil, p, dt, total, totals, fastest):
     y, v, moment, hits = reflected(w.grid, w.kin, y, v, moment)
     increase(field(w.points.fields, Bounces), p, hits)
     store(field(w.points.fields, VelocityBefore), p, old)
+    forget(field(w.points.fields, VelocityBefore), p, hits)  # on the other side of the edge
     store(w.points.v, p, v)
     store(field(w.points.fields, transfers.Moment), p, moment)
     store(w.places.y, p, y)

@@ -113,7 +113,7 @@ class SeriesBack(Scattered):
 
 
 class VelocityBefore(Field):
-    """Velocity before the last step; NaN where there was none."""
+    """Velocity before the last step; NaN where there was none, or it was reflected in it."""
 
     shape = vector
     start = nan
