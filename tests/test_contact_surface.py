@@ -83,6 +83,44 @@ def test_a_body_that_begins_in_a_region_is_told(run_interpreted):
     assert "points in the region of fix 'F': all points of its group begin there" in said
 
 
+@pytest.mark.parametrize("outside", ["line", "union"])
+def test_a_region_without_an_inside_is_refused(run_interpreted, tmp_path, outside):
+    corners = np.array([[0.0, 0.31], [0.9, 0.31]])
+    marks = {name: [np.array([7])] for name in ("gmsh:physical", "gmsh:geometrical")}
+    mesh = meshio.Mesh(corners, {"line": [[0, 1]]}, cell_data=marks)
+    mesh.write(tmp_path / "line.msh", file_format="gmsh22")
+    lines = (
+        f"region(line, mesh, {tmp_path}/line.msh, 7)", "region(die, block, 0, 0.9, 0, 0.2)",
+        "region(union, union, die, line)", f"fix(F, contact/surface, all, {outside})", "run(1)",
+    )  # fmt: skip
+    said = run_interpreted(block(2, *lines), status=1).err
+    assert f"region '{outside}' has lines or surfaces, which nothing can be in" in said
+    assert "fix(F, contact/surface" in said and "a region with an inside" in said
+
+
+def test_a_point_too_deep_ends_the_run(run_interpreted):
+    """The way out of what lies more than a cell below the surface is not known."""
+    lines = "region(die, block, 0, 0.9, 0, 0.9)", "fix(F, contact/surface, all, die)"
+    said = run_interpreted(block(2, *lines, "set_dt(1e-9)", "run(1)"), status=1).err
+    assert "point 1 of solid 'body' is so deep in region 'die' of fix 'F'" in said
+    assert "smaller steps" in said and "fix(F, contact/surface" in said
+
+
+@pytest.mark.parametrize(
+    ("fix", "told"),
+    [
+        ("contact/surface, all, die, 0, 0, x", "'x' depends on x, which differs from point"),
+        ("indent, all, sphere, 1, 0.1, 0, y, 0", "'y' depends on y, which differs from point"),
+        ("contact/surface, all, die, 0, 0", "expected: ux, uy\n"),
+    ],
+)
+def test_motions_are_formulas_of_time(run_interpreted, fix, told):
+    text = block(2, "region(die, block, 0, 0.9, 0, 0.2)", f"fix(F, {fix})", "run(1)")
+    said = run_interpreted(text, status=1).err
+    assert told in said and f"fix(F, {fix})" in said
+    assert "expected: a formula of time" in said or "ux, uy" in told
+
+
 def test_friction_is_not_below_0(run_interpreted):
     lines = "region(die, block, 0, 0.9, 0, 0.2)", "fix(F, contact/surface, all, die, -0.1)"
     assert "at least 0" in run_interpreted(block(2, *lines), status=1).err

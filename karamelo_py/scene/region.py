@@ -70,6 +70,11 @@ class Region(Named):
         """True if all faces are known to lie along the axes."""
         return bool(self.parts) and all(part.aligned for part in self.parts)
 
+    @property
+    def flat(self) -> bool:
+        """True if it, or one of its parts, is made of lines or surfaces, which nothing is in."""
+        return any(part.flat for part in self.parts)
+
     def contains(self, x: np.ndarray) -> np.ndarray:
         """Test which positions `x` (n, >= dimension) lie in the shape, faces included: (n,) bool.
 

@@ -103,13 +103,17 @@ class MeshRegion(Enclosed):
 
     @property
     def aligned(self) -> bool:
-        return self.simplices.flat or super().aligned
+        return self.flat or super().aligned
+
+    @property
+    def flat(self) -> bool:
+        return self.simplices.flat
 
     def faces(self) -> np.ndarray:
         return outer_faces(self.corners)
 
     def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
-        if self.simplices.flat:
+        if self.flat:
             return np.full(len(x), -reach)  # nothing lies in a surface or a line
         return super().distance(x, reach)
 

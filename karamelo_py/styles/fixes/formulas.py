@@ -15,8 +15,8 @@ AXES = "xyz"
 USUAL_FRICTION = 2.0
 
 
-def per_direction(hub: Hub, name: str, formulas: tuple) -> tuple:
-    """Check that there is one formula (or NULL) for each direction of the domain.
+def per_direction(hub: Hub, name: str, formulas: Sequence, *, all_given: bool = False) -> tuple:
+    """Check that there is one formula (or NULL, unless `all_given`) per direction of the domain.
 
     Further components are allowed when they are NULL or zero, as published inputs write them.
     """
@@ -25,7 +25,7 @@ def per_direction(hub: Hub, name: str, formulas: tuple) -> tuple:
     if len(formulas) < d:
         raise ScriptError(
             f"{plural(len(formulas), 'component')} in {plural(d, 'dimension')}",
-            expected=f"{wanted} (NULL leaves a component alone)",
+            expected=wanted + " (NULL leaves a component alone)" * (not all_given),
         )
     if len(formulas) > 3:
         raise ScriptError(
@@ -40,7 +40,7 @@ def per_direction(hub: Hub, name: str, formulas: tuple) -> tuple:
             )
     if all(formula is None for formula in formulas[:d]):
         hub.warn("all components are NULL: it leaves everything alone")
-    return formulas[:d]
+    return tuple(formulas[:d])
 
 
 def vector(formulas: Sequence, hub: Hub, x: np.ndarray, first: Callable) -> np.ndarray:

@@ -13,7 +13,7 @@ from karamelo_py.output.point_table import PointTable
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.region import Region
-from karamelo_py.scene.solid import Solid
+from karamelo_py.scene.solid import Solid, named
 from karamelo_py.scene.views import PointsView
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
@@ -43,6 +43,12 @@ class ToolFix(PointForces):
     def now(self, *formulas: Expression) -> np.ndarray:
         """The present numbers (n,) of formulas of time."""
         return np.array([formula.evaluate(self.hub.values) for formula in formulas])
+
+    def of_time(self, name: str, formulas: Sequence[Expression]) -> tuple[Expression, ...]:
+        """Check that there is a formula of time for each direction."""
+        found = per_direction(self.hub, name, formulas, all_given=True)
+        self.now(*found)
+        return found
 
     def from_place(
         self, points: PointsView | PointTable, place: Sequence[Expression]
@@ -142,8 +148,8 @@ class PlaneTool(ToolFix):
 
     def lay(self, place: Sequence[Expression], normal: Sequence[Expression]) -> None:
         """Check the formulas of a place in the plane, and of its normal."""
-        self.origin = per_direction(self.hub, "", place)
-        self.towards = per_direction(self.hub, "n", normal)
+        self.origin = self.of_time("", place)
+        self.towards = self.of_time("n", normal)
         if not self.hub.rehearsing:  # which does not know all numbers
             unit(self.now(*self.towards))
 
@@ -291,8 +297,9 @@ class ContactSurface(ToolFix):
     Parameters
     ----------
     region
-        What pushes points out: a region of any style, such as a mesh, an STL surface, or a plane,
-        with the word ``exterior`` a mould. It holds no points, and costs none.
+        What pushes points out: a region with an inside, such as a mesh of elements of volume (in
+        the plane of area), a closed STL surface, or a plane; with the word ``exterior`` a mould. It
+        holds no points, and costs none.
     mu
         Coefficient of friction (Coulomb); 0 when left out.
     way
@@ -310,8 +317,9 @@ class ContactSurface(ToolFix):
     reaches p into the region it gets the force m (v / dt + p / (10 dt^2)) out of it, with the speed
     v at which it approaches, but none that pulls: that stops it within one step, and takes a tenth
     of p out. Friction is mu times that, along the slip on the moving region, and at most what stops
-    it. The way out is where the depth falls fastest, and does not know what lies more than a cell
-    below the surface. A region does not turn.
+    it. The way out is where the depth falls fastest. It is known down to a cell below the surface:
+    a point that comes deeper, or to the middle of a thin region, ends the run. A region does not
+    turn.
 
     A block slides down a slope of 20 degrees with 1.54 in tlmpm, and 1.56 in ulmpm (exact 1.541,
     mu = 0.2; points=cut, or 1.53 and 1.55 without), and its energy is balanced to 0.3 %. It sinks
@@ -336,9 +344,16 @@ class ContactSurface(ToolFix):
         *way: Expression,
     ):
         super().__init__(hub, group)
+        if region.flat:
+            raise ScriptError(
+                f"region '{region.id}' has lines or surfaces, which nothing can be in",
+                argument="region",
+                expected="a region with an inside: a mesh of elements of volume (in 2D of area), "
+                "a closed STL surface, a block, ...",
+            )
         self.region, self.mu = region, mu
         judge_friction(hub, mu)
-        self.way = per_direction(hub, "u", way) if way else ()
+        self.way = self.of_time("u", way) if way else ()
 
     def moved(self, dt: float) -> tuple[np.ndarray, np.ndarray]:
         """Find the way (d,) of the region so far, and its mean velocity (d,) in the next step."""
@@ -360,13 +375,24 @@ class ContactSurface(ToolFix):
     def forces(self, points: PointsView) -> np.ndarray:
         way, velocity = self.moved(points.dt)
         x = points.position.astype(float) - way
-        depth = self.depth(x) + self.side(points) / 2
+        within = self.depth(x)
+        depth = within + self.side(points) / 2
         normal, near = np.zeros_like(x), np.flatnonzero(depth > 0)
         aside = 0.05 * self.hub.domain.h
         for k, step in enumerate(aside * np.eye(x.shape[1])):
             normal[near, k] = self.depth(x[near] - step) - self.depth(x[near] + step)
         size = np.linalg.norm(normal, axis=1, keepdims=True)
         normal = np.divide(normal, size, out=np.zeros_like(x), where=size > 1e-3 * aside)
+        lost = np.flatnonzero((within > 0) & (size[:, 0] <= 1e-3 * aside))
+        if len(lost):
+            raise ScriptError(
+                f"{named(self.hub, int(points.ids[lost[0]]) - 1)} is so deep in region "
+                f"'{self.region.id}' of fix '{self.id}' that no way out of it is the shortest",
+                place=self.place,
+                expected="points that come less than a cell below the surface",
+                hint="smaller steps (dt_factor), a stiffer body, or a region that moves more "
+                "slowly, or is thicker",
+            )
         # A spring alone, which takes all penetration out within a step, throws bodies back.
         closing = ((velocity - points.velocity.astype(float)) * normal).sum(axis=1)
         push = np.where(depth > 0, SOFT * depth + points.dt * closing, 0.0)
@@ -447,7 +473,7 @@ class Indent(ToolFix):
     ):
         super().__init__(hub, group)
         self.K, self.R = K, R
-        self.centre = per_direction(hub, "", (x, y, z))
+        self.centre = self.of_time("", (x, y, z))
 
     def forces(self, points: PointsView) -> np.ndarray:
         K, R = self.now(self.K, self.R)
@@ -515,8 +541,8 @@ class IndentMinimizePenetration(ToolFix):
         super().__init__(hub, group)
         self.R, self.mu = R, mu
         judge_friction(hub, mu)
-        self.centre = per_direction(hub, "", (x, y, z))
-        self.velocity = per_direction(hub, "v", (vx, vy, vz))
+        self.centre = self.of_time("", (x, y, z))
+        self.velocity = self.of_time("v", (vx, vy, vz))
 
     def forces(self, points: PointsView) -> np.ndarray:
         away = self.from_place(points, self.centre)
@@ -578,7 +604,7 @@ class CuttingTool(ToolFix):
         if hub.domain.dimension != 2:
             raise ScriptError("the tool is one in the plane", expected="a domain in 2D")
         self.K = K
-        self.tip = per_direction(hub, "", (x_tip, y_tip, z_tip))
+        self.tip = self.of_time("", (x_tip, y_tip, z_tip))
         self.ends = (xA, yA), (xB, yB)
         if not hub.rehearsing:  # which does not know all numbers
             self._faces()
@@ -658,6 +684,7 @@ class MeldTool(ToolFix):
         if hub.domain.dimension != 3:
             raise ScriptError("the tool is one in space", expected="a domain in 3D")
         self.numbers = (K, half_width, c1, c2, theta, lo, hi, Rmax)
+        self.now(*self.numbers)  # refuses those of places
         self.along = "xyz".index(axis)
         self.across = [k for k in range(3) if k != self.along]
 
