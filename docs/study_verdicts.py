@@ -9,6 +9,7 @@ import io
 import os
 import re
 import sys
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -68,6 +69,9 @@ SCENES = {
 }  # fmt: skip
 
 
+VERDICTS = ("right", "not sure", "by chance", "wrong")
+
+
 class Verdict(NamedTuple):
     """What advise said for a target, and what the sweep shows."""
 
@@ -76,7 +80,7 @@ class Verdict(NamedTuple):
     choice: str
     error: float
     excess: float  # its cost over that of the cheapest that meets the target, not by chance
-    right: bool
+    verdict: str  # one of VERDICTS
 
 
 def run(words: Sequence[str]) -> str:
@@ -116,14 +120,20 @@ def verdict(target: float, said: str, table: Table) -> Verdict:
     least = min(column(sure, COST), default=np.inf)
     word = re.search(r"^(sure|almost sure|likely|uncertain|not sure)\b", said, re.M)
     if word is None or "no variant is expected" in said:
-        return Verdict(target, "none", "", np.nan, np.nan, not sure or "may do, at about" in said)
+        right = not sure or "may do, at about" in said
+        return Verdict(target, "none", "", np.nan, np.nan, "right" if right else "wrong")
     values = dict(re.findall(r'^  (\w+) = "?([^"\n]+)"?$', said, re.M))
     row = next(row for row in table.rows if all(row[n] == v for n, v in values.items()))
     error = abs(records.value(row, accuracy) or np.nan)
     excess = float(column([row], COST)[0]) / least if sure else np.nan
-    right = id(row) in good or word[1] in ("uncertain", "not sure")
+    if word[1] in ("uncertain", "not sure"):
+        found = "not sure"
+    elif id(row) in good:
+        found = "by chance" if id(row) in lucky else "right"
+    else:
+        found = "wrong"
     differing = {n: v for n, v in values.items() if len({row[n] for row in table.rows}) > 1}
-    return Verdict(target, word[1], " ".join(differing.values()), error, excess, right)
+    return Verdict(target, word[1], " ".join(differing.values()), error, excess, found)
 
 
 def line(scene: Scene, one: Verdict) -> str:
@@ -131,14 +141,17 @@ def line(scene: Scene, one: Verdict) -> str:
     numbers = [f"{number:.2g}" if np.isfinite(number) else "" for number in (one.error, one.excess)]
     advice = f"{one.choice} ({one.word})" if one.choice else "nothing"
     cells = [f"`{Path(scene.script).name}`", scene.hard, f"{one.target:g}", advice, *numbers]
-    return "| " + " | ".join([*cells, "right" if one.right else "wrong"]) + " |"
+    return "| " + " | ".join([*cells, one.verdict]) + " |"
 
 
 def table(names: Mapping[str, Scene]) -> str:
     """Make the table of scenes."""
     head = "| scene | what is hard | target | advice | its error | cost over the least | verdict |"
-    rows = [line(scene, one) for name, scene in names.items() for one in judge(name, scene)]
-    return "\n".join([head, "|---|---|---|---|---|---|---|", *rows])
+    found = [(scene, one) for name, scene in names.items() for one in judge(name, scene)]
+    counts = Counter(one.verdict for _, one in found)
+    last = "| all |" + " |" * 5 + " " + ", ".join(f"{counts[v]} {v}" for v in VERDICTS) + " |"
+    rows = [line(scene, one) for scene, one in found]
+    return "\n".join([head, "|---|---|---|---|---|---|---|", *rows, last])
 
 
 if __name__ == "__main__":

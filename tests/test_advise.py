@@ -330,21 +330,24 @@ def test_verdicts_are_held_against_all_variants(folder):
         str(folder / "in.law"), "-var N=10,20,40,80 -var least=0.01", "err", (0.02, 0.005), ""
     )
     first, second = held.judge("law", scene)
-    assert (first.word, first.choice, first.right) == ("likely", "80", True)
+    assert (first.word, first.choice, first.verdict) == ("likely", "80", "right")
     assert first.error == pytest.approx(1 / 64) and first.excess == 1
-    assert (second.word, second.right) == ("none", True)
+    assert (second.word, second.verdict) == ("none", "right")
     # A floor that no run has shown is foreseen by nobody: order 2 goes on to 0.0039 at N = 160.
     wider = scene._replace(words=scene.words.replace("80", "80,160"), targets=(0.0095,))
     (verdict,) = held.judge("wider", wider)
-    assert (verdict.word, verdict.right) == ("almost sure", False)
+    assert (verdict.word, verdict.verdict) == ("almost sure", "wrong")
 
 
 @pytest.mark.full
 @pytest.mark.parametrize("name", verdicts().SCENES)
-def test_verdicts_on_hard_scenes_are_right_or_not_sure(name, tmp_path, monkeypatch):
+def test_verdicts_on_hard_scenes_are_right_or_not_sure_and_one_by_chance(
+    name, tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     held = verdicts()
-    assert all(verdict.right for verdict in held.judge(name, held.SCENES[name]))
+    found = [one.verdict for one in held.judge(name, held.SCENES[name])]
+    assert "wrong" not in found and found.count("by chance") <= (name == "bar")
 
 
 @pytest.mark.full
