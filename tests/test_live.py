@@ -1,6 +1,7 @@
 """Live pages: a study, a run, a folder; served to who knows the address, and changing no bit."""
 
 import json
+import os
 import shutil
 import threading
 import urllib.error
@@ -168,6 +169,14 @@ def test_dumps_without_points_are_passed_over(tmp_path):
     page = FolderPage(tmp_path)
     told = Events(page.server.address).next()
     assert told["frames"] == [] and len(told["rows"]) == 1
+    empty = (tmp_path / "d.0.txt").read_text(encoding="utf-8")
+    full = empty.replace("\n0\nITEM: NUMBER", "\n1\nITEM: NUMBER").replace("ATOMS\n0", "ATOMS\n1")
+    for states in (1, 2):  # in one file, which grows
+        text = empty + (full + "1 0.5 0.5 0\n") * states
+        (tmp_path / "d.0.txt").write_text(text, encoding="utf-8")
+        os.utime(tmp_path / "d.0.txt", (states, states))
+        assert page.look()
+        assert len(Events(page.server.address).next()["frames"]) == states
     page.server.close()
 
 

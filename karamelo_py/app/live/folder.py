@@ -36,6 +36,7 @@ class FolderPage:
         self.folder = folder
         self._states: list[tuple[Path, int, int, float, int]] = []  # file, place, step, time, count
         self._seen: dict[Path, float] = {}
+        self._read: dict[Path, int] = {}  # states of each file that were looked at
         self._widths: dict[str, int] = {}  # columns, by names of dumps
         self._log: dict[str, np.ndarray] = {}
         self._columns: list[str] = []
@@ -63,14 +64,14 @@ class FolderPage:
         grown = len(next(iter(log.values()), ())) != len(next(iter(self._log.values()), ()))
         self._log = log
         for path in self._dumps():
-            known = sum(file == path for file, *_ in self._states)
             try:
                 changed = path.stat().st_mtime
                 if self._seen.get(path) == changed:
                     continue
                 for place, snapshot in enumerate(read(path)):
-                    if place >= known:
+                    if place >= self._read.get(path, 0):
                         self._add(path, place, snapshot)
+                        self._read[path] = place + 1
                 self._seen[path] = changed
             except (ScriptError, OSError):  # it is being written, or has gone
                 continue

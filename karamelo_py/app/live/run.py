@@ -52,7 +52,7 @@ class RunPage(Rhythmic):
             hub.output.log.rows = []
         self._rows: list[Row] = []
         self._paused = self._once = self._over = False
-        self._column = ""
+        self._column = "seq"
         self.server = Server(
             frames.PAGE, self._news, {"frame": self.frames.answer},
             {"pause": self._pause, "go": self._go, "step": self._step, "stop": self._stop,
@@ -96,8 +96,7 @@ class RunPage(Rhythmic):
     def _take(self) -> None:
         update, read = self.hub.update, self.hub.fields.particle
         axes = "xyz"[: self.hub.domain.dimension]
-        column = self._column or "seq"
-        self.frames.add(Frame.of_columns(update.step, update.time, axes, column, read))
+        self.frames.add(Frame.of_columns(update.step, update.time, axes, self._column, read))
 
     def _wait(self) -> None:
         shown, left = self._column, time.perf_counter()
@@ -135,7 +134,7 @@ class RunPage(Rhythmic):
                 "title": self.title,
                 "dimension": self.hub.domain.dimension,
                 "columns": self.hub.fields.particle_names(),
-                "column": self._column or "seq",
+                "column": self._column,
                 "method": self.hub.update.words,
                 "bounds": [-100 * energy.LOSS, 100 * energy.WITHIN],
                 "steers": True,

@@ -60,7 +60,6 @@ class StudyPage:
             Path(__file__).with_name("study.html"), self._news, {"run": self._run},
             {"stop": lambda words: self.stopped.set()},
         )  # fmt: skip
-
         atexit.register(self._end)
 
     def _end(self) -> None:
@@ -110,10 +109,9 @@ class StudyPage:
             *said_in(folder / "err.txt").splitlines(),
             *said_in(folder / "out.txt").splitlines(),
         ]
-        told: dict[str, Any] = {"said": said[-LINES:], "columns": {}}
-        told["columns"] = {
+        columns = {
             name: [plain(float(value)) for value in values[:: max(1, len(values) // MOST)]]
             for name, values in read_log(folder).items()
             if np.issubdtype(values.dtype, np.number)
         }
-        return told
+        return {"said": said[-LINES:], "columns": columns}

@@ -23,12 +23,12 @@ NEARLY_INCOMPRESSIBLE = 0.4  # Poisson's ratio from where on linear functions lo
 MANY_POINTS = 4  # a cell and direction
 LARGE = 100_000  # points from where on their numbers are read from memory
 RESOLVED = 1000  # times the distance of neighbouring singles: what a step moves points by, at least
-# Errors of inputs/in.sod: 3.18 % with 0.3 of the stable step and 4 points a cell, 3.50 % with 0.9
-# of it, 4.05 % with 2 points as well.
 # Seconds of a core (Intel Xeon): a point in a step of linear functions, a line of the log, a
 # picture and the first one, a file of points and a number in it.
 POINT, LINE, PICTURE, DRAWING, FILE, NUMBER = 1e-7, 5e-4, 0.02, 0.5, 3e-4, 3e-7
 LONG = 0.5  # seconds of output that count
+# Errors of inputs/in.sod: 3.18 % with 0.3 of the stable step and 4 points a cell, 3.50 % with 0.9
+# of it, 4.05 % with 2 points as well.
 OF_STEPS = "longer steps move results, those of a shock tube by a tenth"
 OF_POINTS = "fewer points move results, those of a shock tube by a sixth with half of them"
 
