@@ -251,18 +251,18 @@ def _excess_of(contact, kin, nodes, pair, where):
 
     It is 0 for bodies that stay apart along any other direction.
     """
-    for direction in _directions(contact, kin, nodes, pair):
-        length = sqrt(dot(direction, direction))
-        if length > 0:
-            gap = _gap(contact, nodes, direction, pair.n, pair.m, where)
-            if gap > 0 and dot(direction, pair.relative) * where.dt <= gap * length:
-                return 0.0
     size = sqrt(dot(pair.outward, pair.outward))
     if not size > 0:
         return 0.0
     approach = dot(pair.outward, pair.relative)
     if not approach > 0:
         return 0.0
+    for direction in _directions(contact, kin, nodes, pair):
+        length = sqrt(dot(direction, direction))
+        if length > 0:
+            gap = _gap(contact, nodes, direction, pair.n, pair.m, where)
+            if gap > 0 and dot(direction, pair.relative) * where.dt <= gap * length:
+                return 0.0
     gap = _gap(contact, nodes, pair.outward, pair.n, pair.m, where)
     return approach / size - max(gap, 0.0) / where.dt
 
