@@ -182,22 +182,25 @@ NODE_WORDS = {
 NODE_WRITES = {"post_particles_to_grid": "force", "post_update_grid_state": "velocity_update"}
 
 
-def _node_reader(item: Any) -> Callable:
-    """Return what reads an item of a node."""
-    if not isinstance(item, type):
-        return NODE_WORDS.get(item, _node_mass)  # others are refused before that
-    kind: Any = item
-    shape = kind.shape
+def _field_reader(item: Any, number: Callable) -> Callable:
+    """Return what reads a declared field, whose numbers ``number(what, k, n)`` gives."""
+    shape = item.shape
     as_vector = shape is vector
 
     def of_field(what, law, state, n):
-        array = field(what.nodes.fields, item)
-        numbers = tuple([array[n, k] for k in range(shape(what.kin))])
+        numbers = tuple([number(what, k, n) for k in range(shape(what.kin))])
         if as_vector:
             return what.kin.Vector._make(numbers)
         return numbers[0] if len(numbers) == 1 else numbers
 
     return of_field
+
+
+def _node_reader(item: Any) -> Callable:
+    """Return what reads an item of a node."""
+    if not isinstance(item, type):
+        return NODE_WORDS.get(item, _node_mass)  # others are refused before that
+    return _field_reader(item, lambda what, k, n: field(what.nodes.fields, item)[n, k])
 
 
 def _node_writer(item: Any) -> Callable:
@@ -226,18 +229,7 @@ def _node_writer(item: Any) -> Callable:
 def _reader(item: Any) -> Callable:
     """Return what reads an item of a point."""
     if isinstance(item, type):
-        kind: Any = item
-        shape = kind.shape
-        as_vector = shape is vector
-
-        def of_field(what, law, state, p):
-            array = field(what.points.fields, item)
-            numbers = tuple([array[k, p] for k in range(shape(what.kin))])
-            if as_vector:
-                return what.kin.Vector._make(numbers)
-            return numbers[0] if len(numbers) == 1 else numbers
-
-        return of_field
+        return _field_reader(item, lambda what, k, p: field(what.points.fields, item)[k, p])
     return WORDS.get(item) or (lambda what, law, state, p: item(law, what.kin, state))
 
 
