@@ -9,6 +9,7 @@ import sys
 import tomllib
 from functools import cache
 from graphlib import TopologicalSorter
+from itertools import product
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -230,6 +231,53 @@ def test_links_of_pages_lead_somewhere():
                 assert generated[2] in names, target
             else:
                 assert (page.parent / target).exists() or "generated/" in target, (page, target)
+
+
+def questions():
+    """The three questions of choose.md: the answers to each, and rows of answers and a line."""
+    head = (ROOT / "docs" / "choose.md").read_text("utf-8").partition("## Why")[0]
+    numbered = re.findall(r"^\d\. (.*?)(?=^\d\. |\n\n)", head, re.S | re.M)
+    cells = re.findall(r"^\| ([^|`]+) \| (\w+) \| (\w+) \| (.+) \|$", head, re.M)
+    rows = [(*(cell.split(", ") for cell in three), line) for *three, line in cells]
+    return [re.findall(r"`(\w+)`", question) for question in numbered], rows
+
+
+def test_every_answer_to_the_questions_leads_to_a_method():
+    """One row has each set of answers first, and no row is out of reach."""
+    answers, rows = questions()
+    assert [len(one) for one in answers] == [4, 2, 4]
+    taken = set()
+    for given in product(*answers):
+        fits = [
+            k
+            for k, (*cells, _) in enumerate(rows)
+            if all(word in cell or cell == ["any"] for word, cell in zip(given, cells, strict=True))
+        ]
+        assert fits, given
+        taken.add(fits[0])
+    assert taken == set(range(len(rows)))
+
+
+@pytest.mark.parametrize(
+    "row", questions()[1], ids=lambda row: "-".join([*row[0], *row[1], *row[2]])
+)
+def test_lines_of_the_questions_are_understood(row, tmp_path):
+    """Two solids with the method, and with the fix between them, and a run of one step."""
+    *_, text = row
+    hub = Hub()
+    hub.console.quiet = hub.rehearsing = True
+    hub.folder = tmp_path
+    lines = re.findall(r"`(\w+\(.*?\))`", text)
+    lines += ["dimension(2, 0, 1, 0, 1, 0.1)", "material(rubber, neo-hookean, 1000, 1e5, 0.3)"]
+    for name, lo, hi in (("left", 0.2, 0.4), ("right", 0.5, 0.7)):
+        lines.append(f"region({name}, block, {lo}, {hi}, 0.3, 0.5)")
+        lines.append(f"solid({name}, region, {name}, 2, rubber, 0.1)")
+    if "minimize_penetration" in text:
+        lines.append("fix(touch, contact/minimize_penetration, left, right, 0.3)")
+    Interpreter(hub).run_text("\n".join([*lines, "run(1)"]))
+    kind, transfer, basis = re.search(r"method\(([^,]+), (\w+), ([^,)]+)", text).groups()
+    assert registry.find("method", kind) is type(hub.update.method)
+    assert registry.knows("transfer", transfer) and registry.knows("basis", basis)
 
 
 @pytest.mark.parametrize(("family", "name"), STYLES, ids=[f"{f}-{n}" for f, n in STYLES])
