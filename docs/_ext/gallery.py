@@ -108,6 +108,13 @@ def chart_of(name: str, static: Path) -> Path | None:
     return None
 
 
+def lead_to_gallery(app, docname: str, source: list[str]) -> None:
+    """Let links of the front page to scripts lead to their pages, and to all of them."""
+    if docname == "index":
+        text = re.sub(r"\]\(\.\./inputs/in\.(\w+)\)", r"](gallery/generated/\1.md)", source[0])
+        source[0] = text.replace("](../inputs)", "](gallery/generated/index.md)")
+
+
 def setup(app):
     """Write the pages when a build begins."""
 
@@ -116,4 +123,5 @@ def setup(app):
         write_gallery(docs, docs / "gallery" / "generated")
 
     app.connect("builder-inited", write, priority=800)
+    app.connect("source-read", lead_to_gallery)
     return {"parallel_read_safe": True}

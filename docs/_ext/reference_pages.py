@@ -1,7 +1,8 @@
 """The reference: a page for each command and style, made from its signature and its docstring.
 
 Pages are written to docs/reference/generated before Sphinx reads its sources. Only what karamelo-py
-itself brings is described; plug-ins describe themselves (karamelo-py help).
+itself brings is described; plug-ins describe themselves (karamelo-py help). Pages of docs/ link to
+reference/index.md#fix-body_force, which is there in the source tree, too.
 """
 
 from __future__ import annotations
@@ -134,8 +135,22 @@ def escaped(text: str) -> str:
     return "".join(p if p.startswith("`") else _SPECIAL.sub(r"\\\1", p) for p in parts)
 
 
+_LINK = re.compile(r"\]\(((?:\.\./)*(?:reference/)?)index\.md#([a-z]+)-([^)]+)\)")
+
+
+def lead_to_pages(app, docname: str, source: list[str]) -> None:
+    """Let links to a style on the page of the reference lead to the page of the style."""
+
+    def page(link: re.Match) -> str:
+        known = link[2] in families()
+        return f"]({link[1]}generated/{link[2]}/{link[3]}.md)" if known else link[0]
+
+    source[0] = _LINK.sub(page, source[0])
+
+
 def setup(app):
     """Write the pages before the sources are read."""
+    app.connect("source-read", lead_to_pages)
     app.connect(
         "builder-inited", lambda app: write_pages(Path(app.srcdir) / "reference" / "generated")
     )
