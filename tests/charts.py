@@ -43,7 +43,7 @@ def faults(figure):
         for axis, name in ((axes.xaxis, "x"), (axes.yaxis, "y")):
             label = axis.label.get_text()
             bar = axes.get_label() == "<colorbar>"
-            if label and not re.search(r"[(\[][^()\[\]]+[)\]]$", label):
+            if label and not re.search(r"\([^()]+\)$", label):
                 found.append(f"no unit: {label!r}")
             if not label and not bar:
                 found.append(f"no label along {name}")

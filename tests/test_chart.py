@@ -340,7 +340,7 @@ def test_titles_have_the_units_of_the_script(tmp_path):
     script.write_text("\n".join(lines) + "\n", encoding="utf-8")
     table = Table([], [], made={"script": str(script)})
     assert [table.label(name) for name in ("Time", "Ek", "v_x", "max:Ek", "err", "seconds")] == [
-        "Time [ms]", "Ek [mJ]", "v_x [mm/ms]", "max:Ek [mJ]", "err",
+        "Time (ms)", "Ek (mJ)", "v_x (mm/ms)", "max:Ek (mJ)", "err",
         "time of the stepping loop (s)",
     ]  # fmt: skip
     assert Table([], []).label("wall_s") == "time of the process (s)"

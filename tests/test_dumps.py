@@ -424,10 +424,10 @@ def test_legend_of_solids_and_units(plane):
     dump = PyPlot(plane, 1, "p.svg", 4, 3)
     dump.write()
     svg = (plane.folder / "p.svg").read_text()
-    for word in ("left", "right", "x [mm]", "y [mm]", "step 0, time 0 ms"):
+    for word in ("left", "right", "x (mm)", "y (mm)", "step 0, time 0 ms"):
         assert f"<!-- {word} -->" in svg
     PyPlot(plane, 1, "q.svg", 4, 3, "seq").write()
-    assert "<!-- seq [MPa] -->" in (plane.folder / "q.svg").read_text()
+    assert "<!-- seq (MPa) -->" in (plane.folder / "q.svg").read_text()
 
 
 def test_units_are_in_the_header_and_ovito_reads_on(plane):

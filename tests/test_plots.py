@@ -64,7 +64,7 @@ def test_two_axes_and_units(hub):
     hub.output.plots.add("stored", PlottedCurve(1, *quantities, side="right", scale="log"))
     hub.run(5)
     svg = (hub.folder / "energies.svg").read_text()
-    for word in ("time [ms]", "Ek_s [mJ]", "Es_s", "Ek", "stored (right)"):
+    for word in ("time (ms)", "Ek_s (mJ)", "Es_s", "Ek", "stored (right)"):
         assert f"<!-- {word} -->" in svg
     # Powers of ten are written as formulas.
     assert re.search(r"<!-- \$\\mathdefault\{10\^\{", svg)

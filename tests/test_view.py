@@ -314,17 +314,17 @@ def test_the_bar_of_colours_has_the_ends_that_are_given(ends):
 
 def test_small_lengths_count_in_powers_of_a_thousand():
     """20 micrometres are no 0.00002 beside a tick."""
-    options = pictures.Options("seq", "seq", lengths=" [m]")
+    options = pictures.Options("seq", "seq", lengths=" (m)")
     domain = SimpleNamespace(dimension=2, lo=np.zeros(2), hi=np.full(2, 2e-5))
     picture = pictures.make(domain, (3, 3), 100, options)
-    assert picture.axes.get_xlabel() == "x [1e-6 m]"
+    assert picture.axes.get_xlabel() == "x (1e-6 m)"
     assert picture.axes.yaxis.get_major_formatter()(1e-5, 0) == "10"
 
 
 @pytest.mark.parametrize("high", [7e-6, 0.026, 1.0, 3e6])
 def test_pictures_with_units_are_fit_for_print(high):
     """Units, numbers and contrast; no label lies on another, however small the scene."""
-    options = pictures.Options("seq", "von Mises stress (Pa)", lengths=" [m]")
+    options = pictures.Options("seq", "von Mises stress (Pa)", lengths=" (m)")
     domain = SimpleNamespace(dimension=2, lo=np.zeros(2), hi=np.array([high / 2, high]))
     picture = pictures.make(domain, (4.8, 6), 100, options)
     x = np.linspace(0, high / 2, 50)

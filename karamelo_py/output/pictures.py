@@ -126,8 +126,8 @@ class Picture:
         if 0 < size < 1e-2 or size >= 1e5:
             power = 3 * int(np.floor(np.log10(size) / 3))
             axis.set_major_formatter(FuncFormatter(lambda value, _: _number(value / 10.0**power)))
-            unit = self.options.lengths.strip(" []")
-            name += f" [1e{power} {unit}]" if unit else f" / 1e{power}"
+            unit = self.options.lengths.strip(" ()")
+            name += f" (1e{power} {unit})" if unit else f" / 1e{power}"
         else:
             name += self.options.lengths
         axis.set_label_text(name, fontsize=self.options.fontsize)

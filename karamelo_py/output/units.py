@@ -106,5 +106,5 @@ class Units(NamedTuple):
 
 
 def labelled(name: str, unit: str) -> str:
-    """Write ``name [unit]``, or the name where there is no unit."""
-    return f"{name} [{unit}]" if unit else name
+    """Write ``name (unit)``, or the name where there is no unit."""
+    return f"{name} ({unit})" if unit else name

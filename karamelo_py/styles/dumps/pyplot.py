@@ -204,7 +204,7 @@ class PyPlot(Dump):
         options = pictures.Options(
             label,
             solids=tuple(self.hub.solids) if label == "type" else (),
-            lengths=f" [{units.length}]" if units else "",
+            lengths=f" ({units.length})" if units else "",
             **(look | self.look),
         )
         made = pictures.make(self.hub.domain, self.size, self.dpi, options)
