@@ -94,6 +94,25 @@ def test_help_finds_an_argument_and_what_it_may_be(capsys, word):
 
 
 @pytest.mark.parametrize(
+    ("word", "listed"),
+    [
+        ("contact", ["fix contact/friction", "fix contact/surface", "method ulmpm/contacts"]),
+        ("Gravity", ["fix body_force"]),
+        ("sand", ["strength drucker-prager"]),
+        ("heat", ["fix heat_flux_particles", "command temperature"]),
+    ],
+)
+def test_help_finds_styles_by_a_word(capsys, word, listed):
+    """A part of the name, a word of the summary, a word of the text; below an argument, too."""
+    status, out, _ = call(capsys, "help", word)
+    assert status == 0
+    rows = out.partition("about" if "about" in out else "See also")[2].splitlines()[1:]
+    families = {" ".join(row.split()[:2]) for row in rows}
+    assert set(listed) <= families
+    assert all("contact" in row for row in families) or word != "contact"
+
+
+@pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (["help", "bodyforce"], "did you mean 'body_force'?"),

@@ -1,6 +1,7 @@
 """karamelo-py styles and karamelo-py help: what a script can say, and what each word means."""
 
 import inspect
+import re
 import textwrap
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
@@ -69,11 +70,7 @@ def print_styles(given: Sequence[str]) -> int:
         if index:
             page.say()
         page.say(_plural(family), "bold")
-        names = registry.names(family)
-        origins = [registry.origin(family, name) for name in names]
-        widths = [max(map(len, column), default=0) for column in (names, origins)]
-        for name, origin in zip(names, origins, strict=True):
-            page.row(name.ljust(widths[0]), origin.ljust(widths[1]), *_summary(family, name))
+        page.rows([(name, family, name) for name in registry.names(family)])
     return 0
 
 
@@ -94,8 +91,15 @@ def print_help(given: Sequence[str]) -> int:
         )
     if _singular(name) in families():
         return print_styles([name])
-    if found := _arguments(name):
-        return _explain_argument(name, found)
+    found, related = _arguments(name), _about(name)
+    if found:
+        _explain_argument(name, found)
+    if related:
+        page = _Page()
+        page.say("\nSee also" if found else f"Commands and styles about {name}", "bold")
+        page.rows([(f"{family} {style}", family, style) for family, style in related])
+    if found or related:
+        return 0
     raise _unknown("command or style", name, {n for f in families() for n in registry.names(f)})
 
 
@@ -164,6 +168,19 @@ def _explain(family: str, name: str) -> int:
     return 0
 
 
+def _about(word: str) -> list[tuple[str, str]]:
+    """Find commands and styles by a part of their name, then by their summary, else their text."""
+    begins = re.compile(rf"(?<![^\W_]){re.escape(word)}", re.IGNORECASE)
+    found: list[list[tuple[str, str]]] = [[], [], [], []]
+    for family in families():
+        for name in registry.names(family):
+            summary, broken = _summary(family, name)
+            text = "" if broken else registry.find(family, name).__doc__ or ""
+            places = (k for k, said in enumerate((name, summary, text)) if begins.search(said))
+            found[next(places, 3)].append((family, name))
+    return found[0] + found[1] or found[2]
+
+
 def _arguments(word: str) -> dict[str, Parameter]:
     """Find arguments of this name, or that may be this word, by their command or style."""
     found = {}
@@ -178,7 +195,7 @@ def _arguments(word: str) -> dict[str, Parameter]:
     return own or found
 
 
-def _explain_argument(word: str, found: dict[str, Parameter]) -> int:
+def _explain_argument(word: str, found: dict[str, Parameter]) -> None:
     """Explain an argument where most is said of it, and list where else there is one."""
     page = _Page()
     owner, parameter = max(found.items(), key=lambda item: len(item[1].description))
@@ -191,7 +208,6 @@ def _explain_argument(word: str, found: dict[str, Parameter]) -> int:
     page.paragraph(parameter.description, indent=6)
     page.say()
     page.say(f"karamelo-py help {owner} explains the rest.")
-    return 0
 
 
 # ---- how it looks -------------------------------------------------------------------------------
@@ -218,6 +234,13 @@ class _Page(Console):
                 self.say()
             for line in textwrap.wrap(" ".join(part.split()), width):
                 self.say(" " * indent + line)
+
+    def rows(self, listed: Sequence[tuple[str, str, str]]) -> None:
+        """Write names as they are shown, each with the origin and summary of its style."""
+        origins = [registry.origin(family, name) for _, family, name in listed]
+        widths = [max(map(len, column), default=0) for column in ([s for s, *_ in listed], origins)]
+        for (shown, family, name), origin in zip(listed, origins, strict=True):
+            self.row(shown.ljust(widths[0]), origin.ljust(widths[1]), *_summary(family, name))
 
     def row(self, name: str, origin: str, summary: str, broken: bool) -> None:
         """Write a line of a list; cut where a terminal ends."""

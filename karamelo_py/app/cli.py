@@ -47,10 +47,11 @@ karamelo-py help COMMAND         explain a command: karamelo-py help solid
 karamelo-py help STYLE           explain a style: karamelo-py help body_force
 karamelo-py help FAMILY STYLE    where a name means several things:
                                  karamelo-py help fix kinetic_energy
+karamelo-py help WORD            find a style by a word: karamelo-py help contact
 karamelo-py styles [FAMILY]      list commands and styles"""
 USAGE = """\
 karamelo-py SCRIPT [-var NAME VALUE] [--threads N] [--ranks N] [-log FILE]
-                          [-out FOLDER] [-restart FILE]
+                          [-out FOLDER] [-restart FILE] [--live]
                           [--trust-geometries] [--quiet] [--debug]
        karamelo-py COMMAND ..."""
 RESTART = ("-restart", "--restart")
@@ -92,12 +93,12 @@ def _complain(text: str) -> None:
 ELSEWHERE = {
     "bench": ("karamelo_py.app.bench.command", "Measure the speed of this machine."),
     "view": ("karamelo_py.app.view", "Draw pictures or a movie of dumps."),
-    "plot": ("karamelo_py.app.plot", "Draw columns of a log."),
-    "sweep": ("karamelo_py.app.studies.study", "Run a family of variants into one table."),
-    "chart": ("karamelo_py.app.studies.chart", "Draw a table of runs: what accuracy costs."),
-    "advise": ("karamelo_py.app.studies.advise", "Find the cheapest variant that is good enough."),
+    "plot": ("karamelo_py.app.plot", "Draw curves of a log."),
+    "sweep": ("karamelo_py.app.studies.study", "Run a script with many values of its variables."),
+    "chart": ("karamelo_py.app.studies.chart", "Draw the table of a sweep: error against cost."),
+    "advise": ("karamelo_py.app.studies.advise", "Find the cheapest set-up within an error."),
     "stability": ("karamelo_py.app.studies.stability", "Map where a method is stable."),
-    "atlas": ("karamelo_py.app.studies.atlas", "Make the pictures of a page again."),
+    "atlas": ("karamelo_py.app.studies.atlas", "Make all charts of a list of studies."),
 }
 COMMANDS = ("run", "check", "styles", "help", *ELSEWHERE)
 
@@ -244,20 +245,20 @@ def _parser(command: str) -> tuple[CommandLine, Any]:
         return added
 
     for name, summary, text in (
-        ("run", "Run a script.", RUN), ("check", "Build a scene and say what it needs.", CHECK)
+        ("run", "Run a script.", RUN), ("check", "Check a script: memory, step, mistakes.", CHECK)
     ):  # fmt: skip
         script = add(name, _run, summary, text)
         script.set_defaults(checking=name == "check")
         script.add_argument("script", metavar="SCRIPT", nargs="?")
         script.add_argument("-i", "-in", dest="input", metavar="SCRIPT", help=argparse.SUPPRESS)
-        add_variables(script, "set a variable; the script's own assignment of it then yields")
+        add_variables(script, "set a variable, in place of its value in the script")
         script.add_argument(
             "--threads", type=threads_option, metavar="N",
             help="threads to use (default: all cores where the scene is large enough)",
         )  # fmt: skip
         script.add_argument(
             "--ranks", type=positive, metavar="N", default=None,
-            help="processes that share the scene (MPI); threads are those of each",
+            help="processes (MPI) that share the scene; --threads is per process",
         )  # fmt: skip
         script.add_argument(
             "--trust-geometries", action="store_true",
@@ -265,16 +266,16 @@ def _parser(command: str) -> tuple[CommandLine, Any]:
         )  # fmt: skip
         script.add_argument(
             "-log", "--log", type=Path, metavar="FILE",
-            help="where the log goes (default: log.mpm); with the ending .csv it has commas",
+            help="file of the log (default: log.mpm); .csv separates columns by commas",
         )  # fmt: skip
         script.add_argument(
             "-out", "--out", type=Path, metavar="FOLDER",
-            help="where all files go; it is made if need be (default: the current folder)",
+            help="folder of all files, made if it is missing (default: the current one)",
         )  # fmt: skip
         if name == "run":
             script.add_argument(
                 *RESTART, type=Path, metavar="FILE",
-                help="go on from a file that restart(...) has written",
+                help="continue from a file that restart(...) wrote",
             )  # fmt: skip
         if name == "run":
             script.add_argument(

@@ -14,7 +14,7 @@ from karamelo_py.script.errors import ScriptError, nearest_few
 from karamelo_py.script.terms import number_of
 
 DESCRIPTION = """\
-Draw columns of a log.
+Draw curves of a log.
 The log is log.mpm or log.csv. Without columns, lists those that there are. The command of scripts
 is explained by karamelo-py help command plot."""
 
@@ -73,12 +73,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("columns", metavar="Y", nargs="*", help="columns to draw")
     parser.add_argument("-x", help="column to draw over (default: Time, or Step)")
     parser.add_argument(
-        "--right", nargs="+", default=[], metavar="Y", help="on an axis at the right"
+        "--right", nargs="+", default=[], metavar="Y", help="columns on a second axis, at the right"
     )
-    parser.add_argument("--log-scale", action="store_true", help="logarithmic axes of y")
+    parser.add_argument("--log-scale", action="store_true", help="logarithmic y axes")
     parser.add_argument(
         "-o", "--output", type=Path, default=Path("log.png"), metavar="FILE",
-        help="ending in .png, .pdf or .svg (default: log.png)",
+        help="picture: .png, .pdf or .svg (default: log.png)",
     )  # fmt: skip
 
 

@@ -44,10 +44,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("files", metavar="FILE", nargs="+", type=Path)
     parser.add_argument(
         *LIVE, action="store_true",
-        help="FILE is the folder of a run: its dumps and its log on a page in a browser, as they "
-        "come",
+        help="show the dumps and the log of the folder FILE on a page in a browser, while "
+        "a run writes them",
     )  # fmt: skip
-    parser.add_argument("-c", "--column", help="what colours the points (default: their solid)")
+    parser.add_argument("-c", "--column", help="column for the colours (default: the solid)")
     parser.add_argument(
         "-o", "--output", metavar="FILE", type=Path,
         help="picture.*.png, where * becomes the step, or a movie: .gif, or .mp4 where ffmpeg is "
@@ -59,7 +59,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     for word in _look_words():
         said = word.description.replace("%", "%%")
         parser.add_argument(f"--{word.name}", metavar=word.name.upper(), help=said)
-    parser.add_argument("--fps", type=float, default=25.0, help="frames a second of a movie")
+    parser.add_argument("--fps", type=float, default=25.0, help="frames per second of a movie")
 
 
 def _look_words() -> list[Parameter]:

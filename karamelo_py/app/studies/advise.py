@@ -325,11 +325,11 @@ def add_options(parser: ArgumentParser) -> None:
         "-accuracy", required=True, metavar="COLUMN",
         help="log column: err, max:err, or a formula: off=abs(max:u/3.28 - 1)",
     )  # fmt: skip
-    parser.add_argument("-target", required=True, type=above_zero, help="the error that is allowed")
-    parser.add_argument("-cost", default="seconds", help="what counts as cost (seconds)")
-    parser.add_argument("-along", metavar="NAME", help="the variable that makes the scene finer")
-    parser.add_argument("-pilot", type=positive, default=3, help="runs of each choice at first (3)")
-    parser.add_argument("-run", action="store_true", help="run what is advised")
+    parser.add_argument("-target", required=True, type=above_zero, help="largest error allowed")
+    parser.add_argument("-cost", default="seconds", help="column of the cost (seconds)")
+    parser.add_argument("-along", metavar="NAME", help="variable that refines the scene")
+    parser.add_argument("-pilot", type=positive, default=3, help="first runs of each choice (3)")
+    parser.add_argument("-run", action="store_true", help="run the advised set-up")
     parser.add_argument("-o", type=Path, default=Path("advise.csv"), help="table (advise.csv)")
 
 

@@ -106,15 +106,15 @@ def read(path: Path) -> tuple[list[Entry], Path]:
 def add_options(parser: ArgumentParser) -> None:
     """Add what the subcommand takes."""
     parser.add_argument("atlas", type=Path, help="the list of entries, such as docs/atlas.toml")
-    parser.add_argument("-only", default="", metavar="NAMES", help="entries or groups, with commas")
-    parser.add_argument("-small", action="store_true", help="at the smaller values of the entries")
-    parser.add_argument("-again", action="store_true", help="also what is done")
-    parser.add_argument("-list", action="store_true", help="only say what there is")
+    parser.add_argument("-only", default="", metavar="NAMES", help="entries or groups: NAME,NAME")
+    parser.add_argument("-small", action="store_true", help="use the smaller values of the entries")
+    parser.add_argument("-again", action="store_true", help="repeat what is done")
+    parser.add_argument("-list", action="store_true", help="list the entries, run nothing")
     parser.add_argument(
-        "-o", type=Path, default=Path("atlas"), metavar="FOLDER", help="the folder of work (atlas)"
+        "-o", type=Path, default=Path("atlas"), metavar="FOLDER", help="folder for the runs (atlas)"
     )
     parser.add_argument(
-        "-page", type=Path, help="write this page, its pictures to _static/atlas beside it"
+        "-page", type=Path, help="page to write; its pictures go to _static/atlas beside it"
     )
 
 

@@ -41,29 +41,29 @@ def add_options(parser: ArgumentParser) -> None:
         help="what karamelo-py sweep has written; several with -versus",
     )  # fmt: skip
     wanted = parser.add_mutually_exclusive_group(required=True)
-    wanted.add_argument("-accuracy", metavar="COLUMN", help="the error")
+    wanted.add_argument("-accuracy", metavar="COLUMN", help="column of the error")
     wanted.add_argument(
-        "-curve", metavar="COLUMN", help="a log column, a curve for each run, over -x (Time)"
+        "-curve", metavar="COLUMN", help="draw a log column of each run over -x (Time)"
     )
     wanted.add_argument(
         "-keeps", metavar="COLUMN",
-        help="a table of words: does a log column stay (keeps, damps, gains, breaks, refused)? "
-        "Rows are -by, columns the other variables",
+        help="write a table of what a log column does: keeps, damps, gains, breaks, refused; "
+        "rows by -by, columns by the other variables",
     )  # fmt: skip
-    parser.add_argument("-cost", metavar="COLUMN", help="the cost (seconds)")
-    parser.add_argument("-by", default="", metavar="A,B", help="variables that tell lines apart")
+    parser.add_argument("-cost", metavar="COLUMN", help="column of the cost (seconds)")
+    parser.add_argument("-by", default="", metavar="A,B", help="variables with a line per value")
     kinds = parser.add_mutually_exclusive_group()
-    kinds.add_argument("-x", metavar="NAME", help="errors over this variable, not over cost")
-    kinds.add_argument("-heat", metavar="A,B", help="errors over two variables, as colours")
+    kinds.add_argument("-x", metavar="NAME", help="draw errors over this variable, not over cost")
+    kinds.add_argument("-heat", metavar="A,B", help="draw errors over two variables, as colours")
     kinds.add_argument(
-        "-versus", metavar="NAME", help="its two values side by side, for each of the tables"
+        "-versus", metavar="NAME", help="compare its two values in each of the tables"
     )
-    parser.add_argument("-exact", metavar="COLUMN", help="of -curve: the exact log column")
-    parser.add_argument("-names", default="", help="of -curve: what to call the runs, with commas")
+    parser.add_argument("-exact", metavar="COLUMN", help="log column of the exact -curve")
+    parser.add_argument("-names", default="", metavar="A,B", help="names of the runs of -curve")
     add_axes(parser)
-    parser.add_argument("-log", default="log.mpm", metavar="FILE", help="of -curve: another log")
-    parser.add_argument("-where", action="append", default=[], help="rows that fulfil a condition")
-    parser.add_argument("-title", help="heads the chart (the name of the script)")
+    parser.add_argument("-log", default="log.mpm", metavar="FILE", help="log of -curve (log.mpm)")
+    parser.add_argument("-where", action="append", default=[], help="draw only these rows")
+    parser.add_argument("-title", help="title (the name of the script)")
     parser.add_argument("-o", type=Path, help="the picture or page: " + ", ".join(SUFFIXES))
 
 

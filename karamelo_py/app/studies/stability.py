@@ -69,15 +69,13 @@ def add_options(parser: ArgumentParser) -> None:
     """Add what the subcommand takes."""
     variables.add_family(parser)
     variables.add_steps(parser)
-    parser.add_argument(
-        "-energy", metavar="COLUMN", help="judge by a log column that should not grow"
-    )
+    parser.add_argument("-energy", metavar="COLUMN", help="log column that must not grow")
     parser.add_argument(
         "-bound", type=above_zero, default=2.0,
-        help="of -energy: growing is above this times the first tenth of the log, in the mean (2)",
+        help="growth of -energy over the mean of the first tenth of the log (2)",
     )  # fmt: skip
     parser.add_argument(
-        "-accuracy", metavar="COLUMN", help="shade what is stable by this error: err, off=abs(...)"
+        "-accuracy", metavar="COLUMN", help="error that shades the stable part: err, off=abs(...)"
     )
     parser.add_argument("-stride", type=positive, default=6, help="cells between first runs (6)")
     variables.add_axes(parser)

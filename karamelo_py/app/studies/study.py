@@ -339,14 +339,14 @@ def add_options(parser: ArgumentParser) -> None:
     variables.add_combinations(parser)
     parser.add_argument(
         "-record", default="", metavar="COLUMNS",
-        help="log columns: err (the last value), max:err, min:err, mean:err, first:err, the time "
-        "when:err:0.1; formulas of them: off=abs(max:u/3.28 - 1); with commas",
+        help="log columns, separated by commas: err (the last value), max:err, min:err, mean:err, "
+        "first:err, the time when:err:0.1, or a formula: off=abs(max:u/3.28 - 1)",
     )  # fmt: skip
     parser.add_argument(
         "-time", action="store_true",
-        help="measure time: one run at a time, each repeated; seconds are the median",
+        help="measure time: one run at a time, each several times; the table has the median",
     )  # fmt: skip
-    parser.add_argument("-repeat", type=positive, default=3, help="repetitions of -time (3)")
+    parser.add_argument("-repeat", type=positive, default=3, help="runs of each for -time (3)")
     parser.add_argument("-o", type=Path, default=Path("sweep.csv"), help="the table (sweep.csv)")
 
 

@@ -253,11 +253,9 @@ def add_family(parser: Any) -> None:
         "--threads", type=positive, default=None, help="threads of each run (default: 1)"
     )
     parser.add_argument(
-        "-limit", type=above_zero, metavar="SECONDS", help="give up a run that takes longer"
+        "-limit", type=above_zero, metavar="SECONDS", help="stop a run that takes longer"
     )
-    parser.add_argument(
-        "-again", action="store_true", help="run also what is known from an earlier study"
-    )
+    parser.add_argument("-again", action="store_true", help="repeat runs of earlier studies, too")
     parser.add_argument(
         *LIVE, action="store_true", help="show the study on a page in a browser, while it goes on"
     )
@@ -268,8 +266,8 @@ def add_axes(parser: Any) -> None:
     parser.add_argument(
         "-axes",
         metavar="X,Y",
-        help="what to write along them, such as 'time (s),F (N)'; an empty one stays as it is, "
-        "one with commas stands in double quotes",
+        help="labels of the axes: 'time (s),F (N)'; an empty label keeps the usual one, a label "
+        "with commas needs double quotes",
     )
 
 
@@ -295,7 +293,7 @@ def add_steps(parser: Any) -> None:
     """Add the option of variables that go in step."""
     parser.add_argument(
         "-zip", action="append", default=[], metavar="A,B",
-        help="variables that go in step: the first values together, then the second, ...",
+        help="variables that change together: their first values, then their second, ...",
     )  # fmt: skip
 
 
@@ -304,7 +302,7 @@ def add_combinations(parser: Any) -> None:
     add_steps(parser)
     parser.add_argument(
         "-where", action="append", default=[], metavar="CONDITION",
-        help="keep the combinations that fulfil it: 'N < 40 || basis == linear'",
+        help="run only combinations with: 'N < 40 || basis == linear'",
     )  # fmt: skip
 
 
