@@ -55,6 +55,19 @@ def test_a_body_at_a_wall_inside_moves_as_at_the_end(
 
 
 @pytest.mark.parametrize("basis", ["quadratic-spline", "cubic-spline"])
+def test_a_wall_inside_a_grid_that_is_one_cell_wide(run_interpreted, basis):
+    """The nodes beyond the box, which splines see, have no cells."""
+    logs = []
+    for low in (0, -1):
+        text = scene(f"ulmpm, FLIP, {basis}, 1", low, 3, (0, 2), "-INF, 0.01")
+        text = text.replace("-1, 2, 0.5", "0, 0.5, 0.5")
+        text = text.replace("2, 0, 1)", "2, 0, 0.5)").replace("0.1, -0.2", "0.1, 0")
+        logs.append(run_interpreted(text, folder=f"from{low}").log)
+    np.testing.assert_allclose(logs[1].Es, logs[0].Es, rtol=1e-8)
+    np.testing.assert_allclose(logs[1].wall_x, logs[0].wall_x, rtol=1e-8, atol=1e-8)
+
+
+@pytest.mark.parametrize("basis", ["quadratic-spline", "cubic-spline"])
 def test_a_bar_that_is_stretched_evenly_from_a_wall_inside(run_interpreted, basis):
     """The strain is the same everywhere: the functions reproduce linear fields up to the wall."""
     text = f"""

@@ -70,6 +70,7 @@ def _walls(lattice: Lattice, nodes: np.ndarray) -> Iterator[tuple[int, np.ndarra
         wall = face.copy()
         wall[1:-1] &= ~(face[:-2] & face[2:])
         place = np.argwhere(np.moveaxis(wall, 0, k)) + corner
-        place = place[(place[:, k] > 0) & (place[:, k] < lattice.cells[k])]
+        # Functions that see three nodes have some beyond a box that is one cell wide.
+        place = place[(place[:, k] > 0) & (place < lattice.cells[:d]).all(axis=1)]
         if len(place):
             yield k, place
