@@ -114,10 +114,14 @@ class ArgumentBuffer:
                 own.append(0)
         return own, arrays
 
-    def in_memory(self, plan: Plan) -> tuple[bytearray, int]:
-        """Write the arguments into memory; where the items of the outermost tuple are."""
+    def in_memory(self, plan: Plan, at: int | None = None) -> tuple[bytearray, int]:
+        """Write the arguments into memory; where the items of the outermost tuple are.
+
+        `at` is where that memory is copied to, if it is not used where it is.
+        """
         memory = bytearray(max(plan.text.size, 1))
-        at = ctypes.addressof(ctypes.c_char.from_buffer(memory))
+        if at is None:
+            at = ctypes.addressof(ctypes.c_char.from_buffer(memory))
         words = self.words
         for k, begin in plan.tuples:
             words[k] = at + begin

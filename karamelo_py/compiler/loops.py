@@ -104,12 +104,30 @@ def _no_collections() -> Iterator[None]:
             gc.enable()
 
 
+_in_one = False  # whether kernels become a part of the module of what calls them
+
+
+@contextmanager
+def in_one() -> Iterator[None]:
+    """Write kernels into what calls them meanwhile: no other unit can be called there."""
+    global _in_one
+    before, _in_one = _in_one, True
+    try:
+        yield
+    finally:
+        _in_one = before
+
+
 def written(
-    function: Callable, kinds: tuple, result: types.Type | None = None
+    function: Callable,
+    kinds: tuple,
+    result: types.Type | None = None,
+    entry: Callable | None = None,
 ) -> tuple[ir.Module, types.Type]:
     """Write a function down for arguments of these types; the module, and the type of its result.
 
     Attributes of the module are `needs`, the units that it calls, and `raises`, as in `Unit`.
+    ``entry(module, main, kinds, result)`` writes what it is called by, if not by Python.
     """
     found = formula(function, kinds)
     result = found.result if result is None else result
@@ -120,7 +138,7 @@ def written(
     main.attributes.add("nounwind")
     lowering = write_into(ir.IRBuilder(main.append_basic_block("entry")))
     lowering.give_back(found.run, kinds, main.args, result)
-    _write_entry(module, main, kinds, result)
+    (entry or _write_entry)(module, main, kinds, result)
     module.raises = hasattr(main, "raises")
     return module, result
 
@@ -209,6 +227,8 @@ class Kernel:
 
     def in_kernel(self, lowering: Any, *arguments: Any) -> Any:
         """Write a call from another kernel."""
+        if _in_one:
+            return lowering.call(self.function, arguments)
         held = [lowering.call(hold, (argument,)) for argument in arguments]
         kinds = tuple(types.unliteral(lowering.kind_of(one)) for one in held)
         unit = self.unit(kinds)

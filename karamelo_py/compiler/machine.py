@@ -58,8 +58,16 @@ def _engine() -> llvm.ExecutionEngine:
     return llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target())
 
 
-def _optimised(text: str, target: llvm.TargetMachine) -> llvm.ModuleRef:
+def _optimised(
+    text: str, target: llvm.TargetMachine, library: bytes | None = None
+) -> llvm.ModuleRef:
     module = llvm.parse_assembly(text)
+    if library is not None:
+        own = {function.name for function in module.functions if not function.is_declaration}
+        module.link_in(llvm.parse_bitcode(library))
+        for function in module.functions:
+            if not (function.is_declaration or function.name in own):
+                function.linkage = llvm.Linkage.internal
     module.triple, module.data_layout = target.triple, str(target.target_data)
     module.verify()
     tuning = llvm.create_pipeline_tuning_options(speed_level=LEVEL)
@@ -74,13 +82,16 @@ def compile_text(text: str) -> bytes:
     return _target().emit_object(_optimised(text, _target()))
 
 
-def assembly(text: str, triple: str, processor: str) -> str:
-    """Make assembly of the text of a module for another processor, such as a GPU."""
+def assembly(text: str, triple: str, processor: str, library: bytes | None = None) -> str:
+    """Make assembly of the text of a module for another processor, such as a GPU.
+
+    What it calls may be in a `library`, bitcode of LLVM's.
+    """
     _set_options()
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
     target = llvm.Target.from_triple(triple).create_target_machine(cpu=processor, opt=LEVEL)
-    return target.emit_assembly(_optimised(text, target))
+    return target.emit_assembly(_optimised(text, target, library))
 
 
 def load(code: bytes, *names: str) -> list[int]:

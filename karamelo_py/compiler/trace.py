@@ -13,7 +13,6 @@ come by another way than a global name or a closure, as methods do, are refused.
 
 import dis
 import functools
-import inspect
 import itertools
 import types as python
 from collections import namedtuple
@@ -182,9 +181,10 @@ def _copy(thing: Any) -> Any:
 @functools.cache
 def _fault_of(code: python.CodeType) -> str:
     """Say why a function is not run: it catches what is raised here, or nothing follows it."""
-    if code.co_exceptiontable and not code.co_flags & inspect.CO_GENERATOR:
+    names = {i.opname for i in dis.get_instructions(code)}
+    if "PUSH_EXC_INFO" in names:  # handlers of comprehensions and generators do without it
         return "kernels know no `try` and no `with`"
-    if any(i.opname == "IMPORT_NAME" for i in dis.get_instructions(code)):
+    if "IMPORT_NAME" in names:
         return "kernels know no `import` within a function: import at the top of the file"
     return ""
 

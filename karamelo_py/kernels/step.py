@@ -47,7 +47,7 @@ def rows_of(scheme: Any, visits: Any) -> list[Any]:
     return table.fused(scheme.rows) if visits is Fused else table.staged(scheme.rows)
 
 
-def _first_rows(scheme: Any, visits: Any) -> list[Any]:
+def first_rows(scheme: Any, visits: Any) -> list[Any]:
     """Fused steps expect the sums on the nodes: the scatter of the last visit, alone."""
     if visits is not Fused:
         return []
@@ -92,7 +92,7 @@ def _take_all(rows, s, mode, hooks, more):
 
 
 _step_rows: Any = functools.cache(rows_of)  # interpreted
-_begin_rows: Any = functools.cache(_first_rows)
+_begin_rows: Any = functools.cache(first_rows)
 
 
 def step(scheme: Tag, visits: Tag, mode: Tag, s: Setup, hooks: Tag, more: bool) -> bool:
@@ -116,7 +116,7 @@ def begin(scheme: Tag, visits: Tag, mode: Tag, s: Setup) -> bool:
 
 @implements(begin, by_type=True)
 def _begin(scheme, visits, mode, s):
-    rows = _first_rows(scheme.instance_class, visits.instance_class)
+    rows = first_rows(scheme.instance_class, visits.instance_class)
     return lambda scheme, visits, mode, s: _take_all(rows, s, mode, NoHooks(), True)
 
 

@@ -1,0 +1,458 @@
+"""Functions of one thread, for the thousands of a GPU: their code, its memory, and launches.
+
+A function ``f(i, ...)`` says what thread `i` does. It is traced as all kernels are, and written as
+PTX, which the driver of a card assembles. :class:`Emulator` runs the same code on the processor,
+one thread after another: what is written for a card is tested without one.
+"""
+
+import ctypes
+import hashlib
+from collections.abc import Callable, Iterable
+from itertools import pairwise
+from pathlib import Path
+from time import perf_counter
+from typing import Any, NamedTuple
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+
+from karamelo_py.compiler import code, machine
+from karamelo_py.compiler.argument_buffer import ArgumentBuffer, plan_for
+from karamelo_py.compiler.code import I32, I64
+from karamelo_py.compiler.compile import implements, shared
+from karamelo_py.compiler.held import HeldTuple, item_of
+from karamelo_py.compiler.loops import ENTRY, NAME, in_one, written
+from karamelo_py.compiler.values import intrinsic
+
+THREADS = 128  # of a block
+USUAL = Path("/usr/local/cuda/nvvm/libdevice/libdevice.10.bc")  # of NVIDIA's own installer
+TRIPLE = "nvptx64-nvidia-cuda"
+
+
+class NoCard(Exception):
+    """Tell why no GPU can be used, and what helps."""
+
+    def __init__(self, reason: str, hint: str):
+        super().__init__(reason)
+        self.hint = hint
+
+
+# --- memory that threads share ----------------------------------------------------------------
+
+
+def taken(array: np.ndarray, i: int) -> int:
+    """Add 1 to a whole number of an array, which other threads may do, too; what it was before."""
+    array[i] += 1
+    return array[i] - 1
+
+
+@implements(taken)
+@intrinsic
+def _taken(array, i):
+    def codegen(builder, table, i):
+        at = code.item_pointer(builder, array, table, (i,))
+        return builder.atomic_rmw("add", at, ir.Constant(at.type.pointee, 1), "monotonic")
+
+    return array.dtype(array, types.int64), codegen
+
+
+def added_to(array: np.ndarray, i: int, j: int, value: int) -> None:
+    """Add a whole number to one of an array, which other threads may do, too."""
+    array[i, j] += value
+
+
+@implements(added_to)
+@intrinsic
+def _added_to(array, i, j, value):
+    def codegen(builder, table, i, j, number):
+        at = code.item_pointer(builder, array, table, (i, j))
+        builder.atomic_rmw("add", at, number, "monotonic")
+
+    return types.none(array, types.int64, types.int64, types.int64), codegen
+
+
+@intrinsic
+def _largest(array, i, value):
+    def codegen(builder, table, i, number):
+        at = code.item_pointer(builder, array, table, (i,))
+        # The bits of numbers that are not negative are in the order of the numbers.
+        bits = builder.bitcast(number, I64)
+        builder.atomic_rmw("umax", builder.bitcast(at, I64.as_pointer()), bits, "monotonic")
+
+    return types.none(array, types.int64, types.float64), codegen
+
+
+@shared
+def raise_to(array: np.ndarray, i: int, value: float) -> None:
+    """Make a double of an array, not below 0, the larger of it and `value`; others may, too."""
+    if value > array[i]:
+        _largest(array, i, value)
+
+
+# --- code -------------------------------------------------------------------------------------
+
+
+def _items(builder: Any, kinds: tuple, place: Any) -> list:
+    held = HeldTuple(kinds[1:])
+    place = builder.inttoptr(place, held.register_type())
+    full = (k for k, kind in enumerate(kinds[1:]) if not code.is_empty(kind))
+    return [item_of(builder, held, place, k) for k in full]
+
+
+def _entry(module: ir.Module) -> tuple[ir.Function, ir.IRBuilder]:
+    kind = ir.FunctionType(ir.VoidType(), [I64] * 2)
+    entry = ir.Function(module, kind, NAME + ENTRY)
+    return entry, ir.IRBuilder(entry.append_basic_block("entry"))
+
+
+def _as_loop(module: ir.Module, main: ir.Function, kinds: tuple, result: Any) -> None:
+    """Write what does the work of all threads, one after another."""
+    entry, builder = _entry(module)
+    items = _items(builder, kinds, entry.args[0])
+    with code.counted(builder, entry.args[1]) as i:
+        builder.call(main, [i, *items])
+    builder.ret_void()
+
+
+def _as_threads(module: ir.Module, main: ir.Function, kinds: tuple, result: Any) -> None:
+    """Write what each thread of a card calls."""
+    entry, builder = _entry(module)
+    entry.calling_convention = "ptx_kernel"
+
+    def special(name: str) -> Any:
+        asked = code.external(builder, f"llvm.nvvm.read.ptx.sreg.{name}", I32, [])
+        return builder.zext(builder.call(asked, []), I64)
+
+    i = builder.add(builder.mul(special("ctaid.x"), special("ntid.x")), special("tid.x"))
+    with builder.if_then(builder.icmp_signed("<", i, entry.args[1])):
+        builder.call(main, [i, *_items(builder, kinds, entry.args[0])])
+    builder.ret_void()
+    for function in module.functions:
+        if function.blocks and function is not entry:
+            function.linkage = "internal"
+            function.attributes.discard("noinline")
+            function.attributes.add("alwaysinline")
+
+
+# What LLVM leaves to a library of C, and NVIDIA has in one of its own.
+_MATHEMATICS = {
+    "exp", "exp2", "log", "log2", "log10", "log1p", "expm1", "pow", "sin", "cos", "tan", "asin",
+    "acos", "atan", "atan2", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh", "erf", "erfc",
+    "lgamma", "cbrt", "hypot", "fmod", "ldexp", "frexp",
+}  # fmt: skip
+
+
+def _of_nvidia(name: str) -> str | None:
+    """Name the function of NVIDIA's library that does what one of LLVM's or C's does."""
+    if name == "karamelo_gamma":
+        return "__nv_tgamma"
+    plain = name.removeprefix("llvm.").removesuffix(".f64")
+    single = plain.removesuffix(".f32") if name.startswith("llvm.") else plain.removesuffix("f")
+    if plain in _MATHEMATICS:
+        return f"__nv_{plain}"
+    return f"__nv_{single}f" if single in _MATHEMATICS else None
+
+
+def library() -> bytes:
+    """Read NVIDIA's library of mathematics."""
+    from cuda import pathfinder
+
+    try:
+        return Path(pathfinder.find_bitcode_lib("device")).read_bytes()
+    except pathfinder.BitcodeLibNotFoundError:
+        if USUAL.exists():
+            return USUAL.read_bytes()
+        raise NoCard(
+            "NVIDIA's library of mathematics (libdevice) was not found",
+            "pip install 'karamelo-py[gpu]'",
+        ) from None
+
+
+def text_of(function: Callable, kinds: tuple, on_card: bool) -> tuple[str, str]:
+    """Write a function of a thread for the rest of its arguments; name and text of the module."""
+    with in_one():
+        entry = _as_threads if on_card else _as_loop
+        module, _ = written(shared(function), (types.int64, *kinds), types.none, entry)
+    if module.needs or module.raises:
+        raise TypeError(f"{function.__qualname__} calls what no thread can call")
+    text = str(module)
+    if on_card:
+        outside = [f.name for f in module.functions if not f.blocks]
+        for other, own in [(f, _of_nvidia(f)) for f in outside]:
+            text = text.replace(f'@"{other}"', f'@"{own}"') if own else text
+    name = f"{function.__name__}_{hashlib.sha256(text.encode()).hexdigest()[:32]}"
+    return name, text.replace(NAME + ENTRY, f"{name}_entry").replace(NAME, name)
+
+
+def assembled(text: str, processor: str) -> str:
+    """Make PTX of the text of a module."""
+    return machine.assembly(text, TRIPLE, processor, library() if '@"__nv_' in text else None)
+
+
+# --- what runs it -----------------------------------------------------------------------------
+
+
+class Emulator:
+    """Run functions of threads on the processor, in memory of its own."""
+
+    name = "emulated"
+
+    def __init__(self) -> None:
+        self._rooms: dict[int, Any] = {}
+        self._entries: dict[str, Callable] = {}
+
+    def allocate(self, size: int) -> int:
+        """Give memory of so many bytes; its address."""
+        room = ctypes.create_string_buffer(size + 64)
+        at = -(-ctypes.addressof(room) // 64) * 64
+        self._rooms[at] = room
+        return at
+
+    def free(self, address: int) -> None:
+        """Give memory back."""
+        del self._rooms[address]
+
+    def copy_to(self, address: int, there: int, size: int) -> None:
+        """Copy memory of the program to that of the card."""
+        ctypes.memmove(address, there, size)
+
+    copy_from = copy_to  # the first argument is where it goes to
+
+    def compiled(self, function: Callable, kinds: tuple) -> Callable:
+        """Make the function ready to be launched for arguments of these types."""
+        name, text = text_of(function, kinds, on_card=False)
+        if name not in self._entries:
+            (address,) = machine.load(machine.compile_text(text), f"{name}_entry")
+            call = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64)(address)
+            self._entries[name] = call
+        return self._entries[name]
+
+    def launch(self, entry: Callable, arguments: int, count: int, threads: int = THREADS) -> None:
+        """Do the work of `count` threads."""
+        entry(arguments, count)
+
+    def wait(self) -> None:
+        """Wait for all launches."""
+
+    def seconds_of(self, launches: Iterable[Callable]) -> list[float]:
+        """Do launches, one after another, and time each."""
+        found = []
+        for launch in launches:
+            begun = perf_counter()
+            launch()
+            found.append(perf_counter() - begun)
+        return found
+
+
+class Card:
+    """An NVIDIA GPU, through its driver."""
+
+    def __init__(self) -> None:
+        try:
+            from cuda.bindings import driver
+        except ImportError:
+            raise NoCard(
+                "--gpu needs the packages for NVIDIA GPUs",
+                "pip install 'karamelo-py[gpu]', or no --gpu",
+            ) from None
+        self._driver = driver
+        self._entries: dict[str, Any] = {}
+        try:
+            self._do("cuInit", 0)
+            device = self._do("cuDeviceGet", 0)
+        except Exception as error:
+            raise NoCard(
+                f"there is no NVIDIA GPU with a driver on this machine ({error})",
+                "no --gpu: processors run the same script; nvidia-smi shows what there is",
+            ) from None
+        self._context = self._do("cuDevicePrimaryCtxRetain", device)
+        self._do("cuCtxSetCurrent", self._context)
+        about = driver.CUdevice_attribute
+        major, minor = (
+            self._do("cuDeviceGetAttribute", getattr(about, f"CU_DEVICE_ATTRIBUTE_{what}"), device)
+            for what in ("COMPUTE_CAPABILITY_MAJOR", "COMPUTE_CAPABILITY_MINOR")
+        )
+        self.processor = f"sm_{major}{minor}"
+        self.name = self._do("cuDeviceGetName", 100, device).split(b"\0")[0].decode()
+
+    def _do(self, function: str, *arguments: Any) -> Any:
+        error, *found = getattr(self._driver, function)(*arguments)
+        if int(error) != 0:
+            name = self._driver.cuGetErrorName(error)[1]
+            raise RuntimeError(f"{function}: {name.decode() if name else int(error)}")
+        return found[0] if found else None
+
+    def memory(self) -> tuple[int, int]:
+        """Bytes of memory that are free, and all."""
+        _, free, whole = self._driver.cuMemGetInfo()
+        return int(free), int(whole)
+
+    def allocate(self, size: int) -> int:
+        """Give memory of so many bytes; its address."""
+        try:
+            return int(self._do("cuMemAlloc", max(size, 1)))
+        except RuntimeError:
+            free, whole = self.memory()
+            raise MemoryError(
+                f"the GPU has {free:.3g} of {whole:.3g} bytes free, {size:.3g} are asked for"
+            ) from None
+
+    def free(self, address: int) -> None:
+        """Give memory back."""
+        self._do("cuMemFree", address)
+
+    def copy_to(self, address: int, there: int, size: int) -> None:
+        """Copy memory of the program to that of the card."""
+        self._do("cuMemcpyHtoD", address, there, size)
+
+    def copy_from(self, address: int, there: int, size: int) -> None:
+        """Copy memory of the card to that of the program, at the first address."""
+        self._do("cuMemcpyDtoH", address, there, size)
+
+    def compiled(self, function: Callable, kinds: tuple) -> Any:
+        """Make the function ready to be launched for arguments of these types."""
+        name, text = text_of(function, kinds, on_card=True)
+        if name not in self._entries:
+            ptx = assembled(text, self.processor).encode() + b"\0"
+            room = ctypes.create_string_buffer(ptx)
+            module = self._do("cuModuleLoadData", ctypes.addressof(room))
+            entry = self._do("cuModuleGetFunction", module, f"{name}_entry".encode())
+            self._entries[name] = entry
+        return self._entries[name]
+
+    def launch(self, entry: Any, arguments: int, count: int, threads: int = THREADS) -> None:
+        """Let `count` threads work, in blocks of some."""
+        given = (arguments, count), (ctypes.c_int64, ctypes.c_int64)
+        blocks = -(-count // threads)
+        self._do("cuLaunchKernel", entry, blocks, 1, 1, threads, 1, 1, 0, 0, given, 0)
+
+    def wait(self) -> None:
+        """Wait for all launches."""
+        self._do("cuCtxSynchronize")
+
+    def seconds_of(self, launches: Iterable[Callable]) -> list[float]:
+        """Do launches, one after another, and time each."""
+        launches = list(launches)
+        events = [self._do("cuEventCreate", 0) for _ in range(len(launches) + 1)]
+        self._do("cuEventRecord", events[0], 0)
+        for launch, event in zip(launches, events[1:], strict=True):
+            launch()
+            self._do("cuEventRecord", event, 0)
+        self.wait()
+        found = [self._do("cuEventElapsedTime", *pair) / 1e3 for pair in pairwise(events)]
+        for event in events:
+            self._do("cuEventDestroy", event)
+        return found
+
+
+# --- arrays on a card -------------------------------------------------------------------------
+
+
+class _There(NamedTuple):
+    address: int
+    size: int
+    array: np.ndarray  # of the program
+    image: np.ndarray  # the same shape and steps, at the address on the card
+
+
+def _extent(array: np.ndarray) -> int:
+    """Bytes from the first item to behind the last."""
+    if not array.size:
+        return 0
+    steps = zip(array.shape, array.strides, strict=True)
+    return sum((n - 1) * step for n, step in steps) + array.itemsize
+
+
+class Images:
+    """Arrays of the program that a card has copies of.
+
+    An image is an array of NumPy's at an address on the card: kernels are told all of it, and
+    nothing in the program reads or writes its items.
+    """
+
+    def __init__(self, card: Any):
+        self.card = card
+        self._known: dict[int, _There] = {}
+        self._rooms: list[int] = []
+
+    def of(self, thing: Any) -> Any:
+        """`thing`, nested tuples of arrays and numbers, with images in the place of arrays."""
+        if isinstance(thing, np.ndarray):
+            return self._image(thing)
+        if isinstance(thing, tuple):
+            items = [self.of(item) for item in thing]
+            return type(thing)(*items) if hasattr(thing, "_fields") else tuple(items)
+        return thing
+
+    def _image(self, array: np.ndarray) -> np.ndarray:
+        known = self._known.get(id(array))
+        if known is None:
+            size = _extent(array)
+            if not size:
+                return array
+            address = self._room(size)
+            memory = (ctypes.c_char * size).from_address(address)
+            made = np.ndarray(array.shape, array.dtype, memory, 0, array.strides)
+            image = made.view(type(array))
+            image.flags.writeable = array.flags.writeable
+            known = self._known[id(array)] = _There(address, size, array, image)
+        return known.image
+
+    def _room(self, size: int) -> int:
+        self._rooms.append(self.card.allocate(size))
+        return self._rooms[-1]
+
+    def new(self, shape: tuple[int, ...], dtype: Any) -> np.ndarray:
+        """Give an array that is on the card alone."""
+        size = max(int(np.prod(shape)) * np.dtype(dtype).itemsize, 1)
+        memory = (ctypes.c_char * size).from_address(self._room(size))
+        return np.ndarray(shape, dtype, memory)
+
+    def send(self, arrays: Iterable[np.ndarray]) -> None:
+        """Copy what arrays hold to their images."""
+        for one in self._of(arrays):
+            self.card.copy_to(one.address, one.array.ctypes.data, one.size)
+
+    def fetch(self, arrays: Iterable[np.ndarray]) -> None:
+        """Copy what images hold back."""
+        for one in self._of(arrays):
+            self.card.copy_from(one.array.ctypes.data, one.address, one.size)
+
+    def _of(self, arrays: Iterable[np.ndarray]) -> list[_There]:
+        return [self._known[id(array)] for array in arrays if id(array) in self._known]
+
+    def put(self, content: bytes) -> int:
+        """Put bytes into memory of the card; where they are."""
+        at = self._room(len(content))
+        self.put_at(at, content)
+        return at
+
+    def put_at(self, at: int, content: bytes | bytearray) -> None:
+        """Put bytes where there is room."""
+        room = (ctypes.c_char * len(content)).from_buffer_copy(content)
+        self.card.copy_to(at, ctypes.addressof(room), len(content))
+
+    def close(self) -> None:
+        """Give all memory back."""
+        for address in self._rooms:
+            self.card.free(address)
+        self._rooms.clear()
+        self._known.clear()
+
+
+class Launch:
+    """A function of a thread with its arguments, on a card; `count` threads do it."""
+
+    def __init__(self, images: Images, function: Callable, count: int, *arguments: Any):
+        self.card, self.count, self.name = images.card, count, function.__name__
+        own = images.of(arguments)
+        plan = plan_for(own)
+        self.entry = self.card.compiled(function, plan.types)
+        self._arguments = images._room(max(plan.text.size, 1))
+        memory, self.at = ArgumentBuffer(own).in_memory(plan, self._arguments)
+        images.put_at(self._arguments, memory)
+
+    def __call__(self) -> None:
+        if self.count:
+            self.card.launch(self.entry, self.at, self.count)

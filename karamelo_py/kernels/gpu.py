@@ -1,0 +1,423 @@
+"""A step on a GPU: what one thread does for a point, a cell, a node, or the clock.
+
+Points belong to cells: that of a point is the first node it sees, and all points of a cell see the
+same nodes. They are listed cell by cell before each scatter, those of a cell in the order of their
+ids. A thread sums what the points of a cell give to each node that they see; another sums at a node
+what cells have given. No real number is added by two threads at once: results are the same in
+each run, and do not depend on how points lie in memory.
+
+`fate` holds how the points fared (doubles); threads of steps behind one that ended do nothing.
+"""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from karamelo_py.compiler.compile import index, real, shared
+from karamelo_py.compiler.fields import field
+from karamelo_py.compiler.gpu import raise_to, taken
+from karamelo_py.compiler.lanes import room_for
+from karamelo_py.compiler.tuples import record
+from karamelo_py.kernels.arrays import DT, TIME, Nodes
+from karamelo_py.kernels.clock import finish, kick, last_step_size, step_size
+from karamelo_py.kernels.g2p import updated_all
+from karamelo_py.kernels.lanes import OneByOne
+from karamelo_py.kernels.nodes import at_node
+from karamelo_py.kernels.p2g import adds, columns_of, load_all, scattered_all
+from karamelo_py.kernels.stencils import gathered_by
+from karamelo_py.kernels.step import ABOVE_LIMIT, DONE, PATIENCE, SHRUNK, SMALLEST, STOPPED
+from karamelo_py.kernels.sweep import (
+    PresentWeights,
+    context_of,
+    places_of,
+    position_of,
+    stencil_of,
+    work_of,
+)
+from karamelo_py.kernels.visit import place_at
+from karamelo_py.points import basis as bases
+from karamelo_py.points.basis import entry, locate, support
+from karamelo_py.points.basis.product import digits, node_number
+from karamelo_py.points.grid import inside
+
+MOVED, RATE, WRONG, STATUS = range(4)  # of `fate`; 0: it goes on, else 1 + a status of steps
+CHUNK = 64  # items that one thread adds up
+OCCUPIED = 1 << 40  # in the sums of `Cells.sums`: a cell with points, beside their number
+
+
+class Cells(NamedTuple):
+    """The points of a block by cell; N is the number of nodes, n that of points."""
+
+    count: np.ndarray  # (N,) int64 of points in each cell
+    number: np.ndarray  # (n,) int64: the cell of each point
+    first: np.ndarray  # (N + 1,) int64: points of cell c are order[first[c]:first[c + 1]]
+    box: np.ndarray  # (N,) int64: number of an occupied cell among these
+    order: np.ndarray  # (n,) int64: the points
+    sums: np.ndarray  # (m,) int64: of count and OCCUPIED, by chunks of chunks
+    boxes: np.ndarray  # (columns, boxes): what cells give to each node that their points see
+
+
+class InCell(NamedTuple):
+    """In the place of a basis: the nodes of a point have the numbers 0, 1, ... of its stencil."""
+
+    basis: NamedTuple
+
+
+bases.support.on(InCell)(lambda basis, kin: bases.support(basis.basis, kin))
+bases.locate.on(InCell)(lambda basis, kin, grid, place: bases.locate(basis.basis, kin, grid, place))
+bases.reach.on(InCell)(
+    lambda basis, kin, grid, stencil, k: bases.reach(basis.basis, kin, grid, stencil, k)
+)
+bases.affine_weight.on(InCell)(
+    lambda basis, kin, grid, stencil, k: bases.affine_weight(basis.basis, kin, grid, stencil, k)
+)
+
+
+@bases.entry.on(InCell)
+def _entry_in_cell(basis, kin, grid, stencil, k):
+    return index(k), *bases.entry(basis.basis, kin, grid, stencil, k)[1:]
+
+
+# --- visits of points -------------------------------------------------------------------------
+
+
+@shared
+def _report(fate, i, moved, rate, stride):
+    """Note how a point fared; so written, NaN counts as wrong."""
+    if (moved <= stride) & (rate < 1e300):
+        raise_to(fate, MOVED, float(moved))
+        raise_to(fate, RATE, float(rate))
+    else:
+        raise_to(fate, WRONG, i + 1.0)
+
+
+@shared
+def _is_last(s):
+    """Check that the present step reaches the end of the run: nothing is summed for a next one."""
+    values = s.control.values
+    return values[TIME] + values[DT] >= s.control.clock[0].end_time
+
+
+class Stage:
+    """A visit of the points in a step, as functions of threads: `row` is one of its scheme's."""
+
+    def __init__(self, row: Any, basis: Any, kin: Any, present: list, parts: int = 1):
+        share, of_last_step = row.share, row.of_last_step
+        self.row, self.parts = row, parts
+        self.lists = isinstance(row.visit.weights, PresentWeights)  # points by their cells anew
+        quantities = row.visit.quantities
+        self.columns = [
+            (name, column, add)
+            for add in (False, True)
+            for name, first, end in columns_of(tuple(q for q in quantities if adds(q) == add), kin)
+            if name in present
+            for column in range(first, end)
+        ]
+        self.support = int(support(basis, kin))
+
+        @shared
+        def context(s):
+            whole = last_step_size(s) if of_last_step else step_size(s)
+            dt = whole if share == 1 else real(share, whole) * whole
+            return context_of(s, dt, row.gathers, row.scatters, row.moves)
+
+        self.context = context
+
+    def gather(self) -> Callable:
+        """Make what a point does: it gathers from the nodes, and is updated."""
+        context, tasks = self.context, self.row.visit.tasks
+
+        def gather_point(i, fate, s, block):
+            if fate[STATUS] > 0:
+                return
+            c = context(s)
+            points, p = block.points, index(i)
+            grid = record(c.grids, index(points.grid[p]))
+            w = work_of(c, grid, c.nodes, block, places_of(c.frame, points, c.now, c.then))
+            stencil = stencil_of(w, p)
+            found = gathered_by(OneByOne(), tasks, w, stencil, position_of(w, p))
+            fastest = real(fate[RATE], c.dt)
+            moved, rate = updated_all(tasks, w, stencil, p, c.dt, found, fastest)
+            _report(fate, i, moved, rate, c.stride)
+
+        return gather_point
+
+    def _place(self) -> Callable:
+        present = self.lists
+
+        @shared
+        def place(w, p):
+            places = w.places.y if present and w.frame.moves else w.places.where
+            return place_at(w.basis, w.kin, places, p)
+
+        return place
+
+    def count(self) -> Callable:
+        """Make what a point does to be listed: it finds its cell, and is counted."""
+        context, place = self.context, self._place()
+
+        def count_point(i, fate, s, block, cells):
+            if fate[STATUS] > 0:
+                return
+            c = context(s)
+            points, p = block.points, index(i)
+            grid = record(c.grids, index(points.grid[p]))
+            w = work_of(c, grid, c.nodes, block, places_of(c.frame, points, c.now, c.then))
+            where = place(w, p)
+            if inside(grid, c.kin, where):
+                stencil = locate(c.basis, c.kin, grid, where)
+                number = entry(c.basis, c.kin, grid, stencil, 0)[0]
+                cells.number[p] = number
+                taken(cells.count, number)
+            else:
+                cells.number[p] = 0  # of a run that ends here
+                taken(cells.count, 0)
+                raise_to(fate, WRONG, i + 1.0)
+
+        return count_point
+
+    def scatter(self, part: int) -> Callable:
+        """Make what a cell does: it sums what its points give to a part of the nodes they see."""
+        context, place, quantities = self.context, self._place(), self.row.visit.quantities
+        columns, only_if_more = self.columns, self.row.only_if_more
+        count = self.support
+        begin, end = count * part // self.parts, count * (part + 1) // self.parts
+        filled = tuple(dict.fromkeys(name for name, _, _ in columns))
+        widths = tuple(max(c for n, c, _ in columns if n == name) + 1 for name in filled)
+
+        def room_of(name, rooms, otherwise):
+            return rooms[filled.index(name)] if name in filled else otherwise
+
+        @shared
+        def nodes_for(nodes, rooms):
+            return Nodes(
+                room_of("sums", rooms, nodes.sums),
+                nodes.update,
+                room_of("velocity", rooms, nodes.velocity),
+                tuple([type(one)(room_of(type(one), rooms, one.array)) for one in nodes.fields]),
+            )
+
+        @shared
+        def clear(rooms, like):
+            for name, column, _ in columns:
+                for k in range(begin, end):
+                    room_of(name, rooms, None)[k, column] = like - like
+
+        @shared
+        def give(out, stencil, loads):
+            for k in range(begin, end):
+                scattered_all(quantities, out, stencil, k, loads)
+
+        @shared
+        def put(rooms, boxes, box):
+            for j, (name, column, _) in enumerate(columns):
+                for k in range(begin, end):
+                    boxes[j * count + k, box] = room_of(name, rooms, None)[k, column]
+
+        @shared
+        def loaded(w, p, dt):
+            return load_all(quantities, w, p, dt)
+
+        @shared
+        def rooms_for(like):
+            return tuple([room_for(width, (like,) * count) for width in widths])
+
+        @shared
+        def in_cell(w, rooms):
+            return w._replace(basis=InCell(w.basis), nodes=nodes_for(w.nodes, rooms))
+
+        def scatter_cell(i, fate, s, block, cells):
+            if fate[STATUS] > 0:
+                return
+            if only_if_more and _is_last(s):
+                return
+            first, last = cells.first[i], cells.first[i + 1]
+            if first == last:
+                return
+            c = context(s)
+            points = block.points
+            grid = record(c.grids, index(points.grid[index(cells.order[first])]))
+            w = work_of(c, grid, c.nodes, block, places_of(c.frame, points, c.now, c.then))
+            rooms = rooms_for(c.dt)
+            clear(rooms, c.dt)
+            out = in_cell(w, rooms)
+            for q in range(first, last):
+                p = index(cells.order[q])
+                stencil = locate(w.basis, w.kin, grid, place(w, p))
+                give(out, stencil, loaded(w, p, c.dt))
+            put(rooms, cells.boxes, index(cells.box[i]))
+
+        return scatter_cell
+
+    def sum(self, first_block: bool) -> Callable:
+        """Make what a node does: it sums what cells have given to it."""
+        columns, only_if_more, count = self.columns, self.row.only_if_more, self.support
+
+        @shared
+        def put(nodes, n, found):
+            for (name, column, add), value in zip(columns, found, strict=True):
+                array = getattr(nodes, name) if isinstance(name, str) else field(nodes.fields, name)
+                if add or not first_block:
+                    array[n, column] += value
+                else:
+                    array[n, column] = value
+
+        def sum_node(i, fate, s, block, cells):
+            if fate[STATUS] > 0:
+                return
+            if only_if_more and _is_last(s):
+                return
+            grid = _grid_of(s.grids, i)
+            found = (real(0, s.nodes.sums[0, 0]),) * len(columns)
+            for k in range(count):
+                found = _with_cell(s, cells, grid, i, k, count, found)
+            put(s.nodes, index(i), found)
+
+        return sum_node
+
+
+@shared
+def _grid_of(grids, n):
+    """The grid that node `n` belongs to."""
+    g = 0
+    for k in range(1, grids.first.size):
+        if grids.first[k] <= n:
+            g = k
+    return record(grids, index(g))
+
+
+@shared
+def _with_cell(s, cells, grid, n, k, count, found):
+    """`found` with what the cell gives to node `n` whose points see it as their k-th node."""
+    places = digits(k, s.basis.line_nodes, s.kin.dimension)
+    c = n - node_number(grid, 0, places)
+    if c >= 0:
+        first, last = cells.first[index(c)], cells.first[index(c + 1)]
+        if first < last:
+            box = index(cells.box[index(c)])
+            found = tuple(
+                [value + cells.boxes[j * count + k, box] for j, value in enumerate(found)]
+            )
+    return found
+
+
+# --- lists of the points by cell --------------------------------------------------------------
+
+
+@shared
+def _counted(number):
+    return number + (OCCUPIED if number > 0 else 0)
+
+
+def sum_counts(i, fate, cells):
+    """Sum a chunk of counts, and occupied cells."""
+    if fate[STATUS] > 0:
+        return
+    total = 0
+    for c in range(i * CHUNK, min((i + 1) * CHUNK, cells.count.size)):
+        total += _counted(cells.count[c])
+    cells.sums[i] = total
+
+
+def sum_sums(i, fate, sums, begin, count, above):
+    """Sum a chunk of sums: those from `begin` on, into the level from `above` on."""
+    if fate[STATUS] > 0:
+        return
+    total = 0
+    for k in range(i * CHUNK, min((i + 1) * CHUNK, count)):
+        total += sums[begin + k]
+    sums[above + i] = total
+
+
+def spread_sums(i, fate, sums, begin, count, above):
+    """Put in the place of each sum those before it; `above` as in `sum_sums`, -1 for none."""
+    if fate[STATUS] > 0:
+        return
+    total = sums[above + i] if above >= 0 else 0
+    for k in range(i * CHUNK, min((i + 1) * CHUNK, count)):
+        own = sums[begin + k]
+        sums[begin + k] = total
+        total += own
+
+
+def spread_counts(i, fate, cells):
+    """Say where the points of each cell are listed, and the number of its box."""
+    if fate[STATUS] > 0:
+        return
+    total = cells.sums[i]
+    for c in range(i * CHUNK, min((i + 1) * CHUNK, cells.count.size)):
+        cells.first[c] = total % OCCUPIED
+        cells.box[c] = total // OCCUPIED
+        total += _counted(cells.count[c])
+        cells.count[c] = 0
+        if c + 1 == cells.count.size:
+            cells.first[c + 1] = total % OCCUPIED
+
+
+def list_point(i, fate, cells):
+    """Enter a point into the list of its cell."""
+    if fate[STATUS] > 0:
+        return
+    c = cells.number[i]
+    cells.order[cells.first[c] + taken(cells.count, c)] = i
+
+
+def sort_cell(i, fate, ids, cells):
+    """Sort the points of a cell by id."""
+    if fate[STATUS] > 0:
+        return
+    cells.count[i] = 0
+    first, last = cells.first[i], cells.first[i + 1]
+    for q in range(first + 1, last):
+        p = cells.order[q]
+        at = q
+        while at > first and ids[cells.order[at - 1]] > ids[p]:
+            cells.order[at] = cells.order[at - 1]
+            at -= 1
+        cells.order[at] = p
+
+
+# --- nodes, and the clock ---------------------------------------------------------------------
+
+
+def of_nodes(task: Any) -> Callable:
+    """Make what a node does: a task, or what a function of the setup makes one."""
+    made = task if callable(task) else shared(lambda s: task)
+
+    def visit_node(i, fate, s):
+        if fate[STATUS] > 0:
+            return
+        at_node(made(s), s.kin, s.nodes, index(i), kick(s))
+
+    return visit_node
+
+
+def take_reports(i, fate, s):
+    """Take over how the points fared in a visit."""
+    if fate[STATUS] > 0:
+        return
+    clock = s.control.clock[0]
+    clock.move += fate[MOVED]
+    if fate[RATE] > 0:
+        clock.rate = fate[RATE]
+    fate[MOVED] = 0.0
+    fate[RATE] = 0.0
+    if fate[WRONG] > 0:
+        clock.wrong = 1
+        fate[STATUS] = 1.0 + STOPPED
+
+
+def end_step(i, fate, s):
+    """End a step: time goes on, and the next step is chosen, unless this was the last."""
+    if fate[STATUS] > 0:
+        return
+    control = s.control
+    clock = control.clock[0]
+    finish(control)
+    if clock.watch_limit > 0 and clock.over_limit >= PATIENCE:
+        fate[STATUS] = 1.0 + ABOVE_LIMIT
+    elif clock.limit < SMALLEST * clock.first_limit:
+        fate[STATUS] = 1.0 + SHRUNK
+    elif control.values[TIME] >= clock.end_time:
+        fate[STATUS] = 1.0 + DONE
