@@ -57,21 +57,6 @@ def _taken(array, i):
     return array.dtype(array, types.int64), codegen
 
 
-def added_to(array: np.ndarray, i: int, j: int, value: int) -> None:
-    """Add a whole number to one of an array, which other threads may do, too."""
-    array[i, j] += value
-
-
-@implements(added_to)
-@intrinsic
-def _added_to(array, i, j, value):
-    def codegen(builder, table, i, j, number):
-        at = code.item_pointer(builder, array, table, (i, j))
-        builder.atomic_rmw("add", at, number, "monotonic")
-
-    return types.none(array, types.int64, types.int64, types.int64), codegen
-
-
 @intrinsic
 def _largest(array, i, value):
     def codegen(builder, table, i, number):
@@ -128,11 +113,9 @@ def _as_threads(module: ir.Module, main: ir.Function, kinds: tuple, result: Any)
     with builder.if_then(builder.icmp_signed("<", i, entry.args[1])):
         builder.call(main, [i, *_items(builder, kinds, entry.args[0])])
     builder.ret_void()
-    for function in module.functions:
-        if function.blocks and function is not entry:
-            function.linkage = "internal"
-            function.attributes.discard("noinline")
-            function.attributes.add("alwaysinline")
+    main.linkage = "internal"
+    main.attributes.discard("noinline")
+    main.attributes.add("alwaysinline")
 
 
 # What LLVM leaves to a library of C, and NVIDIA has in one of its own.
@@ -169,9 +152,14 @@ def library() -> bytes:
         ) from None
 
 
-def text_of(function: Callable, kinds: tuple, on_card: bool) -> tuple[str, str]:
-    """Write a function of a thread for the rest of its arguments; name and text of the module."""
-    with in_one():
+def text_of(
+    function: Callable, kinds: tuple, on_card: bool, called: dict | None = None
+) -> tuple[str, str]:
+    """Write a function of a thread for the rest of its arguments; name and text of the module.
+
+    `called` as in `loops.in_one`.
+    """
+    with in_one(called or {}):
         entry = _as_threads if on_card else _as_loop
         module, _ = written(shared(function), (types.int64, *kinds), types.none, entry)
     if module.needs or module.raises:
@@ -219,9 +207,9 @@ class Emulator:
 
     copy_from = copy_to  # the first argument is where it goes to
 
-    def compiled(self, function: Callable, kinds: tuple) -> Callable:
+    def compiled(self, function: Callable, kinds: tuple, called: dict | None = None) -> Callable:
         """Make the function ready to be launched for arguments of these types."""
-        name, text = text_of(function, kinds, on_card=False)
+        name, text = text_of(function, kinds, False, called)
         if name not in self._entries:
             (address,) = machine.load(machine.compile_text(text), f"{name}_entry")
             call = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64)(address)
@@ -310,9 +298,9 @@ class Card:
         """Copy memory of the card to that of the program, at the first address."""
         self._do("cuMemcpyDtoH", address, there, size)
 
-    def compiled(self, function: Callable, kinds: tuple) -> Any:
+    def compiled(self, function: Callable, kinds: tuple, called: dict | None = None) -> Any:
         """Make the function ready to be launched for arguments of these types."""
-        name, text = text_of(function, kinds, on_card=True)
+        name, text = text_of(function, kinds, True, called)
         if name not in self._entries:
             ptx = assembled(text, self.processor).encode() + b"\0"
             room = ctypes.create_string_buffer(ptx)
@@ -444,11 +432,14 @@ class Images:
 class Launch:
     """A function of a thread with its arguments, on a card; `count` threads do it."""
 
-    def __init__(self, images: Images, function: Callable, count: int, *arguments: Any):
+    def __init__(
+        self, images: Images, function: Callable, count: int, *arguments: Any,
+        called: dict | None = None,
+    ):  # fmt: skip
         self.card, self.count, self.name = images.card, count, function.__name__
         own = images.of(arguments)
         plan = plan_for(own)
-        self.entry = self.card.compiled(function, plan.types)
+        self.entry = self.card.compiled(function, plan.types, called)
         self._arguments = images._room(max(plan.text.size, 1))
         memory, self.at = ArgumentBuffer(own).in_memory(plan, self._arguments)
         images.put_at(self._arguments, memory)

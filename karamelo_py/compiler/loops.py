@@ -34,7 +34,7 @@ from karamelo_py.compiler.failing import noting, raise_noted
 from karamelo_py.compiler.held import HeldTuple, hold, item_of
 from karamelo_py.compiler.lowering import function_type
 from karamelo_py.compiler.trace import alone, formula, write_into
-from karamelo_py.compiler.values import builtin, intrinsic
+from karamelo_py.compiler.values import builtin, in_kernels, intrinsic
 
 _CALL = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64)  # free of the interpreter lock
 NAME, ENTRY = "$kernel", ".entry"  # what functions of a module are called until it has a name
@@ -104,18 +104,32 @@ def _no_collections() -> Iterator[None]:
             gc.enable()
 
 
-_in_one = False  # whether kernels become a part of the module of what calls them
+_whole: dict[Any, Callable] | None = None  # where a module has all that it calls: see `in_one`
 
 
 @contextmanager
-def in_one() -> Iterator[None]:
-    """Write kernels into what calls them meanwhile: no other unit can be called there."""
-    global _in_one
-    before, _in_one = _in_one, True
+def in_one(called: dict[Any, Callable]) -> Iterator[None]:
+    """Write modules of threads of a GPU meanwhile, which have all that they call.
+
+    Kernels are written into what calls them, and so is what is else called by its address:
+    `called` has the function for each signature.
+    """
+    global _whole
+    before, _whole = _whole, called
     try:
         yield
     finally:
-        _in_one = before
+        _whole = before
+
+
+def many_threads() -> bool:
+    """Tell whether thousands of others may write to the same number meanwhile: see `in_one`."""
+    return False
+
+
+@builtin(many_threads)
+def _many_threads(lowering: Any) -> bool:
+    return _whole is not None
 
 
 def written(
@@ -227,10 +241,11 @@ class Kernel:
 
     def in_kernel(self, lowering: Any, *arguments: Any) -> Any:
         """Write a call from another kernel."""
-        if _in_one:
-            return lowering.call(self.function, arguments)
         held = [lowering.call(hold, (argument,)) for argument in arguments]
         kinds = tuple(types.unliteral(lowering.kind_of(one)) for one in held)
+        if _whole is not None:
+            own = formula(self.function, kinds)
+            return lowering.call_own(own.name, own.run, kinds, own.result, held)
         unit = self.unit(kinds)
         note(unit.choices)
         note([self.function.__code__])
@@ -307,11 +322,19 @@ def caller_of(signature: Any) -> Callable:
         return lambda address, *arguments: _uncompiled[address](*arguments)
 
     @intrinsic
-    def call(address, *arguments):
+    def by_address(address, *arguments):
         def codegen(builder, place, *values):
             kind = function_type(parameters, result)
             return builder.call(builder.inttoptr(place, kind.as_pointer()), values)
 
         return result(types.int64, *parameters), codegen
+
+    @in_kernels
+    def call(lowering, address, *arguments):
+        own = _whole and _whole.get(signature)
+        if not own:
+            return lowering.call(by_address, (address, *arguments))
+        pairs = zip(arguments, parameters, strict=True)
+        return lowering.call(own, tuple([lowering.cast(a, kind) for a, kind in pairs]))
 
     return call

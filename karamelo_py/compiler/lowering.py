@@ -185,6 +185,10 @@ class Lowering:
         value = self.builder and code.cast(self.builder, thing._value, thing._kind, kind)
         return Value(kind, value)
 
+    def cast(self, thing: Any, kind: types.Type) -> Any:
+        """Give what point functions see in the type `kind`."""
+        return self.wrapped(kind, self.builder and self.lowered(thing, kind))
+
     attribute, set_attribute = indexing.attribute, indexing.set_attribute
 
     def item(self, held: HeldValue, k: int) -> Any:

@@ -125,7 +125,7 @@ def add_among(array, i, j, value):
 def _add_among(array, i, j, value):
     def codegen(builder, table, i, j, number):
         at = code.item_pointer(builder, array, table, (i, j))
-        builder.atomic_rmw("add", at, number, "acq_rel")
+        builder.atomic_rmw("add", at, number, "monotonic")
 
     return types.none(array, types.int64, types.int64, types.int64), codegen
 

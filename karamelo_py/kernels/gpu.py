@@ -93,7 +93,7 @@ def _report(fate, i, moved, rate, stride):
 
 
 @shared
-def _is_last(s):
+def is_last(s):
     """Check that the present step reaches the end of the run: nothing is summed for a next one."""
     values = s.control.values
     return values[TIME] + values[DT] >= s.control.clock[0].end_time
@@ -230,7 +230,7 @@ class Stage:
         def scatter_cell(i, fate, s, block, cells):
             if fate[STATUS] > 0:
                 return
-            if only_if_more and _is_last(s):
+            if only_if_more and is_last(s):
                 return
             first, last = cells.first[i], cells.first[i + 1]
             if first == last:
@@ -266,7 +266,7 @@ class Stage:
         def sum_node(i, fate, s, block, cells):
             if fate[STATUS] > 0:
                 return
-            if only_if_more and _is_last(s):
+            if only_if_more and is_last(s):
                 return
             grid = _grid_of(s.grids, i)
             found = (real(0, s.nodes.sums[0, 0]),) * len(columns)
@@ -393,6 +393,13 @@ def of_nodes(task: Any) -> Callable:
     return visit_node
 
 
+def clear(i, fate, array, first):
+    """Clear a number of an array."""
+    if fate[STATUS] > 0:
+        return
+    array[first + i] = 0
+
+
 def take_reports(i, fate, s):
     """Take over how the points fared in a visit."""
     if fate[STATUS] > 0:
@@ -408,16 +415,21 @@ def take_reports(i, fate, s):
         fate[STATUS] = 1.0 + STOPPED
 
 
-def end_step(i, fate, s):
-    """End a step: time goes on, and the next step is chosen, unless this was the last."""
+def finish_step(i, fate, s):
+    """End a step: time goes on, and the size of the next is chosen."""
     if fate[STATUS] > 0:
         return
-    control = s.control
-    clock = control.clock[0]
-    finish(control)
+    finish(s.control)
+
+
+def end_step(i, fate, s):
+    """Say whether steps go on."""
+    if fate[STATUS] > 0:
+        return
+    clock = s.control.clock[0]
     if clock.watch_limit > 0 and clock.over_limit >= PATIENCE:
         fate[STATUS] = 1.0 + ABOVE_LIMIT
     elif clock.limit < SMALLEST * clock.first_limit:
         fate[STATUS] = 1.0 + SHRUNK
-    elif control.values[TIME] >= clock.end_time:
+    elif s.control.values[TIME] >= clock.end_time:
         fate[STATUS] = 1.0 + DONE

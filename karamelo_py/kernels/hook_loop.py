@@ -151,7 +151,7 @@ def _act_on_part(what, task, hooks, control, dt, h, share, k, parts):
             if isinstance(what, (HookedNodes, WholeNodes)):
                 count, place, member = _choose_nodes(what, hooks, h, place, end, member)
             else:
-                count, place = _choose_points(what, hooks, h, place, end)
+                count, place = choose_points(what, hooks, h, place, end)
             if count > 0:
                 found += act(what, task, hooks, control, dt, h, count, share)
     return found
@@ -264,7 +264,7 @@ def _clear_total(hooks, h, control):
 
 
 @noinline
-def _publish_total(hooks, h, control):
+def publish_total(hooks, h, control):
     """Publish the totals of a hook."""
     totals.carry(control.totals[totals.WORK])  # it grows from step to step
     first, count = _published(hooks, h)
@@ -322,7 +322,7 @@ def _act_at_nodes(what, task, hooks, control, dt, h, count, share):
         _work_at_nodes(what, hooks, control, dt, count)
         return 0
     if hooks.table[h].uses_place:
-        _locate_nodes(what.grids, hooks, count)
+        locate_nodes(what.grids, hooks, count)
     if task == RUB:
         _rub_at_nodes(what, hooks, control, dt, h, count)
     else:
@@ -331,7 +331,7 @@ def _act_at_nodes(what, task, hooks, control, dt, h, count, share):
 
 
 @noinline
-def _locate_nodes(grids, hooks, count):
+def locate_nodes(grids, hooks, count):
     """Find the positions of the chosen nodes."""
     where = hooks.scratch
     for q in range(count):
@@ -477,7 +477,7 @@ def _work_at_nodes(what, hooks, control, dt, count):
 def _act_on_whole_nodes(what, task, hooks, control, dt, h, count, share):
     tag, nodes, kin = what.tag, what.nodes, what.kin
     if hooks.table[h].uses_place:
-        _locate_nodes(what.grids, hooks, count)
+        locate_nodes(what.grids, hooks, count)
     rows, first, change = (VALUE, BEFORE, THIRD), arrays.of_force(kin), arrays.of_change(kin)
     for c in range(len(tag.values)):
         evaluate(hooks, h, c, count, control, rows[c], 0.0)
@@ -564,7 +564,7 @@ def _node_hooks(stage, target, kin, grids, nodes, ranges, whole, hooks, control,
                     _act_on_all(one, ACT, hooks, control, dt, h, share)
         else:
             _act_on_all(what, ACT, hooks, control, dt, h, share)
-        _publish_total(hooks, h, control)
+        publish_total(hooks, h, control)
     # Walls rub when it is known which of them hold a node.
     for h in range(len(hooks.table)):
         if hooks.table[h].stage != stage:
@@ -573,7 +573,7 @@ def _node_hooks(stage, target, kin, grids, nodes, ranges, whole, hooks, control,
         if rubs:
             _act_on_all(what, RUB, hooks, control, dt, h, 1.0)
         if rubs or (hooks.table[h].holds and hooks.held.size > 0):
-            _publish_total(hooks, h, control)
+            publish_total(hooks, h, control)
 
 
 @point_function(otherwise=True)
@@ -604,7 +604,7 @@ def _add_work_hooks(hooks, s):
 
 
 @shared
-def _choose_points(what, hooks, h, p, end):
+def choose_points(what, hooks, h, p, end):
     """Choose up to a block of members; how many, where to go on. Note places before the step."""
     begin, ids, where = hooks.table[h].begin, what.ids, hooks.scratch
     count = 0
@@ -734,7 +734,7 @@ def _begin_or_end_totals(stage, hooks, control, begin):
             if begin:
                 _clear_total(hooks, h, control)
             else:
-                _publish_total(hooks, h, control)
+                publish_total(hooks, h, control)
 
 
 @shared

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.compiler.compile import point_function, shared
-from karamelo_py.compiler.loops import kernel, noinline
+from karamelo_py.compiler.loops import kernel, many_threads, noinline
 from karamelo_py.compiler.threads import add_among
 
 LIMBS = 68
@@ -33,6 +33,15 @@ class Alone(NamedTuple):
     """One process has the whole scene."""
 
 
+@shared
+def _grow(totals, row, limb, number):
+    """Add to a limb."""
+    if many_threads():
+        add_among(totals, row, limb, number)
+    else:
+        totals[row, limb] += number
+
+
 @noinline
 def add_to(totals, row, x):
     """Add `x` to a total, without rounding."""
@@ -41,7 +50,7 @@ def add_to(totals, row, x):
     bits = np.float64(x).view(np.int64)
     exponent = (bits >> 52) & 0x7FF
     if exponent == 0x7FF:
-        totals[row, LOST] += 1
+        _grow(totals, row, LOST, 1)
         return
     mantissa = bits & MANTISSA
     if exponent > 0:
@@ -52,9 +61,9 @@ def add_to(totals, row, x):
     low = (mantissa & DIGIT) << shift
     high = (mantissa >> 32) << shift
     sign = 1 if bits >= 0 else -1
-    totals[row, limb] += sign * (low & DIGIT)
-    totals[row, limb + 1] += sign * ((low >> 32) + (high & DIGIT))
-    totals[row, limb + 2] += sign * (high >> 32)
+    _grow(totals, row, limb, sign * (low & DIGIT))
+    _grow(totals, row, limb + 1, sign * ((low >> 32) + (high & DIGIT)))
+    _grow(totals, row, limb + 2, sign * (high >> 32))
 
 
 @noinline
@@ -65,6 +74,10 @@ def add_many(totals, row, terms, count):
     A number added to 1.5 2^52 has its whole part in its last bits: both loops are sums of bits, in
     any order, which vectors of the processor do.
     """
+    if many_threads():  # each has a term or two
+        for q in range(count):
+            add_to(totals, row, terms[q])
+        return
     top = 0
     for q in range(count):
         top = max(top, np.float64(terms[q]).view(np.int64) & MAGNITUDE)

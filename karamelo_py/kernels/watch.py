@@ -51,7 +51,7 @@ BORNE = 4.0
 
 
 @shared
-def _solid_of(firsts, number):
+def solid_of(firsts, number):
     """The solid that a point of this id belongs to."""
     return first_from(firsts, 0, firsts.size, number + 1) - 1
 
@@ -64,7 +64,7 @@ def _look_at_share(kin, points, laws, tiling, firsts, k):
     for place in range(tiling.share[k], tiling.share[k + 1]):
         t = tiling.order[place]
         start, end = tiling.range[t, 0], tiling.range[t, 1]
-        solid = _solid_of(firsts, points.id[start])
+        solid = solid_of(firsts, points.id[start])
         begin, behind = firsts[solid], firsts[solid + 1]
         kinetic = stored = 0.0
         total = (0.0,) * (1 + kin.dimension)
@@ -117,6 +117,12 @@ def sum_energies(s, mode):
         work = field(block.points.fields, WorkOfForces)
         if work is not None:
             _take_work(work, s.control)
+    take_energies(s)
+
+
+@shared
+def take_energies(s):
+    """Take over the totals of energies and work into the clock."""
     totals.collect(s.control.ranks, s.control, totals.KINETIC, 3)
     clock, answer = s.control.clock[0], s.control.answer
     clock.kinetic = answer[totals.KINETIC]
@@ -138,7 +144,7 @@ def _add_momenta(d, ids, masses, v, tiling, control):
             for p in range(tiling.range[t, 0], tiling.range[t, 1]):
                 if not begin <= ids[p] < end:
                     _add_momentum(control, solid, d)
-                    solid = _solid_of(firsts, ids[p])
+                    solid = solid_of(firsts, ids[p])
                     begin, end = firsts[solid], firsts[solid + 1]
                 mass = float(masses[p])
                 sums[0] += mass
@@ -165,6 +171,14 @@ def _sum_drift(s):
         points = block.points
         if not moves_as_told(block.laws):
             _add_momenta(d, points.id, points.mass, points.v, block.tiling, control)
+    take_drift(s)
+
+
+@shared
+def take_drift(s):
+    """Take over the totals of mass and momentum of the solids."""
+    control, d = s.control, s.kin.dimension
+    own = control.values.size
     totals.collect(control.ranks, control, own, control.totals.shape[0] - own)
     energy = 0.0
     for k in range(control.firsts.size - 1):
@@ -179,7 +193,12 @@ def _sum_drift(s):
 def _sum_before(s, mode, step):
     """The energies of a step whose next is looked at."""
     sum_energies(s, mode)
-    clock = s.control.clock[0]
+    note_before(s.control.clock[0], step)
+
+
+@shared
+def note_before(clock, step):
+    """Keep the present energies for the look at the next step."""
     clock.stored_before = clock.stored
     clock.moving_before = clock.kinetic - clock.work
     clock.stored_at = step

@@ -2,19 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
+from karamelo_py.compiler.compile import shared
+from karamelo_py.compiler.fields import field
+from karamelo_py.compiler.formula import EVALUATE, GLOBAL, UNIFORM, evaluate_in_table
 from karamelo_py.compiler.gpu import Images, Launch
 from karamelo_py.kernels import gpu, table
-from karamelo_py.kernels.arrays import Setup
-from karamelo_py.kernels.p2g import columns_of
+from karamelo_py.kernels import gpu_fixes as fixes
+from karamelo_py.kernels.arrays import (
+    INITIAL_INTEGRATE,
+    ON_UPDATE,
+    ON_VELOCITY,
+    POST_PARTICLES_TO_GRID,
+    TIMESTEP,
+    WHOLE,
+    Hooks,
+    NoHooks,
+    Setup,
+)
+from karamelo_py.kernels.hook_loop import ACT, RUB
+from karamelo_py.kernels.hooks import HEAT_FUNCTION, NODE_FUNCTION, POINT_FUNCTION
+from karamelo_py.kernels.p2g import WorkOfForces, columns_of
 from karamelo_py.kernels.step import DONE, first_rows, rows_of
+from karamelo_py.kernels.totals import WORK
+from karamelo_py.kernels.walls import FRICTION
+from karamelo_py.kernels.watch import LOOK
+from karamelo_py.points.laws import moves_as_told
 
 POLL = 64  # steps between two looks at how far a run is
 REGISTERS = 64  # numbers that a thread of a cell sums at once
+_NONE = NoHooks()
+
 
 
 def arrays_in(thing: Any) -> Iterator[np.ndarray]:
@@ -26,23 +48,49 @@ def arrays_in(thing: Any) -> Iterator[np.ndarray]:
             yield from arrays_in(item)
 
 
-class StepsOnCard:
-    """Take the steps of a lowered scene on a card."""
+@shared
+def _no_formula(*_):
+    """Evaluate nothing, for hooks whose formulas are numbers."""
 
-    def __init__(self, card: Any, s: Setup, scheme: Any, visits: type):
-        self.card, self.s = card, s
+
+shared(evaluate_in_table)
+
+
+class StepsOnCard:
+    """Take the steps of a lowered scene on a card.
+
+    `functions` are those of the compiled hooks, in the order of their table.
+    """
+
+    def __init__(
+        self, card: Any, s: Setup, scheme: Any, visits: type, hooks: Hooks | NoHooks = _NONE,
+        functions: Sequence[Callable] = (),
+    ):  # fmt: skip
+        self.card, self.s, self.hooks, self.functions = card, s, hooks, functions
         self.images = Images(card)
         self.fate = np.zeros(4)
         self.fate_there = self.images.of(self.fate)
         self.nodes = len(s.nodes.sums)
         own = [b.points.mass.size for b in s.blocks]
         self.cells = [self._cells(n) for n in own]
-        self.listed = False  # whether the points are in lists that stay
-        self._rooms(s, rows_of(scheme, visits))
-        self.begin = self._launches(first_rows(scheme, visits))
+        self._totals()
         rows = rows_of(scheme, visits)
-        self.step = [*self._launches(rows), self._launch(gpu.end_step, 1, s)]
-        self.last_step = [*self._launches(rows, more=False), self.step[-1]]
+        self._rooms(s, rows)
+        self.begin = self._launches(first_rows(scheme, visits))
+        self.step, self.last_step = self._steps(rows)
+        self.end = self._launch(gpu.end_step, 1, s)
+        self.before, self.behind = self._looks()
+
+    def _steps(self, rows: list) -> tuple[list[Launch], list[Launch]]:
+        """What a step launches, and the last of several."""
+        begin, end = self._clear_published(), [self._launch(gpu.finish_step, 1, self.s)]
+        ahead: list[Launch] = []  # sums for the next step
+        own = self._launches(rows, ahead)
+        last = [launch for launch in own if launch not in ahead]
+        return (
+            [*begin, *own, *end, *self._publish(last=False)],
+            [*begin, *last, *end, *self._publish(last=True)],
+        )
 
     # --- rooms
 
@@ -58,6 +106,14 @@ class StepsOnCard:
             new((nodes,), np.int64), new((points,), np.int64), new((sum(self.levels),), np.int64),
             np.zeros((0, 0)),
         )  # fmt: skip
+
+    def _totals(self) -> None:
+        """Give room to copies of the totals, and to counts of members."""
+        sums = self.s.control.totals
+        self.copies = np.zeros((fixes.COPIES, *sums.shape), np.int64)
+        self.heavy = np.zeros(max(len(self.functions), 1), np.int64)
+        self.images.of((self.copies, self.heavy))
+        self.images.send([self.copies, self.heavy])
 
     def _rooms(self, s: Setup, rows: list) -> None:
         """Give room to what cells sum: for the visit that gives most."""
@@ -80,32 +136,53 @@ class StepsOnCard:
 
     # --- launches
 
-    def _launch(self, function: Callable, count: int, *arguments: Any) -> Launch:
-        return Launch(self.images, function, count, self.fate, *arguments)
+    def _launch(
+        self, function: Callable, count: int, *arguments: Any, called: dict | None = None
+    ) -> Launch:
+        return Launch(self.images, function, count, self.fate, *arguments, called=called)
 
-    def _launches(self, rows: list, more: bool = True) -> list[Launch]:
-        """What the rows of a part of a step launch."""
+    def _launches(self, rows: list, ahead: list[Launch] | None = None) -> list[Launch]:
+        """What the rows of a part of a step launch; `ahead` takes what serves the next step."""
         found: list[Launch] = []
         for row in rows:
             if isinstance(row, table.Sweep):
-                found += self._visit(row, more)
+                found += self._visit(row, ahead)
             elif isinstance(row, table.NodeTask):
                 found.append(self._launch(gpu.of_nodes(row.task), self.nodes, self.s))
-            elif isinstance(row, table.SceneTask) and row.function.says(self.s) is not None:
+            elif isinstance(row, table.AtNodes):
+                found += self._hooks_on_nodes(row.stage, row.target)
+            elif isinstance(row, table.AtPoints):
+                found += self._hooks_on_points(row.stage, row.then)
+            elif isinstance(row, table.Check):
+                for block in self.s.blocks:
+                    size = block.points.mass.size
+                    found.append(self._launch(fixes.check_point, size, self.s, block))
+                found.append(self._launch(fixes.take_moves, 1, self.s))
+                found.append(self._launch(gpu.take_reports, 1, self.s))
+            elif row is table.WORK_OF_LOADS:
+                found += self._work_of_loads()
+            elif row.function.says(self.s) is not None:
                 raise NotImplementedError(row.function.says(self.s))
         return found
 
-    def _visit(self, row: Any, more: bool) -> Iterator[Launch]:
+    def _visit(self, row: Any, ahead: list[Launch] | None) -> list[Launch]:
+        gathers, scatters = list(self._gathers(row)), list(self._scatters(row))
+        if row.only_if_more and ahead is not None:
+            ahead += scatters
+        return gathers + scatters
+
+    def _gathers(self, row: Any) -> Iterator[Launch]:
+        if row.gathers:
+            gather = self._stage(row).gather()
+            for block in self.s.blocks:
+                yield self._launch(gather, block.points.mass.size, self.s, block)
+            yield self._launch(gpu.take_reports, 1, self.s)
+
+    def _scatters(self, row: Any) -> Iterator[Launch]:
         s, stage = self.s, self._stage(row)
-        scatters = more if row.only_if_more else row.scatters
         sizes = [block.points.mass.size for block in s.blocks]
         pairs = list(zip(s.blocks, self.cells, sizes, strict=True))
-        if row.gathers:
-            gather = stage.gather()
-            for block, _, size in pairs:
-                yield self._launch(gather, size, s, block)
-            yield self._launch(gpu.take_reports, 1, s)
-        if not scatters or not row.visit.quantities:
+        if not (row.scatters or row.only_if_more) or not row.visit.quantities:
             return
         if stage.lists:
             count = stage.count()
@@ -134,11 +211,146 @@ class StepsOnCard:
         yield self._launch(gpu.list_point, block.points.mass.size, cells)
         yield self._launch(gpu.sort_cell, self.nodes, block.points.id, cells)
 
+    # --- hooks of fixes
+
+    def _table(self) -> Any:
+        return () if isinstance(self.hooks, NoHooks) else self.hooks.table
+
+    def _called(self, h: int) -> dict:
+        """What is called by its address for a hook."""
+        signatures = (NODE_FUNCTION, POINT_FUNCTION, HEAT_FUNCTION)
+        own = dict.fromkeys(signatures, shared(self.functions[h]))
+        return {**own, EVALUATE: evaluate_in_table if self._has_formulas(h) else _no_formula}
+
+    def _has_formulas(self, h: int) -> bool:
+        """Tell whether a hook has formulas that are no numbers."""
+        return any(program.begin < program.end for program in self.hooks.programs[h])
+
+    def _values(self, h: int) -> int:
+        """Published values that a thread needs for itself: those of formulas a step earlier."""
+        if not (self._table()[h].uses_before and self._has_formulas(h)):
+            return 0
+        return 1 + max((operand for op, operand in self._globals()), default=0)
+
+    def _globals(self) -> Iterator[tuple[int, int]]:
+        """The instructions of formulas that ask for published values."""
+        return ((op, int(slot)) for op, slot in self.hooks.code if op % UNIFORM == GLOBAL)
+
+    def _members(self, h: int) -> int:
+        row = self._table()[h]
+        return self.nodes if row.begin < 0 else int(row.end - row.begin)
+
+    def _hooks_on_nodes(self, stage: int, target: int) -> Iterator[Launch]:
+        s, hooks, heavy, copies = self.s, self.hooks, self.heavy, self.copies
+        own = [h for h, row in enumerate(self._table()) if row.stage == stage]
+        if own and target == ON_UPDATE and hooks.held.size:
+            yield self._launch(fixes.clear_held, self.nodes, hooks.held)
+        for h in own:
+            row, count, called = self._table()[h], self._members(h), self._called(h)
+            if row.uses_share:
+                yield self._launch(gpu.clear, 1, heavy, h)
+                yield self._launch(fixes.count_node, count, s.nodes, hooks, h, heavy)
+            if row.address != WHOLE:
+                act = fixes.on_node(target, ACT, self._values(h))
+                yield self._launch(act, count, s, hooks, h, heavy, copies, called=called)
+            elif target != ON_VELOCITY:
+                (tag,) = (one for one in hooks.whole if one.row == h)
+                act = fixes.on_whole_node(target, stage == POST_PARTICLES_TO_GRID)
+                yield self._launch(act, count, s, hooks, tag, h, copies, called=called)
+        for h in own:
+            if hooks.programs[h][FRICTION].begin >= 0:
+                rub = fixes.on_node(target, RUB, 0)
+                rest = (s, hooks, h, heavy, copies)
+                yield self._launch(rub, self._members(h), *rest, called=self._called(h))
+
+    def _hooks_on_points(self, stage: int, then: int) -> Iterator[Launch]:
+        s, hooks, copies = self.s, self.hooks, self.copies
+        own = [h for h, row in enumerate(self._table()) if row.stage == stage]
+        for block in s.blocks:
+            size = block.points.mass.size
+            if stage == INITIAL_INTEGRATE and getattr(hooks, "whole", ()):
+                yield self._launch(fixes.clear_force, size, block, s.kin.dimension)
+            for h in own:
+                called = self._called(h)
+                if self._table()[h].address != WHOLE:
+                    act = fixes.on_point(then, self._values(h))
+                    yield self._launch(act, size, s, block, hooks, h, copies, called=called)
+                else:
+                    (tag,) = (one for one in hooks.whole if one.row == h)
+                    act = fixes.on_whole_point(then)
+                    yield self._launch(act, size, s, block, hooks, tag, h, copies, called=called)
+
+    def _work_of_loads(self) -> Iterator[Launch]:
+        if len(self._table()) and self.hooks.loads.size:
+            called = self._called(0)
+            rest = (self.s, self.hooks, self.copies)
+            yield self._launch(fixes.work_of_loads, self.nodes, *rest, called=called)
+
+    # --- totals, and the watch over energy
+
+    def _clear_published(self) -> list[Launch]:
+        """Let the totals that hooks publish start from zero."""
+        return self._clear(*self._slots())
+
+    def _slots(self) -> tuple[int, int]:
+        """The first of the rows of totals that hooks publish, and where they end."""
+        slots = [int(row.slot) for row in self._table() if row.slot >= 0]
+        return (min(slots), max(slots) + 3) if slots else (0, 0)
+
+    def _clear(self, first: int, end: int) -> list[Launch]:
+        """Clear rows of the totals."""
+        sums, count = self.s.control.totals, end - first
+        size = count * sums.shape[1]
+        if not size:
+            return []
+        return [
+            self._launch(fixes.clear_totals, fixes.COPIES * size, self.copies, first, count),
+            self._launch(fixes.clear_rows, size, sums, first),
+        ]
+
+    def _collect(self, first: int, end: int) -> list[Launch]:
+        """Add up the copies of rows of the totals."""
+        sums = self.s.control.totals
+        size = (end - first) * sums.shape[1]
+        return [self._launch(fixes.collect_total, size, self.copies, sums, first)] if size else []
+
+    def _publish(self, last: bool) -> list[Launch]:
+        if not len(self._table()):
+            return []
+        always = last or self._reads_totals()
+        publish = self._launch(fixes.publish, 1, self.s, self.hooks, always)
+        return [*self._collect(*self._slots()), *self._collect(WORK, WORK + 1), publish]
+
+    def _reads_totals(self) -> bool:
+        """Tell whether a formula of a hook needs what hooks publish."""
+        slots = range(*self._slots())
+        return any(slot in slots for _, slot in self._globals())
+
+    def _looks(self) -> tuple[list[Launch], list[Launch]]:
+        """What is done to look at the energy: before, and a step later."""
+        s, sums = self.s, self.s.control.totals
+        copies, solids = self.copies, (len(s.control.values), len(sums))
+        found = [*self._clear(0, WORK), *self._clear(*solids)]
+        for block in s.blocks:
+            if not moves_as_told(block.laws):
+                threads = -(-block.points.mass.size // fixes.CHUNK)
+                found.append(
+                    self._launch(fixes.add_energies, threads, s, block, copies, threads)
+                )
+            if field(block.points.fields, WorkOfForces) is not None:
+                size = block.points.mass.size
+                found.append(self._launch(fixes.add_work, size, block, copies))
+        found += [*self._collect(0, WORK + 1), *self._collect(*solids)]
+        before, behind = (
+            self._launch(function, 1, s) for function in (fixes.look_before, fixes.look_behind)
+        )
+        return [*found, before], [*found, behind]
+
     # --- steps
 
     def send(self) -> None:
         """Copy the state of the scene to the card."""
-        self.images.send(arrays_in(self.s))
+        self.images.send(arrays_in((self.s, self.hooks)))
 
     def fetch(self) -> None:
         """Copy it back."""
@@ -146,17 +358,25 @@ class StepsOnCard:
 
     def advance(self, count: int) -> int:
         """Take up to `count` steps; DONE, or why they ended."""
+        control = self.s.control
+        exchanged = [self.fate, control.clock, control.values, control.totals]
         self.fate[:] = 0
-        self.images.send([self.fate, self.s.control.clock, self.s.control.values])
+        self.images.send(exchanged)
+        begun, watched = int(control.values[TIMESTEP]), control.clock[0].watch_energy
         for launch in self.begin:
             launch()
         for n in range(count):
             for launch in self.step if n + 1 < count else self.last_step:
                 launch()
+            looked = (begun + n + 1) % LOOK
+            if watched and looked < 2:
+                for launch in self.behind if looked else self.before:
+                    launch()
+            self.end()
             if (n + 1) % POLL == 0:
                 self.images.fetch([self.fate])
                 if self.fate[gpu.STATUS] > 0:
                     break
-        self.images.fetch([self.fate, self.s.control.clock, self.s.control.values])
+        self.images.fetch(exchanged)
         status = self.fate[gpu.STATUS]
         return int(status) - 1 if status > 0 else DONE

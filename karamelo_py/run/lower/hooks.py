@@ -32,10 +32,8 @@ def lower_hooks(
     dimension = hub.domain.dimension
     count = sum(s.count for s in hub.solids.values())
     builder = _Builder(hub, count)
-    for fix in fixes:
-        for name, hook in fix.hooks().items():
-            if isinstance(hook, CompiledHook):
-                builder.add(fix, name, hook)
+    for fix, name, hook in compiled_hooks(fixes):
+        builder.add(fix, name, hook)
     if not builder.rows:
         return arrays.NoHooks()
     solids = hub.solids.values() if builder.uses_first else ()
@@ -63,6 +61,16 @@ def lower_hooks(
         ),
         whole=tuple(builder.whole),
     )
+
+
+def compiled_hooks(fixes: list) -> list[tuple[Any, str, CompiledHook]]:
+    """List the compiled hooks of fixes with their moments, in the order of the tables."""
+    return [
+        (fix, name, hook)
+        for fix in fixes
+        for name, hook in fix.hooks().items()
+        if isinstance(hook, CompiledHook)
+    ]
 
 
 class _Builder:
@@ -159,6 +167,7 @@ class PythonHooks:
 
     def __init__(self, simulation: Any, fixes: list):
         self.simulation = simulation
+        self.functions = [hook.function for _, _, hook in compiled_hooks(fixes)]
         self.compiled = lower_hooks(simulation.hub, fixes, simulation.mode, simulation.threads)
         self.by_stage: dict[int, list[tuple[Any, Callable]]] = {}
         for fix in fixes:

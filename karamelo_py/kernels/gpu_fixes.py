@@ -1,0 +1,381 @@
+"""Hooks of fixes, their totals, and the watch over energy on a GPU: what one thread does.
+
+The functions of :mod:`karamelo_py.kernels.hook_loop` do the work, for one member at a time: each
+thread has the tables of the hooks with a scratch of its own. Totals are sums of whole numbers,
+which threads may add to in any order: a few copies of them share the traffic.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from karamelo_py.compiler.compile import index, real, shared
+from karamelo_py.compiler.fields import field, load_vector
+from karamelo_py.compiler.formula import ROWS, STACK
+from karamelo_py.compiler.gpu import raise_to, taken
+from karamelo_py.compiler.lanes import room_for
+from karamelo_py.compiler.tuples import record
+from karamelo_py.kernels import arrays, totals
+from karamelo_py.kernels.arrays import TIMESTEP, known_to_laws, with_items_of
+from karamelo_py.kernels.clock import kick, step_size
+from karamelo_py.kernels.gpu import MOVED, STATUS, WRONG, is_last
+from karamelo_py.kernels.hook_loop import (
+    ACT,
+    LOADS,
+    HookedNodes,
+    MovingPoints,
+    WholeNodes,
+    WholePoints,
+    act,
+    choose_points,
+    corners_that_move,
+    publish_total,
+    without_whole,
+)
+from karamelo_py.kernels.loss import FrictionalHeat
+from karamelo_py.kernels.p2g import Force, WorkOfForces
+from karamelo_py.kernels.step import GAINED
+from karamelo_py.kernels.visit import state_at
+from karamelo_py.kernels.watch import (
+    judge,
+    note_before,
+    solid_of,
+    take_drift,
+    take_energies,
+)
+from karamelo_py.points.grid import inside
+from karamelo_py.points.kinematics import planar
+from karamelo_py.points.laws import (
+    dissipated_energy,
+    energy_density,
+    moves_as_told,
+    specific_volume,
+)
+
+COPIES = 64  # of the totals: threads side by side add to different ones
+CHUNK = 64  # points whose energies one thread adds up
+
+
+class Own(NamedTuple):
+    """What a thread has of its own in the place of the same of `Hooks`."""
+
+    chosen: np.ndarray
+    scratch: np.ndarray
+
+
+class OwnTotals(NamedTuple):
+    """What it has in the place of the same of `Control`."""
+
+    totals: np.ndarray
+
+
+class OwnValues(NamedTuple):
+    """Published values of a thread, whose time it may set back."""
+
+    totals: np.ndarray
+    values: np.ndarray
+
+
+@shared
+def _hooks_with_room(hooks):
+    """Return the hooks with room for one member."""
+    own = Own(room_for(1, (0,))[0], room_for(1, (0.0,) * (STACK + ROWS + 1)))
+    own.scratch[:6] = 0.0
+    return with_items_of(without_whole(hooks), own)
+
+
+def _control(count: int) -> Callable:
+    """Make what gives a thread its control; `count` values, if it needs some of its own, or 0."""
+
+    @shared
+    def own_values(values):
+        room = room_for(count, (0.0,))[0]
+        for k in range(values.size):
+            room[k] = values[k]
+        return room
+
+    @shared
+    def control_of(s, copies, i):
+        own = copies[index((i // 32) % COPIES)]
+        if count:
+            return with_items_of(s.control, OwnValues(own, own_values(s.control.values)))
+        return with_items_of(s.control, OwnTotals(own))
+
+    return control_of
+
+
+_CONTROL = _control(0)
+
+
+# --- nodes ------------------------------------------------------------------------------------
+
+
+def clear_held(i, fate, held):
+    """Forget who has held a node."""
+    if fate[STATUS] > 0:
+        return
+    for c in range(held.shape[1]):
+        held[i, c].slot = 0
+
+
+@shared
+def _member(hooks, h, i):
+    begin = hooks.table[h].begin
+    return i if begin < 0 else hooks.members[begin + i]
+
+
+def count_node(i, fate, nodes, hooks, h, heavy):
+    """Count a member that has mass."""
+    if fate[STATUS] > 0:
+        return
+    if nodes.sums[_member(hooks, h, i), arrays.MASS] > 0:
+        taken(heavy, h)
+
+
+@shared
+def _share(hooks, h, heavy):
+    return 1.0 / max(heavy[h], 1) if hooks.table[h].uses_share else 1.0
+
+
+@shared
+def _planar_nodes(nodes):
+    """Return the nodes with what walls know of them."""
+    fields = tuple([one for one in nodes.fields if type(one) is FrictionalHeat])
+    return arrays.Nodes(nodes.sums, nodes.update, nodes.velocity, fields)
+
+
+def on_node(target: int, task: int, values: int) -> Callable:
+    """Make what a member of a hook on nodes does; `task` is ACT or RUB."""
+    control_of = _control(values)
+
+    def visit_member(i, fate, s, hooks, h, heavy, copies):
+        if fate[STATUS] > 0:
+            return
+        n = _member(hooks, h, i)
+        if not s.nodes.sums[n, arrays.MASS] > 0:
+            return
+        own = _hooks_with_room(hooks)
+        own.chosen[0] = n
+        control, kept = control_of(s, copies, i), s.control.clock[0].kept
+        nodes = _planar_nodes(s.nodes)
+        what = HookedNodes(target, planar(s.kin), s.grids, nodes, s.ranges, kept)
+        act(what, task, own, control, float(kick(s)), h, 1, _share(hooks, h, heavy))
+
+    return visit_member
+
+
+def on_whole_node(target: int, early: bool) -> Callable:
+    """Make the same of a hook on whole nodes; `early` before the update."""
+    control_of = _control(0)
+
+    def visit_whole_member(i, fate, s, hooks, tag, h, copies):
+        if fate[STATUS] > 0:
+            return
+        n = _member(hooks, h, i)
+        if not s.nodes.sums[n, arrays.MASS] > 0:
+            return
+        own = _hooks_with_room(hooks)
+        own.chosen[0] = n
+        what = WholeNodes(tag, planar(s.kin), s.grids, s.nodes, s.ranges, early, target)
+        act(what, ACT, own, control_of(s, copies, i), float(kick(s)), h, 1, 1.0)
+
+    return visit_whole_member
+
+
+def work_of_loads(i, fate, s, hooks, copies):
+    """Add up the work of loads on a node, and forget them."""
+    if fate[STATUS] > 0:
+        return
+    if s.nodes.sums[i, arrays.MASS] > 0:
+        own = _hooks_with_room(hooks)
+        own.chosen[0] = i
+        what = HookedNodes(LOADS, planar(s.kin), s.grids, _planar_nodes(s.nodes), s.ranges, 0.0)
+        act(what, ACT, own, _CONTROL(s, copies, i), float(kick(s)), 0, 1, 1.0)
+
+
+# --- points -----------------------------------------------------------------------------------
+
+
+def clear_force(i, fate, block, d):
+    """Let a point bear no force of fixes, until these say so anew."""
+    if fate[STATUS] > 0:
+        return
+    force = field(block.points.fields, Force)
+    if force is not None:
+        for c in range(d):
+            force[c, i] = 0
+
+
+def on_point(then: int, values: int) -> Callable:
+    """Make what a point does for a hook on points; `then` is 1 behind the move."""
+    control_of = _control(values)
+
+    def visit_point(i, fate, s, block, hooks, h, copies):
+        if fate[STATUS] > 0:
+            return
+        p, now = block.points, s.control.clock[0].now
+        y = 1 - now if then else now
+        corners = corners_that_move(s)
+        rigid = moves_as_told(block.laws)
+        what = MovingPoints(p.id, p.v, p.mass, p.x[now], p.x[y], corners, rigid)
+        own = _hooks_with_room(hooks)
+        count, _ = choose_points(what, own, h, i, i + 1)
+        if count > 0:
+            act(what, ACT, own, control_of(s, copies, i), float(step_size(s)), h, 1, 1.0)
+
+    return visit_point
+
+
+def on_whole_point(then: int) -> Callable:
+    """Make the same of a hook on whole points."""
+    control_of = _control(0)
+
+    def visit_whole_point(i, fate, s, block, hooks, tag, h, copies):
+        if fate[STATUS] > 0:
+            return
+        p, now = block.points, s.control.clock[0].now
+        y = 1 - now if then else now
+        what = WholePoints(tag, p.id, s.kin, p, block.laws, p.x[y], ())
+        own = _hooks_with_room(hooks)
+        count, _ = choose_points(what, own, h, i, i + 1)
+        if count > 0:
+            act(what, ACT, own, control_of(s, copies, i), float(step_size(s)), h, 1, 1.0)
+
+    return visit_whole_point
+
+
+def check_point(i, fate, s, block):
+    """Look at the new position of a point again, after hooks that may have changed it."""
+    if fate[STATUS] > 0:
+        return
+    points, clock = block.points, s.control.clock[0]
+    grid = record(s.grids, index(points.grid[i]))
+    y = load_vector(s.kin, points.x[1 - clock.now], i)
+    step = (y - load_vector(s.kin, points.x[clock.now], i)).largest()
+    cells = float(step * grid.inv_h)
+    if cells <= clock.stride and (inside(grid, s.kin, y) or not s.frame.moves):
+        raise_to(fate, MOVED, cells)
+    else:
+        raise_to(fate, WRONG, i + 1.0)
+
+
+def take_moves(i, fate, s):
+    """Take over how far points have come."""
+    if fate[STATUS] > 0:
+        return
+    clock = s.control.clock[0]
+    clock.move = max(clock.move, fate[MOVED])
+    fate[MOVED] = 0.0
+
+
+# --- totals -----------------------------------------------------------------------------------
+
+
+def clear_totals(i, fate, copies, first, count):
+    """Clear a number of the totals in rows from `first` on, `count` of them, in all copies."""
+    if fate[STATUS] > 0:
+        return
+    limbs = copies.shape[2]
+    k, rest = i // (count * limbs), i % (count * limbs)
+    copies[k, first + rest // limbs, rest % limbs] = 0
+
+
+def clear_rows(i, fate, sums, first):
+    """Clear a number of the totals from row `first` on."""
+    if fate[STATUS] > 0:
+        return
+    sums[first + i // sums.shape[1], i % sums.shape[1]] = 0
+
+
+def collect_total(i, fate, copies, sums, first):
+    """Add up a number of the totals, in rows from `first` on, over the copies."""
+    if fate[STATUS] > 0:
+        return
+    row, limb = first + i // copies.shape[2], i % copies.shape[2]
+    total = sums[row, limb]
+    for k in range(copies.shape[0]):
+        total += copies[k, row, limb]
+        copies[k, row, limb] = 0
+    sums[row, limb] = total
+
+
+def publish(i, fate, s, hooks, always):
+    """Publish the totals of all hooks, if somebody sees them."""
+    if fate[STATUS] > 0:
+        return
+    if always or is_last(s):
+        for h in range(len(hooks.table)):
+            publish_total(hooks, h, s.control)
+
+
+# --- the watch over energy --------------------------------------------------------------------
+
+
+def add_energies(i, fate, s, block, copies, threads):
+    """Add up the energies of some points, and mass and momentum of their solids."""
+    if fate[STATUS] > 0:
+        return
+    points, laws, kin = known_to_laws(block.points), block.laws, s.kin
+    own = copies[index(i % COPIES)]
+    firsts, first_row = s.control.firsts, s.control.values.size
+    kinetic = stored = 0.0
+    solid, begin, behind = -1, 0, 0
+    total = (0.0,) * (1 + kin.dimension)
+    for p in range(i, points.mass.size, threads):
+        law, state = state_at(kin, points, laws, index(p))
+        mass = real(points.mass[p], 0.0)
+        v = [real(x, 0.0) for x in load_vector(kin, points.v, p)]
+        kinetic += 0.5 * mass * sum([x * x for x in v])
+        energy = energy_density(law, kin, state) + dissipated_energy(law, kin, state)
+        stored += mass * real(specific_volume(law), 0.0) * real(energy, 0.0)
+        if not begin <= points.id[p] < behind:
+            _add_all(own, first_row, solid, total)
+            total = (0.0,) * (1 + kin.dimension)
+            solid = solid_of(firsts, points.id[p])
+            begin, behind = firsts[solid], firsts[solid + 1]
+        more = zip(total, (mass, *[mass * x for x in v]), strict=True)
+        total = tuple([part + x for part, x in more])
+    totals.add_to(own, totals.KINETIC, kinetic)
+    totals.add_to(own, totals.STORED, stored)
+    _add_all(own, first_row, solid, total)
+
+
+@shared
+def _add_all(own, first_row, solid, total):
+    if solid >= 0:
+        for k, number in enumerate(total):
+            totals.add_to(own, first_row + solid * len(total) + k, number)
+
+
+def add_work(i, fate, block, copies):
+    """Add the work of forces on a point to that of the loads on nodes."""
+    if fate[STATUS] > 0:
+        return
+    work = field(block.points.fields, WorkOfForces)
+    if work is not None:
+        totals.add_to(copies[index((i // 32) % COPIES)], totals.WORK, float(work[0, i]))
+        work[0, i] = 0
+
+
+def look_before(i, fate, s):
+    """Keep the energies of a step whose next is looked at."""
+    if fate[STATUS] > 0:
+        return
+    totals.carry(s.control.totals[totals.WORK])
+    take_energies(s)
+    note_before(s.control.clock[0], int(s.control.values[TIMESTEP]))
+
+
+def look_behind(i, fate, s):
+    """Look at the energy; the run ends where it has come from nowhere."""
+    if fate[STATUS] > 0:
+        return
+    clock = s.control.clock[0]
+    if clock.stored_at != int(s.control.values[TIMESTEP]) - 1:
+        return
+    totals.carry(s.control.totals[totals.WORK])
+    take_energies(s)
+    take_drift(s)
+    if not judge(s.control):
+        fate[STATUS] = 1.0 + GAINED
