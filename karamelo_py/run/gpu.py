@@ -38,7 +38,6 @@ REGISTERS = 64  # numbers that a thread of a cell sums at once
 _NONE = NoHooks()
 
 
-
 def arrays_in(thing: Any) -> Iterator[np.ndarray]:
     """Every array in nested tuples."""
     if isinstance(thing, np.ndarray):
@@ -334,9 +333,7 @@ class StepsOnCard:
         for block in s.blocks:
             if not moves_as_told(block.laws):
                 threads = -(-block.points.mass.size // fixes.CHUNK)
-                found.append(
-                    self._launch(fixes.add_energies, threads, s, block, copies, threads)
-                )
+                found.append(self._launch(fixes.add_energies, threads, s, block, copies, threads))
             if field(block.points.fields, WorkOfForces) is not None:
                 size = block.points.mass.size
                 found.append(self._launch(fixes.add_work, size, block, copies))
