@@ -41,20 +41,20 @@ class NoCard(Exception):
 # --- memory that threads share ----------------------------------------------------------------
 
 
-def taken(array: np.ndarray, i: int) -> int:
-    """Add 1 to a whole number of an array, which other threads may do, too; what it was before."""
-    array[i] += 1
-    return array[i] - 1
+def counted(array: np.ndarray, i: int, step: int) -> int:
+    """Add a step to a whole number of an array, which others may do, too; what it was before."""
+    array[i] += step
+    return array[i] - step
 
 
-@implements(taken)
+@implements(counted)
 @intrinsic
-def _taken(array, i):
-    def codegen(builder, table, i):
+def _counted(array, i, step):
+    def codegen(builder, table, i, step):
         at = code.item_pointer(builder, array, table, (i,))
-        return builder.atomic_rmw("add", at, ir.Constant(at.type.pointee, 1), "monotonic")
+        return builder.atomic_rmw("add", at, step, "monotonic")
 
-    return array.dtype(array, types.int64), codegen
+    return array.dtype(array, types.int64, array.dtype), codegen
 
 
 @intrinsic
@@ -362,7 +362,7 @@ class Images:
     def __init__(self, card: Any):
         self.card = card
         self._known: dict[int, _There] = {}
-        self._rooms: list[int] = []
+        self._rooms: dict[int, int] = {}  # addresses, and bytes there
 
     def of(self, thing: Any) -> Any:
         """`thing`, nested tuples of arrays and numbers, with images in the place of arrays."""
@@ -376,9 +376,9 @@ class Images:
     def _image(self, array: np.ndarray) -> np.ndarray:
         known = self._known.get(id(array))
         if known is None:
-            size = _extent(array)
-            if not size:
-                return array
+            size, at = _extent(array), array.ctypes.data
+            if not size or any(room <= at < room + n for room, n in self._rooms.items()):
+                return array  # on the card already, or nothing
             address = self._room(size)
             memory = (ctypes.c_char * size).from_address(address)
             made = np.ndarray(array.shape, array.dtype, memory, 0, array.strides)
@@ -388,8 +388,14 @@ class Images:
         return known.image
 
     def _room(self, size: int) -> int:
-        self._rooms.append(self.card.allocate(size))
-        return self._rooms[-1]
+        address = self.card.allocate(size)
+        self._rooms[address] = size
+        return address
+
+    def known(self, array: np.ndarray) -> np.ndarray:
+        """Give an array room on the card; the array itself."""
+        self.of(array)
+        return array
 
     def new(self, shape: tuple[int, ...], dtype: Any) -> np.ndarray:
         """Give an array that is on the card alone."""
@@ -409,12 +415,6 @@ class Images:
 
     def _of(self, arrays: Iterable[np.ndarray]) -> list[_There]:
         return [self._known[id(array)] for array in arrays if id(array) in self._known]
-
-    def put(self, content: bytes) -> int:
-        """Put bytes into memory of the card; where they are."""
-        at = self._room(len(content))
-        self.put_at(at, content)
-        return at
 
     def put_at(self, at: int, content: bytes | bytearray) -> None:
         """Put bytes where there is room."""

@@ -16,7 +16,7 @@ import numpy as np
 
 from karamelo_py.compiler.compile import index, real, shared
 from karamelo_py.compiler.fields import field
-from karamelo_py.compiler.gpu import raise_to, taken
+from karamelo_py.compiler.gpu import counted, raise_to
 from karamelo_py.compiler.lanes import room_for
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import DT, TIME, Nodes
@@ -41,20 +41,23 @@ from karamelo_py.points.basis import entry, locate, support
 from karamelo_py.points.basis.product import digits, node_number
 from karamelo_py.points.grid import inside
 
-MOVED, RATE, WRONG, STATUS = range(4)  # of `fate`; 0: it goes on, else 1 + a status of steps
+MOVED, RATE, WRONG, STATUS, DRIFT = range(5)  # of `fate`; 0: it goes on, else 1 + a status of steps
 CHUNK = 64  # items that one thread adds up
+WARP = 32  # threads that read memory at once
 OCCUPIED = 1 << 40  # in the sums of `Cells.sums`: a cell with points, beside their number
 
 
 class Cells(NamedTuple):
     """The points of a block by cell; N is the number of nodes, n that of points."""
 
-    count: np.ndarray  # (N,) int64 of points in each cell
-    number: np.ndarray  # (n,) int64: the cell of each point
-    first: np.ndarray  # (N + 1,) int64: points of cell c are order[first[c]:first[c + 1]]
-    box: np.ndarray  # (N,) int64: number of an occupied cell among these
-    order: np.ndarray  # (n,) int64: the points
+    count: np.ndarray  # (N,) int32 of points in each cell that are not listed yet
+    number: np.ndarray  # (n,) int32: the cell of each point
+    first: np.ndarray  # (N + 1,) int32: points of cell c are order[first[c]:first[c + 1]]
+    box: np.ndarray  # (N,) int32: number of an occupied cell among these
+    cell: np.ndarray  # (boxes,) int32: the cell of a box
+    order: np.ndarray  # (n,) int32: the points
     sums: np.ndarray  # (m,) int64: of count and OCCUPIED, by chunks of chunks
+    before: np.ndarray  # (m,) int64: the sum of those before
     boxes: np.ndarray  # (columns, boxes): what cells give to each node that their points see
 
 
@@ -169,10 +172,10 @@ class Stage:
                 stencil = locate(c.basis, c.kin, grid, where)
                 number = entry(c.basis, c.kin, grid, stencil, 0)[0]
                 cells.number[p] = number
-                taken(cells.count, number)
+                counted(cells.count, number, 1)
             else:
                 cells.number[p] = 0  # of a run that ends here
-                taken(cells.count, 0)
+                counted(cells.count, 0, 1)
                 raise_to(fate, WRONG, i + 1.0)
 
         return count_point
@@ -263,16 +266,24 @@ class Stage:
                 else:
                     array[n, column] = value
 
-        def sum_node(i, fate, s, block, cells):
+        lists = self.lists
+
+        def sum_node(i, fate, s, block, cells, use):
             if fate[STATUS] > 0:
                 return
             if only_if_more and is_last(s):
                 return
             grid = _grid_of(s.grids, i)
-            found = (real(0, s.nodes.sums[0, 0]),) * len(columns)
-            for k in range(count):
-                found = _with_cell(s, cells, grid, i, k, count, found)
-            put(s.nodes, index(i), found)
+            seen = 0
+            if lists:
+                for k in range(count):
+                    seen += _points_in(cells, _cell_of(s, grid, i, k))
+                use[i] = _in_use(use[i], seen, first_block)
+            if use[i] > 0:
+                found = (real(0, s.nodes.sums[0, 0]),) * len(columns)
+                for k in range(count):
+                    found = _with_cell(cells, _cell_of(s, grid, i, k), k, count, found)
+                put(s.nodes, index(i), found)
 
         return sum_node
 
@@ -288,17 +299,30 @@ def _grid_of(grids, n):
 
 
 @shared
-def _with_cell(s, cells, grid, n, k, count, found):
-    """`found` with what the cell gives to node `n` whose points see it as their k-th node."""
-    places = digits(k, s.basis.line_nodes, s.kin.dimension)
-    c = n - node_number(grid, 0, places)
-    if c >= 0:
-        first, last = cells.first[index(c)], cells.first[index(c + 1)]
-        if first < last:
-            box = index(cells.box[index(c)])
-            found = tuple(
-                [value + cells.boxes[j * count + k, box] for j, value in enumerate(found)]
-            )
+def _cell_of(s, grid, n, k):
+    """The cell whose points see node `n` as their k-th node; perhaps there is none."""
+    return n - node_number(grid, 0, digits(k, s.basis.line_nodes, s.kin.dimension))
+
+
+@shared
+def _points_in(cells, c):
+    return cells.first[index(c + 1)] - cells.first[index(c)] if c >= 0 else 0
+
+
+@shared
+def _in_use(before, seen, first_block):
+    """Whether a node is in use: 2, if points see it; 1 once more behind that, to be cleared."""
+    if seen > 0:
+        return 2
+    return max(before - 1, 0) if first_block else before
+
+
+@shared
+def _with_cell(cells, c, k, count, found):
+    """`found` with what the points of a cell give to the k-th node that they see."""
+    if _points_in(cells, c) > 0:
+        box = index(cells.box[index(c)])
+        found = tuple([value + cells.boxes[j * count + k, box] for j, value in enumerate(found)])
     return found
 
 
@@ -306,7 +330,8 @@ def _with_cell(s, cells, grid, n, k, count, found):
 
 
 @shared
-def _counted(number):
+def _weight(number):
+    """Return a count with a mark of cells that have points."""
     return number + (OCCUPIED if number > 0 else 0)
 
 
@@ -316,43 +341,46 @@ def sum_counts(i, fate, cells):
         return
     total = 0
     for c in range(i * CHUNK, min((i + 1) * CHUNK, cells.count.size)):
-        total += _counted(cells.count[c])
+        total += _weight(cells.count[c])
     cells.sums[i] = total
 
 
-def sum_sums(i, fate, sums, begin, count, above):
-    """Sum a chunk of sums: those from `begin` on, into the level from `above` on."""
+def sum_sums(i, fate, cells, begin, count, above):
+    """Sum a chunk of sums: of those from `begin` on, into the level from `above` on."""
     if fate[STATUS] > 0:
         return
     total = 0
     for k in range(i * CHUNK, min((i + 1) * CHUNK, count)):
-        total += sums[begin + k]
-    sums[above + i] = total
+        total += cells.sums[begin + k]
+    cells.sums[above + i] = total
 
 
-def spread_sums(i, fate, sums, begin, count, above):
-    """Put in the place of each sum those before it; `above` as in `sum_sums`, -1 for none."""
+def sum_before(i, fate, cells, begin, above):
+    """Find the sum of all sums before one; `above` as in `sum_sums`, -1 where there is none."""
     if fate[STATUS] > 0:
         return
-    total = sums[above + i] if above >= 0 else 0
-    for k in range(i * CHUNK, min((i + 1) * CHUNK, count)):
-        own = sums[begin + k]
-        sums[begin + k] = total
-        total += own
+    chunk = i // CHUNK
+    total = cells.before[above + chunk] if above >= 0 else 0
+    for k in range(chunk * CHUNK, i):
+        total += cells.sums[begin + k]
+    cells.before[begin + i] = total
 
 
-def spread_counts(i, fate, cells):
-    """Say where the points of each cell are listed, and the number of its box."""
+def place_list(i, fate, cells):
+    """Say where the points of a cell are listed, and the number of its box."""
     if fate[STATUS] > 0:
         return
-    total = cells.sums[i]
-    for c in range(i * CHUNK, min((i + 1) * CHUNK, cells.count.size)):
-        cells.first[c] = total % OCCUPIED
-        cells.box[c] = total // OCCUPIED
-        total += _counted(cells.count[c])
-        cells.count[c] = 0
-        if c + 1 == cells.count.size:
-            cells.first[c + 1] = total % OCCUPIED
+    chunk = i // CHUNK
+    total = cells.before[chunk]
+    for c in range(chunk * CHUNK, i):
+        total += _weight(cells.count[c])
+    first, own = total % OCCUPIED, cells.count[i]
+    cells.first[i] = first
+    cells.box[i] = total // OCCUPIED
+    if own > 0:
+        cells.cell[total // OCCUPIED] = i
+    if i + 1 == cells.count.size:
+        cells.first[i + 1] = first + own
 
 
 def list_point(i, fate, cells):
@@ -360,14 +388,13 @@ def list_point(i, fate, cells):
     if fate[STATUS] > 0:
         return
     c = cells.number[i]
-    cells.order[cells.first[c] + taken(cells.count, c)] = i
+    cells.order[cells.first[c] + counted(cells.count, c, -1) - 1] = i
 
 
 def sort_cell(i, fate, ids, cells):
     """Sort the points of a cell by id."""
     if fate[STATUS] > 0:
         return
-    cells.count[i] = 0
     first, last = cells.first[i], cells.first[i + 1]
     for q in range(first + 1, last):
         p = cells.order[q]
@@ -378,6 +405,52 @@ def sort_cell(i, fate, ids, cells):
         cells.order[at] = p
 
 
+# --- order in memory --------------------------------------------------------------------------
+#
+# Threads side by side go through the points of cells side by side: what they read at once should
+# lie side by side, the first points of a warp's cells, then the second ones.
+
+
+def order_cell(i, fate, cells, come_from):
+    """Say where the points of a cell come to lie, and which come there."""
+    if fate[STATUS] > 0:
+        return
+    first, last = cells.first[i], cells.first[i + 1]
+    if first == last:
+        return
+    own = cells.box[i]
+    begin = own // WARP * WARP
+    end = min(begin + WARP, cells.box[cells.box.size - 1])  # no point has the last node first
+    start = cells.first[cells.cell[begin]]
+    for q in range(last - first):
+        at = start
+        for k in range(begin, end):
+            c = cells.cell[k]
+            count = cells.first[c + 1] - cells.first[c]
+            at += min(count, q)
+            if k < own and count > q:
+                at += 1
+        come_from[at] = cells.order[first + q]
+        cells.order[first + q] = at
+
+
+def take_rows(i, fate, rows, come_from, room):
+    """Copy the numbers of the point that comes to place `i`."""
+    if fate[STATUS] > 0:
+        return
+    p = index(come_from[i])
+    for k in range(rows.shape[0]):
+        room[k, i] = rows[k, p]
+
+
+def put_rows(i, fate, rows, room):
+    """Put numbers of a point where it comes to lie."""
+    if fate[STATUS] > 0:
+        return
+    for k in range(rows.shape[0]):
+        rows[k, i] = room[k, i]
+
+
 # --- nodes, and the clock ---------------------------------------------------------------------
 
 
@@ -385,8 +458,8 @@ def of_nodes(task: Any) -> Callable:
     """Make what a node does: a task, or what a function of the setup makes one."""
     made = task if callable(task) else shared(lambda s: task)
 
-    def visit_node(i, fate, s):
-        if fate[STATUS] > 0:
+    def visit_node(i, fate, s, use):
+        if fate[STATUS] > 0 or use[i] == 0:
             return
         at_node(made(s), s.kin, s.nodes, index(i), kick(s))
 
@@ -419,6 +492,7 @@ def finish_step(i, fate, s):
     """End a step: time goes on, and the size of the next is chosen."""
     if fate[STATUS] > 0:
         return
+    fate[DRIFT] += s.control.clock[0].move
     finish(s.control)
 
 

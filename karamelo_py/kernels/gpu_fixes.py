@@ -13,7 +13,7 @@ import numpy as np
 from karamelo_py.compiler.compile import index, real, shared
 from karamelo_py.compiler.fields import field, load_vector
 from karamelo_py.compiler.formula import ROWS, STACK
-from karamelo_py.compiler.gpu import raise_to, taken
+from karamelo_py.compiler.gpu import counted, raise_to
 from karamelo_py.compiler.lanes import room_for
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels import arrays, totals
@@ -130,7 +130,7 @@ def count_node(i, fate, nodes, hooks, h, heavy):
     if fate[STATUS] > 0:
         return
     if nodes.sums[_member(hooks, h, i), arrays.MASS] > 0:
-        taken(heavy, h)
+        counted(heavy, h, 1)
 
 
 @shared

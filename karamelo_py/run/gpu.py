@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.lib.stride_tricks import as_strided
 
 from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.fields import field
@@ -23,6 +24,7 @@ from karamelo_py.kernels.arrays import (
     Hooks,
     NoHooks,
     Setup,
+    arrays_of,
 )
 from karamelo_py.kernels.hook_loop import ACT, RUB
 from karamelo_py.kernels.hooks import HEAT_FUNCTION, NODE_FUNCTION, POINT_FUNCTION
@@ -35,6 +37,7 @@ from karamelo_py.points.laws import moves_as_told
 
 POLL = 64  # steps between two looks at how far a run is
 REGISTERS = 64  # numbers that a thread of a cell sums at once
+FAR = 1.0  # cells that points go before they are ordered anew in memory
 _NONE = NoHooks()
 
 
@@ -45,6 +48,15 @@ def arrays_in(thing: Any) -> Iterator[np.ndarray]:
     elif isinstance(thing, tuple):
         for item in thing:
             yield from arrays_in(item)
+
+
+def as_rows(image: np.ndarray) -> np.ndarray:
+    """The numbers of points, (..., n), as whole numbers (rows, n) of as many bytes."""
+    rows = int(np.prod(image.shape[:-1], dtype=int))
+    step = image.strides[-2] if image.ndim > 1 else 0
+    whole = {4: np.int32, 8: np.int64}[image.itemsize]
+    strides = (step, image.itemsize)
+    return as_strided(image.view(whole), (rows, image.shape[-1]), strides)
 
 
 @shared
@@ -67,11 +79,13 @@ class StepsOnCard:
     ):  # fmt: skip
         self.card, self.s, self.hooks, self.functions = card, s, hooks, functions
         self.images = Images(card)
-        self.fate = np.zeros(4)
+        self.fate = np.zeros(5)
         self.fate_there = self.images.of(self.fate)
         self.nodes = len(s.nodes.sums)
         own = [b.points.mass.size for b in s.blocks]
         self.cells = [self._cells(n) for n in own]
+        self.use = np.zeros(self.nodes, np.int8)
+        self.images.of(self.use)
         self._totals()
         rows = rows_of(scheme, visits)
         self._rooms(s, rows)
@@ -79,6 +93,8 @@ class StepsOnCard:
         self.step, self.last_step = self._steps(rows)
         self.end = self._launch(gpu.end_step, 1, s)
         self.before, self.behind = self._looks()
+        self.order = list(self._order())
+        self.ordered = -np.inf  # how far points had gone when they were ordered
 
     def _steps(self, rows: list) -> tuple[list[Launch], list[Launch]]:
         """What a step launches, and the last of several."""
@@ -94,16 +110,17 @@ class StepsOnCard:
     # --- rooms
 
     def _cells(self, points: int) -> gpu.Cells:
-        nodes, new = self.nodes, self.images.new
-        levels, count = [], nodes
-        while count > 1:
-            count = -(-count // gpu.CHUNK)
-            levels.append(count)
-        self.levels = levels or [1]
+        nodes, new, boxes = self.nodes, self.images.new, min(self.nodes, points) + 1
+        self.levels = [-(-nodes // gpu.CHUNK)]
+        while self.levels[-1] > gpu.CHUNK:
+            self.levels.append(-(-self.levels[-1] // gpu.CHUNK))
+        sums = (sum(self.levels),)
+        count = np.zeros(nodes, np.int32)
+        self.images.send([self.images.known(count)])
         return gpu.Cells(
-            new((nodes,), np.int64), new((points,), np.int64), new((nodes + 1,), np.int64),
-            new((nodes,), np.int64), new((points,), np.int64), new((sum(self.levels),), np.int64),
-            np.zeros((0, 0)),
+            count, new((points,), np.int32), new((nodes + 1,), np.int32),
+            new((nodes,), np.int32), new((boxes,), np.int32), new((points,), np.int32),
+            new(sums, np.int64), new(sums, np.int64), np.zeros((0, 0)),
         )  # fmt: skip
 
     def _totals(self) -> None:
@@ -120,9 +137,8 @@ class StepsOnCard:
         stages = [self._stage(row) for row in rows if isinstance(row, table.Sweep)]
         most = max((len(stage.columns) * stage.support for stage in stages), default=0)
         made = []
-        for cells, block in zip(self.cells, s.blocks, strict=True):
-            boxes = min(self.nodes, block.points.mass.size)
-            room = self.images.new((most, max(boxes, 1)), s.nodes.sums.dtype)
+        for cells in self.cells:
+            room = self.images.new((most, cells.cell.size), s.nodes.sums.dtype)
             made.append(cells._replace(boxes=room))
         self.cells = made
 
@@ -147,7 +163,8 @@ class StepsOnCard:
             if isinstance(row, table.Sweep):
                 found += self._visit(row, ahead)
             elif isinstance(row, table.NodeTask):
-                found.append(self._launch(gpu.of_nodes(row.task), self.nodes, self.s))
+                visit = gpu.of_nodes(row.task)
+                found.append(self._launch(visit, self.nodes, self.s, self.use))
             elif isinstance(row, table.AtNodes):
                 found += self._hooks_on_nodes(row.stage, row.target)
             elif isinstance(row, table.AtPoints):
@@ -193,22 +210,35 @@ class StepsOnCard:
         for k, (block, cells, _) in enumerate(pairs):
             for scatter in functions:
                 yield self._launch(scatter, self.nodes, s, block, cells)
-            yield self._launch(stage.sum(k == 0), self.nodes, s, block, cells)
+            yield self._launch(stage.sum(k == 0), self.nodes, s, block, cells, self.use)
 
     def _lists(self, block: Any, cells: gpu.Cells) -> Iterator[Launch]:
         levels = self.levels
         begins = [0, *np.cumsum(levels).tolist()]
         yield self._launch(gpu.sum_counts, levels[0], cells)
-        steps = [(begins[k], levels[k], begins[k + 1]) for k in range(len(levels) - 1)]
-        for k, (begin, count, above) in enumerate(steps):
-            yield self._launch(gpu.sum_sums, levels[k + 1], cells.sums, begin, count, above)
+        for k in range(len(levels) - 1):
+            rest = (begins[k], levels[k], begins[k + 1])
+            yield self._launch(gpu.sum_sums, levels[k + 1], cells, *rest)
         for k in reversed(range(len(levels))):
             above = begins[k + 1] if k + 1 < len(levels) else -1
-            threads = -(-levels[k] // gpu.CHUNK)
-            yield self._launch(gpu.spread_sums, threads, cells.sums, begins[k], levels[k], above)
-        yield self._launch(gpu.spread_counts, levels[0], cells)
+            yield self._launch(gpu.sum_before, levels[k], cells, begins[k], above)
+        yield self._launch(gpu.place_list, self.nodes, cells)
         yield self._launch(gpu.list_point, block.points.mass.size, cells)
         yield self._launch(gpu.sort_cell, self.nodes, block.points.id, cells)
+
+    def _order(self) -> Iterator[Launch]:
+        """Bring points into the order in which threads go through them."""
+        for block, cells in zip(self.s.blocks, self.cells, strict=True):
+            size = block.points.mass.size
+            come_from = self.images.new((size,), np.int32)
+            yield self._launch(gpu.order_cell, self.nodes, cells, come_from)
+            arrays = [as_rows(self.images.of(array)) for _, array in arrays_of(block.points)]
+            most = max(rows.nbytes for rows in arrays)
+            room = self.images.new((most // 4,), np.int32)
+            for rows in arrays:
+                own = room.view(rows.dtype)[: rows.size].reshape(rows.shape)
+                yield self._launch(gpu.take_rows, size, rows, come_from, own)
+                yield self._launch(gpu.put_rows, size, rows, own)
 
     # --- hooks of fixes
 
@@ -347,7 +377,9 @@ class StepsOnCard:
 
     def send(self) -> None:
         """Copy the state of the scene to the card."""
-        self.images.send(arrays_in((self.s, self.hooks)))
+        self.use[:] = 2  # what nodes show is unknown
+        self.images.send([*arrays_in((self.s, self.hooks)), self.use])
+        self.ordered = -np.inf
 
     def fetch(self) -> None:
         """Copy it back."""
@@ -357,11 +389,12 @@ class StepsOnCard:
         """Take up to `count` steps; DONE, or why they ended."""
         control = self.s.control
         exchanged = [self.fate, control.clock, control.values, control.totals]
-        self.fate[:] = 0
+        self.fate[: gpu.DRIFT] = 0
         self.images.send(exchanged)
         begun, watched = int(control.values[TIMESTEP]), control.clock[0].watch_energy
         for launch in self.begin:
             launch()
+        self._order_if_due()
         for n in range(count):
             for launch in self.step if n + 1 < count else self.last_step:
                 launch()
@@ -374,6 +407,16 @@ class StepsOnCard:
                 self.images.fetch([self.fate])
                 if self.fate[gpu.STATUS] > 0:
                     break
+                if n + 1 < count:
+                    self._order_if_due()
         self.images.fetch(exchanged)
         status = self.fate[gpu.STATUS]
         return int(status) - 1 if status > 0 else DONE
+
+    def _order_if_due(self) -> None:
+        """Order points in memory, once some have gone far since that was done last."""
+        gone = self.fate[gpu.DRIFT]
+        if gone - self.ordered > FAR:
+            self.ordered = gone
+            for launch in self.order:
+                launch()
