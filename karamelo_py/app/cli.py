@@ -50,8 +50,8 @@ karamelo-py help FAMILY STYLE    where a name means several things:
 karamelo-py help WORD            find a style by a word: karamelo-py help contact
 karamelo-py styles [FAMILY]      list commands and styles"""
 USAGE = """\
-karamelo-py SCRIPT [-var NAME VALUE] [--threads N] [--ranks N] [-log FILE]
-                          [-out FOLDER] [-restart FILE] [--live]
+karamelo-py SCRIPT [-var NAME VALUE] [--threads N] [--ranks N] [--gpu]
+                          [-log FILE] [-out FOLDER] [-restart FILE] [--live]
                           [--trust-geometries] [--quiet] [--debug]
        karamelo-py COMMAND ..."""
 RESTART = ("-restart", "--restart")
@@ -261,6 +261,10 @@ def _parser(command: str) -> tuple[CommandLine, Any]:
             help="processes (MPI) that share the scene; --threads is per process",
         )  # fmt: skip
         script.add_argument(
+            "--gpu", action="store_true",
+            help="let an NVIDIA GPU take the steps (pip install 'karamelo-py[gpu]')",
+        )  # fmt: skip
+        script.add_argument(
             "--trust-geometries", action="store_true",
             help="let .geo files run programs and write files",
         )  # fmt: skip
@@ -330,6 +334,7 @@ def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = 
     with leaving_at_once():
         from karamelo_py.language.interpreter import Interpreter
         from karamelo_py.output.console import Console
+        from karamelo_py.run.lower.card import use_card
         from karamelo_py.run.runner import Interrupted
         from karamelo_py.scene.hub import Hub
     begun()
@@ -341,6 +346,8 @@ def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = 
     hub.settings.debug = options.debug
     hub.settings.trusts = options.trust_geometries
     hub.checking = options.checking
+    if options.gpu:
+        use_card(hub)
     _direct(hub, options)
     page = _live_page(hub, script) if not options.checking and options.live else None
     presets = dict(options.var)

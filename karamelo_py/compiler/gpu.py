@@ -7,6 +7,7 @@ one thread after another: what is written for a card is tested without one.
 
 import ctypes
 import hashlib
+import os
 from collections.abc import Callable, Iterable
 from itertools import pairwise
 from pathlib import Path
@@ -19,6 +20,7 @@ from numba import types
 
 from karamelo_py.compiler import code, machine
 from karamelo_py.compiler.argument_buffer import ArgumentBuffer, plan_for
+from karamelo_py.compiler.choices import INTERPRETED
 from karamelo_py.compiler.code import I32, I64
 from karamelo_py.compiler.compile import implements, shared
 from karamelo_py.compiler.held import HeldTuple, item_of
@@ -68,9 +70,13 @@ def _largest(array, i, value):
     return types.none(array, types.int64, types.float64), codegen
 
 
-@shared
 def raise_to(array: np.ndarray, i: int, value: float) -> None:
     """Make a double of an array, not below 0, the larger of it and `value`; others may, too."""
+    array[i] = max(array[i], value)
+
+
+@implements(raise_to)
+def _raise_to(array, i, value):
     if value > array[i]:
         _largest(array, i, value)
 
@@ -217,8 +223,12 @@ class Emulator:
         return self._entries[name]
 
     def launch(self, entry: Callable, arguments: int, count: int, threads: int = THREADS) -> None:
-        """Do the work of `count` threads."""
-        entry(arguments, count)
+        """Do the work of `count` threads; of a function of Python where nothing is compiled."""
+        if not INTERPRETED:
+            entry(arguments, count)
+            return
+        for i in range(count):
+            entry(i, *arguments)
 
     def wait(self) -> None:
         """Wait for all launches."""
@@ -334,6 +344,11 @@ class Card:
         return found
 
 
+def card() -> Card | Emulator:
+    """Give the GPU of this machine, or what KARAMELO_PY_GPU=emulated puts in its place."""
+    return Emulator() if os.environ.get("KARAMELO_PY_GPU") == "emulated" else Card()
+
+
 # --- arrays on a card -------------------------------------------------------------------------
 
 
@@ -438,6 +453,9 @@ class Launch:
     ):  # fmt: skip
         self.card, self.count, self.name = images.card, count, function.__name__
         own = images.of(arguments)
+        if INTERPRETED:
+            self.entry, self.at = function, own
+            return
         plan = plan_for(own)
         self.entry = self.card.compiled(function, plan.types, called)
         self._arguments = images._room(max(plan.text.size, 1))

@@ -42,6 +42,7 @@ from karamelo_py.points.basis.product import digits, node_number
 from karamelo_py.points.grid import inside
 
 MOVED, RATE, WRONG, STATUS, DRIFT = range(5)  # of `fate`; 0: it goes on, else 1 + a status of steps
+BEHIND = 2.0**53  # all numbers of points
 CHUNK = 64  # items that one thread adds up
 WARP = 32  # threads that read memory at once
 OCCUPIED = 1 << 40  # in the sums of `Cells.sums`: a cell with points, beside their number
@@ -86,13 +87,19 @@ def _entry_in_cell(basis, kin, grid, stencil, k):
 
 
 @shared
-def _report(fate, i, moved, rate, stride):
+def goes_wrong(fate, number):
+    """Note the number of a point that goes wrong: the lowest stays."""
+    raise_to(fate, WRONG, BEHIND - float(number))
+
+
+@shared
+def _report(fate, number, moved, rate, stride):
     """Note how a point fared; so written, NaN counts as wrong."""
     if (moved <= stride) & (rate < 1e300):
         raise_to(fate, MOVED, float(moved))
         raise_to(fate, RATE, float(rate))
     else:
-        raise_to(fate, WRONG, i + 1.0)
+        goes_wrong(fate, number)
 
 
 @shared
@@ -142,7 +149,7 @@ class Stage:
             found = gathered_by(OneByOne(), tasks, w, stencil, position_of(w, p))
             fastest = real(fate[RATE], c.dt)
             moved, rate = updated_all(tasks, w, stencil, p, c.dt, found, fastest)
-            _report(fate, i, moved, rate, c.stride)
+            _report(fate, points.id[p], moved, rate, c.stride)
 
         return gather_point
 
@@ -176,7 +183,7 @@ class Stage:
             else:
                 cells.number[p] = 0  # of a run that ends here
                 counted(cells.count, 0, 1)
-                raise_to(fate, WRONG, i + 1.0)
+                goes_wrong(fate, points.id[p])
 
         return count_point
 

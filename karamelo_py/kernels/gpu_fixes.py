@@ -19,7 +19,7 @@ from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels import arrays, totals
 from karamelo_py.kernels.arrays import TIMESTEP, known_to_laws, with_items_of
 from karamelo_py.kernels.clock import kick, step_size
-from karamelo_py.kernels.gpu import MOVED, STATUS, WRONG, is_last
+from karamelo_py.kernels.gpu import MOVED, STATUS, goes_wrong, is_last
 from karamelo_py.kernels.hook_loop import (
     ACT,
     LOADS,
@@ -257,7 +257,7 @@ def check_point(i, fate, s, block):
     if cells <= clock.stride and (inside(grid, s.kin, y) or not s.frame.moves):
         raise_to(fate, MOVED, cells)
     else:
-        raise_to(fate, WRONG, i + 1.0)
+        goes_wrong(fate, points.id[i])
 
 
 def take_moves(i, fate, s):

@@ -50,6 +50,12 @@ def arrays_in(thing: Any) -> Iterator[np.ndarray]:
             yield from arrays_in(item)
 
 
+def there(s: Setup) -> Setup:
+    """What of a setup is on a card: no tiles, and the nodes in the place of their boxes."""
+    blocks = tuple(block._replace(tiling=()) for block in s.blocks)
+    return s._replace(blocks=blocks, buffers=s.buffers._replace(nodes=s.nodes))
+
+
 def as_rows(image: np.ndarray) -> np.ndarray:
     """The numbers of points, (..., n), as whole numbers (rows, n) of as many bytes."""
     rows = int(np.prod(image.shape[:-1], dtype=int))
@@ -77,7 +83,7 @@ class StepsOnCard:
         self, card: Any, s: Setup, scheme: Any, visits: type, hooks: Hooks | NoHooks = _NONE,
         functions: Sequence[Callable] = (),
     ):  # fmt: skip
-        self.card, self.s, self.hooks, self.functions = card, s, hooks, functions
+        self.card, self.s, self.hooks, self.functions = card, (s := there(s)), hooks, functions
         self.images = Images(card)
         self.fate = np.zeros(5)
         self.fate_there = self.images.of(self.fate)
@@ -384,6 +390,11 @@ class StepsOnCard:
     def fetch(self) -> None:
         """Copy it back."""
         self.images.fetch(arrays_in(self.s))
+
+    @property
+    def wrong(self) -> int:
+        """Number of the first of the points that went wrong."""
+        return int(gpu.BEHIND - self.fate[gpu.WRONG])
 
     def advance(self, count: int) -> int:
         """Take up to `count` steps; DONE, or why they ended."""

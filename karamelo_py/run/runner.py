@@ -368,6 +368,7 @@ class Runner:
                 **({} if simulation.implicit else of_waves),
                 **of_energy,
                 **({"processes": processes} if simulation.comm.size > 1 else {}),
+                **({"gpu": hub.settings.card.name} if hub.settings.card else {}),
                 "threads": simulation.threads,
                 "precision": hub.settings.precision,
                 **({"units": str(hub.output.units)} if hub.output.units else {}),

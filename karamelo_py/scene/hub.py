@@ -91,6 +91,7 @@ class Settings:
         self.threads: int | None = None
         self.precision = "double"
         self.engine = "processor"
+        self.card: Any = None  # the GPU that takes the steps of the engine of that name
         self.ranks = 1  # processes that are asked for
         self.comm = SerialComm()  # the processes that share the scene
         self.debug = False

@@ -4,6 +4,7 @@ import operator
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+import numpy as np
 from llvmlite import ir
 from numba import types
 
@@ -85,12 +86,17 @@ def spread(tag, value):
     return lanes(tag, value), lambda builder, _, number: splat(builder, number, lanes)
 
 
-@intrinsic
 def room_for(points, numbers):
     """An array (components, points) for a while, for such numbers of so many points.
 
     It lies where a function keeps its variables, and is gone with it.
     """
+    return np.zeros((len(numbers), points), np.asarray(numbers[0]).dtype)
+
+
+@implements(room_for)
+@intrinsic
+def _room_for(points, numbers):
     if not isinstance(points, types.IntegerLiteral):
         return None
     array = types.Array(numbers[0], 2, "C")

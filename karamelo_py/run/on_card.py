@@ -1,0 +1,144 @@
+"""Simulation whose steps a GPU takes: arrays go there when they changed, and come back late."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.compiler.loops import compilation
+from karamelo_py.kernels.arrays import Setup
+from karamelo_py.kernels.step import DONE, STOPPED
+from karamelo_py.run.gpu import StepsOnCard, arrays_in, there
+from karamelo_py.run.lower.card import refuse
+from karamelo_py.run.simulation import Simulation
+
+
+class SimulationOnCard(Simulation):
+    """Take the steps of a scene on a GPU; all else is done here, on what the steps have left.
+
+    `setup` brings the arrays back where steps have been taken since. What changes them here says so
+    by `changed` or `sort`; they are sent again before the next steps. The order of the points is
+    that of the card then, and tiles know nothing of it: who needs these sorts first.
+    """
+
+    _steps: StepsOnCard | None = None
+    _known: Sequence = ()  # the arrays and hooks that these are for
+    _ahead = False  # steps on the card are not in the arrays here
+    _sent = False  # the card has what the arrays here show
+
+    @property
+    def setup(self) -> Setup:
+        """The arrays, as the last step has left them."""
+        self._fetch()
+        return self._setup
+
+    @setup.setter
+    def setup(self, setup: Setup) -> None:
+        self._setup, self._sent = setup, False
+
+    @property
+    def kin(self) -> Any:
+        return self._setup.kin
+
+    def _fetch(self) -> None:
+        """Bring the arrays back, unless they are as the last step has left them."""
+        if self._ahead:
+            self._ahead = False
+            self._steps.fetch()
+            self.control.clock[0].drift = np.inf  # tiles know nothing of these steps
+
+    # --- changes here
+
+    def changed(self) -> None:
+        self._sent = False
+        super().changed()
+
+    def sort(self) -> None:
+        super().sort()
+        self._sent = False
+
+    def clear_forces(self) -> None:
+        super().clear_forces()
+        self._sent = False
+
+    def restore(self, snapshot: dict[str, np.ndarray]) -> None:
+        self._ahead = False  # what the card has is of no use any more
+        super().restore(snapshot)
+
+    def show_on_nodes(self) -> None:
+        # Which nodes are in use is known of sorted points.
+        self._fetch()
+        self.sort_if_due()
+        super().show_on_nodes()
+
+    # --- sums by tile, of points that are sorted
+
+    def energy(self) -> float:
+        self._sort_for_sums()
+        return super().energy()
+
+    def _begin_to_look(self, level: float, anew: bool) -> None:
+        self._sort_for_sums()
+        super()._begin_to_look(level, anew)
+
+    def _sort_for_sums(self) -> None:
+        self._fetch()
+        self.sort_if_due()
+        self._sent = False  # the work of forces is taken from the points
+
+    # --- steps
+
+    def _make_ready(self) -> None:
+        refuse(self.hub, self._setup)
+        super()._make_ready()
+
+    def compile(self) -> None:
+        """Have all that threads do compiled now, and room for the arrays on the card."""
+        self._launches()
+
+    def _launches(self) -> StepsOnCard:
+        """Give the steps for the arrays and hooks as they are."""
+        steps, hooks = self._steps, self.hooks
+        known = [type(self.visits), *map(id, arrays_in((there(self._setup), hooks)))]
+        if steps is None or known != self._known:
+            self._fetch()
+            if steps is not None:
+                steps.images.close()
+            card, scheme = self.hub.settings.card, type(self.hub.update.scheme)
+            hooks = self.hooks, self.python.functions
+            with compilation("steps on a GPU"):
+                steps = StepsOnCard(card, self._setup, scheme, type(self.visits), *hooks)
+            self._steps, self._known, self._sent = steps, known, False
+        return steps
+
+    def _advance_to(self, target: int) -> int:
+        if self._first is not None:
+            # Fixes of the first step act in it from Python.
+            self._sent = False
+            status = super()._advance_to(self.step + 1)
+            if status != DONE or self.step >= target:
+                return status
+        if self._ends(target):
+            return DONE
+        steps = self._launches()
+        if not self._sent:
+            self._fetch()
+            steps.send()
+            self._sent = True
+        status = steps.advance(target - self.step)
+        self._ahead = self.mapped = True
+        if status == STOPPED:
+            self._report(steps.wrong)
+        return status
+
+    def _ends(self, target: int) -> bool:
+        return self.step >= target or self.time >= self.control.clock[0].end_time
+
+    def _report(self, number: int) -> None:
+        """Let the reports of tiles show the point that went wrong, where others look for it."""
+        for block in self.setup.blocks:
+            report = block.tiling.report
+            report[:, 2] = 0
+            report[0, 2] = 1 + np.argmax(here) if (here := block.points.id == number).any() else 0
