@@ -339,7 +339,7 @@ def _with_cell(cells, c, k, count, found):
 @shared
 def _weight(number):
     """Return a count with a mark of cells that have points."""
-    return number + (OCCUPIED if number > 0 else 0)
+    return int(number) + (OCCUPIED if number > 0 else 0)
 
 
 def sum_counts(i, fate, cells):
