@@ -1,5 +1,6 @@
 """karamelo-py view and plot, and where the files of a run go: what a person does after a run."""
 
+import io
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -7,6 +8,7 @@ import numpy as np
 import pytest
 from charts import faults
 from fakes import FakeHub
+from hubs import SmallHub
 from PIL import Image
 from scenes import block
 
@@ -19,6 +21,7 @@ from karamelo_py.output.rhythm import ByTime
 from karamelo_py.output.snapshots import Snapshot, read
 from karamelo_py.styles.dumps.hdf5 import Hdf5
 from karamelo_py.styles.dumps.lammps import Particle, ParticleGz
+from karamelo_py.styles.dumps.pyplot import PyPlot
 from karamelo_py.styles.dumps.vtk import Vtk
 
 FORMS = {"p.dump": Particle, "p.dump.gz": ParticleGz, "p.h5": Hdf5, "p.*.vtu": Vtk}
@@ -241,6 +244,7 @@ LOOKS = {
     "letters": ('label="stress (Pa)", fontsize=14, dpi=200', {"label": "stress (Pa)",
                 "fontsize": "14", "dpi": "200"}),
     "points": ("pointsize=1.4", {"pointsize": "1.4"}),
+    "outlines": ("outlines=true", {"outlines": "true"}),
 }  # fmt: skip
 
 
@@ -278,6 +282,58 @@ def test_one_point_does_not_take_all_colours(hub):
     columns = {"id": np.arange(100), "x": x, "y": x, "z": 0 * x, "seq": np.append(x[:-1], 1e3)}
     picture.show(Snapshot(0, 0.0, columns, domain.lo, domain.hi), 0.01, "")
     assert picture.limits[1] < 1.5 and picture.beyond == (False, True)
+
+
+@pytest.mark.parametrize(("stretch", "size"), [(1.0, 0.05), (1.5, 0.05), (1.0, 0.02)])
+def test_outlines_are_where_bodies_end(stretch, size):
+    """A block of points, as it is and stretched to 1.5 and 1/1.5: within half a point.
+
+    Corners are cut: the line goes through nodes that are two points apart.
+    """
+    own = np.arange(size / 2, 1, size)
+    x = np.stack(np.meshgrid(own * stretch, own / stretch), -1).reshape(-1, 2)
+    (line,) = pictures.outlines(x)
+    ends = np.array([stretch, 1 / stretch])
+    outside = np.maximum(-line, line - ends).max(axis=1)
+    far = (np.minimum(line, ends - line) > 4 * size).any(axis=1)  # from the corners
+    assert abs(outside[far]).max() < size / 2
+    (x, y), (right, up) = line[:-1].T, line[1:].T
+    assert abs(np.sum(x * up - right * y)) / 2 == pytest.approx(1.0, abs=size)
+
+
+def test_outlines_show_solids_and_tools():
+    """Two disks have two circles; a moved region, a ball, a wedge and a wall have lines."""
+    hub = SmallHub(2, 0, 1, 0.02)
+    hub.interpreter.run_text(
+        """
+        region(left, cylinder, 0.2, 0.2, 0.1)
+        region(right, cylinder, 0.8, 0.2, 0.15)
+        region(tool, block, 0.1, 0.3, 0.7, 0.9)
+        solid(a, region, left, 2, steel, 0.02)
+        solid(b, region, right, 2, steel, 0.02)
+        fix(press, contact/surface, all, tool, 0, 0.1 + time, 0)
+        fix(ball, indent, all, sphere, 1e4, 0.1, 0.7, 0.8, 0)
+        fix(wedge, cuttingtool, all, 1, 0.5, 0.5, 0, 0, 0, 0, 0.4, 0.6, 0.6, 0.6)
+        fix(wall, impenetrablesurface, all, 1, 0, 0.05, 0, 0, 1, 0)
+        """
+    )
+    dump = PyPlot(hub, 1, "p.png", 300, 300, outlines=True)
+    dump.draw(io.BytesIO())
+    lines = dump._picture.marks.lines.get_segments()
+    boxes = sorted([*line.min(axis=0), *line.max(axis=0)] for line in lines)
+    assert boxes == [
+        pytest.approx(box, abs=0.01)  # half a cell
+        for box in (
+            [0, 0.05, 1, 0.05], [0, 0.5, 1, 1], [0.1, 0.1, 0.3, 0.3],
+            [0.2, 0.7, 0.4, 0.9], [0.6, 0.7, 0.8, 0.9], [0.65, 0.05, 0.95, 0.35],
+        )
+    ]  # fmt: skip
+
+
+def test_outlines_are_of_the_plane(run_interpreted):
+    text = block(3, "dump(d, all, pyplot, 10, p.png, 300, 300, outlines=true)", "run(1)")
+    err = run_interpreted(text, status=1).err
+    assert "outlines are drawn in the plane, and this scene has 3 dimensions" in err
 
 
 def test_a_logarithm_is_shown_by_its_number():

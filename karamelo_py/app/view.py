@@ -36,7 +36,6 @@ Draw pictures or a movie of dumps of points.
 Files are those of dump particle, particle/gz, hdf5 and vtk (its .pvd). The pictures are those of
 dump pyplot, and so are the options that say how they look."""
 DPI = 100
-SAMPLE = 400  # points whose nearest neighbours are looked for
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -185,7 +184,7 @@ def _picture(
     types = np.unique(first.columns["type"]).astype(int) if column == "type" else []
     words = {name: value for name, value in look.items() if name not in ("only", "title", "dpi")}
     words["window"] = tuple((words.pop(f"{x}min"), words.pop(f"{x}max")) for x in "xyz")
-    made_look = {"label": column} | look_of(column, **words)
+    made_look = {"label": column} | look_of(column, dimension, **words)
     solids = tuple(f"solid {k}" for k in range(1, max(types, default=0) + 1))
     lo, hi, span = _all(files, column, look["only"])
     domain = SimpleNamespace(dimension=dimension, lo=lo, hi=hi)
@@ -195,7 +194,7 @@ def _picture(
     )
     if not made_look["log"] and not made_look["quantile"]:
         made.begin_with(span)
-    made.side = _side(np.column_stack([first.columns[name] for name in "xyz"]))
+    made.side = pictures.spacing(np.column_stack([first.columns[name] for name in "xyz"]))
     return made
 
 
@@ -214,16 +213,3 @@ def _all(
         ends += [values.min(), values.max()] if len(values) else []
     lo, hi = zip(*corners, strict=True)
     return np.min(lo, axis=0), np.max(hi, axis=0), grown(None, np.array(ends)) if ends else None
-
-
-def _side(x: np.ndarray) -> float:
-    """Measure the distance of points from their nearest neighbours."""
-    if len(x) < 2:
-        return 0.0
-    chosen: Iterable[int] = np.linspace(0, len(x) - 1, min(SAMPLE, len(x))).astype(int)
-    nearest_ones = []
-    for k in chosen:
-        square = ((x - x[k]) ** 2).sum(axis=1)
-        square[k] = np.inf
-        nearest_ones.append(square.min())
-    return float(np.sqrt(np.median(nearest_ones)))

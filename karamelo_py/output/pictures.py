@@ -11,10 +11,12 @@ from types import SimpleNamespace
 from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
+from contourpy import contour_generator
 from matplotlib import colormaps
 from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
+from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize, to_rgba_array
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -30,6 +32,7 @@ SOLIDS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0
 MOST_IN_LEGEND = 16
 MARGIN = 4  # pixels at both sides of a long title
 MARKS = 1 << 16  # points that are drawn together
+FINE = 300  # steps along the longest side at which the outline of a tool is looked for
 # A circle of this diameter has the area of a unit square.
 ROUND = np.sqrt(4 / np.pi)
 STEPS = (1, 2, 2.5, 5, 10)  # between ticks
@@ -37,6 +40,7 @@ STEPS = (1, 2, 2.5, 5, 10)  # between ticks
 LIGHT = np.array([-0.35, 0.6, 0.72])
 AMBIENT = 0.5  # light from all sides
 LIT = 8  # points, from which on they have a surface
+SAMPLE = 400  # points whose nearest neighbours are looked for
 
 
 class Options(NamedTuple):
@@ -57,6 +61,7 @@ class Options(NamedTuple):
     quantile: float = 0.0  # share of the values, at each end, for which limits do not grow
     fontsize: float = 9.0
     pointsize: float = 1.0  # of points, over that of the material they stand for
+    outlines: bool = False  # of solids and tools, in the plane
 
 
 class DrawnPoints(Artist):
@@ -66,6 +71,9 @@ class DrawnPoints(Artist):
         super().__init__()
         self.picture = picture
         self.rows = np.empty((3, 0))  # places on paper, a value, and the cell where there is light
+        self.lines = LineCollection([], colors="black", linewidths=0.1 * picture.options.fontsize)
+        picture.axes.add_collection(self.lines, autolim=False)
+        self.lines.set_visible(False)
         self.set_zorder(picture.artist.get_zorder())
         picture.artist.set_visible(False)  # but when this draws
 
@@ -79,6 +87,9 @@ class DrawnPoints(Artist):
             self.picture.place(self.rows[:, first : first + MARKS])
             artist.draw(renderer)
         artist.set_visible(False)
+        self.lines.set_visible(True)
+        self.lines.draw(renderer)
+        self.lines.set_visible(False)
 
 
 class Picture:
@@ -145,8 +156,13 @@ class Picture:
             handles=dots, loc="outside right upper", frameon=False, fontsize=self.small
         )
 
-    def show(self, snapshot: Snapshot, side: float, title: str) -> None:
-        """Set the points and the title to draw; `side` is the length of a typical point."""
+    def show(
+        self, snapshot: Snapshot, side: float, title: str, tools: Sequence[Callable] = ()
+    ) -> None:
+        """Set the points and the title to draw; `side` is the length of a typical point.
+
+        `tools` give the depth (n,) of points in what is outlined beside the solids.
+        """
         if not self._laid_out:
             self._lay_out()
         columns = snapshot.columns
@@ -174,6 +190,20 @@ class Picture:
         values = np.where(values == -np.inf, self.limits[0], values) if self.limits else values
         x = np.column_stack([columns[name] for name in "xyz"])
         self.marks.rows = self._rows(columns["id"], x, values, side)
+        if self.options.outlines:
+            lines = [line for tool in tools for line in self._around(tool)]
+            for kind in np.unique(columns["type"]):
+                lines += outlines(x[columns["type"] == kind, :2])
+            self.marks.lines.set_segments(lines)
+
+    def _around(self, tool: Callable) -> list[np.ndarray]:
+        """Outlines (m, 2) of a tool in the plane, where its depth is 0."""
+        (left, right), (low, high) = self.axes.get_xlim(), self.axes.get_ylim()
+        step = max(right - left, high - low) / FINE
+        x, y = np.arange(left, right + step, step), np.arange(low, high + step, step)
+        places = np.stack(np.meshgrid(x, y), axis=-1)
+        depth = tool(SimpleNamespace(position=places.reshape(-1, 2))).reshape(places.shape[:2])
+        return contour_generator(x, y, depth).lines(0.0)
 
     def _entitle(self, text: str) -> None:
         """Write the title above the axes, and where that is too narrow within the picture."""
@@ -281,6 +311,40 @@ def grown(limits: tuple[float, float] | None, values: np.ndarray) -> tuple[float
     unit = 2.0 ** (np.ceil(np.log2(span)) - 3)
     lo, hi = np.floor(lo / unit) * unit, np.ceil(hi / unit) * unit
     return float(lo), float(hi if hi > lo else lo + unit)
+
+
+def outlines(x: np.ndarray) -> list[np.ndarray]:
+    """Lines (m, 2) where half of the material of points x (n, 2) ends.
+
+    Each point is shared out to the nearest nodes of cells of twice its size: a node within a body
+    gets four of them, one at its surface two.
+    """
+    cell = 2 * spacing(x, 4)
+    if not cell > 0:
+        return []
+    lo = x.min(axis=0) - 2 * cell
+    at = (x - lo) / cell
+    filled = np.zeros((at.max(axis=0) + 3).astype(int))
+    nodes = [at.astype(int) + corner for corner in product((0, 1), repeat=2)]
+    shares = [np.prod(1 - abs(at - node), axis=1) for node in nodes]
+    for node, share in zip(nodes, shares, strict=True):
+        np.add.at(filled, tuple(node.T), share)
+    # Points that have come closer to each other end where the others do.
+    within = sum(filled[*node.T] * share for node, share in zip(nodes, shares, strict=True))
+    full = np.median(within)
+    across, up = (low + cell * np.arange(n) for low, n in zip(lo, filled.shape, strict=True))
+    return contour_generator(across, up, np.minimum(filled.T, full)).lines(full / 2)
+
+
+def spacing(x: np.ndarray, count: int = 1) -> float:
+    """Measure the distance of points (n, d) from their nearest neighbours, the mean of `count`."""
+    if len(x) <= count:
+        return 0.0
+    near = []
+    for k in np.linspace(0, len(x) - 1, min(SAMPLE, len(x))).astype(int):
+        square = ((x - x[k]) ** 2).sum(axis=1)
+        near.append(np.sqrt(np.partition(square, count)[1 : count + 1]).mean())
+    return float(np.median(near))
 
 
 def _zoomed(domain: Any, window: Sequence[tuple[float | None, float | None]]) -> Any:

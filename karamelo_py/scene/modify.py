@@ -99,6 +99,7 @@ class Fix(Publisher):
     impulsive = False  # undoes a penetration within one step
     leads_points = False  # against their forces
     follows_points = False  # pushes points by where they are, as tools do
+    depth_of: Any = None  # of points in a tool: (n,), which pictures outline
     accelerates = False  # its formulas are forces per mass, as of weight
     acts_last = False  # after all others at each moment, wherever the script has it
     # Its hooks in Python bring no energy: what they do to points and nodes stores it, passes it on

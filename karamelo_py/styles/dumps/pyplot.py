@@ -82,6 +82,9 @@ class PyPlot(Dump):
         Size of letters in points.
     pointsize
         Size of the points over that of the material they stand for; 1.4 fills all gaps.
+    outlines
+        true: in the plane, a line around each solid, and around the regions and rigid tools of
+        fixes, such as contact/surface.
 
     Example
     -------
@@ -125,6 +128,7 @@ class PyPlot(Dump):
         dpi: Annotated[int, In(20, 2400)] = DPI,
         fontsize: Annotated[float, In(1, 100)] = 9.0,
         pointsize: Annotated[float, Positive] = 1.0,
+        outlines: bool = False,
     ):
         if field is not None:
             check_columns([field], hub.fields.particle_names(), first=4)
@@ -136,9 +140,10 @@ class PyPlot(Dump):
         self.field, self.title, self.only, self.dpi = field, title, only, dpi
         self.look = look_of(
             field or "vx",
+            hub.domain.dimension,
             vmin=vmin, vmax=vmax, cmap=cmap, azimuth=azimuth, elevation=elevation, axes=axes,
             label=label, window=((xmin, xmax), (ymin, ymax), (zmin, zmax)), scale=scale,
-            quantile=quantile, fontsize=fontsize, pointsize=pointsize,
+            quantile=quantile, fontsize=fontsize, pointsize=pointsize, outlines=outlines,
         )  # fmt: skip
         self.limits = self.look["limits"]
         self._picture: Any = None
@@ -192,7 +197,9 @@ class PyPlot(Dump):
         if self.title:
             title = f"{self.title}: {title}"
         snapshot = self.snapshot()
-        self._picture.show(snapshot, self.side(snapshot), title)
+        fixes = self.hub.fixes.values() if self.look["outlines"] else ()
+        tools = [fix.depth_of for fix in fixes if fix.depth_of is not None]
+        self._picture.show(snapshot, self.side(snapshot), title, tools)
 
     def _make(self) -> Any:
         # Matplotlib takes a third of a second to import: only scenes with pictures pay it.
@@ -214,7 +221,7 @@ class PyPlot(Dump):
     def snapshot(self) -> Snapshot:
         """Take what a picture needs of all points, some of them after others."""
         label, domain, update = self._label(), self.hub.domain, self.hub.update
-        names = dict.fromkeys(["id", "x", "y", "z", "volume", label])
+        names = dict.fromkeys(["id", "type", "x", "y", "z", "volume", label])
         tables = self.hub.fields.pieces(to_first=True)
         pieces = [self._chosen(table, names) for table in tables]
         columns = dict(zip(names, map(np.concatenate, zip(*pieces, strict=True)), strict=True))
@@ -247,6 +254,7 @@ class PyPlot(Dump):
 
 def look_of(
     column: str,
+    dimension: int,
     *,
     vmin: float | None,
     vmax: float | None,
@@ -254,6 +262,7 @@ def look_of(
     label: str | None,
     window: tuple[tuple[float | None, float | None], ...],
     scale: str,
+    outlines: bool,
     **look: Any,
 ) -> dict[str, Any]:
     """Options of a picture (`output.pictures`) from the words of a script or a command line."""
@@ -265,6 +274,12 @@ def look_of(
                 argument=high,
                 expected=f"a number above {low}",
             )
+    if outlines and dimension != 2:
+        raise ScriptError(
+            f"outlines are drawn in the plane, and this scene has {dimension} dimensions",
+            argument="outlines",
+            expected="false",
+        )
     log = scale == "log"
     if log and min((end for end in (vmin, vmax) if end is not None), default=1.0) <= 0:
         raise ScriptError(
@@ -286,6 +301,7 @@ def look_of(
     # Where the user says about what the colours lie, they do not lie about 0.
     symmetric = signed and (vmin, vmax) == (None, None)
     look |= {"limits": (vmin, vmax), "symmetric": symmetric, "log": log}
+    look["outlines"] = outlines
     look |= {"cmap": cmap or (SIGNED_MAP if signed else MAP)}
     look |= {"window": window if any(end is not None for ends in window for end in ends) else ()}
     return look if label is None else look | {"label": label}

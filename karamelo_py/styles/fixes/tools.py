@@ -40,6 +40,11 @@ class ToolFix(PointForces):
                 expected="a group of points of elastic materials",
             )
 
+    def behind(self, points: PointTable) -> tuple[int, float]:
+        """Count points that are in the tool now, and find how deep the deepest is."""
+        depth = self.depth_of(points)
+        return int(np.sum(depth > self.hub.domain.tolerance)), float(depth.max(initial=0.0))
+
     def now(self, *formulas: Expression) -> np.ndarray:
         """The present numbers (n,) of formulas of time."""
         return np.array([formula.evaluate(self.hub.values) for formula in formulas])
@@ -158,10 +163,9 @@ class PlaneTool(ToolFix):
         normal = unit(self.now(*self.towards))
         return -(self.from_place(points, self.origin) @ normal), normal
 
-    def behind(self, points: PointTable) -> tuple[int, float]:
-        """Count points that are behind the plane now, and find how deep the deepest is."""
-        depth, _ = self.depth(points)
-        return int(np.sum(depth > self.hub.domain.tolerance)), float(depth.max(initial=0.0))
+    def depth_of(self, points: PointTable) -> np.ndarray:
+        """Depth (n,) of points behind the plane now."""
+        return self.depth(points)[0]
 
 
 def _begin_behind(plane: Any, scene: Any) -> Any:
@@ -367,10 +371,9 @@ class ContactSurface(ToolFix):
         """Depth (n,) of positions that move with the region, a cell at most."""
         return self.region.depth(x, self.hub.domain.h)
 
-    def behind(self, points: PointTable) -> tuple[int, float]:
-        """Count points that are in the region now, and find how deep the deepest is."""
-        depth = self.depth(points.position.astype(float) - self.moved(1.0)[0])
-        return int(np.sum(depth > self.hub.domain.tolerance)), float(depth.max(initial=0.0))
+    def depth_of(self, points: PointTable) -> np.ndarray:
+        """Depth (n,) of points in the region now."""
+        return self.depth(points.position.astype(float) - self.moved(1.0)[0])
 
     def forces(self, points: PointsView) -> np.ndarray:
         way, velocity = self.moved(points.dt)
@@ -475,6 +478,10 @@ class Indent(ToolFix):
         self.K, self.R = K, R
         self.centre = self.of_time("", (x, y, z))
 
+    def depth_of(self, points: PointTable) -> np.ndarray:
+        """Depth (n,) of points in the ball now."""
+        return self.now(self.R) - np.linalg.norm(self.from_place(points, self.centre), axis=1)
+
     def forces(self, points: PointsView) -> np.ndarray:
         K, R = self.now(self.K, self.R)
         away = self.from_place(points, self.centre)
@@ -543,6 +550,8 @@ class IndentMinimizePenetration(ToolFix):
         judge_friction(hub, mu)
         self.centre = self.of_time("", (x, y, z))
         self.velocity = self.of_time("v", (vx, vy, vz))
+
+    depth_of = Indent.depth_of
 
     def forces(self, points: PointsView) -> np.ndarray:
         away = self.from_place(points, self.centre)
@@ -619,6 +628,11 @@ class CuttingTool(ToolFix):
         # Turned away from the other face.
         normals = np.array([[a[1], -a[0]], [-b[1], b[0]]]) * np.sign(turn)
         return normals / np.linalg.norm(normals, axis=1, keepdims=True), tip
+
+    def depth_of(self, points: PointTable) -> np.ndarray:
+        """Depth (n,) of points in the tool now, below the nearer face."""
+        normals, tip = self._faces()
+        return ((tip - points.position.astype(float)) @ normals.T).min(axis=1)
 
     def forces(self, points: PointsView) -> np.ndarray:
         normals, tip = self._faces()
