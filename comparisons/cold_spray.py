@@ -52,6 +52,6 @@ def compare(run, axes, full):
         yield Row(f"energy at the end over that at first, {what}", (0.85, 1), total, 0.0, "balance")
     r = np.hypot(b.x, b.y)
     x, y = np.append(a.x, -r), np.append(a.y, b.z)
-    heat, size = np.append(a["T"], b["T"]), np.repeat([4, 2], [len(a.x), len(r)])
-    coloured(axes, 1e6 * x, 1e6 * y, heat, "temperature (K)", s=size, vmin=298, vmax=500)
+    heat = np.append(a["T"], b["T"])
+    coloured(axes, 1e6 * x, 1e6 * y, heat, "temperature (K)", limits=(298, 500))
     axes.set(xlabel="in space | axisymmetric, radius (um)", ylabel="height (um)", aspect="equal")

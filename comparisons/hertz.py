@@ -22,6 +22,16 @@ def error(last, top=0.3):
     return np.sqrt((off**2).mean()) / LARGEST
 
 
+def beside(last, cell):
+    """Place and mean pressure of each column of cells, of the points above 0.3 half widths."""
+    near = (last.y0 > 0.25) & (last.x < 1.5 * HALF) & (last.y - SURFACE < 0.3 * HALF)
+    column = (last.x[near] / cell).astype(int)
+    count = np.bincount(column)
+    there = count > 0
+    sums = (np.bincount(column, values)[there] for values in (last.x[near], -last.s22[near]))
+    return [of / count[there] for of in sums]
+
+
 def compare(run, axes, full):
     """Force and stress on finer and finer grids, and with finer points on one of them.
 
@@ -34,7 +44,7 @@ def compare(run, axes, full):
         cases = [("linear", 2, "cut", (16, 32, 64))]
         cases.append(("quadratic-spline", 2, "cut", (16, 32, 64, 128)))
         cases += [("linear", 2, "regular", (16, 32, 64)), ("linear", 4, "regular", (32,))]
-    for (basis, ppc, rim, sizes), mark in zip(cases, "os^D", strict=False):
+    for basis, ppc, rim, sizes in cases:
         errors = []
         for cells in sizes:
             result = run(refine=cells / 32, basis=basis, ppc=ppc, rim=rim)
@@ -49,15 +59,14 @@ def compare(run, axes, full):
             yield Row(f"{quantity}, {of}", 0.0, errors[-1], 6 / cells, HERTZ)
             yield Row(f"{quantity}, below 0.7 half widths, {of}", 0.0, error(last, 0.7),
                       4 / cells, HERTZ)  # fmt: skip
-        label = f"{basis}, {ppc} x {ppc}, {rim}, {cells}"
-        near = (last.y0 > 0.25) & (last.x < 1.5 * HALF) & (last.y - SURFACE < 0.3 * HALF)
-        axes.plot(
-            last.x[near] / HALF, -last.s22[near] / LARGEST, mark, ms=3, mfc="none", label=label
-        )
+        label = f"{basis}, {ppc} x {ppc}, {rim}, {cells} cells"
+        x, stress = beside(last, R / cells)
+        axes.plot(x / HALF, stress / LARGEST, "o-", ms=4, mfc="none", lw=0.6, label=label)
         if len(sizes) > 1:
             slope = -np.polyfit(np.log(sizes), np.log(errors), 1)[0]
             of = f"{basis}, {rim}, {sizes[0]} to {sizes[-1]} cells"
             yield Row(f"order of that error, {of}", 1.0, slope, 0.3, "steps of the rim")
-    x = np.linspace(0, 1, 100)
-    axes.plot(x, np.sqrt(1 - x**2), "k--", lw=0.8, label="Hertz, at the surface")
-    axes.set(xlabel="x / half width (1)", ylabel="stress / largest pressure (1)")
+    x, deep = np.linspace(0, 1.5, 100), np.linspace(0.01, 0.3, 30)[:, None]
+    exact = -hertz_stress(x * HALF, deep * HALF, LOAD, HALF).mean(axis=0) / LARGEST
+    axes.plot(x, exact, "k-", lw=1, label="Hertz (exact)")
+    axes.set(xlabel="x / half width (1)", ylabel="stress near the plane / largest pressure (1)")

@@ -42,5 +42,5 @@ def compare(run, axes, full):
         below = last.y0 < 0.05e-3
         deep = np.average(last.damage[below] > 0.99, weights=last.mass[below])
         yield Row(f"broken share deep below the cut{cells}", 0.0, deep, 0.01, "the piece holds")
-    coloured(axes, 1e3 * last.x, 1e3 * last.y, last.ep, "plastic strain", s=2, vmax=2)
+    coloured(axes, 1e3 * last.x, 1e3 * last.y, last.ep, "plastic strain (1)", limits=(0, 2))
     axes.set(xlabel="x (mm)", ylabel="y (mm)", aspect="equal", xlim=(0, 1.2), ylim=(0, 0.6))

@@ -35,5 +35,5 @@ def compare(run, axes, full):
     ahead = -last.z[last.type == 2].min() / (15e-6 * V)
     yield Row("place of the front over v t", (0.9, 1.1), ahead, 0.05, "twice that behind the shock")
     speed = -last.vz / 1e3
-    coloured(axes, 1e3 * last.x, 1e3 * last.z, speed, "speed downwards (km/s)", s=4)
+    coloured(axes, 1e3 * last.x, 1e3 * last.z, speed, "speed downwards (km/s)")
     axes.set(xlabel="x (mm)", ylabel="z (mm)", aspect="equal")

@@ -26,6 +26,6 @@ def compare(run, axes, full):
         yield Row(name, N, limit(result.log), within, "Chen 1975 (bound from above)")
     last = result.snapshots("static_slope")[-1]
     strain = "plastic strain (%)"
-    coloured(axes, last.x, last.y, 100 * last.ep, strain, s=1.5, vmax=1, cmap="Greys")
+    coloured(axes, last.x, last.y, 100 * last.ep, strain, cmap="Greys", limits=(0, 1))
     axes.plot(*(TOE + H * line).T, "C0", label="spiral through the toe (Chen 1975)")
     axes.set(xlabel="x (m)", ylabel="y (m)", aspect="equal", ylim=(0, 45))

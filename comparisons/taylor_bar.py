@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from comparisons.pictures import body
 from comparisons.row import Row
 
 SOURCE = "Johnson & Holmquist 1988 (experiment)"
@@ -11,13 +12,13 @@ SMALL = {"refine": 1 / 4}
 
 
 def shape(snapshots):
-    """Radius and height of the points at the end, and the diameter at the waist, in mm."""
+    """Height of the points at the end, and the diameter at the waist, in mm."""
     first, last = snapshots[0], snapshots[-1]
     radius, height = 1e3 * np.hypot(last.x, last.y), 1e3 * last.z
     # The outermost points lie inside the surface by as much as at the start.
     margin = R0 - 1e3 * np.hypot(first.x, first.y).max()
     waist = radius[np.abs(height - 0.2 * L0) < 0.02 * L0].max() + margin
-    return radius, height, 2 * waist
+    return height, 2 * waist
 
 
 def compare(run, axes, full):
@@ -29,16 +30,16 @@ def compare(run, axes, full):
     for kind, words in ways.items():
         result = run(**words)
         log = result.log
-        radius, height, waist = shape(result.snapshots("taylor_bar"))
+        height, waist = shape(result.snapshots("taylor_bar"))
         found[kind] = length, foot = log.length[-1], log.diameter[-1]
         yield Row(f"length, {kind} (mm)", LENGTH, length, 0.05, SOURCE)
         # The wall has no friction; one that holds the foot fast leaves it 9.7 mm wide.
         yield Row(f"diameter of the foot, {kind} (mm)", DIAMETER, foot, 0.1, SOURCE)
         yield Row(f"diameter at 0.2 L0, {kind} (mm)", WAIST, waist, 0.1, SOURCE)
         side = 1 if kind == "tlmpm" else -1
-        axes.plot(
-            side * radius, height, ".", ms=2, label=f"{kind}, {'right' if side > 0 else 'left'}"
-        )
+        last = result.snapshots("taylor_bar")[-1]
+        cut = np.abs(last.y) < 1.5 * np.abs(last.y).min()  # the layer of points beside the axis
+        body(axes, side * np.abs(1e3 * last.x[cut]), height[cut], kind)
     if full:
         for what, a, b in zip(("length", "foot"), found["tlmpm"], found["ulmpm"], strict=True):
             yield Row(f"{what}, tlmpm / ulmpm", 1.0, a / b, 0.02, "two methods")

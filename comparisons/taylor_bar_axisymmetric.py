@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from comparisons.pictures import body
 from comparisons.row import Row
 
 SOURCE = "Johnson & Holmquist 1988 (experiment)"
@@ -33,7 +34,7 @@ def compare(run, axes, full):
         yield Row(f"kinetic energy left, {kind}", 0.0, left, 0.01, "at rest")
         found.append((log.length[-1], log.diameter[-1]))
         side = -1 if found[1:] else 1  # one method beside the other
-        axes.plot(side * 1e3 * last.x, 1e3 * last.y, ".", ms=2.5, label=kind)
+        body(axes, side * 1e3 * last.x, 1e3 * last.y, kind)
     if full:
         free = run(mu=0).log
         name = "diameter of the foot without friction (mm)"

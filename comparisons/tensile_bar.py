@@ -75,5 +75,5 @@ def compare(run, axes, full):
     axes.plot(strain, stress, lw=1, label="computed")
     axes.set(xlabel="engineering strain (1)", ylabel="engineering stress (MPa)", ylim=(0, 700))
     inset = axes.inset_axes([0.05, 0.06, 0.33, 0.55])
-    coloured(inset, last.x, last.y, last.damage, "damage", bar=0.3, s=1)
+    coloured(inset, last.x, last.y, last.damage, "damage (1)", bar=0.3)
     inset.set(aspect="equal", xticks=[], yticks=[])

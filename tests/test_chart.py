@@ -228,6 +228,17 @@ def test_numbers_along_a_short_logarithmic_axis_do_not_touch(low, span):
     assert all(a.x1 < b.x0 for a, b in itertools.pairwise(boxes))
 
 
+def test_lines_that_end_together_share_a_name():
+    """Four of one colour have one; another colour, and another place, have their own."""
+    axes = blank_figure(8.4, 5.2).subplots()
+    axes.set(xlim=(0, 1), ylim=(0, 1))
+    ends = [(1, 0.5 + 0.001 * k, f"linear, {word}", "k") for k, word in enumerate(look.FAMILIES[3])]
+    ends += [(1, 0.5, "cpgimp, musl", "g"), (1, 0.8, "linear, musl, alpha = 1", "k")]
+    look.direct_labels(axes, ends)
+    names = [text.get_text() for text in axes.texts]
+    assert names == ["linear, musl / usl / usf / usavg", "cpgimp, musl", "linear, musl, alpha = 1"]
+
+
 def test_round_ticks():
     assert look.log_ticks(0.9, 55) == [1, 2, 5, 10, 20, 50]
     assert look.log_ticks(1e-7, 1) == pytest.approx([10.0**k for k in range(-7, 1)])

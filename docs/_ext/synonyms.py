@@ -12,7 +12,7 @@ WORDS = {
     "materials": "constitutive model law plasticity elasticity soil metal fluid hyperelastic UMAT",
     "many-processes": "MPI parallel cluster Slurm srun mpiexec OpenMP threads GPU scaling resume",
     "needs": "dry run validate preview memory estimate time step check",
-    "studies": "parameter sweep optimisation convergence study sensitivity batch calibrate",
+    "studies": "parameter sweep optimisation convergence study sensitivity batch calibrate fit",
     "energy": "conservation drift energy error instability blow up hourglass gain loss",
     "failures": "instability blow up numerical fracture locking hourglass cell crossing null space",
     "implicit": "static quasi-static Newton solver load step equilibrium Newmark large time step",

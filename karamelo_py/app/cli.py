@@ -97,6 +97,7 @@ ELSEWHERE = {
     "sweep": ("karamelo_py.app.studies.study", "Run a script with many values of its variables."),
     "chart": ("karamelo_py.app.studies.chart", "Draw the table of a sweep: error against cost."),
     "advise": ("karamelo_py.app.studies.advise", "Find the cheapest set-up within an error."),
+    "fit": ("karamelo_py.app.studies.fit", "Find the values of variables that match measurements."),
     "stability": ("karamelo_py.app.studies.stability", "Map where a method is stable."),
     "atlas": ("karamelo_py.app.studies.atlas", "Make all charts of a list of studies."),
 }

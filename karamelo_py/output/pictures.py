@@ -203,7 +203,8 @@ class Picture:
         x, y = np.arange(left, right + step, step), np.arange(low, high + step, step)
         places = np.stack(np.meshgrid(x, y), axis=-1)
         depth = tool(SimpleNamespace(position=places.reshape(-1, 2))).reshape(places.shape[:2])
-        return contour_generator(x, y, depth).lines(0.0)
+        lines: Any = contour_generator(x, y, depth).lines(0.0)
+        return lines
 
     def _entitle(self, text: str) -> None:
         """Write the title above the axes, and where that is too narrow within the picture."""
@@ -316,24 +317,35 @@ def grown(limits: tuple[float, float] | None, values: np.ndarray) -> tuple[float
 def outlines(x: np.ndarray) -> list[np.ndarray]:
     """Lines (m, 2) where half of the material of points x (n, 2) ends.
 
-    Each point is shared out to the nearest nodes of cells of twice its size: a node within a body
-    gets four of them, one at its surface two.
+    Each point is shared out to the nodes of cells of its size, over three of them: a node within a
+    body gets a whole point, one at its surface half of one.
     """
-    cell = 2 * spacing(x, 4)
+    cell = spacing(x, 4)
     if not cell > 0:
         return []
-    lo = x.min(axis=0) - 2 * cell
+    lo = x.min(axis=0) - 4 * cell
     at = (x - lo) / cell
-    filled = np.zeros((at.max(axis=0) + 3).astype(int))
+    filled = np.zeros((at.max(axis=0) + 6).astype(int))
     nodes = [at.astype(int) + corner for corner in product((0, 1), repeat=2)]
     shares = [np.prod(1 - abs(at - node), axis=1) for node in nodes]
     for node, share in zip(nodes, shares, strict=True):
         np.add.at(filled, tuple(node.T), share)
+    filled = _smoothed(filled)
     # Points that have come closer to each other end where the others do.
     within = sum(filled[*node.T] * share for node, share in zip(nodes, shares, strict=True))
     full = np.median(within)
     across, up = (low + cell * np.arange(n) for low, n in zip(lo, filled.shape, strict=True))
-    return contour_generator(across, up, np.minimum(filled.T, full)).lines(full / 2)
+    lines: Any = contour_generator(across, up, np.minimum(filled.T, full)).lines(full / 2)
+    return lines
+
+
+def _smoothed(values: np.ndarray) -> np.ndarray:
+    """Take the mean of each node and its neighbours, twice along each axis."""
+    for axis in range(values.ndim):
+        for _ in range(2):
+            beside = np.roll(values, 1, axis) + np.roll(values, -1, axis)
+            values = 0.5 * values + 0.25 * beside
+    return values
 
 
 def spacing(x: np.ndarray, count: int = 1) -> float:
@@ -535,12 +547,7 @@ class SpacePicture(PlanePicture):
 
     def _light(self, counts: np.ndarray) -> np.ndarray:
         """Measure the light on each cell: a surface looks where there are fewer points."""
-        density = counts.astype(float)
-        for axis in range(3):
-            for _ in range(2):
-                density = 0.5 * density + 0.25 * (
-                    np.roll(density, 1, axis) + np.roll(density, -1, axis)
-                )
+        density = _smoothed(counts.astype(float))
         there = np.flatnonzero(counts)
         normal = -np.column_stack([slope.ravel()[there] for slope in np.gradient(density)])
         length = np.linalg.norm(normal, axis=1)

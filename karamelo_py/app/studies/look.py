@@ -26,6 +26,7 @@ PLOTLY_MARKERS = (
     "circle", "square", "triangle-up", "diamond", "triangle-down", "cross", "x",
     "triangle-left", "triangle-right",
 )  # fmt: skip
+NEAR = 0.02  # share of the axes within which ends of lines are at one place
 PART = 0.105  # of a logarithmic axis, that a number of six digits covers
 FAMILIES = (
     ("linear", "quadratic-spline", "cubic-spline", "Bernstein-quadratic", "ugimp", "cpgimp"),
@@ -166,14 +167,26 @@ def apart(wanted: Sequence[float], gap: float, low: float, high: float) -> np.nd
 
 
 def direct_labels(axes: Any, ends: Sequence[tuple[float, float, str, str]]) -> None:
-    """Write names of lines beside the axes, by x and y of their ends, names and colours."""
+    """Write names of lines beside the axes, by x and y of their ends, names and colours.
+
+    Lines of a colour that end at one place share a name: "linear, usf / usavg".
+    """
     if not ends:
         return
     to_axes = axes.transData + axes.transAxes.inverted()
-    at = np.array([to_axes.transform((x, y)) for x, y, *_ in ends])
-    size = 9 if len(ends) <= 16 else 7
+    names: dict[tuple[str, str, int, int], list[str]] = {}
+    found: dict[tuple[str, str, int, int], Any] = {}
+    for x, y, name, colour in ends:
+        place = to_axes.transform((x, y))
+        head, _, rest = name.partition(", ")
+        key = (head, colour, *np.rint(place / NEAR).astype(int).tolist())
+        names.setdefault(key, []).append(rest)
+        found.setdefault(key, place)
+    at = np.array(list(found.values()))
+    size = 9 if len(at) <= 16 else 7
     places = apart(at[:, 1], 0.0052 * size, 0.0, 1.0)
-    for (_, _, name, colour), (x, y), place in zip(ends, at, places, strict=True):
+    for ((head, colour, *_), rests), (x, y), place in zip(names.items(), at, places, strict=True):
+        name = ", ".join(filter(None, (head, " / ".join(dict.fromkeys(rests)))))
         axes.plot(
             [x, 1.0, 1.03], [y, place, place], transform=axes.transAxes, clip_on=False,
             color=colour, linewidth=0.6, alpha=0.6, zorder=1,
