@@ -420,6 +420,7 @@ def test_the_site_builds_without_warnings(tmp_path):
 
 
 @pytest.mark.xdist_group("disks")
+@pytest.mark.full
 def test_the_tutorial_runs(tmp_path, monkeypatch):
     """Cell after cell, as the build of the site does; its own assertions hold."""
     monkeypatch.chdir(tmp_path)

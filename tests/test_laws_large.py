@@ -213,10 +213,10 @@ def test_drained_triaxial(run_script):
 SQUEEZED = """
     method(tlmpm, FLIP, linear, 1)
     scheme(quasi-static)
-    dimension(2, 0, 1.4, 0, 1, 0.1)
+    dimension(2, 0, 1.5, 0, 1, 0.5)
     region(box, block, 0, 1, 0, 1)
     material(clay, cam-clay, 1, 40, 1.2, 0.1, 0.02, 1, pc=2)
-    solid(s, region, box, 2, clay, 0.1, 0)
+    solid(s, region, box, 1, clay, 0.5, 0)
     region(left, block, -INF, 1e-6, -INF, INF)
     region(right, block, 1-1e-6, INF, -INF, INF)
     region(everywhere, block, -INF, INF, -INF, INF)
@@ -232,9 +232,9 @@ SQUEEZED = """
 """
 
 
-def test_clay_in_load_steps(run_script):
+def test_clay_in_load_steps(run_interpreted):
     """Oedometer: the force is that of the law at one point, P = tau/F, found in few corrections."""
-    log_of = run_script(SQUEEZED).log
+    log_of = run_interpreted(SQUEEZED).log
     law = CamClay.given(1.0, 40.0, 1.2, 0.1, 0.02, 1.0, pc=2.0)
     kin, F = PlaneStrain(), 1.0
     state = initial_state(law, kin, 1.0)

@@ -31,8 +31,12 @@ def test_billet(run_interpreted):
     assert 10 / np.sqrt(0.9) < log.radius[-1] < 1.1 * 10 / np.sqrt(0.9)
 
 
+@pytest.mark.full
 def test_cold_spray(run_script):
-    """All energy is kinetic, stored or spent; the ball is flattened, warm, and stops."""
+    """As a Taylor bar and sheared metal do (test_comparisons.py).
+
+    All energy is kinetic, stored or spent; the ball is flattened, warm, and stops.
+    """
     result = tiny(run_script, "cold_spray_axisymmetric", refine=0.3, ppc=1, T=16e-9)
     log = result.log
     total = log.kinetic + log.spent + log.stored
