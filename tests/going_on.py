@@ -218,7 +218,7 @@ SCENES = {
     "loads": block(2, *LOADS, size=SIZE),
     "loads in the total frame": block(2, *LOADS, size=SIZE).replace("ulmpm", "tlmpm"),
     "wall that rubs": rubbed().replace("run_time(0.2)", "run(6)"),
-    "rigid": pushed().replace("run_time(3)", "set_dt(0.02)\nrun(40)"),
+    "rigid": pushed().replace("run_time(3)", "set_dt(0.05)\nrun(16)"),
     "rigid by a formula": pushed("ulmpm/contacts").replace("initial_velocity_particles, tool, 0.5",
         "velocity_particles, tool, 0.2*time").replace("run_time(3)", "run(6)"),
     "flow": flowing("ulmpm, FLIP, linear, 1"),

@@ -32,6 +32,7 @@ def test_momentum_is_conserved(run_interpreted, transfer, scheme):
         "run(6)",
         transfer=transfer,
         scheme=scheme,
+        size=(0.2, 0.1),
     )
     log = run_interpreted(script).log
     # Ten digits are logged.
@@ -281,6 +282,7 @@ def test_averaged_volumes_do_the_work_that_is_stored(run_interpreted, method, sc
             f"run({10 * halves})",
             scheme=scheme,
             law="neo-hookean",
+            size=(0.2, 0.1),
         ).replace("ulmpm", method)
         log = run_interpreted(script, folder=f"{halves}").log
         lost.append((log.Ek[0] - log.Ek[-1] - log.Es[-1]) / log.Es[-1])

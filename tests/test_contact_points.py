@@ -147,7 +147,7 @@ def test_hertz_collision(run_script):
     """Slow enough for the force of single points: the bodies bounce, and energy is kept."""
     lines = (
         "log_modify(custom, step, time, va_x, vb_x, k, e, c_x)", "dt_factor(0.4)",
-        "set_output(5)", "run_time(8)",
+        "set_output(5)", "run_time(2.7)",
     )  # fmt: skip
     log = run_script(bodies(0.02, "contact/hertz, a, b", *lines, n=2, v=0.01, E=100)).log
     assert np.abs(log.va_x + log.vb_x).max() < 1e-16

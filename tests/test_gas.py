@@ -83,5 +83,6 @@ def test_energy_of_the_shock_tube(run_interpreted, transfer, alpha, scheme, with
     script = script.replace("method(kind", f"scheme({scheme})\nmethod(kind")
     lines = [line for line in script.splitlines() if not line.startswith("dump(")]
     words = ["-var", "transfer", transfer, "-var", "alpha", alpha, "-var", "refine", "0.1"]
+    words += ["-var", "ppc", "3"]
     log = run_interpreted("\n".join(lines), *words).log
     assert abs(log.total[-1]) / log.Ek[-1] < within
