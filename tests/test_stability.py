@@ -71,6 +71,18 @@ def test_failures_have_reasons(folder):
     assert "the step is 3 times the stable one" in table["message"][1]
 
 
+def test_runs_too_short_to_show_growth_are_not_called_stable(folder, capsys):
+    """At 1.05 times its limit the bar blows up later than in 30 steps."""
+    text = SCRIPT.replace("run(80)", "run(n)").replace("push = 0", "push = 0\nn = 80")
+    (folder / "in.bar").write_text(text, encoding="utf-8")
+    words = ["-var", "factor=2.1", "-var", "n=30,80", "-o", "map.svg"]
+    assert main(["stability", "in.bar", *words]) == 0
+    assert list(pandas.read_csv(folder / "map.csv")["class"]) == ["short", "failed"]
+    out = capsys.readouterr().out
+    assert "runs of fewer than 31 steps do not show whether energy grows" in out
+    assert "the largest stable" not in out  # what lies below the edge is not known to be stable
+
+
 def test_a_mistake_of_the_script_is_no_failure(folder, capsys):
     """What says that the step is too long is one."""
     (folder / "in.bar").write_text(SCRIPT.replace("linear, 1)", "linear, share)") + "share = 1\n")

@@ -28,7 +28,8 @@ DESCRIPTION = """\
 Maps where a script is stable over one or two of its variables: stable, damped (energy is lost),
 growing (energy comes from nowhere; both as the program itself finds by kinetic + stored +
 dissipated energy less the work of loads, or as a log column exceeds a bound), left (a point left
-the domain, which tells nothing of the step), or failed, with the reason. A mistake of the script
+the domain, which tells nothing of the step), short (too few steps to see whether energy grows), or
+failed, with the reason. A mistake of the script
 ends the study. Edges are searched by halves, from coarse to fine: cells between like ones are not
 run, and "run 7 of at most 400" is one of about 100. Rows of words (basis, transfer, scheme) are
 searched one by one. The table is written beside the picture (map.csv), and says which cells were
@@ -42,13 +43,16 @@ Cell = tuple[int, int]
 UNKNOWN = -1
 FROM_NOWHERE = "energy comes from nowhere"  # what the program says of growth
 LOST = "energy is lost"
-CLASSES = ("stable", "damped", "growing", "left", "failed")
+CLASSES = ("stable", "damped", "growing", "left", "short", "failed")
 BORNE = ("stable", "damped")  # classes of steps that are borne
+UNTOLD = ("left", "short")  # of steps that nothing is known of
+LABELS = {"left": "left the domain", "short": "too short to tell"}
+FEWEST = watch.FEW * watch.LOOK + 1  # steps in which the program looks often enough at energies
 FIRST = 0.1  # of the rows of a log: energies are means over so many
 FEW = 9  # values of a variable that stand at the axis one by one
 COLOURS = {
     "stable": "#d9ecf7", "damped": "#c3dfb5", "growing": "#f0a53c", "left": "#9b9b9b",
-    "failed": "#7d2a3a",
+    "short": "#e4e4e4", "failed": "#7d2a3a",
 }  # fmt: skip
 LEFT = re.compile("leaves the domain|left the domain")  # and was not thrown out of it
 # What the program says of failures, in short.
@@ -249,16 +253,19 @@ class Map:
             share = remains(energy)
             falls = f"{self.energy} falls to {share:.3g}" if share < 1 / self.bound else ""
         else:
-            changes = map(float, re.findall(r"^  energy +([-+][.\d]+) %", said, re.M))
-            found["growth"] = max((1 + change / 100 for change in changes), default=None)
+            changes = re.findall(r"^  energy +([-+][.\d]+) %", said, re.M)
+            found["growth"] = max((1 + float(each) / 100 for each in changes), default=None)
             if unwatched := re.search(r"^  energy +is (not watched: .*)", said, re.M):
                 found["unwatched"] = unwatched[1]
-            grows = FROM_NOWHERE if FROM_NOWHERE in complaint else ""
-            falls = LOST if LOST in complaint or (found["growth"] or 1.0) < 1 - watch.WITHIN else ""
+            change = (found["growth"] or 1.0) - 1
+            grows = FROM_NOWHERE if FROM_NOWHERE in complaint or change > watch.WITHIN else ""
+            falls = LOST if LOST in complaint or change < -watch.WITHIN else ""
         if not done:
             # A domain that is too small tells nothing of the step.
             left = LEFT.search(row["reason"]) and FROM_NOWHERE not in complaint
             found |= {"class": "left" if left else "failed", "why": in_short(row)}
+        elif not (self.energy or changes or unwatched) and row["steps"] < FEWEST:
+            found |= {"class": "short", "why": f"{row['steps']:.0f} steps"}
         elif grows:
             found |= {"class": "growing", "why": grows}
         elif falls:
@@ -319,7 +326,7 @@ class Map:
         for j in range(self.shape[1]):
             column = [classes[i, j] for i in range(self.shape[0])]
             edge = next((i for i, kind in enumerate(column) if kind not in BORNE), None)
-            row = self.found.get((edge - 1, j)) if edge and column[edge] != "left" else None
+            row = self.found.get((edge - 1, j)) if edge and column[edge] not in UNTOLD else None
             if row and row.get("dt") and row.get("stable_dt"):
                 found.append(row["dt"] / row["stable_dt"])
         return found
@@ -336,6 +343,8 @@ class Map:
         if unwatched := Counter(filter(None, (row["unwatched"] for row in self.found.values()))):
             (why, times), *_ = unwatched.most_common()
             print(f"energy is {why} ({plural(times, 'run')}); -energy COLUMN judges by the log")
+        if count["short"]:
+            print(f"runs of fewer than {FEWEST} steps do not show whether energy grows: run longer")
         margins = self.margins()
         if margins:
             low, high = min(margins), max(margins)
@@ -368,7 +377,7 @@ class Map:
             else:
                 axes.plot(x[i], y[j], "k.", markersize=4)
         handles = [
-            Patch(facecolor=COLOURS[k], edgecolor="0.4", label=k + " the domain" * (k == "left"))
+            Patch(facecolor=COLOURS[k], edgecolor="0.4", label=LABELS.get(k, k))
             for k in CLASSES if k in self.classes.values()
         ]  # fmt: skip
         handles += [
