@@ -294,11 +294,13 @@ Run
   points     1 300
 Run finished
   steps             100
+  path              0.0125 cells at most
   processor time    0.2 s in steps, of all threads
     steps           0.25 s       7 %
 """
     facts = case.read_facts(said)
     assert facts["points"] == 1234 and facts["stable_dt"] == 0.02
+    assert facts["path"] == 0.0125
     assert facts["steps"] == 352 and facts["seconds"] == 0.75
     assert facts["particle_steps"] == 352 * 1234
     assert facts["particle_steps_per_s"] == pytest.approx(352 * 1234 / 0.75)

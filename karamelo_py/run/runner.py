@@ -381,12 +381,14 @@ class Runner:
         stages.append(("rest", max(wall - sum(seconds for _, seconds in stages), 0.0)))
         in_steps, worked = self.timings.on["steps"]
         rate = steps * simulation.count / in_steps if in_steps > 0 else 0.0
+        path = inf if simulation.implicit else float(simulation.control.clock[0].path)
         self.hub.console.summary(
             {
                 "wall time": f"{wall:.3g} s",
                 "steps": steps,
                 "time": simulation.time,
                 **energy.change_of_energy(self.hub, simulation),
+                **({"path": f"{path:.3g} cells at most"} if path < inf else {}),
                 "particle-steps/s": f"{rate:.3g}",
                 "processor time": f"{worked:.3g} s in steps, of all threads",
                 **boundary.counted(self.hub, simulation),

@@ -30,9 +30,11 @@ from karamelo_py.app.studies.curves import (
     errors,
     order,
     reached,
+    sizes,
     usable,
 )
 from karamelo_py.app.studies.study import Study, live_page, plain_table, shown, terminal
+from karamelo_py.kernels.clock import STILL
 from karamelo_py.script.errors import ScriptError, plural
 from karamelo_py.script.terms import number_of
 
@@ -54,6 +56,7 @@ and it is told whether it met the target."""
 # Functions whose gradients jump between cells, and methods whose points cross these.
 JUMPING, CROSSED = ("linear", "Bernstein-quadratic"), ("ulmpm", "ulmpm/contacts")
 ALONE = "no finer run is known"
+UNFOLLOWED = f"{ALONE}, whose points may cross cells"
 SECOND = 2.0  # the order that all methods here may reach
 
 
@@ -80,17 +83,17 @@ def forecast(
     is steps times (a + b points), fitted to the runs; any other cost goes on as between the last
     two. None where fewer than two runs have an error, or the last one got worse.
     """
-    xs = np.asarray(xs, float)
-    error = credible(xs, errors(rows, accuracy), highest)
-    good = np.isfinite(error) & (error > 0)
+    xs, signed = np.asarray(xs, float), errors(rows, accuracy)
+    error = credible(xs, signed, highest)
+    good = np.isfinite(error) & (error > 0) & (signed != 0)
     if good.sum() < 2 or not good[-1]:
         return None
-    xs, error = xs[good], error[good]
+    xs, error, own = xs[good], error[good], np.abs(signed[good])
     rows = [row for row, is_good in zip(rows, good, strict=True) if is_good]
-    local = np.diff(np.log(error)) / np.diff(np.log(xs))
-    # Signs such that finer means a larger way.
-    way = abs(np.log(x / xs[-1]))
-    fall = local * np.sign(np.diff(np.log(xs)))
+    # Ways are positive towards what is finer. An error that counts for more than it is makes the
+    # next one fall too steeply.
+    way, ways = abs(np.log(x / xs[-1])), np.abs(np.diff(np.log(xs)))
+    fall = np.fmax(np.diff(np.log(error)), np.fmin(np.diff(np.log(own)), 0.0)) / ways
     if fall[-1] >= 0:
         return None
     expected = -fall[-1]
@@ -217,11 +220,23 @@ class Adviser:
         why = by_chance(self.xs[: len(signed)], signed, choice.highest)
         if len(why) == 1 < len(self.values):
             why = [ALONE]
+        elif 0 < len(why) < len(self.values):
+            if self._crosses(choice, len(why)):
+                why[-1] = why[-1] or UNFOLLOWED
+        else:  # Nothing is finer that misses the target.
+            meets = np.logical_and.accumulate(np.abs(signed[::-1]) <= self.target)[::-1]
+            why[:-1] = ["" if ok else w for w, ok in zip(why, meets[:-1], strict=False)]
         return [
             Candidate(choice, k, cost, abs(error), None, chance)
             for k, (cost, error, chance) in enumerate(zip(costs, signed, why, strict=True))
             if abs(error) <= self.target
         ]
+
+    def _crosses(self, choice: ChoiceRuns, step: int) -> bool:
+        """Tell whether gradients of its functions jump, and points may cross cells at a step."""
+        finer = np.exp(abs(np.log(self.xs[step] / self.xs[len(choice.rows) - 1])))
+        stay = column(choice.rows[-1:], "path")[0] * finer <= STILL  # NaN: nobody knows
+        return not stay and bool(choice.kind & {*JUMPING} and choice.kind & {*CROSSED})
 
     def candidate(
         self, choice: ChoiceRuns, hope: bool = False, lucky: bool = False
@@ -270,28 +285,38 @@ class Adviser:
                 c for c in self.candidates(hope=True)
                 if c.forecast and c.step > len(c.choice.rows) and c.cost <= limit
             ]  # fmt: skip
-            if not doubtful:
+            follow = next((c.choice for c in doubtful), None) or self._risen(limit)
+            if follow is None:
                 return best
-            self.go_on(doubtful[0].choice)
+            self.go_on(follow)
 
     def _doubted(self, limit: float) -> ChoiceRuns | None:
-        """Find a choice whose finest run meets the target below a cost, perhaps by chance."""
+        """Find a choice whose finest run meets the target below a cost, if only by chance."""
         for choice in self.choices:
-            met = self._met(choice)
-            if met and met[0].cost < limit and len(choice.rows) < len(self.values):
-                last = met[-1]
-                if last.chance and last.step == len(choice.rows) - 1:
+            finest = len(choice.rows) - 1
+            for last in self._met(choice)[-1:] if finest < len(self.values) - 1 else ():
+                if last.chance and last.step == finest and last.cost < limit:
                     return choice
+        return None
+
+    def _risen(self, limit: float) -> ChoiceRuns | None:
+        """Find a choice whose last error alone has grown, and whose next run costs less."""
+        for choice in self.choices:
+            count = len(choice.rows)
+            fell = np.diff(sizes(choice.rows, self.accuracy)) < 0
+            if not 2 < count < len(self.xs) or fell[-1] or not fell[:-1].all():
+                continue
+            if _cost(self.xs[count], np.array(self.xs[:count]), choice.rows, self.cost) < limit:
+                return choice
         return None
 
     def doubts(self, best: Candidate) -> list[str]:
         """Tell what the error of a forecast may end at: what is known of its kind."""
         found = [f"its runs are warned of: {text}" for text in best.choice.warnings[:1]]
-        jumping = best.choice.kind & {*JUMPING}
-        if jumping and best.choice.kind & {*CROSSED}:
+        if self._crosses(best.choice, best.step):
             found.append(
-                f"gradients of {', '.join(jumping)} functions jump between cells: errors grow once "
-                "points cross them, and on finer grids they cross more"
+                f"gradients of {', '.join(best.choice.kind & {*JUMPING})} functions jump between "
+                "cells: errors grow once points cross them, and on finer grids they cross more"
             )
         for other in self.choices:
             if other.kind != best.choice.kind:
@@ -449,7 +474,8 @@ def sureness(adviser: Adviser, best: Candidate) -> str:
     doubts = adviser.doubts(best)
     word = "almost sure"
     if high > adviser.target:
-        word = "uncertain" if adviser.target / best.error < 1.1 else "likely"
+        near = adviser.target**2 < best.error * high  # nearer to what is expected than to the bound
+        word = "uncertain" if near else "likely"
     if doubts:
         word = "not sure"
     said = f"{word}: expected {said}; by its orders the error lies between {low:.3g} and {high:.3g}"

@@ -69,6 +69,7 @@ COLUMNS = {
     "stable_dt": "stable step (time of the script)",  # the largest stable step at the beginning
     # The first of the program's own choice, where the script chose another.
     "own_dt": "the program's own step (time of the script)",
+    "path": "path of the fastest points (cells)",  # the farthest that one may have gone
     "bytes_per_particle": "bytes per particle",  # of all fields, the mean over points
     "peak_memory_mib": "peak memory (MiB)",
     "wall_s": "time of the process (s)",
@@ -260,6 +261,8 @@ def read_facts(said: str) -> dict[str, float]:
             steps += value
         elif name == "processor time":
             cpu += value
+        elif name == "path":
+            facts[name] = value
     if steps:
         facts.update(steps=steps, seconds=seconds, cpu_seconds=cpu)
         if "points" in facts:
