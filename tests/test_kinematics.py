@@ -3,7 +3,9 @@
 Tolerances of 1e-12 are round-off of a dozen operations on numbers of order one.
 """
 
+import builtins
 import inspect
+import math
 
 import numpy as np
 import pytest
@@ -44,6 +46,7 @@ from karamelo_py.points.kinematics import (
     outer,
     planar,
     sym,
+    total,
     tr,
     unit,
     zero,
@@ -55,6 +58,12 @@ ROUND_OFF = 1e-12
 
 def close(a, b, tolerance=ROUND_OFF):
     return np.allclose(a, b, rtol=tolerance, atol=tolerance)
+
+
+def test_terms_are_added_one_after_another(monkeypatch):
+    """As in kernels, with any Python: from 3.12 on `sum` keeps what floats lose, as fsum does."""
+    monkeypatch.setattr(builtins, "sum", lambda terms, start=0: math.fsum([start, *terms]))
+    assert total([1.0, 1e-16, 1e-16, 0.1]) == 1.0 + 1e-16 + 1e-16 + 0.1 != 1.1 + 2e-16
 
 
 @every_kinematics

@@ -169,9 +169,19 @@ def asks_for_one(n, x):
     return {1: x, 2: -x}[2] * raised(x, by=1)
 
 
+scale = 3.0
+
+
+def comprehends(n, x):
+    """Comprehensions that ask, as parts of a function of any Python; one hides a global's name."""
+    sizes = {k: a if a > 0 else -a for k, a in enumerate((x, x - n))}
+    turns = [scale * k if k > n else x for scale in (1, 2) for k in range(9)]
+    return scale * sizes[0] + sizes[1] + sum(turns)
+
+
 FUNCTIONS = [
     returns_early, counts, waits, nested, carries, chains, guarded, unrolled, long, halves,
-    leaves_loops, asks_for_one,
+    leaves_loops, asks_for_one, comprehends,
 ]  # fmt: skip
 
 

@@ -9,6 +9,7 @@ that was taken. A loop over a range that is known is written out, any other one 
 import ast
 import builtins
 import copy
+import dis
 import functools
 import inspect
 import linecache
@@ -33,6 +34,13 @@ def _stored(node: ast.AST) -> frozenset[str]:
     return frozenset(
         n.id for n in ast.walk(node) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)
     )
+
+
+@functools.cache
+def _globals_in(code: python.CodeType) -> frozenset[str]:
+    """List globals; variables of comprehensions, of the function from 3.12 on, may be called so."""
+    loads = (i for one in codes_in(code) for i in dis.get_instructions(one))
+    return frozenset(i.argval for i in loads if i.opname == "LOAD_GLOBAL")
 
 
 def place_in_text(frame: python.FrameType) -> tuple[str, int] | None:
@@ -197,7 +205,8 @@ class AstCompiler:
             return self.names[name]
         if name in self.free:
             return self.free[name]
-        if name in self.function.__code__.co_varnames:
+        code = self.function.__code__
+        if name in code.co_varnames and name not in _globals_in(code):
             raise Untraceable(f"'{name}' is not of one kind on all ways to here")
         return self.function.__globals__[name]
 
@@ -336,23 +345,33 @@ class AstCompiler:
 
         return call
 
-    def ListComp(self, node: ast.ListComp | ast.GeneratorExp) -> list:
+    def comprehended(self, node: ast.expr, item: Callable[[], Any]) -> list:
+        """List what a comprehension makes, turn by turn."""
         out: list = []
         outer = dict(self.names)
 
         def go(k: int) -> None:
             if k == len(node.generators):
-                out.append(self.do(node.elt))
+                out.append(item())
                 return
             one = node.generators[k]
-            for item in self.do(one.iter):
-                self.give(one.target, item)
+            for value in self.do(one.iter):
+                self.give(one.target, value)
                 if all(self.do(test) for test in one.ifs):
                     go(k + 1)
 
         go(0)
         self.names = outer
         return out
+
+    def ListComp(self, node: ast.ListComp | ast.GeneratorExp) -> list:
+        return self.comprehended(node, lambda: self.do(node.elt))
+
+    def SetComp(self, node: ast.SetComp) -> set:
+        return set(self.ListComp(node))
+
+    def DictComp(self, node: ast.DictComp) -> dict:
+        return dict(self.comprehended(node, lambda: (self.do(node.key), self.do(node.value))))
 
     GeneratorExp = ListComp
 

@@ -67,8 +67,15 @@ class Globals(dict):
 branching: set = set()  # code of functions that ask for what only a run knows
 
 
+def _asking(frame: python.FrameType) -> python.FrameType:
+    """Find the frame of a function from that of a comprehension in it, of its own until 3.12."""
+    while frame.f_code.co_name in ("<listcomp>", "<setcomp>", "<dictcomp>"):
+        frame = frame.f_back
+    return frame
+
+
 def _branch(frame: python.FrameType, what: str) -> None:
-    code = frame.f_code
+    code = _asking(frame).f_code
     if type(frame.f_globals) is not Globals or code.co_name.startswith("<"):
         raise Untraceable(what)
     branching.add(code)
@@ -357,7 +364,7 @@ LONG = 8  # range that is gone through where it need not be
 
 def counting(*bounds: int) -> range:
     """Count as `range` does, in functions that are run."""
-    frame = sys._getframe(1)
+    frame = _asking(sys._getframe(1))
     if any(isinstance(bound, Value) for bound in bounds):
         _branch(frame, "the end of a range")
     made = range(*bounds)

@@ -23,7 +23,7 @@ from karamelo_py.kernels.arrays import TIMESTEP, first_from, known_to_laws
 from karamelo_py.kernels.lanes import lanes_with, points_from
 from karamelo_py.kernels.p2g import WorkOfForces
 from karamelo_py.kernels.visit import state_at
-from karamelo_py.points.kinematics import free_from
+from karamelo_py.points.kinematics import dot, free_from
 from karamelo_py.points.laws import (
     dissipated_energy,
     energy_density,
@@ -73,7 +73,7 @@ def _look_at_share(kin, points, laws, tiling, firsts, k):
             law, state = state_at(kin, points, laws, p)
             mass = real(of_present(p, points.mass[p]), 0.0)
             v = [real(x, 0.0) for x in load_vector(kin, points.v, p)]
-            kinetic = added(kinetic, 0.5 * mass * sum([x * x for x in v]))
+            kinetic = added(kinetic, 0.5 * mass * dot(v, v))
             energy = energy_density(law, kin, state) + dissipated_energy(law, kin, state)
             stored = added(stored, mass * real(specific_volume(law), 0.0) * real(energy, 0.0))
             more = zip(total, (mass, *[mass * x for x in v]), strict=True)

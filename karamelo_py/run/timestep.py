@@ -8,6 +8,7 @@ import numpy as np
 from karamelo_py.kernels.arrays import DT
 from karamelo_py.kernels.clock import STILL, STRIDE
 from karamelo_py.kernels.laws import law_on
+from karamelo_py.points.kinematics import total
 from karamelo_py.points.laws import (
     Absent,
     can,
@@ -142,12 +143,10 @@ def own_weight_of_drift(hub: Hub) -> float:
 
 def common_velocity(simulation: Any, weight: float) -> np.ndarray:
     """(3,) The velocity that speeds are measured from so that the common drift has this weight."""
-    if weight == 1:
-        return np.zeros(3)
-    bodies = motions(simulation)
-    mass = sum(one.mass for one in bodies)
+    bodies = motions(simulation) if weight != 1 else []
     common = np.zeros(3)
-    if mass > 0:
+    if bodies:
+        mass = total([one.mass for one in bodies])
         common[: simulation.kin.dimension] = sum(one.mass * one.velocity for one in bodies) / mass
     return (1 - weight) * common
 

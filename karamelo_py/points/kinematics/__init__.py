@@ -96,8 +96,11 @@ def planar(kin):
 
 
 def total(terms):
-    """Sum terms, from the first on."""
-    return sum(terms[1:], terms[0])
+    """Sum terms, from the first on, as kernels do: `sum` rounds otherwise from Python 3.12 on."""
+    made = terms[0]
+    for term in terms[1:]:
+        made = made + term
+    return made
 
 
 def product(factors):

@@ -3,6 +3,7 @@
 import numpy as np
 
 from karamelo_py.output.point_table import PointTable
+from karamelo_py.points.kinematics import total
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Compute, Fix
@@ -160,9 +161,9 @@ class EnergyBalance(Compute):
         kinds = "kinetic", "stored", "dissipated"
         parts = [self.hub.fields.energy(kind, self.group) for kind in kinds]
         work = self.work.evaluate(self.hub.values) if self.work is not None else 0.0
-        total = sum(parts)
-        drift = self._drift(total - work, max(abs(part) for part in (*parts, work)))
-        self.publish_all(total - work, total, drift)
+        energies = total(parts)
+        drift = self._drift(energies - work, max(abs(part) for part in (*parts, work)))
+        self.publish_all(energies - work, energies, drift)
 
 
 class Momentum(Compute):
