@@ -25,6 +25,7 @@ from karamelo_py.compiler.code import I32, I64
 from karamelo_py.compiler.compile import implements, shared
 from karamelo_py.compiler.held import HeldTuple, item_of
 from karamelo_py.compiler.loops import ENTRY, NAME, in_one, written
+from karamelo_py.compiler.trace import formula
 from karamelo_py.compiler.values import intrinsic
 
 THREADS = 128  # of a block
@@ -79,6 +80,32 @@ def raise_to(array: np.ndarray, i: int, value: float) -> None:
 def _raise_to(array, i, value):
     if value > array[i]:
         _largest(array, i, value)
+
+
+@intrinsic
+def aligned_record(array, i, count):
+    """Read the first `count` numbers of record `i`, which begins at an address divisible by 16.
+
+    Where that is less than 16 bytes, at one divisible by its size.
+    """
+    if not isinstance(count, types.IntegerLiteral):
+        return None
+    result = types.UniTuple(array.dtype, count.literal_value)
+    size = array.dtype.bitwidth // 8
+    together = max(1, min(16 // size, count.literal_value))
+
+    def codegen(builder, table, i, _):
+        number = code.register_type(array.dtype)
+        kind = ir.VectorType(number, together)
+        place = code.item_pointer(builder, array, table, (i, I64(0)))
+        place = builder.bitcast(place, kind.as_pointer())
+        numbers = []
+        for k in range(count.literal_value // together):
+            found = builder.load(builder.gep(place, [I64(k)]), align=size * together)
+            numbers += [builder.extract_element(found, I32(lane)) for lane in range(together)]
+        return code.make_tuple(builder, result, numbers)
+
+    return result(array, types.int64, count), codegen
 
 
 # --- code -------------------------------------------------------------------------------------
@@ -177,6 +204,14 @@ def text_of(
             text = text.replace(f'@"{other}"', f'@"{own}"') if own else text
     name = f"{function.__name__}_{hashlib.sha256(text.encode()).hexdigest()[:32]}"
     return name, text.replace(NAME + ENTRY, f"{name}_entry").replace(NAME, name)
+
+
+def numbers_of(function: Callable, arguments: tuple) -> int:
+    """Count the numbers that a function of a thread gives for the rest of its arguments."""
+    kinds = plan_for(arguments).types
+    with in_one({}):
+        found = formula(shared(function), (*kinds, types.int64))
+    return len(found.result)
 
 
 def assembled(text: str, processor: str) -> str:

@@ -7,11 +7,28 @@ through.
 from math import inf, sqrt
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import all_lanes, fma, point_function, real, shared, where
+from karamelo_py.compiler.compile import (
+    Weighted,
+    all_lanes,
+    fma,
+    point_function,
+    real,
+    shared,
+    where,
+)
 from karamelo_py.compiler.fields import field, forget, increase, load_vector, store, store_from
+from karamelo_py.compiler.gpu import aligned_record
+from karamelo_py.compiler.loops import many_threads
 from karamelo_py.compiler.tuples import row
 from karamelo_py.kernels import visit
-from karamelo_py.kernels.arrays import Index, Nodes, Number, Tag, of_change, vector_at
+from karamelo_py.kernels.arrays import (
+    Index,
+    Nodes,
+    Number,
+    Tag,
+    of_change,
+    vector_at,
+)
 from karamelo_py.kernels.loss import FrictionalHeat, in_company, reflect, warm, warm_by_friction
 from karamelo_py.kernels.p2g import Force, VelocityBefore, WorkOfForces
 from karamelo_py.kernels.visit import Work, node_of, straining_node
@@ -178,6 +195,10 @@ def moves_corners(basis: Tag, kin: Tag) -> bool:
 @shared
 def update_at(kin: Tag, nodes: Nodes, i: Index, like: Number) -> tuple:
     """v* and v* - v of a node: one record in the plane, two in space."""
+    if many_threads() and not isinstance(i, Weighted):  # records that lie side by side
+        both = aligned_record(nodes.update, i, 2 * of_change(kin))
+        first, d = of_change(kin), kin.dimension
+        return vector(kin, both[:d]), vector(kin, both[first : first + d])
     if kin.dimension == 2:
         both = row(nodes.update, i, 0, (*like, *like))
         return vector(kin, both[:2]), vector(kin, both[2:])
@@ -191,7 +212,11 @@ def add_gradient(w, stencil, k, grad_v):
     if not len(grad_v):
         return grad_v
     i, _, grad_N = straining_node(w, stencil, k)
-    v = vector_at(w.kin, w.nodes.velocity, i, 0, zero_vector(w.kin, grad_N[0]))
+    if many_threads() and not isinstance(i, Weighted):
+        d = w.kin.dimension
+        v = vector(w.kin, aligned_record(w.nodes.velocity, i, of_change(w.kin))[:d])
+    else:
+        v = vector_at(w.kin, w.nodes.velocity, i, 0, zero_vector(w.kin, grad_N[0]))
     return grad_v + outer(v, grad_N)
 
 

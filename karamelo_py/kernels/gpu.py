@@ -14,17 +14,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import index, real, shared
+from karamelo_py.compiler.compile import index, real, shared, where
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.gpu import counted, raise_to
 from karamelo_py.compiler.lanes import room_for
-from karamelo_py.compiler.tuples import record
-from karamelo_py.kernels.arrays import DT, TIME, Nodes
+from karamelo_py.compiler.tuples import flat, nested_as, record
+from karamelo_py.kernels.arrays import DT, TIME, Nodes, of_force
 from karamelo_py.kernels.clock import finish, kick, last_step_size, step_size
 from karamelo_py.kernels.g2p import updated_all
 from karamelo_py.kernels.lanes import OneByOne
 from karamelo_py.kernels.nodes import at_node
-from karamelo_py.kernels.p2g import adds, columns_of, load_all, scattered_all
+from karamelo_py.kernels.p2g import RigidSums, adds, columns_of, load_all, scattered_all
 from karamelo_py.kernels.stencils import gathered_by
 from karamelo_py.kernels.step import ABOVE_LIMIT, DONE, PATIENCE, SHRUNK, SMALLEST, STOPPED
 from karamelo_py.kernels.sweep import (
@@ -54,11 +54,14 @@ class Cells(NamedTuple):
     count: np.ndarray  # (N,) int32 of points in each cell that are not listed yet
     number: np.ndarray  # (n,) int32: the cell of each point
     first: np.ndarray  # (N + 1,) int32: points of cell c are order[first[c]:first[c + 1]]
-    box: np.ndarray  # (N,) int32: number of an occupied cell among these
+    box: (
+        np.ndarray
+    )  # (N + 1,) int32: number of an occupied cell among these, -1 of others; how many
     cell: np.ndarray  # (boxes,) int32: the cell of a box
     order: np.ndarray  # (n,) int32: the points
     sums: np.ndarray  # (m,) int64: of count and OCCUPIED, by chunks of chunks
     before: np.ndarray  # (m,) int64: the sum of those before
+    loads: np.ndarray  # (numbers, n): what each point gives, before it is weighted
     boxes: np.ndarray  # (columns, boxes): what cells give to each node that their points see
 
 
@@ -109,6 +112,16 @@ def is_last(s):
     return values[TIME] + values[DT] >= s.control.clock[0].end_time
 
 
+def _is_filled(name: Any, column: int, kin: Any) -> bool:
+    """Tell whether a column of the nodes' records has a number, and is no gap."""
+    if name == "velocity":
+        return column < kin.dimension
+    force = column - of_force(kin)
+    return name not in ("sums", RigidSums) or (
+        column <= kin.dimension if force < 0 else force < kin.dimension
+    )
+
+
 class Stage:
     """A visit of the points in a step, as functions of threads: `row` is one of its scheme's."""
 
@@ -123,8 +136,10 @@ class Stage:
             for name, first, end in columns_of(tuple(q for q in quantities if adds(q) == add), kin)
             if name in present
             for column in range(first, end)
+            if _is_filled(name, column, kin)
         ]
         self.support = int(support(basis, kin))
+        self.scatters = bool((row.scatters or row.only_if_more) and quantities)
 
         @shared
         def context(s):
@@ -134,11 +149,49 @@ class Stage:
 
         self.context = context
 
-    def gather(self) -> Callable:
-        """Make what a point does: it gathers from the nodes, and is updated."""
-        context, tasks = self.context, self.row.visit.tasks
+    def _keep(self) -> Callable:
+        """Make what keeps the load of a point."""
+        quantities, scatters = self.row.visit.quantities, self.scatters
 
-        def gather_point(i, fate, s, block):
+        @shared
+        def keep(w, p, dt, cells):
+            if scatters:
+                for k, number in enumerate(flat(load_all(quantities, w, p, dt))):
+                    cells.loads[k, p] = number
+
+        return keep
+
+    def load(self) -> Callable:
+        """Make what a point gives."""
+        context, quantities = self.context, self.row.visit.quantities
+
+        @shared
+        def load_of_point(s, block, i):
+            c = context(s)
+            points, p = block.points, index(i)
+            grid = record(c.grids, index(points.grid[p]))
+            w = work_of(c, grid, c.nodes, block, places_of(c.frame, points, c.now, c.then))
+            return flat(load_all(quantities, w, p, c.dt))
+
+        return load_of_point
+
+    def load_point(self) -> Callable:
+        """Make what a point does that has not gathered: it keeps its load."""
+        load = self.load()
+
+        def load_point(i, fate, s, block, cells):
+            if fate[STATUS] > 0:
+                return
+            for k, number in enumerate(load(s, block, i)):
+                cells.loads[k, i] = number
+
+        return load_point
+
+    def gather(self) -> Callable:
+        """Make what a point does: it gathers from the nodes, is updated, and keeps its load."""
+        context, tasks, keep = self.context, self.row.visit.tasks, self._keep()
+
+        def gather_point(i, fate, s, block, cells):
             if fate[STATUS] > 0:
                 return
             c = context(s)
@@ -150,6 +203,7 @@ class Stage:
             fastest = real(fate[RATE], c.dt)
             moved, rate = updated_all(tasks, w, stencil, p, c.dt, found, fastest)
             _report(fate, points.id[p], moved, rate, c.stride)
+            keep(w, p, c.dt, cells)
 
         return gather_point
 
@@ -226,8 +280,9 @@ class Stage:
                     boxes[j * count + k, box] = room_of(name, rooms, None)[k, column]
 
         @shared
-        def loaded(w, p, dt):
-            return load_all(quantities, w, p, dt)
+        def loaded(w, p, dt, cells):
+            like = load_all(quantities, w, p, dt)  # for its shape alone
+            return nested_as(like, tuple([cells.loads[k, p] for k in range(len(flat(like)))]))
 
         @shared
         def rooms_for(like):
@@ -238,25 +293,25 @@ class Stage:
             return w._replace(basis=InCell(w.basis), nodes=nodes_for(w.nodes, rooms))
 
         def scatter_cell(i, fate, s, block, cells):
-            if fate[STATUS] > 0:
+            if fate[STATUS] > 0 or i >= cells.box[cells.box.size - 1]:
                 return
             if only_if_more and is_last(s):
                 return
-            first, last = cells.first[i], cells.first[i + 1]
-            if first == last:
-                return
+            cell = cells.cell[i]
+            first, last = cells.first[cell], cells.first[cell + 1]
             c = context(s)
-            points = block.points
-            grid = record(c.grids, index(points.grid[index(cells.order[first])]))
+            points, p = block.points, index(cells.order[first])
+            grid = record(c.grids, index(points.grid[p]))
             w = work_of(c, grid, c.nodes, block, places_of(c.frame, points, c.now, c.then))
             rooms = rooms_for(c.dt)
             clear(rooms, c.dt)
             out = in_cell(w, rooms)
             for q in range(first, last):
-                p = index(cells.order[q])
+                behind = index(cells.order[min(q + 1, last - 1)])  # asked for ahead
                 stencil = locate(w.basis, w.kin, grid, place(w, p))
-                give(out, stencil, loaded(w, p, c.dt))
-            put(rooms, cells.boxes, index(cells.box[i]))
+                give(out, stencil, loaded(w, p, c.dt, cells))
+                p = behind
+            put(rooms, cells.boxes, index(i))
 
         return scatter_cell
 
@@ -273,26 +328,42 @@ class Stage:
                 else:
                     array[n, column] = value
 
-        lists = self.lists
-
         def sum_node(i, fate, s, block, cells, use):
-            if fate[STATUS] > 0:
+            if fate[STATUS] > 0 or use[i] == 0:
                 return
             if only_if_more and is_last(s):
                 return
             grid = _grid_of(s.grids, i)
-            seen = 0
-            if lists:
-                for k in range(count):
-                    seen += _points_in(cells, _cell_of(s, grid, i, k))
-                use[i] = _in_use(use[i], seen, first_block)
-            if use[i] > 0:
-                found = (real(0, s.nodes.sums[0, 0]),) * len(columns)
-                for k in range(count):
-                    found = _with_cell(cells, _cell_of(s, grid, i, k), k, count, found)
-                put(s.nodes, index(i), found)
+            found = (real(0, s.nodes.sums[0, 0]),) * len(columns)
+            for k in range(count):
+                found = _with_cell(s, cells, grid, i, k, count, found)
+            put(s.nodes, index(i), found)
 
         return sum_node
+
+    def mark(self) -> Callable:
+        """Make what a cell does: it marks the nodes that its points see as used."""
+        count, only_if_more = self.support, self.row.only_if_more
+
+        def mark_nodes(i, fate, s, cells, use):
+            if fate[STATUS] > 0 or i >= cells.box[cells.box.size - 1]:
+                return
+            if only_if_more and is_last(s):
+                return
+            cell = cells.cell[i]
+            grid = _grid_of(s.grids, cell)
+            for k in range(count):
+                use[index(cell + _steps_to(s, grid, k))] = 2
+
+        return mark_nodes
+
+
+def age_node(i, fate, use):
+    """Count a node as used once more, to be cleared, before it is no longer."""
+    if fate[STATUS] > 0:
+        return
+    if use[i] > 0:
+        use[i] -= 1
 
 
 @shared
@@ -306,31 +377,24 @@ def _grid_of(grids, n):
 
 
 @shared
-def _cell_of(s, grid, n, k):
-    """The cell whose points see node `n` as their k-th node; perhaps there is none."""
-    return n - node_number(grid, 0, digits(k, s.basis.line_nodes, s.kin.dimension))
+def _steps_to(s, grid, k):
+    """How far the k-th node that a point sees is from the first, in numbers of nodes."""
+    return node_number(grid, 0, digits(k, s.basis.line_nodes, s.kin.dimension))
 
 
 @shared
-def _points_in(cells, c):
-    return cells.first[index(c + 1)] - cells.first[index(c)] if c >= 0 else 0
-
-
-@shared
-def _in_use(before, seen, first_block):
-    """Whether a node is in use: 2, if points see it; 1 once more behind that, to be cleared."""
-    if seen > 0:
-        return 2
-    return max(before - 1, 0) if first_block else before
-
-
-@shared
-def _with_cell(cells, c, k, count, found):
-    """`found` with what the points of a cell give to the k-th node that they see."""
-    if _points_in(cells, c) > 0:
-        box = index(cells.box[index(c)])
-        found = tuple([value + cells.boxes[j * count + k, box] for j, value in enumerate(found)])
-    return found
+def _with_cell(s, cells, grid, n, k, count, found):
+    """`found` with what a cell gives to node `n`, which its points see as their k-th node."""
+    c = n - _steps_to(s, grid, k)
+    box = cells.box[index(max(c, 0))]
+    there = (box >= 0) & (c >= 0)
+    at = index(max(box, 0))
+    return tuple(
+        [
+            value + where(there, cells.boxes[j * count + k, at], value - value)
+            for j, value in enumerate(found)
+        ]
+    )
 
 
 # --- lists of the points by cell --------------------------------------------------------------
@@ -381,13 +445,14 @@ def place_list(i, fate, cells):
     total = cells.before[chunk]
     for c in range(chunk * CHUNK, i):
         total += _weight(cells.count[c])
-    first, own = total % OCCUPIED, cells.count[i]
+    first, own, box = total % OCCUPIED, cells.count[i], total // OCCUPIED
     cells.first[i] = first
-    cells.box[i] = total // OCCUPIED
+    cells.box[i] = box if own > 0 else -1
     if own > 0:
-        cells.cell[total // OCCUPIED] = i
+        cells.cell[box] = i
     if i + 1 == cells.count.size:
         cells.first[i + 1] = first + own
+        cells.box[i + 1] = box + (1 if own > 0 else 0)
 
 
 def list_point(i, fate, cells):
@@ -400,13 +465,15 @@ def list_point(i, fate, cells):
 
 def sort_cell(i, fate, ids, cells):
     """Sort the points of a cell by id."""
-    if fate[STATUS] > 0:
+    if fate[STATUS] > 0 or i >= cells.box[cells.box.size - 1]:
         return
-    first, last = cells.first[i], cells.first[i + 1]
+    c = cells.cell[i]
+    first, last = cells.first[c], cells.first[c + 1]
     for q in range(first + 1, last):
         p = cells.order[q]
+        own = ids[p]
         at = q
-        while at > first and ids[cells.order[at - 1]] > ids[p]:
+        while at > first and ids[cells.order[at - 1]] > own:
             cells.order[at] = cells.order[at - 1]
             at -= 1
         cells.order[at] = p
@@ -420,22 +487,20 @@ def sort_cell(i, fate, ids, cells):
 
 def order_cell(i, fate, cells, come_from):
     """Say where the points of a cell come to lie, and which come there."""
-    if fate[STATUS] > 0:
+    boxes = cells.box[cells.box.size - 1]
+    if fate[STATUS] > 0 or i >= boxes:
         return
-    first, last = cells.first[i], cells.first[i + 1]
-    if first == last:
-        return
-    own = cells.box[i]
-    begin = own // WARP * WARP
-    end = min(begin + WARP, cells.box[cells.box.size - 1])  # no point has the last node first
+    cell = cells.cell[i]
+    first, last = cells.first[cell], cells.first[cell + 1]
+    begin = i // WARP * WARP
     start = cells.first[cells.cell[begin]]
     for q in range(last - first):
         at = start
-        for k in range(begin, end):
+        for k in range(begin, min(begin + WARP, boxes)):
             c = cells.cell[k]
             count = cells.first[c + 1] - cells.first[c]
             at += min(count, q)
-            if k < own and count > q:
+            if k < i and count > q:
                 at += 1
         come_from[at] = cells.order[first + q]
         cells.order[first + q] = at

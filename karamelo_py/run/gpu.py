@@ -11,7 +11,7 @@ from numpy.lib.stride_tricks import as_strided
 from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.formula import EVALUATE, GLOBAL, UNIFORM, evaluate_in_table
-from karamelo_py.compiler.gpu import Images, Launch
+from karamelo_py.compiler.gpu import Images, Launch, numbers_of
 from karamelo_py.kernels import gpu, table
 from karamelo_py.kernels import gpu_fixes as fixes
 from karamelo_py.kernels.arrays import (
@@ -28,7 +28,7 @@ from karamelo_py.kernels.arrays import (
 )
 from karamelo_py.kernels.hook_loop import ACT, RUB
 from karamelo_py.kernels.hooks import HEAT_FUNCTION, NODE_FUNCTION, POINT_FUNCTION
-from karamelo_py.kernels.p2g import WorkOfForces, columns_of
+from karamelo_py.kernels.p2g import WorkOfForces
 from karamelo_py.kernels.step import DONE, first_rows, rows_of
 from karamelo_py.kernels.totals import WORK
 from karamelo_py.kernels.walls import FRICTION
@@ -36,7 +36,7 @@ from karamelo_py.kernels.watch import LOOK
 from karamelo_py.points.laws import moves_as_told
 
 POLL = 64  # steps between two looks at how far a run is
-REGISTERS = 64  # numbers that a thread of a cell sums at once
+REGISTERS = 200  # words that a thread of a cell sums up, of 255
 FAR = 1.0  # cells that points go before they are ordered anew in memory
 _NONE = NoHooks()
 
@@ -125,8 +125,8 @@ class StepsOnCard:
         self.images.send([self.images.known(count)])
         return gpu.Cells(
             count, new((points,), np.int32), new((nodes + 1,), np.int32),
-            new((nodes,), np.int32), new((boxes,), np.int32), new((points,), np.int32),
-            new(sums, np.int64), new(sums, np.int64), np.zeros((0, 0)),
+            new((nodes + 1,), np.int32), new((boxes,), np.int32), new((points,), np.int32),
+            new(sums, np.int64), new(sums, np.int64), np.zeros((0, 0)), np.zeros((0, 0)),
         )  # fmt: skip
 
     def _totals(self) -> None:
@@ -142,17 +142,25 @@ class StepsOnCard:
         self.present = ["sums", "velocity", *(type(one) for one in s.nodes.fields)]
         stages = [self._stage(row) for row in rows if isinstance(row, table.Sweep)]
         most = max((len(stage.columns) * stage.support for stage in stages), default=0)
-        made = []
-        for cells in self.cells:
-            room = self.images.new((most, cells.cell.size), s.nodes.sums.dtype)
-            made.append(cells._replace(boxes=room))
-        self.cells = made
+        self.cells = [
+            cells._replace(
+                boxes=self.images.new((most, cells.cell.size), s.nodes.sums.dtype),
+                loads=self._loads(stages, block),
+            )
+            for cells, block in zip(self.cells, s.blocks, strict=True)
+        ]
+
+    def _loads(self, stages: list[gpu.Stage], block: Any) -> np.ndarray:
+        """Give room to what the points of a block give."""
+        arguments = self.images.of((self.s, block))
+        counts = (numbers_of(stage.load(), arguments) for stage in stages if stage.scatters)
+        shape = (max(counts, default=0), block.points.mass.size)
+        return self.images.new(shape, self.s.nodes.sums.dtype)
 
     def _stage(self, row: Any) -> gpu.Stage:
-        columns = columns_of(row.visit.quantities, self.s.kin)
-        numbers = sum(end - first for name, first, end in columns if name in self.present)
         stage = gpu.Stage(row, self.s.basis, self.s.kin, self.present)
-        stage.parts = max(1, -(-numbers * stage.support // REGISTERS))
+        words = self.s.nodes.sums.itemsize // 4 * len(stage.columns) * stage.support
+        stage.parts = max(1, -(-words // REGISTERS))
         return stage
 
     # --- launches
@@ -196,26 +204,34 @@ class StepsOnCard:
     def _gathers(self, row: Any) -> Iterator[Launch]:
         if row.gathers:
             gather = self._stage(row).gather()
-            for block in self.s.blocks:
-                yield self._launch(gather, block.points.mass.size, self.s, block)
+            for block, cells in zip(self.s.blocks, self.cells, strict=True):
+                yield self._launch(gather, block.points.mass.size, self.s, block, cells)
             yield self._launch(gpu.take_reports, 1, self.s)
 
     def _scatters(self, row: Any) -> Iterator[Launch]:
         s, stage = self.s, self._stage(row)
         sizes = [block.points.mass.size for block in s.blocks]
         pairs = list(zip(s.blocks, self.cells, sizes, strict=True))
-        if not (row.scatters or row.only_if_more) or not row.visit.quantities:
+        if not stage.scatters:
             return
+        if not row.gathers:
+            load = stage.load_point()
+            for block, cells, size in pairs:
+                yield self._launch(load, size, s, block, cells)
         if stage.lists:
             count = stage.count()
             for block, cells, size in pairs:
                 yield self._launch(count, size, s, block, cells)
                 yield from self._lists(block, cells)
             yield self._launch(gpu.take_reports, 1, s)
+            yield self._launch(gpu.age_node, self.nodes, self.use)
+            mark = stage.mark()
+            for cells in self.cells:
+                yield self._launch(mark, cells.cell.size, s, cells, self.use)
         functions = [stage.scatter(part) for part in range(stage.parts)]
         for k, (block, cells, _) in enumerate(pairs):
             for scatter in functions:
-                yield self._launch(scatter, self.nodes, s, block, cells)
+                yield self._launch(scatter, cells.cell.size, s, block, cells)
             yield self._launch(stage.sum(k == 0), self.nodes, s, block, cells, self.use)
 
     def _lists(self, block: Any, cells: gpu.Cells) -> Iterator[Launch]:
@@ -230,14 +246,14 @@ class StepsOnCard:
             yield self._launch(gpu.sum_before, levels[k], cells, begins[k], above)
         yield self._launch(gpu.place_list, self.nodes, cells)
         yield self._launch(gpu.list_point, block.points.mass.size, cells)
-        yield self._launch(gpu.sort_cell, self.nodes, block.points.id, cells)
+        yield self._launch(gpu.sort_cell, cells.cell.size, block.points.id, cells)
 
     def _order(self) -> Iterator[Launch]:
         """Bring points into the order in which threads go through them."""
         for block, cells in zip(self.s.blocks, self.cells, strict=True):
             size = block.points.mass.size
             come_from = self.images.new((size,), np.int32)
-            yield self._launch(gpu.order_cell, self.nodes, cells, come_from)
+            yield self._launch(gpu.order_cell, cells.cell.size, cells, come_from)
             arrays = [as_rows(self.images.of(array)) for _, array in arrays_of(block.points)]
             most = max(rows.nbytes for rows in arrays)
             room = self.images.new((most // 4,), np.int32)
