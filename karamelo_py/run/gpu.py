@@ -36,7 +36,7 @@ from karamelo_py.kernels.watch import LOOK
 from karamelo_py.points.laws import moves_as_told
 
 POLL = 64  # steps between two looks at how far a run is
-REGISTERS = 200  # words that a thread of a cell sums up, of 255
+REGISTERS = {4: 200, 8: 130}  # words that a thread of a cell sums up, by the size of numbers
 FAR = 1.0  # cells that points go before they are ordered anew in memory
 _NONE = NoHooks()
 
@@ -159,8 +159,9 @@ class StepsOnCard:
 
     def _stage(self, row: Any) -> gpu.Stage:
         stage = gpu.Stage(row, self.s.basis, self.s.kin, self.present)
-        words = self.s.nodes.sums.itemsize // 4 * len(stage.columns) * stage.support
-        stage.parts = max(1, -(-words // REGISTERS))
+        size = self.s.nodes.sums.itemsize
+        words = size // 4 * len(stage.columns) * stage.support
+        stage.parts = max(1, -(-words // REGISTERS[size]))
         return stage
 
     # --- launches
