@@ -96,9 +96,9 @@ class SimulationOnCard(Simulation):
 
     def compile(self) -> None:
         """Have all that threads do compiled now, and room for the arrays on the card."""
-        self._launches()
+        self.launches()
 
-    def _launches(self) -> StepsOnCard:
+    def launches(self) -> StepsOnCard:
         """Give the steps for the arrays and hooks as they are."""
         steps, hooks = self._steps, self.hooks
         known = [type(self.visits), *map(id, arrays_in((there(self._setup), hooks)))]
@@ -122,7 +122,7 @@ class SimulationOnCard(Simulation):
                 return status
         if self._ends(target):
             return DONE
-        steps = self._launches()
+        steps = self.launches()
         if not self._sent:
             self._fetch()
             steps.send()

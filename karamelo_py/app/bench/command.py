@@ -14,12 +14,13 @@ from pathlib import Path
 from typing import Any
 
 import karamelo_py
-from karamelo_py.app.bench import apart, measure
+from karamelo_py.app.bench import apart, measure, on_card
 from karamelo_py.app.bench.measure import WORKLOADS
 from karamelo_py.app.options import above_zero, add_variables, threads_option
 from karamelo_py.app.plot import read_text
 from karamelo_py.app.studies.records import surroundings
 from karamelo_py.app.studies.variables import out_file
+from karamelo_py.compiler.gpu import NoCard, bandwidth, card
 from karamelo_py.output.files import write_whole
 from karamelo_py.script.errors import ScriptError, unknown
 
@@ -52,6 +53,11 @@ def add_options(parser: ArgumentParser) -> None:
         "--seconds", type=above_zero, default=2.0, metavar="S",
         help="how long each scene is measured (default: 2)",
     )  # fmt: skip
+    parser.add_argument(
+        "--gpu", action="store_true",
+        help="measure an NVIDIA GPU, at 1, 4 and 16 million points unless -var says how fine "
+        f"(default workloads: {', '.join(on_card.USUAL)})",
+    )  # fmt: skip
     parser.add_argument("-o", type=Path, metavar="FILE", help="write what is measured, as JSON")
     parser.add_argument(
         "--against", type=Path, metavar="FILE", help="compare with what -o has written before"
@@ -63,7 +69,8 @@ def run(options: Namespace) -> int:
     for name in options.workloads:
         if name not in WORKLOADS:
             raise unknown(f"unknown workload '{name}'", name, WORKLOADS)
-    chosen = options.workloads or (apart.USUAL if options.ranks else list(WORKLOADS))
+    usual = on_card.USUAL if options.gpu else apart.USUAL if options.ranks else list(WORKLOADS)
+    chosen = options.workloads or usual
     known = {name: set(re.findall(r"\w+", WORKLOADS[name].script)) for name in chosen}
     for variable, _ in options.var:
         if not any(variable in words for words in known.values()):
@@ -72,6 +79,8 @@ def run(options: Namespace) -> int:
             )
     out = out_file(options.o, ".json") if options.o else None
     earlier = read(options.against) if options.against else None
+    if options.gpu:
+        return _on_card(options, chosen, known, out, earlier)
     from numba import config
 
     from karamelo_py.compiler.threads import set_threads
@@ -99,6 +108,34 @@ def run(options: Namespace) -> int:
         found["workloads"][name] = {"title": title, "variables": presets, **one}
         if out:
             write_whole(out, json.dumps(found, indent=1) + "\n")
+    if earlier:
+        print("\n" + "\n".join(comparison(found, earlier)))
+    if out:
+        print(f"\nwritten: {out}")
+    return 0
+
+
+def _on_card(
+    options: Namespace, chosen: Any, known: Mapping[str, set], out: Path | None, earlier: Any
+) -> int:
+    """Measure workloads on the GPU of this machine."""
+    try:
+        gpu = card()
+    except NoCard as error:
+        raise ScriptError(str(error), hint=error.hint) from None
+    copied = bandwidth(gpu)
+    print(f"{gpu.name}, copies of memory {copied / 1e9:.0f} GB/s, read and written")
+    about = {"commit": commit(), "card": gpu.name, "bandwidth": copied, "seconds": options.seconds}
+    found: dict[str, Any] = {"kind": KIND, **surroundings(), **about, "workloads": {}}
+    for name in chosen:
+        presets = {n: value for n, value in options.var if n in known[name]}
+        for variables in on_card.sizes_of(name, presets):
+            one = on_card.measured(name, variables, gpu, options.seconds)
+            on_card.say(name, one, variables)
+            key = " ".join([name, *(f"{n}={value}" for n, value in variables.items())])
+            found["workloads"][key] = {"variables": variables, **one.record()}
+            if out:
+                write_whole(out, json.dumps(found, indent=1) + "\n")
     if earlier:
         print("\n" + "\n".join(comparison(found, earlier)))
     if out:

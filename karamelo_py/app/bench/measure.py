@@ -199,11 +199,17 @@ def _noted(seconds: dict[str, list[float]], name: str) -> Iterator[None]:
 
 
 def build(
-    workload: Workload, threads: int | None, presets: Mapping[str, str], comm: MpiComm | None = None
-) -> Simulation:
-    """Build the simulation of a workload, ready to step; `presets` set variables of its script."""
+    workload: Workload, threads: int | None, presets: Mapping[str, str],
+    comm: MpiComm | None = None, card: Any = None,
+) -> Simulation:  # fmt: skip
+    """Build the simulation of a workload, ready to step; `presets` set variables of its script.
+
+    A `card` takes its steps, if one is given.
+    """
     hub = Hub(Console(quiet=True))
     hub.settings.threads = threads
+    if card is not None:
+        hub.settings.engine, hub.settings.card = "gpu", card
     if comm is not None:
         share(hub, comm)
     hub.interpreter = Interpreter(hub, presets=presets)

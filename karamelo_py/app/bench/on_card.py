@@ -1,0 +1,117 @@
+"""karamelo-py bench --gpu: workloads at sizes of a GPU, measured against its memory's bandwidth."""
+
+from __future__ import annotations
+
+import re
+import statistics
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from time import perf_counter
+from typing import Any, NamedTuple
+
+from karamelo_py.app.bench.measure import REPETITIONS, WORKLOADS, build, traffic
+from karamelo_py.compiler.gpu import bandwidth
+from karamelo_py.kernels.gpu import OTHERS, STAGES
+from karamelo_py.kernels.step import DONE
+from karamelo_py.script.errors import ScriptError
+
+USUAL = ("disks-320", "disks-320-mls-single", "block-3d-mls-single", "block-3d-mls", "bar-3d-ul")
+MOST = 200  # steps of a repetition: nothing leaves the scenes in five
+SIZES = (1e6, 4e6, 16e6)  # points, where no variable is set
+DIMENSIONS = {"disks": 2, "dam": 2}  # of workloads; of the others 3
+FINENESS = "N", "coarser"  # variables that say how fine a scene is, how coarse
+
+
+class OnCard(NamedTuple):
+    """Measured speed of a workload on a GPU."""
+
+    points: int
+    speeds: list[float]  # particle-steps per second of each repetition
+    bytes_per_particle_step: float  # that move in a particle-step if no cache keeps them
+    roofline: float  # share of the memory's bandwidth that these take at the best speed
+    bytes_on_card: int
+    stages: dict[str, float]  # seconds per step
+    made: float  # seconds until the code of a step was there
+    precision: str
+
+    @property
+    def best(self) -> float:
+        return max(self.speeds)
+
+    @property
+    def median(self) -> float:
+        return statistics.median(self.speeds)
+
+    def record(self) -> dict[str, Any]:
+        """Write what is kept in a file; speeds in particle-steps/s, times in seconds."""
+        return {"best": self.best, "median": self.median} | self._asdict()
+
+
+def sizes_of(name: str, presets: Mapping[str, str]) -> Iterator[dict[str, str]]:
+    """The variables of a workload at each of `SIZES`; as they are, where one is set."""
+    script = WORKLOADS[name].script
+    known = [
+        (v, m[1]) for v in FINENESS if (m := re.search(rf"^{v} = (.*)$", script, re.MULTILINE))
+    ]
+    if "coarser" in script and not known:
+        known = [("coarser", "1")]
+    if not known or set(presets) & set(FINENESS):
+        yield dict(presets)
+        return
+    ((variable, value),) = known
+    d = next((d for word, d in DIMENSIONS.items() if name.startswith(word)), 3)
+    count = build(WORKLOADS[name], 1, presets).count
+    for size in SIZES:
+        finer = (size / count) ** (1 / d)
+        number = round(int(value) * finer) if variable == "N" else float(value) / finer
+        yield {**presets, variable: f"{number:.6g}"}
+
+
+def measured(name: str, presets: Mapping[str, str], card: Any, seconds: float) -> OnCard:
+    """Measure a workload on a card for about so many seconds."""
+    simulation = build(WORKLOADS[name], 1, presets, card=card)
+    copied = bandwidth(card)
+    begun = perf_counter()
+    simulation.compile()
+    made = perf_counter() - begun
+    per_step = traffic(simulation)[0]
+
+    def timed(count: int) -> float:
+        card.wait()
+        begun = perf_counter()
+        status = simulation.advance(count)
+        card.wait()
+        if status != DONE:
+            raise ScriptError(f"{name}: a workload went wrong")
+        return perf_counter() - begun
+
+    timed(WORKLOADS[name].lead + 5)
+    count = min(max(5, int(seconds / REPETITIONS / (timed(20) / 20))), MOST)
+    rates = [simulation.count * count / timed(count) for _ in range(REPETITIONS)]
+    steps = simulation.launches()
+    stages: dict[str, float] = defaultdict(float)
+    for launch, spent in steps.seconds_of_step():
+        stages[STAGES.get(launch.name, OTHERS)] += spent
+    found = OnCard(
+        simulation.count, rates, per_step, max(rates) * per_step / copied, steps.images.size,
+        dict(sorted(stages.items(), key=lambda item: -item[1])), made,
+        simulation.hub.settings.precision,
+    )  # fmt: skip
+    steps.images.close()
+    return found
+
+
+def say(name: str, one: OnCard, presets: Mapping[str, str]) -> None:
+    """Print what was measured."""
+    words = ", ".join(f"{variable} = {value}" for variable, value in presets.items())
+    print(f"\n{name}: {WORKLOADS[name].title}; {words}; {one.points} points, {one.precision}")
+    print(
+        f"  {'particle-steps/s':<38} {one.best / 1e6:8.1f} million (median {one.median / 1e6:.1f})"
+    )
+    print(f"  {'bytes moved per particle-step':<38} {one.bytes_per_particle_step:8.0f}")
+    print(f"  {'share of the memory roofline':<38} {100 * one.roofline:8.1f} %")
+    print(f"  {'memory of the GPU':<38} {one.bytes_on_card / 1e9:8.2f} GB")
+    print(f"  {'compilation':<38} {one.made:8.1f} s")
+    for stage, spent in one.stages.items():
+        print(f"    {stage:<38} {1e9 * spent / one.points:6.3f} ns")
+    print(f"    {'a step':<38} {1e9 / one.best:6.3f} ns", flush=True)
