@@ -167,6 +167,7 @@ def compiled_visit(visit: Visit, setup: Setup) -> Compiled:
     context = Context(
         s.frame, s.kin, s.basis, s.transfer, s.averaging, s.grids, nodes, nodes, 0, real(0),
         real(1), (real(0),) * s.kin.dimension, 0, True, True, real(1),
+        real(1),
     )  # fmt: skip
     report = np.zeros((1, 2), real)
     return compiled(visit_point, visit, context, s.blocks[0], 0, report)
