@@ -35,7 +35,12 @@ def kernels(folder: Path) -> set[str]:
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.xdist_group(name)) for name in SCENES]
+    "name",
+    [
+        pytest.param("neo-hookean", marks=pytest.mark.xdist_group("neo-hookean")),
+        pytest.param("identical", marks=pytest.mark.xdist_group("identical")),
+        pytest.param("heat_slab", marks=pytest.mark.full),
+    ],
 )
 def test_the_second_run_compiles_nothing(tmp_path, name):
     script, threads, variables = SCENES[name]

@@ -128,8 +128,8 @@ def test_flip_rings_behind_a_wave(run):
 
 @pytest.mark.xdist_group("bar")
 def test_flip_noise_does_not_grow(run_script):
-    """The energy of the vibrating bar over 20 periods."""
-    check_energy(run_script, 20)
+    """The energy of the vibrating bar over 10 periods."""
+    check_energy(run_script, 10)
 
 
 @pytest.mark.full
@@ -139,7 +139,7 @@ def test_flip_noise_does_not_grow_in_many_periods(run_script, periods):
 
 
 def check_energy(run_script, periods):
-    """What is gained is told from nothing by 20 periods as by 100: limits are a share of those.
+    """What is gained is told from nothing by 10 periods as by 100: limits are a share of those.
 
     Found: 5e-5 of the largest energy in 40 periods, 1e-4 in 100; nothing and 7e-5 of the mean.
     """
@@ -270,7 +270,7 @@ def shaken(run_interpreted, scheme, ppc, factor, method="tlmpm, FLIP, linear, 1"
         method({method})
         scheme({scheme})
         dimension(2, -2, 5, -2, 5, 1)
-        region(box, block, 0, 3, 0, 2)
+        region(box, block, 0, 2, 0, 2)
         material(rubber, neo-hookean, 1, 100, 0.3)
         solid(box, region, box, {ppc}, rubber, 1, 0)
         fix(v, initial_velocity_particles, all, 1e-6*sin(37*x + 11*y), 1e-6*sin(29*x*x + 17*y))
@@ -489,7 +489,7 @@ def test_a_ball_on_the_axis_stays_whole(run_interpreted, scheme, basis):
         scheme({scheme})
         dimension(2, 0, 1.5, -1.5, 1.5, 0.25)
         axisymmetric(true)
-        region(ball, cylinder, 0, 0, 1)
+        region(ball, cylinder, 0, 0, {0.75 if basis == "linear" else 1})
         material(rubber, neo-hookean, 1, 1, 0.3)
         solid(ball, region, ball, 3, rubber, 0.25, 0)
         fix(v, initial_velocity_particles, all, 0.03*x0, 0.03*y0)

@@ -38,14 +38,14 @@ def scene(method="ulmpm, FLIP, linear, 1", scheme="musl", push=0, v0=1):
         ("tlmpm, FLIP, linear, 0.99", "usl"),
     ],
 )
-def test_friction_takes_mu_times_what_the_wall_gives(run_script, method, scheme):
+def test_friction_takes_mu_times_what_the_wall_gives(run_interpreted, method, scheme):
     """While all nodes slide, momentum along the wall falls by mu times what it rises across.
 
     v_x = v_0 - mu (g t + v_y), whatever the block swings by. A node here and there that sticks
     while the block swings rubs less: 1 % of the momentum lost; to ten digits logged the force is mu
     times the reaction in all steps in which none does.
     """
-    log = run_script(scene(method, scheme)).log
+    log = run_interpreted(scene(method, scheme)).log
     lost = MU * (10 * log.Time + log.v_y)
     assert 1 - log.v_x == pytest.approx(lost, abs=0.01 * lost[-1])
     ratio = log.floor_x[log.floor_y > 0] / log.floor_y[log.floor_y > 0]

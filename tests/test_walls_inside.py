@@ -18,7 +18,7 @@ compute(Es, strain_energy, all)
 compute(Ek, kinetic_energy, all)
 set_output(1)
 log_modify(custom, step, time, x_x, x_y, Es, Ek, wall_x, wall_y)
-run(5)
+run(3)
 """
 
 
