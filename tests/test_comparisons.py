@@ -38,9 +38,10 @@ SHARED = {
     "incline": "contact", "hertz": "contact", "slump": "soil",
     "dam_break": "water", "dam_ritter": "water",
 }  # fmt: skip
-# Of these a sibling shows the same in less: static_rough_footing (test_implicit_tools.py), slump,
-# and taylor_bar_axisymmetric.
-SHOWN = {"static_footing", "collapse", "taylor_bar", "taylor_bar_227"}
+# Of these a sibling shows the same in less: a rough footing in test_implicit_tools.py, a cylinder
+# and a vertical cut in test_implicit.py, slump, and taylor_bar_axisymmetric.
+SHOWN = {"footing", "static_footing", "lame", "static_slope"}
+SHOWN |= {"collapse", "taylor_bar", "taylor_bar_227"}
 SMALL = [
     pytest.param(name, marks=pytest.mark.xdist_group(SHARED.get(name, name)))
     for name in scenes()

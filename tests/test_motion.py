@@ -16,6 +16,7 @@ from karamelo_py.run.body_motion import BodyMotion
 from karamelo_py.schemes.usl import USL
 
 VELOCITY = (0.7, -0.4, 0.3)
+WAY = {1: 0.34, 2: 0.19, 3: 0.19}  # time of a flight
 SMALL = (0.2, 0.1, 0.1)
 every_dimension = pytest.mark.parametrize("d", [1, 2, 3])
 every_law = pytest.mark.parametrize("law", [law for law in LAWS if law != "soft"])
@@ -25,7 +26,7 @@ every_transfer = pytest.mark.parametrize("transfer", TRANSFERS)
 def flight(d, transfer, scheme, law):
     """Result of free flight through 2.4 cells in 34 steps or, with usl's shorter ones, more.
 
-    In space through 1.3, by which all points come over an edge of cells.
+    In the plane and in space through 1.3, by which all points come over an edge of cells.
     """
     one_point = d == 3
     courant = {"usl": USL.courant[one_point]}.get(scheme, 1)
@@ -39,7 +40,7 @@ def flight(d, transfer, scheme, law):
         "log_modify(custom, step, time, error_s, Es, v_x)",
         "set_output(100)",
         f"set_dt({0.01 * courant})",
-        "run_time(0.19)" if one_point else "run_time(0.34)",
+        f"run_time({WAY[d]})",
         transfer=transfer,
         scheme=scheme,
         law=law,
@@ -65,7 +66,7 @@ def test_free_flight_is_exact(run_interpreted, d, transfer, scheme, law):
     other schemes, and are refused (test_combinations.py).
     """
     log = run_interpreted(flight(d, transfer, scheme, law)).log
-    assert log.Time[-1] == pytest.approx(0.19 if d == 3 else 0.34, rel=1e-12)
+    assert log.Time[-1] == pytest.approx(WAY[d], rel=1e-12)
     assert log.error_s[-1] < 1e-14
     assert log.v_x[-1] == pytest.approx(0.7, rel=1e-10)  # ten digits are logged
     if law == "soft":
