@@ -37,8 +37,8 @@ def compare(run, axes, full):
         yield Row(f"diameter of the foot, {kind} (mm)", DIAMETER, foot, 0.1, SOURCE)
         yield Row(f"diameter at 0.2 L0, {kind} (mm)", WAIST, waist, 0.1, SOURCE)
         side = 1 if kind == "tlmpm" else -1
-        last = result.snapshots("taylor_bar")[-1]
-        cut = np.abs(last.y) < 1.5 * np.abs(last.y).min()  # the layer of points beside the axis
+        first, *_, last = result.snapshots("taylor_bar")
+        cut = np.abs(first.y) < 1.5 * np.abs(first.y).min()  # two layers of points beside the axis
         body(axes, side * np.abs(1e3 * last.x[cut]), height[cut], kind)
     if full:
         for what, a, b in zip(("length", "foot"), found["tlmpm"], found["ulmpm"], strict=True):

@@ -32,4 +32,5 @@ def compare(run, axes, full):
     yield Row("energy kept", (0.98, 1.002), last / first, 0.0, "exact; lumped masses cost a little")
     axes.plot(log.Time, log.exact, "k-", lw=1, label="exact")
     axes.plot(log.Time, log.v_x, "--", lw=1.4, label="computed")
-    axes.set(xlabel="time (s)", ylabel="mean velocity (m/s)")
+    # The last three periods, where a difference in frequency would have added up.
+    axes.set(xlabel="time (s)", ylabel="mean velocity (m/s)", xlim=(70, 100))
