@@ -33,8 +33,8 @@ ENOUGH = 1e-4  # relative change of the misfit, or of the values, at which the s
 ALIKE = 0.99  # correlation from which on variables are not told apart
 
 
-class Measured:
-    """What is measured: a number of the log, or a log column over time."""
+class Observation:
+    """Hold a measurement: a number of the log, or a log column over time."""
 
     def __init__(self, text: str, script: variables.ScriptFiles, values: Mapping[str, list[str]]):
         word, _, what = (part.strip() for part in text.partition("="))
@@ -69,7 +69,7 @@ class Measured:
 class Search:
     """Runs of a script by the shares of the ranges of its variables, from 0 to 1."""
 
-    def __init__(self, study: Study, values: Mapping[str, list[str]], measured: list[Measured]):
+    def __init__(self, study: Study, values: Mapping[str, list[str]], measured: list[Observation]):
         self.study, self.measured = study, measured
         self.fixed = {name: given[0] for name, given in values.items()}
         self.names = [name for name, given in values.items() if given[1:]]
@@ -123,7 +123,7 @@ def run(options: Any) -> int:
         raise ScriptError("karamelo-py fit needs SciPy", hint=hint) from None
     out = variables.out_file(options.o, ".csv")
     values, script, launch, jobs = variables.family(options)
-    measured = [Measured(text, script, values) for text in options.match]
+    measured = [Observation(text, script, values) for text in options.match]
     items = [one.item for one in measured if one.times is None]
     study = Study(launch, out, list(values), items, jobs, options.again, strict=True)
     search = Search(study, values, measured)
