@@ -228,6 +228,20 @@ def test_numbers_along_a_short_logarithmic_axis_do_not_touch(low, span):
     assert all(a.x1 < b.x0 for a, b in itertools.pairwise(boxes))
 
 
+def test_orders_have_their_sign_by_the_work_of_runs_not_by_noise_of_their_times():
+    """Errors N^-1 of runs on a busy machine, of which the finest took the shortest time."""
+    found = [
+        {"N": f"{n}", "err": f"{1 / n}", "seconds": f"{1 / n}", "particle_steps": f"{n**3}"}
+        for n in (10, 20, 40)
+    ]
+    (line,) = Family(Table(found, ["N"], made={}), "err", "seconds", along="N").lines
+    assert line.rises
+    for row in found:  # a table of another program has its costs alone
+        del row["particle_steps"]
+    (line,) = Family(Table(found, ["N"], made={}), "err", "seconds", along="N").lines
+    assert not line.rises
+
+
 def test_lines_that_end_together_share_a_name():
     """Four of one colour have one; another colour, and another place, have their own."""
     axes = blank_figure(8.4, 5.2).subplots()
