@@ -317,8 +317,8 @@ def grown(limits: tuple[float, float] | None, values: np.ndarray) -> tuple[float
 def outlines(x: np.ndarray) -> list[np.ndarray]:
     """Lines (m, 2) where half of the material of points x (n, 2) ends.
 
-    Each point is shared out to the nodes of cells of its size, over three of them: a node within a
-    body gets a whole point, one at its surface half of one.
+    Each point is shared out to the nodes of cells of its size, over three of them: a node at the
+    surface gets half as much as those within the body beside it.
     """
     cell = spacing(x, 4)
     if not cell > 0:
@@ -326,16 +326,17 @@ def outlines(x: np.ndarray) -> list[np.ndarray]:
     lo = x.min(axis=0) - 4 * cell
     at = (x - lo) / cell
     filled = np.zeros((at.max(axis=0) + 6).astype(int))
-    nodes = [at.astype(int) + corner for corner in product((0, 1), repeat=2)]
-    shares = [np.prod(1 - abs(at - node), axis=1) for node in nodes]
-    for node, share in zip(nodes, shares, strict=True):
-        np.add.at(filled, tuple(node.T), share)
+    for corner in product((0, 1), repeat=2):
+        node = at.astype(int) + corner
+        np.add.at(filled, tuple(node.T), np.prod(1 - abs(at - node), axis=1))
     filled = _smoothed(filled)
-    # Points that have come closer to each other end where the others do.
-    within = sum(filled[*node.T] * share for node, share in zip(nodes, shares, strict=True))
-    full = np.median(within)
+    within = filled
+    for axis in (0, 1, 0, 1):  # the largest of two nodes around
+        beside = np.maximum(np.roll(within, 1, axis), np.roll(within, -1, axis))
+        within = np.maximum(within, beside)
+    share = np.divide(filled, within, out=np.zeros_like(filled), where=within > 0)
     across, up = (low + cell * np.arange(n) for low, n in zip(lo, filled.shape, strict=True))
-    lines: Any = contour_generator(across, up, np.minimum(filled.T, full)).lines(full / 2)
+    lines: Any = contour_generator(across, up, share.T).lines(0.5)
     return lines
 
 
