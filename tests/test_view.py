@@ -355,6 +355,7 @@ def test_show_writes_the_format_that_a_name_asks_for(tmp_path):
     for ending, magic in (("svg", b"<?xml"), ("pdf", b"%PDF"), ("png", b"\x89PNG")):
         sim.show(file=tmp_path / f"s.{ending}")
         assert (tmp_path / f"s.{ending}").read_bytes().startswith(magic)
+    assert sim.show(outlines=True).png != sim.show().png
 
 
 @pytest.mark.parametrize("ends", [(298.0, 600.0), (-600.0, -298.0)])
