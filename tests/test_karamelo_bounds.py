@@ -91,7 +91,7 @@ REBOUND = """
     method(ulmpm, FLIP, linear, 1)
     scheme({})
     dimension(1, 0, 2, 0.1)
-    region(bar, block, 0.3, 0.8)
+    region(bar, block, 0.15, 0.65)
     region(low, block, INF, 0.01)
     material(m, neo-hookean, 1, 1, 0)
     solid(bar, region, bar, 2, m, 0.1, 0)
@@ -105,7 +105,7 @@ REBOUND = """
     set_output(1000)
     dt_factor(0.4)
     log_modify(custom, step, E, v_x)
-    run_time(9)
+    run_time(6)
 """
 
 

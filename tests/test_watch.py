@@ -451,17 +451,17 @@ def test_gravity_beside_a_fix_in_python(run_interpreted):
 
 def test_what_impulses_of_contact_lose_is_told(run_interpreted):
     fix = "contact/minimize_penetration/plane, body, 0.28, 0, 0, 1, 0, 0, 0"
-    (share,), said = balance(run_interpreted, fix)
+    (share,), said = balance(run_interpreted, fix, 0.002)
     assert float(share) < -10
     assert "contact that undoes penetrations within a step" in said
 
 
-def balance(run_interpreted, fix):
+def balance(run_interpreted, fix, dt=0.004):
     """By how much the balance of energy does not close, in per cent, and what is said."""
     text = block(
         2, "region(end, block, 0.55, 1, INF, INF)", "group(grip, particles, region, end, all)",
         *["fix(v, initial_velocity_particles, all, -0.5, 0)"] * ("velocity" not in fix),
-        f"fix(F, {fix})", "set_dt(0.002)", "run_time(0.3)", size=(0.3, 0.1),
+        f"fix(F, {fix})", f"set_dt({dt})", "run_time(0.3)", size=(0.3, 0.1),
     ).replace("method(ulmpm", "method(tlmpm")  # fmt: skip
     result = run_interpreted(text)
     assert "is not watched" not in result.out
