@@ -5,6 +5,7 @@ import pytest
 from numba import config
 
 from karamelo_py.compiler.gpu import Emulator
+from karamelo_py.kernels.arrays import arrays_of
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.run.gpu import StepsOnCard
@@ -66,3 +67,72 @@ def test_same_as_processor(method, scheme, precision):
     error = 1e3 * np.finfo({"double": float, "single": np.float32}[precision]).eps
     for here, there in zip(state(one), state(other), strict=True):
         assert np.abs(here - there).max() <= error * np.abs(there).max()
+
+
+WATER = """
+method(ulmpm, FLIP, linear, 0.99)
+h = 0.1
+dimension(2, 0, 1.2, 0, 0.8, h)
+region(column, block, 0, 0.5, 0, 0.5)
+eos(water, fluid, 1000, 1e6, 7)
+strength(water, fluid, 1e-3)
+material(water, eos-strength, water, water)
+solid(water, region, column, 2, water, h, 0)
+region(sides, block, -h/4, h/4, INF, INF)
+region(base, block, INF, INF, -h/4, h/4)
+group(sides, nodes, region, sides, all)
+group(base, nodes, region, base, all)
+region(top, block, INF, INF, 0.4, 0.5)
+group(top, particles, region, top, solid, water)
+fix(sides, velocity_nodes, sides, 0, NULL)
+fix(base, velocity_nodes, base, NULL, geq0, mu=0.2)
+fix(gravity, body_force, all, 0.1*sin(x), -9.81*min(1, time/0.01))
+fix(push, velocity_particles, top, 0.1*cos(40*time), NULL)
+"""
+
+
+def test_fixes():
+    """Walls with friction in common nodes, formulas, forces on points; the balance of energy.
+
+    Reactions are sums without rounding: they differ by what their terms do.
+    """
+    (hub, one), (other_hub, other) = begun(WATER), begun(WATER)
+    hooks = one.hooks, one.python.functions
+    steps = StepsOnCard(Emulator(), one.setup, hub.update.scheme, type(one.visits), *hooks)
+    steps.send()
+    assert steps.advance(43) == other.advance(43) == 0
+    steps.fetch()
+    for here, there in zip(state(one), state(other), strict=True):
+        assert np.abs(here - there).max() <= 1e-12 * np.abs(there).max()
+    published = [name for name in hub.values.names() if name.endswith(("_x", "_y"))]
+    assert len(published) == 8
+    for name in published:
+        value = other_hub.values.get(name)
+        assert hub.values.get(name) == pytest.approx(value, rel=1e-10, abs=1e-9), name
+    assert hub.values.get("base_y") > 100  # it bears the column by now
+    clocks = one.control.clock[0], other.control.clock[0]
+    assert clocks[0].looks == clocks[1].looks == 5
+    for name in ("kinetic", "stored", "work", "balance", "of_drift"):
+        assert clocks[0][name] == pytest.approx(clocks[1][name], rel=1e-9, abs=1e-12), name
+
+
+def test_order_in_memory_changes_nothing():
+    """Points are summed in the order of their ids, wherever they lie."""
+    script = DISKS.format(method="ulmpm, FLIP, linear, 1", scheme="musl", precision="double")
+    found = []
+    for shuffled in (False, True):
+        hub, simulation = begun(script)
+        if shuffled:
+            for block in simulation.setup.blocks:
+                order = np.random.default_rng(1).permutation(block.points.id.size)
+                for _, array in arrays_of(block.points):
+                    array[...] = array[..., order]
+        steps = StepsOnCard(
+            Emulator(), simulation.setup, hub.update.scheme, type(simulation.visits)
+        )
+        steps.send()
+        assert steps.advance(20) == 0
+        steps.fetch()
+        found.append(state(simulation))
+    for here, there in zip(*found, strict=True):
+        assert (here == there).all()

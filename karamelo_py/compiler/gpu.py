@@ -8,7 +8,7 @@ one thread after another: what is written for a card is tested without one.
 import ctypes
 import hashlib
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from itertools import pairwise
 from pathlib import Path
 from time import perf_counter
@@ -266,13 +266,22 @@ class Emulator:
             self._entries[name] = call
         return self._entries[name]
 
-    def launch(self, entry: Callable, arguments: int, count: int, threads: int = THREADS) -> None:
+    def launch(self, entry: Callable, arguments: int, count: int) -> None:
         """Do the work of `count` threads; of a function of Python where nothing is compiled."""
         if not INTERPRETED:
             entry(arguments, count)
             return
         for i in range(count):
             entry(i, *arguments)
+
+    def together(self, launches: Sequence[Callable]) -> Callable:
+        """Make one of several launches."""
+
+        def do() -> None:
+            for launch in launches:
+                launch()
+
+        return do
 
     def wait(self) -> None:
         """Wait for all launches."""
@@ -310,6 +319,7 @@ class Card:
             ) from None
         self._context = self._do("cuDevicePrimaryCtxRetain", device)
         self._do("cuCtxSetCurrent", self._context)
+        self._stream = self._do("cuStreamCreate", 0)  # copies wait for it
         about = driver.CUdevice_attribute
         major, minor = (
             self._do("cuDeviceGetAttribute", getattr(about, f"CU_DEVICE_ATTRIBUTE_{what}"), device)
@@ -367,11 +377,21 @@ class Card:
             self._entries[name] = entry
         return self._entries[name]
 
-    def launch(self, entry: Any, arguments: int, count: int, threads: int = THREADS) -> None:
+    def launch(self, entry: Any, arguments: int, count: int) -> None:
         """Let `count` threads work, in blocks of some."""
         given = (arguments, count), (ctypes.c_int64, ctypes.c_int64)
-        blocks = -(-count // threads)
-        self._do("cuLaunchKernel", entry, blocks, 1, 1, threads, 1, 1, 0, 0, given, 0)
+        blocks = -(-count // THREADS)
+        self._do("cuLaunchKernel", entry, blocks, 1, 1, THREADS, 1, 1, 0, self._stream, given, 0)
+
+    def together(self, launches: Sequence[Callable]) -> Callable:
+        """Make one of several launches: a graph, which the card goes through by itself."""
+        mode = self._driver.CUstreamCaptureMode.CU_STREAM_CAPTURE_MODE_RELAXED
+        self._do("cuStreamBeginCapture", self._stream, mode)
+        for launch in launches:
+            launch()
+        graph = self._do("cuStreamEndCapture", self._stream)
+        made = self._do("cuGraphInstantiate", graph, 0)
+        return lambda: self._do("cuGraphLaunch", made, self._stream)
 
     def wait(self) -> None:
         """Wait for all launches."""
@@ -381,10 +401,10 @@ class Card:
         """Do launches, one after another, and time each."""
         launches = list(launches)
         events = [self._do("cuEventCreate", 0) for _ in range(len(launches) + 1)]
-        self._do("cuEventRecord", events[0], 0)
+        self._do("cuEventRecord", events[0], self._stream)
         for launch, event in zip(launches, events[1:], strict=True):
             launch()
-            self._do("cuEventRecord", event, 0)
+            self._do("cuEventRecord", event, self._stream)
         self.wait()
         found = [self._do("cuEventElapsedTime", *pair) / 1e3 for pair in pairwise(events)]
         for event in events:

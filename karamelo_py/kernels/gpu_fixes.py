@@ -91,7 +91,7 @@ def _control(count: int) -> Callable:
     @shared
     def own_values(values):
         room = room_for(count, (0.0,))[0]
-        for k in range(values.size):
+        for k in range(count):
             room[k] = values[k]
         return room
 

@@ -39,6 +39,7 @@ from karamelo_py.points.laws import moves_as_told
 POLL = 64  # steps between two looks at how far a run is
 REGISTERS = {4: 200, 8: 130}  # words that a thread of a cell sums up, by the size of numbers
 FAR = 1.0  # cells that points go before they are ordered anew in memory
+PARTS = "begin", "step", "last step", "before", "behind", "order"  # of what is launched
 _NONE = NoHooks()
 
 
@@ -101,6 +102,8 @@ class StepsOnCard:
         self.end = self._launch(gpu.end_step, 1, s)
         self.before, self.behind = self._looks()
         self.order = list(self._order())
+        parts = (self.begin, self.step, self.last_step, self.before, self.behind, self.order)
+        self._do = dict(zip(PARTS, map(card.together, parts), strict=True))
         self.ordered = -np.inf  # how far points had gone when they were ordered
 
     def _steps(self, rows: list) -> tuple[list[Launch], list[Launch]]:
@@ -198,7 +201,7 @@ class StepsOnCard:
         return found
 
     def _visit(self, row: Any, ahead: list[Launch] | None) -> list[Launch]:
-        gathers, scatters = list(self._gathers(row)), list(self._scatters(row))
+        gathers, scatters = list(self._gathers(row)), list(self._scatters(row, ahead))
         if row.only_if_more and ahead is not None:
             ahead += scatters
         return gathers + scatters
@@ -210,7 +213,7 @@ class StepsOnCard:
                 yield self._launch(gather, block.points.mass.size, self.s, block, cells)
             yield self._launch(gpu.take_reports, 1, self.s)
 
-    def _scatters(self, row: Any) -> Iterator[Launch]:
+    def _scatters(self, row: Any, ahead: list[Launch] | None) -> Iterator[Launch]:
         s, stage = self.s, self._stage(row)
         sizes = [block.points.mass.size for block in s.blocks]
         pairs = list(zip(s.blocks, self.cells, sizes, strict=True))
@@ -220,7 +223,7 @@ class StepsOnCard:
             load = stage.load_point()
             for block, cells, size in pairs:
                 yield self._launch(load, size, s, block, cells)
-        if stage.lists:
+        if stage.lists and (s.frame.moves or ahead is None):  # else points stay where they are
             count = stage.count()
             for block, cells, size in pairs:
                 yield self._launch(count, size, s, block, cells)
@@ -421,23 +424,21 @@ class StepsOnCard:
         self.fate[: gpu.DRIFT] = 0
         self.images.send(exchanged)
         begun, watched = int(control.values[TIMESTEP]), control.clock[0].watch_energy
-        for launch in self.begin:
-            launch()
-        self._order_if_due()
+        do = self._do
+        do["begin"]()
+        if self.begin:  # else points are listed in the first step
+            self._order_if_due()
         for n in range(count):
-            for launch in self.step if n + 1 < count else self.last_step:
-                launch()
+            do["step" if n + 1 < count else "last step"]()
             looked = (begun + n + 1) % LOOK
             if watched and looked < 2:
-                for launch in self.behind if looked else self.before:
-                    launch()
+                do["behind" if looked else "before"]()
             self.end()
             if (n + 1) % POLL == 0:
                 self.images.fetch([self.fate])
                 if self.fate[gpu.STATUS] > 0:
                     break
-                if n + 1 < count:
-                    self._order_if_due()
+                self._order_if_due()
         self.images.fetch(exchanged)
         status = self.fate[gpu.STATUS]
         return int(status) - 1 if status > 0 else DONE
@@ -447,8 +448,7 @@ class StepsOnCard:
         gone = self.fate[gpu.DRIFT]
         if gone - self.ordered > FAR:
             self.ordered = gone
-            for launch in self.order:
-                launch()
+            self._do["order"]()
 
     def seconds_of_step(self) -> list[tuple[Launch, float]]:
         """Time each launch of a step behind the last one: the medians of a few steps."""

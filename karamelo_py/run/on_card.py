@@ -23,6 +23,7 @@ class SimulationOnCard(Simulation):
     that of the card then, and tiles know nothing of it: who needs these sorts first.
     """
 
+    states_every = 1000  # what is kept has to be brought back
     _steps: StepsOnCard | None = None
     _known: Sequence = ()  # the arrays and hooks that these are for
     _ahead = False  # steps on the card are not in the arrays here

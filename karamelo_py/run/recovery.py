@@ -16,7 +16,6 @@ from karamelo_py.scene import boundary
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError, render_message
 
-CHUNK = 100  # steps between two looks at the run, and between two good states, at most
 HALVINGS = 5  # at most, in a run
 RETURNS = 2  # at most, to one state from where energy grows: what two halves do not mend stays
 
@@ -72,7 +71,11 @@ class RollBack:
         step = self.simulation.step
         # When states are kept must not depend on how fast steps are: runs go back to them.
         # Load steps take long: none is done twice.
-        often = step % CHUNK == 0 or step == self.first_step + 1 or self.simulation.implicit
+        often = (
+            step % self.simulation.states_every == 0
+            or step == self.first_step + 1
+            or self.simulation.implicit
+        )
         due = step != self.point.step and often
         if due and energy.grown_little(self.simulation):
             self._keep()
@@ -97,7 +100,11 @@ class RollBack:
             hub.warn(found[0], hint=found[1])
             simulation.told_of_growth = True
         self.tell_of_loss(WITHIN)
-        if self._limits and simulation.step % CHUNK == 0 and (words := self._limits.words()):
+        if (
+            self._limits
+            and simulation.step % simulation.states_every == 0
+            and (words := self._limits.words())
+        ):
             hub.console.say(render_message("note", words))
         return True
 

@@ -22,7 +22,7 @@ from karamelo_py.run.diagnosis import energy
 from karamelo_py.run.lower.build import check_scene
 from karamelo_py.run.lower.memory import bytes_per_point
 from karamelo_py.run.mpi.comm import check_same_run, handled_signals
-from karamelo_py.run.recovery import CHUNK, RollBack, Stopped
+from karamelo_py.run.recovery import RollBack, Stopped
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.tiles import DIRECT_UP_TO
 from karamelo_py.run.timestep import ruling_limit, words_of_own_step, words_of_share
@@ -256,11 +256,12 @@ class Runner:
     def _loop(self, simulation: Simulation) -> None:
         hub, rollback, timings = self.hub, self.rollback, self.timings
         self._rhythms = {fix.every for fix in hub.fixes.values() if fix.every}
-        length, longest = 1, CHUNK if self.condition is None else 1
+        most = simulation.states_every
+        length, longest = 1, most if self.condition is None else 1
         while self._goes_on(simulation):
             rollback.before()
             step, before = simulation.step, {name: timings.passed(name) for name in timings.on}
-            kept = (step // CHUNK + 1) * CHUNK  # where a state may be kept
+            kept = (step // most + 1) * most  # where a state may be kept
             end = min(hub.output.next_step(step), self.last_step, step + length, kept)
             end = min([end, *((step // every + 1) * every for every in self._rhythms)])
             with timings.counted("steps"):

@@ -40,6 +40,7 @@ class Simulation(SceneArrays):
         self._first_fixes: list = []
         self.beginning: list = []  # fixes of the first step that act in this run
 
+    states_every = 100  # steps between two states that a run can go back to
     taken_up = False  # a step goes on whose first moment has been, with other arrays
 
     @cached_property
