@@ -48,7 +48,9 @@ class SimulationOnCard(Simulation):
         if self._ahead:
             self._ahead = False
             self._steps.fetch()
-            self.control.clock[0].drift = np.inf  # tiles know nothing of these steps
+            # Tiles know nothing of these steps.
+            clock = self.control.clock[0]
+            clock.drift, clock.drift_limit = np.inf, 0.0
 
     # --- changes here
 
