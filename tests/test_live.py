@@ -260,12 +260,16 @@ def test_a_study_is_followed_and_stopped(tmp_path):
     row["folder"] = folder.name
     page.follow([], [({"N": "20"}, folder)], [({"N": "10"}, tmp_path, 1.0)], of=2, left=None)
     page.follow([row], [], [({"N": "20"}, folder, 0.5)], of=2, left=3.0)
-    told = Events(address).next()
+    events = Events(address)
+    told = events.next()
     assert told["about"]["names"] == ["N"] and told["left"] == 3.0
     assert told["running"] == [["N = 20", 0.5]]
     assert told["rows"][0]["command"].endswith("in.bar -var N 10")
     assert told["rows"][0]["seconds"] is None  # which JSON has not
     assert told["cases"] == {"N = 20": {"N": "20"}, "N = 10": {"N": "10"}}
+    page.follow([row], [({"N": "30"}, folder)], [({"N": "20"}, folder, 0.7)], of=3, left=3.0)
+    told = events.until(lambda told: told["cases"])  # only what has come since
+    assert told["cases"] == {"N = 30": {"N": "30"}} and not told["rows"]
     known = json.loads(get(address, "run", title="N%20=%2010"))  # of an earlier study
     assert known["said"] == ["warning: much"]
     run = json.loads(get(address, "run", title="N%20=%2020"))

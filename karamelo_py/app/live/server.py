@@ -29,8 +29,8 @@ class Server:
     page
         The file of the page (HTML).
     news
-        ``news(seen)`` tells what has come since `seen` entries, and how many there are now; called
-        in threads of the server, at once when a page opens, then after each `changed`.
+        ``news(seen)`` gives what is seen then, and tells what has come since `seen`, 0 at first;
+        called in threads of the server, at once when a page opens, then after each `changed`.
     answers
         What is given for further addresses, by their names: bytes or what becomes JSON, None where
         there is none. Called with the words behind the question mark.
@@ -46,7 +46,7 @@ class Server:
     def __init__(
         self,
         page: Path,
-        news: Callable[[int], tuple[int, dict]],
+        news: Callable[[Any], tuple[Any, dict]],
         answers: Mapping[str, Answer],
         actions: Mapping[str, Callable[[Mapping[str, str]], None]],
     ):

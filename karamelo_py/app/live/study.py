@@ -51,7 +51,6 @@ class StudyPage:
             "facts": [name for name in COLUMNS if name != "seconds_spread"], "axes": [*axes],
         }  # fmt: skip
         self._rows: list[dict[str, Any]] = []
-        self._waiting: list[str] = []
         self._running: list[tuple[str, float]] = []
         self._progress: dict[str, Any] = {}
         self._folders: dict[str, Path] = {}
@@ -63,7 +62,7 @@ class StudyPage:
         atexit.register(self._end)
 
     def _end(self) -> None:
-        self._waiting, self._running, self._progress = [], [], {**self._progress, "over": True}
+        self._running, self._progress = [], {**self._progress, "over": True}
         self.server.changed()
         self.server.close()
 
@@ -84,21 +83,22 @@ class StudyPage:
         for case, folder in (*waiting, *((case, folder) for case, folder, _ in running)):
             self._folders[worded(case)] = folder
             self._cases[worded(case)] = dict(case)
-        self._waiting = [worded(case) for case, _ in waiting]
         self._running = [(worded(case), since) for case, _, since in running]
         self._progress = progress
         self.server.changed()
 
-    def _news(self, seen: int) -> tuple[int, dict]:
-        rows = self._rows[seen:]
+    def _news(self, seen: Any) -> tuple[Any, dict]:
+        """Tell of rows and cases that have come; cases without a row that do not run wait."""
+        first_row, first_case = seen or (0, 0)
+        rows, cases = self._rows[first_row:], [*self._cases.items()][first_case:]
         told = {
-            "waiting": self._waiting, "running": self._running, "cases": self._cases,
+            "running": self._running, "cases": dict(cases),
             "rows": [{name: plain(value) for name, value in row.items()} for row in rows],
             **self._progress,
         }  # fmt: skip
         if not seen:
             told["about"] = self._about
-        return seen + len(rows), told
+        return (first_row + len(rows), first_case + len(cases)), told
 
     def _run(self, words: Mapping[str, str]) -> dict | None:
         """Tell of one run: the last lines that it has said, and the columns of its log."""
