@@ -392,6 +392,17 @@ def test_verdicts_on_hard_scenes_are_right_or_not_sure(name, tmp_path, monkeypat
 
 
 @pytest.mark.full
+@pytest.mark.parametrize("name", verdicts().MAPS)
+def test_maps_call_nothing_stable_that_blows_up_and_nothing_failed_that_does_not(
+    name, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    held = verdicts()
+    *_, stable, damped, failed, _ = held.chart(name, *held.MAPS[name])
+    assert stable.endswith("and 0") and damped.endswith("and 0") and failed.startswith("0 and")
+
+
+@pytest.mark.full
 @pytest.mark.parametrize("script", SCENES)
 def test_advice_meets_the_target_at_little_more_than_the_least_cost(
     script, tmp_path, monkeypatch, capsys
