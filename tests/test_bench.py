@@ -40,10 +40,9 @@ SMALL = {
 def test_scenes_run(name, run_interpreted):
     """At small sizes; a mistake in a script would show here."""
     size = SMALL[name.partition("-")[0]]
-    steps = 1 if "implicit" in name else 3
-    result = run_interpreted(f"{WORKLOADS[name].script}run({steps})\n", "-var", *size, "--quiet")
+    result = run_interpreted(f"{WORKLOADS[name].script}run(1)\n", "-var", *size, "--quiet")
     assert "error" not in result.err  # of hourglasses it warns
-    assert result.log.Step[-1] == steps
+    assert result.log.Step[-1] == 1
 
 
 def compiled(name, changes=()):

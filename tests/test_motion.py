@@ -87,7 +87,7 @@ def linear_field(a) -> str:
     return ", ".join(" + ".join(row) for row in terms)
 
 
-def strained(d, law, *, scheme="musl", transfer="FLIP", steps=20, dt=0.01, **options):
+def strained(d, law, *, scheme="musl", transfer="FLIP", steps=10, dt=0.01, **options):
     """A block whose nodes all move with v = A X."""
     columns = "x, y, z, vx, vy, vz, s11, s22, s33, s12, s13, s23, volume"
     return block(
@@ -139,10 +139,10 @@ def test_uniform_strain_is_exact(run_interpreted, d, law, scheme):
     Dumps carry nine digits, so numbers agree to 1e-8 of their size; stresses are of the size of
     E e = 10.
     """
-    steps, dt = 20, 0.01
+    steps, dt = 10, 0.01
     options = {"ppc": 1} if d == 3 else {}
     result = run_interpreted(strained(d, law, scheme=scheme, steps=steps, dt=dt, **options))
-    first, last = result.dump("end.0.LAMMPS"), result.dump("end.20.LAMMPS")
+    first, last = result.dump("end.0.LAMMPS"), result.dump("end.10.LAMMPS")
     a = np.zeros((3, 3))
     a[:d, :d] = GRADIENTS[d]
     f, _ = stress_of(law, [dt * a] * steps)
@@ -216,10 +216,10 @@ def test_usf_strains_to_where_points_have_come(run_interpreted, d, averaged):
 @every_transfer
 def test_uniform_strain_with_every_transfer(run_interpreted, transfer):
     """Velocities differ between transfers, the strain of prescribed nodes does not."""
-    last = run_interpreted(strained(2, "neo-hookean", transfer=transfer)).dump("end.20.LAMMPS")
+    last = run_interpreted(strained(2, "neo-hookean", transfer=transfer)).dump("end.10.LAMMPS")
     a = np.zeros((3, 3))
     a[:2, :2] = GRADIENTS[2]
-    _, stress = stress_of("neo-hookean", [0.01 * a] * 20)
+    _, stress = stress_of("neo-hookean", [0.01 * a] * 10)
     assert last.s11 == pytest.approx(np.full(len(last.id), stress[0, 0]), abs=1e-7)
     assert last.s12 == pytest.approx(np.full(len(last.id), stress[0, 1]), abs=1e-7)
 
