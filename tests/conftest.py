@@ -18,6 +18,7 @@ from hypothesis import settings
 
 from comparisons.results import Result
 from karamelo_py.app.cli import main
+from karamelo_py.app.studies import case
 
 TESTS = Path(__file__).parent
 ROOT = TESTS.parent
@@ -175,7 +176,7 @@ def _forking() -> Iterator[str]:
         words = [sys.executable, str(TESTS / "forking.py"), f"{folder}/door"]
         python = Path(folder) / "python"
         start = " ".join([words[0], "-ISs", *words[1:]])
-        python.write_text(f'#!/bin/sh\nexec {start} "$0" "$@"\n', encoding="utf-8")
+        python.write_text(f'#!/bin/sh\nexec {start} "$@"\n', encoding="utf-8")
         python.chmod(0o755)
         environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
         process = subprocess.Popen(words, stdout=subprocess.PIPE, env=environment)
@@ -186,7 +187,10 @@ def _forking() -> Iterator[str]:
 
 
 @pytest.fixture
-def starts_are_cheap(_forking, monkeypatch) -> None:
+def starts_are_cheap(_forking, monkeypatch) -> Iterator[None]:
     """Runs and code, interpreted, start as forks of a process that has the program at hand."""
     monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
     monkeypatch.setattr(sys, "executable", _forking)
+    python, case.PROGRAM[0] = case.PROGRAM[0], _forking
+    yield
+    case.PROGRAM[0] = python

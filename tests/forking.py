@@ -1,8 +1,8 @@
 """Starts of Python that cost no import: an interpreted process has the program at hand, and forks.
 
-``python forking.py SOCKET`` is that process. ``python forking.py SOCKET SELF word ...`` hands it
-what Python would be given, ``-m karamelo_py.app.cli word ...`` or ``-c code word ...``, and ends as
-that does: SELF, a script of this line, is started as Python is.
+``python forking.py SOCKET`` is that process. ``python forking.py SOCKET word ...`` hands it what
+Python would be given, ``-m karamelo_py.app.cli word ...`` or ``-c code word ...``, and ends as that
+does: a script of this line is started as Python is. What it starts itself is Python.
 """
 
 import os
@@ -28,7 +28,7 @@ def do(said: list[str]) -> int:
 
     from karamelo_py.app.start import main
 
-    folder, paths, sys.executable, *words = said
+    folder, paths, *words = said
     os.chdir(folder)
     sys.path[:0] = paths.split(os.pathsep)
     while words[0] == "-W":
@@ -53,8 +53,11 @@ def serve(path: str) -> None:
     import gc
 
     import karamelo_py.app.cli
+    import karamelo_py.commands
     import karamelo_py.run.runner  # noqa: F401
+    from karamelo_py.script.parser import parse
 
+    parse("run(1)")  # which reads the grammar
     gc.freeze()
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # nobody waits for them
     with socket.socket(socket.AF_UNIX) as door:

@@ -251,7 +251,7 @@ SCENES = {
     ),
     "deleted": thrown(2, "delete", "run(8)", "run(12)"),
     "reflected": thrown(2, "reflect", "run(8)", "run(12)"),
-    "tools": block(2, *TOOLS, size=SIZE),
+    "tools": block(2, *TOOLS),
     "groups": block(2, GROUPS, "run(7)", size=SIZE),
     "functions in Python": block(2, PYTHON, "run(5)", size=SIZE),
     "bench": block(3, BENCH, size=(0.2, 0.1, 0.1)),
