@@ -231,14 +231,37 @@ def bandwidth(card: Any, size: int = 1 << 30) -> float:
     return 2 * size / fastest
 
 
-class Emulator:
-    """Run functions of threads on the processor, in memory of its own."""
+class _Coded:
+    """Keep the code of functions of threads."""
 
-    name = "emulated"
+    on_card: bool
+    loaded: Callable
 
     def __init__(self) -> None:
+        self._entries: dict[str, Any] = {}
+        self._known: dict[tuple, Any] = {}
+
+    def compiled(self, function: Callable, kinds: tuple, called: dict | None = None) -> Any:
+        """Make the function ready to be launched for arguments of these types."""
+        key = function, kinds, *(called or {}).values()
+        if key in self._known:
+            return self._known[key]
+        name, text = text_of(function, kinds, self.on_card, called)
+        if name not in self._entries:
+            self._entries[name] = self.loaded(f"{name}_entry", text)
+        if "<locals>" not in function.__qualname__:  # others are made anew for each scene
+            self._known[key] = self._entries[name]
+        return self._entries[name]
+
+
+class Emulator(_Coded):
+    """Run functions of threads on the processor, in memory of its own."""
+
+    name, on_card = "emulated", False
+
+    def __init__(self) -> None:
+        super().__init__()
         self._rooms: dict[int, Any] = {}
-        self._entries: dict[str, Callable] = {}
 
     def allocate(self, size: int) -> int:
         """Give memory of so many bytes; its address."""
@@ -257,14 +280,10 @@ class Emulator:
 
     copy = copy_from = copy_to  # the first argument is where it goes to
 
-    def compiled(self, function: Callable, kinds: tuple, called: dict | None = None) -> Callable:
-        """Make the function ready to be launched for arguments of these types."""
-        name, text = text_of(function, kinds, False, called)
-        if name not in self._entries:
-            (address,) = machine.load(machine.compile_text(text), f"{name}_entry")
-            call = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64)(address)
-            self._entries[name] = call
-        return self._entries[name]
+    def loaded(self, name: str, text: str) -> Callable:
+        """Make code that can be launched."""
+        (address,) = machine.load(machine.compile_text(text), name)
+        return ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64)(address)
 
     def launch(self, entry: Callable, arguments: int, count: int) -> None:
         """Do the work of `count` threads; of a function of Python where nothing is compiled."""
@@ -296,8 +315,10 @@ class Emulator:
         return found
 
 
-class Card:
+class Card(_Coded):
     """An NVIDIA GPU, through its driver."""
+
+    on_card = True
 
     def __init__(self) -> None:
         try:
@@ -307,8 +328,8 @@ class Card:
                 "--gpu needs the packages for NVIDIA GPUs",
                 "pip install 'karamelo-py[gpu]', or no --gpu",
             ) from None
+        super().__init__()
         self._driver = driver
-        self._entries: dict[str, Any] = {}
         try:
             self._do("cuInit", 0)
             device = self._do("cuDeviceGet", 0)
@@ -366,16 +387,11 @@ class Card:
         """Copy memory of the card to that of the program, at the first address."""
         self._do("cuMemcpyDtoH", address, there, size)
 
-    def compiled(self, function: Callable, kinds: tuple, called: dict | None = None) -> Any:
-        """Make the function ready to be launched for arguments of these types."""
-        name, text = text_of(function, kinds, True, called)
-        if name not in self._entries:
-            ptx = assembled(text, self.processor).encode() + b"\0"
-            room = ctypes.create_string_buffer(ptx)
-            module = self._do("cuModuleLoadData", ctypes.addressof(room))
-            entry = self._do("cuModuleGetFunction", module, f"{name}_entry".encode())
-            self._entries[name] = entry
-        return self._entries[name]
+    def loaded(self, name: str, text: str) -> Any:
+        """Make code that can be launched."""
+        room = ctypes.create_string_buffer(assembled(text, self.processor).encode() + b"\0")
+        module = self._do("cuModuleLoadData", ctypes.addressof(room))
+        return self._do("cuModuleGetFunction", module, name.encode())
 
     def launch(self, entry: Any, arguments: int, count: int) -> None:
         """Let `count` threads work, in blocks of some."""

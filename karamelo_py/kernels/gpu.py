@@ -81,7 +81,7 @@ class Cells(NamedTuple):
     sums: np.ndarray  # (m,) int64: of count and OCCUPIED, by chunks of chunks
     before: np.ndarray  # (m,) int64: the sum of those before
     loads: np.ndarray  # (numbers, n): what each point gives, before it is weighted
-    boxes: np.ndarray  # (columns, boxes): what cells give to each node that their points see
+    boxes: np.ndarray  # (columns, boxes): what cells give to some of the nodes their points see
 
 
 class InCell(NamedTuple):
@@ -264,8 +264,7 @@ class Stage:
         """Make what a cell does: it sums what its points give to a part of the nodes they see."""
         context, place, quantities = self.context, self._place(), self.row.visit.quantities
         columns, only_if_more = self.columns, self.row.only_if_more
-        count = self.support
-        begin, end = count * part // self.parts, count * (part + 1) // self.parts
+        count, (begin, end) = self.support, self.nodes_of(part)
         filled = tuple(dict.fromkeys(name for name, _, _ in columns))
         widths = tuple(max(c for n, c, _ in columns if n == name) + 1 for name in filled)
 
@@ -296,7 +295,9 @@ class Stage:
         def put(rooms, boxes, box):
             for j, (name, column, _) in enumerate(columns):
                 for k in range(begin, end):
-                    boxes[j * count + k, box] = room_of(name, rooms, None)[k, column]
+                    boxes[j * (end - begin) + k - begin, box] = room_of(name, rooms, None)[
+                        k, column
+                    ]
 
         @shared
         def loaded(w, p, dt, cells):
@@ -334,15 +335,26 @@ class Stage:
 
         return scatter_cell
 
-    def sum(self, first_block: bool) -> Callable:
-        """Make what a node does: it sums what cells have given to it."""
-        columns, only_if_more, count = self.columns, self.row.only_if_more, self.support
+    @property
+    def numbers(self) -> int:
+        """The most numbers that a cell sums in a part."""
+        return len(self.columns) * -(-self.support // self.parts)
+
+    def nodes_of(self, part: int) -> tuple[int, int]:
+        """The nodes of a stencil that are summed in a part: from the first to before the second."""
+        count = self.support
+        return count * part // self.parts, count * (part + 1) // self.parts
+
+    def sum(self, part: int, anew: bool) -> Callable:
+        """Make what a node does: it sums what cells have given to it; `anew` from zero."""
+        columns, only_if_more = self.columns, self.row.only_if_more
+        begin, end = self.nodes_of(part)
 
         @shared
         def put(nodes, n, found):
             for (name, column, add), value in zip(columns, found, strict=True):
                 array = getattr(nodes, name) if isinstance(name, str) else field(nodes.fields, name)
-                if add or not first_block:
+                if add or not anew:
                     array[n, column] += value
                 else:
                     array[n, column] = value
@@ -354,8 +366,8 @@ class Stage:
                 return
             grid = _grid_of(s.grids, i)
             found = (real(0, s.nodes.sums[0, 0]),) * len(columns)
-            for k in range(count):
-                found = _with_cell(s, cells, grid, i, k, count, found)
+            for k in range(begin, end):
+                found = _with_cell(s, cells, grid, i, k, begin, end, found)
             put(s.nodes, index(i), found)
 
         return sum_node
@@ -402,7 +414,7 @@ def _steps_to(s, grid, k):
 
 
 @shared
-def _with_cell(s, cells, grid, n, k, count, found):
+def _with_cell(s, cells, grid, n, k, begin, end, found):
     """`found` with what a cell gives to node `n`, which its points see as their k-th node."""
     c = n - _steps_to(s, grid, k)
     box = cells.box[index(max(c, 0))]
@@ -410,7 +422,7 @@ def _with_cell(s, cells, grid, n, k, count, found):
     at = index(max(box, 0))
     return tuple(
         [
-            value + where(there, cells.boxes[j * count + k, at], value - value)
+            value + where(there, cells.boxes[j * (end - begin) + k - begin, at], value - value)
             for j, value in enumerate(found)
         ]
     )

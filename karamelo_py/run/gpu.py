@@ -145,7 +145,7 @@ class StepsOnCard:
         """Give room to what cells sum: for the visit that gives most."""
         self.present = ["sums", "velocity", *(type(one) for one in s.nodes.fields)]
         stages = [self._stage(row) for row in rows if isinstance(row, table.Sweep)]
-        most = max((len(stage.columns) * stage.support for stage in stages), default=0)
+        most = max((stage.numbers for stage in stages), default=0)
         self.cells = [
             cells._replace(
                 boxes=self.images.new((most, cells.cell.size), s.nodes.sums.dtype),
@@ -233,11 +233,11 @@ class StepsOnCard:
             mark = stage.mark()
             for cells in self.cells:
                 yield self._launch(mark, cells.cell.size, s, cells, self.use)
-        functions = [stage.scatter(part) for part in range(stage.parts)]
         for k, (block, cells, _) in enumerate(pairs):
-            for scatter in functions:
+            for part in range(stage.parts):
+                scatter, sum_up = stage.scatter(part), stage.sum(part, anew=k == part == 0)
                 yield self._launch(scatter, cells.cell.size, s, block, cells)
-            yield self._launch(stage.sum(k == 0), self.nodes, s, block, cells, self.use)
+                yield self._launch(sum_up, self.nodes, s, block, cells, self.use)
 
     def _lists(self, block: Any, cells: gpu.Cells) -> Iterator[Launch]:
         levels = self.levels
@@ -260,10 +260,11 @@ class StepsOnCard:
             come_from = self.images.new((size,), np.int32)
             yield self._launch(gpu.order_cell, cells.cell.size, cells, come_from)
             arrays = [as_rows(self.images.of(array)) for _, array in arrays_of(block.points)]
-            most = max(rows.nbytes for rows in arrays)
-            room = self.images.new((most // 4,), np.int32)
+            room, most = cells.boxes.reshape(-1), max(rows.nbytes for rows in arrays)
+            if room.nbytes < most:  # where cells sum, there is room meanwhile
+                room = self.images.new((-(-most // 8),), np.int64)
             for rows in arrays:
-                own = room.view(rows.dtype)[: rows.size].reshape(rows.shape)
+                own = room.view(np.uint8)[: rows.nbytes].view(rows.dtype).reshape(rows.shape)
                 yield self._launch(gpu.take_rows, size, rows, come_from, own)
                 yield self._launch(gpu.put_rows, size, rows, own)
 
