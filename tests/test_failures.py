@@ -78,11 +78,11 @@ def test_the_fix_whose_formula_gives_no_number(run_interpreted):
 
 
 def test_a_point_that_leaves_the_domain(run_interpreted):
-    """The block's end, at x = 0.575 and y = 0.475, reaches x = 1.2 at time 0.0625: step 63."""
-    script = block(2, "fix(v, initial_velocity_particles, all, 10, 0)", "set_dt(0.001)", *OUTPUT,
+    """The block's end, at x = 0.575 and y = 0.475, reaches x = 1.2 at time 0.026: step 27."""
+    script = block(2, "fix(v, initial_velocity_particles, all, 24, 0)", "set_dt(0.001)", *OUTPUT,
                    "run(200)")  # fmt: skip
     message = stopped(run_interpreted(script, status=1), "leaves the domain", "x = 1.2", "point ")
-    assert "step 63," in message
+    assert "step 27," in message
 
 
 def test_the_last_good_state_is_written_once(run_interpreted, tmp_path):

@@ -310,6 +310,7 @@ def parsed(words):
 
 
 @pytest.mark.skipif(not shutil.which("chromium"), reason="no browser")
+@pytest.mark.full
 def test_pages_in_a_browser(simulation):
     """The page loads, news arrive, a click holds the run, another stops the study."""
     sync = pytest.importorskip("playwright.sync_api")

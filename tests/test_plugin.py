@@ -16,7 +16,8 @@ from going_on import goes_on, same_files
 from plugged import PLUGIN, install
 from scenes import block
 
-pytestmark = pytest.mark.xdist_group("plugin")
+pytestmark = [pytest.mark.xdist_group("plugin"), pytest.mark.usefixtures("starts_are_cheap")]
+PYTHON = sys.executable  # which compiles, too
 
 # One period of the first mode of a bar with fixed ends.
 VIBRATION = """
@@ -79,7 +80,8 @@ def karamelo_py(site, folder, *arguments, compiled=False):
     path = os.pathsep.join(filter(None, [str(site), os.environ.get("PYTHONPATH")]))
     environment = os.environ | {"PYTHONPATH": path}
     environment["NUMBA_DISABLE_JIT"] = "0" if compiled else "1"
-    command = [sys.executable, "-m", "karamelo_py.app.cli", *map(str, arguments)]
+    python = PYTHON if compiled else sys.executable
+    command = [python, "-m", "karamelo_py.app.cli", *map(str, arguments)]
     return subprocess.run(
         command, cwd=folder, env=environment, capture_output=True, text=True, timeout=300
     )
@@ -94,7 +96,7 @@ def test_pip_installs_it_and_styles_and_help_tell_of_it(tmp_path):
     require_build_tools()
     source = shutil.copytree(PLUGIN, tmp_path / "source")  # building leaves files behind
     options = ["--no-deps", "--no-build-isolation", "--no-index", "--disable-pip-version-check"]
-    command = [sys.executable, "-m", "pip", "install", "-q", *options]
+    command = [PYTHON, "-m", "pip", "install", "-q", *options]
     command += ["--target", str(tmp_path / "site"), str(source)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
