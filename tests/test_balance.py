@@ -34,7 +34,7 @@ print(*measure(Path(sys.argv[1]))[:3])
 """
 
 
-def test_a_block_on_a_base(tmp_path):
+def test_a_block_on_a_base(tmp_path, starts_are_cheap):
     """Weight, contact and friction give it all its momentum and energy."""
     script = tmp_path / "in.scene"
     script.write_text(HEAVY, encoding="utf-8")

@@ -151,7 +151,7 @@ def test_pictures_are_written(table, suffix):
     assert (table / name).read_bytes().startswith(magic)
 
 
-def test_a_closed_pipe_leaves_the_picture(table):
+def test_a_closed_pipe_leaves_the_picture(table, starts_are_cheap):
     """Who reads the first lines of the table alone (head -1) wants the picture all the same."""
     words = ["chart", "sweep.csv", "-accuracy", "err", "-o", "chart.png"]
     command = [sys.executable, "-m", "karamelo_py.app.cli", *words]

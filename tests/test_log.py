@@ -193,7 +193,7 @@ def test_words_for_values():
     assert [duration(s) for s in (4.2, 200, 7500)] == ["4 s", "3 min 20 s", "2 h 5 min"]
 
 
-def test_two_runs_in_one_folder_are_noticed(hub):
+def test_two_runs_in_one_folder_are_noticed(hub, starts_are_cheap):
     """The second one stops, and leaves the log of the first one as it is."""
     pytest.importorskip("fcntl")
     hub.run(1)

@@ -542,7 +542,7 @@ def test_a_temperature_that_is_logged_is_not_left_out(advice):
         advice(text)
 
 
-def test_check_prints_what_could_be_left_out(tmp_path, monkeypatch, capsys):
+def test_check_prints_what_could_be_left_out(tmp_path, monkeypatch, starts_are_cheap):
     """By the command itself, in words that can be written into the script."""
     monkeypatch.chdir(tmp_path)
     text = plane(more="set_dt(1e-4)").replace("run(1)", "")

@@ -104,7 +104,7 @@ def test_the_limit_of_each_process_counts_for_those_of_the_machine(machine, monk
 
 
 @pytest.mark.skipif(not os.path.exists("/proc/self/limits"), reason="needs /proc")
-def test_a_process_finds_its_own_limit():
+def test_a_process_finds_its_own_limit(starts_are_cheap):
     code = (
         "import resource; resource.setrlimit(resource.RLIMIT_AS, (3 << 30, -1)); "
         "from karamelo_py.scene.machine_memory import machine_memory; print(*machine_memory())"

@@ -179,7 +179,7 @@ def test_names_that_the_system_cannot_write(tmp_path):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no limits of files")
 @pytest.mark.parametrize("room", [8, 100])
-def test_no_room_for_a_dump_in_hdf5(tmp_path, room):
+def test_no_room_for_a_dump_in_hdf5(tmp_path, starts_are_cheap, room):
     """Told once, in the words of the system; HDF5 itself cannot close a file that does not fit."""
     import h5py
 
