@@ -97,7 +97,7 @@ FRESH = {
         "docs/verdicts/in.piston", f"-var refine=0.5,1,2,4 {TWO}", "off=abs(p/exact - 1)",
         (0.05, 5e-3), "a gas pressed by a body"),
 }  # fmt: skip
-# And these after that: no rule was made with them in view.
+# And these after that: of all rules the upper bound of a forecast alone was made with them in view.
 AFTER = {
     "collision": Scene(
         "docs/verdicts/in.collision", f"-var refine=0.5,1,2,4,8 {TWO}", "err", (0.15, 0.05),
