@@ -78,10 +78,17 @@ def telling(tell: Callable[[str], None]) -> Iterator[None]:
 
 
 class KernelFiles:
-    """Keep the kernels of one function in files; what `load` cannot bring into memory is none."""
+    """Keep the kernels of one function in files; what `load` cannot bring into memory is none.
 
-    def __init__(self, function: Callable, load: Callable[[Any], Any]):
-        self._function, self._load = function, load
+    `about` tells apart functions of one name, such as those that a function makes; `beside` are
+    others that its kernels may call.
+    """
+
+    def __init__(
+        self, function: Callable, load: Callable[[Any], Any], about: str = "", beside: tuple = ()
+    ):
+        self._function, self._load, self._about = function, load, about
+        self._roots = [function, *beside]
 
     def kernel(self, kinds: tuple, result: Any, compiled: Callable[[], tuple[Any, Any]]) -> Any:
         """Read a kernel; where there is none, compile it, while others wait for the file."""
@@ -108,7 +115,7 @@ class KernelFiles:
                 if hashlib.sha256(data[32:]).digest() != data[:32]:
                     raise ValueError("not what was written")
                 choices, code = pickle.loads(data[32:])
-                stamp = fingerprint([self._function], kinds, frozenset(choices))
+                stamp = fingerprint(self._roots, kinds, frozenset(choices))
                 if stamp[:24] != path.stem.rpartition("-")[2]:
                     continue
                 unit = pickle.loads(code)
@@ -132,7 +139,7 @@ class KernelFiles:
         try:
             if isinstance(codes, Unknown):
                 raise codes
-            stamp = fingerprint([self._function], kinds, unit.choices, codes)
+            stamp = fingerprint(self._roots, kinds, unit.choices, codes)
             content = pickle.dumps((tuple(sorted(unit.choices)), pickle.dumps(unit)))
             path = folder() / f"{key}-{stamp[:24]}{_ENDING}"
             write(path, hashlib.sha256(content).digest() + content)
@@ -153,6 +160,7 @@ class KernelFiles:
         """Give the name of the function with a hash of the types and of the machine."""
         words = [name_of(self._function), *map(describe, kinds)]
         words += [describe(result) if result is not None else "", repr(machine.describe())]
+        words.append(self._about)
         digest = hashlib.sha256("|".join([*words, _SETTING]).encode()).hexdigest()
         return f"{self._name()}-{digest[:24]}"
 

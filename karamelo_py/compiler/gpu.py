@@ -20,9 +20,11 @@ from numba import types
 
 from karamelo_py.compiler import code, machine
 from karamelo_py.compiler.argument_buffer import ArgumentBuffer, plan_for
-from karamelo_py.compiler.choices import INTERPRETED
+from karamelo_py.compiler.cache import KernelFiles
+from karamelo_py.compiler.choices import INTERPRETED, Unknown, choosers, contents, parts_noted
 from karamelo_py.compiler.code import I32, I64
 from karamelo_py.compiler.compile import implements, shared
+from karamelo_py.compiler.fingerprint import fingerprint
 from karamelo_py.compiler.held import HeldTuple, item_of
 from karamelo_py.compiler.loops import ENTRY, NAME, in_one, written
 from karamelo_py.compiler.trace import formula
@@ -106,6 +108,11 @@ def aligned_record(array, i, count):
         return code.make_tuple(builder, result, numbers)
 
     return result(array, types.int64, count), codegen
+
+
+def _known(function: Callable) -> Callable:
+    """Let kernels know a function."""
+    return function if function in choosers else shared(function)
 
 
 # --- code -------------------------------------------------------------------------------------
@@ -194,7 +201,7 @@ def text_of(
     """
     with in_one(called or {}):
         entry = _as_threads if on_card else _as_loop
-        module, _ = written(shared(function), (types.int64, *kinds), types.none, entry)
+        module, _ = written(_known(function), (types.int64, *kinds), types.none, entry)
     if module.needs or module.raises:
         raise TypeError(f"{function.__qualname__} calls what no thread can call")
     text = str(module)
@@ -210,7 +217,7 @@ def numbers_of(function: Callable, arguments: tuple) -> int:
     """Count the numbers that a function of a thread gives for the rest of its arguments."""
     kinds = plan_for(arguments).types
     with in_one({}):
-        found = formula(shared(function), (*kinds, types.int64))
+        found = formula(_known(function), (*kinds, types.int64))
     return len(found.result)
 
 
@@ -231,11 +238,21 @@ def bandwidth(card: Any, size: int = 1 << 30) -> float:
     return 2 * size / fastest
 
 
+class Code(NamedTuple):
+    """Keep the code of a function of threads, as :class:`~karamelo_py.compiler.loops.Unit` does."""
+
+    name: str
+    content: bytes
+    choices: frozenset
+
+
 class _Coded:
-    """Keep the code of functions of threads."""
+    """Keep the code of functions of threads, here and on disk."""
 
     on_card: bool
-    loaded: Callable
+    processor: str
+    made: Callable[[str], bytes]  # code of the text of a module
+    loaded: Callable[[Code], Any]
 
     def __init__(self) -> None:
         self._entries: dict[str, Any] = {}
@@ -243,21 +260,46 @@ class _Coded:
 
     def compiled(self, function: Callable, kinds: tuple, called: dict | None = None) -> Any:
         """Make the function ready to be launched for arguments of these types."""
-        key = function, kinds, *(called or {}).values()
-        if key in self._known:
-            return self._known[key]
-        name, text = text_of(function, kinds, self.on_card, called)
-        if name not in self._entries:
-            self._entries[name] = self.loaded(f"{name}_entry", text)
-        if "<locals>" not in function.__qualname__:  # others are made anew for each scene
-            self._known[key] = self._entries[name]
-        return self._entries[name]
+        called = called or {}
+        key = function, kinds, *called.values()
+        if key not in self._known:
+            code = self._found(function, kinds, called)
+            if code.name not in self._entries:
+                self._entries[code.name] = self.loaded(code)
+            if "<locals>" in function.__qualname__:  # made anew for each scene
+                return self._entries[code.name]
+            self._known[key] = self._entries[code.name]
+        return self._known[key]
+
+    def _found(self, function: Callable, kinds: tuple, called: dict) -> Code:
+        """Read code from the disk, or make it and write it there."""
+        beside = tuple(called.values())
+        try:  # what it is made of, but for choices by type
+            own = fingerprint([_known(function), *beside], kinds, frozenset())
+        except Unknown:
+            return self._compiled(function, kinds, called)[0]
+        files = KernelFiles(function, lambda code: code, f"{self.processor} {own}", beside)
+        return files.kernel(kinds, None, lambda: self._compiled(function, kinds, called))
+
+    def _compiled(
+        self, function: Callable, kinds: tuple, called: dict
+    ) -> tuple[Code, frozenset | Unknown]:
+        """Make code; also the Python functions that it was made of."""
+        with parts_noted() as parts:
+            name, text = text_of(function, kinds, self.on_card, called)
+        code = Code(f"{name}_entry", self.made(text), frozenset())
+        try:
+            choices, codes = contents(parts)
+        except Unknown as what:
+            return code, what
+        return code._replace(choices=choices), codes
 
 
 class Emulator(_Coded):
     """Run functions of threads on the processor, in memory of its own."""
 
-    name, on_card = "emulated", False
+    name, processor, on_card = "emulated", "processor", False
+    made = staticmethod(machine.compile_text)
 
     def __init__(self) -> None:
         super().__init__()
@@ -280,9 +322,9 @@ class Emulator(_Coded):
 
     copy = copy_from = copy_to  # the first argument is where it goes to
 
-    def loaded(self, name: str, text: str) -> Callable:
-        """Make code that can be launched."""
-        (address,) = machine.load(machine.compile_text(text), name)
+    def loaded(self, code: Code) -> Callable:
+        """Make code one that can be launched."""
+        (address,) = machine.load(code.content, code.name)
         return ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64)(address)
 
     def launch(self, entry: Callable, arguments: int, count: int) -> None:
@@ -387,11 +429,15 @@ class Card(_Coded):
         """Copy memory of the card to that of the program, at the first address."""
         self._do("cuMemcpyDtoH", address, there, size)
 
-    def loaded(self, name: str, text: str) -> Any:
-        """Make code that can be launched."""
-        room = ctypes.create_string_buffer(assembled(text, self.processor).encode() + b"\0")
+    def made(self, text: str) -> bytes:
+        """Make PTX of the text of a module."""
+        return assembled(text, self.processor).encode() + b"\0"
+
+    def loaded(self, code: Code) -> Any:
+        """Make code one that can be launched."""
+        room = ctypes.create_string_buffer(code.content)
         module = self._do("cuModuleLoadData", ctypes.addressof(room))
-        return self._do("cuModuleGetFunction", module, name.encode())
+        return self._do("cuModuleGetFunction", module, code.name.encode())
 
     def launch(self, entry: Any, arguments: int, count: int) -> None:
         """Let `count` threads work, in blocks of some."""

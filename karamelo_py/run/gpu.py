@@ -276,7 +276,8 @@ class StepsOnCard:
     def _called(self, h: int) -> dict:
         """What is called by its address for a hook."""
         signatures = (NODE_FUNCTION, POINT_FUNCTION, HEAT_FUNCTION)
-        own = dict.fromkeys(signatures, shared(self.functions[h]))
+        own: dict = dict.fromkeys(signatures, shared(self.functions[h]))
+        own["others"] = tuple(self.functions)  # code on disk asks for all that was traced
         return {**own, EVALUATE: evaluate_in_table if self._has_formulas(h) else _no_formula}
 
     def _has_formulas(self, h: int) -> bool:
