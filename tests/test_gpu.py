@@ -136,3 +136,17 @@ def test_order_in_memory_changes_nothing():
         found.append(state(simulation))
     for here, there in zip(*found, strict=True):
         assert (here == there).all()
+
+
+def test_code_is_kept(monkeypatch):
+    """The second run of a kind of scene compiles nothing."""
+
+    def made_again(*_):
+        raise AssertionError("it is compiled again")
+
+    for again in (False, True):
+        if again:
+            monkeypatch.setattr(Emulator, "_compiled", made_again)
+        hub, one = begun(WATER)
+        hooks = one.hooks, one.python.functions
+        StepsOnCard(Emulator(), one.setup, hub.update.scheme, type(one.visits), *hooks)
