@@ -141,8 +141,8 @@ def test_order_in_memory_changes_nothing():
 def test_code_is_kept(monkeypatch):
     """The second run of a kind of scene compiles nothing."""
 
-    def made_again(*_):
-        raise AssertionError("it is compiled again")
+    def made_again(self, function, *_):
+        raise AssertionError(f"{function.__qualname__} is compiled again")
 
     for again in (False, True):
         if again:

@@ -110,7 +110,7 @@ def aligned_record(array, i, count):
     return result(array, types.int64, count), codegen
 
 
-def _known(function: Callable) -> Callable:
+def known(function: Callable) -> Callable:
     """Let kernels know a function."""
     return function if function in choosers else shared(function)
 
@@ -201,7 +201,7 @@ def text_of(
     """
     with in_one(called or {}):
         entry = _as_threads if on_card else _as_loop
-        module, _ = written(_known(function), (types.int64, *kinds), types.none, entry)
+        module, _ = written(known(function), (types.int64, *kinds), types.none, entry)
     if module.needs or module.raises:
         raise TypeError(f"{function.__qualname__} calls what no thread can call")
     text = str(module)
@@ -217,7 +217,7 @@ def numbers_of(function: Callable, arguments: tuple) -> int:
     """Count the numbers that a function of a thread gives for the rest of its arguments."""
     kinds = plan_for(arguments).types
     with in_one({}):
-        found = formula(_known(function), (*kinds, types.int64))
+        found = formula(known(function), (*kinds, types.int64))
     return len(found.result)
 
 
@@ -275,7 +275,7 @@ class _Coded:
         """Read code from the disk, or make it and write it there."""
         beside = tuple(called.values())
         try:  # what it is made of, but for choices by type
-            own = fingerprint([_known(function), *beside], kinds, frozenset())
+            own = fingerprint([known(function), *beside], kinds, frozenset())
         except Unknown:
             return self._compiled(function, kinds, called)[0]
         files = KernelFiles(function, lambda code: code, f"{self.processor} {own}", beside)

@@ -12,7 +12,7 @@ from numpy.lib.stride_tricks import as_strided
 from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.formula import EVALUATE, GLOBAL, UNIFORM, evaluate_in_table
-from karamelo_py.compiler.gpu import Images, Launch, numbers_of
+from karamelo_py.compiler.gpu import Images, Launch, known, numbers_of
 from karamelo_py.kernels import gpu, table
 from karamelo_py.kernels import gpu_fixes as fixes
 from karamelo_py.kernels.arrays import (
@@ -276,7 +276,7 @@ class StepsOnCard:
     def _called(self, h: int) -> dict:
         """What is called by its address for a hook."""
         signatures = (NODE_FUNCTION, POINT_FUNCTION, HEAT_FUNCTION)
-        own: dict = dict.fromkeys(signatures, shared(self.functions[h]))
+        own: dict = dict.fromkeys(signatures, known(self.functions[h]))
         own["others"] = tuple(self.functions)  # code on disk asks for all that was traced
         return {**own, EVALUATE: evaluate_in_table if self._has_formulas(h) else _no_formula}
 
