@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scenes import block
 
+pytestmark = pytest.mark.xdist_group("surface")
 SLOPE = """
     method({method}, FLIP, linear, 1)
     dimension(2, 0, 3, 0, 3, 0.1)

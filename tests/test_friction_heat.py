@@ -7,6 +7,7 @@ import pytest
 from karamelo_py.points.laws.linear import LinearElastic
 from karamelo_py.styles.methods.ulmpm_contacts import heat_shares
 
+pytestmark = pytest.mark.xdist_group("friction heat")
 MU, G, V, TIME = 0.4, 10.0, 2.0, 0.2
 BLOCK = f"""
     method({{method}}, FLIP, linear, 1)

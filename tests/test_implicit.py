@@ -8,6 +8,7 @@ import pytest
 
 from comparisons.results import read_dump
 
+pytestmark = pytest.mark.xdist_group("implicit")
 INPUTS = Path(__file__).parent.parent / "inputs"
 PATCH = """
     d = 2

@@ -14,6 +14,7 @@ from karamelo_py.run.implicit.newton import Broken, Newton
 from karamelo_py.script.errors import ScriptError
 from tests.test_implicit import HELD, coarse, patch
 
+pytestmark = pytest.mark.xdist_group("implicit")
 FLUID = """eos(w, fluid, 1000, 1e5, 7)
     strength(w, fluid, 1e-3)
     material(m, eos-strength, w, w)"""

@@ -8,6 +8,7 @@ import pytest
 from comparisons import hertz
 from tests.test_implicit import HELD, patch
 
+pytestmark = pytest.mark.xdist_group("implicit tools")
 PRESS = """
     basis = "linear"
     method(ulmpm, FLIP, basis, 1)

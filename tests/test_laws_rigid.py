@@ -7,6 +7,7 @@ import pytest
 
 from karamelo_py.app.cli import main
 
+pytestmark = pytest.mark.xdist_group("rigid")
 SCENE = """
 method(METHOD, FLIP, linear, 1)
 dimension(2, -2, 4, 0, 1, 0.25)
