@@ -290,7 +290,7 @@ def test_averaged_volumes_do_the_work_that_is_stored(run_interpreted, method, sc
     assert 2 * lost[1] - lost[0] == pytest.approx(left, abs=0.002)
 
 
-@pytest.mark.parametrize("scheme", ["musl", "usf", "usavg"])
+@pytest.mark.parametrize("scheme", [pytest.param("musl", marks=pytest.mark.full), "usf", "usavg"])
 def test_a_disk_that_turns_keeps_its_size(run_script, scheme):
     """As if rigid, by 3 rad: centrifugal forces stretch it by about rho (w R)^2/E, a thousandth.
 

@@ -162,8 +162,7 @@ def test_viscosity_knows_the_cell_size(tmp_path, capsys):
     assert limits[1] < limits[0] / 2
 
 
-def test_check_names_the_parts_there_are(tmp_path, capsys):
-    path = tmp_path / "in.check"
+def test_check_names_the_parts_there_are(run_interpreted):
     for parts, name, count in (  # viscosity is a number more
         ("bulk, hard", "shock, johnson_cook", 8),
         ("bulk, hard, warm", "shock, johnson_cook, plastic_work", 9),
@@ -171,9 +170,8 @@ def test_check_names_the_parts_there_are(tmp_path, capsys):
         ("quiet, hard", "shock, johnson_cook", 7),
     ):
         quiet = "eos(quiet, shock, 8.96, 1, 0.394, 1.489, 2, 383e-8, 298, 0, 0)\n"
-        path.write_text(pulled(f"{quiet}material(m, eos-strength, {parts})"))
-        assert main(["check", str(path)]) == 0
-        out = capsys.readouterr().out
+        text = pulled(f"{quiet}material(m, eos-strength, {parts})")
+        out = run_interpreted(text, command="check").out
         assert f"a point of m (eos-strength: {name})\n" in out
         assert re.search(rf"^  state +{count} +{8 * count}$", out, re.M)
 
