@@ -300,6 +300,7 @@ class Emulator(_Coded):
 
     name, processor, on_card = "emulated", "processor", False
     made = staticmethod(machine.compile_text)
+    copies = 1  # of totals that threads add to
 
     def __init__(self) -> None:
         super().__init__()
@@ -361,6 +362,7 @@ class Card(_Coded):
     """An NVIDIA GPU, through its driver."""
 
     on_card = True
+    copies = 64  # of totals: threads side by side add to different ones
 
     def __init__(self) -> None:
         try:

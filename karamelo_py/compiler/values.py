@@ -309,7 +309,7 @@ class HeldValue:
         found = getattr(self._kind.instance_class, name)
         if callable(found) or isinstance(found, property):
             raise Untraceable(f"'{name}' is a method of a tuple with arrays")
-        return found
+        return now().seen(found) if isinstance(found, tuple) else found
 
     __eq__ = __ne__ = __hash__ = __contains__ = _only_at_run_time("a tuple with arrays")
     __add__ = __radd__ = __eq__

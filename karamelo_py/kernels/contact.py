@@ -38,7 +38,7 @@ from karamelo_py.kernels.arrays import (
 )
 from karamelo_py.kernels.loss import FrictionalHeat, warm_node
 from karamelo_py.kernels.p2g import Centre, Normal
-from karamelo_py.kernels.table import touch, touch_velocity
+from karamelo_py.kernels.table import Once, each_node
 from karamelo_py.kernels.totals import WORK, add_to, carry, counts, publish
 from karamelo_py.points.basis.surface import ENTRIES
 from karamelo_py.points.grid import node_position
@@ -75,6 +75,14 @@ class SeparateFields(NamedTuple):
     meeting: np.ndarray  # (F,) int64 scratch: the fields that meet at a place
     partners: np.ndarray  # (F,) int64 scratch: with how many others each of them is in contact
     change: np.ndarray  # (F, d) scratch: of the velocity of each of them
+
+
+class Scratch(NamedTuple):
+    """The last of these, which a thread that shares out places with others has for itself."""
+
+    meeting: np.ndarray
+    partners: np.ndarray
+    change: np.ndarray
 
 
 # --- two bodies at a place --------------------------------------------------------------------
@@ -456,25 +464,32 @@ def _keep_rigid(contact, kin, nodes, control, n):
 
 
 @kernel
-def _touch_nodes(contact, kin, grids, nodes, spans, control):
-    """Resolve contact in v* and the change of velocity of this step; publish the forces."""
-    values, totals, forces = control.values, control.totals, contact.forces
-    for s in range(1, 1 + spans[0, 0]):
-        for n in range(spans[s, 0], spans[s, 1]):
-            _keep_rigid(contact, kin, nodes, control, n)
+def _begin_forces(s):
+    forces = s.contact.forces
     for c in range(1, 1 + forces[0]):
-        totals[forces[c] : forces[c] + 3] = 0
-    for s in range(1, 1 + spans[0, 0]):
-        for n in range(spans[s, 0], spans[s, 1]):
-            touch_node(contact, kin, grids, nodes, control, n)
-    carry(totals[WORK])
+        s.control.totals[forces[c] : forces[c] + 3] = 0
+
+
+@kernel
+def _publish_forces(s):
+    contact, control, forces = s.contact, s.control, s.contact.forces
+    carry(control.totals[WORK])
     for c in range(1, 1 + forces[0]):
         publish(control, forces[c], 3)
     for c in range(contact.reactions[0]):
-        publish(control, contact.reactions[1 + c], kin.dimension)
+        publish(control, contact.reactions[1 + c], s.kin.dimension)
     for c in range(len(contact.copies)):
         for k in range(3):
-            values[contact.copies[c, 1] + k] = values[contact.copies[c, 0] + k]
+            control.values[contact.copies[c, 1] + k] = control.values[contact.copies[c, 0] + k]
+
+
+# Contact acts in v* and the change of velocity of this step.
+SeparateFields.rows = (  # type: ignore[attr-defined]
+    Once(_begin_forces),
+    each_node(lambda s, n: _keep_rigid(s.contact, s.kin, s.nodes, s.control, n)),
+    each_node(lambda s, n: touch_node(s.contact, s.kin, s.grids, s.nodes, s.control, n)),
+    Once(_publish_forces),
+)
 
 
 @kernel
@@ -507,11 +522,6 @@ def list_pairs(contact, kin, grids, nodes, spans, pairs, normals, gaps):
                         gaps[found] = gap
                         found += 1
     return found
-
-
-@touch.on(SeparateFields)
-def _touch_separate_fields(contact, s):
-    _touch_nodes(contact, s.kin, s.grids, s.nodes, s.spans, s.control)
 
 
 # --- the velocity that deforms ----------------------------------------------------------------
@@ -554,28 +564,28 @@ def _stay_place(contact, kin, nodes, place, count, step):
 
 @noinline
 def stay_node(contact, kin, nodes, step, n):
-    """Do at the place of node `n` as `touch_velocity` says, where contact acted in `step`."""
+    """Do as `_stay` says at the place of node `n`, where contact acted in `step`."""
     count = _meet(contact, nodes, n)
     if count > 1:
         _stay_place(contact, kin, nodes, n % contact.stride, count, step)
 
 
-@kernel
-def _stay_nodes(contact, kin, nodes, spans, step):
-    """Keep the velocity that deforms from opening or closing contact that acted in `step`.
+def _stay(steps):
+    """Keep the velocity that deforms from opening or closing contact that acted in a step.
 
     Where that velocity is mapped apart from v*, the surfaces would seem to move in it although they
     are pressed together, and stress would do work on nothing: a collision of bars then quadruples
-    their energy, or doubles it when only approach is taken away.
+    their energy, or doubles it when only approach is taken away. `steps` is 1 when v* of this step
+    is known, and 0 before: what touched in the last step counts.
     """
-    if step == 0:
-        return  # nothing has touched yet
-    for s in range(1, 1 + spans[0, 0]):
-        for n in range(spans[s, 0], spans[s, 1]):
-            stay_node(contact, kin, nodes, step, n)
+
+    def stay(s, n):
+        step = int(s.control.values[TIMESTEP]) + steps
+        if step > 0:  # something may have touched yet
+            stay_node(s.contact, s.kin, s.nodes, step, n)
+
+    return (each_node(stay),)
 
 
-@touch_velocity.on(SeparateFields)
-def _touch_velocity_separate_fields(contact, s, steps):
-    step = int(s.control.values[TIMESTEP]) + steps
-    _stay_nodes(contact, s.kin, s.nodes, s.spans, step)
+SeparateFields.rows_before = _stay(0)  # type: ignore[attr-defined]
+SeparateFields.rows_after = _stay(1)  # type: ignore[attr-defined]

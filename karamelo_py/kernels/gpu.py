@@ -59,6 +59,8 @@ STAGES = {
     "visit_whole_member": "fixes at nodes",
     "visit_point": "fixes at points",
     "visit_whole_point": "fixes at points",
+    "visit_each_node": "contact, axis",
+    "visit_each_point": "contact, axis",
     **dict.fromkeys(
         ("count_point", "sum_counts", "sum_sums", "sum_before", "place_list", "list_point",
          "sort_cell", "age_node", "mark_nodes"), "lists of points by cell",
@@ -141,6 +143,11 @@ def _is_filled(name: Any, column: int, kin: Any) -> bool:
     )
 
 
+@shared
+def _as_it_is(s):
+    return s
+
+
 class Stage:
     """A visit of the points in a step, as functions of threads: `row` is one of its scheme's."""
 
@@ -160,11 +167,13 @@ class Stage:
         self.support = int(support(basis, kin))
         self.scatters = bool((row.scatters or row.only_if_more) and quantities)
 
+        self.at = at = row.at or _as_it_is
+
         @shared
         def context(s):
             whole = last_step_size(s) if of_last_step else step_size(s)
             dt = whole if share == 1 else real(share, whole) * whole
-            return context_of(s, dt, row.gathers, row.scatters, row.moves)
+            return context_of(at(s), dt, row.gathers, row.scatters, row.moves)
 
         self.context = context
 
@@ -349,6 +358,7 @@ class Stage:
         """Make what a node does: it sums what cells have given to it; `anew` from zero."""
         columns, only_if_more = self.columns, self.row.only_if_more
         begin, end = self.nodes_of(part)
+        at = self.at
 
         @shared
         def put(nodes, n, found):
@@ -368,7 +378,7 @@ class Stage:
             found = (real(0, s.nodes.sums[0, 0]),) * len(columns)
             for k in range(begin, end):
                 found = _with_cell(s, cells, grid, i, k, begin, end, found)
-            put(s.nodes, index(i), found)
+            put(at(s).nodes, index(i), found)
 
         return sum_node
 
@@ -557,14 +567,16 @@ def put_rows(i, fate, rows, room):
 # --- nodes, and the clock ---------------------------------------------------------------------
 
 
-def of_nodes(task: Any) -> Callable:
-    """Make what a node does: a task, or what a function of the setup makes one."""
+def of_nodes(row: Any) -> Callable:
+    """Make what a node does for a row of a task."""
+    task, at, length = row.task, row.at or _as_it_is, row.length or kick
     made = task if callable(task) else shared(lambda s: task)
 
     def visit_node(i, fate, s, use):
         if fate[STATUS] > 0 or use[i] == 0:
             return
-        at_node(made(s), s.kin, s.nodes, index(i), kick(s))
+        here = at(s)
+        at_node(made(s), here.kin, here.nodes, index(i), length(s))
 
     return visit_node
 
@@ -576,19 +588,22 @@ def clear(i, fate, array, first):
     array[first + i] = 0
 
 
-def take_reports(i, fate, s):
-    """Take over how the points fared in a visit."""
-    if fate[STATUS] > 0:
-        return
-    clock = s.control.clock[0]
-    clock.move += fate[MOVED]
-    if fate[RATE] > 0:
-        clock.rate = fate[RATE]
-    fate[MOVED] = 0.0
-    fate[RATE] = 0.0
-    if fate[WRONG] > 0:
-        clock.wrong = 1
-        fate[STATUS] = 1.0 + STOPPED
+def take_reports(take: Callable) -> Callable:
+    """Make what takes over how the points fared in a visit, with a function of the clock."""
+
+    def take_all_reports(i, fate, s):
+        if fate[STATUS] > 0:
+            return
+        clock = s.control.clock[0]
+        clock.new_move, clock.new_rate = fate[MOVED], fate[RATE]
+        take(clock)
+        fate[MOVED] = 0.0
+        fate[RATE] = 0.0
+        if fate[WRONG] > 0:
+            clock.wrong = 1
+            fate[STATUS] = 1.0 + STOPPED
+
+    return take_all_reports
 
 
 def finish_step(i, fate, s):

@@ -19,6 +19,7 @@ from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels import arrays, totals
 from karamelo_py.kernels.arrays import TIMESTEP, known_to_laws, with_items_of
 from karamelo_py.kernels.clock import kick, step_size
+from karamelo_py.kernels.contact import Scratch, SeparateFields
 from karamelo_py.kernels.gpu import MOVED, STATUS, goes_wrong, is_last
 from karamelo_py.kernels.hook_loop import (
     ACT,
@@ -53,7 +54,6 @@ from karamelo_py.points.laws import (
     specific_volume,
 )
 
-COPIES = 64  # of the totals: threads side by side add to different ones
 CHUNK = 64  # points whose energies one thread adds up
 
 
@@ -97,7 +97,7 @@ def _control(count: int) -> Callable:
 
     @shared
     def control_of(s, copies, i):
-        own = copies[index((i // 32) % COPIES)]
+        own = copies[index((i // 32) % len(copies))]
         if count:
             return with_items_of(s.control, OwnValues(own, own_values(s.control.values)))
         return with_items_of(s.control, OwnTotals(own))
@@ -269,6 +269,72 @@ def take_moves(i, fate, s):
     fate[MOVED] = 0.0
 
 
+# --- functions of nodes, of points, and between loops -------------------------------------------
+
+
+class OwnParts(NamedTuple):
+    """What a thread has of its own in the place of the same of `Setup`."""
+
+    contact: NamedTuple
+    control: NamedTuple
+
+
+def _setup(s: arrays.Setup) -> Callable:
+    """Make what gives a thread the setup with all that it writes to in the way of others."""
+    contact = s.contact
+    fields = len(contact.slot) if isinstance(contact, SeparateFields) else 0
+    d = s.kin.dimension
+
+    @shared
+    def contact_of(s):
+        if fields == 0:
+            return s.contact
+        own = room_for(2, (0,) * fields)
+        room = Scratch(own[:, 0], own[:, 1], room_for(d, (0.0,) * fields))
+        return with_items_of(s.contact, room)
+
+    @shared
+    def setup_of(s, copies, i):
+        return with_items_of(s, OwnParts(contact_of(s), _CONTROL(s, copies, i)))
+
+    return setup_of
+
+
+def each_node(function: Callable, s: arrays.Setup) -> Callable:
+    """Make what a node does for a row of a function."""
+    setup_of = _setup(s)
+
+    def visit_each_node(i, fate, s, use, copies):
+        if fate[STATUS] > 0 or use[i] == 0:
+            return
+        function(setup_of(s, copies, i), i)
+
+    return visit_each_node
+
+
+def each_point(function: Callable, s: arrays.Setup) -> Callable:
+    """Make what a point does for a row of a function."""
+    setup_of = _setup(s)
+
+    def visit_each_point(i, fate, s, block, copies):
+        if fate[STATUS] > 0:
+            return
+        function(setup_of(s, copies, i), block, i)
+
+    return visit_each_point
+
+
+def once(function: Callable) -> Callable:
+    """Make what is done once for a row of a function."""
+
+    def do_once(i, fate, s):
+        if fate[STATUS] > 0:
+            return
+        function(s)
+
+    return do_once
+
+
 # --- totals -----------------------------------------------------------------------------------
 
 
@@ -317,7 +383,7 @@ def add_energies(i, fate, s, block, copies, threads):
     if fate[STATUS] > 0:
         return
     points, laws, kin = known_to_laws(block.points), block.laws, s.kin
-    own = copies[index(i % COPIES)]
+    own = copies[index(i % len(copies))]
     firsts, first_row = s.control.firsts, s.control.values.size
     kinetic = stored = 0.0
     solid, begin, behind = -1, 0, 0
@@ -354,7 +420,7 @@ def add_work(i, fate, block, copies):
         return
     work = field(block.points.fields, WorkOfForces)
     if work is not None:
-        totals.add_to(copies[index((i // 32) % COPIES)], totals.WORK, float(work[0, i]))
+        totals.add_to(copies[index((i // 32) % len(copies))], totals.WORK, float(work[0, i]))
         work[0, i] = 0
 
 

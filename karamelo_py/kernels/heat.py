@@ -26,12 +26,12 @@ from karamelo_py.compiler.compile import (
 from karamelo_py.compiler.fields import Field, StepField, field, load, load_vector, store, vector
 from karamelo_py.kernels import arrays, hook_loop
 from karamelo_py.kernels.arrays import MASS, Buffers, Nodes, of_force
-from karamelo_py.kernels.clock import read_reports, step_size
+from karamelo_py.kernels.clock import step_size
 from karamelo_py.kernels.g2p import empty, gathered, updated
 from karamelo_py.kernels.nodes import NodalUpdate, SumsToVelocity, TakeMean
 from karamelo_py.kernels.p2g import load_of, scattered
-from karamelo_py.kernels.sweep import OldWeights, Visit, sweep, sweep_nodes
-from karamelo_py.kernels.table import conduct
+from karamelo_py.kernels.sweep import OldWeights, Visit
+from karamelo_py.kernels.table import ByFixes, NodeTask, Sweep
 from karamelo_py.kernels.totals import agree_on_heat
 from karamelo_py.kernels.visit import NodalMean, deformed_state, law_and_state, node_of
 from karamelo_py.points import laws
@@ -70,27 +70,6 @@ class HeatGradient(Field):
     """Gradient of temperature at a point."""
 
     shape = vector
-
-
-class Conducting(NamedTuple):
-    """Heat flows through `nodes`, whose fields are those of velocities and of F-bar.
-
-    sums: capacity, heat, heat flow; update: T* and T* - T; velocity: T; mean: T weighted with
-    conductance.
-    """
-
-    nodes: Nodes
-    buffers: Buffers
-
-    point_fields = (
-        Temperature,
-        Capacity,
-        Conductance,
-        Volume,
-        Supply,
-        TemperatureShare,
-        HeatGradient,
-    )
 
 
 class HeatContent(NamedTuple):
@@ -318,54 +297,63 @@ def _at_heated_points_hooks(hooks, s):
 
 
 @shared
-def visit_for_heat(heat, s, mode, visit, gathers, scatters):
-    """Visit the points for heat: the nodes are those of heat."""
-    here = arrays.with_items_of(s, heat)
-    sweep(here, mode, visit, step_size(s), gathers, scatters, False)
+def _of_heat(s):
+    """The setup with the nodes of heat."""
+    return arrays.with_items_of(s, s.heat)
+
+
+@shared
+def _at_nodes(s):
+    return _of_heat(s)._replace(kin=Line())
+
+
+@shared
+def _take_factor(clock):
+    # What `Warming` reports as a rate is by what factor conduction has become faster.
+    clock.heat_limit = clock.heat_reference / clock.new_rate
 
 
 MAP = Visit((Warming(),), (HeatContent(),), OldWeights())  # one loop for both ways
 FLOW = Visit((TemperatureGradient(),), (HeatFlow(),), OldWeights())
 
-
-@shared
-def show_heat(heat, s, mode):
-    """See that the nodes of heat, where there are some, show the temperature."""
-    if isinstance(heat, Conducting):
-        visit_for_heat(heat, s, mode, MAP, False, True)
-        sweep_nodes(mode, SumsToVelocity(), Line(), heat.nodes, s.ranges, step_size(s))
-
-
-@shared
-def flow_of_heat(heat, s, mode, hooks):
-    """See that the nodes of heat have capacity, heat, and the flow that present gradients make."""
-    show_heat(heat, s, mode)
-    sweep_nodes(mode, TakeMean(), Line(), heat.nodes, s.ranges, step_size(s))
-    at_heat_nodes(hooks, arrays.POST_HEAT_TO_GRID, arrays.ON_VELOCITY, s)
-    at_heated_points(hooks, s)
-    visit_for_heat(heat, s, mode, FLOW, True, True)
-
-
-@shared
-def hold_heat(s, hooks):
-    """Let the fixes hold the new temperature of nodes."""
-    at_heat_nodes(hooks, arrays.POST_UPDATE_GRID_HEAT, arrays.ON_UPDATE, s)
+# Capacity, heat and temperature to the nodes.
+SHOW = (
+    Sweep(MAP, gathers=False, moves=False, at=_of_heat, reported=None),
+    NodeTask(SumsToVelocity(), _at_nodes, step_size),
+)
+# And the flow that present gradients make.
+FLOW_TO_NODES = (
+    *SHOW,
+    NodeTask(TakeMean(), _at_nodes, step_size),
+    ByFixes(lambda hooks, s: at_heat_nodes(hooks, arrays.POST_HEAT_TO_GRID, arrays.ON_VELOCITY, s)),
+    ByFixes(lambda hooks, s: at_heated_points(hooks, s)),
+    Sweep(FLOW, moves=False, at=_of_heat, reported=None),
+)
+# The fixes hold the new temperature of nodes.
+HOLD = ByFixes(
+    lambda hooks, s: at_heat_nodes(hooks, arrays.POST_UPDATE_GRID_HEAT, arrays.ON_UPDATE, s)
+)
+# Points take what the temperature of the nodes changes by.
+WARM = Sweep(MAP, scatters=False, moves=False, at=_of_heat, reported=_take_factor)
 
 
-@shared
-def warm_points(heat, s, mode):
-    """Let the points take what the temperature of the nodes changes by."""
-    visit_for_heat(heat, s, mode, MAP, True, False)
+class Conducting(NamedTuple):
+    """Heat flows through `nodes`, whose fields are those of velocities and of F-bar.
 
+    sums: capacity, heat, heat flow; update: T* and T* - T; velocity: T; mean: T weighted with
+    conductance.
+    """
 
-@conduct.on(Conducting)
-def _conduct_conducting(heat, s, mode, hooks):
-    dt = step_size(s)
-    flow_of_heat(heat, s, mode, hooks)
-    sweep_nodes(mode, NodalUpdate(), Line(), heat.nodes, s.ranges, dt)
-    hold_heat(s, hooks)
-    warm_points(heat, s, mode)
-    # What `Warming` reports as a rate is by what factor conduction has become faster.
-    read_reports(s)
-    clock = s.control.clock[0]
-    clock.heat_limit = clock.heat_reference / clock.new_rate
+    nodes: Nodes
+    buffers: Buffers
+
+    point_fields = (
+        Temperature,
+        Capacity,
+        Conductance,
+        Volume,
+        Supply,
+        TemperatureShare,
+        HeatGradient,
+    )
+    rows = (*FLOW_TO_NODES, NodeTask(NodalUpdate(), _at_nodes, step_size), HOLD, WARM)

@@ -24,10 +24,8 @@ from karamelo_py.kernels.clock import (
     last_step_size,
     step_size,
 )
-from karamelo_py.kernels.g2p import Strain, TrialStrain, TrialStrainOfLastStep
 from karamelo_py.kernels.hook_loop import at_nodes, at_points
 from karamelo_py.kernels.sweep import sweep, sweep_nodes
-from karamelo_py.kernels.table import average_volumes
 from karamelo_py.kernels.visit import deformation_of, state_at
 from karamelo_py.kernels.watch import look, look_at_heat
 from karamelo_py.points.frames import inverse_stretch_squared
@@ -60,11 +58,23 @@ def _take(row, s, mode, hooks, more):
         at_points(hooks, row.stage, row.then, s)
     elif isinstance(row, table.AtNodes):
         at_nodes(hooks, row.stage, row.target, s)
-    elif isinstance(row, table.SceneTask):
-        row.function(s, mode, hooks)
+    elif isinstance(row, table.ByFixes):
+        row.function(hooks, s)
     elif isinstance(row, table.NodeTask):
         task = row.task(s) if callable(row.task) else row.task
-        sweep_nodes(mode, task, s.kin, s.nodes, s.ranges, kick(s))
+        here = row.at(s) if row.at else s
+        sweep_nodes(mode, task, here.kin, here.nodes, s.ranges, (row.length or kick)(s))
+    elif isinstance(row, table.EachNode):
+        row.loop(s)
+    elif isinstance(row, table.EachPoint):
+        for block in s.blocks:
+            if isinstance(block.laws, row.law):
+                row.loop(s, block)
+    elif isinstance(row, table.Once):
+        row.function(s)
+    elif isinstance(row, table.Repeated):
+        for k in range(row.count(s)):
+            _take_all(row.rows(k), s, mode, hooks, more)
     elif isinstance(row, table.Check):
         return check_moves(s, mode)
     else:
@@ -73,19 +83,17 @@ def _take(row, s, mode, hooks, more):
 
 
 def _visit(row, s, mode, more):
-    """A visit of the points, and what comes before it."""
+    """A visit of the points; whether all went well."""
     whole = last_step_size(s) if row.of_last_step else step_size(s)
     dt = whole if row.share == 1 else real(row.share, whole) * whole
-    if row.gathers and any(isinstance(task, Strain) for task in row.visit.tasks):
-        trial = TrialStrainOfLastStep() if row.of_last_step else TrialStrain()
-        average_volumes(s, mode, dt, trial)
     scatters = more if row.only_if_more else row.scatters
-    sweep(s, mode, row.visit, dt, row.gathers, scatters, row.moves)
-    return all_well(s)
+    here = row.at(s) if row.at else s
+    sweep(here, mode, row.visit, dt, row.gathers, scatters, row.moves)
+    return all_well(s, row.reported) if row.reported else True
 
 
 def _take_all(rows, s, mode, hooks, more):
-    for row in rows:  # noqa: SIM110  (no more rows after what went wrong)
+    for row in table.plain(rows, s):  # noqa: SIM110  (no more rows after what went wrong)
         if not _take(row, s, mode, hooks, more):
             return False
     return True

@@ -7,22 +7,22 @@ A scheme names its rows once, stage by stage, as its class attribute ``rows``. F
   nothing separates share a visit, and the first scatter joins the last visit of the step before;
 - what `karamelo-py check` says of a step, and the traffic that `karamelo-py bench` counts.
 
-Averaged volumes, XPIC, heat and contact are calls that do nothing in scenes without them.
+Averaged volumes, XPIC, heat and contact are rows that a scene adds (`plain`).
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import point_function, real, shared
+from karamelo_py.compiler.compile import real, shared
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.tuples import clear_first
 from karamelo_py.kernels import arrays, g2p, nodes, p2g
-from karamelo_py.kernels.arrays import Number, Setup, Tag
-from karamelo_py.kernels.clock import step_size
+from karamelo_py.kernels.arrays import Setup, Tag
+from karamelo_py.kernels.clock import take_reports
 from karamelo_py.kernels.hook_loop import add_work
 from karamelo_py.kernels.loss import EnergyLoss, FrictionalHeat
-from karamelo_py.kernels.sweep import OldWeights, PresentWeights, Visit, sweep, sweep_nodes
+from karamelo_py.kernels.sweep import OldWeights, PresentWeights, Visit
 from karamelo_py.kernels.visit import FBar
 from karamelo_py.points.kinematics import Axisymmetric
 from karamelo_py.points.transfers.xpic import XPIC
@@ -64,12 +64,49 @@ class NodeTask(NamedTuple):
     """A task at every node in use: its tag, or a function of the setup that makes it."""
 
     task: Any
+    at: Any = None  # function of the setup: that with the nodes that are meant
+    length: Any = None  # function of the setup: that of time, where it is not `kick`
+
+
+class EachNode(NamedTuple):
+    """A function ``(s, n)`` of every node in use; ``loop(s)`` calls it for them."""
+
+    function: Any
+    loop: Any
+
+
+class EachPoint(NamedTuple):
+    """A function ``(s, block, p)`` of every point with a kind of law; ``loop(s, block)``."""
+
+    function: Any
+    law: type
+    loop: Any
+
+
+class Once(NamedTuple):
+    """A function ``(s)`` between two loops."""
+
+    function: Any
+
+
+class ByFixes(NamedTuple):
+    """A function ``(hooks, s)``: fixes act in a way of their own."""
+
+    function: Any
+
+
+class Repeated(NamedTuple):
+    """Rows that are taken ``count(s)`` times: those of time k, from 0, are ``rows(k)``."""
+
+    count: Any
+    rows: Any
 
 
 class SceneTask(NamedTuple):
-    """A call ``function(s, mode, hooks)`` of what only some scenes have."""
+    """What only some scenes do: ``rows(s)`` are the rows that it consists of in a scene."""
 
-    function: Any
+    rows: Any
+    says: str | None = None
 
 
 class Check(NamedTuple):
@@ -86,6 +123,31 @@ class Sweep(NamedTuple):
     scatters: bool = True
     moves: bool = True  # whether new places go to the other of the two arrays
     only_if_more: bool = False  # the scatter belongs to the next step
+    at: Any = None  # function of the setup: that with the nodes that are meant
+    reported: Any = take_reports  # function of the clock, which has the reports of the points
+
+
+def each_node(function: Any) -> EachNode:
+    """Make a row of a function of a node."""
+
+    @kernel
+    def loop(s):
+        for r in range(1, 1 + s.spans[0, 0]):
+            for n in range(s.spans[r, 0], s.spans[r, 1]):
+                function(s, n)
+
+    return EachNode(function, loop)
+
+
+def each_point(function: Any, law: type) -> EachPoint:
+    """Make a row of a function of a point."""
+
+    @kernel
+    def loop(s, block):
+        for p in range(block.points.mass.size):
+            function(s, block, p)
+
+    return EachPoint(function, law, loop)
 
 
 def _tasks(gathers: list[Gather]) -> tuple:
@@ -170,101 +232,106 @@ def says(row: Any, setup: Any) -> str | None:
         return ", ".join(parts) + (" in one visit of the points" if len(parts) > 1 else "")
     if isinstance(row, NodeTask):
         return getattr(row.task, "says", None)
-    if isinstance(row, SceneTask):
-        return row.function.says(setup)
+    if isinstance(row, SceneTask) and len(row.rows(setup)):
+        return row.says
     return None
+
+
+def plain(rows: Iterable[Any], s: Setup) -> Iterator[Any]:
+    """The rows of a scene, with all that it adds: averaged volumes belong to visits that strain."""
+    for row in rows:
+        if isinstance(row, SceneTask):
+            yield from plain(row.rows(s), s)
+        else:
+            if isinstance(row, Sweep) and isinstance(s.averaging, FBar):
+                yield from average_volumes(row)
+            yield row
 
 
 class Insulated(NamedTuple):
     """No heat flows between points."""
 
-
-@point_function(otherwise=True)
-def conduct(heat: Tag, s: Setup, mode: Tag, hooks: Tag) -> None:
-    """Let heat flow between points for the length of a step; by default none does."""
+    rows = ()
 
 
-@point_function(otherwise=True)
-def touch(contact: Tag, s: Setup) -> None:
-    """Let solids with velocity fields of their own act on each other; by default there are none."""
+@shared
+def _clear_radial(s, n):
+    nodes, kin = s.nodes, s.kin
+    if nodes.sums[n, arrays.MASS] > 0:
+        nodes.sums[n, arrays.of_momentum(kin)] = 0
+        nodes.sums[n, arrays.of_force(kin)] = 0
+        nodes.update[n, 0] = 0
+        nodes.update[n, arrays.of_change(kin)] = 0
+        nodes.velocity[n, 0] = 0
+        clear_first(field(nodes.fields, p2g.Normal), n)
 
 
-@point_function(otherwise=True)
-def touch_velocity(contact: Tag, s: Setup, steps: int) -> None:
-    """See that the velocity that deforms the points agrees with contact, where it is not v*.
-
-    `steps` is 1 when v* of this step is known, and 0 before: what touched in the last step counts.
-    """
+@shared
+def _axis_of(grids, g):
+    """The range of the nodes on the axis of a grid."""
+    first = grids.first[g]
+    return first, first + (
+        grids.step_x[g] if abs(grids.x0[g]) <= grids.slack[g] * grids.h[g] else 0
+    )
 
 
 @kernel
-def _clear_radial(kin, nodes, grids):
-    for g in range(grids.first.size):
-        if abs(grids.x0[g]) > grids.slack[g] * grids.h[g]:
-            continue
-        for n in range(grids.first[g], grids.first[g] + grids.step_x[g]):
-            if nodes.sums[n, arrays.MASS] > 0:
-                nodes.sums[n, arrays.of_momentum(kin)] = 0
-                nodes.sums[n, arrays.of_force(kin)] = 0
-                nodes.update[n, 0] = 0
-                nodes.update[n, arrays.of_change(kin)] = 0
-                nodes.velocity[n, 0] = 0
-                clear_first(field(nodes.fields, p2g.Normal), n)
+def _hold_axis(s):
+    for g in range(s.grids.first.size):
+        begin, end = _axis_of(s.grids, g)
+        for n in range(begin, end):
+            _clear_radial(s, n)
 
 
-@shared
-def hold_axis(s: Setup) -> None:
+def _hold_node(s, n):
+    for g in range(s.grids.first.size):
+        begin, end = _axis_of(s.grids, g)
+        if begin <= n < end:
+            _clear_radial(s, n)
+
+
+def hold_axis(s: Setup) -> tuple:
     """Let no node on an axis of symmetry leave it, where there is one."""
     # v_r = 0 at r = 0: N / r of a node there grows without bound where a point comes near. And a
     # body that touches another on the axis has a normal along it.
-    if isinstance(s.kin, Axisymmetric):
-        _clear_radial(s.kin, s.nodes, s.grids)
+    return (EachNode(_hold_node, _hold_axis),) if isinstance(s.kin, Axisymmetric) else ()
 
 
-@shared
-def sum_series(s: Setup, mode: Tag) -> None:
+def sum_series(s: Setup) -> tuple:
     """Put the new velocity of XPIC in the place of the change of velocity; others need nothing."""
     if not isinstance(s.transfer, XPIC):
-        return
+        return ()
     # (I - (I - S S+)^m) v_p = S sum_k (I - S+ S)^k S+ v, the sum from 0 to m - 1
-    dt = step_size(s)
-    sweep_nodes(mode, nodes.StartSeries(), s.kin, s.nodes, s.ranges, dt)
-    for k in range(s.transfer.order - 1):
-        visit = Visit((g2p.SeriesTerm(k),), (p2g.SeriesBack(),), OldWeights())
-        sweep(s, mode, visit, dt, True, True, False)
-        sweep_nodes(mode, nodes.ExtendSeries(), s.kin, s.nodes, s.ranges, dt)
-    hold_axis(s)
+    terms = Repeated(lambda s: s.transfer.order - 1, _next_term)
+    return NodeTask(nodes.StartSeries()), terms, *hold_axis(s)
 
 
-@shared
-def average_volumes(s: Setup, mode: Tag, dt: Number, trial: Tag) -> None:
-    """Average the change of volume of the strain to come at the nodes, with F-bar.
-
-    `trial` is the task that finds it.
-    """
-    if isinstance(s.averaging, FBar):
-        visit = Visit((trial,), (p2g.Volumes(),), OldWeights())
-        sweep(s, mode, visit, dt, True, True, False)
-        sweep_nodes(mode, nodes.TakeMean(), s.kin, s.nodes, s.ranges, dt)
+def _next_term(k: int) -> tuple:
+    visit = Visit((g2p.SeriesTerm(k),), (p2g.SeriesBack(),), OldWeights())
+    return Sweep(visit, moves=False, reported=None), NodeTask(nodes.ExtendSeries())
 
 
-@shared
-def average_stress(s: Setup, mode: Tag) -> None:
+def average_volumes(row: Sweep) -> tuple:
+    """Average the change of volume of the strain to come at the nodes."""
+    if not (row.gathers and any(isinstance(task, g2p.Strain) for task in row.visit.tasks)):
+        return ()
+    trial = g2p.TrialStrainOfLastStep() if row.of_last_step else g2p.TrialStrain()
+    visit = Visit((trial,), (p2g.Volumes(),), OldWeights())
+    sweep = Sweep(visit, row.share, row.of_last_step, moves=False, reported=None)
+    return sweep, NodeTask(nodes.TakeMean())
+
+
+def average_stress(s: Setup) -> tuple:
     """Put the averaged mean stress in the place of the points' own, with F-bar."""
-    if isinstance(s.averaging, FBar):
-        dt = step_size(s)
-        sweep_nodes(mode, nodes.TakeMeanStress(), s.kin, s.nodes, s.ranges, dt)
-        visit = Visit((g2p.SetMeanStress(),), (p2g.AveragedForce(),), OldWeights())
-        sweep(s, mode, visit, dt, True, True, False)
+    if not isinstance(s.averaging, FBar):
+        return ()
+    visit = Visit((g2p.SetMeanStress(),), (p2g.AveragedForce(),), OldWeights())
+    return NodeTask(nodes.TakeMeanStress()), Sweep(visit, moves=False, reported=None)
 
 
-@shared
-def sum_loss(s: Setup, mode: Tag) -> None:
-    """At the nodes, what they do not keep of kinetic energy, where it becomes heat."""
-    if field(s.nodes.fields, FrictionalHeat) is not None:
-        sweep_nodes(mode, nodes.ClearFrictionalHeat(), s.kin, s.nodes, s.ranges, step_size(s))
-    if field(s.nodes.fields, EnergyLoss) is not None:
-        sweep_nodes(mode, nodes.KeepLoss(), s.kin, s.nodes, s.ranges, step_size(s))
+def at_nodes_with(kind: type, task: Tag) -> Any:
+    """Make the rows of a task at nodes that have a field."""
+    return lambda s: (NodeTask(task),) if field(s.nodes.fields, kind) is not None else ()
 
 
 @shared
@@ -283,47 +350,20 @@ def light_node(s):
 light_node.goes_through = nodes.UpdateToVelocity.goes_through  # type: ignore[attr-defined]
 
 
-def _call(
-    function: Any, says: str | None = None, where: Callable[[Any], bool] = lambda s: True
-) -> SceneTask:
-    """A row that calls a function; `says` tells what it does in scenes where it does anything."""
-    function.says = lambda s: says if where(s) else None
-    return SceneTask(function)
-
-
-HEAT = _call(
-    lambda s, mode, hooks: conduct(s.heat, s, mode, hooks),
-    "heat to the nodes, its flow, temperature of the points",
-    lambda s: conduct.defined(type(s.heat)),
-)
-LOSS = _call(
-    lambda s, mode, hooks: sum_loss(s, mode),
+HEAT = SceneTask(lambda s: s.heat.rows, "heat to the nodes, its flow, temperature of the points")
+FRICTION = SceneTask(at_nodes_with(FrictionalHeat, nodes.ClearFrictionalHeat()))
+LOSS = SceneTask(
+    at_nodes_with(EnergyLoss, nodes.KeepLoss()),
     "kinetic energy that the nodes do not keep, as heat to the points",
-    lambda s: field(s.nodes.fields, EnergyLoss) is not None,
 )
-AVERAGED = _call(
-    lambda s, mode, hooks: average_stress(s, mode),
-    "force of the averaged mean stress in one visit of the points",
-    lambda s: isinstance(s.averaging, FBar),
-)
-CONTACT = _call(
-    lambda s, mode, hooks: touch(s.contact, s),
-    "contact of v*",
-    lambda s: touch.defined(type(s.contact)),
-)
-WORK_OF_LOADS = _call(lambda s, mode, hooks: add_work(hooks, s))
-CONTACT_BEFORE = _call(lambda s, mode, hooks: touch_velocity(s.contact, s, 0))
-CONTACT_AFTER = _call(lambda s, mode, hooks: touch_velocity(s.contact, s, 1))
-AXIS = _call(
-    lambda s, mode, hooks: hold_axis(s),
-    "v_r = 0 on the axis",
-    lambda s: isinstance(s.kin, Axisymmetric),
-)
-SERIES = _call(
-    lambda s, mode, hooks: sum_series(s, mode),
-    "series of XPIC",
-    lambda s: isinstance(s.transfer, XPIC),
-)
+AVERAGED = SceneTask(average_stress, "force of the averaged mean stress in one visit of the points")
+CONTACT = SceneTask(lambda s: s.contact.rows, "contact of v*")
+WORK_OF_LOADS = SceneTask(lambda s: (ByFixes(add_work),))
+# The velocity that deforms the points has to agree with contact, where it is not v*.
+CONTACT_BEFORE = SceneTask(lambda s: s.contact.rows_before)
+CONTACT_AFTER = SceneTask(lambda s: s.contact.rows_after)
+AXIS = SceneTask(hold_axis, "v_r = 0 on the axis")
+SERIES = SceneTask(sum_series, "series of XPIC")
 
 BEGIN = AtPoints(arrays.INITIAL_INTEGRATE, 0)
 END = AtPoints(arrays.FINAL_INTEGRATE, 1)
@@ -340,6 +380,7 @@ VELOCITY_BEFORE = (
 FORCE = Scatter((p2g.InternalForce(),), OldWeights())
 # v* = v + dt f / m, with what the fixes add and prescribe; and heat flows.
 ACCELERATE = (
+    FRICTION,
     LOSS,
     AVERAGED,
     HEAT,

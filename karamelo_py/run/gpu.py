@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from statistics import median
 from typing import Any
 
@@ -27,7 +27,9 @@ from karamelo_py.kernels.arrays import (
     Setup,
     arrays_of,
 )
-from karamelo_py.kernels.hook_loop import ACT, RUB
+from karamelo_py.kernels.clock import take_reports
+from karamelo_py.kernels.heat import Conducting
+from karamelo_py.kernels.hook_loop import ACT, RUB, add_work
 from karamelo_py.kernels.hooks import HEAT_FUNCTION, NODE_FUNCTION, POINT_FUNCTION
 from karamelo_py.kernels.p2g import WorkOfForces
 from karamelo_py.kernels.step import DONE, first_rows, rows_of
@@ -55,7 +57,10 @@ def arrays_in(thing: Any) -> Iterator[np.ndarray]:
 def there(s: Setup) -> Setup:
     """What of a setup is on a card: no tiles, and the nodes in the place of their boxes."""
     blocks = tuple(block._replace(tiling=()) for block in s.blocks)
-    return s._replace(blocks=blocks, buffers=s.buffers._replace(nodes=s.nodes))
+    buffers, heat = s.buffers._replace(nodes=s.nodes), s.heat
+    if isinstance(heat, Conducting):
+        heat = heat._replace(buffers=buffers._replace(nodes=heat.nodes))
+    return s._replace(blocks=blocks, buffers=buffers, heat=heat)
 
 
 def as_rows(image: np.ndarray) -> np.ndarray:
@@ -136,15 +141,14 @@ class StepsOnCard:
     def _totals(self) -> None:
         """Give room to copies of the totals, and to counts of members."""
         sums = self.s.control.totals
-        self.copies = np.zeros((fixes.COPIES, *sums.shape), np.int64)
+        self.copies = np.zeros((self.card.copies, *sums.shape), np.int64)
         self.heavy = np.zeros(max(len(self.functions), 1), np.int64)
         self.images.of((self.copies, self.heavy))
         self.images.send([self.copies, self.heavy])
 
     def _rooms(self, s: Setup, rows: list) -> None:
         """Give room to what cells sum: for the visit that gives most."""
-        self.present = ["sums", "velocity", *(type(one) for one in s.nodes.fields)]
-        stages = [self._stage(row) for row in rows if isinstance(row, table.Sweep)]
+        stages = [self._stage(row) for row in self._plain(rows) if isinstance(row, table.Sweep)]
         most = max((stage.numbers for stage in stages), default=0)
         self.cells = [
             cells._replace(
@@ -162,7 +166,9 @@ class StepsOnCard:
         return self.images.new(shape, self.s.nodes.sums.dtype)
 
     def _stage(self, row: Any) -> gpu.Stage:
-        stage = gpu.Stage(row, self.s.basis, self.s.kin, self.present)
+        nodes = (row.at(self.s) if row.at else self.s).nodes
+        present = ["sums", "velocity", *(type(one) for one in nodes.fields)]
+        stage = gpu.Stage(row, self.s.basis, self.s.kin, present)
         size = self.s.nodes.sums.itemsize
         words = size // 4 * len(stage.columns) * stage.support
         stage.parts = max(1, -(-words // REGISTERS[size]))
@@ -178,12 +184,23 @@ class StepsOnCard:
     def _launches(self, rows: list, ahead: list[Launch] | None = None) -> list[Launch]:
         """What the rows of a part of a step launch; `ahead` takes what serves the next step."""
         found: list[Launch] = []
-        for row in rows:
+        for row in self._plain(rows):
             if isinstance(row, table.Sweep):
                 found += self._visit(row, ahead)
             elif isinstance(row, table.NodeTask):
-                visit = gpu.of_nodes(row.task)
-                found.append(self._launch(visit, self.nodes, self.s, self.use))
+                found.append(self._launch(gpu.of_nodes(row), self.nodes, self.s, self.use))
+            elif isinstance(row, table.EachNode):
+                act = fixes.each_node(row.function, self.s)
+                found.append(self._launch(act, self.nodes, self.s, self.use, self.copies))
+            elif isinstance(row, table.EachPoint):
+                act = fixes.each_point(row.function, self.s)
+                for block in self.s.blocks:
+                    if isinstance(block.laws, row.law):
+                        size = block.points.mass.size
+                        found.append(self._launch(act, size, self.s, block, self.copies))
+            elif isinstance(row, table.Once):
+                found += self._collect(0, len(self.s.control.totals))
+                found.append(self._launch(fixes.once(row.function), 1, self.s))
             elif isinstance(row, table.AtNodes):
                 found += self._hooks_on_nodes(row.stage, row.target)
             elif isinstance(row, table.AtPoints):
@@ -193,12 +210,19 @@ class StepsOnCard:
                     size = block.points.mass.size
                     found.append(self._launch(fixes.check_point, size, self.s, block))
                 found.append(self._launch(fixes.take_moves, 1, self.s))
-                found.append(self._launch(gpu.take_reports, 1, self.s))
-            elif row is table.WORK_OF_LOADS:
+                found.append(self._launch(gpu.take_reports(take_reports), 1, self.s))
+            elif row.function is add_work:
                 found += self._work_of_loads()
-            elif row.function.says(self.s) is not None:
-                raise NotImplementedError(row.function.says(self.s))
         return found
+
+    def _plain(self, rows: Iterable) -> Iterator[Any]:
+        """The rows of the scene, those that are repeated one after another."""
+        for row in table.plain(rows, self.s):
+            if isinstance(row, table.Repeated):
+                for k in range(row.count(self.s)):
+                    yield from self._plain(row.rows(k))
+            else:
+                yield row
 
     def _visit(self, row: Any, ahead: list[Launch] | None) -> list[Launch]:
         gathers, scatters = list(self._gathers(row)), list(self._scatters(row, ahead))
@@ -211,7 +235,8 @@ class StepsOnCard:
             gather = self._stage(row).gather()
             for block, cells in zip(self.s.blocks, self.cells, strict=True):
                 yield self._launch(gather, block.points.mass.size, self.s, block, cells)
-            yield self._launch(gpu.take_reports, 1, self.s)
+            if row.reported:
+                yield self._launch(gpu.take_reports(row.reported), 1, self.s)
 
     def _scatters(self, row: Any, ahead: list[Launch] | None) -> Iterator[Launch]:
         s, stage = self.s, self._stage(row)
@@ -228,7 +253,7 @@ class StepsOnCard:
             for block, cells, size in pairs:
                 yield self._launch(count, size, s, block, cells)
                 yield from self._lists(block, cells)
-            yield self._launch(gpu.take_reports, 1, s)
+            yield self._launch(gpu.take_reports(take_reports), 1, s)
             yield self._launch(gpu.age_node, self.nodes, self.use)
             mark = stage.mark()
             for cells in self.cells:
@@ -362,7 +387,7 @@ class StepsOnCard:
         if not size:
             return []
         return [
-            self._launch(fixes.clear_totals, fixes.COPIES * size, self.copies, first, count),
+            self._launch(fixes.clear_totals, len(self.copies) * size, self.copies, first, count),
             self._launch(fixes.clear_rows, size, sums, first),
         ]
 

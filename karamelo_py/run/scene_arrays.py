@@ -9,11 +9,12 @@ import numpy as np
 from karamelo_py.compiler import fields
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.threads import Serial, Threaded, new_team
-from karamelo_py.kernels.arrays import DT, TIME, TIMESTEP, some_of
+from karamelo_py.kernels.arrays import DT, TIME, TIMESTEP, NoHooks, some_of
 from karamelo_py.kernels.clock import all_well, step_size
-from karamelo_py.kernels.heat import show_heat
+from karamelo_py.kernels.heat import SHOW, Conducting
 from karamelo_py.kernels.nodes import SumsToVelocity
 from karamelo_py.kernels.p2g import Force
+from karamelo_py.kernels.step import take_rows
 from karamelo_py.kernels.sweep import Visit, sweep, sweep_nodes
 from karamelo_py.kernels.table import SUMS
 from karamelo_py.kernels.totals import WORK, add_to
@@ -238,7 +239,8 @@ class SceneArrays:
         sweep(s, self.mode, visit, dt, False, True, False)
         all_well(s)
         sweep_nodes(self.mode, SumsToVelocity(), s.kin, s.nodes, s.ranges, dt)
-        show_heat(s.heat, s, self.mode)
+        if isinstance(s.heat, Conducting):
+            take_rows(SHOW, s, self.mode, NoHooks())
         self.mapped = True
 
     def snapshot(self, before: dict[str, np.ndarray] | None = None) -> dict[str, np.ndarray]:

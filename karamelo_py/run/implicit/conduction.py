@@ -6,7 +6,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from karamelo_py.kernels.arrays import MASS, of_force
-from karamelo_py.kernels.heat import flow_of_heat, hold_heat, warm_points
+from karamelo_py.kernels.heat import FLOW_TO_NODES, HOLD, WARM
+from karamelo_py.kernels.step import take_rows
 from karamelo_py.points.kinematics import Line
 from karamelo_py.run.implicit.equations import Equations
 from karamelo_py.run.implicit.prescribed import prescribed
@@ -26,17 +27,17 @@ def conduct(equations: Equations, hooks: Any, dt: float) -> None:
         If the equations have no solution.
     """
     s, mode = equations.s, equations.mode
-    heat = s.heat
-    flow_of_heat(heat, s, mode, hooks)
+    take_rows(FLOW_TO_NODES, s, mode, hooks)
     nodes = equations.nodes
-    sums, update = heat.nodes.sums, heat.nodes.update
+    heated = s.heat.nodes
+    sums, update = heated.sums, heated.update
     capacity = sums[nodes, MASS].astype(float)
     some = capacity > 0
     own = np.divide(sums[nodes, MASS + 1], capacity, out=np.zeros(len(nodes)), where=some)
-    mapped = heat.nodes.velocity[nodes, 0].astype(float)
+    mapped = heated.velocity[nodes, 0].astype(float)
     flow = sums[nodes, of_force(Line())].astype(float)
     K = equations.conduction()
-    found = prescribed(s, update, nodes, 1, lambda: hold_heat(s, hooks))
+    found = prescribed(s, update, nodes, 1, lambda: take_rows((HOLD,), s, mode, hooks))
     given, temperatures = found[0][:, 0], found[1][:, 0]
     free = some & ~given
     change = np.where(given, temperatures - mapped, 0.0)
@@ -51,6 +52,6 @@ def conduct(equations: Equations, hooks: Any, dt: float) -> None:
     without = new - np.where(given, np.divide(
         A @ change - balance, stored, out=np.zeros(len(nodes)), where=some), 0.0)  # fmt: skip
     update[nodes, 0], update[nodes, 1] = without, without - own
-    hold_heat(s, hooks)
+    take_rows((HOLD,), s, mode, hooks)
     update[nodes, 0], update[nodes, 1] = new, new - own
-    warm_points(heat, s, mode)
+    take_rows((WARM._replace(reported=None),), s, mode, hooks)

@@ -5,10 +5,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from karamelo_py.compiler.fields import field
 from karamelo_py.kernels.arrays import DT, TIME, TIMESTEP, Hooks, of_change, of_force
 from karamelo_py.kernels.clock import finish
 from karamelo_py.kernels.heat import Conducting
-from karamelo_py.kernels.rigid import RigidBodies, put_forces
+from karamelo_py.kernels.rigid import PUBLISH, RigidBodies, RigidSums
 from karamelo_py.kernels.step import DONE, GAINED, SORT, STOPPED, take_rows
 from karamelo_py.kernels.totals import WORK, add_to, carry
 from karamelo_py.kernels.watch import look_at_end
@@ -358,7 +359,9 @@ class LoadSteps:
         if isinstance(s.contact, RigidBodies):
             forces = np.where(found.fixed, 0.0, -found.reaction)
             led = found.equations.led
-            put_forces(s.contact, s, nodes[led], forces[led])
+            rigid, first = field(s.nodes.fields, RigidSums), of_force(s.kin)
+            rigid[nodes[led], first : first + s.kin.dimension] = forces[led]
+            take_rows(PUBLISH, s, simulation.mode, hooks)
 
     def _error(self, message: str, hint: str, place: Place | None = None) -> ScriptError:
         return ScriptError(

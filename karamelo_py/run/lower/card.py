@@ -7,7 +7,6 @@ from typing import Any
 
 from karamelo_py.compiler.gpu import NoCard, card
 from karamelo_py.kernels.hooks import CompiledHook
-from karamelo_py.kernels.table import SceneTask
 from karamelo_py.language import registry
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
@@ -49,12 +48,13 @@ def refusals(hub: Hub, setup: Any = None) -> Iterator[ScriptError]:
                     hint=f"a fix whose hooks are compiled, or {WITHOUT}",
                 )
                 break
-    for row in scheme.rows if setup is not None else ():
-        words = row.function.says(setup) if isinstance(row, SceneTask) else None
-        if words is not None:
-            yield ScriptError(
-                f"a GPU does not know yet: {words}", place=hub.update.method.place, hint=WITHOUT
-            )
+    if setup is not None and not hasattr(type(setup.basis), "line_nodes"):
+        yield ScriptError(
+            f"a GPU does not know basis {hub.update.method.basis_name} yet, whose points see nodes "
+            "of several cells",
+            place=hub.update.method.place,
+            hint=f"linear, a spline or uGIMP, or {WITHOUT}",
+        )
 
 
 def refuse(hub: Hub, setup: Any = None) -> None:

@@ -33,6 +33,8 @@ def slots_of_loads(hub: Hub, solid: Solid) -> list[int]:
 class NoContact(NamedTuple):
     """Solids act on each other by sharing nodes, or not at all."""
 
+    rows = rows_before = rows_after = ()
+
 
 class Method:
     """Base of the method styles.

@@ -1,0 +1,86 @@
+"""Scenes with --gpu that have rows of their own, as in test_gpu_runs."""
+
+import pytest
+from test_gpu_runs import alike
+
+OUTPUT = """
+dt_factor(0.3)
+compute(Ek, kinetic_energy, all)
+compute(Es, strain_energy, all)
+log_modify(custom, step, dt, time, Ek, Es{more})
+set_output(2)
+dump(points, all, particle, 5, d.*.LAMMPS, x, vx, s11{T})
+dump(nodes, all, grid, 5, g.*.LAMMPS, mass, vx)
+run(10)
+"""
+# A short bar is drawn out.
+BAR = """
+{method}
+dimension(2, 0, 0.4, 0, 0.4, 0.1)
+axisymmetric(true)
+region(bar, block, 0, 0.1, 0.1, 0.3)
+material(rubber, neo-hookean, 1000, 1000, 0.45)
+solid(bar, region, bar, 2, rubber, 0.1, 0)
+fix(v, initial_velocity_particles, all, 2*x, -4*y)
+"""
+# Two bodies meet.
+PAIR = """
+{method}
+dimension({d}, 0, 0.5{domain}, 0.1)
+region(left, block, 0.1, 0.2{side})
+region(right, block, {begin}, {begin} + 0.1{side})
+{materials}
+solid(left, region, left, 2, left, 0.1, 400)
+solid(right, region, right, 2, right, 0.1, 300)
+group(left, particles, region, left, solid, left)
+group(right, particles, region, right, solid, right)
+fix(v1, initial_velocity_particles, left, 0.1{still})
+"""
+RUBBER = "material({}, neo-hookean, 1000, 1000, 0.3)"
+RUBBERS = [RUBBER.format("left"), RUBBER.format("right")]
+ON_RIGID = [RUBBER.format("left"), "material(right, rigid, 1000)"]
+GASES = [
+    "eos(dense, ideal-gas, 1, 1.4, p=1)", "eos(thin, ideal-gas, 0.125, 1.4, p=0.1)",
+    "strength(none, fluid, 0)",
+    "material(left, eos-strength, dense, none)", "material(right, eos-strength, thin, none)",
+]  # fmt: skip
+CONDUCTORS = [
+    "material(left, linear, 1000, 1000, 0.3, 1, 1000)",
+    "material(right, linear, 1000, 1000, 0.3, 2, 2000)",
+]
+CONTACTS = "method(ulmpm/contacts, FLIP, linear, 0.99)"
+FORCES = ", ContactForce_right_x, ContactForce_right_y"
+
+
+def bar(method):
+    return BAR.format(method=method) + OUTPUT.format(more="", T="")
+
+
+def pair(method, materials, *lines, d=2, begin=0.2, more="", T=""):
+    domain, side, still = (", 0, 0.3", ", 0.1, 0.2", ", 0.05") if d == 2 else ("", "", "")
+    found = PAIR.format(
+        method=method, materials="\n".join(materials), d=d, begin=begin, domain=domain, side=side,
+        still=still,
+    )  # fmt: skip
+    return "\n".join([found, *lines]) + OUTPUT.format(more=more, T=T)
+
+
+SCENES = {
+    "axis": bar("method(ulmpm, FLIP, linear, 0.99)"),
+    "averaged volumes": bar("method(ulmpm, FLIP, linear, 0.99)\nanti_volumetric_locking(true)"),
+    "series": bar("method(ulmpm, XPIC, linear, 3)"),
+    "loss": pair("method(ulmpm, TPIC, quadratic-spline)", GASES, d=1),
+    "heat": pair("method(ulmpm, FLIP, linear, 1, thermo-mechanical)", CONDUCTORS, T=", T"),
+    "rigid": pair("method(ulmpm, FLIP, linear, 0.99)", ON_RIGID, more=FORCES),
+    "contact": pair(
+        CONTACTS, RUBBERS, "fix(rub, contact/friction, left, right, 0.3)", begin=0.21, more=FORCES
+    ),
+    "contact of rigid": pair(CONTACTS, ON_RIGID, more=FORCES),
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_same_as_processor(run_interpreted, name):
+    here = run_interpreted(SCENES[name], folder="here")
+    there = run_interpreted(SCENES[name], "--gpu", folder="there")
+    alike(here, there, 1e-11)
