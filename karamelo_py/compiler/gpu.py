@@ -581,7 +581,7 @@ class Images:
         self._known.clear()
 
 
-class Launch:
+class KernelLaunch:
     """A function of a thread with its arguments, on a card; `count` threads do it."""
 
     def __init__(

@@ -45,7 +45,7 @@ MOVED, RATE, WRONG, STATUS, DRIFT = range(5)  # of `fate`; 0: it goes on, else 1
 BEHIND = 2.0**53  # all numbers of points
 CHUNK = 64  # items that one thread adds up
 WARP = 32  # threads that read memory at once
-OCCUPIED = 1 << 40  # in the sums of `Cells.sums`: a cell with points, beside their number
+OCCUPIED = 1 << 40  # in the sums of `CellLists.sums`: a cell with points, beside their number
 
 
 # The stages of a step that functions of threads belong to, as `karamelo-py bench` names them.
@@ -69,7 +69,7 @@ STAGES = {
 OTHERS = "clock, reports, totals"
 
 
-class Cells(NamedTuple):
+class CellLists(NamedTuple):
     """The points of a block by cell; N is the number of nodes, n that of points."""
 
     count: np.ndarray  # (N,) int32 of points in each cell that are not listed yet
@@ -419,7 +419,7 @@ def _grid_of(grids, n):
 
 @shared
 def _steps_to(s, grid, k):
-    """How far the k-th node that a point sees is from the first, in numbers of nodes."""
+    """Count the nodes from the first that a point sees to the k-th, by their numbers."""
     return node_number(grid, 0, digits(k, s.basis.line_nodes, s.kin.dimension))
 
 

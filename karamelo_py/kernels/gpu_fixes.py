@@ -58,14 +58,14 @@ CHUNK = 64  # points whose energies one thread adds up
 
 
 class Own(NamedTuple):
-    """What a thread has of its own in the place of the same of `Hooks`."""
+    """Rooms of a thread in the place of those of `Hooks`."""
 
     chosen: np.ndarray
     scratch: np.ndarray
 
 
 class OwnTotals(NamedTuple):
-    """What it has in the place of the same of `Control`."""
+    """Totals of a thread in the place of those of `Control`."""
 
     totals: np.ndarray
 
@@ -273,7 +273,7 @@ def take_moves(i, fate, s):
 
 
 class OwnParts(NamedTuple):
-    """What a thread has of its own in the place of the same of `Setup`."""
+    """Items of a thread in the place of those of `Setup`."""
 
     contact: NamedTuple
     control: NamedTuple

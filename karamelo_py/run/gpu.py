@@ -12,7 +12,7 @@ from numpy.lib.stride_tricks import as_strided
 from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.formula import EVALUATE, GLOBAL, UNIFORM, evaluate_in_table
-from karamelo_py.compiler.gpu import Images, Launch, known, numbers_of
+from karamelo_py.compiler.gpu import Images, KernelLaunch, known, numbers_of
 from karamelo_py.kernels import gpu, table
 from karamelo_py.kernels import gpu_fixes as fixes
 from karamelo_py.kernels.arrays import (
@@ -55,7 +55,7 @@ def arrays_in(thing: Any) -> Iterator[np.ndarray]:
 
 
 def there(s: Setup) -> Setup:
-    """What of a setup is on a card: no tiles, and the nodes in the place of their boxes."""
+    """Leave out of a setup what no card needs: tiles, and the boxes of their nodes."""
     blocks = tuple(block._replace(tiling=()) for block in s.blocks)
     buffers, heat = s.buffers._replace(nodes=s.nodes), s.heat
     if isinstance(heat, Conducting):
@@ -111,10 +111,10 @@ class StepsOnCard:
         self._do = dict(zip(PARTS, map(card.together, parts), strict=True))
         self.ordered = -np.inf  # how far points had gone when they were ordered
 
-    def _steps(self, rows: list) -> tuple[list[Launch], list[Launch]]:
-        """What a step launches, and the last of several."""
+    def _steps(self, rows: list) -> tuple[list[KernelLaunch], list[KernelLaunch]]:
+        """List the launches of a step, and those of the last of several."""
         begin, end = self._clear_published(), [self._launch(gpu.finish_step, 1, self.s)]
-        ahead: list[Launch] = []  # sums for the next step
+        ahead: list[KernelLaunch] = []  # sums for the next step
         own = self._launches(rows, ahead)
         last = [launch for launch in own if launch not in ahead]
         return (
@@ -124,7 +124,7 @@ class StepsOnCard:
 
     # --- rooms
 
-    def _cells(self, points: int) -> gpu.Cells:
+    def _cells(self, points: int) -> gpu.CellLists:
         nodes, new, boxes = self.nodes, self.images.new, min(self.nodes, points) + 1
         self.levels = [-(-nodes // gpu.CHUNK)]
         while self.levels[-1] > gpu.CHUNK:
@@ -132,7 +132,7 @@ class StepsOnCard:
         sums = (sum(self.levels),)
         count = np.zeros(nodes, np.int32)
         self.images.send([self.images.known(count)])
-        return gpu.Cells(
+        return gpu.CellLists(
             count, new((points,), np.int32), new((nodes + 1,), np.int32),
             new((nodes + 1,), np.int32), new((boxes,), np.int32), new((points,), np.int32),
             new(sums, np.int64), new(sums, np.int64), np.zeros((0, 0)), np.zeros((0, 0)),
@@ -178,12 +178,12 @@ class StepsOnCard:
 
     def _launch(
         self, function: Callable, count: int, *arguments: Any, called: dict | None = None
-    ) -> Launch:
-        return Launch(self.images, function, count, self.fate, *arguments, called=called)
+    ) -> KernelLaunch:
+        return KernelLaunch(self.images, function, count, self.fate, *arguments, called=called)
 
-    def _launches(self, rows: list, ahead: list[Launch] | None = None) -> list[Launch]:
-        """What the rows of a part of a step launch; `ahead` takes what serves the next step."""
-        found: list[Launch] = []
+    def _launches(self, rows: list, ahead: list[KernelLaunch] | None = None) -> list[KernelLaunch]:
+        """List the launches of rows of a step; `ahead` takes those that serve the next one."""
+        found: list[KernelLaunch] = []
         for row in self._plain(rows):
             if isinstance(row, table.Sweep):
                 found += self._visit(row, ahead)
@@ -224,13 +224,13 @@ class StepsOnCard:
             else:
                 yield row
 
-    def _visit(self, row: Any, ahead: list[Launch] | None) -> list[Launch]:
+    def _visit(self, row: Any, ahead: list[KernelLaunch] | None) -> list[KernelLaunch]:
         gathers, scatters = list(self._gathers(row)), list(self._scatters(row, ahead))
         if row.only_if_more and ahead is not None:
             ahead += scatters
         return gathers + scatters
 
-    def _gathers(self, row: Any) -> Iterator[Launch]:
+    def _gathers(self, row: Any) -> Iterator[KernelLaunch]:
         if row.gathers:
             gather = self._stage(row).gather()
             for block, cells in zip(self.s.blocks, self.cells, strict=True):
@@ -238,7 +238,7 @@ class StepsOnCard:
             if row.reported:
                 yield self._launch(gpu.take_reports(row.reported), 1, self.s)
 
-    def _scatters(self, row: Any, ahead: list[Launch] | None) -> Iterator[Launch]:
+    def _scatters(self, row: Any, ahead: list[KernelLaunch] | None) -> Iterator[KernelLaunch]:
         s, stage = self.s, self._stage(row)
         sizes = [block.points.mass.size for block in s.blocks]
         pairs = list(zip(s.blocks, self.cells, sizes, strict=True))
@@ -264,7 +264,7 @@ class StepsOnCard:
                 yield self._launch(scatter, cells.cell.size, s, block, cells)
                 yield self._launch(sum_up, self.nodes, s, block, cells, self.use)
 
-    def _lists(self, block: Any, cells: gpu.Cells) -> Iterator[Launch]:
+    def _lists(self, block: Any, cells: gpu.CellLists) -> Iterator[KernelLaunch]:
         levels = self.levels
         begins = [0, *np.cumsum(levels).tolist()]
         yield self._launch(gpu.sum_counts, levels[0], cells)
@@ -278,7 +278,7 @@ class StepsOnCard:
         yield self._launch(gpu.list_point, block.points.mass.size, cells)
         yield self._launch(gpu.sort_cell, cells.cell.size, block.points.id, cells)
 
-    def _order(self) -> Iterator[Launch]:
+    def _order(self) -> Iterator[KernelLaunch]:
         """Bring points into the order in which threads go through them."""
         for block, cells in zip(self.s.blocks, self.cells, strict=True):
             size = block.points.mass.size
@@ -299,7 +299,7 @@ class StepsOnCard:
         return () if isinstance(self.hooks, NoHooks) else self.hooks.table
 
     def _called(self, h: int) -> dict:
-        """What is called by its address for a hook."""
+        """Map what is called by its address to the functions of a hook."""
         signatures = (NODE_FUNCTION, POINT_FUNCTION, HEAT_FUNCTION)
         own: dict = dict.fromkeys(signatures, known(self.functions[h]))
         own["others"] = tuple(self.functions)  # code on disk asks for all that was traced
@@ -323,7 +323,7 @@ class StepsOnCard:
         row = self._table()[h]
         return self.nodes if row.begin < 0 else int(row.end - row.begin)
 
-    def _hooks_on_nodes(self, stage: int, target: int) -> Iterator[Launch]:
+    def _hooks_on_nodes(self, stage: int, target: int) -> Iterator[KernelLaunch]:
         s, hooks, heavy, copies = self.s, self.hooks, self.heavy, self.copies
         own = [h for h, row in enumerate(self._table()) if row.stage == stage]
         if own and target == ON_UPDATE and hooks.held.size:
@@ -346,7 +346,7 @@ class StepsOnCard:
                 rest = (s, hooks, h, heavy, copies)
                 yield self._launch(rub, self._members(h), *rest, called=self._called(h))
 
-    def _hooks_on_points(self, stage: int, then: int) -> Iterator[Launch]:
+    def _hooks_on_points(self, stage: int, then: int) -> Iterator[KernelLaunch]:
         s, hooks, copies = self.s, self.hooks, self.copies
         own = [h for h, row in enumerate(self._table()) if row.stage == stage]
         for block in s.blocks:
@@ -363,7 +363,7 @@ class StepsOnCard:
                     act = fixes.on_whole_point(then)
                     yield self._launch(act, size, s, block, hooks, tag, h, copies, called=called)
 
-    def _work_of_loads(self) -> Iterator[Launch]:
+    def _work_of_loads(self) -> Iterator[KernelLaunch]:
         if len(self._table()) and self.hooks.loads.size:
             called = self._called(0)
             rest = (self.s, self.hooks, self.copies)
@@ -371,7 +371,7 @@ class StepsOnCard:
 
     # --- totals, and the watch over energy
 
-    def _clear_published(self) -> list[Launch]:
+    def _clear_published(self) -> list[KernelLaunch]:
         """Let the totals that hooks publish start from zero."""
         return self._clear(*self._slots())
 
@@ -380,7 +380,7 @@ class StepsOnCard:
         slots = [int(row.slot) for row in self._table() if row.slot >= 0]
         return (min(slots), max(slots) + 3) if slots else (0, 0)
 
-    def _clear(self, first: int, end: int) -> list[Launch]:
+    def _clear(self, first: int, end: int) -> list[KernelLaunch]:
         """Clear rows of the totals."""
         sums, count = self.s.control.totals, end - first
         size = count * sums.shape[1]
@@ -391,13 +391,13 @@ class StepsOnCard:
             self._launch(fixes.clear_rows, size, sums, first),
         ]
 
-    def _collect(self, first: int, end: int) -> list[Launch]:
+    def _collect(self, first: int, end: int) -> list[KernelLaunch]:
         """Add up the copies of rows of the totals."""
         sums = self.s.control.totals
         size = (end - first) * sums.shape[1]
         return [self._launch(fixes.collect_total, size, self.copies, sums, first)] if size else []
 
-    def _publish(self, last: bool) -> list[Launch]:
+    def _publish(self, last: bool) -> list[KernelLaunch]:
         if not len(self._table()):
             return []
         always = last or self._reads_totals()
@@ -409,8 +409,8 @@ class StepsOnCard:
         slots = range(*self._slots())
         return any(slot in slots for _, slot in self._globals())
 
-    def _looks(self) -> tuple[list[Launch], list[Launch]]:
-        """What is done to look at the energy: before, and a step later."""
+    def _looks(self) -> tuple[list[KernelLaunch], list[KernelLaunch]]:
+        """List the launches of a look at the energy: before, and a step later."""
         s, sums = self.s, self.s.control.totals
         copies, solids = self.copies, (len(s.control.values), len(sums))
         found = [*self._clear(0, WORK), *self._clear(*solids)]
@@ -477,7 +477,7 @@ class StepsOnCard:
             self.ordered = gone
             self._do["order"]()
 
-    def seconds_of_step(self) -> list[tuple[Launch, float]]:
+    def seconds_of_step(self) -> list[tuple[KernelLaunch, float]]:
         """Time each launch of a step behind the last one: the medians of a few steps."""
         for launch in self.begin:
             launch()
