@@ -103,7 +103,7 @@ class Repeated(NamedTuple):
 
 
 class SceneTask(NamedTuple):
-    """What only some scenes do: ``rows(s)`` are the rows that it consists of in a scene."""
+    """Rows that only some scenes have: ``rows(s)`` lists those of a scene."""
 
     rows: Any
     says: str | None = None
