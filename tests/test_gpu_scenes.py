@@ -70,7 +70,17 @@ SCENES = {
     "averaged volumes": bar("method(ulmpm, FLIP, linear, 0.99)\nanti_volumetric_locking(true)"),
     "series": bar("method(ulmpm, XPIC, linear, 3)"),
     "loss": pair("method(ulmpm, TPIC, quadratic-spline)", GASES, d=1),
-    "heat": pair("method(ulmpm, FLIP, linear, 1, thermo-mechanical)", CONDUCTORS, T=", T"),
+    "heat": pair(
+        "method(ulmpm, FLIP, linear, 1, thermo-mechanical)",
+        CONDUCTORS,
+        "region(face, block, 0.1, 0.12, INF, INF)",
+        "group(face, nodes, region, face, all)",
+        "fix(hot, temperature_nodes, face, 450 + 100*y)",
+        "fix(flux, heat_flux_particles, right, 1000*time)",
+        "fix(air, convection_particles, left, 100, 350)",
+        T=", T",
+        more=", hot_s, flux_s, air_s",
+    ),
     "rigid": pair("method(ulmpm, FLIP, linear, 0.99)", ON_RIGID, more=FORCES),
     "contact": pair(
         CONTACTS, RUBBERS, "fix(rub, contact/friction, left, right, 0.3)", begin=0.21, more=FORCES

@@ -21,6 +21,7 @@ from karamelo_py.kernels.arrays import TIMESTEP, known_to_laws, with_items_of
 from karamelo_py.kernels.clock import kick, step_size
 from karamelo_py.kernels.contact import Scratch, SeparateFields
 from karamelo_py.kernels.gpu import MOVED, STATUS, goes_wrong, is_last
+from karamelo_py.kernels.heat import heat_of, heated
 from karamelo_py.kernels.hook_loop import (
     ACT,
     LOADS,
@@ -145,9 +146,10 @@ def _planar_nodes(nodes):
     return arrays.Nodes(nodes.sums, nodes.update, nodes.velocity, fields)
 
 
-def on_node(target: int, task: int, values: int) -> Callable:
+def on_node(target: int, task: int, values: int, of_heat: bool = False) -> Callable:
     """Make what a member of a hook on nodes does; `task` is ACT or RUB."""
     control_of = _control(values)
+    length = step_size if of_heat else kick
 
     def visit_member(i, fate, s, hooks, h, heavy, copies):
         if fate[STATUS] > 0:
@@ -157,10 +159,11 @@ def on_node(target: int, task: int, values: int) -> Callable:
             return
         own = _hooks_with_room(hooks)
         own.chosen[0] = n
-        control, kept = control_of(s, copies, i), s.control.clock[0].kept
+        # Temperatures are always kept: FLIP, whatever the transfer of velocity.
+        control, kept = control_of(s, copies, i), 1.0 if of_heat else s.control.clock[0].kept
         nodes = _planar_nodes(s.nodes)
         what = HookedNodes(target, planar(s.kin), s.grids, nodes, s.ranges, kept)
-        act(what, task, own, control, float(kick(s)), h, 1, _share(hooks, h, heavy))
+        act(what, task, own, control, float(length(s)), h, 1, _share(hooks, h, heavy))
 
     return visit_member
 
@@ -227,7 +230,23 @@ def on_point(then: int, values: int) -> Callable:
     return visit_point
 
 
-def on_whole_point(then: int) -> Callable:
+def on_heated_point(values: int) -> Callable:
+    """Make what a point does for a hook that heats points."""
+    control_of = _control(values)
+
+    def visit_heated_point(i, fate, s, block, hooks, h, copies):
+        if fate[STATUS] > 0:
+            return
+        own = _hooks_with_room(hooks)
+        what = heated(s.kin, block.points, block.points.x[s.control.clock[0].now])
+        count, _ = choose_points(what, own, h, i, i + 1)
+        if count > 0:
+            act(what, ACT, own, control_of(s, copies, i), float(step_size(s)), h, 1, 1.0)
+
+    return visit_heated_point
+
+
+def on_whole_point(then: int, heats: bool = False) -> Callable:
     """Make the same of a hook on whole points."""
     control_of = _control(0)
 
@@ -236,7 +255,8 @@ def on_whole_point(then: int) -> Callable:
             return
         p, now = block.points, s.control.clock[0].now
         y = 1 - now if then else now
-        what = WholePoints(tag, p.id, s.kin, p, block.laws, p.x[y], ())
+        heat = heat_of(p) if heats else ()
+        what = WholePoints(tag, p.id, s.kin, p, block.laws, p.x[y], heat)
         own = _hooks_with_room(hooks)
         count, _ = choose_points(what, own, h, i, i + 1)
         if count > 0:

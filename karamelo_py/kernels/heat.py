@@ -261,14 +261,16 @@ def _at_heat_nodes_hooks(hooks, stage, target, s):
 
 
 @shared
-def _heated(kin, points, x):
+def heated(kin, points, x):
+    """Give what fixes that heat points act on."""
     kinds = Capacity, Temperature, Volume, Supply, TemperatureShare
     own = [field(points.fields, kind) for kind in kinds]
     return hook_loop.HeatedPoints(points.id, kin, *own, x)
 
 
 @shared
-def _heat_of(points):
+def heat_of(points):
+    """Give supply and capacity of points."""
     return tuple([field(points.fields, kind) for kind in (Supply, Capacity)])
 
 
@@ -284,8 +286,8 @@ def _at_heated_points_hooks(hooks, s):
     blocks = tuple(
         [
             (
-                _heated(s.kin, p, p.x[clock.now]),
-                hook_loop.whole_points(hooks, s.kin, p, laws, p.x[clock.now], _heat_of(p)),
+                heated(s.kin, p, p.x[clock.now]),
+                hook_loop.whole_points(hooks, s.kin, p, laws, p.x[clock.now], heat_of(p)),
             )
             for p, laws, _ in s.blocks
         ]
@@ -303,7 +305,8 @@ def _of_heat(s):
 
 
 @shared
-def _at_nodes(s):
+def at_its_nodes(s):
+    """The same for tasks at nodes, which have one component."""
     return _of_heat(s)._replace(kin=Line())
 
 
@@ -319,20 +322,18 @@ FLOW = Visit((TemperatureGradient(),), (HeatFlow(),), OldWeights())
 # Capacity, heat and temperature to the nodes.
 SHOW = (
     Sweep(MAP, gathers=False, moves=False, at=_of_heat, reported=None),
-    NodeTask(SumsToVelocity(), _at_nodes, step_size),
+    NodeTask(SumsToVelocity(), at_its_nodes, step_size),
 )
 # And the flow that present gradients make.
 FLOW_TO_NODES = (
     *SHOW,
-    NodeTask(TakeMean(), _at_nodes, step_size),
-    ByFixes(lambda hooks, s: at_heat_nodes(hooks, arrays.POST_HEAT_TO_GRID, arrays.ON_VELOCITY, s)),
-    ByFixes(lambda hooks, s: at_heated_points(hooks, s)),
+    NodeTask(TakeMean(), at_its_nodes, step_size),
+    ByFixes(at_heat_nodes, (arrays.POST_HEAT_TO_GRID, arrays.ON_VELOCITY)),
+    ByFixes(at_heated_points),
     Sweep(FLOW, moves=False, at=_of_heat, reported=None),
 )
 # The fixes hold the new temperature of nodes.
-HOLD = ByFixes(
-    lambda hooks, s: at_heat_nodes(hooks, arrays.POST_UPDATE_GRID_HEAT, arrays.ON_UPDATE, s)
-)
+HOLD = ByFixes(at_heat_nodes, (arrays.POST_UPDATE_GRID_HEAT, arrays.ON_UPDATE))
 # Points take what the temperature of the nodes changes by.
 WARM = Sweep(MAP, scatters=False, moves=False, at=_of_heat, reported=_take_factor)
 
@@ -356,4 +357,4 @@ class Conducting(NamedTuple):
         TemperatureShare,
         HeatGradient,
     )
-    rows = (*FLOW_TO_NODES, NodeTask(NodalUpdate(), _at_nodes, step_size), HOLD, WARM)
+    rows = (*FLOW_TO_NODES, NodeTask(NodalUpdate(), at_its_nodes, step_size), HOLD, WARM)

@@ -59,7 +59,7 @@ def _take(row, s, mode, hooks, more):
     elif isinstance(row, table.AtNodes):
         at_nodes(hooks, row.stage, row.target, s)
     elif isinstance(row, table.ByFixes):
-        row.function(hooks, s)
+        row.function(hooks, *row.arguments, s)
     elif isinstance(row, table.NodeTask):
         task = row.task(s) if callable(row.task) else row.task
         here = row.at(s) if row.at else s

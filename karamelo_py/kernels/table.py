@@ -90,9 +90,10 @@ class Once(NamedTuple):
 
 
 class ByFixes(NamedTuple):
-    """A function ``(hooks, s)``: fixes act in a way of their own."""
+    """A function ``(hooks, *arguments, s)``: fixes act in a way of their own."""
 
     function: Any
+    arguments: tuple = ()
 
 
 class Repeated(NamedTuple):

@@ -20,6 +20,7 @@ from karamelo_py.kernels.arrays import (
     ON_UPDATE,
     ON_VELOCITY,
     POST_PARTICLES_TO_GRID,
+    SUPPLY_HEAT,
     TIMESTEP,
     WHOLE,
     Hooks,
@@ -28,7 +29,7 @@ from karamelo_py.kernels.arrays import (
     arrays_of,
 )
 from karamelo_py.kernels.clock import take_reports
-from karamelo_py.kernels.heat import Conducting
+from karamelo_py.kernels.heat import Conducting, at_heat_nodes, at_heated_points, at_its_nodes
 from karamelo_py.kernels.hook_loop import ACT, RUB, add_work
 from karamelo_py.kernels.hooks import HEAT_FUNCTION, NODE_FUNCTION, POINT_FUNCTION
 from karamelo_py.kernels.p2g import WorkOfForces
@@ -213,6 +214,10 @@ class StepsOnCard:
                 found.append(self._launch(gpu.take_reports(take_reports), 1, self.s))
             elif row.function is add_work:
                 found += self._work_of_loads()
+            elif row.function is at_heat_nodes:
+                found += self._hooks_on_nodes(*row.arguments, of_heat=True)
+            elif row.function is at_heated_points:
+                found += self._hooks_on_points(SUPPLY_HEAT, 0)
         return found
 
     def _plain(self, rows: Iterable) -> Iterator[Any]:
@@ -323,8 +328,11 @@ class StepsOnCard:
         row = self._table()[h]
         return self.nodes if row.begin < 0 else int(row.end - row.begin)
 
-    def _hooks_on_nodes(self, stage: int, target: int) -> Iterator[KernelLaunch]:
-        s, hooks, heavy, copies = self.s, self.hooks, self.heavy, self.copies
+    def _hooks_on_nodes(
+        self, stage: int, target: int, of_heat: bool = False
+    ) -> Iterator[KernelLaunch]:
+        hooks, heavy, copies = self.hooks, self.heavy, self.copies
+        s = at_its_nodes(self.s) if of_heat else self.s
         own = [h for h, row in enumerate(self._table()) if row.stage == stage]
         if own and target == ON_UPDATE and hooks.held.size:
             yield self._launch(fixes.clear_held, self.nodes, hooks.held)
@@ -334,7 +342,7 @@ class StepsOnCard:
                 yield self._launch(gpu.clear, 1, heavy, h)
                 yield self._launch(fixes.count_node, count, s.nodes, hooks, h, heavy)
             if row.address != WHOLE:
-                act = fixes.on_node(target, ACT, self._values(h))
+                act = fixes.on_node(target, ACT, self._values(h), of_heat)
                 yield self._launch(act, count, s, hooks, h, heavy, copies, called=called)
             elif target != ON_VELOCITY:
                 (tag,) = (one for one in hooks.whole if one.row == h)
@@ -356,11 +364,12 @@ class StepsOnCard:
             for h in own:
                 called = self._called(h)
                 if self._table()[h].address != WHOLE:
-                    act = fixes.on_point(then, self._values(h))
+                    heats, values = stage == SUPPLY_HEAT, self._values(h)
+                    act = fixes.on_heated_point(values) if heats else fixes.on_point(then, values)
                     yield self._launch(act, size, s, block, hooks, h, copies, called=called)
                 else:
                     (tag,) = (one for one in hooks.whole if one.row == h)
-                    act = fixes.on_whole_point(then)
+                    act = fixes.on_whole_point(then, stage == SUPPLY_HEAT)
                     yield self._launch(act, size, s, block, hooks, tag, h, copies, called=called)
 
     def _work_of_loads(self) -> Iterator[KernelLaunch]:

@@ -86,6 +86,10 @@ class SimulationOnCard(Simulation):
         self._sort_for_sums()
         super()._begin_to_look(level, anew)
 
+    def _watch_energy(self, begun_before: int) -> None:
+        super()._watch_energy(begun_before)
+        self.control.clock[0].watch_heat = 0  # threads note no range of temperatures
+
     def _sort_for_sums(self) -> None:
         self._fetch()
         self.sort_if_due()
