@@ -1,7 +1,16 @@
 """Scripts with --gpu on an emulated card, interpreted: logs and dumps as of the processor."""
 
+import re
+import shutil
+
 import numpy as np
 import pytest
+from going_on import SCENES, SERIAL, goes_on, with_files
+from scenes import block
+from test_ranks import FAILING, HALVED
+
+from karamelo_py import Simulation, SimulationError
+from karamelo_py.compiler import gpu
 
 # Two squares that meet; of 2 x 2 points each.
 SQUARES = """
@@ -32,6 +41,11 @@ def squares(*lines, **changes):
     return SQUARES.format(**(USUAL | changes)) + "\n".join(lines)
 
 
+def nowhere(said):
+    """Messages without the folder of their script."""
+    return re.sub(r"\S*in.script", "", said)
+
+
 def alike(one, other, error=1e-12):
     """Sums have another order: some round-off errors of the largest number of a column."""
     assert sorted(f.name for f in one.folder.iterdir()) == sorted(
@@ -43,14 +57,6 @@ def alike(one, other, error=1e-12):
         assert list(mine) == list(theirs)
         for name, column in mine.items():
             assert np.abs(column - theirs[name]).max() <= error * np.abs(column).max(), name
-
-
-def same_files(one, other, but=()):
-    """Every byte of logs and dumps."""
-    names = {f.name for f in one.folder.iterdir() if f.suffix in (".LAMMPS", ".mpm")}
-    assert names
-    for name in names - set(but):
-        assert (one.folder / name).read_bytes() == (other.folder / name).read_bytes(), name
 
 
 @pytest.mark.parametrize(
@@ -67,3 +73,146 @@ def test_same_as_processor(run_interpreted, changes, error):
     there = run_interpreted(script, "--gpu", folder="there")
     assert "gpu                 emulated" in there.out
     alike(here, there, error)
+
+
+def test_in_pieces(run_interpreted):
+    """The bits of a run do not depend on where it is cut: neither by runs nor by outputs."""
+    whole = run_interpreted(squares("run(10)"), "--gpu", folder="whole")
+    pieces = run_interpreted(squares("run(3)", "run(1)", "run(6)"), "--gpu", folder="pieces")
+    for name in ("d.5.LAMMPS", "d.10.LAMMPS", "g.10.LAMMPS"):
+        assert (whole.folder / name).read_bytes() == (pieces.folder / name).read_bytes(), name
+
+
+@pytest.mark.parametrize(
+    "scene", ["flow in the total frame", "deleted", "points that go", "wall that rubs"]
+)
+def test_goes_on_from_a_file(run_interpreted, scene):
+    """Also with a file of the other: what a card does not know of, such as tiles, is made anew."""
+    script = with_files((SCENES | SERIAL)[scene])
+    whole = goes_on(lambda *given, **named: run_interpreted(*given, "--gpu", **named), script)
+    file = sorted(whole.glob("r.*.h5"))[0].name
+    mixed = whole.with_name("mixed")
+    shutil.copytree(whole, mixed)
+    run_interpreted(script, "-restart", file, folder="mixed")
+    for path in whole.glob("*.LAMMPS"):
+        here, other = (np.loadtxt(of / path.name, skiprows=11) for of in (whole, mixed))
+        assert np.abs(here - other).max() <= 1e-9 * np.abs(here).max(), path.name
+
+
+WRONG = [
+    "fix g gets NaN from sqrt(0.02 - time)", "leaves the domain at (1.2", "is turned inside out",
+    'last_good.5.h5" -out "of 1" goes on from there, with such a step',
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("says", WRONG)
+def test_what_went_wrong(run_interpreted, says):
+    """Message, log and last good state as of the processor, which may name another point."""
+    here, there = (
+        run_interpreted(FAILING[says] + "\n", *option, folder=folder, status=1)
+        for option, folder in (((), "here"), (("--gpu",), "there"))
+    )
+    assert says.replace(' -out "of 1"', "").replace('"', "") in there.err
+    said, other = (re.sub(r"point \d+ of.*?\)", "", nowhere(run.err)) for run in (here, there))
+    assert said == other
+    alike(here, there)
+
+
+def test_the_first_by_number_that_goes_wrong_is_named(run_interpreted):
+    script = squares("run(30)", v=-0.4).replace("-0.1, -0.1", "0, 0")
+    said = run_interpreted(script, "--gpu", status=1).err
+    assert "point 1 of solid 'a' leaves the domain" in said
+
+
+def test_a_step_above_the_limit(run_interpreted):
+    lines = (
+        "fix(v, initial_velocity_particles, all, 4.2)", "fix(g, body_force, all, 12)",
+        "set_dt(0.008)", "set_output(1000)", "run(60)",
+    )  # fmt: skip
+    script = block(1, *lines, size=(0.1,)).replace("0, 1.2", "0, 4")
+    said = run_interpreted(script, "--gpu", status=1).err
+    assert "is above the stable limit, which has fallen to" in said
+    assert "The last good state is in last_good." in said
+
+
+def test_a_step_that_is_halved(run_interpreted):
+    script = block(2, *HALVED, size=(0.3, 0.2)).replace("run(60", "run(24")
+    here = run_interpreted(script, folder="here")
+    there = run_interpreted(script, "--gpu", folder="there")
+    assert nowhere(here.err) == nowhere(there.err) and "1/2 of the step" in there.err
+    alike(here, there)
+
+
+def test_fixes_of_the_first_step(run_interpreted):
+    """What acts in it from Python, or sets the state before it, acts on the processor."""
+    lines = (
+        "region(everywhere, block, INF, INF, INF, INF)",
+        "group(nodes, nodes, region, everywhere, all)",
+        "fix(kick, initial_velocity_nodes, nodes, 0.3*x, NULL)",
+        "fix(s, initial_stress, a, 3, 1, 0, 0, 0, -2*y0)",
+        "run(5)",
+    )
+    script = squares(*lines).replace("rubber, neo-hookean", "rubber, linear")
+    here = run_interpreted(script, folder="here")
+    there = run_interpreted(script, "--gpu", folder="there")
+    alike(here, there)
+    assert abs(there.log.Ek[1] - run_interpreted(squares("run(5)")).log.Ek[1]) > 1e-3
+
+
+# --- what a GPU refuses ---------------------------------------------------------------------------
+
+
+def test_what_is_refused_is_said_before_the_run(run_interpreted):
+    """Each part with its line; also of later runs; by check, too."""
+    lines = ("fix(F, force_particles, all, 1, 0)", "fix(G, force_particles, all, 1, 0)", "run(1)")
+    for command in ("run", "check"):
+        said = run_interpreted(squares(*lines), "--gpu", status=1, command=command).err
+        assert said.count("acts from Python in each step (initial_integrate)") == 2
+        assert "in.script:21:1: error: run: fix force_particles 'F'" in said
+        assert "hint: a fix whose hooks are compiled, or no --gpu" in said
+    later = run_interpreted(squares("run(1)", *lines), "--gpu", folder="later", status=1)
+    assert "fix force_particles 'F'" in later.err and not (later.folder / "log.mpm").exists()
+    said = run_interpreted(SERIAL["load steps"], "--gpu", status=1).err
+    assert "a GPU takes no steps of scheme quasi-static" in said
+    assert "    7 | scheme(quasi-static)" in said
+    said = run_interpreted(squares("run(1)"), "--gpu", "--ranks", "2", status=1).err
+    assert said.startswith("error: --gpu: one GPU has all of a scene, and 2 processes would share")
+
+
+def test_check_says_what_a_scene_takes_there(run_interpreted):
+    out = run_interpreted(squares("run(1)"), "--gpu", command="check").out
+    found = re.search(r"^gpu            emulated, .* free\n *([\d.]+) MiB in a run$", out, re.M)
+    assert 1 < float(found[1]) < 100
+
+
+def test_no_gpu(run_script, monkeypatch):
+    """Messages of ours without card, driver or packages."""
+    monkeypatch.delenv("KARAMELO_PY_GPU")
+    monkeypatch.setattr(gpu.Card, "_do", lambda self, name, *rest: 1 / 0)
+    said = run_script(squares("run(1)"), "--gpu", status=1).err
+    assert said.startswith("error: there is no NVIDIA GPU with a driver on this machine")
+    assert "hint: no --gpu: processors run the same script" in said
+    monkeypatch.setitem(__import__("sys").modules, "cuda.bindings", None)
+    said = run_script(squares("run(1)"), "--gpu", status=1).err
+    assert said.startswith("error: --gpu needs the packages for NVIDIA GPUs")
+    assert "hint: pip install 'karamelo-py[gpu]', or no --gpu" in said
+    with pytest.raises(SimulationError, match="--gpu needs the packages"):
+        Simulation(squares(), gpu=True)
+
+
+def test_a_scene_that_is_too_large_for_the_gpu(run_script, monkeypatch):
+    """By its points alone, before there are arrays; by all that it takes, before it runs."""
+    monkeypatch.setattr(gpu.Emulator, "memory", lambda self: (500, 1000))
+    said = run_script(squares("run(1)"), "--gpu", status=1).err
+    assert "in.script:9:1: error: solid: the GPU has no room for the scene: 8 points, which" in said
+    assert "emulated has 4.66e-07 GiB of 9.31e-07 GiB free" in said
+    monkeypatch.undo()
+
+    def refuse(self, size):
+        raise MemoryError
+
+    monkeypatch.setenv("KARAMELO_PY_GPU", "emulated")
+    monkeypatch.setattr(gpu.Emulator, "allocate", refuse)
+    said = run_script(squares("run(1)"), "--gpu", status=1).err
+    assert "the GPU has no room for the scene: 8 points; emulated has" in said
+    assert "hint: larger cells, or fewer points per cell; precision(single); no --gpu" in said

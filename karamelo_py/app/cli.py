@@ -320,7 +320,7 @@ def _run(options: argparse.Namespace) -> int:
             lambda comm: _carry_out(options, script, comm),
             debugging=options.debug,
         )
-    if (options.ranks or 1) > 1 and not options.checking:
+    if (options.ranks or 1) > 1 and not options.checking and not options.gpu:
         if options.live:
             raise ScriptError(
                 f"a live page shows a run of one process, and {options.ranks} share this one",

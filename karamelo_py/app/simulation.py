@@ -23,6 +23,7 @@ from karamelo_py.app.options import make_folder, threads_option
 from karamelo_py.language import registry, signature
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
+from karamelo_py.run.lower.card import use_card
 from karamelo_py.run.mpi.comm import launched
 from karamelo_py.run.runner import Interrupted
 from karamelo_py.scene.hub import Hub
@@ -200,6 +201,8 @@ class Simulation:
         is kept in memory, and what a script says of dumps and plots has no effect.
     threads
         Threads to use; all cores where the scene is large enough by default.
+    gpu
+        Let an NVIDIA GPU take the steps.
     verbose
         Show on the terminal what the command line shows.
     trust_geometries
@@ -213,8 +216,8 @@ class Simulation:
     Raises
     ------
     SimulationError
-        For a wrong script, number of threads or folder; it carries the message and the place
-        that the command line shows.
+        For a wrong script, number of threads or folder, or no GPU; it carries the message and the
+        place that the command line shows.
 
     Notes
     -----
@@ -239,6 +242,7 @@ class Simulation:
         *,
         out: str | PathLike | None = None,
         threads: int | None = None,
+        gpu: bool = False,
         verbose: bool = False,
         trust_geometries: bool = False,
         alone: bool = False,
@@ -255,6 +259,8 @@ class Simulation:
         self._name = "a scene"
         with _as_simulation_error():
             hub.settings.threads = _threads_of(threads)
+            if gpu:
+                use_card(hub)
             if out is not None:
                 hub.folder = self._claimed(out)
             presets = {name: _as_script_text(value) for name, value in variables.items()}

@@ -26,7 +26,7 @@ from karamelo_py.compiler.code import I32, I64
 from karamelo_py.compiler.compile import implements, shared
 from karamelo_py.compiler.fingerprint import fingerprint
 from karamelo_py.compiler.held import HeldTuple, item_of
-from karamelo_py.compiler.loops import ENTRY, NAME, in_one, written
+from karamelo_py.compiler.loops import ENTRY, NAME, compilation, in_one, written
 from karamelo_py.compiler.trace import formula
 from karamelo_py.compiler.values import intrinsic
 
@@ -285,9 +285,9 @@ class _Coded:
         self, function: Callable, kinds: tuple, called: dict
     ) -> tuple[Code, frozenset | Unknown]:
         """Make code; also the Python functions that it was made of."""
-        with parts_noted() as parts:
+        with compilation(function.__name__), parts_noted() as parts:
             name, text = text_of(function, kinds, self.on_card, called)
-        code = Code(f"{name}_entry", self.made(text), frozenset())
+            code = Code(f"{name}_entry", self.made(text), frozenset())
         try:
             choices, codes = contents(parts)
         except Unknown as what:
@@ -312,6 +312,10 @@ class Emulator(_Coded):
         at = -(-ctypes.addressof(room) // 64) * 64
         self._rooms[at] = room
         return at
+
+    def memory(self) -> tuple[int, int]:
+        """Bytes of memory that are free, and all: more than any scene takes."""
+        return 1 << 60, 1 << 60
 
     def free(self, address: int) -> None:
         """Give memory back."""
@@ -356,6 +360,25 @@ class Emulator(_Coded):
             launch()
             found.append(perf_counter() - begun)
         return found
+
+
+class Counted(Emulator):
+    """Count the bytes that are asked for; nothing runs."""
+
+    name, taken = "counted", 0
+
+    def allocate(self, size: int) -> int:
+        """Count so many bytes; where none are."""
+        self.taken += size
+        return 1 << 40
+
+    def copy_to(self, address: int, there: int, size: int) -> None:
+        """Copy nothing."""
+
+    copy = copy_from = copy_to
+
+    def compiled(self, function: Callable, kinds: tuple, called: dict | None = None) -> None:
+        """Compile nothing."""
 
 
 class Card(_Coded):

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.compiler.loops import compilation
 from karamelo_py.kernels.arrays import Setup
 from karamelo_py.kernels.step import DONE, STOPPED
 from karamelo_py.run.gpu import StepsOnCard, arrays_in, there
-from karamelo_py.run.lower.card import refuse
+from karamelo_py.run.lower.card import check_room_there, missing_told, refuse
 from karamelo_py.run.simulation import Simulation
+from karamelo_py.scene.hub import Hub
 
 
 class SimulationOnCard(Simulation):
@@ -28,6 +28,10 @@ class SimulationOnCard(Simulation):
     _known: Sequence = ()  # the arrays and hooks that these are for
     _ahead = False  # steps on the card are not in the arrays here
     _sent = False  # the card has what the arrays here show
+
+    def __init__(self, hub: Hub, previous: Simulation | None = None):
+        check_room_there(hub)
+        super().__init__(hub, previous)
 
     @property
     def setup(self) -> Setup:
@@ -97,8 +101,12 @@ class SimulationOnCard(Simulation):
 
     # --- steps
 
-    def _make_ready(self) -> None:
+    def refuse(self) -> None:
         refuse(self.hub, self._setup)
+
+    def _make_ready(self) -> None:
+        if not self.hub.checking:
+            self.refuse()
         super()._make_ready()
 
     def compile(self) -> None:
@@ -115,7 +123,7 @@ class SimulationOnCard(Simulation):
                 steps.images.close()
             card, scheme = self.hub.settings.card, type(self.hub.update.scheme)
             hooks = self.hooks, self.python.functions
-            with compilation("steps on a GPU"):
+            with missing_told(self.hub):
                 steps = StepsOnCard(card, self._setup, scheme, type(self.visits), *hooks)
             self._steps, self._known, self._sent = steps, known, False
         return steps

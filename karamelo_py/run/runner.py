@@ -20,6 +20,7 @@ from karamelo_py.run.advice import known_failures
 from karamelo_py.run.advice.report import report
 from karamelo_py.run.diagnosis import energy
 from karamelo_py.run.lower.build import check_scene
+from karamelo_py.run.lower.card import refuse
 from karamelo_py.run.lower.memory import bytes_per_point
 from karamelo_py.run.mpi.comm import check_same_run, handled_signals
 from karamelo_py.run.recovery import RollBack, Stopped
@@ -121,6 +122,8 @@ def carry_out(hub: Hub, **length: Any) -> None:
     runner = Runner(hub, **length)
     check_scene(hub)
     if hub.rehearsing:
+        if hub.settings.card:
+            refuse(hub)
         span = runner.end_time - hub.update.time, inf if runner.steps is None else runner.steps
         if not getattr(hub.update.scheme, "implicit", False):
             hub.later.append(known_failures.step_of(hub, runner.rollback.halve, span))
@@ -133,6 +136,7 @@ def carry_out(hub: Hub, **length: Any) -> None:
     if hub.checking:
         report(hub, runner.end_time)
         runner.warn(hub.simulation)
+        hub.simulation.refuse()
         raise Quit
     replay = hub.interpreter.replay
     if replay is None or replay.at_end:

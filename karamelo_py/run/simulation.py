@@ -306,6 +306,9 @@ class Simulation(SceneArrays):
 
         return LoadSteps(self)
 
+    def refuse(self) -> None:
+        """Refuse a scene that this one cannot run: there is none."""
+
     def compile(self) -> None:
         """Have the loop over the steps compiled now: nobody waits for it amid a log."""
         if config.DISABLE_JIT or self.python.by_stage or self.implicit:

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from math import inf
 from typing import Any
 
+from karamelo_py.compiler.gpu import NoCard, card
 from karamelo_py.kernels.step import Staged, rows_of
 from karamelo_py.kernels.table import one_by_one, says
 from karamelo_py.points.basis import support
@@ -12,6 +13,7 @@ from karamelo_py.points.laws.further import without_rate
 from karamelo_py.run.advice.known_failures import refuse_endless_speeds
 from karamelo_py.run.advice.suggestions import suggestions
 from karamelo_py.run.diagnosis.energy import not_watched, unknown_work
+from karamelo_py.run.lower.card import memory_there, refusals
 from karamelo_py.run.lower.memory import (
     known,
     memory_of,
@@ -81,6 +83,8 @@ def report(hub: Hub, end_time: float = inf) -> None:
     if (there := machine_memory.machine_memory()) is not None:
         free = _size(there.free)
         say(f"               {free} are free on this machine, beside what check has taken")
+    if hub.settings.card:
+        _say_of_gpu(say, simulation)
     if hub.settings.ranks > 1:
         say("")
         for line in report_lines(simulation, hub.settings.ranks):
@@ -97,6 +101,19 @@ def report(hub: Hub, end_time: float = inf) -> None:
     for suggestion in found:
         say(f"  {suggestion.reason}")
         say(f"    instead: {suggestion.cure}")
+
+
+def _say_of_gpu(say: Callable, simulation: Simulation) -> None:
+    """Say which GPU there is, and what the scene takes there."""
+    try:
+        here = card()
+        free, whole = map(_size, here.memory())
+        about = f"{here.name}, {free} of {whole} free"
+    except NoCard as error:
+        about = f"none here: {error}"
+    say(f"gpu            {about}")
+    if next(refusals(simulation.hub, simulation.setup), None) is None:
+        say(f"               {_size(memory_there(simulation))} in a run")
 
 
 def _size(count: float) -> str:

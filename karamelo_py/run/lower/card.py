@@ -3,24 +3,76 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
-from karamelo_py.compiler.gpu import NoCard, card
+from karamelo_py.compiler.gpu import Counted, NoCard, card
 from karamelo_py.kernels.hooks import CompiledHook
 from karamelo_py.language import registry
+from karamelo_py.run.lower.build import PRECISIONS
+from karamelo_py.run.lower.memory import largest, least_bytes
 from karamelo_py.scene.hub import Hub
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.scene.machine_memory import in_words
+from karamelo_py.script.errors import ScriptError, plural
 
 WITHOUT = "no --gpu: processors run the same script"
 
 
 def use_card(hub: Hub) -> None:
-    """Let the GPU of this machine take the steps of a scene; it is an error that there is none."""
-    hub.settings.engine = "gpu"
+    """Let the GPU of this machine take the steps of a scene; it is an error that there is none.
+
+    To check a scene none is needed.
+    """
+    settings = hub.settings
+    if settings.ranks > 1:
+        raise ScriptError(
+            f"--gpu: one GPU has all of a scene, and {settings.ranks} processes would share it",
+            hint="--gpu by one process, or no --gpu",
+        )
+    settings.engine = "gpu"
+    with missing_told():
+        settings.card = Counted() if hub.checking else card()
+
+
+@contextmanager
+def missing_told(hub: Hub | None = None) -> Iterator[None]:
+    """Tell what a GPU has not, meanwhile: itself, packages, memory for the scene in `hub`."""
     try:
-        hub.settings.card = card()
+        yield
     except NoCard as error:
         raise ScriptError(str(error), hint=error.hint) from None
+    except MemoryError:
+        if hub is None:
+            raise
+        raise _too_large(hub, 0.0) from None
+
+
+def check_room_there(hub: Hub) -> None:
+    """Refuse a scene whose points and nodes alone do not fit into the memory of the GPU."""
+    need = least_bytes(hub, PRECISIONS[hub.settings.precision], copied=False)
+    if need > hub.settings.card.memory()[0]:
+        raise _too_large(hub, need)
+
+
+def _too_large(hub: Hub, least: float) -> ScriptError:
+    count = sum(solid.count for solid in hub.solids.values())
+    free, whole = map(in_words, hub.settings.card.memory())
+    need = f", which take at least {in_words(least)} of its memory" if least else ""
+    has = f"{hub.settings.card.name} has {free} of {whole} free"
+    single = "" if hub.settings.precision == "single" else "; precision(single)"
+    found = ScriptError(
+        f"the GPU has no room for the scene: {plural(count, 'point')}{need}; {has}",
+        place=largest(hub).place,
+        hint=f"larger cells, or fewer points per cell{single}; {WITHOUT}",
+    )
+    found.command = "solid"
+    return found
+
+
+def memory_there(simulation: Any) -> int:
+    """Count the bytes that a scene takes on a GPU, under ``check``."""
+    simulation.launches()
+    return simulation.hub.settings.card.taken
 
 
 def refusals(hub: Hub, setup: Any = None) -> Iterator[ScriptError]:

@@ -121,7 +121,7 @@ def check_room(hub: Hub, *, copied: bool) -> None:
         there = machine_memory(comm.on_machine) or there
     if need <= there.free:
         return
-    place, beside = _largest(hub).place, ""
+    place, beside = largest(hub).place, ""
     if comm.share_here < 1:
         beside = f" for {comm.on_machine} of {comm.size} processes"
     message = (
@@ -173,7 +173,8 @@ def least_bytes(hub: Hub, real: type, copied: bool) -> float:
     return points + nodes * per_cell * of_node
 
 
-def _largest(hub: Hub) -> Solid:
+def largest(hub: Hub) -> Solid:
+    """Find the solid with most points."""
     return max(hub.solids.values(), key=lambda solid: solid.count)
 
 
@@ -185,7 +186,7 @@ def no_room(hub: Hub, error: MemoryError) -> ScriptError:
     found = ScriptError(
         f"the arrays of {plural(nodes, 'node')} and {plural(count, 'point')} do not fit into "
         f"memory: {str(error) or 'the system gives no more'}",
-        place=hub.domain.place if of_grid else _largest(hub).place,
+        place=hub.domain.place if of_grid else largest(hub).place,
         hint="larger cells, or a smaller domain" if of_grid else "larger cells, or fewer points",
     )
     found.command = "dimension" if of_grid else "solid"
