@@ -85,6 +85,8 @@ SCENES = {
     "contact": pair(
         CONTACTS, RUBBERS, "fix(rub, contact/friction, left, right, 0.3)", begin=0.21, more=FORCES
     ),
+    "domains": pair("method(ulcpdi, FLIP, linear, 0.99, R4)", RUBBERS),
+    "corners that move": pair("method(ulcpdi, MLS, linear, Q4)", RUBBERS),
     "contact of rigid": pair(CONTACTS, ON_RIGID, more=FORCES),
 }
 
@@ -93,4 +95,12 @@ SCENES = {
 def test_same_as_processor(run_interpreted, name):
     here = run_interpreted(SCENES[name], folder="here")
     there = run_interpreted(SCENES[name], "--gpu", folder="there")
+    alike(here, there, 1e-11)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("name", SCENES)
+def test_same_as_processor_compiled(run_script, name):
+    here = run_script(SCENES[name], folder="here")
+    there = run_script(SCENES[name], "--gpu", folder="there")
     alike(here, there, 1e-11)

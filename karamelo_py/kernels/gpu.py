@@ -38,6 +38,7 @@ from karamelo_py.kernels.sweep import (
 from karamelo_py.kernels.visit import place_at
 from karamelo_py.points import basis as bases
 from karamelo_py.points.basis import entry, locate, support
+from karamelo_py.points.basis.cpdi import of_corner
 from karamelo_py.points.basis.product import digits, node_number
 from karamelo_py.points.grid import inside
 
@@ -70,7 +71,10 @@ OTHERS = "clock, reports, totals"
 
 
 class CellLists(NamedTuple):
-    """The points of a block by cell; N is the number of nodes, n that of points."""
+    """The points of a block by cell; N is the number of nodes, n that of points.
+
+    Of domains each corner is listed, in its own cell: corner c of point p as c n + p.
+    """
 
     count: np.ndarray  # (N,) int32 of points in each cell that are not listed yet
     number: np.ndarray  # (n,) int32: the cell of each point
@@ -105,6 +109,11 @@ bases.affine_weight.on(InCell)(
 @bases.entry.on(InCell)
 def _entry_in_cell(basis, kin, grid, stencil, k):
     return index(k), *bases.entry(basis.basis, kin, grid, stencil, k)[1:]
+
+
+def nodes_in_cell(basis: Any, kin: Any) -> int:
+    """Count the nodes that all points of a cell, or corners in it, see."""
+    return basis.line_nodes**kin.dimension
 
 
 # --- visits of points -------------------------------------------------------------------------
@@ -164,7 +173,8 @@ class Stage:
             for column in range(first, end)
             if _is_filled(name, column, kin)
         ]
-        self.support = int(support(basis, kin))
+        self.support = nodes_in_cell(basis, kin)
+        self.corners = int(support(basis, kin)) // self.support  # that are listed of a point
         self.scatters = bool((row.scatters or row.only_if_more) and quantities)
 
         self.at = at = row.at or _as_it_is
@@ -247,7 +257,7 @@ class Stage:
 
     def count(self) -> Callable:
         """Make what a point does to be listed: it finds its cell, and is counted."""
-        context, place = self.context, self._place()
+        context, place, count, corners = self.context, self._place(), self.support, self.corners
 
         def count_point(i, fate, s, block, cells):
             if fate[STATUS] > 0:
@@ -259,12 +269,14 @@ class Stage:
             where = place(w, p)
             if inside(grid, c.kin, where):
                 stencil = locate(c.basis, c.kin, grid, where)
-                number = entry(c.basis, c.kin, grid, stencil, 0)[0]
-                cells.number[p] = number
-                counted(cells.count, number, 1)
+                for k in range(corners):
+                    number = entry(c.basis, c.kin, grid, stencil, k * count)[0]
+                    cells.number[index(k * points.mass.size + i)] = number
+                    counted(cells.count, number, 1)
             else:
-                cells.number[p] = 0  # of a run that ends here
-                counted(cells.count, 0, 1)
+                for k in range(corners):
+                    cells.number[index(k * points.mass.size + i)] = 0  # of a run that ends here
+                    counted(cells.count, 0, 1)
                 goes_wrong(fate, points.id[p])
 
         return count_point
@@ -272,7 +284,7 @@ class Stage:
     def scatter(self, part: int) -> Callable:
         """Make what a cell does: it sums what its points give to a part of the nodes they see."""
         context, place, quantities = self.context, self._place(), self.row.visit.quantities
-        columns, only_if_more = self.columns, self.row.only_if_more
+        columns, only_if_more, corners = self.columns, self.row.only_if_more, self.corners
         count, (begin, end) = self.support, self.nodes_of(part)
         filled = tuple(dict.fromkeys(name for name, _, _ in columns))
         widths = tuple(max(c for n, c, _ in columns if n == name) + 1 for name in filled)
@@ -296,9 +308,10 @@ class Stage:
                     room_of(name, rooms, None)[k, column] = like - like
 
         @shared
-        def give(out, stencil, loads):
+        def give(out, stencil, corner, loads):
+            seen = stencil if corners == 1 else of_corner(stencil, corner)
             for k in range(begin, end):
-                scattered_all(quantities, out, stencil, k, loads)
+                scattered_all(quantities, out, seen, k, loads)
 
         @shared
         def put(rooms, boxes, box):
@@ -329,17 +342,18 @@ class Stage:
             cell = cells.cell[i]
             first, last = cells.first[cell], cells.first[cell + 1]
             c = context(s)
-            points, p = block.points, index(cells.order[first])
+            points = block.points
+            p, corner = _point_and_corner(corners, points.mass.size, cells.order[first])
             grid = record(c.grids, index(points.grid[p]))
             w = work_of(c, grid, c.nodes, block, places_of(c.frame, points, c.now, c.then))
             rooms = rooms_for(c.dt)
             clear(rooms, c.dt)
             out = in_cell(w, rooms)
             for q in range(first, last):
-                behind = index(cells.order[min(q + 1, last - 1)])  # asked for ahead
+                behind = cells.order[min(q + 1, last - 1)]  # asked for ahead
                 stencil = locate(w.basis, w.kin, grid, place(w, p))
-                give(out, stencil, loaded(w, p, c.dt, cells))
-                p = behind
+                give(out, stencil, corner, loaded(w, p, c.dt, cells))
+                p, corner = _point_and_corner(corners, points.mass.size, behind)
             put(rooms, cells.boxes, index(i))
 
         return scatter_cell
@@ -504,20 +518,35 @@ def list_point(i, fate, cells):
     cells.order[cells.first[c] + counted(cells.count, c, -1) - 1] = i
 
 
-def sort_cell(i, fate, ids, cells):
-    """Sort the points of a cell by id."""
-    if fate[STATUS] > 0 or i >= cells.box[cells.box.size - 1]:
-        return
-    c = cells.cell[i]
-    first, last = cells.first[c], cells.first[c + 1]
-    for q in range(first + 1, last):
-        p = cells.order[q]
-        own = ids[p]
-        at = q
-        while at > first and ids[cells.order[at - 1]] > own:
-            cells.order[at] = cells.order[at - 1]
-            at -= 1
-        cells.order[at] = p
+@shared
+def _point_and_corner(corners, count, listed):
+    """The point that is listed, of so many, and which of its corners."""
+    return (index(listed), 0) if corners == 1 else (index(listed % count), listed // count)
+
+
+def sort_cell(corners: int) -> Callable:
+    """Make what sorts the points of a cell by id, and corners of domains."""
+
+    @shared
+    def key(ids, listed):
+        p, corner = _point_and_corner(corners, ids.size, listed)
+        return ids[p] * corners + corner
+
+    def sort_cell(i, fate, ids, cells):
+        if fate[STATUS] > 0 or i >= cells.box[cells.box.size - 1]:
+            return
+        c = cells.cell[i]
+        first, last = cells.first[c], cells.first[c + 1]
+        for q in range(first + 1, last):
+            p = cells.order[q]
+            own = key(ids, p)
+            at = q
+            while at > first and key(ids, cells.order[at - 1]) > own:
+                cells.order[at] = cells.order[at - 1]
+                at -= 1
+            cells.order[at] = p
+
+    return sort_cell
 
 
 # --- order in memory --------------------------------------------------------------------------

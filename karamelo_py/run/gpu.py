@@ -37,6 +37,7 @@ from karamelo_py.kernels.step import DONE, first_rows, rows_of
 from karamelo_py.kernels.totals import WORK
 from karamelo_py.kernels.walls import FRICTION
 from karamelo_py.kernels.watch import LOOK
+from karamelo_py.points.basis import support
 from karamelo_py.points.laws import moves_as_told
 
 POLL = 64  # steps between two looks at how far a run is
@@ -96,8 +97,8 @@ class StepsOnCard:
         self.fate = np.zeros(5)
         self.fate_there = self.images.of(self.fate)
         self.nodes = len(s.nodes.sums)
-        own = [b.points.mass.size for b in s.blocks]
-        self.cells = [self._cells(n) for n in own]
+        self.corners = int(support(s.basis, s.kin)) // gpu.nodes_in_cell(s.basis, s.kin)
+        self.cells = [self._cells(b.points.mass.size * self.corners) for b in s.blocks]
         self.use = np.zeros(self.nodes, np.int8)
         self.images.of(self.use)
         self._totals()
@@ -280,11 +281,13 @@ class StepsOnCard:
             above = begins[k + 1] if k + 1 < len(levels) else -1
             yield self._launch(gpu.sum_before, levels[k], cells, begins[k], above)
         yield self._launch(gpu.place_list, self.nodes, cells)
-        yield self._launch(gpu.list_point, block.points.mass.size, cells)
-        yield self._launch(gpu.sort_cell, cells.cell.size, block.points.id, cells)
+        yield self._launch(gpu.list_point, cells.number.size, cells)
+        yield self._launch(gpu.sort_cell(self.corners), cells.cell.size, block.points.id, cells)
 
     def _order(self) -> Iterator[KernelLaunch]:
-        """Bring points into the order in which threads go through them."""
+        """Bring points into the order in which threads go through them; domains stay."""
+        if self.corners > 1:
+            return
         for block, cells in zip(self.s.blocks, self.cells, strict=True):
             size = block.points.mass.size
             come_from = self.images.new((size,), np.int32)

@@ -15,7 +15,16 @@ are kept and go with the grid derives from `CarriedDomain` and gives `upright`, 
 from math import inf
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import Weighted, beside, index, point_function, real, where
+from karamelo_py.compiler.compile import (
+    Weighted,
+    beside,
+    index,
+    point_function,
+    real,
+    shared,
+    where,
+)
+from karamelo_py.compiler.tuples import flat, nested_as
 from karamelo_py.language.rules import known_failure
 from karamelo_py.points import basis as bases
 from karamelo_py.points.basis.product import (
@@ -49,6 +58,7 @@ class ConvectedDomain(NamedTuple):
     """
 
     cells = 3
+    line_nodes = 2  # that a corner sees
     nodes_per_cell = 1
     least_nodes = 2
     steady_moment = True
@@ -230,6 +240,17 @@ def seen_at_corner(kin, stencil, c):
     """The c-th corner of a stencil, its weight, and its gradient."""
     weight, slopes = item(stencil.weights, c), item(stencil.gradients, c)
     return item(stencil.corners, c), weight, with_hoop(kin, weight, slopes, stencil.inv_r)
+
+
+@shared
+def of_corner(stencil, c):
+    """The stencil with one of its corners alone, the c-th, which a run knows."""
+    parts = list(zip(stencil.corners, stencil.weights, stencil.gradients, strict=True))
+    numbers = flat(parts[0])
+    for k, part in enumerate(parts):
+        numbers = tuple([where(c == k, a, b) for a, b in zip(flat(part), numbers, strict=True)])
+    corner, weight, slopes = nested_as(parts[0], numbers)
+    return stencil._replace(corners=(corner,), weights=(weight,), gradients=(slopes,))
 
 
 @bases.entry.on(ConvectedDomain)
