@@ -13,6 +13,7 @@ from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.formula import EVALUATE, GLOBAL, UNIFORM, evaluate_in_table
 from karamelo_py.compiler.gpu import Images, KernelLaunch, known, numbers_of
+from karamelo_py.compiler.trace import forget
 from karamelo_py.kernels import gpu, table
 from karamelo_py.kernels import gpu_fixes as fixes
 from karamelo_py.kernels.arrays import (
@@ -93,6 +94,7 @@ class StepsOnCard:
         functions: Sequence[Callable] = (),
     ):  # fmt: skip
         self.card, self.s, self.hooks, self.functions = card, (s := there(s)), hooks, functions
+        forget()  # of other scenes: code on disk would depend on their functions
         self.images = Images(card)
         self.fate = np.zeros(5)
         self.fate_there = self.images.of(self.fate)
@@ -310,7 +312,8 @@ class StepsOnCard:
         """Map what is called by its address to the functions of a hook."""
         signatures = (NODE_FUNCTION, POINT_FUNCTION, HEAT_FUNCTION)
         own: dict = dict.fromkeys(signatures, known(self.functions[h]))
-        own["others"] = tuple(self.functions)  # code on disk asks for all that was traced
+        # Code on disk asks for all that was traced.
+        own["others"] = (*self.functions, evaluate_in_table, _no_formula)
         return {**own, EVALUATE: evaluate_in_table if self._has_formulas(h) else _no_formula}
 
     def _has_formulas(self, h: int) -> bool:
