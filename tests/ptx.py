@@ -4,7 +4,7 @@ Needs NVIDIA's linker, but neither a GPU nor a driver.
 """
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,26 +17,24 @@ from karamelo_py.compiler.compile import index, shared
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Nodes, Setup
-from karamelo_py.kernels.g2p import SeriesTerm, SetMeanStress, TrialStrain, empty_all, updated_all
-from karamelo_py.kernels.heat import HeatContent, HeatFlow, TemperatureGradient, Warming
+from karamelo_py.kernels.g2p import empty_all, updated_all
+from karamelo_py.kernels.heat import HeatContent, HeatFlow
 from karamelo_py.kernels.lanes import OneByOne, zero_of
 from karamelo_py.kernels.nodes import at_node
-from karamelo_py.kernels.p2g import AveragedForce, SeriesBack, Volumes, load_all, sum_share
+from karamelo_py.kernels.p2g import load_all, sum_share
 from karamelo_py.kernels.stencils import gather_nodes, scatter_nodes
 from karamelo_py.kernels.sweep import (
     Context,
-    OldWeights,
     Visit,
     places_of,
     recompute_stencil,
     work_of,
 )
-from karamelo_py.kernels.table import Insulated, Sweep, fused, staged
-from karamelo_py.kernels.visit import FBar, place_at
+from karamelo_py.kernels.table import Repeated, Sweep, fused, plain, staged
+from karamelo_py.kernels.visit import place_at
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.points.basis import locate
-from karamelo_py.points.transfers.xpic import XPIC
 from karamelo_py.run.lower.build import lower
 from karamelo_py.scene.hub import Hub
 
@@ -86,23 +84,19 @@ def setup_of(script: str) -> tuple[Setup, type]:
     return lower(hub)[0], hub.update.scheme
 
 
-def of_rows(rows: list) -> list[Visit]:
+def of_rows(rows: Iterable) -> Iterator[Visit]:
     """The visits of the points among the rows of a step."""
-    return [row.visit for row in rows if isinstance(row, Sweep)]
+    for row in rows:
+        if isinstance(row, Sweep):
+            yield row.visit
+        elif isinstance(row, Repeated):
+            yield from of_rows(row.rows(0))
 
 
 def visits_of(setup: Setup, scheme: Any, in_stages: bool = False) -> list[Visit]:
     """Every visit of the points in a step of a scene, each once; those in stages, if asked for."""
-    visits = of_rows(fused(scheme.rows)) + (of_rows(staged(scheme.rows)) if in_stages else [])
-    if isinstance(setup.transfer, XPIC):
-        visits.append(Visit((SeriesTerm(0),), (SeriesBack(),), OldWeights()))
-    if isinstance(setup.averaging, FBar):
-        visits.append(Visit((TrialStrain(),), (Volumes(),), OldWeights()))
-        visits.append(Visit((SetMeanStress(),), (AveragedForce(),), OldWeights()))
-    if not isinstance(setup.heat, Insulated):
-        visits.append(Visit((Warming(),), (HeatContent(),), OldWeights()))
-        visits.append(Visit((TemperatureGradient(),), (HeatFlow(),), OldWeights()))
-    return list({typeof(visit): visit for visit in visits}.values())
+    rows = fused(scheme.rows) + (staged(scheme.rows) if in_stages else [])
+    return list({typeof(visit): visit for visit in of_rows(plain(rows, setup))}.values())
 
 
 def compiled(function: Any, *arguments: Any) -> Compiled:

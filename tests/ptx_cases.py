@@ -1,6 +1,6 @@
 """All that is done at a point or a node compiles for a GPU, and stays in its registers.
 
-Without a GPU: that scenes run on one, and how fast, nobody has seen.
+Without a GPU.
 """
 
 import re
