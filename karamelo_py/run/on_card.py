@@ -108,6 +108,8 @@ class SimulationOnCard(Simulation):
         if not self.hub.checking:
             self.refuse()
         super()._make_ready()
+        if self._setup.contact:  # made ready for the fixes of this run
+            self._sent = False
 
     def compile(self) -> None:
         """Have all that threads do compiled now, and room for the arrays on the card."""
