@@ -6,11 +6,15 @@ import shutil
 import numpy as np
 import pytest
 from going_on import SCENES, SERIAL, goes_on, with_files
+from numba import config
 from scenes import block
+from test_gpu import DISKS
 from test_ranks import FAILING, HALVED
 
 from karamelo_py import Simulation, SimulationError
 from karamelo_py.compiler import gpu
+from karamelo_py.run.gpu import arrays_in, there
+from karamelo_py.run.on_card import SimulationOnCard
 
 # Two squares that meet; of 2 x 2 points each.
 SQUARES = """
@@ -216,3 +220,41 @@ def test_a_scene_that_is_too_large_for_the_gpu(run_script, monkeypatch):
     said = run_script(squares("run(1)"), "--gpu", status=1).err
     assert "the GPU has no room for the scene: 8 points; emulated has" in said
     assert "hint: larger cells, or fewer points per cell; precision(single); no --gpu" in said
+
+
+@pytest.mark.skipif(bool(config.DISABLE_JIT), reason="the disks of test_gpu.py are compiled")
+@pytest.mark.xdist_group("disks on a GPU")
+def test_what_is_not_sent_again_has_not_changed(monkeypatch):
+    """Outputs bring arrays back; only what has changed them says so, and so has them sent again."""
+    advance, compared = SimulationOnCard._advance_to, []
+
+    def compare(simulation, target):
+        steps, setup = simulation._steps, simulation._setup
+        if simulation._sent and not simulation._ahead:
+            for array in arrays_in((there(setup)._replace(control=()), simulation.hooks)):
+                assert np.array_equal(array, steps.images.of(array), equal_nan=array.dtype != bool)
+            compared.append(simulation.step)
+        return advance(simulation, target)
+
+    monkeypatch.setattr(SimulationOnCard, "_advance_to", compare)
+    script = DISKS.format(method="ulmpm, FLIP, linear, 0.99", scheme="musl", precision="double")
+    one, other = (Simulation(script + OUTPUTS, gpu=gpu) for gpu in (True, False))
+    for sim in (one, other):
+        sim.run(24)
+        sim.points["vx"] = sim.points["vx"] * 0.5
+        sim.run(6)
+        assert sim.log["Ek"][-1] > 0
+    assert len(compared) > 8
+    for name in ("x", "vy", "s11"):
+        assert np.abs(one.points[name] - other.points[name]).max() <= (
+            1e-12 * np.abs(other.points[name]).max()
+        )
+
+
+OUTPUTS = """
+compute(Ek, kinetic_energy, all)
+compute(Es, strain_energy, all)
+compute(E, energy_balance, all)
+log_modify(custom, step, Ek, Es, E_drift)
+set_output(3)
+"""
