@@ -19,7 +19,7 @@ from karamelo_py.kernels.nodes import KeepLoss
 from karamelo_py.language import registry
 from karamelo_py.language.help import sections_of
 
-REASON = "needs NVIDIA's linker and mathematics: pip install '.[gpu]'"
+REASON = "needs NVIDIA's linker: pip install '.[gpu]' nvidia-nvjitlink"
 pathfinder = pytest.importorskip("cuda.pathfinder", reason=REASON)
 try:
     pathfinder.load_nvidia_dynamic_lib("nvJitLink")
