@@ -365,7 +365,7 @@ class Emulator(_Coded):
 class Counted(Emulator):
     """Count the bytes that are asked for; nothing runs."""
 
-    name, taken = "counted", 0
+    name, taken, copies = "counted", 0, 64
 
     def allocate(self, size: int) -> int:
         """Count so many bytes; where none are."""
