@@ -44,6 +44,7 @@ CALLS = {
     "NoEquilibrium": ("error", 0, None, None),
     "Unreachable": ("error", 0, None, None),
     "Undefined": ("error", 0, None, None),
+    "NoCard": ("error", 0, None, 1),
     "warn": ("warning", 0, "expected", "hint"),
     "known_failure": ("warning", "reason", None, "cure"),
     "render_message": ("", 1, "expected", "hint"),
@@ -62,6 +63,8 @@ CAUSES = {
 PAGES = (
     ("known-failures", "Known failures", "Warnings before the first step: a combination that is "
      "known to fail in scenes of this kind.", r"^run/advice/"),
+    ("gpu", "On a GPU", "Messages of runs with `--gpu`: what is missing, or not done there.",
+     r"^run/lower/card|^compiler/gpu"),
     ("processes", "Several processes", "Messages of runs with `--ranks` and MPI.",
      r"^run/mpi/|^app/launch|^scene/comm"),
     ("run", "During a run", "Errors that stop a run, and warnings of steps, energy and memory.",
