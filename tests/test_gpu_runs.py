@@ -13,6 +13,7 @@ from test_ranks import FAILING, HALVED
 
 from karamelo_py import Simulation, SimulationError
 from karamelo_py.compiler import gpu
+from karamelo_py.kernels.arrays import Nodes
 from karamelo_py.run.gpu import arrays_in, there
 from karamelo_py.run.on_card import SimulationOnCard
 
@@ -232,7 +233,9 @@ def test_what_is_not_sent_again_has_not_changed(monkeypatch):
     def compare(simulation, target):
         steps, setup = simulation._steps, simulation._setup
         if simulation._sent and not simulation._ahead:
-            for array in arrays_in((there(setup)._replace(control=()), simulation.hooks)):
+            nodes = Nodes(*[array[:0] for array in setup.nodes[:3]], ())  # no step needs them
+            rest = there(setup)._replace(control=(), nodes=nodes)
+            for array in arrays_in((rest._replace(buffers=()), simulation.hooks)):
                 assert np.array_equal(array, steps.images.of(array), equal_nan=array.dtype != bool)
             compared.append(simulation.step)
         return advance(simulation, target)

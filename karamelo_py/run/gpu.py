@@ -40,6 +40,7 @@ from karamelo_py.kernels.walls import FRICTION
 from karamelo_py.kernels.watch import LOOK
 from karamelo_py.points.basis import support
 from karamelo_py.points.laws import moves_as_told
+from karamelo_py.run.checkpoint.arrays import kept_at_nodes, of_nodes
 
 POLL = 64  # steps between two looks at how far a run is
 REGISTERS = {4: 200, 8: 130}  # words that a thread of a cell sums up, by the size of numbers
@@ -451,8 +452,18 @@ class StepsOnCard:
         self.ordered = -np.inf
 
     def fetch(self) -> None:
-        """Copy it back; clock and values are those of the last step already."""
-        self.images.fetch(arrays_in(self.s._replace(control=())))
+        """Copy it back, but for nodes; clock and values are those of the last step already."""
+        here = arrays_in(self.s._replace(control=()))
+        nodes = set(map(id, self._of_nodes()))
+        self.images.fetch([array for array in here if id(array) not in nodes])
+
+    def fetch_nodes(self) -> None:
+        """Copy back what nodes show, which no step needs."""
+        self.images.fetch(self._of_nodes())
+
+    def _of_nodes(self) -> list[np.ndarray]:
+        kept = {id(array) for _, array in kept_at_nodes(self.s)}
+        return [array for _, array in of_nodes(self.s) if id(array) not in kept]
 
     @property
     def wrong(self) -> int:

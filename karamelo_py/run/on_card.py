@@ -9,6 +9,7 @@ import numpy as np
 
 from karamelo_py.kernels.arrays import Setup
 from karamelo_py.kernels.step import DONE, STOPPED
+from karamelo_py.run.access import NodesByNumber
 from karamelo_py.run.gpu import StepsOnCard, arrays_in, there
 from karamelo_py.run.lower.card import check_room_there, missing_told, refuse
 from karamelo_py.run.simulation import Simulation
@@ -27,6 +28,7 @@ class SimulationOnCard(Simulation):
     _steps: StepsOnCard | None = None
     _known: Sequence = ()  # the arrays and hooks that these are for
     _ahead = False  # steps on the card are not in the arrays here
+    _nodes_ahead = False  # nor what they show at nodes
     _sent = False  # the card has what the arrays here show
 
     def __init__(self, hub: Hub, previous: Simulation | None = None):
@@ -42,6 +44,19 @@ class SimulationOnCard(Simulation):
     @setup.setter
     def setup(self, setup: Setup) -> None:
         self._setup, self._sent = setup, False
+
+    @property
+    def nodes(self) -> NodesByNumber:
+        """The nodes, as the last step has left them: there may be many, and few ask for them."""
+        if self._nodes_ahead:
+            self._fetch()
+            self._nodes_ahead = False
+            self._steps.fetch_nodes()
+        return self._nodes
+
+    @nodes.setter
+    def nodes(self, nodes: NodesByNumber) -> None:
+        self._nodes = nodes
 
     @property
     def kin(self) -> Any:
@@ -71,16 +86,18 @@ class SimulationOnCard(Simulation):
         self._sent = False
 
     def restore(self, snapshot: dict[str, np.ndarray]) -> None:
-        self._ahead = False  # what the card has is of no use any more
+        self._ahead = self._nodes_ahead = False  # what the card has is of no use any more
         super().restore(snapshot)
 
-    def show_on_nodes(self) -> None:
-        # Which nodes are in use is known of sorted points.
+    # --- what needs points that are sorted: sums by tile, which nodes are in use
+
+    def sort_if_due(self) -> None:
         self._fetch()
+        super().sort_if_due()
+
+    def show_on_nodes(self) -> None:
         self.sort_if_due()
         super().show_on_nodes()
-
-    # --- sums by tile, of points that are sorted
 
     def energy(self) -> float:
         self._sort_for_sums()
@@ -90,12 +107,14 @@ class SimulationOnCard(Simulation):
         self._sort_for_sums()
         super()._begin_to_look(level, anew)
 
+    def bring(self) -> None:
+        self.sort_if_due()
+
     def _watch_energy(self, begun_before: int) -> None:
         super()._watch_energy(begun_before)
         self.control.clock[0].watch_heat = 0  # threads note no range of temperatures
 
     def _sort_for_sums(self) -> None:
-        self._fetch()
         self.sort_if_due()
         self._sent = False  # the work of forces is taken from the points
 
@@ -145,7 +164,7 @@ class SimulationOnCard(Simulation):
             steps.send()
             self._sent = True
         status = steps.advance(target - self.step)
-        self._ahead = self.mapped = True
+        self._ahead = self._nodes_ahead = self.mapped = True
         if status == STOPPED:
             self._report(steps.wrong)
         return status

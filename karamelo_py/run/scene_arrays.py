@@ -228,6 +228,9 @@ class SceneArrays:
         if clock.drift > clock.drift_limit:
             self.sort()
 
+    def bring(self) -> None:
+        """Have all of the state here, points in the order of their tiles: it is."""
+
     def show_on_nodes(self) -> None:
         """See that the nodes show the present state when no step has been taken yet."""
         if self.mapped:

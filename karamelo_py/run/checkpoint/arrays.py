@@ -80,6 +80,8 @@ def stored(simulation: Any, kept: dict[str, np.ndarray] | None = None) -> Iterat
     All processes go through this together; the first gets the arrays, with the bits and in the
     order of one process.
     """
+    if not kept:
+        simulation.bring()
     if not kept and simulation.subdomain is not None:
         simulation.subdomain.share_kept()
     state = kept or dict(changing(simulation)) | touched(simulation)
