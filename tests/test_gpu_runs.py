@@ -175,7 +175,7 @@ def test_what_is_refused_is_said_before_the_run(run_interpreted):
         said = run_interpreted(squares(*lines), "--gpu", status=1, command=command).err
         assert said.count("acts from Python in each step (initial_integrate)") == 2
         assert "in.script:21:1: error: run: fix force_particles 'F'" in said
-        assert "hint: a fix whose hooks are compiled, or no --gpu" in said
+        assert "hint: a fix whose hooks are compiled, or leave out --gpu" in said
     later = run_interpreted(squares("run(1)", *lines), "--gpu", folder="later", status=1)
     assert "fix force_particles 'F'" in later.err and not (later.folder / "log.mpm").exists()
     said = run_interpreted(SERIAL["load steps"], "--gpu", status=1).err
@@ -197,11 +197,11 @@ def test_no_gpu(run_script, monkeypatch):
     monkeypatch.setattr(gpu.Card, "_do", lambda self, name, *rest: 1 / 0)
     said = run_script(squares("run(1)"), "--gpu", status=1).err
     assert said.startswith("error: there is no NVIDIA GPU with a driver on this machine")
-    assert "hint: no --gpu: processors run the same script" in said
+    assert "hint: leave out --gpu: processors run the same script" in said
     monkeypatch.setitem(__import__("sys").modules, "cuda.bindings", None)
     said = run_script(squares("run(1)"), "--gpu", status=1).err
     assert said.startswith("error: --gpu needs the packages for NVIDIA GPUs")
-    assert "hint: pip install 'karamelo-py[gpu]', or no --gpu" in said
+    assert "hint: pip install 'karamelo-py[gpu]', or leave out --gpu" in said
     with pytest.raises(SimulationError, match="--gpu needs the packages"):
         Simulation(squares(), gpu=True)
 
@@ -221,7 +221,9 @@ def test_a_scene_that_is_too_large_for_the_gpu(run_script, monkeypatch):
     monkeypatch.setattr(gpu.Emulator, "allocate", refuse)
     said = run_script(squares("run(1)"), "--gpu", status=1).err
     assert "the GPU has no room for the scene: 8 points; emulated has" in said
-    assert "hint: larger cells, or fewer points per cell; precision(single); no --gpu" in said
+    assert (
+        "hint: larger cells, or fewer points per cell; precision(single); leave out --gpu" in said
+    )
 
 
 @pytest.mark.skipif(bool(config.DISABLE_JIT), reason="the disks of test_gpu.py are compiled")

@@ -8,6 +8,7 @@ one thread after another: what is written for a card is tested without one.
 import ctypes
 import hashlib
 import os
+import weakref
 from collections.abc import Callable, Iterable, Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -393,7 +394,7 @@ class Card(_Coded):
         except ImportError:
             raise NoCard(
                 "--gpu needs the packages for NVIDIA GPUs",
-                "pip install 'karamelo-py[gpu]', or no --gpu",
+                "pip install 'karamelo-py[gpu]', or leave out --gpu",
             ) from None
         super().__init__()
         self._driver = driver
@@ -402,9 +403,9 @@ class Card(_Coded):
             device = self._do("cuDeviceGet", 0)
         except Exception as error:
             raise NoCard(
-                f"there is no NVIDIA GPU with a driver on this machine ({error})",
-                "no --gpu: processors run the same script; nvidia-smi shows what there is",
-            ) from None
+                "there is no NVIDIA GPU with a driver on this machine",
+                "leave out --gpu: processors run the same script; nvidia-smi shows what there is",
+            ) from error
         self._context = self._do("cuDevicePrimaryCtxRetain", device)
         self._do("cuCtxSetCurrent", self._context)
         self._stream = self._do("cuStreamCreate", 0)  # copies wait for it
@@ -478,7 +479,13 @@ class Card(_Coded):
             launch()
         graph = self._do("cuStreamEndCapture", self._stream)
         made = self._do("cuGraphInstantiate", graph, 0)
-        return lambda: self._do("cuGraphLaunch", made, self._stream)
+        self._do("cuGraphDestroy", graph)
+
+        def do() -> None:
+            self._do("cuGraphLaunch", made, self._stream)
+
+        weakref.finalize(do, self._driver.cuGraphExecDestroy, made).atexit = False
+        return do
 
     def wait(self) -> None:
         """Wait for all launches."""
@@ -522,6 +529,12 @@ def _extent(array: np.ndarray) -> int:
     return sum((n - 1) * step for n, step in steps) + array.itemsize
 
 
+def _free_all(card: Any, rooms: dict[int, int]) -> None:
+    for address in rooms:
+        card.free(address)
+    rooms.clear()
+
+
 class Images:
     """Arrays of the program that a card has copies of.
 
@@ -533,6 +546,7 @@ class Images:
         self.card = card
         self._known: dict[int, _There] = {}
         self._rooms: dict[int, int] = {}  # addresses, and bytes there
+        weakref.finalize(self, _free_all, card, self._rooms).atexit = False
 
     def of(self, thing: Any) -> Any:
         """`thing`, nested tuples of arrays and numbers, with images in the place of arrays."""
@@ -598,9 +612,7 @@ class Images:
 
     def close(self) -> None:
         """Give all memory back."""
-        for address in self._rooms:
-            self.card.free(address)
-        self._rooms.clear()
+        _free_all(self.card, self._rooms)
         self._known.clear()
 
 

@@ -238,8 +238,8 @@ class Stage:
             w = work_of(c, grid, c.nodes, block, places_of(c.frame, points, c.now, c.then))
             stencil = stencil_of(w, p)
             found = gathered_by(OneByOne(), tasks, w, stencil, position_of(w, p))
-            fastest = real(fate[RATE], c.dt)
-            moved, rate = updated_all(tasks, w, stencil, p, c.dt, found, fastest)
+            # From zero: what others have found by now would depend on which thread comes first.
+            moved, rate = updated_all(tasks, w, stencil, p, c.dt, found, real(0, c.dt))
             _report(fate, points.id[p], moved, rate, c.stride)
             keep(w, p, c.dt, cells)
 
@@ -396,6 +396,19 @@ class Stage:
 
         return sum_node
 
+    def age(self) -> Callable:
+        """Make what a node does before cells mark it: it is used (2), to be cleared (1), or not."""
+        only_if_more = self.row.only_if_more
+
+        def age_node(i, fate, s, use):
+            if fate[STATUS] > 0 or use[i] == 0:
+                return
+            if only_if_more and is_last(s):
+                return
+            use[i] -= 1
+
+        return age_node
+
     def mark(self) -> Callable:
         """Make what a cell does: it marks the nodes that its points see as used."""
         count, only_if_more = self.support, self.row.only_if_more
@@ -411,14 +424,6 @@ class Stage:
                 use[index(cell + _steps_to(s, grid, k))] = 2
 
         return mark_nodes
-
-
-def age_node(i, fate, use):
-    """Count a node as used once more, to be cleared, before it is no longer."""
-    if fate[STATUS] > 0:
-        return
-    if use[i] > 0:
-        use[i] -= 1
 
 
 @shared

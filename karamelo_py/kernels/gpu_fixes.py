@@ -395,6 +395,13 @@ def publish(i, fate, s, hooks, always):
             publish_total(hooks, h, s.control)
 
 
+def publish_hook(i, fate, s, hooks, h):
+    """Publish the totals of one hook."""
+    if fate[STATUS] > 0:
+        return
+    publish_total(hooks, h, s.control)
+
+
 # --- the watch over energy --------------------------------------------------------------------
 
 

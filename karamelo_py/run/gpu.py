@@ -222,6 +222,8 @@ class StepsOnCard:
                 found += self._hooks_on_nodes(*row.arguments, of_heat=True)
             elif row.function is at_heated_points:
                 found += self._hooks_on_points(SUPPLY_HEAT, 0)
+            else:
+                raise TypeError(f"no GPU knows what {row.function.__name__} does in a step")
         return found
 
     def _plain(self, rows: Iterable) -> Iterator[Any]:
@@ -257,13 +259,14 @@ class StepsOnCard:
             load = stage.load_point()
             for block, cells, size in pairs:
                 yield self._launch(load, size, s, block, cells)
-        if stage.lists and (s.frame.moves or ahead is None):  # else points stay where they are
+        # Points that stay are listed once, before the first step, where something is done then.
+        if stage.lists and (s.frame.moves or ahead is None or not self.begin):
             count = stage.count()
             for block, cells, size in pairs:
                 yield self._launch(count, size, s, block, cells)
                 yield from self._lists(block, cells)
             yield self._launch(gpu.take_reports(take_reports), 1, s)
-            yield self._launch(gpu.age_node, self.nodes, self.use)
+            yield self._launch(stage.age(), self.nodes, s, self.use)
             mark = stage.mark()
             for cells in self.cells:
                 yield self._launch(mark, cells.cell.size, s, cells, self.use)
@@ -355,11 +358,13 @@ class StepsOnCard:
                 (tag,) = (one for one in hooks.whole if one.row == h)
                 act = fixes.on_whole_node(target, stage == POST_PARTICLES_TO_GRID)
                 yield self._launch(act, count, s, hooks, tag, h, copies, called=called)
+            yield from self._publish_at_once(h)
         for h in own:
             if hooks.programs[h][FRICTION].begin >= 0:
                 rub = fixes.on_node(target, RUB, 0)
                 rest = (s, hooks, h, heavy, copies)
                 yield self._launch(rub, self._members(h), *rest, called=self._called(h))
+                yield from self._publish_at_once(h)
 
     def _hooks_on_points(self, stage: int, then: int) -> Iterator[KernelLaunch]:
         s, hooks, copies = self.s, self.hooks, self.copies
@@ -378,6 +383,8 @@ class StepsOnCard:
                     (tag,) = (one for one in hooks.whole if one.row == h)
                     act = fixes.on_whole_point(then, stage == SUPPLY_HEAT)
                     yield self._launch(act, size, s, block, hooks, tag, h, copies, called=called)
+        for h in own:
+            yield from self._publish_at_once(h)
 
     def _work_of_loads(self) -> Iterator[KernelLaunch]:
         if len(self._table()) and self.hooks.loads.size:
@@ -420,6 +427,14 @@ class StepsOnCard:
         publish = self._launch(fixes.publish, 1, self.s, self.hooks, always)
         return [*self._collect(*self._slots()), *self._collect(WORK, WORK + 1), publish]
 
+    def _publish_at_once(self, h: int) -> list[KernelLaunch]:
+        """Publish the totals of a hook behind it, where formulas of others may read them."""
+        slot = int(self._table()[h].slot)
+        if slot < 0 or not self._reads_totals():
+            return []
+        publish = self._launch(fixes.publish_hook, 1, self.s, self.hooks, h)
+        return [*self._collect(slot, slot + 3), publish]
+
     def _reads_totals(self) -> bool:
         """Tell whether a formula of a hook needs what hooks publish."""
         slots = range(*self._slots())
@@ -448,7 +463,8 @@ class StepsOnCard:
     def send(self) -> None:
         """Copy the state of the scene to the card."""
         self.use[:] = 2  # what nodes show is unknown
-        self.images.send([*arrays_in((self.s, self.hooks)), self.use])
+        # Steps that went wrong have left their part of the totals.
+        self.images.send([*arrays_in((self.s, self.hooks)), self.use, self.copies])
         self.ordered = -np.inf
 
     def fetch(self) -> None:

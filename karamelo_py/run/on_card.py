@@ -34,6 +34,15 @@ class SimulationOnCard(Simulation):
     def __init__(self, hub: Hub, previous: Simulation | None = None):
         check_room_there(hub)
         super().__init__(hub, previous)
+        if isinstance(previous, SimulationOnCard):
+            previous.leave_card()
+
+    def leave_card(self) -> None:
+        """Give the memory of the card back; the arrays are here."""
+        self._fetch()
+        if self._steps is not None:
+            self._steps.images.close()
+        self._steps, self._sent = None, False
 
     @property
     def setup(self) -> Setup:

@@ -15,7 +15,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.machine_memory import in_words
 from karamelo_py.script.errors import ScriptError, plural
 
-WITHOUT = "no --gpu: processors run the same script"
+WITHOUT = "leave out --gpu: processors run the same script"
 
 
 def use_card(hub: Hub) -> None:
@@ -27,7 +27,7 @@ def use_card(hub: Hub) -> None:
     if settings.ranks > 1:
         raise ScriptError(
             f"--gpu: one GPU has all of a scene, and {settings.ranks} processes would share it",
-            hint="--gpu by one process, or no --gpu",
+            hint="--gpu by one process, or leave it out",
         )
     settings.engine = "gpu"
     with missing_told():
@@ -41,6 +41,10 @@ def missing_told(hub: Hub | None = None) -> Iterator[None]:
         yield
     except NoCard as error:
         raise ScriptError(str(error), hint=error.hint) from None
+    except TypeError as error:
+        if hub is None:
+            raise
+        raise ScriptError(f"a GPU cannot run this scene: {error}", hint=WITHOUT) from error
     except MemoryError:
         if hub is None:
             raise
