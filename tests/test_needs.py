@@ -130,7 +130,7 @@ IN_KERNEL = {
     # what the scene has: grid, basis, transfer, threads
     "Grid", "Linear", "FLIP", "Serial",
     # that it has no more: heat, contact, fixes at every step, other processes
-    "Insulated", "NoContact", "NoHooks", "FixedFrame", "Alone",
+    "NoHooks", "FixedFrame", "Alone",
     # what is done at points and nodes in the two visits of musl
     "Strain", "Move", "MassMomentum", "MomentumAgain", "InternalForce", "NodalUpdate",
     "MomentumToVelocity", "Stencil",

@@ -140,7 +140,7 @@ class PyPlot(Dump):
         self.field, self.title, self.only, self.dpi = field, title, only, dpi
         self.look = look_of(
             field or "vx",
-            hub.domain.dimension,
+            hub.domain.dimension if hub.domain else None,
             vmin=vmin, vmax=vmax, cmap=cmap, azimuth=azimuth, elevation=elevation, axes=axes,
             label=label, window=((xmin, xmax), (ymin, ymax), (zmin, zmax)), scale=scale,
             quantile=quantile, fontsize=fontsize, pointsize=pointsize, outlines=outlines,
