@@ -46,6 +46,10 @@ class Observation:
         self.times, self.wanted = None, np.array([number], float)
         if number is None:
             file, _, column = what.rpartition(":")
+            if not file and Path(what).is_file():
+                columns = ", ".join(read_table(Path(what)))
+                expected = f"a column of it: {what}:COLUMN, one of {columns}"
+                raise ScriptError(f"-match {text}", expected=expected)
             if not Path(file).is_file():
                 expected = "a number, or FILE:COLUMN"
                 raise ScriptError(f"-match {text}: there is no file '{file}'", expected=expected)

@@ -77,8 +77,8 @@ def report(hub: Hub, end_time: float = inf) -> None:
         say(f"  {name:<30}  {array.shape[1]!s:<10} {array.itemsize * array.shape[1]:>6}")
     say(f"boxes of tiles {_size(tiles.box_bytes(s))}")
     memory = memory_of(simulation, s, tiles.box_bytes(s))
-    say(f"memory         {_size(sum(memory))} in a run, of which")
-    say(f"               {_size(memory.copied)} are a copy of the last good state")
+    say(f"memory         {_size(sum(memory))} in a run")
+    say(f"               {_size(memory.copied)} of them are a copy of the last good state")
     say(f"               {_size(sum(memory) + own + LOADED)} with the program itself")
     if (there := machine_memory.machine_memory()) is not None:
         free = _size(there.free)
