@@ -8,14 +8,15 @@ import pytest
 from going_on import SCENES, SERIAL, goes_on, with_files
 from numba import config
 from scenes import block
-from test_gpu import DISKS
+from test_gpu import DISKS, begun
 from test_ranks import FAILING, HALVED
 
 from karamelo_py import Simulation, SimulationError
 from karamelo_py.compiler import gpu
-from karamelo_py.kernels.arrays import Nodes
+from karamelo_py.kernels.arrays import Nodes, NoHooks
 from karamelo_py.run.gpu import arrays_in, there
 from karamelo_py.run.on_card import SimulationOnCard
+from karamelo_py.run.on_card import alike as same_hooks
 
 # Two squares that meet; of 2 x 2 points each.
 SQUARES = """
@@ -256,6 +257,18 @@ def test_what_is_not_sent_again_has_not_changed(monkeypatch):
         assert np.abs(one.points[name] - other.points[name]).max() <= (
             1e-12 * np.abs(other.points[name]).max()
         )
+
+
+def test_hooks_of_runs_that_follow_each_other():
+    """Those of a run before serve, where they do the same: nothing is made anew."""
+    lines = "fix(g, body_force, all, 0, {})\nfix(v, velocity_particles, a, {}*time, NULL)"
+    hooks = []
+    for numbers in ((-1, 2), (-1, 2), (-2, 2), (-1, 3)):
+        hub = begun(squares(lines.format(*numbers)))[0]
+        hooks.append(hub.simulation.hooks)
+    assert hooks[0].members.size and hooks[0].code.size
+    assert [same_hooks(hooks[0], other) for other in hooks] == [True, True, False, False]
+    assert same_hooks(NoHooks(), NoHooks()) and not same_hooks(NoHooks(), hooks[0])
 
 
 OUTPUTS = """
