@@ -230,7 +230,7 @@ def test_a_scene_is_made_in_twice_its_memory(tmp_path, monkeypatch, capsys):
     path.write_text(text, encoding="utf-8")
     assert main(["check", "in.disks", "-var", "N", "700"]) == 0
     said = re.search(
-        r"memory +(\d+) MiB in a run.*\n +([\d.]+) MiB are a copy", capsys.readouterr().out
+        r"memory +(\d+) MiB in a run.*\n +([\d.]+) MiB of them are a copy", capsys.readouterr().out
     )
     whole, copy = float(said[1]), float(said[2])
     assert whole - copy > 60 and copy > 40
