@@ -584,11 +584,6 @@ class Images:
         """Bytes on the card."""
         return sum(self._rooms.values())
 
-    def known(self, array: np.ndarray) -> np.ndarray:
-        """Give an array room on the card; the array itself."""
-        self.of(array)
-        return array
-
     def new(self, shape: tuple[int, ...], dtype: Any) -> np.ndarray:
         """Give an array that is on the card alone."""
         size = max(int(np.prod(shape)) * np.dtype(dtype).itemsize, 1)

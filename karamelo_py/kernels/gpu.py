@@ -79,9 +79,7 @@ class CellLists(NamedTuple):
     count: np.ndarray  # (N,) int32 of points in each cell that are not listed yet
     number: np.ndarray  # (n,) int32: the cell of each point
     first: np.ndarray  # (N + 1,) int32: points of cell c are order[first[c]:first[c + 1]]
-    box: (
-        np.ndarray
-    )  # (N + 1,) int32: number of an occupied cell among these, -1 of others; how many
+    box: np.ndarray  # (N + 1,) int32: number of an occupied cell, or -1; behind them how many are
     cell: np.ndarray  # (boxes,) int32: the cell of a box
     order: np.ndarray  # (n,) int32: the points
     sums: np.ndarray  # (m,) int64: of count and OCCUPIED, by chunks of chunks
@@ -185,7 +183,14 @@ class Stage:
             dt = whole if share == 1 else real(share, whole) * whole
             return context_of(at(s), dt, row.gathers, row.scatters, row.moves)
 
-        self.context = context
+        @shared
+        def at_point(s, block, p):
+            c, points = context(s), block.points
+            grid = record(c.grids, index(points.grid[p]))
+            places = places_of(c.frame, points, c.now, c.then)
+            return c, work_of(c, grid, c.nodes, block, places)
+
+        self.at_point = at_point  # the context of the visit, and the work at a point
 
     def _keep(self) -> Callable:
         """Make what keeps the load of a point."""
@@ -201,46 +206,41 @@ class Stage:
 
     def load(self) -> Callable:
         """Make what a point gives."""
-        context, quantities = self.context, self.row.visit.quantities
+        at_point, quantities = self.at_point, self.row.visit.quantities
 
         @shared
         def load_of_point(s, block, i):
-            c = context(s)
-            points, p = block.points, index(i)
-            grid = record(c.grids, index(points.grid[p]))
-            w = work_of(c, grid, c.nodes, block, places_of(c.frame, points, c.now, c.then))
-            return flat(load_all(quantities, w, p, c.dt))
+            c, w = at_point(s, block, index(i))
+            return flat(load_all(quantities, w, index(i), c.dt))
 
         return load_of_point
 
     def load_point(self) -> Callable:
         """Make what a point does that has not gathered: it keeps its load."""
-        load = self.load()
+        at_point, keep = self.at_point, self._keep()
 
         def load_point(i, fate, s, block, cells):
             if fate[STATUS] > 0:
                 return
-            for k, number in enumerate(load(s, block, i)):
-                cells.loads[k, i] = number
+            c, w = at_point(s, block, index(i))
+            keep(w, index(i), c.dt, cells)
 
         return load_point
 
     def gather(self) -> Callable:
         """Make what a point does: it gathers from the nodes, is updated, and keeps its load."""
-        context, tasks, keep = self.context, self.row.visit.tasks, self._keep()
+        at_point, tasks, keep = self.at_point, self.row.visit.tasks, self._keep()
 
         def gather_point(i, fate, s, block, cells):
             if fate[STATUS] > 0:
                 return
-            c = context(s)
-            points, p = block.points, index(i)
-            grid = record(c.grids, index(points.grid[p]))
-            w = work_of(c, grid, c.nodes, block, places_of(c.frame, points, c.now, c.then))
+            p = index(i)
+            c, w = at_point(s, block, p)
             stencil = stencil_of(w, p)
             found = gathered_by(OneByOne(), tasks, w, stencil, position_of(w, p))
             # From zero: what others have found by now would depend on which thread comes first.
             moved, rate = updated_all(tasks, w, stencil, p, c.dt, found, real(0, c.dt))
-            _report(fate, points.id[p], moved, rate, c.stride)
+            _report(fate, block.points.id[p], moved, rate, c.stride)
             keep(w, p, c.dt, cells)
 
         return gather_point
@@ -257,20 +257,18 @@ class Stage:
 
     def count(self) -> Callable:
         """Make what a point does to be listed: it finds its cell, and is counted."""
-        context, place, count, corners = self.context, self._place(), self.support, self.corners
+        at_point, place, count, corners = self.at_point, self._place(), self.support, self.corners
 
         def count_point(i, fate, s, block, cells):
             if fate[STATUS] > 0:
                 return
-            c = context(s)
             points, p = block.points, index(i)
-            grid = record(c.grids, index(points.grid[p]))
-            w = work_of(c, grid, c.nodes, block, places_of(c.frame, points, c.now, c.then))
+            c, w = at_point(s, block, p)
             where = place(w, p)
-            if inside(grid, c.kin, where):
-                stencil = locate(c.basis, c.kin, grid, where)
+            if inside(w.grid, c.kin, where):
+                stencil = locate(c.basis, c.kin, w.grid, where)
                 for k in range(corners):
-                    number = entry(c.basis, c.kin, grid, stencil, k * count)[0]
+                    number = entry(c.basis, c.kin, w.grid, stencil, k * count)[0]
                     cells.number[index(k * points.mass.size + i)] = number
                     counted(cells.count, number, 1)
             else:
@@ -283,7 +281,7 @@ class Stage:
 
     def scatter(self, part: int) -> Callable:
         """Make what a cell does: it sums what its points give to a part of the nodes they see."""
-        context, place, quantities = self.context, self._place(), self.row.visit.quantities
+        at_point, place, quantities = self.at_point, self._place(), self.row.visit.quantities
         columns, only_if_more, corners = self.columns, self.row.only_if_more, self.corners
         count, (begin, end) = self.support, self.nodes_of(part)
         filled = tuple(dict.fromkeys(name for name, _, _ in columns))
@@ -317,9 +315,8 @@ class Stage:
         def put(rooms, boxes, box):
             for j, (name, column, _) in enumerate(columns):
                 for k in range(begin, end):
-                    boxes[j * (end - begin) + k - begin, box] = room_of(name, rooms, None)[
-                        k, column
-                    ]
+                    row = j * (end - begin) + k - begin
+                    boxes[row, box] = room_of(name, rooms, None)[k, column]
 
         @shared
         def loaded(w, p, dt, cells):
@@ -341,19 +338,17 @@ class Stage:
                 return
             cell = cells.cell[i]
             first, last = cells.first[cell], cells.first[cell + 1]
-            c = context(s)
-            points = block.points
-            p, corner = _point_and_corner(corners, points.mass.size, cells.order[first])
-            grid = record(c.grids, index(points.grid[p]))
-            w = work_of(c, grid, c.nodes, block, places_of(c.frame, points, c.now, c.then))
+            size = block.points.mass.size
+            p, corner = _point_and_corner(corners, size, cells.order[first])
+            c, w = at_point(s, block, p)
             rooms = rooms_for(c.dt)
             clear(rooms, c.dt)
             out = in_cell(w, rooms)
             for q in range(first, last):
                 behind = cells.order[min(q + 1, last - 1)]  # asked for ahead
-                stencil = locate(w.basis, w.kin, grid, place(w, p))
+                stencil = locate(w.basis, w.kin, w.grid, place(w, p))
                 give(out, stencil, corner, loaded(w, p, c.dt, cells))
-                p, corner = _point_and_corner(corners, points.mass.size, behind)
+                p, corner = _point_and_corner(corners, size, behind)
             put(rooms, cells.boxes, index(i))
 
         return scatter_cell

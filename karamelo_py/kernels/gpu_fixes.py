@@ -55,8 +55,6 @@ from karamelo_py.points.laws import (
     specific_volume,
 )
 
-CHUNK = 64  # points whose energies one thread adds up
-
 
 class Own(NamedTuple):
     """Rooms of a thread in the place of those of `Hooks`."""

@@ -98,7 +98,7 @@ class StepsOnCard:
         forget()  # of other scenes: code on disk would depend on their functions
         self.images = Images(card)
         self.fate = np.zeros(5)
-        self.fate_there = self.images.of(self.fate)
+        self.images.of(self.fate)
         self.nodes = len(s.nodes.sums)
         self.corners = int(support(s.basis, s.kin)) // gpu.nodes_in_cell(s.basis, s.kin)
         self.cells = [self._cells(b.points.mass.size * self.corners) for b in s.blocks]
@@ -136,7 +136,8 @@ class StepsOnCard:
             self.levels.append(-(-self.levels[-1] // gpu.CHUNK))
         sums = (sum(self.levels),)
         count = np.zeros(nodes, np.int32)
-        self.images.send([self.images.known(count)])
+        self.images.of(count)
+        self.images.send([count])
         return gpu.CellLists(
             count, new((points,), np.int32), new((nodes + 1,), np.int32),
             new((nodes + 1,), np.int32), new((boxes,), np.int32), new((points,), np.int32),
@@ -423,8 +424,7 @@ class StepsOnCard:
     def _publish(self, last: bool) -> list[KernelLaunch]:
         if not len(self._table()):
             return []
-        always = last or self._reads_totals()
-        publish = self._launch(fixes.publish, 1, self.s, self.hooks, always)
+        publish = self._launch(fixes.publish, 1, self.s, self.hooks, last)
         return [*self._collect(*self._slots()), *self._collect(WORK, WORK + 1), publish]
 
     def _publish_at_once(self, h: int) -> list[KernelLaunch]:
@@ -447,7 +447,7 @@ class StepsOnCard:
         found = [*self._clear(0, WORK), *self._clear(*solids)]
         for block in s.blocks:
             if not moves_as_told(block.laws):
-                threads = -(-block.points.mass.size // fixes.CHUNK)
+                threads = -(-block.points.mass.size // gpu.CHUNK)
                 found.append(self._launch(fixes.add_energies, threads, s, block, copies, threads))
             if field(block.points.fields, WorkOfForces) is not None:
                 size = block.points.mass.size

@@ -108,6 +108,11 @@ def run(options: Namespace) -> int:
         found["workloads"][name] = {"title": title, "variables": presets, **one}
         if out:
             write_whole(out, json.dumps(found, indent=1) + "\n")
+    return _ended(found, earlier, out)
+
+
+def _ended(found: Mapping[str, Any], earlier: Mapping[str, Any] | None, out: Path | None) -> int:
+    """Compare what was found with an earlier bench, and name the file; the exit status."""
     if earlier:
         print("\n" + "\n".join(comparison(found, earlier)))
     if out:
@@ -130,17 +135,13 @@ def _on_card(
     for name in chosen:
         presets = {n: value for n, value in options.var if n in known[name]}
         for variables in on_card.sizes_of(name, presets):
-            one = on_card.measured(name, variables, gpu, options.seconds)
+            one = on_card.measured(name, variables, gpu, copied, options.seconds)
             on_card.say(name, one, variables)
             key = " ".join([name, *(f"{n}={value}" for n, value in variables.items())])
             found["workloads"][key] = {"variables": variables, **one.record()}
             if out:
                 write_whole(out, json.dumps(found, indent=1) + "\n")
-    if earlier:
-        print("\n" + "\n".join(comparison(found, earlier)))
-    if out:
-        print(f"\nwritten: {out}")
-    return 0
+    return _ended(found, earlier, out)
 
 
 def _counts(text: str) -> list[int]:

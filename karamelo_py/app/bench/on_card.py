@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import re
-import statistics
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from time import perf_counter
 from typing import Any, NamedTuple
 
-from karamelo_py.app.bench.measure import REPETITIONS, WORKLOADS, build, traffic
-from karamelo_py.compiler.gpu import bandwidth
+from karamelo_py.app.bench.measure import REPETITIONS, WORKLOADS, Measured, build, traffic
 from karamelo_py.kernels.gpu import OTHERS, STAGES
 from karamelo_py.kernels.step import DONE
 from karamelo_py.script.errors import ScriptError
@@ -34,13 +32,8 @@ class OnCard(NamedTuple):
     made: float  # seconds until the code of a step was there
     precision: str
 
-    @property
-    def best(self) -> float:
-        return max(self.speeds)
-
-    @property
-    def median(self) -> float:
-        return statistics.median(self.speeds)
+    best = Measured.best
+    median = Measured.median
 
     def record(self) -> dict[str, Any]:
         """Write what is kept in a file; speeds in particle-steps/s, times in seconds."""
@@ -67,10 +60,11 @@ def sizes_of(name: str, presets: Mapping[str, str]) -> Iterator[dict[str, str]]:
         yield {**presets, variable: f"{number:.6g}"}
 
 
-def measured(name: str, presets: Mapping[str, str], card: Any, seconds: float) -> OnCard:
-    """Measure a workload on a card for about so many seconds."""
+def measured(
+    name: str, presets: Mapping[str, str], card: Any, copied: float, seconds: float
+) -> OnCard:
+    """Measure a workload on a card for about so many seconds; `copied` is its bandwidth."""
     simulation = build(WORKLOADS[name], 1, presets, card=card)
-    copied = bandwidth(card)
     begun = perf_counter()
     simulation.compile()
     made = perf_counter() - begun
