@@ -2,6 +2,8 @@
 
 import re
 import shutil
+import sys
+from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
@@ -196,11 +198,13 @@ def test_check_says_what_a_scene_takes_there(run_interpreted):
 def test_no_gpu(run_script, monkeypatch):
     """Messages of ours without card, driver or packages."""
     monkeypatch.delenv("KARAMELO_PY_GPU")
+    monkeypatch.setitem(sys.modules, "cuda", ModuleType("cuda"))
+    monkeypatch.setitem(sys.modules, "cuda.bindings", SimpleNamespace(driver=None))
     monkeypatch.setattr(gpu.Card, "_do", lambda self, name, *rest: 1 / 0)
     said = run_script(squares("run(1)"), "--gpu", status=1).err
     assert said.startswith("error: there is no NVIDIA GPU with a driver on this machine")
     assert "hint: leave out --gpu: processors run the same script" in said
-    monkeypatch.setitem(__import__("sys").modules, "cuda.bindings", None)
+    monkeypatch.setitem(sys.modules, "cuda.bindings", None)
     said = run_script(squares("run(1)"), "--gpu", status=1).err
     assert said.startswith("error: --gpu needs the packages for NVIDIA GPUs")
     assert "hint: pip install 'karamelo-py[gpu]', or leave out --gpu" in said
