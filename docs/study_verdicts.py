@@ -2,7 +2,7 @@
 
 ``python docs/study_verdicts.py FOLDER [NAME ...]`` runs all variants of each scene, asks advise as
 if none had been run, draws the maps, runs all of their cells, and prints the tables of
-docs/studies.md. What was run before in the folder is used.
+docs/study-verdicts.md. What was run before in the folder is used.
 """
 
 import contextlib

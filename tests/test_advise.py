@@ -336,7 +336,7 @@ def test_advice_on_recorded_scenes_meets_the_target_at_little_more_than_the_leas
 
 
 def verdicts():
-    """The script that makes the table of verdicts in docs/studies.md."""
+    """The script that makes the tables of docs/study-verdicts.md."""
     spec = spec_from_file_location("study_verdicts", ROOT / "docs" / "study_verdicts.py")
     module = module_from_spec(spec)
     spec.loader.exec_module(module)
