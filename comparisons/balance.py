@@ -26,15 +26,20 @@ CLOSES = 1.0  # per cent
 RUN = re.compile(r"^ *run(_time)?\((.*?)(?:, *on_trouble.*)?\) *$", re.M)
 HEAD = """# Balances of energy and momentum
 
-Written by `python -m comparisons.balance`, which takes the first run of every scene of `inputs/`,
-and of it 3000 steps at most, fewer of more than 700 points; with `--full` all of it.
+This table shows how well each scene of `inputs/` keeps energy and momentum.
+`python -m comparisons.balance` writes it. It takes the first run of each scene, with at most 3000
+steps, and fewer for more than 700 points. With `--full` it takes the whole run.
 
-Energy is what the program says at the end of a run: kinetic, stored and dissipated energy less the
-work of the loads, as a share of the largest so far ([Energy balance](energy.md#the-watch)).
-Momentum is that of the points that are not rigid, less the impulses of the forces that fixes and
-rigid solids publish, as a share of the largest impulse or of sqrt(2 m E), with the largest kinetic
-energy E; around an axis, that along it; not of implicit steps, whose forces are shown at the
-end. A row that does not close to 1 % says why.
+| column | meaning |
+|---|---|
+| energy | change of kinetic, stored and dissipated energy less the work of the loads |
+| momentum | change of the momentum of points that are not rigid, less the impulses on them |
+| why | the cause of an energy that changes by more than 1 %, as the program names it |
+
+Energy is a share of the largest energy ([the watch](energy.md#the-watch)). Momentum is a share of
+the largest impulse or of sqrt(2 m E), with the largest kinetic energy E. In axisymmetric scenes it
+is the momentum along the axis. Implicit steps have no momentum, since they show forces at the end
+of a step. The impulses are those of fixes and rigid solids.
 
 | scene | steps | energy | momentum | why |
 |---|---|---|---|---|

@@ -223,7 +223,7 @@ def test_failures_of_long_runs(run_interpreted, name, method, more, steps, told)
     """Two disks in a held box for 100 s: 3.5 times the energy at the end, 0.2 times with 0.3 dt.
 
     The noise of a drift, of 0.9 of a cell in 1, over 60 cells with 0.9 of the stable step, and over
-    18 with 0.4 of it and functions whose gradients jump: docs/energy.md.
+    18 with 0.4 of it and functions whose gradients jump: docs/energy-measurements.md.
     """
     words = {**QUIET, "method": method, "v": "-0.9, 0", "more": more, "steps": steps}
     text = SCENE.format(**words)
@@ -248,7 +248,7 @@ def test_failures_of_long_runs(run_interpreted, name, method, more, steps, told)
 )
 def test_noise_of_a_turn(run_interpreted, method, ppc, more, steps, told):
     """A square turns at 0.05, 1.25 cells from its centre to its outer points, waves at 1.16: at the
-    end of 3000 steps of 0.34 by 52 rad, its rim through 65 cells (docs/energy.md)."""
+    end of 3000 steps of 0.34 by 52 rad, its rim through 65 cells (docs/energy-measurements.md)."""
     turn = "0.05*(3.5 - y), 0.05*(x - 3.5)"
     words = {**QUIET, "method": method, "ppc": ppc, "u": turn, "more": more, "steps": steps}
     text = dedent(SCENE).format(**words).replace("set_dt(0.01)", "")

@@ -58,7 +58,7 @@ ORDERS = "musl", "leapfrog"  # there is no such scheme as the second
 
 
 def test_the_energy_table_reduced(tmp_path, monkeypatch, capsys, starts_are_cheap):
-    """The command of docs/energy.md on a coarse disk, one period, with a scheme that there is not.
+    """The command of measured energies on a coarse disk, one period, and a scheme that is none.
 
     PIC takes what nodes have averaged away in every step: it damps by its definition.
     """
@@ -125,9 +125,9 @@ def test_mistakes(tmp_path, monkeypatch, capsys, words, said):
 
 
 def gaining() -> list[tuple[str, ...]]:
-    """(transfer, basis, scheme, strain) of cells of docs/energy.md that go wrong and are told."""
-    text = (ROOT / "docs" / "energy.md").read_text(encoding="utf-8").partition("## Other")[2]
-    text = text.partition("## The watch")[0]
+    """(transfer, basis, scheme, strain) of measured energies that go wrong and are told."""
+    page = ROOT / "docs" / "energy-measurements.md"
+    text = page.read_text(encoding="utf-8").partition("## Other")[2].partition("## Finer")[0]
     rows = [line[2:-2].split(" | ") for line in text.splitlines() if line.startswith("| ")]
     heads = [head.split() for head in rows[0][2:]]
     return [
@@ -157,8 +157,8 @@ def test_what_gains_is_told_beforehand(tmp_path, monkeypatch, capsys, starts_are
 
 
 def drifting() -> list[tuple[str, str, str]]:
-    """Variables of disks on finer grids in docs/energy.md, their energy, and when that is told."""
-    text = (ROOT / "docs" / "energy.md").read_text(encoding="utf-8")
+    """Variables of measured disks on finer grids, their energy, and when that is told."""
+    text = (ROOT / "docs" / "energy-measurements.md").read_text(encoding="utf-8")
     lines = text.partition("| variables |")[2].partition("## Bodies")[0].splitlines()
     rows = [[cell.strip() for cell in line.split("|")] for line in lines if "| n =" in line]
     return [(row[1], row[3], row[4]) for row in rows if "moving" not in row[1]]

@@ -399,7 +399,7 @@ def test_the_own_step_is_stable_and_not_far_from_the_edge(run_interpreted, basis
     ],
 )
 def test_the_own_step_of_what_drifts(run_interpreted, basis, which, drift, words, expected):
-    """The table of docs/studies.md, in cells over the speed of waves."""
+    """The table of docs/study-measurements.md, in cells over the speed of waves."""
     script = SHAKEN.format(step=words).replace("drift + 1e", "drift*c + 1e")
     script = "c = sqrt(100*0.7/1.3/0.4)\n" + script.replace("run(120)", "run(4)")
     options = ["-var", "basis", basis, "-var", "which", which]

@@ -13,11 +13,15 @@ from comparisons import defaults
 PAGE = Path(__file__).parent.parent.parent / "docs" / "defaults.md"
 HEAD = """# What the defaults do
 
-Scenes with exact answers, run with the program's own choices of step, scheme and averaging. This
-page is written by `python -m comparisons.defaults`. Errors are shares of the exact number; where
-that is 0, the number itself. The order in h tells how fast the error falls with smaller cells;
-"exact" stands for errors below 0.1 %. A scene that errs by more than 5 % (1 % where that is easy)
-has to be told; the last column quotes what the program says.
+This table compares scenes that have exact answers with the program's own choices of step, scheme
+and averaging. `python -m comparisons.defaults` writes it.
+
+| column | meaning |
+|---|---|
+| error | relative to the exact number; where that is 0, the number itself |
+| order in h | how fast the error falls with smaller cells; "exact" means an error below 0.1 % |
+| at half the step | the error with half the time step |
+| what is said | the warnings of the program; an error above 5 % needs one, or 1 % if easy |
 
 | scene | quantity | exact | default | error | order in h | at half the step | what is said |
 |---|---|---|---|---|---|---|---|

@@ -1,7 +1,7 @@
 """Motion through the grid that a body bears: it feeds what the grid does not see of velocities.
 
 Measured with disks of rubber and of metal, 4 to 16 cells across the radius, that vibrate by 0.01 to
-2 % while they drift or turn (docs/energy.md).
+2 % while they drift or turn (docs/energy-measurements.md).
 """
 
 from math import inf
