@@ -12,16 +12,8 @@ from typing import Any, NamedTuple
 from llvmlite import ir
 from numba import types
 
-from karamelo_py.compiler import arithmetic, code
+from karamelo_py.compiler import arithmetic, choices, code
 from karamelo_py.compiler.arithmetic import common
-from karamelo_py.compiler.choices import (
-    INTERPRETED,
-    choosers,
-    declare_point_function,
-    note,
-    of_numbers,
-    tag_class,
-)
 from karamelo_py.compiler.code import I64, Lanes, lane, scalar_of
 from karamelo_py.compiler.trace import INSTEAD, Undefined, forget, run_for_kernel
 from karamelo_py.compiler.values import (
@@ -47,12 +39,12 @@ def implements(function: Callable, *numbers: type, by_type: bool = False) -> Cal
     """
 
     def register(made: Callable) -> Callable:
-        known = choosers.setdefault(function, [])
+        known = choices.choosers.setdefault(function, [])
         for one in numbers:
             if "implements" not in vars(one):
                 one.implements = {}
             one.implements[function] = made
-            of_numbers.setdefault(function, []).append(made)
+            choices.of_numbers.setdefault(function, []).append(made)
         if by_type:
             known.insert(0, made)
         elif not numbers:
@@ -101,12 +93,12 @@ def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Calla
         def watched(*arguments: Any) -> Any:
             return run_for_kernel(dispatch, arguments) if at_work() else plain(*arguments)
 
-        dispatch = plain if INTERPRETED else watched
+        dispatch = plain if choices.INTERPRETED else watched
         for name in ("__name__", "__qualname__", "__module__", "__doc__"):
             setattr(dispatch, name, getattr(stub, name))
 
         def choose(*arguments: Any) -> Callable | None:
-            classes = tuple(tag_class(a) for a in arguments[:tags])
+            classes = tuple(choices.tag_class(a) for a in arguments[:tags])
             found = find(classes)
             apart = any(stub.__name__ in getattr(tag, "scalarised", ()) for tag in classes)
             if apart and lanes_of(arguments):
@@ -125,11 +117,11 @@ def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Calla
             return register
 
         def defined(*classes: type) -> bool:
-            note([(dispatch, classes)])
+            choices.note([(dispatch, classes)])
             return find(classes) is not fallback
 
         dispatch.tags, dispatch.find, dispatch.on, dispatch.defined = tags, find, on, defined
-        declare_point_function(dispatch)
+        choices.declare_point_function(dispatch)
         return dispatch
 
     return declare

@@ -12,6 +12,7 @@ for threads: one that another program keeps from running holds nobody up.
 
 import ctypes
 import functools
+import inspect
 import os
 import platform
 import sys
@@ -30,7 +31,7 @@ from karamelo_py.compiler.code import I32, I64
 from karamelo_py.compiler.compile import implements, shared
 from karamelo_py.compiler.failing import note, noting
 from karamelo_py.compiler.held import HeldTuple, held_as, held_type
-from karamelo_py.compiler.loops import noinline
+from karamelo_py.compiler.loops import kernel, noinline
 from karamelo_py.compiler.trace import formula
 from karamelo_py.compiler.values import HeldValue, Value, in_kernels, intrinsic, now
 
@@ -366,6 +367,24 @@ def shared_out(function: Callable) -> Callable:
                 function(*arguments, k)
 
     return loop
+
+
+def by_threads(share: Callable) -> Callable:
+    """Make the kernel ``f(mode, count, ...)`` that does ``share(..., k)`` for each k below `count`.
+
+    The threads of `mode` divide these numbers among them.
+    """
+    names = ["mode", "count", *inspect.signature(share).parameters][:-1]
+    loop = shared_out(noinline(share))
+
+    def all_shares(*arguments):
+        loop(*arguments)
+
+    kinds = [inspect.Parameter(name, inspect.Parameter.POSITIONAL_OR_KEYWORD) for name in names]
+    all_shares.__signature__ = inspect.Signature(kinds)  # type: ignore[attr-defined]
+    for name in ("__name__", "__qualname__", "__module__", "__doc__"):
+        setattr(all_shares, name, getattr(share, name))
+    return kernel(all_shares)
 
 
 def by_team(function: Callable) -> Callable:

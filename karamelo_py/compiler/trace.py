@@ -23,29 +23,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
+from karamelo_py.compiler import values
 from karamelo_py.compiler.arithmetic import OPERATIONS
 from karamelo_py.compiler.choices import choosers, codes_in, note, parts_noted, tag_class
 from karamelo_py.compiler.flow import Flow
 from karamelo_py.compiler.lowering import Lowering, name_of, numbers_of
 from karamelo_py.compiler.statements import AstFunction, place_in_text
-from karamelo_py.compiler.values import (
-    BUILTINS,
-    DataDependentBranch,
-    Emitted,
-    Globals,
-    HeldValue,
-    Intrinsic,
-    Untraceable,
-    Value,
-    at_work,
-    branching,
-    counting,
-    is_literal,
-    now,
-    rebuilt,
-    words,
-    writing,
-)
 
 # --- what cannot be compiled ------------------------------------------------------------------
 
@@ -70,7 +53,7 @@ class Undefined(TypeError):
 
 def _reason(error: BaseException) -> str:
     """Tell what is wrong, in one line."""
-    if isinstance(error, Untraceable):
+    if isinstance(error, values.Untraceable):
         return str(error)
     return ": ".join(filter(None, (type(error).__name__, str(error))))
 
@@ -88,7 +71,7 @@ def places_of(error: BaseException) -> Iterator[tuple[str, int]]:
 # --- functions as they are run here -----------------------------------------------------------
 
 
-_modules: dict[int, Globals] = {}
+_modules: dict[int, values.Globals] = {}
 _copies: dict[Any, Any] = {}
 
 
@@ -103,32 +86,36 @@ class Module:
 
 
 def _class_of(thing: Any) -> type:
-    if isinstance(thing, Value):
-        raise Untraceable("a kernel cannot ask for the type of a number: ask for that of a tag")
+    if isinstance(thing, values.Value):
+        raise values.Untraceable(
+            "a kernel cannot ask for the type of a number: ask for that of a tag"
+        )
     kind = getattr(thing, "_kind", None)
     return type(thing) if kind is None else getattr(kind, "instance_class", tuple)
 
 
 def _is_instance(thing: Any, kind: Any) -> bool:
     kinds = tuple(getattr(k, "seen", k) for k in (kind if isinstance(kind, tuple) else (kind,)))
-    if not isinstance(thing, Value):
+    if not isinstance(thing, values.Value):
         return issubclass(_class_of(thing), kinds)
     if not all(issubclass(k, tuple) for k in kinds):
-        raise Untraceable("a kernel cannot ask for the type of a number: ask for that of a tag")
+        raise values.Untraceable(
+            "a kernel cannot ask for the type of a number: ask for that of a tag"
+        )
     return False
 
 
 def _attribute(thing: Any, *name: Any) -> Any:
     if isinstance(thing, Module):
-        raise Untraceable("what is taken from a module has to be named: module.name")
+        raise values.Untraceable("what is taken from a module has to be named: module.name")
     return getattr(thing, *name)
 
 
 INSTEAD = {
-    is_literal: is_literal,
+    values.is_literal: values.is_literal,
     type: _class_of,
     isinstance: _is_instance,
-    range: counting,
+    range: values.counting,
     getattr: _attribute,
 }
 _SAFE = {
@@ -140,25 +127,25 @@ _CONSTANT = (type(None), type(NotImplemented), bool, int, float, str, np.number,
 
 def _seen(thing: Any) -> Any:
     """Find what takes the place of a global in functions that are run here."""
-    if isinstance(thing, (*_CONSTANT, Emitted, Module)):
+    if isinstance(thing, (*_CONSTANT, values.Emitted, Module)):
         return thing
     if isinstance(thing, python.ModuleType):
         return Module(thing, _seen)
     if isinstance(thing, tuple):
-        return rebuilt(thing, map(_seen, thing))
+        return values.rebuilt(thing, map(_seen, thing))
     if isinstance(thing, list):
         return list(map(_seen, thing))
     if isinstance(thing, np.ndarray):
-        return now().constant(thing)
+        return values.now().constant(thing)
     if not isinstance(thing, Hashable):
-        raise Untraceable(f"a {type(thing).__name__} is nothing that kernels know")
+        raise values.Untraceable(f"a {type(thing).__name__} is nothing that kernels know")
     if thing not in _copies:
         _copies[thing] = _copy(thing)
     made = _copies[thing]
-    if isinstance(made, AstFunction) or type(getattr(made, "__globals__", None)) is Globals:
+    if isinstance(made, AstFunction) or type(getattr(made, "__globals__", None)) is values.Globals:
         note([made.__code__])
     if isinstance(made, type):
-        now().classes.add(made)
+        values.now().classes.add(made)
     return made
 
 
@@ -170,12 +157,12 @@ def _copy(thing: Any) -> Any:
         return thing
     if isinstance(thing, type) and issubclass(thing, tuple):
         return thing
-    known = thing in choosers or thing in BUILTINS or thing in OPERATIONS
-    if known or isinstance(thing, Intrinsic | type):
-        return Emitted(thing)
+    known = thing in choosers or thing in values.BUILTINS or thing in OPERATIONS
+    if known or isinstance(thing, values.Intrinsic | type):
+        return values.Emitted(thing)
     if isinstance(thing, python.FunctionType):
         return _copied(thing)
-    raise Untraceable(f"kernels do not know {getattr(thing, '__name__', repr(thing))}")
+    raise values.Untraceable(f"kernels do not know {getattr(thing, '__name__', repr(thing))}")
 
 
 @functools.cache
@@ -193,17 +180,17 @@ def _copied(function: Callable) -> Callable:
     """Copy a function with other globals; one that asks what only a run knows, from its text."""
     code = function.__code__
     if _fault_of(code):
-        raise Untraceable(_fault_of(code))
+        raise values.Untraceable(_fault_of(code))
     true = function.__globals__
-    seen = _modules.setdefault(id(true), Globals(true, _seen))
+    seen = _modules.setdefault(id(true), values.Globals(true, _seen))
     cells = tuple(python.CellType(_seen(c.cell_contents)) for c in function.__closure__ or ())
     defaults = function.__defaults__ and tuple(map(_seen, function.__defaults__))
     made = python.FunctionType(code, seen, function.__name__, defaults, cells)
     made.__kwdefaults__ = {k: _seen(v) for k, v in (function.__kwdefaults__ or {}).items()}
-    if code not in branching:
+    if code not in values.branching:
         return made
     vars(made).update(vars(function))
-    return AstFunction(made, lambda: Flow(now()))
+    return AstFunction(made, lambda: Flow(values.now()))
 
 
 # --- methods, which nothing follows ---------------------------------------------------------------
@@ -227,7 +214,7 @@ def _refuse_methods(codes: Iterable[python.CodeType], classes: set[type]) -> Non
     inner = itertools.chain.from_iterable(map(codes_in, codes))
     named = functions & {name for code in inner for name in code.co_names}
     for name in sorted(name for name in functions if name.startswith("__") or name in named):
-        raise Untraceable(
+        raise values.Untraceable(
             f"'{name}' is a method of a class of tuples, which kernels cannot call: "
             "write a function, or mark the class with `algebra`"
         )
@@ -260,7 +247,7 @@ _own: set[Callable] = set()  # functions that are not written into what calls th
 def _is_plain(thing: Any) -> bool:
     if isinstance(thing, tuple):
         return all(map(_is_plain, thing))
-    return thing is None or isinstance(thing, Value | HeldValue)
+    return thing is None or isinstance(thing, values.Value | values.HeldValue)
 
 
 def _written(dispatch: Callable, kinds: tuple) -> _Formula | None:
@@ -268,11 +255,11 @@ def _written(dispatch: Callable, kinds: tuple) -> _Formula | None:
     chosen = dispatch
     try:
         lowering = Lowering(_seen)
-        with writing(lowering), parts_noted() as parts:
+        with values.writing(lowering), parts_noted() as parts:
             chosen = _chosen(dispatch, kinds)
             if chosen is None:
                 return None
-            run = _seen(chosen) if isinstance(chosen, Intrinsic) else _copied(chosen)
+            run = _seen(chosen) if isinstance(chosen, values.Intrinsic) else _copied(chosen)
             note([run.__code__] if hasattr(run, "__code__") else ())
             found = run(*(lowering.wrapped(kind, None) for kind in kinds))
             result = types.unliteral(lowering.kind_of(found))
@@ -281,16 +268,16 @@ def _written(dispatch: Callable, kinds: tuple) -> _Formula | None:
         if hasattr(dispatch, "tags"):
             parts.add((dispatch, tuple(map(tag_class, kinds[: dispatch.tags]))))
         return _Formula(run, result, frozenset(parts), _is_plain(found), dispatch.__qualname__)
-    except (DataDependentBranch, CannotCompile, Undefined):
+    except (values.DataDependentBranch, CannotCompile, Undefined):
         raise
-    except (Exception, Untraceable) as why:
+    except (Exception, values.Untraceable) as why:
         raise CannotCompile(_reason(why), chosen or dispatch) from why
 
 
 def formula(dispatch: Callable, kinds: tuple) -> _Formula | None:
     """Find what to run for arguments of these types; None if nothing is chosen."""
     key = dispatch, numbers_of(kinds)
-    if len(_formulas) > MOST_FORMULAS and not at_work():
+    if len(_formulas) > MOST_FORMULAS and not values.at_work():
         forget()
     while key not in _formulas:
         if key in _begun:
@@ -298,7 +285,7 @@ def formula(dispatch: Callable, kinds: tuple) -> _Formula | None:
         _begun.add(key)
         try:
             _formulas[key] = _written(dispatch, kinds)
-        except DataDependentBranch:
+        except values.DataDependentBranch:
             # Once more, and through the text of the function that asks.
             _copies.clear()
         finally:
@@ -312,7 +299,7 @@ def formula(dispatch: Callable, kinds: tuple) -> _Formula | None:
 def forget() -> None:
     """Find anew what is run: a point function has another implementation than was known."""
     _formulas.clear()
-    if not at_work():
+    if not values.at_work():
         _copies.clear()
         _modules.clear()
 
@@ -337,7 +324,7 @@ def _chosen(dispatch: Callable, kinds: tuple) -> Callable | None:
         if found is not None:
             return found
     if hasattr(dispatch, "tags"):
-        classes = [tag_class(kind) or words(kind) for kind in kinds[: dispatch.tags]]
+        classes = [tag_class(kind) or values.words(kind) for kind in kinds[: dispatch.tags]]
         raise Undefined(dispatch.__name__, tuple(classes))
     return None
 
@@ -351,7 +338,7 @@ def _call(function: Callable, arguments: tuple) -> Any:
     """Call the function that is chosen by the types of the arguments, if one is chosen."""
     if function not in choosers:
         return NotImplemented
-    lowering = now()
+    lowering = values.now()
     kinds = tuple(map(lowering.kind_of, arguments))
     if function in _own:  # one serves all numbers
         kinds = tuple(map(types.unliteral, kinds))

@@ -3,11 +3,11 @@
 from math import inf
 from typing import Any
 
-from karamelo_py.compiler.compile import real, shared
+from karamelo_py.compiler.compile import index, real, shared
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.held import at_hand
-from karamelo_py.compiler.loops import kernel, noinline
-from karamelo_py.compiler.threads import shared_out
+from karamelo_py.compiler.loops import kernel
+from karamelo_py.compiler.threads import by_threads
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import DT, MASS, TIME, TIMESTEP, Control, Number, Setup, Tag
 from karamelo_py.kernels.totals import agree_on_reports
@@ -159,8 +159,18 @@ def all_well(s: Setup, take: Any = take_reports) -> bool:
     return clock.wrong == 0
 
 
-@noinline
-def _check_share(frame, kin, grids, points, tiling, now, stride, k):
+@shared
+def checked_move(frame, kin, grids, points, now, stride, p):
+    """Count the cells that point `p` moves by in a step; tell whether it may go as far."""
+    grid = record(grids, index(points.grid[p]))
+    y = load_vector(kin, points.x[1 - now], p)
+    step = (y - load_vector(kin, points.x[now], p)).largest()
+    cells = float(step * grid.inv_h)
+    return cells, cells <= stride and (inside(grid, kin, y) or not frame.moves)
+
+
+@by_threads
+def _check_points(frame, kin, grids, points, tiling, now, stride, k):
     """Report the largest move of the points of the k-th share, and the point that went wrong."""
     grids, points, tiling = at_hand(grids), at_hand(points), at_hand(tiling)
     for place in range(tiling.share[k], tiling.share[k + 1]):
@@ -168,23 +178,11 @@ def _check_share(frame, kin, grids, points, tiling, now, stride, k):
         furthest = 0.0
         wrong = 0
         for p in range(tiling.range[t, 0], tiling.range[t, 1]):
-            grid = record(grids, points.grid[p])
-            y = load_vector(kin, points.x[1 - now], p)
-            step = (y - load_vector(kin, points.x[now], p)).largest()
-            cells = float(step * grid.inv_h)
+            cells, good = checked_move(frame, kin, grids, points, now, stride, p)
             furthest = max(furthest, cells)
-            if not (cells <= stride and (inside(grid, kin, y) or not frame.moves)):
-                wrong = p + 1
+            wrong = wrong if good else p + 1
         tiling.report[t, 0] = furthest
         tiling.report[t, 2] = wrong
-
-
-_check_shares = shared_out(_check_share)
-
-
-@kernel
-def _check_points(mode, frame, kin, grids, points, tiling, now, stride):
-    _check_shares(mode, tiling.count[1], frame, kin, grids, points, tiling, now, stride)
 
 
 @shared
@@ -192,8 +190,8 @@ def check_moves(s: Setup, mode: Tag) -> bool:
     """Look at the new positions again, after hooks that may have changed them."""
     clock = s.control.clock[0]
     for block in s.blocks:
-        points, tiling = block.points, block.tiling
-        _check_points(mode, s.frame, s.kin, s.grids, points, tiling, clock.now, clock.stride)
+        of = block.points, block.tiling, clock.now, clock.stride
+        _check_points(mode, block.tiling.count[1], s.frame, s.kin, s.grids, *of)
     read_reports(s)
     clock.move = max(clock.move, clock.new_move)
     return clock.wrong == 0

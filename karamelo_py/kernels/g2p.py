@@ -20,15 +20,7 @@ from karamelo_py.compiler.fields import field, forget, increase, load_vector, st
 from karamelo_py.compiler.gpu import aligned_record
 from karamelo_py.compiler.loops import many_threads
 from karamelo_py.compiler.tuples import row
-from karamelo_py.kernels import visit
-from karamelo_py.kernels.arrays import (
-    Index,
-    Nodes,
-    Number,
-    Tag,
-    of_change,
-    vector_at,
-)
+from karamelo_py.kernels import arrays, visit
 from karamelo_py.kernels.loss import FrictionalHeat, in_company, reflect, warm, warm_by_friction
 from karamelo_py.kernels.p2g import Force, VelocityBefore, WorkOfForces
 from karamelo_py.kernels.visit import Work, node_of, straining_node
@@ -121,7 +113,7 @@ class SeriesTerm(NamedTuple):
 
 
 @point_function()
-def empty(task: Tag, w: Work, x: tuple) -> tuple:
+def empty(task: arrays.Tag, w: Work, x: tuple) -> tuple:
     """Return the totals of a gather before the first node: zeros."""
 
 
@@ -144,14 +136,10 @@ def _empty_strain(task, w, x):
     return gradient, visit.no_ratio(w, x[0])
 
 
-@empty.on(TrialStrain)
-def _empty_trial_strain(task, w, x):
-    return zero(w.kin, x[0])
+empty.on(TrialStrain)(lambda task, w, x: zero(w.kin, x[0]))
 
 
-@empty.on(SetMeanStress)
-def _empty_average_stress(task, w, x):
-    return real(0, x[0])
+empty.on(SetMeanStress)(lambda task, w, x: real(0, x[0]))
 
 
 @empty.on(SeriesTerm)
@@ -159,9 +147,7 @@ def _empty_series_term(task, w, x):
     return x - x
 
 
-@visit.records_of.on(Move)
-def _records_of_move(task, nodes):
-    return nodes.update
+visit.records_of.on(Move)(lambda task, nodes: nodes.update)
 
 
 @visit.records_of.on(Strain)
@@ -170,7 +156,7 @@ def _records_of_strain(task, nodes):
 
 
 @point_function()
-def gathered(task: Tag, w: Work, stencil: tuple, k: int, total: tuple) -> tuple:
+def gathered(task: arrays.Tag, w: Work, stencil: tuple, k: int, total: tuple) -> tuple:
     """`total` with the part of the k-th node of the stencil."""
 
 
@@ -187,23 +173,23 @@ def _gathered_move(task, w, stencil, k, total):
 
 
 @shared
-def moves_corners(basis: Tag, kin: Tag) -> bool:
+def moves_corners(basis: arrays.Tag, kin: arrays.Tag) -> bool:
     """Return True for a gather at corners of domains that move with the velocity there."""
     return isinstance(basis, AtCorners) and carried(basis.basis, kin) > 0
 
 
 @shared
-def update_at(kin: Tag, nodes: Nodes, i: Index, like: Number) -> tuple:
+def update_at(kin: arrays.Tag, nodes: arrays.Nodes, i: arrays.Index, like: arrays.Number) -> tuple:
     """v* and v* - v of a node: one record in the plane, two in space."""
     if many_threads() and not isinstance(i, Weighted):  # records that lie side by side
-        both = aligned_record(nodes.update, i, 2 * of_change(kin))
-        first, d = of_change(kin), kin.dimension
+        both = aligned_record(nodes.update, i, 2 * arrays.of_change(kin))
+        first, d = arrays.of_change(kin), kin.dimension
         return vector(kin, both[:d]), vector(kin, both[first : first + d])
     if kin.dimension == 2:
         both = row(nodes.update, i, 0, (*like, *like))
         return vector(kin, both[:2]), vector(kin, both[2:])
-    v = vector_at(kin, nodes.update, i, 0, like)
-    return v, vector_at(kin, nodes.update, i, of_change(kin), like)
+    v = arrays.vector_at(kin, nodes.update, i, 0, like)
+    return v, arrays.vector_at(kin, nodes.update, i, arrays.of_change(kin), like)
 
 
 @shared
@@ -214,9 +200,9 @@ def add_gradient(w, stencil, k, grad_v):
     i, _, grad_N = straining_node(w, stencil, k)
     if many_threads() and not isinstance(i, Weighted):
         d = w.kin.dimension
-        v = vector(w.kin, aligned_record(w.nodes.velocity, i, of_change(w.kin))[:d])
+        v = vector(w.kin, aligned_record(w.nodes.velocity, i, arrays.of_change(w.kin))[:d])
     else:
-        v = vector_at(w.kin, w.nodes.velocity, i, 0, zero_vector(w.kin, grad_N[0]))
+        v = arrays.vector_at(w.kin, w.nodes.velocity, i, 0, zero_vector(w.kin, grad_N[0]))
     return grad_v + outer(v, grad_N)
 
 
@@ -228,9 +214,7 @@ def _gathered_strain(task, w, stencil, k, total):
     )
 
 
-@gathered.on(TrialStrain)
-def _gathered_trial_strain(task, w, stencil, k, total):
-    return add_gradient(w, stencil, k, total)
+gathered.on(TrialStrain)(lambda task, w, stencil, k, total: add_gradient(w, stencil, k, total))
 
 
 @gathered.on(SetMeanStress)
@@ -242,7 +226,7 @@ def _gathered_average_stress(task, w, stencil, k, total):
 @gathered.on(SeriesTerm)
 def _gathered_series_term(task, w, stencil, k, total):
     i, weight, _ = node_of(w, stencil, k)
-    return total + weight * vector_at(w.kin, field(w.nodes.fields, Series), i, 0, total)
+    return total + weight * arrays.vector_at(w.kin, field(w.nodes.fields, Series), i, 0, total)
 
 
 # --- update -----------------------------------------------------------------------------------
@@ -371,7 +355,7 @@ def _updated_move(task, w, stencil, p, dt, total, totals, fastest):
                 u = corners[corner]
             else:
                 by = carrier(w.basis, w.kin, w.grid, stencil, corner)
-                u = vector_at(w.kin, w.nodes.update, by, 0, x)
+                u = arrays.vector_at(w.kin, w.nodes.update, by, 0, x)
             new = carry(w.basis, w.kin, new, before, corner, dt * u)
         store(w.places.y, p, new)
         moved += further_reach(w.basis, w.kin, w.grid, before, new)

@@ -19,6 +19,7 @@ from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.gpu import counted, raise_to
 from karamelo_py.compiler.lanes import room_for
 from karamelo_py.compiler.tuples import flat, nested_as, record
+from karamelo_py.kernels import sweep
 from karamelo_py.kernels.arrays import DT, TIME, Nodes, of_force
 from karamelo_py.kernels.clock import finish, kick, last_step_size, step_size
 from karamelo_py.kernels.g2p import updated_all
@@ -27,14 +28,6 @@ from karamelo_py.kernels.nodes import at_node
 from karamelo_py.kernels.p2g import RigidSums, adds, columns_of, load_all, scattered_all
 from karamelo_py.kernels.stencils import gathered_by
 from karamelo_py.kernels.step import ABOVE_LIMIT, DONE, PATIENCE, SHRUNK, SMALLEST, STOPPED
-from karamelo_py.kernels.sweep import (
-    PresentWeights,
-    context_of,
-    places_of,
-    position_of,
-    stencil_of,
-    work_of,
-)
 from karamelo_py.kernels.visit import place_at
 from karamelo_py.points import basis as bases
 from karamelo_py.points.basis import entry, locate, support
@@ -117,6 +110,18 @@ def nodes_in_cell(basis: Any, kin: Any) -> int:
 # --- visits of points -------------------------------------------------------------------------
 
 
+def while_steps_go_on(function: Callable) -> Callable:
+    """Make what a thread does for as long as steps go on: nothing behind one that ended."""
+
+    def go_on(i, fate, *arguments):
+        if fate[STATUS] == 0:
+            function(i, fate, *arguments)
+
+    for name in ("__name__", "__qualname__", "__module__"):
+        setattr(go_on, name, getattr(function, name))
+    return vars(function).setdefault("go_on", go_on)  # one for all launches
+
+
 @shared
 def goes_wrong(fate, number):
     """Note the number of a point that goes wrong: the lowest stays."""
@@ -161,7 +166,9 @@ class Stage:
     def __init__(self, row: Any, basis: Any, kin: Any, present: list, parts: int = 1):
         share, of_last_step = row.share, row.of_last_step
         self.row, self.parts = row, parts
-        self.lists = isinstance(row.visit.weights, PresentWeights)  # points by their cells anew
+        self.lists = isinstance(
+            row.visit.weights, sweep.PresentWeights
+        )  # points by their cells anew
         quantities = row.visit.quantities
         self.columns = [
             (name, column, add)
@@ -181,14 +188,14 @@ class Stage:
         def context(s):
             whole = last_step_size(s) if of_last_step else step_size(s)
             dt = whole if share == 1 else real(share, whole) * whole
-            return context_of(at(s), dt, row.gathers, row.scatters, row.moves)
+            return sweep.context_of(at(s), dt, row.gathers, row.scatters, row.moves)
 
         @shared
         def at_point(s, block, p):
             c, points = context(s), block.points
             grid = record(c.grids, index(points.grid[p]))
-            places = places_of(c.frame, points, c.now, c.then)
-            return c, work_of(c, grid, c.nodes, block, places)
+            places = sweep.places_of(c.frame, points, c.now, c.then)
+            return c, sweep.work_of(c, grid, c.nodes, block, places)
 
         self.at_point = at_point  # the context of the visit, and the work at a point
 
@@ -220,8 +227,6 @@ class Stage:
         at_point, keep = self.at_point, self._keep()
 
         def load_point(i, fate, s, block, cells):
-            if fate[STATUS] > 0:
-                return
             c, w = at_point(s, block, index(i))
             keep(w, index(i), c.dt, cells)
 
@@ -232,12 +237,10 @@ class Stage:
         at_point, tasks, keep = self.at_point, self.row.visit.tasks, self._keep()
 
         def gather_point(i, fate, s, block, cells):
-            if fate[STATUS] > 0:
-                return
             p = index(i)
             c, w = at_point(s, block, p)
-            stencil = stencil_of(w, p)
-            found = gathered_by(OneByOne(), tasks, w, stencil, position_of(w, p))
+            stencil = sweep.stencil_of(w, p)
+            found = gathered_by(OneByOne(), tasks, w, stencil, sweep.position_of(w, p))
             # From zero: what others have found by now would depend on which thread comes first.
             moved, rate = updated_all(tasks, w, stencil, p, c.dt, found, real(0, c.dt))
             _report(fate, block.points.id[p], moved, rate, c.stride)
@@ -260,8 +263,6 @@ class Stage:
         at_point, place, count, corners = self.at_point, self._place(), self.support, self.corners
 
         def count_point(i, fate, s, block, cells):
-            if fate[STATUS] > 0:
-                return
             points, p = block.points, index(i)
             c, w = at_point(s, block, p)
             where = place(w, p)
@@ -332,9 +333,7 @@ class Stage:
             return w._replace(basis=InCell(w.basis), nodes=nodes_for(w.nodes, rooms))
 
         def scatter_cell(i, fate, s, block, cells):
-            if fate[STATUS] > 0 or i >= cells.box[cells.box.size - 1]:
-                return
-            if only_if_more and is_last(s):
+            if i >= cells.box[cells.box.size - 1] or (only_if_more and is_last(s)):
                 return
             cell = cells.cell[i]
             first, last = cells.first[cell], cells.first[cell + 1]
@@ -379,9 +378,7 @@ class Stage:
                     array[n, column] = value
 
         def sum_node(i, fate, s, block, cells, use):
-            if fate[STATUS] > 0 or use[i] == 0:
-                return
-            if only_if_more and is_last(s):
+            if use[i] == 0 or (only_if_more and is_last(s)):
                 return
             grid = _grid_of(s.grids, i)
             found = (real(0, s.nodes.sums[0, 0]),) * len(columns)
@@ -396,11 +393,8 @@ class Stage:
         only_if_more = self.row.only_if_more
 
         def age_node(i, fate, s, use):
-            if fate[STATUS] > 0 or use[i] == 0:
-                return
-            if only_if_more and is_last(s):
-                return
-            use[i] -= 1
+            if use[i] > 0 and not (only_if_more and is_last(s)):
+                use[i] -= 1
 
         return age_node
 
@@ -409,9 +403,7 @@ class Stage:
         count, only_if_more = self.support, self.row.only_if_more
 
         def mark_nodes(i, fate, s, cells, use):
-            if fate[STATUS] > 0 or i >= cells.box[cells.box.size - 1]:
-                return
-            if only_if_more and is_last(s):
+            if i >= cells.box[cells.box.size - 1] or (only_if_more and is_last(s)):
                 return
             cell = cells.cell[i]
             grid = _grid_of(s.grids, cell)
@@ -463,8 +455,6 @@ def _weight(number):
 
 def sum_counts(i, fate, cells):
     """Sum a chunk of counts, and occupied cells."""
-    if fate[STATUS] > 0:
-        return
     total = 0
     for c in range(i * CHUNK, min((i + 1) * CHUNK, cells.count.size)):
         total += _weight(cells.count[c])
@@ -473,8 +463,6 @@ def sum_counts(i, fate, cells):
 
 def sum_sums(i, fate, cells, begin, count, above):
     """Sum a chunk of sums: of those from `begin` on, into the level from `above` on."""
-    if fate[STATUS] > 0:
-        return
     total = 0
     for k in range(i * CHUNK, min((i + 1) * CHUNK, count)):
         total += cells.sums[begin + k]
@@ -483,8 +471,6 @@ def sum_sums(i, fate, cells, begin, count, above):
 
 def sum_before(i, fate, cells, begin, above):
     """Find the sum of all sums before one; `above` as in `sum_sums`, -1 where there is none."""
-    if fate[STATUS] > 0:
-        return
     chunk = i // CHUNK
     total = cells.before[above + chunk] if above >= 0 else 0
     for k in range(chunk * CHUNK, i):
@@ -494,8 +480,6 @@ def sum_before(i, fate, cells, begin, above):
 
 def place_list(i, fate, cells):
     """Say where the points of a cell are listed, and the number of its box."""
-    if fate[STATUS] > 0:
-        return
     chunk = i // CHUNK
     total = cells.before[chunk]
     for c in range(chunk * CHUNK, i):
@@ -512,8 +496,6 @@ def place_list(i, fate, cells):
 
 def list_point(i, fate, cells):
     """Enter a point into the list of its cell."""
-    if fate[STATUS] > 0:
-        return
     c = cells.number[i]
     cells.order[cells.first[c] + counted(cells.count, c, -1) - 1] = i
 
@@ -533,7 +515,7 @@ def sort_cell(corners: int) -> Callable:
         return ids[p] * corners + corner
 
     def sort_cell(i, fate, ids, cells):
-        if fate[STATUS] > 0 or i >= cells.box[cells.box.size - 1]:
+        if i >= cells.box[cells.box.size - 1]:
             return
         c = cells.cell[i]
         first, last = cells.first[c], cells.first[c + 1]
@@ -558,7 +540,7 @@ def sort_cell(corners: int) -> Callable:
 def order_cell(i, fate, cells, come_from):
     """Say where the points of a cell come to lie, and which come there."""
     boxes = cells.box[cells.box.size - 1]
-    if fate[STATUS] > 0 or i >= boxes:
+    if i >= boxes:
         return
     cell = cells.cell[i]
     first, last = cells.first[cell], cells.first[cell + 1]
@@ -578,8 +560,6 @@ def order_cell(i, fate, cells, come_from):
 
 def take_rows(i, fate, rows, come_from, room):
     """Copy the numbers of the point that comes to place `i`."""
-    if fate[STATUS] > 0:
-        return
     p = index(come_from[i])
     for k in range(rows.shape[0]):
         room[k, i] = rows[k, p]
@@ -587,8 +567,6 @@ def take_rows(i, fate, rows, come_from, room):
 
 def put_rows(i, fate, rows, room):
     """Put numbers of a point where it comes to lie."""
-    if fate[STATUS] > 0:
-        return
     for k in range(rows.shape[0]):
         rows[k, i] = room[k, i]
 
@@ -602,7 +580,7 @@ def of_nodes(row: Any) -> Callable:
     made = task if callable(task) else shared(lambda s: task)
 
     def visit_node(i, fate, s, use):
-        if fate[STATUS] > 0 or use[i] == 0:
+        if use[i] == 0:
             return
         here = at(s)
         at_node(made(s), here.kin, here.nodes, index(i), length(s))
@@ -612,8 +590,6 @@ def of_nodes(row: Any) -> Callable:
 
 def clear(i, fate, array, first):
     """Clear a number of an array."""
-    if fate[STATUS] > 0:
-        return
     array[first + i] = 0
 
 
@@ -621,8 +597,6 @@ def take_reports(take: Callable) -> Callable:
     """Make what takes over how the points fared in a visit, with a function of the clock."""
 
     def take_all_reports(i, fate, s):
-        if fate[STATUS] > 0:
-            return
         clock = s.control.clock[0]
         clock.new_move, clock.new_rate = fate[MOVED], fate[RATE]
         take(clock)
@@ -637,16 +611,12 @@ def take_reports(take: Callable) -> Callable:
 
 def finish_step(i, fate, s):
     """End a step: time goes on, and the size of the next is chosen."""
-    if fate[STATUS] > 0:
-        return
     fate[DRIFT] += s.control.clock[0].move
     finish(s.control)
 
 
 def end_step(i, fate, s):
     """Say whether steps go on."""
-    if fate[STATUS] > 0:
-        return
     clock = s.control.clock[0]
     if clock.watch_limit > 0 and clock.over_limit >= PATIENCE:
         fate[STATUS] = 1.0 + ABOVE_LIMIT

@@ -10,50 +10,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import index, real, shared
-from karamelo_py.compiler.fields import field, load_vector
+from karamelo_py.compiler.compile import index, shared
+from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.formula import ROWS, STACK
 from karamelo_py.compiler.gpu import counted, raise_to
 from karamelo_py.compiler.lanes import room_for
-from karamelo_py.compiler.tuples import record
-from karamelo_py.kernels import arrays, totals
+from karamelo_py.kernels import arrays, hook_loop, totals, watch
 from karamelo_py.kernels.arrays import TIMESTEP, known_to_laws, with_items_of
-from karamelo_py.kernels.clock import kick, step_size
+from karamelo_py.kernels.clock import checked_move, kick, step_size
 from karamelo_py.kernels.contact import Scratch, SeparateFields
 from karamelo_py.kernels.gpu import MOVED, STATUS, goes_wrong, is_last
 from karamelo_py.kernels.heat import heat_of, heated
-from karamelo_py.kernels.hook_loop import (
-    ACT,
-    LOADS,
-    HookedNodes,
-    MovingPoints,
-    WholeNodes,
-    WholePoints,
-    act,
-    choose_points,
-    corners_that_move,
-    publish_total,
-    without_whole,
-)
 from karamelo_py.kernels.loss import FrictionalHeat
 from karamelo_py.kernels.p2g import Force, WorkOfForces
 from karamelo_py.kernels.step import GAINED
-from karamelo_py.kernels.visit import state_at
-from karamelo_py.kernels.watch import (
-    judge,
-    note_before,
-    solid_of,
-    take_drift,
-    take_energies,
-)
-from karamelo_py.points.grid import inside
 from karamelo_py.points.kinematics import planar
-from karamelo_py.points.laws import (
-    dissipated_energy,
-    energy_density,
-    moves_as_told,
-    specific_volume,
-)
+from karamelo_py.points.laws import moves_as_told
 
 
 class Own(NamedTuple):
@@ -81,7 +53,7 @@ def _hooks_with_room(hooks):
     """Return the hooks with room for one member."""
     own = Own(room_for(1, (0,))[0], room_for(1, (0.0,) * (STACK + ROWS + 1)))
     own.scratch[:6] = 0.0
-    return with_items_of(without_whole(hooks), own)
+    return with_items_of(hook_loop.without_whole(hooks), own)
 
 
 def _control(count: int) -> Callable:
@@ -112,8 +84,6 @@ _CONTROL = _control(0)
 
 def clear_held(i, fate, held):
     """Forget who has held a node."""
-    if fate[STATUS] > 0:
-        return
     for c in range(held.shape[1]):
         held[i, c].slot = 0
 
@@ -126,8 +96,6 @@ def _member(hooks, h, i):
 
 def count_node(i, fate, nodes, hooks, h, heavy):
     """Count a member that has mass."""
-    if fate[STATUS] > 0:
-        return
     if nodes.sums[_member(hooks, h, i), arrays.MASS] > 0:
         counted(heavy, h, 1)
 
@@ -150,8 +118,6 @@ def on_node(target: int, task: int, values: int, of_heat: bool = False) -> Calla
     length = step_size if of_heat else kick
 
     def visit_member(i, fate, s, hooks, h, heavy, copies):
-        if fate[STATUS] > 0:
-            return
         n = _member(hooks, h, i)
         if not s.nodes.sums[n, arrays.MASS] > 0:
             return
@@ -160,8 +126,8 @@ def on_node(target: int, task: int, values: int, of_heat: bool = False) -> Calla
         # Temperatures are always kept: FLIP, whatever the transfer of velocity.
         control, kept = control_of(s, copies, i), 1.0 if of_heat else s.control.clock[0].kept
         nodes = _planar_nodes(s.nodes)
-        what = HookedNodes(target, planar(s.kin), s.grids, nodes, s.ranges, kept)
-        act(what, task, own, control, float(length(s)), h, 1, _share(hooks, h, heavy))
+        what = hook_loop.HookedNodes(target, planar(s.kin), s.grids, nodes, s.ranges, kept)
+        hook_loop.act(what, task, own, control, float(length(s)), h, 1, _share(hooks, h, heavy))
 
     return visit_member
 
@@ -171,28 +137,26 @@ def on_whole_node(target: int, early: bool) -> Callable:
     control_of = _control(0)
 
     def visit_whole_member(i, fate, s, hooks, tag, h, copies):
-        if fate[STATUS] > 0:
-            return
         n = _member(hooks, h, i)
         if not s.nodes.sums[n, arrays.MASS] > 0:
             return
         own = _hooks_with_room(hooks)
         own.chosen[0] = n
-        what = WholeNodes(tag, planar(s.kin), s.grids, s.nodes, s.ranges, early, target)
-        act(what, ACT, own, control_of(s, copies, i), float(kick(s)), h, 1, 1.0)
+        what = hook_loop.WholeNodes(tag, planar(s.kin), s.grids, s.nodes, s.ranges, early, target)
+        hook_loop.act(what, hook_loop.ACT, own, control_of(s, copies, i), float(kick(s)), h, 1, 1.0)
 
     return visit_whole_member
 
 
 def work_of_loads(i, fate, s, hooks, copies):
     """Add up the work of loads on a node, and forget them."""
-    if fate[STATUS] > 0:
-        return
     if s.nodes.sums[i, arrays.MASS] > 0:
         own = _hooks_with_room(hooks)
         own.chosen[0] = i
-        what = HookedNodes(LOADS, planar(s.kin), s.grids, _planar_nodes(s.nodes), s.ranges, 0.0)
-        act(what, ACT, own, _CONTROL(s, copies, i), float(kick(s)), 0, 1, 1.0)
+        what = hook_loop.HookedNodes(
+            hook_loop.LOADS, planar(s.kin), s.grids, _planar_nodes(s.nodes), s.ranges, 0.0
+        )
+        hook_loop.act(what, hook_loop.ACT, own, _CONTROL(s, copies, i), float(kick(s)), 0, 1, 1.0)
 
 
 # --- points -----------------------------------------------------------------------------------
@@ -200,12 +164,19 @@ def work_of_loads(i, fate, s, hooks, copies):
 
 def clear_force(i, fate, block, d):
     """Let a point bear no force of fixes, until these say so anew."""
-    if fate[STATUS] > 0:
-        return
     force = field(block.points.fields, Force)
     if force is not None:
         for c in range(d):
             force[c, i] = 0
+
+
+def _act_on_point(what, control_of, i, s, hooks, h, copies):
+    own = _hooks_with_room(hooks)
+    count, _ = hook_loop.choose_points(what, own, h, i, i + 1)
+    if count > 0:
+        hook_loop.act(
+            what, hook_loop.ACT, own, control_of(s, copies, i), float(step_size(s)), h, 1, 1.0
+        )
 
 
 def on_point(then: int, values: int) -> Callable:
@@ -213,17 +184,12 @@ def on_point(then: int, values: int) -> Callable:
     control_of = _control(values)
 
     def visit_point(i, fate, s, block, hooks, h, copies):
-        if fate[STATUS] > 0:
-            return
         p, now = block.points, s.control.clock[0].now
         y = 1 - now if then else now
-        corners = corners_that_move(s)
+        corners = hook_loop.corners_that_move(s)
         rigid = moves_as_told(block.laws)
-        what = MovingPoints(p.id, p.v, p.mass, p.x[now], p.x[y], corners, rigid)
-        own = _hooks_with_room(hooks)
-        count, _ = choose_points(what, own, h, i, i + 1)
-        if count > 0:
-            act(what, ACT, own, control_of(s, copies, i), float(step_size(s)), h, 1, 1.0)
+        what = hook_loop.MovingPoints(p.id, p.v, p.mass, p.x[now], p.x[y], corners, rigid)
+        _act_on_point(what, control_of, i, s, hooks, h, copies)
 
     return visit_point
 
@@ -233,13 +199,8 @@ def on_heated_point(values: int) -> Callable:
     control_of = _control(values)
 
     def visit_heated_point(i, fate, s, block, hooks, h, copies):
-        if fate[STATUS] > 0:
-            return
-        own = _hooks_with_room(hooks)
         what = heated(s.kin, block.points, block.points.x[s.control.clock[0].now])
-        count, _ = choose_points(what, own, h, i, i + 1)
-        if count > 0:
-            act(what, ACT, own, control_of(s, copies, i), float(step_size(s)), h, 1, 1.0)
+        _act_on_point(what, control_of, i, s, hooks, h, copies)
 
     return visit_heated_point
 
@@ -249,30 +210,20 @@ def on_whole_point(then: int, heats: bool = False) -> Callable:
     control_of = _control(0)
 
     def visit_whole_point(i, fate, s, block, hooks, tag, h, copies):
-        if fate[STATUS] > 0:
-            return
         p, now = block.points, s.control.clock[0].now
         y = 1 - now if then else now
         heat = heat_of(p) if heats else ()
-        what = WholePoints(tag, p.id, s.kin, p, block.laws, p.x[y], heat)
-        own = _hooks_with_room(hooks)
-        count, _ = choose_points(what, own, h, i, i + 1)
-        if count > 0:
-            act(what, ACT, own, control_of(s, copies, i), float(step_size(s)), h, 1, 1.0)
+        what = hook_loop.WholePoints(tag, p.id, s.kin, p, block.laws, p.x[y], heat)
+        _act_on_point(what, control_of, i, s, hooks, h, copies)
 
     return visit_whole_point
 
 
 def check_point(i, fate, s, block):
     """Look at the new position of a point again, after hooks that may have changed it."""
-    if fate[STATUS] > 0:
-        return
     points, clock = block.points, s.control.clock[0]
-    grid = record(s.grids, index(points.grid[i]))
-    y = load_vector(s.kin, points.x[1 - clock.now], i)
-    step = (y - load_vector(s.kin, points.x[clock.now], i)).largest()
-    cells = float(step * grid.inv_h)
-    if cells <= clock.stride and (inside(grid, s.kin, y) or not s.frame.moves):
+    cells, good = checked_move(s.frame, s.kin, s.grids, points, clock.now, clock.stride, i)
+    if good:
         raise_to(fate, MOVED, cells)
     else:
         goes_wrong(fate, points.id[i])
@@ -280,8 +231,6 @@ def check_point(i, fate, s, block):
 
 def take_moves(i, fate, s):
     """Take over how far points have come."""
-    if fate[STATUS] > 0:
-        return
     clock = s.control.clock[0]
     clock.move = max(clock.move, fate[MOVED])
     fate[MOVED] = 0.0
@@ -323,7 +272,7 @@ def each_node(function: Callable, s: arrays.Setup) -> Callable:
     setup_of = _setup(s)
 
     def visit_each_node(i, fate, s, use, copies):
-        if fate[STATUS] > 0 or use[i] == 0:
+        if use[i] == 0:
             return
         function(setup_of(s, copies, i), i)
 
@@ -335,8 +284,6 @@ def each_point(function: Callable, s: arrays.Setup) -> Callable:
     setup_of = _setup(s)
 
     def visit_each_point(i, fate, s, block, copies):
-        if fate[STATUS] > 0:
-            return
         function(setup_of(s, copies, i), block, i)
 
     return visit_each_point
@@ -346,8 +293,6 @@ def once(function: Callable) -> Callable:
     """Make what is done once for a row of a function."""
 
     def do_once(i, fate, s):
-        if fate[STATUS] > 0:
-            return
         function(s)
 
     return do_once
@@ -358,8 +303,6 @@ def once(function: Callable) -> Callable:
 
 def clear_totals(i, fate, copies, first, count):
     """Clear a number of the totals in rows from `first` on, `count` of them, in all copies."""
-    if fate[STATUS] > 0:
-        return
     limbs = copies.shape[2]
     k, rest = i // (count * limbs), i % (count * limbs)
     copies[k, first + rest // limbs, rest % limbs] = 0
@@ -367,15 +310,11 @@ def clear_totals(i, fate, copies, first, count):
 
 def clear_rows(i, fate, sums, first):
     """Clear a number of the totals from row `first` on."""
-    if fate[STATUS] > 0:
-        return
     sums[first + i // sums.shape[1], i % sums.shape[1]] = 0
 
 
 def collect_total(i, fate, copies, sums, first):
     """Add up a number of the totals, in rows from `first` on, over the copies."""
-    if fate[STATUS] > 0:
-        return
     row, limb = first + i // copies.shape[2], i % copies.shape[2]
     total = sums[row, limb]
     for k in range(copies.shape[0]):
@@ -386,18 +325,14 @@ def collect_total(i, fate, copies, sums, first):
 
 def publish(i, fate, s, hooks, always):
     """Publish the totals of all hooks, if somebody sees them."""
-    if fate[STATUS] > 0:
-        return
     if always or is_last(s):
         for h in range(len(hooks.table)):
-            publish_total(hooks, h, s.control)
+            hook_loop.publish_total(hooks, h, s.control)
 
 
 def publish_hook(i, fate, s, hooks, h):
     """Publish the totals of one hook."""
-    if fate[STATUS] > 0:
-        return
-    publish_total(hooks, h, s.control)
+    hook_loop.publish_total(hooks, h, s.control)
 
 
 # --- the watch over energy --------------------------------------------------------------------
@@ -405,8 +340,6 @@ def publish_hook(i, fate, s, hooks, h):
 
 def add_energies(i, fate, s, block, copies, threads):
     """Add up the energies of some points, and mass and momentum of their solids."""
-    if fate[STATUS] > 0:
-        return
     points, laws, kin = known_to_laws(block.points), block.laws, s.kin
     own = copies[index(i % len(copies))]
     firsts, first_row = s.control.firsts, s.control.values.size
@@ -414,16 +347,13 @@ def add_energies(i, fate, s, block, copies, threads):
     solid, begin, behind = -1, 0, 0
     total = (0.0,) * (1 + kin.dimension)
     for p in range(i, points.mass.size, threads):
-        law, state = state_at(kin, points, laws, index(p))
-        mass = real(points.mass[p], 0.0)
-        v = [real(x, 0.0) for x in load_vector(kin, points.v, p)]
-        kinetic += 0.5 * mass * sum([x * x for x in v])
-        energy = energy_density(law, kin, state) + dissipated_energy(law, kin, state)
-        stored += mass * real(specific_volume(law), 0.0) * real(energy, 0.0)
+        mass, v, of_motion, of_strain = watch.energies_of(kin, points, laws, index(p))
+        kinetic += of_motion
+        stored += of_strain
         if not begin <= points.id[p] < behind:
             _add_all(own, first_row, solid, total)
             total = (0.0,) * (1 + kin.dimension)
-            solid = solid_of(firsts, points.id[p])
+            solid = watch.solid_of(firsts, points.id[p])
             begin, behind = firsts[solid], firsts[solid + 1]
         more = zip(total, (mass, *[mass * x for x in v]), strict=True)
         total = tuple([part + x for part, x in more])
@@ -441,8 +371,6 @@ def _add_all(own, first_row, solid, total):
 
 def add_work(i, fate, block, copies):
     """Add the work of forces on a point to that of the loads on nodes."""
-    if fate[STATUS] > 0:
-        return
     work = field(block.points.fields, WorkOfForces)
     if work is not None:
         totals.add_to(copies[index((i // 32) % len(copies))], totals.WORK, float(work[0, i]))
@@ -451,22 +379,18 @@ def add_work(i, fate, block, copies):
 
 def look_before(i, fate, s):
     """Keep the energies of a step whose next is looked at."""
-    if fate[STATUS] > 0:
-        return
     totals.carry(s.control.totals[totals.WORK])
-    take_energies(s)
-    note_before(s.control.clock[0], int(s.control.values[TIMESTEP]))
+    watch.take_energies(s)
+    watch.note_before(s.control.clock[0], int(s.control.values[TIMESTEP]))
 
 
 def look_behind(i, fate, s):
     """Look at the energy; the run ends where it has come from nowhere."""
-    if fate[STATUS] > 0:
-        return
     clock = s.control.clock[0]
     if clock.stored_at != int(s.control.values[TIMESTEP]) - 1:
         return
     totals.carry(s.control.totals[totals.WORK])
-    take_energies(s)
-    take_drift(s)
-    if not judge(s.control):
+    watch.take_energies(s)
+    watch.take_drift(s)
+    if not watch.judge(s.control):
         fate[STATUS] = 1.0 + GAINED

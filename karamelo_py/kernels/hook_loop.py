@@ -157,8 +157,9 @@ def _act_on_part(what, task, hooks, control, dt, h, share, k, parts):
     return found
 
 
+@shared_out
 @noinline
-def _act_apart(what, task, hooks, control, dt, h, share, k):
+def _act_on_parts(what, task, hooks, control, dt, h, share, k):
     """Act in the part of thread `k`, with a scratch and totals of its own: totals do not round."""
     own = record(hooks.apart, k)
     for i in range(control.values.size):
@@ -177,9 +178,6 @@ def _act_apart(what, task, hooks, control, dt, h, share, k):
         slot = hooks.table[other].slot
         for row in range(max(slot, 0), min(slot + 3, own.totals.shape[0]) if slot >= 0 else 0):
             totals.hand_over(own.totals, control.totals, row)
-
-
-_act_on_parts = shared_out(_act_apart)
 
 
 @shared

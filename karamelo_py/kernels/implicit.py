@@ -14,16 +14,17 @@ import numpy as np
 from numba import config
 
 from karamelo_py.compiler.algebra import on_numbers
-from karamelo_py.compiler.compile import index, shared
+from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.fields import load, rows_of_points, store
 from karamelo_py.compiler.held import at_hand
-from karamelo_py.compiler.loops import kernel, noinline
+from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.slopes import seeded, slopes_of
+from karamelo_py.compiler.threads import by_threads
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Block, Setup
 from karamelo_py.kernels.lanes import lanes_with, points_from
-from karamelo_py.kernels.sweep import by_threads, places_of
-from karamelo_py.kernels.visit import deformation_of, place_at
+from karamelo_py.kernels.sweep import places_of
+from karamelo_py.kernels.visit import deformation_of, place_at, state_at
 from karamelo_py.points.basis import entry, locate, support
 from karamelo_py.points.basis.cpdi import AtCorners
 from karamelo_py.points.kinematics import (
@@ -38,13 +39,7 @@ from karamelo_py.points.kinematics import (
     zero,
     zero_vector,
 )
-from karamelo_py.points.laws import (
-    advance,
-    by_rates,
-    initial_state,
-    kirchhoff_stress,
-    specific_volume,
-)
+from karamelo_py.points.laws import advance, by_rates, kirchhoff_stress, specific_volume
 
 PARTS = 64  # of a loop that threads share out; points of whole groups of lanes each
 GROUP = 8
@@ -102,8 +97,8 @@ def points_of(count, k):
     return min(GROUP * (groups * k // PARTS), count)
 
 
-@noinline
-def _see(frame, kin, basis, grids, points, laws, now, seen, part):
+@by_threads
+def see(frame, kin, basis, grids, points, laws, now, seen, part):
     """Find the nodes that points see, with weights and gradients in the present places."""
     points, laws, seen = at_hand(points), at_hand(laws), at_hand(seen)
     where = places_of(frame, points, now, 1 - now).where
@@ -130,8 +125,7 @@ def _see(frame, kin, basis, grids, points, laws, now, seen, part):
                     count += 1
         seen.count[p] = count
         if not frame.moves:
-            law = record(laws, index(points.material[p]))
-            state = load(points.state, p, initial_state(law, kin, points.mass[p]))
+            law, state = state_at(kin, points, laws, p)
             back = inv(deformation_of(frame, kin, law, state, points, p)).at()
             for k in range(support(basis, kin)):
                 g = [seen.gradients[p, k, j] for j in range(len(kin.Gradient._fields))]
@@ -148,8 +142,8 @@ def gradient_at(kin, seen, p, k):
     return gradient(kin, [seen.gradients[p, k, j] for j in range(len(kin.Gradient._fields))])
 
 
-@noinline
-def _strain(kin, seen, u, response, part):
+@by_threads
+def strain(kin, seen, u, response, part):
     """H of each point, from displacements (m, d)."""
     seen, response = at_hand(seen), at_hand(response)
     count = seen.nodes.shape[0]
@@ -165,6 +159,15 @@ def _strain(kin, seen, u, response, part):
         store(response.increment, p, H)
         most = max(most, own.largest())
     response.furthest[part] = most
+
+
+@shared
+def strained_point(kin, points, laws, response, p):
+    """Law and state of a point before the step, H, and its reference volume."""
+    law, state = state_at(kin, points, laws, p)
+    mass = points.mass[p]
+    H = load(response.increment, p, zero(kin, mass))
+    return law, state, H, mass * specific_volume(law)
 
 
 @shared
@@ -185,24 +188,20 @@ if config.DISABLE_JIT:  # type: ignore[attr-defined]
     stress_and_tangent = on_numbers(stress_and_tangent)
 
 
-@noinline
-def _respond(kin, points, laws, dt, response, part):
+@by_threads
+def respond(kin, points, laws, dt, response, part):
     """Stress of each point after its increment."""
     points, laws, response = at_hand(points), at_hand(laws), at_hand(response)
     lanes = lanes_with((), laws, points.mass)
     end = points_of(points.mass.size, part + 1)
     for q in range(points_of(points.mass.size, part), end, lanes.width):
         p = points_from(lanes, q, end)
-        law = record(laws, index(points.material[p]))
-        mass = points.mass[p]
-        state = load(points.state, p, initial_state(law, kin, mass))
-        H = load(response.increment, p, zero(kin, mass))
-        volume = mass * specific_volume(law)
+        law, state, H, volume = strained_point(kin, points, laws, response, p)
         store(response.stress, p, volume * nominal_stress(law, kin, state, H, dt))
 
 
-@noinline
-def _respond_to_changes(kin, points, laws, dt, response, first, end, tangent, part):
+@by_threads
+def respond_to_changes(kin, points, laws, dt, response, first, end, tangent, part):
     """V0 dP/dH (t t, c) of c points from the `first` on, a row of P after another."""
     points, laws, response = at_hand(points), at_hand(laws), at_hand(response)
     lanes = lanes_with((), laws, points.mass)
@@ -210,11 +209,7 @@ def _respond_to_changes(kin, points, laws, dt, response, first, end, tangent, pa
     last = points_of(count, part + 1)
     for q in range(points_of(count, part), last, lanes.width):
         p = points_from(lanes, first + q, first + last)
-        law = record(laws, index(points.material[p]))
-        mass = points.mass[p]
-        state = load(points.state, p, initial_state(law, kin, mass))
-        H = load(response.increment, p, zero(kin, mass))
-        volume = mass * specific_volume(law)
+        law, state, H, volume = strained_point(kin, points, laws, response, p)
         _, slopes = stress_and_tangent(law, kin, state, H, dt)
         own = points_from(lanes, q, last)
         store(tangent, own, tuple([volume * s for row in slopes for s in row]))
@@ -225,11 +220,9 @@ def keep_stress(kin, points, laws, stress):
     """V0 P of the present state: no place has changed yet."""
     points, laws = at_hand(points), at_hand(laws)
     for p in range(points.mass.size):
-        law = record(laws, index(points.material[p]))
-        mass = points.mass[p]
-        state = load(points.state, p, initial_state(law, kin, mass))
+        law, state = state_at(kin, points, laws, p)
         tau = kirchhoff_stress(law, kin, state)
-        store(stress, p, mass * specific_volume(law) * tau.nominal(unit(kin)))
+        store(stress, p, points.mass[p] * specific_volume(law) * tau.nominal(unit(kin)))
 
 
 # --- at the nodes -----------------------------------------------------------------------------
@@ -270,8 +263,8 @@ def spread(seen, places):
     return most
 
 
-@noinline
-def _mark_pairs(seen, pairs, part):
+@by_threads
+def mark_pairs(seen, pairs, part):
     """Mark the pairs of nodes that there are, by 0 in `Pairs.rank`."""
     seen, pairs = at_hand(seen), at_hand(pairs)
     m, width = pairs.codes.size, seen.nodes.shape[1]
@@ -282,8 +275,8 @@ def _mark_pairs(seen, pairs, part):
                 pairs.rank[a, pairs.middle + pairs.codes[seen.nodes[p, k]] - pairs.codes[a]] = 0
 
 
-@noinline
-def _add_forces(kin, seen, stress, f, part):
+@by_threads
+def add_forces(kin, seen, stress, f, part):
     """Add what stresses (t, n) make of forces (m, d): V0 P grad N."""
     seen = at_hand(seen)
     m, width = f.shape[0], seen.nodes.shape[1]
@@ -332,8 +325,8 @@ def by_displacement(kin, D, g):
     )  # fmt: skip
 
 
-@noinline
-def _add_stiffness(kin, seen, tangent, first, end, done, pairs, K, part):
+@by_threads
+def add_stiffness(kin, seen, tangent, first, end, done, pairs, K, part):
     """Add derivatives of the forces of points from the `first` to the `end` to blocks K (b, d d).
 
     `done` (m,) are how many entries of each node were taken before, and are now.
@@ -355,15 +348,6 @@ def _add_stiffness(kin, seen, tangent, first, end, done, pairs, K, part):
                     K[at, c] += x
             e += 1
         done[a] = e - seen.starts[a]
-
-
-see = by_threads(_see)
-strain = by_threads(_strain)
-respond = by_threads(_respond)
-respond_to_changes = by_threads(_respond_to_changes)
-mark_pairs = by_threads(_mark_pairs)
-add_forces = by_threads(_add_forces)
-add_stiffness = by_threads(_add_stiffness)
 
 
 @kernel

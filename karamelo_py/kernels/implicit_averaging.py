@@ -21,25 +21,19 @@ import numpy as np
 from numba import config
 
 from karamelo_py.compiler.algebra import on_numbers
-from karamelo_py.compiler.compile import index, shared
+from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.fields import load, rows_of_points, store
 from karamelo_py.compiler.held import at_hand
-from karamelo_py.compiler.loops import kernel, noinline
+from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.slopes import seeded, slopes_of, value_of
-from karamelo_py.compiler.tuples import record
+from karamelo_py.compiler.threads import by_threads
 from karamelo_py.kernels.arrays import Block
-from karamelo_py.kernels.implicit import PARTS, gradient_at, points_of
+from karamelo_py.kernels.implicit import PARTS, gradient_at, points_of, strained_point
 from karamelo_py.kernels.lanes import lanes_with, points_from
-from karamelo_py.kernels.sweep import by_threads
+from karamelo_py.kernels.visit import state_at
 from karamelo_py.points.frames import Updated, scaled_increment
 from karamelo_py.points.kinematics import I, det, inv, tensor, vector, zero
-from karamelo_py.points.laws import (
-    advance,
-    initial_state,
-    jacobian,
-    kirchhoff_stress,
-    specific_volume,
-)
+from karamelo_py.points.laws import advance, jacobian, kirchhoff_stress, specific_volume
 
 
 class Averages(NamedTuple):
@@ -71,17 +65,14 @@ def cofactors(A):
     return det(A) * inv(A).transposed()
 
 
-@noinline
-def _grow(kin, points, laws, response, averages, part):
+@by_threads
+def grow(kin, points, laws, response, averages, part):
     """Volume of each point before and after its increment, and its derivatives."""
     points, laws = at_hand(points), at_hand(laws)
     response, averages = at_hand(response), at_hand(averages)
     for p in range(points_of(points.mass.size, part), points_of(points.mass.size, part + 1)):
-        law = record(laws, index(points.material[p]))
-        mass = points.mass[p]
-        state = load(points.state, p, initial_state(law, kin, mass))
-        A = I + load(response.increment, p, zero(kin, mass))
-        volume = mass * specific_volume(law) * jacobian(law, kin, state)
+        law, state, H, volume = strained_point(kin, points, laws, response, p)
+        A, volume = I + H, volume * jacobian(law, kin, state)
         averages.volume[0, p] = volume
         averages.grown[0, p] = volume * det(A)
         store(averages.cofactors, p, volume * cofactors(A))
@@ -101,8 +92,8 @@ if config.DISABLE_JIT:  # type: ignore[attr-defined]
     averaged_stress = on_numbers(averaged_stress)
 
 
-@noinline
-def _respond(kin, points, laws, dt, response, averages, part):
+@by_threads
+def respond_averaged(kin, points, laws, dt, response, averages, part):
     """P and q of each point, and their derivatives."""
     points, laws = at_hand(points), at_hand(laws)
     response, averages = at_hand(response), at_hand(averages)
@@ -111,14 +102,10 @@ def _respond(kin, points, laws, dt, response, averages, part):
     t = kin.tensor_size
     for q in range(points_of(points.mass.size, part), end, lanes.width):
         p = points_from(lanes, q, end)
-        law = record(laws, index(points.material[p]))
-        mass = points.mass[p]
-        state = load(points.state, p, initial_state(law, kin, mass))
-        H = load(response.increment, p, zero(kin, mass))
-        (ratio,) = load(averages.ratio, p, (mass,))
+        law, state, H, volume = strained_point(kin, points, laws, response, p)
+        (ratio,) = load(averages.ratio, p, (volume,))
         *by_H, by_ratio = seeded((*H, ratio))
         P, pressure = averaged_stress(law, kin, state, tensor(kin, by_H), by_ratio, dt)
-        volume = mass * specific_volume(law)
         slopes = [slopes_of(x, t + 1) for x in P]
         store(response.stress, p, volume * value_of(P))
         store(averages.tangent, p, tuple([volume * s for row in slopes for s in row[:t]]))
@@ -134,20 +121,18 @@ def keep_averaged_stress(kin, points, laws, response, averages):
     """P and q of the present state: no place has changed yet."""
     points, laws = at_hand(points), at_hand(laws)
     for p in range(points.mass.size):
-        law = record(laws, index(points.material[p]))
-        mass = points.mass[p]
-        state = load(points.state, p, initial_state(law, kin, mass))
+        law, state = state_at(kin, points, laws, p)
         tau = kirchhoff_stress(law, kin, state)
         mean = tau.mean_of_stretching()
-        volume = mass * specific_volume(law)
-        none = zero(kin, mass)
+        volume = points.mass[p] * specific_volume(law)
+        none = zero(kin, volume)
         store(response.increment, p, none)
         store(response.stress, p, volume * (tau - mean * I).nominal(I + none))
         averages.pressure[0, p] = volume * mean
 
 
-@noinline
-def _bring_mean(kin, response, averages, part):
+@by_threads
+def bring_mean(kin, response, averages, part):
     """Add to P and its derivatives what the average of q makes of them."""
     response, averages = at_hand(response), at_hand(averages)
     count = averages.mean.shape[1]
@@ -166,8 +151,8 @@ def _bring_mean(kin, response, averages, part):
 # --- at the nodes -----------------------------------------------------------------------------
 
 
-@noinline
-def _sum_at_nodes(seen, values, sums, part):
+@by_threads
+def sum_at_nodes(seen, values, sums, part):
     """Add values (1, n) of points to nodes (m,), by weights."""
     seen = at_hand(seen)
     m, width = sums.size, seen.nodes.shape[1]
@@ -177,8 +162,8 @@ def _sum_at_nodes(seen, values, sums, part):
             sums[a] += seen.weights[p, k] * values[0, p]
 
 
-@noinline
-def _average(seen, nodes, values, part):
+@by_threads
+def average(seen, nodes, values, part):
     """Find the average (1, n) that points have of the values of nodes (m,)."""
     seen = at_hand(seen)
     count = seen.nodes.shape[0]
@@ -189,8 +174,8 @@ def _average(seen, nodes, values, part):
         values[0, p] = sum_of
 
 
-@noinline
-def _add_slopes(kin, seen, tensors, pairs, out, part):
+@by_threads
+def add_slopes(kin, seen, tensors, pairs, out, part):
     """Add N_a T grad N_b of tensors T (t, n) of points to pairs of nodes, d numbers each."""
     seen, pairs = at_hand(seen), at_hand(pairs)
     d = kin.dimension
@@ -208,8 +193,8 @@ def _add_slopes(kin, seen, tensors, pairs, out, part):
                     out[at + j] += weight * x
 
 
-@noinline
-def _add_products(seen, values, pairs, out, part):
+@by_threads
+def add_products(seen, values, pairs, out, part):
     """Add N_a N_b times values (1, n) of points to pairs of nodes."""
     seen, pairs = at_hand(seen), at_hand(pairs)
     m, width = pairs.codes.size, seen.nodes.shape[1]
@@ -221,12 +206,3 @@ def _add_products(seen, values, pairs, out, part):
                 code = pairs.codes[seen.nodes[p, other]] - pairs.codes[a]
                 at = pairs.first[a] + pairs.rank[a, pairs.middle + code]
                 out[at] += scale * seen.weights[p, other]
-
-
-grow = by_threads(_grow)
-respond_averaged = by_threads(_respond)
-bring_mean = by_threads(_bring_mean)
-sum_at_nodes = by_threads(_sum_at_nodes)
-average = by_threads(_average)
-add_slopes = by_threads(_add_slopes)
-add_products = by_threads(_add_products)

@@ -21,7 +21,7 @@ from karamelo_py.compiler.fields import (
 )
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.lanes.records import move_record
-from karamelo_py.compiler.loops import noinline
+from karamelo_py.compiler.threads import by_threads
 from karamelo_py.compiler.tuples import put_at
 from karamelo_py.kernels import arrays, visit
 from karamelo_py.kernels.arrays import MASS, Buffers, Index, Nodes, Number, Tag, of_force
@@ -165,14 +165,10 @@ def load_of(quantity: Tag, w: Work, p: Index, like: Number) -> tuple:
     """Return the load of a point: the numbers that it scatters, before they are weighted."""
 
 
-@visit.records_of.on(MassMomentum)
-def _records_of_mass_momentum(quantity, nodes):
-    return nodes.sums
+visit.records_of.on(MassMomentum)(lambda quantity, nodes: nodes.sums)
 
 
-@visit.records_of.on(MomentumAgain)
-def _records_of_momentum_again(quantity, nodes):
-    return nodes.velocity
+visit.records_of.on(MomentumAgain)(lambda quantity, nodes: nodes.velocity)
 
 
 @point_function()
@@ -373,8 +369,8 @@ def _clear_record(quantities, kin, nodes, n):
             put_at(array, n, first, (0,) * (end - first))
 
 
-@noinline
-def sum_share(quantities: tuple, kin: Tag, nodes: Nodes, buffers: Buffers, share: int) -> None:
+@by_threads
+def sum_shares(quantities: tuple, kin: Tag, nodes: Nodes, buffers: Buffers, share: int) -> None:
     """Sum the quantities at the nodes of a share, tile after tile, box after box."""
     nodes, buffers = at_hand(nodes), at_hand(buffers)
     first, parts = buffers.first, buffers.parts

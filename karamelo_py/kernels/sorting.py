@@ -8,10 +8,9 @@ from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.fields import pick_items, put_items
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import kernel, noinline
-from karamelo_py.compiler.threads import by_team, shared_out
+from karamelo_py.compiler.threads import by_team, by_threads, shared_out
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Number
-from karamelo_py.kernels.sweep import by_threads
 from karamelo_py.kernels.visit import place_at
 from karamelo_py.points.basis import extent
 from karamelo_py.points.grid import Grid, cells_along, in_cells
@@ -69,8 +68,8 @@ def _seen(grid, around, g, direction, at):
     return min(low, top - around.least), max(high, around.least)
 
 
-@noinline
-def _find_tiles(kin, grids, tiles, x, of, ends, tile, k):
+@by_threads
+def find_tiles(kin, grids, tiles, x, of, ends, tile, k):
     """Find the tile of each point of the k-th part at `x` (w, n), on the grids `of` (n,).
 
     `tile` (n,) takes them, `ends` (parts, T) how many of these points each tile has.
@@ -109,8 +108,9 @@ def _begin_tiles(found):
     share[shares:] = ends.shape[1]
 
 
+@shared_out
 @noinline
-def _order_part(found, k):
+def _order_parts(found, k):
     """Put the k-th part of the points into their places; what begins at `ends` ends there then."""
     ends, tile, order = found.ends, found.tile, found.order
     parts = ends.shape[0]
@@ -120,8 +120,9 @@ def _order_part(found, k):
         ends[k, t] += 1
 
 
+@shared_out
 @noinline
-def _order_in_tiles(kin, grids, around, tiles, x, of, ids, found, k):
+def _order_in_all_tiles(kin, grids, around, tiles, x, of, ids, found, k):
     """Sort the points of each tile of the k-th share by the first node that they see, then by id.
 
     Groups of `width` points then mostly see the same nodes: cells whose points fill groups come
@@ -171,8 +172,8 @@ def _order_in_tiles(kin, grids, around, tiles, x, of, ids, found, k):
             order[at] = p
 
 
-@noinline
-def _find_rows(kin, grids, around, x, tiling, parts, k):
+@by_threads
+def find_rows(kin, grids, around, x, tiling, parts, k):
     """Find `Tiling.rows` of the k-th part of the tiles in space; their points are at `x` (w, n)."""
     grids, around, tiling = at_hand(grids), at_hand(around), at_hand(tiling)
     rows, box = tiling.rows, tiling.box
@@ -194,8 +195,9 @@ def _find_rows(kin, grids, around, x, tiling, parts, k):
                     rows[t, r, 1] = max(rows[t, r, 1], last)
 
 
+@shared_out
 @noinline
-def _pick_rows(rows, first, last, order, room, parts, k):
+def _pick_all_rows(rows, first, last, order, room, parts, k):
     """Copy the k-th part of the rows from `first` to `last` to `room`, in order."""
     begin, end = order.size * k // parts, order.size * (k + 1) // parts
     for r in range(first, last + 1):
@@ -205,8 +207,9 @@ def _pick_rows(rows, first, last, order, room, parts, k):
             pick_items(rows[r, 0], np.int64(0), order, room, r - first, begin, end)
 
 
+@shared_out
 @noinline
-def _put_rows(rows, first, last, room, parts, k):
+def _put_all_rows(rows, first, last, room, parts, k):
     """Copy the k-th part of these rows back."""
     begin, end = room.shape[1] * k // parts, room.shape[1] * (k + 1) // parts
     for r in range(first, last + 1):
@@ -214,14 +217,6 @@ def _put_rows(rows, first, last, room, parts, k):
             put_items(rows[r, 0], np.int32(0), room, r - first, begin, end)
         else:
             put_items(rows[r, 0], np.int64(0), room, r - first, begin, end)
-
-
-find_tiles = by_threads(_find_tiles)
-find_rows = by_threads(_find_rows)
-_order_parts = shared_out(_order_part)
-_order_in_all_tiles = shared_out(_order_in_tiles)
-_pick_all_rows = shared_out(_pick_rows)
-_put_all_rows = shared_out(_put_rows)
 
 
 @noinline

@@ -5,7 +5,7 @@ A sweep over the points goes from a scene to a point in five steps:
 - `sweep` clears the nodes, goes over the points, and sums at the nodes what they gave;
 - `sweep_blocks` goes over the blocks, one for each law, in the order that other processes need;
 - `sweep_points` goes over one block, in the way of its mode: by threads, or measured;
-- `visit_share` goes over the tiles of one share of a block: the work of one thread;
+- `visit_shares` goes over the tiles of one share of a block: the work of one thread;
 - `visit_tile` gathers, updates and scatters the points of one tile.
 
 The points of a tile give to a buffer of their own: a dense box of the nodes that they may reach.
@@ -13,8 +13,6 @@ Then each tile of nodes sums the boxes that reach it. Threads share out tiles an
 sums are made in one order, whatever the number of threads.
 """
 
-import inspect
-from collections.abc import Callable
 from math import inf
 from typing import Any, NamedTuple
 
@@ -33,8 +31,8 @@ from karamelo_py.compiler.compile import (
 from karamelo_py.compiler.fields import load, load_vector, store
 from karamelo_py.compiler.held import at_hand, hold
 from karamelo_py.compiler.lanes import room_for
-from karamelo_py.compiler.loops import kernel, noinline
-from karamelo_py.compiler.threads import shared_out
+from karamelo_py.compiler.loops import noinline
+from karamelo_py.compiler.threads import by_threads
 from karamelo_py.compiler.tuples import flat, nested_as, record
 from karamelo_py.kernels.arrays import Block, Index, Nodes, Number, Places, Points, Setup, Tag
 from karamelo_py.kernels.clock import common_velocity
@@ -47,7 +45,7 @@ from karamelo_py.kernels.lanes import (
     zero_of,
 )
 from karamelo_py.kernels.nodes import at_node
-from karamelo_py.kernels.p2g import adds, load_all, sum_share
+from karamelo_py.kernels.p2g import adds, load_all, sum_shares
 from karamelo_py.kernels.stencils import gathered_by, scatter_nodes
 from karamelo_py.kernels.totals import take_over
 from karamelo_py.kernels.visit import Work, ask_ahead, place_at
@@ -232,16 +230,16 @@ def visit_tile(visit: Visit, s: Context, block: Block, t: int) -> None:
     tiling.report[t, 2] = wrong
 
 
-@noinline
-def visit_share(visit: Visit, s: Context, block: Block, first: int, k: int) -> None:
+@by_threads
+def visit_shares(visit: Visit, s: Context, block: Block, first: int, k: int) -> None:
     """Visit the points of the tiles of the k-th share behind the `first`, one thread's work."""
     share, order = block.tiling.share, block.tiling.order
     for t in range(share[first + k], share[first + k + 1]):
         visit_tile(visit, s, block, order[t])
 
 
-@noinline
-def visit_nodes(task: Tag, kin: Tag, nodes: Nodes, ranges: np.ndarray, dt: Number, k: int) -> None:
+@by_threads
+def _visit_nodes(task: Tag, kin: Tag, nodes: Nodes, ranges: np.ndarray, dt: Number, k: int) -> None:
     """Do `task` at the nodes of the k-th share; `ranges` as in `Setup`."""
     nodes = at_hand(nodes)
     for r in range(ranges[k, 0], ranges[k, 1]):
@@ -250,28 +248,6 @@ def visit_nodes(task: Tag, kin: Tag, nodes: Nodes, ranges: np.ndarray, dt: Numbe
 
 
 # --- threads ----------------------------------------------------------------------------------
-
-
-def by_threads(share: Callable) -> Callable:
-    """Make the kernel ``f(mode, count, ...)`` that does ``share(..., k)`` for each k below `count`.
-
-    The threads of `mode` divide these numbers among them.
-    """
-    names = ["mode", "count", *inspect.signature(share).parameters][:-1]
-    loop = shared_out(share)
-
-    def all_shares(*arguments):
-        loop(*arguments)
-
-    kinds = [inspect.Parameter(name, inspect.Parameter.POSITIONAL_OR_KEYWORD) for name in names]
-    all_shares.__signature__ = inspect.Signature(kinds)  # type: ignore[attr-defined]
-    all_shares.__qualname__ = f"{share.__qualname__}s"
-    return kernel(all_shares)
-
-
-visit_shares = by_threads(visit_share)
-_sum_shares = by_threads(sum_share)
-_visit_nodes = by_threads(visit_nodes)
 
 
 @shared
@@ -302,7 +278,7 @@ def sweep_points(mode: Tag, visit: Visit, s: Context, block: Block) -> None:
 def sum_buffers(mode: Tag, quantities: tuple, s: Setup, due: bool) -> None:
     """Sum at the nodes what the points gave of the quantities, if that is due."""
     count = s.buffers.count[0] if due else 0
-    _sum_shares(mode, count, quantities, s.kin, s.nodes, s.buffers)
+    sum_shares(mode, count, quantities, s.kin, s.nodes, s.buffers)
 
 
 @point_function(otherwise=True)

@@ -56,8 +56,20 @@ def solid_of(firsts, number):
     return first_from(firsts, 0, firsts.size, number + 1) - 1
 
 
+@shared
+def energies_of(kin, points, laws, p):
+    """Mass and velocity of a point; its energies, kinetic, and stored plus dissipated."""
+    law, state = state_at(kin, points, laws, p)
+    mass = real(of_present(p, points.mass[p]), 0.0)
+    v = tuple([real(x, 0.0) for x in load_vector(kin, points.v, p)])
+    energy = energy_density(law, kin, state) + dissipated_energy(law, kin, state)
+    stored = mass * real(specific_volume(law), 0.0) * real(energy, 0.0)
+    return mass, v, 0.5 * mass * dot(v, v), stored
+
+
+@shared_out
 @noinline
-def _look_at_share(kin, points, laws, tiling, firsts, k):
+def _look_at_shares(kin, points, laws, tiling, firsts, k):
     """Energies, mass and momentum of the points of each tile of the k-th share, for its report."""
     points, laws, tiling = at_hand(points), at_hand(laws), at_hand(tiling)
     lanes = lanes_with((), laws, points.mass)
@@ -70,20 +82,13 @@ def _look_at_share(kin, points, laws, tiling, firsts, k):
         total = (0.0,) * (1 + kin.dimension)
         for q in range(start, end, lanes.width):
             p = points_from(lanes, q, end)
-            law, state = state_at(kin, points, laws, p)
-            mass = real(of_present(p, points.mass[p]), 0.0)
-            v = [real(x, 0.0) for x in load_vector(kin, points.v, p)]
-            kinetic = added(kinetic, 0.5 * mass * dot(v, v))
-            energy = energy_density(law, kin, state) + dissipated_energy(law, kin, state)
-            stored = added(stored, mass * real(specific_volume(law), 0.0) * real(energy, 0.0))
+            mass, v, of_motion, of_strain = energies_of(kin, points, laws, p)
+            kinetic, stored = added(kinetic, of_motion), added(stored, of_strain)
             more = zip(total, (mass, *[mass * x for x in v]), strict=True)
             total = tuple([added(part, x) for part, x in more])
             if not all_lanes((points.id[p] >= begin) & (points.id[p] < behind)):
                 solid = -1
         put_at(tiling.report, t, ENERGIES, (kinetic, stored, solid, *total))
-
-
-_look_at_shares = shared_out(_look_at_share)
 
 
 @kernel

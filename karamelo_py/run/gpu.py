@@ -185,6 +185,7 @@ class StepsOnCard:
     def _launch(
         self, function: Callable, count: int, *arguments: Any, called: dict | None = None
     ) -> KernelLaunch:
+        function = gpu.while_steps_go_on(function)
         return KernelLaunch(self.images, function, count, self.fate, *arguments, called=called)
 
     def _launches(self, rows: list, ahead: list[KernelLaunch] | None = None) -> list[KernelLaunch]:

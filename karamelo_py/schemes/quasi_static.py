@@ -2,37 +2,25 @@
 
 from typing import Annotated, Literal, NamedTuple
 
-from karamelo_py.kernels.arrays import (
-    FINAL_INTEGRATE,
-    INITIAL_INTEGRATE,
-    ON_SUMS,
-    ON_UPDATE,
-    POST_PARTICLES_TO_GRID,
-    POST_UPDATE_GRID_STATE,
-)
+from karamelo_py.kernels import arrays, table
 from karamelo_py.kernels.g2p import StrainOfLoadStep
-from karamelo_py.kernels.table import (
-    AVERAGED,
-    AXIS,
-    MOVE,
-    SUMS,
-    WORK_OF_LOADS,
-    AtNodes,
-    AtPoints,
-    Gather,
-)
 from karamelo_py.language.signature import Constraint, NonNegative, Positive
 
 # What acts on the nodes in a step, by present stress; who holds them; and how points follow.
 BEGIN = (
-    AtPoints(INITIAL_INTEGRATE, 0),
-    SUMS,
-    AVERAGED,
-    AtNodes(POST_PARTICLES_TO_GRID, ON_SUMS),
-    AXIS,
+    table.AtPoints(arrays.INITIAL_INTEGRATE, 0),
+    table.SUMS,
+    table.AVERAGED,
+    table.AtNodes(arrays.POST_PARTICLES_TO_GRID, arrays.ON_SUMS),
+    table.AXIS,
 )
-HOLD = (AtNodes(POST_UPDATE_GRID_STATE, ON_UPDATE), AXIS)
-CLOSE = (WORK_OF_LOADS, *MOVE, Gather(StrainOfLoadStep()), AtPoints(FINAL_INTEGRATE, 1))
+HOLD = (table.AtNodes(arrays.POST_UPDATE_GRID_STATE, arrays.ON_UPDATE), table.AXIS)
+CLOSE = (
+    table.WORK_OF_LOADS,
+    *table.MOVE,
+    table.Gather(StrainOfLoadStep()),
+    table.AtPoints(arrays.FINAL_INTEGRATE, 1),
+)
 # Of the last step: corrections, the share of forces that was left, and parts it was done in.
 PUBLISHED = "iterations", "residual", "parts"
 

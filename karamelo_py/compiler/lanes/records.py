@@ -7,6 +7,7 @@ from llvmlite import ir
 from numba import types
 
 from karamelo_py.compiler import arithmetic, code, machine
+from karamelo_py.compiler.choices import tag_class
 from karamelo_py.compiler.code import I32, I64, Lanes, lane, pack, shuffle, splat
 from karamelo_py.compiler.compile import (
     Weighted,
@@ -14,7 +15,6 @@ from karamelo_py.compiler.compile import (
     implements,
     lanes_of,
     prefetch_records,
-    tag_class,
 )
 from karamelo_py.compiler.lanes.arrays import Beside, ask, at_lane
 from karamelo_py.compiler.tuples import row

@@ -9,17 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.compiler.compile import all_lanes, point_function, where
-from karamelo_py.points.basis import first_node, walled
-from karamelo_py.points.basis.product import (
-    Along,
-    affine_along,
-    along,
-    cell_number,
-    evenly,
-    inverse_spread,
-    register,
-    wide,
-)
+from karamelo_py.points.basis import first_node, product, walled
 from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.points.noise import CUBIC
 
@@ -42,7 +32,7 @@ def walls_beside(basis, kin, grid, place, direction):
 
 
 def _walls_beside_at_walls(basis, kin, grid, place, direction):
-    wall = basis.faces[cell_number(kin, grid, place), direction]
+    wall = basis.faces[product.cell_number(kin, grid, place), direction]
     return (wall == BELOW) | (wall == BETWEEN), wall >= ABOVE
 
 
@@ -52,7 +42,7 @@ def hats(grid, a, cell, first, count):
     weights = [where(number == k, 1 - t, where(number == k - 1, t, 0)) for k in range(count)]
     slope = grid.inv_h
     gradients = [where(number == k, -slope, where(number == k - 1, slope, 0)) for k in range(count)]
-    return Along(first, a - first, tuple(weights), tuple(gradients), ())
+    return product.Along(first, a - first, tuple(weights), tuple(gradients), ())
 
 
 class QuadraticSpline(NamedTuple):
@@ -76,7 +66,7 @@ class QuadraticSpline(NamedTuple):
     courant_still = 1.25
 
 
-@along.on(QuadraticSpline)
+@product.along.on(QuadraticSpline)
 def _along_quadratic_spline(basis, kin, grid, place, direction):
     a = in_cells(grid, direction, place[direction])
     last = cells_along(grid, direction)
@@ -91,7 +81,7 @@ def _along_quadratic_spline(basis, kin, grid, place, direction):
     left, right = 0.5 - t, 0.5 + t
     weights = (0.5 * left * left, 0.75 - t * t, 0.5 * right * right)
     gradients = (-left * grid.inv_h, -(t + t) * grid.inv_h, right * grid.inv_h)
-    line = Along(nearest - 1, 1 + t, weights, gradients, ())
+    line = product.Along(nearest - 1, 1 + t, weights, gradients, ())
     if all_lanes(bulk):
         return line
     # At a wall the third node, on the side of the material, has no weight.
@@ -106,7 +96,7 @@ def in_bulk(basis, grid, line, direction):
     return (cells_along(grid, direction) > 1) & (line.r >= 0.5) & (line.r < 1.5)
 
 
-@affine_along.on(QuadraticSpline)
+@product.affine_along.on(QuadraticSpline)
 def _affine_along_quadratic_spline(basis, grid, line, direction):
     # D = h^2 / 4. For hat functions, N D^-1 (X - x) is the gradient.
     four = 4 * grid.inv_h
@@ -114,12 +104,12 @@ def _affine_along_quadratic_spline(basis, grid, line, direction):
     return where(in_bulk(basis, grid, line, direction), affine, line.gradients)
 
 
-@inverse_spread.on(QuadraticSpline)
+@product.inverse_spread.on(QuadraticSpline)
 def _inverse_spread_quadratic_spline(basis, grid):
     return (4 * grid.inv_h * grid.inv_h,)
 
 
-@evenly.on(QuadraticSpline)
+@product.evenly.on(QuadraticSpline)
 def _evenly_quadratic_spline(basis, grid, stencil):
     first, *rest = (in_bulk(basis, grid, line, d) for d, line in enumerate(stencil.lines))
     for bulk in rest:
@@ -128,7 +118,7 @@ def _evenly_quadratic_spline(basis, grid, stencil):
 
 
 first_node.on(QuadraticSpline)(lambda basis, like: 0.5)
-register(QuadraticSpline, 3)
+product.register(QuadraticSpline, 3)
 
 
 class QuadraticSplineAtWalls(AtWalls):
@@ -141,13 +131,13 @@ def of_splines(basis: type, of: type, functions: tuple) -> None:
     walls_beside.on(of)(_walls_beside_at_walls)
     for function in functions:
         function.on(of)(function.find((basis,)))
-    register(of, basis.line_nodes)
+    product.register(of, basis.line_nodes)
 
 
 of_splines(
     QuadraticSpline,
     QuadraticSplineAtWalls,
-    (along, affine_along, inverse_spread, evenly, first_node),
+    (product.along, product.affine_along, product.inverse_spread, product.evenly, first_node),
 )
 
 
@@ -183,7 +173,7 @@ class CubicSpline(NamedTuple):
     borne = CUBIC
 
 
-@along.on(CubicSpline)
+@product.along.on(CubicSpline)
 def _along_cubic_spline(basis, kin, grid, place, direction):
     a = in_cells(grid, direction, place[direction])
     last = cells_along(grid, direction)
@@ -208,7 +198,7 @@ def _along_cubic_spline(basis, kin, grid, place, direction):
         three * s * weights[2],
         three * (1 + s) * weights[3],
     )
-    line = Along(cell - 1, r, weights, gradients, affine)
+    line = product.Along(cell - 1, r, weights, gradients, affine)
     cell = min(cell, last - 1)
     bulk = (cell >= 1) & (cell < last - 1)
     below, above = cell == 0, cell == last - 1
@@ -238,7 +228,7 @@ def at_wall(grid, a, cell, last, below, above):
         tuple([where(behind, *pair) for pair in zip((0, *of), (*of, 0), strict=True)])
         for of in (n, g, c)
     ]
-    return where(below & above, between, Along(first, a - first, n, g, c))
+    return where(below & above, between, product.Along(first, a - first, n, g, c))
 
 
 def beside_wall(grid, t):
@@ -259,12 +249,12 @@ def beside_wall(grid, t):
     return weights, slopes, affine
 
 
-register(CubicSpline, 4)
-wide(CubicSpline)
+product.register(CubicSpline, 4)
+product.wide(CubicSpline)
 
 
 class CubicSplineAtWalls(AtWalls):
     """Cubic B-splines where there are walls inside the grid."""
 
 
-of_splines(CubicSpline, CubicSplineAtWalls, (along,))
+of_splines(CubicSpline, CubicSplineAtWalls, (product.along,))

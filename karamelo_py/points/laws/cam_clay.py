@@ -126,9 +126,7 @@ def pressure(law, e):
     return law.p0 * exp(-tr(e) / law.kappa)
 
 
-@laws.initial_state.on(CamClay)
-def _initial_state_cam_clay(law, kin, like):
-    return State(1, nothing(kin), law.pc, 0, 0)
+laws.initial_state.on(CamClay)(lambda law, kin, like: State(1, nothing(kin), law.pc, 0, 0))
 
 
 @laws.advance.on(CamClay)

@@ -1,17 +1,13 @@
 """material hencky: elasticity by logarithmic strain."""
 
-from typing import Annotated, Any, NamedTuple
-
 from karamelo_py.compiler.powers import logarithm_near_one as log
-from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points import laws
-from karamelo_py.points.kinematics import I, det, inner, unit
+from karamelo_py.points.kinematics import I, det, inner
 from karamelo_py.points.kinematics.principal import logarithm_of
-from karamelo_py.points.laws.parameters import lame_parameters, tell_of_locking
-from karamelo_py.points.laws.thermoelastic import expanding
+from karamelo_py.points.laws.elastic import Hyperelastic
 
 
-class Hencky(NamedTuple):
+class Hencky(Hyperelastic):
     """Elastic solid whose stress follows the logarithmic strain, at any strain and rotation.
 
     Parameters
@@ -48,45 +44,8 @@ class Hencky(NamedTuple):
     material, neo-hookean, linear, eos-strength, cam-clay
     """
 
-    in_lanes = True
-    rebounds = True
+    __slots__ = ()
     scalarised = ("kirchhoff_stress", "elastic_strain")
-
-    specific_volume: float  # reference volume per mass
-    lam: float  # Lame's first parameter
-    G: float  # shear modulus
-
-    @classmethod
-    def given(
-        cls,
-        rho: Annotated[float, Positive],
-        E: Annotated[float, Positive],
-        nu: float,
-        cp: Annotated[float, Positive] | None = None,
-        kappa: Annotated[float, NonNegative] | None = None,
-        alpha: float = 0.0,
-    ):
-        """The law from Young's modulus and Poisson's ratio; with a temperature where it has one."""
-        return expanding(cls(1 / rho, *lame_parameters(E, nu)), cp, kappa, alpha)
-
-
-class State(NamedTuple):
-    """State of a point."""
-
-    F: Any  # deformation gradient
-
-
-tell_of_locking(Hencky)
-
-laws.initial_state.on(Hencky)(lambda law, kin, like: State(unit(kin)))
-laws.by_rates.on(Hencky)(lambda law: False)
-laws.deformation.on(Hencky)(lambda law, kin, state: state.F)
-laws.jacobian.on(Hencky)(lambda law, kin, state: det(state.F))
-
-
-@laws.advance.on(Hencky)
-def _advance_hencky(law, kin, state, dl, dt):
-    return State(state.F.after(dl))
 
 
 @laws.elastic_strain.on(Hencky)
@@ -98,11 +57,6 @@ def _elastic_strain_hencky(law, kin, state):
 @laws.kirchhoff_stress.on(Hencky)
 def _kirchhoff_stress_hencky(law, kin, state):
     return law.G * logarithm_of(state.F.left_cauchy_green()) + law.lam * log(det(state.F)) * I
-
-
-@laws.cauchy_stress.on(Hencky)
-def _cauchy_stress_hencky(law, kin, state):
-    return laws.kirchhoff_stress(law, kin, state) / det(state.F)
 
 
 @laws.wave_speed_squared.on(Hencky)

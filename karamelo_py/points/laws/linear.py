@@ -6,11 +6,12 @@ from karamelo_py.language.rules import gain
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, det, inner, nothing, sym, symmetric_tensor, tr
-from karamelo_py.points.laws.parameters import lame_parameters, tell_of_locking
+from karamelo_py.points.laws.elastic import ElasticLaw
+from karamelo_py.points.laws.parameters import lame_parameters
 from karamelo_py.points.laws.thermoelastic import expanding
 
 
-class LinearElastic(NamedTuple):
+class LinearElastic(ElasticLaw):
     """Hooke's law in rate form: the stress rate follows the strain rate, and turns with the point.
 
     Parameters
@@ -50,13 +51,8 @@ class LinearElastic(NamedTuple):
     material, neo-hookean
     """
 
-    in_lanes = True
-    rebounds = True
+    __slots__ = ()
     turns = True
-
-    specific_volume: float  # reference volume per mass
-    lam: float  # Lame's first parameter
-    G: float  # shear modulus
 
     @classmethod
     def given(
@@ -97,8 +93,6 @@ gain(
     "work than it took",
     cure="material neo-hookean, which stores what it is given",
 )
-
-tell_of_locking(LinearElastic)
 
 laws.initial_state.on(LinearElastic)(lambda law, kin, like: State(1, nothing(kin)))
 laws.cauchy_stress.on(LinearElastic)(lambda law, kin, state: state.sigma)

@@ -1,17 +1,14 @@
 """material neo-hookean: compressible hyperelasticity."""
 
 from math import exp
-from typing import Annotated, Any, NamedTuple
 
 from karamelo_py.compiler.powers import logarithm_near_one as log
-from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points import laws
-from karamelo_py.points.kinematics import I, det, tr, unit
-from karamelo_py.points.laws.parameters import lame_parameters, tell_of_locking
-from karamelo_py.points.laws.thermoelastic import expanding
+from karamelo_py.points.kinematics import I, det, tr
+from karamelo_py.points.laws.elastic import Hyperelastic
 
 
-class NeoHookean(NamedTuple):
+class NeoHookean(Hyperelastic):
     """Compressible neo-Hookean solid, right at any strain and rotation.
 
     Parameters
@@ -46,43 +43,7 @@ class NeoHookean(NamedTuple):
     material, linear
     """
 
-    in_lanes = True
-    rebounds = True
-
-    specific_volume: float  # reference volume per mass
-    lam: float  # Lame's first parameter
-    G: float  # shear modulus
-
-    @classmethod
-    def given(
-        cls,
-        rho: Annotated[float, Positive],
-        E: Annotated[float, Positive],
-        nu: float,
-        cp: Annotated[float, Positive] | None = None,
-        kappa: Annotated[float, NonNegative] | None = None,
-        alpha: float = 0.0,
-    ):
-        """The law from Young's modulus and Poisson's ratio; with a temperature where it has one."""
-        return expanding(cls(1 / rho, *lame_parameters(E, nu)), cp, kappa, alpha)
-
-
-class State(NamedTuple):
-    """State of a point."""
-
-    F: Any  # deformation gradient
-
-
-tell_of_locking(NeoHookean)
-
-laws.initial_state.on(NeoHookean)(lambda law, kin, like: State(unit(kin)))
-laws.by_rates.on(NeoHookean)(lambda law: False)
-laws.deformation.on(NeoHookean)(lambda law, kin, state: state.F)
-
-
-@laws.advance.on(NeoHookean)
-def _advance_neo_hookean(law, kin, state, dl, dt):
-    return State(state.F.after(dl))
+    __slots__ = ()
 
 
 @laws.kirchhoff_stress.on(NeoHookean)
@@ -90,16 +51,6 @@ def _kirchhoff_stress_neo_hookean(law, kin, state):
     # P = G (F - F^-T) + lam ln J F^-T, so tau = P F^T = G (b - I) + lam ln J I
     b = state.F.left_cauchy_green()
     return law.G * b + (law.lam * log(det(state.F)) - law.G) * I
-
-
-@laws.cauchy_stress.on(NeoHookean)
-def _cauchy_stress_neo_hookean(law, kin, state):
-    return laws.kirchhoff_stress(law, kin, state) / det(state.F)
-
-
-@laws.jacobian.on(NeoHookean)
-def _jacobian_neo_hookean(law, kin, state):
-    return det(state.F)
 
 
 @laws.wave_speed_squared.on(NeoHookean)

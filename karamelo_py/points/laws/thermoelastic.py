@@ -136,6 +136,4 @@ laws.heat_capacity.on(Thermoelastic)(lambda law, like: law.heat.cp)
 laws.conductivity.on(Thermoelastic)(lambda law, like: law.heat.kappa)
 
 
-@laws.with_temperature.on(Thermoelastic)
-def _with_temperature_thermoelastic(law, kin, state, T):
-    return State(state.elastic, T)
+laws.with_temperature.on(Thermoelastic)(lambda law, kin, state, T: State(state.elastic, T))

@@ -14,13 +14,7 @@ from karamelo_py.run.advice.known_failures import refuse_endless_speeds
 from karamelo_py.run.advice.suggestions import suggestions
 from karamelo_py.run.diagnosis.energy import not_watched, unknown_work
 from karamelo_py.run.lower.card import memory_there, refusals
-from karamelo_py.run.lower.memory import (
-    known,
-    memory_of,
-    node_fields,
-    nodes_in_use,
-    point_fields,
-)
+from karamelo_py.run.lower.memory import known, memory_of, node_fields, nodes_in_use, point_fields
 from karamelo_py.run.mpi.plan import report_lines
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.timestep import ruling_limit, words_of_share

@@ -8,16 +8,9 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+from karamelo_py.run.implicit import solvers
 from karamelo_py.run.implicit.contact import Contact
 from karamelo_py.run.implicit.equations import FAR, Equations, Moduli
-from karamelo_py.run.implicit.solvers import (
-    Singular,
-    Unconverged,
-    changed_sign,
-    direct,
-    hold,
-    solve,
-)
 from karamelo_py.run.implicit.tools import Tool
 
 ROUNDING = 50 * float(np.finfo(float).eps)  # of sums of some dozens of terms
@@ -164,7 +157,7 @@ class Newton:
     @property
     def unstable(self) -> bool:
         """Tell whether the last stiffness is not positive definite, as far as a solver knows."""
-        return "factors" in self.kept and changed_sign(self.kept["factors"])
+        return "factors" in self.kept and solvers.changed_sign(self.kept["factors"])
 
     def _size(self, u: np.ndarray) -> float:
         norms = np.linalg.norm(self.external), np.linalg.norm(self.inner), self.inertia.size(u)
@@ -184,11 +177,11 @@ class Newton:
         with counted(self.seconds, "assembly"):
             equations.linearise(self.dt, self.ghost)
             A, b = equations.whole, balance.ravel() - equations.whole @ jump.ravel()
-            hold(A, ~free, self.inertia.diagonal * equations.mass)
+            solvers.hold(A, ~free, self.inertia.diagonal * equations.mass)
             for one in self.pushing:
                 more = one.matrix()
                 b -= more @ jump.ravel()
-                hold(more, ~free, np.zeros(len(free)))
+                solvers.hold(more, ~free, np.zeros(len(free)))
                 A = A + more
             b[~free.ravel()] = 0
             self.stiff = np.abs(A.diagonal()).reshape(free.shape)
@@ -199,10 +192,10 @@ class Newton:
         try:
             with counted(self.seconds, "solution"):
                 own = rigid.reshape(len(b), -1), accuracy, self.kept
-                x = solve(self.scheme.solver, A, b, *own).reshape(free.shape)
-        except Singular:
+                x = solvers.solve(self.scheme.solver, A, b, *own).reshape(free.shape)
+        except solvers.Singular:
             raise Loose(self._loosest(A)) from None
-        except Unconverged:
+        except solvers.Unconverged:
             raise Failed("multigrid did not converge: take solver=direct") from None
         return np.where(free, x, jump)
 
@@ -228,9 +221,9 @@ class Newton:
         size = np.abs(A.diagonal()) + 1e-12 * np.abs(A.data).max(initial=1e-300)
         B = A + sp.diags(1e-9 * size)
         x = np.where(self.free.ravel(), np.random.default_rng(0).standard_normal(A.shape[0]), 0)
-        with suppress(Singular):
+        with suppress(solvers.Singular):
             for _ in range(2):
-                x = direct(B.tocsr(), x * size)
+                x = solvers.direct(B.tocsr(), x * size)
                 x /= np.abs(x).max()
         return int(np.abs(x).argmax() // self.free.shape[1])
 

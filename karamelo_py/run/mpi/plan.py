@@ -38,14 +38,10 @@ class _Sums(NamedTuple):
     found: list
 
 
-@sweep_points.on(_Sums)
-def _sweep_points_sums(mode, visit, s, block):
-    return None
+sweep_points.on(_Sums)(lambda mode, visit, s, block: None)
 
 
-@sweep_nodes.on(_Sums)
-def _sweep_nodes_sums(mode, task, kin, nodes, ranges, dt):
-    return None
+sweep_nodes.on(_Sums)(lambda mode, task, kin, nodes, ranges, dt: None)
 
 
 @sum_buffers.on(_Sums)

@@ -27,13 +27,7 @@ from karamelo_py.compiler.compile import (
 from karamelo_py.compiler.tuples import flat, nested_as
 from karamelo_py.language.rules import known_failure
 from karamelo_py.points import basis as bases
-from karamelo_py.points.basis.product import (
-    digits,
-    inverse_radius,
-    item,
-    node_number,
-    with_hoop,
-)
+from karamelo_py.points.basis.product import digits, inverse_radius, item, node_number, with_hoop
 from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.points.kinematics import cofactor, determinant, gradient, product, total, vector
 

@@ -2,20 +2,11 @@
 
 from karamelo_py.compiler.compile import real
 from karamelo_py.points import basis as bases
-from karamelo_py.points.basis.cpdi import (
-    CUBE,
-    LEAST,
-    SQUARE,
-    CarriedDomain,
-    ConvectedDomain,
-    Element,
-    domain,
-    upright,
-)
+from karamelo_py.points.basis import cpdi
 from karamelo_py.points.kinematics import Space, cofactor, determinant, dot, total, vector
 
 
-class _Parallel(ConvectedDomain):
+class _Parallel(cpdi.ConvectedDomain):
     """Base of domains by their half edges."""
 
     __slots__ = ()
@@ -67,7 +58,7 @@ def signed(sign, a, b):
     return a + b if sign > 0 else a - b
 
 
-@domain.on(_Parallel)
+@cpdi.domain.on(_Parallel)
 def _domain_parallel(basis, kin, place):
     d = kin.dimension
     x, edges = vector(kin, place[:d]), half_edges(kin, place)
@@ -78,7 +69,7 @@ def _domain_parallel(basis, kin, place):
     # Reciprocal vectors A, B (A . a = 1, A . b = 0 ...): N_c has the mean gradient (+-A +-B) / 4.
     # In space, nine products with k before the sums are fewer than twelve after them.
     A = reciprocals(kin, edges, k if d == 3 else 1)
-    for signs in SQUARE if d == 2 else CUBE:
+    for signs in cpdi.SQUARE if d == 2 else cpdi.CUBE:
         corner = signed(signs[0], x, signed(signs[0] * signs[1], edges[0], edges[1]))
         slope = signed(signs[0] * signs[1], A[0], A[1])
         if d == 2:
@@ -103,10 +94,10 @@ def _extent_parallel(basis, kin, grid, place):
     far = away[0]
     for other in away[1:]:  # so written, NaN comes through
         far = far + max(other - far, 0)
-    return max(far * grid.inv_h, LEAST[kin.dimension])
+    return max(far * grid.inv_h, cpdi.LEAST[kin.dimension])
 
 
-class _Simplex(CarriedDomain):
+class _Simplex(cpdi.CarriedDomain):
     """Base of triangles and tetrahedra."""
 
     __slots__ = ()
@@ -122,7 +113,7 @@ class T3(_Simplex):
 
     __slots__ = ()
     dimension = 2
-    element = Element("triangle", 3, ((0, 1), (0, 2)), (0, 2, 1))
+    element = cpdi.Element("triangle", 3, ((0, 1), (0, 2)), (0, 2, 1))
 
 
 class Tet4(_Simplex):
@@ -137,7 +128,7 @@ class Tet4(_Simplex):
 
     __slots__ = ()
     dimension = 3
-    element = Element("tetra", 4, ((0, 1), (0, 2), (0, 3)), (0, 2, 1, 3))
+    element = cpdi.Element("tetra", 4, ((0, 1), (0, 2), (0, 3)), (0, 2, 1, 3))
 
 
 def corners_and_edges(kin, place):
@@ -148,7 +139,7 @@ def corners_and_edges(kin, place):
     return corners, {(e, i): edges[e][i] for e in range(d) for i in range(d)}
 
 
-@domain.on(_Simplex)
+@cpdi.domain.on(_Simplex)
 def _domain_simplex(basis, kin, place):
     d = kin.dimension
     corners, edges = corners_and_edges(kin, place)
@@ -162,12 +153,12 @@ def _domain_simplex(basis, kin, place):
     return tuple(corners), (weight,) * (d + 1), (first, *others)
 
 
-@upright.on(_Simplex)
+@cpdi.upright.on(_Simplex)
 def _upright_simplex(basis, kin, place):
     return determinant(corners_and_edges(kin, place)[1], kin.dimension) > 0
 
 
-class Q4(CarriedDomain):
+class Q4(cpdi.CarriedDomain):
     """Quadrilaterals of four corners, which neighbouring points move alike.
 
     Domains go on tiling the body without gaps (Sadeghirad, Brannon & Guilkey 2013). In strong shear
@@ -180,10 +171,10 @@ class Q4(CarriedDomain):
 
     __slots__ = ()
     dimension = 2
-    element = Element("quad", 4, ((0, 2), (1, 3)), (0, 3, 2, 1), SQUARE)
+    element = cpdi.Element("quad", 4, ((0, 2), (1, 3)), (0, 3, 2, 1), cpdi.SQUARE)
 
 
-@domain.on(Q4)
+@cpdi.domain.on(Q4)
 def _domain_q4(basis, kin, place):
     x1, y1, x2, y2, x3, y3, x4, y4 = place[2:]
     # Diagonals; their cross product is twice the area V.
@@ -204,7 +195,7 @@ def _domain_q4(basis, kin, place):
     )
 
 
-@upright.on(Q4)
+@cpdi.upright.on(Q4)
 def _upright_q4(basis, kin, place):
     x1, y1, x2, y2, x3, y3, x4, y4 = place[2:]
     ax, ay, bx, by = x2 - x1, y2 - y1, x3 - x2, y3 - y2
@@ -222,7 +213,7 @@ NEAR, FAR = (1 + 3**-0.5) / 2, (1 - 3**-0.5) / 2
 PAIRS = (0, 0), (1, 0), (0, 1), (1, 1)
 
 
-class H8(CarriedDomain):
+class H8(cpdi.CarriedDomain):
     """Trilinear hexahedra of eight corners, which neighbouring points move alike.
 
     Weights and gradients are the exact means over the hexahedron: 2 x 2 x 2 Gauss points integrate
@@ -235,7 +226,9 @@ class H8(CarriedDomain):
 
     __slots__ = ()
     dimension = 3
-    element = Element("hexahedron", 8, ((0, 1), (0, 3), (0, 4)), (4, 5, 6, 7, 0, 1, 2, 3), CUBE)
+    element = cpdi.Element(
+        "hexahedron", 8, ((0, 1), (0, 3), (0, 4)), (4, 5, 6, 7, 0, 1, 2, 3), cpdi.CUBE
+    )
 
 
 def _cross(a, b):
@@ -273,7 +266,7 @@ def _across(e: int, a: int, b: int, s: int) -> tuple[int, ...]:
 
 def _edges(place):
     """Half of the edges along each direction; the other two directions go as in `_at_gauss`."""
-    at = {signs: [place[3 * c + 3 + i] for i in range(3)] for c, signs in enumerate(CUBE)}
+    at = {signs: [place[3 * c + 3 + i] for i in range(3)] for c, signs in enumerate(cpdi.CUBE)}
 
     def half(e, a, b):
         lower, upper = at[_across(e, a, b, -1)], at[_across(e, a, b, 1)]
@@ -282,7 +275,7 @@ def _edges(place):
     return [[half(e, a, b) for b in (-1, 1) for a in (-1, 1)] for e in range(3)]
 
 
-@domain.on(H8)
+@cpdi.domain.on(H8)
 def _domain_h8(basis, kin, place):
     # Rows of the Jacobian at the Gauss points: u does not depend on xi, v not on eta, w not on
     # zeta; numbers say at which points of the other two directions.
@@ -308,7 +301,7 @@ def _means(place, d, p, q, r):
     k = 1 / (sums[0] + sums[1])
     near, far, half = k * NEAR, k * FAR, k * 0.5
     corners, weights, gradients = [], [], []
-    for c, (x, y, z) in enumerate(CUBE):
+    for c, (x, y, z) in enumerate(cpdi.CUBE):
         corners.append(Space.Vector._make(place[3 * c + 3 : 3 * c + 6]))
         first, second = (near, far) if x < 0 else (far, near)
         at = d[_at(y, z)]
@@ -320,9 +313,9 @@ def _means(place, d, p, q, r):
     return tuple(corners), tuple(weights), tuple(gradients)
 
 
-@upright.on(H8)
+@cpdi.upright.on(H8)
 def _upright_h8(basis, kin, place):
     # The least of the corners' Jacobians, from the half edges that meet there.
     u, v, w = _edges(place)
-    met = [(u[_at(y, z)], v[_at(x, z)], w[_at(x, y)]) for x, y, z in CUBE]
+    met = [(u[_at(y, z)], v[_at(x, z)], w[_at(x, y)]) for x, y, z in cpdi.CUBE]
     return min(*[dot(a, _cross(b, c)) for a, b, c in met]) > 0

@@ -1,0 +1,62 @@
+"""Base of isotropic elastic laws; and of those whose state is the deformation gradient."""
+
+from typing import Annotated, Any, NamedTuple
+
+from karamelo_py.language.signature import NonNegative, Positive
+from karamelo_py.points import laws
+from karamelo_py.points.kinematics import det, unit
+from karamelo_py.points.laws.parameters import lame_parameters, tell_of_locking
+from karamelo_py.points.laws.thermoelastic import expanding
+
+
+class ElasticLaw(NamedTuple):
+    """Elastic solid by Young's modulus and Poisson's ratio, perhaps with a temperature."""
+
+    in_lanes = True
+    rebounds = True
+
+    specific_volume: float  # reference volume per mass
+    lam: float  # Lame's first parameter
+    G: float  # shear modulus
+
+    @classmethod
+    def given(
+        cls,
+        rho: Annotated[float, Positive],
+        E: Annotated[float, Positive],
+        nu: float,
+        cp: Annotated[float, Positive] | None = None,
+        kappa: Annotated[float, NonNegative] | None = None,
+        alpha: float = 0.0,
+    ):
+        """The law from Young's modulus and Poisson's ratio; with a temperature where it has one."""
+        return expanding(cls(1 / rho, *lame_parameters(E, nu)), cp, kappa, alpha)
+
+
+tell_of_locking(ElasticLaw)
+
+
+class Hyperelastic(ElasticLaw):
+    """Base of laws whose stress is a function of the deformation gradient."""
+
+    __slots__ = ()
+
+
+class State(NamedTuple):
+    """State of a point."""
+
+    F: Any  # deformation gradient
+
+
+laws.initial_state.on(Hyperelastic)(lambda law, kin, like: State(unit(kin)))
+laws.by_rates.on(Hyperelastic)(lambda law: False)
+laws.deformation.on(Hyperelastic)(lambda law, kin, state: state.F)
+laws.jacobian.on(Hyperelastic)(lambda law, kin, state: det(state.F))
+
+
+laws.advance.on(Hyperelastic)(lambda law, kin, state, dl, dt: State(state.F.after(dl)))
+
+
+@laws.cauchy_stress.on(Hyperelastic)
+def _cauchy_stress_hyperelastic(law, kin, state):
+    return laws.kirchhoff_stress(law, kin, state) / det(state.F)
