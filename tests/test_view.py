@@ -17,6 +17,7 @@ from karamelo_py.app import view
 from karamelo_py.app.cli import main
 from karamelo_py.app.plot import read_rows
 from karamelo_py.output import pictures
+from karamelo_py.output.outlines import outlines, wires
 from karamelo_py.output.rhythm import ByTime
 from karamelo_py.output.snapshots import Snapshot, read
 from karamelo_py.styles.dumps.hdf5 import Hdf5
@@ -292,7 +293,7 @@ def test_outlines_are_where_bodies_end(stretch, size):
     """
     own = np.arange(size / 2, 1, size)
     x = np.stack(np.meshgrid(own * stretch, own / stretch), -1).reshape(-1, 2)
-    (line,) = pictures.outlines(x)
+    (line,) = outlines(x)
     ends = np.array([stretch, 1 / stretch])
     outside = np.maximum(-line, line - ends).max(axis=1)
     far = (np.minimum(line, ends - line) > 4 * size).any(axis=1)  # from the corners
@@ -330,10 +331,121 @@ def test_outlines_show_solids_and_tools():
     ]  # fmt: skip
 
 
-def test_outlines_are_of_the_plane(run_interpreted):
-    text = block(3, "dump(d, all, pyplot, 10, p.png, 300, 300, outlines=true)", "run(1)")
+def test_no_outlines_on_a_line(run_interpreted):
+    text = block(1, "dump(d, all, pyplot, 10, p.png, 300, 300, outlines=true)", "run(1)")
     err = run_interpreted(text, status=1).err
-    assert "outlines are drawn in the plane, and this scene has 3 dimensions" in err
+    assert "outlines are drawn in the plane and in space, and this scene is on a line" in err
+
+
+def lines_of_tool(words):
+    """Lines on the surface of the one tool of a scene in a cube of side 1."""
+    hub = SmallHub(3, 0, 1, 0.1)
+    hub.interpreter.run_text(words)
+    (fix,) = hub.fixes.values()
+    depth = lambda x: fix.depth_of(SimpleNamespace(position=x))  # noqa: E731
+    return list(wires(depth, np.zeros(3), np.ones(3)))
+
+
+def test_lines_of_a_box_are_its_edges():
+    """Two rectangles across each axis, whose corners are within a hundredth of its length."""
+    found = lines_of_tool(
+        """
+        region(plate, block, 0.2, 0.8, 0.3, 0.5, 0.41, 0.44)
+        fix(press, contact/surface, all, plate, 0, 0, 0, 0.1)
+        """
+    )
+    box = np.array([[0.2, 0.3, 0.51], [0.8, 0.5, 0.54]])
+    faces = []
+    for line in found:
+        (axis,) = np.flatnonzero(np.ptp(line, axis=0) < 1e-12)
+        end = int(np.argmin(abs(box[:, axis] - line[0, axis])))
+        faces.append((int(axis), end))
+        expected = box.copy()
+        expected[:, axis] = box[end, axis]
+        ends = [line.min(axis=0), line.max(axis=0)]
+        np.testing.assert_allclose(ends, expected, atol=0.01 * np.ptp(box, axis=0).max())
+    assert sorted(faces) == [(axis, end) for axis in range(3) for end in (0, 1)]
+
+
+def test_lines_of_a_ball_are_on_it():
+    """Circles of the radius of a section: sqrt(R^2 - a^2), at -R/2, 0 and R/2 along each axis."""
+    centre, R = np.array([0.4, 0.5, 0.6]), 0.2
+    found = lines_of_tool("fix(ball, indent, all, sphere, 1, 0.2, 0.4, 0.5, 0.6)")
+    heights = []
+    for line in found:
+        np.testing.assert_allclose(np.linalg.norm(line - centre, axis=1), R, rtol=2e-3)
+        (axis,) = np.flatnonzero(np.ptp(line, axis=0) < 1e-12)
+        heights.append((int(axis), (line[0, axis] - centre[axis]) / R))
+    expected = [(axis, height) for axis in range(3) for height in (-0.5, 0, 0.5)]
+    np.testing.assert_allclose(sorted(heights), expected, atol=0.01)
+
+
+def test_lines_of_a_tube_with_a_channel():
+    """The tool of meldtool: on its cylinder, its square channel or its ends."""
+    found = lines_of_tool("fix(a, meldtool, all, 1, y, 0.1, 0.5, 0.4, 0, 0.3, 0.7, 0.3)")
+    x, y, z = np.concatenate(found).T - np.array([[0.5], [0], [0.4]])
+    away = np.abs([np.hypot(x, z) - 0.3, np.maximum(abs(x), abs(z)) - 0.1, y - 0.3, y - 0.7])
+    assert away.min(axis=0).max() < 5e-3
+    assert (away.min(axis=1) < 1e-3).all()
+
+
+def test_lines_of_a_wall_are_where_it_leaves_the_domain():
+    """x + z = 1.2 in a cube of side 1: four edges, at its ends along x, y and z."""
+    found = np.concatenate(
+        lines_of_tool("fix(wall, impenetrablesurface, all, 1, 0.6, 0, 0.6, -1, 0, -1)")
+    )
+    np.testing.assert_allclose(found[:, 0] + found[:, 2], 1.2, atol=1e-3)
+    on_edge = (abs(found[:, 1] * (1 - found[:, 1])) < 1e-3) | (abs(found[:, 0] - 0.6) > 0.397)
+    assert on_edge.all()
+
+
+def test_outlines_in_space_tell_what_is_behind():
+    """Seen from above: a ball above a plate is before it, one below it is behind, and light."""
+    hub = SmallHub(3, 0, 1, 0.1)
+    hub.interpreter.run_text(
+        """
+        region(plate, block, 0.1, 0.9, 0.1, 0.9, 0.5, 0.6)
+        solid(a, region, plate, 1, steel, 0.1)
+        fix(below, indent, all, sphere, 1, 0.1, 0.3, 0.3, 0.2)
+        fix(above, indent, all, sphere, 1, 0.1, 0.7, 0.7, 0.8)
+        """
+    )
+    dump = PyPlot(hub, 1, "p.png", 300, 300, outlines=True, azimuth=-90.0, elevation=90.0)
+    dump.draw(io.BytesIO())
+    lines = dump._picture.marks.lines
+    of_ball = {"below": [], "above": []}
+    for line, colour in zip(lines.get_segments(), lines.get_color(), strict=True):
+        at = line.mean(axis=0) + 0.5
+        for name, place in (("below", 0.3), ("above", 0.7)):
+            if np.abs(at - place).max() < 0.12:
+                of_ball[name].append((len(line), colour[3]))
+    assert {opacity for _, opacity in of_ball["below"]} == {pictures.HIDDEN[3]}
+    shown = sum(n for n, opacity in of_ball["above"] if opacity == 1)
+    assert shown == pytest.approx(sum(n for n, _ in of_ball["above"]) / 2, rel=0.15)
+    plate = max(lines.get_segments(), key=lambda line: np.ptp(line, axis=0).max())
+    np.testing.assert_allclose(
+        [plate.min(axis=0), plate.max(axis=0)], [[-0.4] * 2, [0.4] * 2], atol=0.04
+    )
+
+
+def test_points_behind_others_are_not_drawn(monkeypatch):
+    """Of 20^3 points that are stretched and moved at random, without a change of one pixel."""
+    own = (np.arange(20) + 0.5) / 20
+    x = np.stack(np.meshgrid(own, own, own), -1).reshape(-1, 3) * (0.5, 0.7, 0.5) + 0.2
+    x += np.random.default_rng(1).normal(0, 5e-3, x.shape)
+    columns = dict(zip("xyz", x.T, strict=True)) | {"id": np.arange(8000), "seq": x[:, 0]}
+    domain = SimpleNamespace(dimension=3, lo=np.zeros(3), hi=np.ones(3))
+    drawn = []
+    for _ in range(2):
+        picture = pictures.make(domain, (3, 3), 100, pictures.Options("seq", "seq"))
+        picture.show(Snapshot(0, 0.0, columns, domain.lo, domain.hi), 0.028, "")
+        picture.save_png(file := io.BytesIO(), 1)
+        drawn.append((picture.marks.rows.shape[1], file.getvalue()))
+        monkeypatch.setattr(
+            pictures.SpacePicture, "_shows", lambda _, x, side: np.ones(len(x), bool)
+        )
+    assert drawn[0][1] == drawn[1][1]
+    assert drawn[0][0] < 0.7 * drawn[1][0] == 0.7 * 8000
 
 
 def test_a_logarithm_is_shown_by_its_number():

@@ -173,7 +173,7 @@ def _picture(
     first: Snapshot, files: Iterable[Path], options: argparse.Namespace, look: dict[str, Any]
 ) -> Any:
     """Make the empty picture that suits the first snapshot; place and colours suit all of them."""
-    from karamelo_py.output import pictures
+    from karamelo_py.output import outlines, pictures
 
     if options.column is not None and options.column not in first.columns:
         said = f"the dump has no column '{options.column}'"
@@ -194,7 +194,7 @@ def _picture(
     )
     if not made_look["log"] and not made_look["quantile"]:
         made.begin_with(span)
-    made.side = pictures.spacing(np.column_stack([first.columns[name] for name in "xyz"]))
+    made.side = outlines.spacing(np.column_stack([first.columns[name] for name in "xyz"]))
     return made
 
 

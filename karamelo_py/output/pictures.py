@@ -11,7 +11,6 @@ from types import SimpleNamespace
 from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
-from contourpy import contour_generator
 from matplotlib import colormaps
 from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -25,6 +24,17 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator
 from matplotlib.transforms import Transform
 from PIL import Image
 
+from karamelo_py.output.outlines import (
+    Depth,
+    Front,
+    corners,
+    outlines,
+    shared_out,
+    smoothed,
+    split,
+    wires,
+    zeros,
+)
 from karamelo_py.output.snapshots import Snapshot
 
 # Colour-blind safe (Okabe and Ito 2008); solids take them in turn.
@@ -33,6 +43,8 @@ MOST_IN_LEGEND = 16
 MARGIN = 4  # pixels at both sides of a long title
 MARKS = 1 << 16  # points that are drawn together
 FINE = 300  # steps along the longest side at which the outline of a tool is looked for
+MOST_CELLS = 1 << 23  # of a picture in which hidden points are looked for
+HIDDEN = (0.0, 0.0, 0.0, 0.25)  # colour of lines behind something
 # A circle of this diameter has the area of a unit square.
 ROUND = np.sqrt(4 / np.pi)
 STEPS = (1, 2, 2.5, 5, 10)  # between ticks
@@ -40,7 +52,6 @@ STEPS = (1, 2, 2.5, 5, 10)  # between ticks
 LIGHT = np.array([-0.35, 0.6, 0.72])
 AMBIENT = 0.5  # light from all sides
 LIT = 8  # points, from which on they have a surface
-SAMPLE = 400  # points whose nearest neighbours are looked for
 
 
 class Options(NamedTuple):
@@ -61,7 +72,7 @@ class Options(NamedTuple):
     quantile: float = 0.0  # share of the values, at each end, for which limits do not grow
     fontsize: float = 9.0
     pointsize: float = 1.0  # of points, over that of the material they stand for
-    outlines: bool = False  # of solids and tools, in the plane
+    outlines: bool = False  # of solids and tools
 
 
 class DrawnPoints(Artist):
@@ -70,7 +81,7 @@ class DrawnPoints(Artist):
     def __init__(self, picture: Picture):
         super().__init__()
         self.picture = picture
-        self.rows = np.empty((3, 0))  # places on paper, a value, and the cell where there is light
+        self.rows = np.empty((3, 0))  # places on paper, a value, in space light
         self.lines = LineCollection([], colors="black", linewidths=0.1 * picture.options.fontsize)
         picture.axes.add_collection(self.lines, autolim=False)
         self.lines.set_visible(False)
@@ -191,20 +202,13 @@ class Picture:
         x = np.column_stack([columns[name] for name in "xyz"])
         self.marks.rows = self._rows(columns["id"], x, values, side)
         if self.options.outlines:
-            lines = [line for tool in tools for line in self._around(tool)]
-            for kind in np.unique(columns["type"]):
-                lines += outlines(x[columns["type"] == kind, :2])
-            self.marks.lines.set_segments(lines)
+            kinds = columns["type"]
+            bodies = [x[kinds == kind] for kind in np.unique(kinds)]
+            depths = [lambda x, tool=tool: tool(SimpleNamespace(position=x)) for tool in tools]
+            self._outline(bodies, depths, side)
 
-    def _around(self, tool: Callable) -> list[np.ndarray]:
-        """Outlines (m, 2) of a tool in the plane, where its depth is 0."""
-        (left, right), (low, high) = self.axes.get_xlim(), self.axes.get_ylim()
-        step = max(right - left, high - low) / FINE
-        x, y = np.arange(left, right + step, step), np.arange(low, high + step, step)
-        places = np.stack(np.meshgrid(x, y), axis=-1)
-        depth = tool(SimpleNamespace(position=places.reshape(-1, 2))).reshape(places.shape[:2])
-        lines: Any = contour_generator(x, y, depth).lines(0.0)
-        return lines
+    def _outline(self, bodies: list[np.ndarray], tools: list[Depth], side: float) -> None:
+        """Set the lines around points (n, 3) of bodies, and around tools."""
 
     def _entitle(self, text: str) -> None:
         """Write the title above the axes, and where that is too narrow within the picture."""
@@ -314,52 +318,6 @@ def grown(limits: tuple[float, float] | None, values: np.ndarray) -> tuple[float
     return float(lo), float(hi if hi > lo else lo + unit)
 
 
-def outlines(x: np.ndarray) -> list[np.ndarray]:
-    """Lines (m, 2) where half of the material of points x (n, 2) ends.
-
-    Each point is shared out to the nodes of cells of its size, over three of them: a node at the
-    surface gets half as much as those within the body beside it.
-    """
-    cell = spacing(x, 4)
-    if not cell > 0:
-        return []
-    lo = x.min(axis=0) - 4 * cell
-    at = (x - lo) / cell
-    filled = np.zeros((at.max(axis=0) + 6).astype(int))
-    for corner in product((0, 1), repeat=2):
-        node = at.astype(int) + corner
-        np.add.at(filled, tuple(node.T), np.prod(1 - abs(at - node), axis=1))
-    filled = _smoothed(filled)
-    within = filled
-    for axis in (0, 1, 0, 1):  # the largest of two nodes around
-        beside = np.maximum(np.roll(within, 1, axis), np.roll(within, -1, axis))
-        within = np.maximum(within, beside)
-    share = np.divide(filled, within, out=np.zeros_like(filled), where=within > 0)
-    across, up = (low + cell * np.arange(n) for low, n in zip(lo, filled.shape, strict=True))
-    lines: Any = contour_generator(across, up, share.T).lines(0.5)
-    return lines
-
-
-def _smoothed(values: np.ndarray) -> np.ndarray:
-    """Take the mean of each node and its neighbours, twice along each axis."""
-    for axis in range(values.ndim):
-        for _ in range(2):
-            beside = np.roll(values, 1, axis) + np.roll(values, -1, axis)
-            values = 0.5 * values + 0.25 * beside
-    return values
-
-
-def spacing(x: np.ndarray, count: int = 1) -> float:
-    """Measure the distance of points (n, d) from their nearest neighbours, the mean of `count`."""
-    if len(x) <= count:
-        return 0.0
-    near = []
-    for k in np.linspace(0, len(x) - 1, min(SAMPLE, len(x))).astype(int):
-        square = ((x - x[k]) ** 2).sum(axis=1)
-        near.append(np.sqrt(np.partition(square, count)[1 : count + 1]).mean())
-    return float(np.median(near))
-
-
 def _zoomed(domain: Any, window: Sequence[tuple[float | None, float | None]]) -> Any:
     """The part of a domain that is shown."""
     if not window:
@@ -451,6 +409,11 @@ class PlanePicture(Picture):
             values = (values - self.limits[0]) / (self.limits[1] - self.limits[0])
         return np.array([*x.T[:2], values], np.float32)[:, np.argsort(ids)]
 
+    def _outline(self, bodies: list[np.ndarray], tools: list[Depth], side: float) -> None:
+        ends = np.transpose([self.axes.get_xlim(), self.axes.get_ylim()])
+        lines = [line for tool in tools for line in zeros(tool, *ends, FINE)]
+        self.marks.lines.set_segments(lines + [line for x in bodies for line in outlines(x[:, :2])])
+
     def place(self, rows: np.ndarray) -> None:
         """Hand what shows of some points to the artist."""
         self.artist.set_offsets(rows[:2].T)
@@ -525,38 +488,66 @@ class SpacePicture(PlanePicture):
 
     def _rows(self, ids: np.ndarray, x: np.ndarray, values: np.ndarray, side: float) -> np.ndarray:
         places = self._project(x)
+        shows = np.flatnonzero(self._shows(places, side))
+        ids, places, values = ids[shows], places[shows], values[shows]
         # From far to near, and by id: bits of negative numbers are in the order of magnitudes.
         bits = places[:, 2].astype(np.float32).view(np.int32).astype(np.int64)
         keys = np.where(bits < 0, -0x80000000 - bits, bits) << 32 | ids.astype(np.int64)
         rows = super()._rows(keys, places, values, side)
-        self.light = None
         if len(x) < LIT:
             return rows
-        lo, size = x.min(axis=0), np.ptp(x, axis=0)
-        cell = max(1.5 * side, size.max() / 120, np.finfo(float).tiny)
-        shape = tuple(((size / cell).astype(int) + 5).tolist())
-        cells = np.ravel_multi_index(tuple(((x - lo) / cell).astype(int).T + 2), shape)
-        counts = np.bincount(cells, minlength=int(np.prod(shape)))
-        self.light = self._light(counts.reshape(shape))
-        return np.vstack([rows, cells[np.argsort(keys)].astype(np.float32)])
+        return np.vstack([rows, self._light(x, side, shows)[np.argsort(keys)]])
+
+    def _shows(self, places: np.ndarray, side: float) -> np.ndarray:
+        """Tell which points are not wholly behind others: of a large body that is its surface."""
+        # A cell beside that of a point is within its circle, which is within three cells.
+        low, high = np.transpose([self.axes.get_xlim(), self.axes.get_ylim()])
+        cell = side * self.options.pointsize / 5
+        if not cell > 0 or np.prod((high - low) / cell) > MOST_CELLS:
+            return np.ones(len(places), bool)
+        return ~Front(places, low, high, cell, 0).hides(places[:, :2], places[:, 2], around=3)
+
+    def _outline(self, bodies: list[np.ndarray], tools: list[Depth], side: float) -> None:
+        low, high = np.transpose([self.axes.get_xlim(), self.axes.get_ylim()])
+        fronts = [
+            Front(self._project(x), low, high, max(side / 3, (high - low).max() / (2 * FINE)), 2)
+            for x in bodies
+        ]
+        found = []  # lines as they are seen, and where they are hidden
+        for front in fronts:
+            for line in front.outlines():
+                found.append((line, [other.hides(line, front.beside(line)) for other in fronts]))
+        for tool in tools:
+            for line in wires(tool, self.lo, self.hi):
+                places = self._project(line)
+                # Towards the eye there is the tool itself, where it hides its other side.
+                nearer = line + 0.01 * np.linalg.norm(np.ptp(line, axis=0)) * self.view[2]
+                hidden = [front.hides(places[:, :2], places[:, 2]) for front in fronts]
+                found.append((places[:, :2], [tool(nearer) > 0, *hidden]))
+        pieces = [piece for line, by in found for piece in split(line, np.any(by, axis=0))]
+        pieces.sort(key=lambda piece: not piece[1])
+        self.marks.lines.set_segments([line for line, _ in pieces])
+        self.marks.lines.set_color([HIDDEN if hidden else "black" for _, hidden in pieces])
 
     def _colours_of(self, rows: np.ndarray) -> np.ndarray:
         colours = super()._colours_of(rows)
-        if self.light is not None:
-            colours[:, :3] *= self.light[rows[3].astype(int)][:, None]
+        if len(rows) > 3:
+            colours[:, :3] *= rows[3][:, None]
         return colours
 
-    def _light(self, counts: np.ndarray) -> np.ndarray:
-        """Measure the light on each cell: a surface looks where there are fewer points."""
-        density = _smoothed(counts.astype(float))
-        there = np.flatnonzero(counts)
-        normal = -np.column_stack([slope.ravel()[there] for slope in np.gradient(density)])
+    def _light(self, x: np.ndarray, side: float, some: np.ndarray) -> np.ndarray:
+        """Measure the light on some points: a surface looks where there are fewer of them."""
+        lo, size = x.min(axis=0), np.ptp(x, axis=0)
+        cell = max(1.5 * side, size.max() / 120, np.finfo(float).tiny)
+        at = (x - lo) / cell + 2
+        shape = tuple((at.max(axis=0) + 3).astype(int))
+        slopes = [slope.ravel() for slope in np.gradient(smoothed(shared_out(at, shape)))]
+        around = list(corners(at[some], shape))
+        normal = -np.transpose([sum(w * slope[k] for k, w in around) for slope in slopes])
         length = np.linalg.norm(normal, axis=1)
         facing = (normal @ self.view.T) @ (LIGHT / np.linalg.norm(LIGHT))
-        facing = np.divide(facing, length, out=np.ones(len(there)), where=length > 0)
-        light = np.zeros(counts.size)
-        light[there] = AMBIENT + (1 - AMBIENT) * np.clip(facing, 0, 1)
-        return light
+        facing = np.divide(facing, length, out=np.ones(len(some)), where=length > 0)
+        return (AMBIENT + (1 - AMBIENT) * np.clip(facing, 0, 1)).astype(np.float32)
 
 
 class LinePicture(Picture):

@@ -83,8 +83,9 @@ class PyPlot(Dump):
     pointsize
         Size of the points over that of the material they stand for; 1.4 fills all gaps.
     outlines
-        true: in the plane, a line around each solid, and around the regions and rigid tools of
-        fixes, such as contact/surface.
+        true: a line around each solid, and around the regions, walls and rigid tools of fixes, such
+        as contact/surface. In 3D tools are drawn by their edges and sections; what lies behind
+        something is light.
 
     Example
     -------
@@ -274,9 +275,9 @@ def look_of(
                 argument=high,
                 expected=f"a number above {low}",
             )
-    if outlines and dimension != 2:
+    if outlines and dimension == 1:
         raise ScriptError(
-            f"outlines are drawn in the plane, and this scene has {dimension} dimensions",
+            "outlines are drawn in the plane and in space, and this scene is on a line",
             argument="outlines",
             expected="false",
         )

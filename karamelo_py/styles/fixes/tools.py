@@ -702,13 +702,25 @@ class MeldTool(ToolFix):
         self.along = "xyz".index(axis)
         self.across = [k for k in range(3) if k != self.along]
 
+    def _seen(self, points: Any, *at: float) -> tuple[np.ndarray, ...]:
+        """Heights (n,) of points above the end, and their places (n, 2): as they are and turned."""
+        c1, c2, theta, lo = at
+        x = points.position.astype(float)
+        q = x[:, self.across] - np.array([c1, c2])
+        turn = np.array([[np.cos(theta), np.sin(theta)], [-np.sin(theta), np.cos(theta)]])
+        return x[:, self.along] - lo, q, q @ turn.T, turn
+
+    def depth_of(self, points: PointTable) -> np.ndarray:
+        """Depth (n,) of points in the tool now."""
+        _, w, c1, c2, theta, lo, hi, Rmax = self.now(*self.numbers)
+        height, q, own, _ = self._seen(points, c1, c2, theta, lo)
+        ways = height, hi - lo - height, Rmax - np.linalg.norm(q, axis=1), abs(own).max(axis=1) - w
+        return np.min(ways, axis=0)
+
     def forces(self, points: PointsView) -> np.ndarray:
         K, w, c1, c2, theta, lo, hi, Rmax = self.now(*self.numbers)
-        x = points.position.astype(float)
-        height, q = x[:, self.along] - lo, x[:, self.across] - np.array([c1, c2])
+        height, q, own, turn = self._seen(points, c1, c2, theta, lo)
         r = np.linalg.norm(q, axis=1)
-        turn = np.array([[np.cos(theta), np.sin(theta)], [-np.sin(theta), np.cos(theta)]])
-        own = q @ turn.T
         inward = (np.clip(own, -w, w) - own) @ turn
         outward = q * np.divide(Rmax - r, r, out=np.zeros_like(r), where=r > 0)[:, None]
         # The ways out (n, 3): into the channel, radially, below; and how long they are.

@@ -1,0 +1,200 @@
+"""Lines around bodies of points and around tools, in the plane and as they are seen in space."""
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from itertools import pairwise, product
+from typing import Any
+
+import numpy as np
+from contourpy import contour_generator
+
+# In space, where tools are drawn by sections: places along each axis where a tool is looked for,
+# steps along a section, halvings of the way to its ends, and sections between these.
+COARSE, SECTION, HALVINGS, BETWEEN = 32, 100, 10, 3
+# Points whose nearest neighbours are looked for, at least and at most, and distances in between.
+FEW, SAMPLE, DISTANCES = 25, 400, 4_000_000
+
+Depth = Callable[[np.ndarray], np.ndarray]  # in a tool, of places (n, d): (n,)
+
+
+def outlines(x: np.ndarray) -> list[np.ndarray]:
+    """Lines (m, 2) where half of the material of points x (n, 2) ends.
+
+    Each point is shared out to the nodes of cells of its size, over three of them: a node at the
+    surface gets half as much as those within the body beside it.
+    """
+    cell = spacing(x, 4)
+    if not cell > 0:
+        return []
+    lo = x.min(axis=0) - 4 * cell
+    at = (x - lo) / cell
+    filled = smoothed(shared_out(at, tuple((at.max(axis=0) + 6).astype(int))))
+    within = _largest(filled, 2)
+    share = np.divide(filled, within, out=np.zeros_like(filled), where=within > 0)
+    across, up = (low + cell * np.arange(n) for low, n in zip(lo, filled.shape, strict=True))
+    lines: Any = contour_generator(across, up, share.T).lines(0.5)
+    return lines
+
+
+def corners(at: np.ndarray, shape: tuple[int, ...]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Yield nodes (n,) around places (n, d), by number, and their linear weights (n,)."""
+    first = at.astype(int)
+    for corner in product((0, 1), repeat=len(shape)):
+        node = first + corner
+        yield np.ravel_multi_index(tuple(node.T), shape), np.prod(1 - abs(at - node), axis=1)
+
+
+def shared_out(at: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """Share places (n, d) out to the nodes around them."""
+    found = np.zeros(int(np.prod(shape)))
+    for node, weight in corners(at, shape):
+        found += np.bincount(node, weight, len(found))
+    return found.reshape(shape)
+
+
+def _largest(values: np.ndarray, reach: int) -> np.ndarray:
+    """Take the largest of each node and those up to `reach` beside it along each axis."""
+    for axis in [*range(values.ndim)] * reach:
+        beside = np.maximum(np.roll(values, 1, axis), np.roll(values, -1, axis))
+        values = np.maximum(values, beside)
+    return values
+
+
+def smoothed(values: np.ndarray) -> np.ndarray:
+    """Take the mean of each node and its neighbours, twice along each axis."""
+    for axis in range(values.ndim):
+        for _ in range(2):
+            beside = np.roll(values, 1, axis) + np.roll(values, -1, axis)
+            values = 0.5 * values + 0.25 * beside
+    return values
+
+
+def zeros(depth: Depth, lo: np.ndarray, hi: np.ndarray, fine: int) -> list[np.ndarray]:
+    """Lines (m, 2) between corners (2,) where a depth is 0; `fine` steps along the longer side."""
+    steps = np.ceil(fine * (hi - lo) / (hi - lo).max()).astype(int)
+    x, y = (np.linspace(*ends) for ends in zip(lo, hi, steps + 1, strict=True))
+    places = np.stack(np.meshgrid(x, y), axis=-1)
+    found = depth(places.reshape(-1, 2)).reshape(places.shape[:2])
+    lines: Any = contour_generator(x, y, found).lines(0.0)
+    return lines
+
+
+def wires(depth: Depth, lo: np.ndarray, hi: np.ndarray) -> Iterator[np.ndarray]:
+    """Yield lines (m, 3) on the surface of a tool, as far as it lies between two corners (3,).
+
+    They are sections across each axis: at the ends, where faces meet, and between where the surface
+    bends. A box has its edges, a ball circles.
+    """
+
+    def on_lattice(axes: list) -> np.ndarray:
+        places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+        return depth(places.reshape(-1, 3)).reshape(places.shape[:3])
+
+    for _ in range(3):  # closer around the surface
+        axes = [np.linspace(*ends, COARSE) for ends in zip(lo, hi, strict=True)]
+        depths = on_lattice(axes)
+        away = np.abs(depths)
+        near = np.nonzero(away < min(np.linalg.norm((hi - lo) / (COARSE - 1)), away.max()))
+        if not len(near[0]):
+            return
+        lo = np.array([a[max(k.min() - 1, 0)] for a, k in zip(axes, near, strict=True)])
+        hi = np.array([a[min(k.max() + 1, COARSE - 1)] for a, k in zip(axes, near, strict=True)])
+    for axis, along in enumerate(np.eye(3)):
+
+        def cut(depths: np.ndarray, axis: int = axis) -> np.ndarray:
+            """Tell of each section whether the surface crosses it."""
+            within = np.moveaxis(depths, axis, 0).reshape(depths.shape[axis], -1) > 0
+            return within.any(axis=1) & ~within.all(axis=1)
+
+        there = np.flatnonzero(cut(depths))
+        ends = []
+        for k, beyond in ((there[0], -1), (there[-1], 1)) if len(there) else ():
+            inner, outer = axes[axis][[k, np.clip(k + beyond, 0, COARSE - 1)]]
+            for _ in range(HALVINGS):
+                middle = [(inner + outer) / 2]
+                crossed = cut(on_lattice([*axes[:axis], middle, *axes[axis + 1 :]]))[0]
+                inner, outer = (middle[0], outer) if crossed else (inner, middle[0])
+            ends.append(inner)
+        if not ends or not ends[0] < ends[1]:
+            continue
+        others = [k for k in range(3) if k != axis]
+        heights = np.linspace(*ends, BETWEEN + 2)
+        apart = (heights[1] - heights[0]) / 2 * along
+        # Depths below an end are known where they are larger than a step of the section.
+        step = (hi[others] - lo[others]).max() / SECTION
+        inset_of = {ends[0]: min(step, apart.sum() / 2), ends[1]: -min(step, apart.sum() / 2)}
+        for height in heights:
+            inset = inset_of.get(height, 0.0)
+            section = partial(_section, depth, axis, height + inset)
+            for flat in zeros(section, lo[others], hi[others], SECTION):
+                line = np.insert(flat, axis, height + inset, axis=1)
+                if inset:  # do other faces meet that at the end?
+                    part = inset / 2 * along
+                    slope = (depth(line + part) - depth(line - part)) / inset
+                    shows = abs(inset) < step or np.median(np.abs(slope)) < 0.7
+                else:
+                    bend = np.abs(depth(line + apart) + depth(line - apart))
+                    shows = np.mean(bend > 1e-3 * np.linalg.norm(apart)) > 0.05
+                if shows:
+                    line[:, axis] = height
+                    yield line
+
+
+def _section(depth: Depth, axis: int, height: float, x: np.ndarray) -> np.ndarray:
+    """Find the depth of places (n, 2) in a plane across an axis."""
+    return depth(np.insert(x, axis, height, axis=1))
+
+
+class Front:
+    """Heights of what is nearest to the eye, of points seen at x (n, 3), by cells of the picture.
+
+    A point fills its cell and those beside it; up to twice as many `gaps` between them are closed.
+    """
+
+    def __init__(self, x: np.ndarray, low: np.ndarray, high: np.ndarray, cell: float, gaps: int):
+        self.low, self.cell = low - 4 * cell, cell
+        self.height = np.full(np.ceil((high - self.low) / cell + 4).astype(int), -np.inf)
+        np.maximum.at(self.height, self._cells(x), x[:, 2])
+        self.height = -_largest(-_largest(self.height, 1 + gaps), gaps)
+
+    def _cells(self, x: np.ndarray) -> tuple[np.ndarray, ...]:
+        last = np.array(self.height.shape) - 1
+        return tuple(np.clip((x[:, :2] - self.low) / self.cell, 0, last).astype(int).T)
+
+    def beside(self, x: np.ndarray) -> np.ndarray:
+        """Heights at lines (n, 2) around the points."""
+        return _largest(self.height, 2)[self._cells(x)]
+
+    def outlines(self) -> list[np.ndarray]:
+        """Draw lines (m, 2) around the points."""
+        filled = smoothed(np.isfinite(self.height).astype(float))
+        across, up = (
+            low + self.cell * (np.arange(n) + 0.5)
+            for low, n in zip(self.low, filled.shape, strict=True)
+        )
+        lines: Any = contour_generator(across, up, filled.T).lines(0.5)
+        return lines
+
+    def hides(self, x: np.ndarray, height: np.ndarray, around: int = 0) -> np.ndarray:
+        """Tell of places seen at x (n, 2), in this height, if all cells `around` are in front."""
+        front = -_largest(-self.height, around)[self._cells(x)]
+        return front > height + 3 * self.cell
+
+
+def split(line: np.ndarray, hidden: np.ndarray) -> Iterator[tuple[np.ndarray, bool]]:
+    """Yield the pieces of a line that are hidden and those that are not."""
+    turns = np.flatnonzero(np.diff(hidden)) + 1
+    for first, end in pairwise([0, *turns, len(line)]):
+        yield line[first : end + 1], bool(hidden[first])
+
+
+def spacing(x: np.ndarray, count: int = 1) -> float:
+    """Measure the distance of points (n, d) from their nearest neighbours, the mean of `count`."""
+    if len(x) <= count:
+        return 0.0
+    near = []
+    sample = min(max(DISTANCES // len(x), FEW), SAMPLE, len(x))
+    for k in np.linspace(0, len(x) - 1, sample).astype(int):
+        square = ((x - x[k]) ** 2).sum(axis=1)
+        near.append(np.sqrt(np.partition(square, count)[1 : count + 1]).mean())
+    return float(np.median(near))
