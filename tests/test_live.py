@@ -147,6 +147,9 @@ def test_a_run_is_held_taken_on_and_coloured_anew(simulation):
         assert told["frames"][-1][1] == 2
         post(page.address, "go")
     assert simulation.step == 6
+    get_column = page.address + "column?name=vy"  # between two runs, or when all is over
+    urllib.request.urlopen(urllib.request.Request(get_column, data=b""), timeout=20)
+    assert events.until(lambda told: told["frames"][-1][3] == "vy")["frames"][-1][1] == 6
     page.close()
 
 
@@ -212,19 +215,34 @@ def test_a_script_is_run_with_a_page_that_stops_it(tmp_path, monkeypatch, capsys
     assert "a live page shows a run of one process" in capsys.readouterr().err
 
 
-def test_frames_are_thinned_and_bounded(monkeypatch):
-    monkeypatch.setattr(frames, "POINTS", 10)
+def test_frames_are_bounded(monkeypatch):
     monkeypatch.setattr(frames, "COUNT", 8)
     columns = {name: np.arange(25.0) for name in ("x", "y", "seq")}
     kept = KeptFrames()
     for step in range(30):
         kept.add(Frame.of_columns(step, 0.1 * step, "xy", "seq", columns.__getitem__))
     listed = kept.listed()
-    assert len(listed) <= 8 and listed[0][1] == 0 and listed[-1][1] == 29
+    assert [frame[1] for frame in listed] == [0, 8, 16, 24, 29]  # evenly, and the newest
     assert listed[-1][4] == 25
-    shown = np.frombuffer(kept.answer({"k": str(listed[-1][0])}), np.float32).reshape(3, -1)
-    assert np.array_equal(shown[0], np.arange(0, 25, 3))
     assert kept.answer({"k": "-1"}) is None
+
+
+def test_points_are_thinned_alike_in_each_state(monkeypatch):
+    """All of a small solid, the same share of large ones; the same points wherever they lie."""
+    monkeypatch.setattr(frames, "POINTS", 10_000)
+    solid = np.repeat([1, 2, 3], [60_000, 300, 40_000])
+    columns = {"id": 1 + np.arange(len(solid)), "type": solid, "x": np.linspace(0, 1, len(solid))}
+    columns["y"] = columns["z"] = 0 * columns["x"]
+    first = Frame.of_columns(0, 0.0, "xyz", "id", columns.__getitem__)
+    assert first.of == 100_300 and first.numbers.dtype == np.float32
+    taken = np.bincount(solid[first.numbers[3].astype(int) - 1])
+    assert taken[2] == 300
+    assert np.allclose(taken[[1, 3]], [5820, 3880], atol=240)  # four standard deviations
+    places = first.numbers[0][first.numbers[3] <= 60_000]  # even, not the first ones
+    assert np.allclose(np.histogram(places, 6)[0], len(places) / 6, atol=125)
+    order = np.random.default_rng(3).permutation(len(solid))
+    again = Frame.of_columns(1, 0.1, "xyz", "id", {n: c[order] for n, c in columns.items()}.get)
+    assert np.array_equal(np.sort(again.numbers[3]), first.numbers[3])
 
 
 def test_a_folder_is_followed(simulation, tmp_path, capsys):

@@ -135,7 +135,8 @@ class FolderPage:
             return None
         path, place, step, moment, _ = self._states[k]
         columns = next(s for n, s in enumerate(read(path)) if n == place).columns
-        axes = "xyz"[: self._dimension]
+        count, axes = len(columns["x"]), "xyz"[: self._dimension]
+        columns = {"id": np.arange(count), "type": np.zeros(count), **columns}
         frame = Frame.of_columns(step, moment, axes, self._column, columns.__getitem__)
         return frame.numbers.tobytes()
 

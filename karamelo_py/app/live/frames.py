@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 PAGE = Path(__file__).with_name("run.html")
-POINTS = 200_000  # of a frame at most
-BYTES = 1 << 28  # of all frames
+POINTS = 1_000_000  # of a frame, about, at most
+BYTES = 1 << 29  # of all frames
 COUNT = 400
 
 
@@ -31,34 +31,51 @@ class Frame(NamedTuple):
         """Make a frame of columns that ``read(name)`` gives, (n,) each."""
         columns = [np.asarray(read(name)) for name in (*axes, column)]
         count = len(columns[0])
-        thin = slice(None, None, -(-count // POINTS) or 1)
-        return cls(
-            step, time, column, np.array([each[thin] for each in columns], np.float32), count
-        )
+        if count > POINTS:
+            some = few_of(*(np.asarray(read(name)).astype(int) for name in ("id", "type")))
+            columns = [each[some] for each in columns]
+        return cls(step, time, column, np.array(columns, np.float32), count)
+
+
+def few_of(ids: np.ndarray, solids: np.ndarray) -> np.ndarray:
+    """Choose (n,) about `POINTS` points of many: by chance, but the same ones in each state.
+
+    Of small solids all are taken, up to their part of a tenth; others have the same share.
+    """
+    counts = np.bincount(solids)
+    least = np.minimum(counts, POINTS // (10 * np.count_nonzero(counts)))
+    small = counts * POINTS < least * len(ids)
+    share = least / np.maximum(counts, 1)
+    share[~small] = (POINTS - least[small].sum()) / counts[~small].sum()
+    chance = np.random.default_rng(0).random(ids.max() + 1, np.float32)
+    return chance[ids] < share[solids]
 
 
 class KeptFrames:
-    """States of points by number; where there are too many, every second goes."""
+    """States of points by number; where there are too many, every second goes from then on."""
 
     def __init__(self) -> None:
         self._kept: dict[int, Frame] = {}
-        self._next = 0
+        self._next, self._every = 0, 1
         self._lock = threading.Lock()
 
     def add(self, frame: Frame) -> None:
         """Keep a frame."""
         with self._lock:
+            if (self._next - 1) % self._every:  # the newest so far was only that
+                self._kept.pop(self._next - 1, None)
             self._kept[self._next] = frame
-            self._next += 1
             size = sum(each.numbers.nbytes for each in self._kept.values())
             if len(self._kept) > COUNT or size > BYTES:
-                for number in [*self._kept][1:-1:2]:
+                self._every *= 2
+                for number in [k for k in self._kept if k % self._every and k != self._next]:
                     del self._kept[number]
+            self._next += 1
 
     def drop_last(self) -> None:
-        """Forget the newest frame."""
+        """Forget the newest frame, whose number the next one has."""
         with self._lock:
-            self._kept.popitem()
+            self._next, _ = self._kept.popitem()
 
     def listed(self) -> list[list]:
         """List number, step, time, column and count of each frame."""

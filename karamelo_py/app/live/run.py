@@ -110,10 +110,13 @@ class RunPage(Rhythmic):
                 self._paused = False
             if shown != self._column:
                 shown = self._column
-                self.frames.drop_last()
-                self._take()
-                self.server.changed()
+                self._take_again()
         self._once = False
+
+    def _take_again(self) -> None:
+        self.frames.drop_last()
+        self._take()
+        self.server.changed()
 
     # ---- in threads of the server ---------------------------------------------------------------
 
@@ -144,6 +147,8 @@ class RunPage(Rhythmic):
     def _choose(self, words: Mapping[str, str]) -> None:
         if words.get("name") in self.hub.fields.particle_names():
             self._column = words["name"]
+            if self._rows and self.hub.running is None:  # nothing else would show it
+                self._take_again()
 
     def _pause(self, _: Mapping[str, str]) -> None:
         self._paused = True

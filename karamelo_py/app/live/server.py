@@ -52,7 +52,7 @@ class Server:
     ):
         require_plotly()
         self.page, self.news = page, news
-        self.answers = {"plotly.js": _plotly, **answers}
+        self.answers = {"plotly.js": _plotly, "points.js": _points, **answers}
         self.actions = actions
         self.version = 0
         self._changed = threading.Condition()
@@ -133,6 +133,10 @@ def _plotly(_: Mapping[str, str]) -> bytes:
     from plotly.offline import get_plotlyjs
 
     return get_plotlyjs().encode()
+
+
+def _points(_: Mapping[str, str]) -> bytes:
+    return Path(__file__).with_name("points.js").read_bytes()
 
 
 def _handler(server: Server) -> type[BaseHTTPRequestHandler]:
