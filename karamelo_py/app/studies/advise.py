@@ -57,7 +57,6 @@ and it is told whether it met the target."""
 JUMPING, CROSSED = ("linear", "Bernstein-quadratic"), ("ulmpm", "ulmpm/contacts")
 ALONE = "no finer run is known"
 UNFOLLOWED = f"{ALONE}, whose points may cross cells"
-SETTLED = 0.1  # of an order: neighbours that differ by less
 SECOND = 2.0  # the order that all methods here may reach
 
 
@@ -78,12 +77,12 @@ def forecast(
     """Expect a run at `x` from the runs at `xs`, coarse ones first.
 
     The error goes on with the order between the last two. Its bounds are those of the least and the
-    largest order so far, at least a third of the expected order away, and half of it below where
-    orders differ; an order that has fallen may fall by as much again, and one that has not yet
-    reached 2 may. Errors that chance has made small count as large as they may be (`credible`, with
-    the order `highest` of the functions). The time is steps times (a + b points), fitted to the
-    runs; any other cost goes on as between the last two. None where fewer than two runs have an
-    error, or the last one got worse.
+    largest order so far, at least a third of the expected order above and half of it below; an
+    order that has fallen may fall by as much again, and one that has not yet reached 2 may. Errors
+    that chance has made small count as large as they may be (`credible`, with the order `highest`
+    of the functions). The time is steps times (a + b points), fitted to the runs; any other cost
+    goes on as between the last two. None where fewer than two runs have an error, or the last one
+    got worse.
     """
     xs, signed = np.asarray(xs, float), errors(rows, accuracy)
     error = credible(xs, signed, highest)
@@ -102,8 +101,7 @@ def forecast(
     rates = [-f for f in fall if f < 0]
     # An order that falls may go on falling.
     drop = max(-fall[-2] - expected, 0.0) if len(fall) > 1 else 0.0
-    settled = len(fall) > 1 and abs(fall[-2] - fall[-1]) < SETTLED * expected
-    slow = max(min(*rates, (2 / 3 if settled else 1 / 2) * expected, expected - drop), 0.0)
+    slow = max(min(*rates, expected / 2, expected - drop), 0.0)
     fast = max(*rates, 4 / 3 * expected, min(highest, SECOND) if drop == 0 else 0.0)
     at = [float(error[-1] * np.exp(-rate * way)) for rate in (expected, fast, slow)]
     return Forecast(*at, _cost(x, xs, rows, cost))
@@ -473,16 +471,15 @@ def sureness(adviser: Adviser, best: Candidate) -> str:
     if best.forecast is None:
         alone = ", and whether finer runs are as good is not known" * (len(adviser.values) == 1)
         return f"sure: it was run ({said}){alone}"
+    # What is known of its kind may end the fall: its orders tell no bound then.
+    if doubts := adviser.doubts(best):
+        return "\n  ".join([f"not sure: expected {said}, if the error goes on to fall", *doubts])
     low, high = best.forecast.low, best.forecast.high
-    doubts = adviser.doubts(best)
     word = "almost sure"
     if high > adviser.target:
         near = adviser.target**2 < best.error * high  # nearer to what is expected than to the bound
         word = "uncertain" if near else "likely"
-    if doubts:
-        word = "not sure"
-    said = f"{word}: expected {said}; by its orders the error lies between {low:.3g} and {high:.3g}"
-    return "\n  ".join([said, *doubts])
+    return f"{word}: expected {said}; by its orders the error lies between {low:.3g} and {high:.3g}"
 
 
 def _nothing(adviser: Adviser) -> int:
