@@ -167,7 +167,7 @@ class PointView {
     const pen = this.pen, right = left + width + 14;
     pen.setTransform(dense, 0, 0, dense, 0, 0); pen.clearRect(0, 0, this.place.clientWidth, this.place.clientHeight);
     pen.font = "12px system-ui, sans-serif"; pen.strokeStyle = "#9aa3ab"; pen.fillStyle = "#1d2329"; pen.lineWidth = 1;
-    const text = (words, x, y, align = "left", base = "middle") => { pen.textAlign = align; pen.textBaseline = base; pen.fillText(words, x, y); };
+    const text = (words, x, y, align = "left", base = "middle") => { pen.textAlign = align; pen.textBaseline = base; pen.save(); pen.strokeStyle = "#fff"; pen.lineWidth = 3; pen.strokeText(words, x, y); pen.restore(); pen.fillText(words, x, y); };
     const line = (...ends) => { pen.beginPath(); pen.moveTo(...ends[0]); pen.lineTo(...ends[1]); pen.stroke(); };
     const at = place => {
       const from = place.map((x, k) => x - this.centre[k]), along = row => row.reduce((sum, r, k) => sum + r * from[k], 0);

@@ -68,8 +68,9 @@ class RunPage(Rhythmic):
         self.every = hub.output.log.every  # each run begins with an output
         names, numbers = hub.output.log.rows[-1] if hub.output.log.rows else ([], [])
         log = {name: n for name, n in zip(names, numbers, strict=True) if not isinstance(n, str)}
-        share = energy.share_lost(simulation) if simulation.control.clock[0].watch_energy else None
-        gain = None if share is None else -100 * share
+        clock = simulation.control.clock[0]
+        known = clock.watch_energy and clock.looks >= energy.FEW  # a mean of so many
+        gain = -100 * energy.share_lost(simulation) if known else None
         limit = "load steps" if simulation.implicit else ruling_limit(simulation)
         self._rows.append(Row(hub.update.step, hub.update.time, hub.update.dt, limit, gain, log))
         self._take()
