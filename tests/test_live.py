@@ -14,6 +14,7 @@ import pytest
 
 from karamelo_py import Simulation
 from karamelo_py.app.cli import main
+from karamelo_py.app.live import folder as folder_pages
 from karamelo_py.app.live import frames
 from karamelo_py.app.live import run as run_pages
 from karamelo_py.app.live.folder import FolderPage
@@ -245,7 +246,7 @@ def test_points_are_thinned_alike_in_each_state(monkeypatch):
     assert np.array_equal(np.sort(again.numbers[3]), first.numbers[3])
 
 
-def test_a_folder_is_followed(simulation, tmp_path, capsys):
+def test_a_folder_is_followed(simulation, tmp_path, monkeypatch, capsys):
     simulation.run(4)
     page = FolderPage(tmp_path)
     first = Events(page.server.address).next()
@@ -261,6 +262,15 @@ def test_a_folder_is_followed(simulation, tmp_path, capsys):
     numbers = np.frombuffer(get(page.server.address, "frame", k=2), np.float32).reshape(3, -1)
     assert np.allclose(numbers[2], simulation.points["vx"], rtol=1e-5)
     page.server.close()
+    many = FolderPage(tmp_path)
+    states = [frame[:2] for frame in Events(many.server.address).next()["frames"]]
+    assert states == [[0, 0], [1, 4], [2, 8]]
+    many.server.close()
+    monkeypatch.setattr(folder_pages, "FILES", 2)
+    few = FolderPage(tmp_path)  # the third file is read later
+    assert len(Events(few.server.address).next()["frames"]) == 2
+    assert few.look() and len(Events(few.server.address).next()["frames"]) == 3
+    few.server.close()
     (tmp_path / "empty").mkdir()
     for name, said in (("empty", "neither a log nor a dump"), ("nowhere", "is no folder")):
         assert main(["view", "--live", str(tmp_path / name)]) == 1

@@ -3,6 +3,7 @@
 import gzip
 import re
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
@@ -22,12 +23,12 @@ class Snapshot(NamedTuple):
     hi: np.ndarray
 
 
-def read(path: Path) -> Iterator[Snapshot]:
-    """Read the snapshots in a file, in their order; an error where it is no dump."""
+def read(path: Path, first: int = 0) -> Iterator[Snapshot]:
+    """Read the snapshots in a file, in their order from the `first`; an error if it is no dump."""
     readers = {".h5": _hdf5, ".hdf5": _hdf5, ".vtu": _vtu, ".pvd": _pvd}
     reader = readers.get(path.suffix, _lammps)
     try:
-        yield from reader(path)
+        yield from reader(path, first)
     # meshio ends the program over a file that it cannot read.
     except (OSError, ValueError, KeyError, ElementTree.ParseError, SystemExit) as error:
         reason = getattr(error, "strerror", None)
@@ -37,7 +38,7 @@ def read(path: Path) -> Iterator[Snapshot]:
         ) from error
 
 
-def _lammps(path: Path) -> Iterator[Snapshot]:
+def _lammps(path: Path, first: int) -> Iterator[Snapshot]:
     opener = gzip.open if path.suffix == ".gz" else open
     with opener(path, "rt", encoding="ascii") as file:
         step, time, count, box = 0, 0.0, 0, np.zeros((3, 2))
@@ -53,6 +54,8 @@ def _lammps(path: Path) -> Iterator[Snapshot]:
                 count = int(file.readline())
             elif item[0] == "BOX":
                 box = np.array([file.readline().split()[:2] for _ in range(3)], float)
+            elif item[0] == "ATOMS" and first > 0:
+                first -= sum(1 for _ in islice(file, count)) == count
             elif item[0] == "ATOMS":
                 table = np.loadtxt(file, max_rows=count, ndmin=2) if count else np.empty((0, 99))
                 columns = dict(zip(item[1:], table.T, strict=count > 0))
@@ -61,13 +64,14 @@ def _lammps(path: Path) -> Iterator[Snapshot]:
                 file.readline()
 
 
-def _hdf5(path: Path) -> Iterator[Snapshot]:
+def _hdf5(path: Path, first: int) -> Iterator[Snapshot]:
     import h5py
 
     # Also one that a killed program has left, or a running one writes.
     with h5py.File(path, "r", libver="latest", swmr=True, locking=False) as root:
         names = [name for name in root if root[name].ndim == 2]
-        for k, (step, time) in enumerate(zip(root["step"][:], root["time"][:], strict=True)):
+        moments = zip(root["step"][first:], root["time"][first:], strict=True)
+        for k, (step, time) in enumerate(moments, first):
             columns = {name: root[name][k] for name in names}
             columns |= {name: root[name][:] for name in ("id", "type")}
             there = ~np.isnan(columns["x"])
@@ -75,12 +79,12 @@ def _hdf5(path: Path) -> Iterator[Snapshot]:
             yield Snapshot(int(step), float(time), columns, *root.attrs["domain"])
 
 
-def _pvd(path: Path) -> Iterator[Snapshot]:
-    for entry in ElementTree.parse(path).iter("DataSet"):
-        yield from _vtu(path.parent / entry.attrib["file"], float(entry.attrib["timestep"]))
+def _pvd(path: Path, first: int) -> Iterator[Snapshot]:
+    for entry in [*ElementTree.parse(path).iter("DataSet")][first:]:
+        yield from _vtu(path.parent / entry.attrib["file"], 0, float(entry.attrib["timestep"]))
 
 
-def _vtu(path: Path, time: float = np.nan) -> Iterator[Snapshot]:
+def _vtu(path: Path, _: int, time: float = np.nan) -> Iterator[Snapshot]:
     import meshio
 
     mesh = meshio.read(path)

@@ -17,7 +17,8 @@ from karamelo_py.app.plot import read_log
 from karamelo_py.output.snapshots import Snapshot, read
 from karamelo_py.script.errors import ScriptError
 
-PAUSE = 0.5  # seconds between looks into the folder
+PAUSE = 0.5  # seconds between looks into the folder, where nothing is new
+FILES = 8  # that are read at a look: what they hold is seen before all are read
 WHOLE = (".h5", ".hdf5", ".pvd")  # dumps that hold many states
 
 
@@ -54,28 +55,30 @@ class FolderPage:
     def follow(self) -> None:
         """Look for news until somebody interrupts."""
         while True:
-            time.sleep(PAUSE)
             if self.look():
                 self.server.changed()
+            else:
+                time.sleep(PAUSE)
 
     def look(self) -> bool:
         """Look into the folder; tell whether there is anything new."""
         log, before = read_log(self.folder), len(self._states)
         grown = len(next(iter(log.values()), ())) != len(next(iter(self._log.values()), ()))
-        self._log = log
+        self._log, files = log, 0
         for path in self._dumps():
+            if files == FILES:
+                break
             try:
                 changed = path.stat().st_mtime
                 if self._seen.get(path) == changed:
                     continue
-                for place, snapshot in enumerate(read(path)):
-                    if place >= self._read.get(path, 0):
-                        self._add(path, place, snapshot)
-                        self._read[path] = place + 1
-                self._seen[path] = changed
+                known = self._read.get(path, 0)
+                for place, snapshot in enumerate(read(path, known), known):
+                    self._add(path, place, snapshot)
+                    self._read[path] = place + 1
+                self._seen[path], files = changed, files + 1
             except (ScriptError, OSError):  # it is being written, or has gone
                 continue
-        self._states.sort(key=lambda state: state[2])
         return grown or len(self._states) > before
 
     def _dumps(self) -> list[Path]:
@@ -117,9 +120,14 @@ class FolderPage:
         ]  # fmt: skip
         listed = [
             [k, step, plain(time), self._column, count]
-            for k, (_, _, step, time, count) in enumerate(self._states)
+            for k, (_, _, step, time, count) in sorted(
+                enumerate(self._states), key=lambda state: state[1][2]
+            )
         ]
-        told: dict[str, Any] = {"rows": rows, "frames": listed, "flags": [], "paused": False}
+        told: dict[str, Any] = {
+            "rows": rows, "frames": listed, "flags": [], "paused": False,
+            "unwatched": "the page of a run has it, not a log",
+        }  # fmt: skip
         if not seen:
             told["about"] = {
                 "title": self.folder.resolve().name, "dimension": self._dimension,
@@ -134,7 +142,7 @@ class FolderPage:
         if not 0 <= k < len(self._states):
             return None
         path, place, step, moment, _ = self._states[k]
-        columns = next(s for n, s in enumerate(read(path)) if n == place).columns
+        columns = next(read(path, place)).columns
         count, axes = len(columns["x"]), "xyz"[: self._dimension]
         columns = {"id": np.arange(count), "type": np.zeros(count), **columns}
         frame = Frame.of_columns(step, moment, axes, self._column, columns.__getitem__)

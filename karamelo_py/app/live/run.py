@@ -52,7 +52,7 @@ class RunPage(Rhythmic):
             hub.output.log.rows = []
         self._rows: list[Row] = []
         self._paused = self._once = self._over = False
-        self._column = "seq"
+        self._column, self._unwatched = "seq", ""
         self.server = Server(
             frames.PAGE, self._news, {"frame": self.frames.answer},
             {"pause": self._pause, "go": self._go, "step": self._step, "stop": self._stop,
@@ -71,6 +71,8 @@ class RunPage(Rhythmic):
         clock = simulation.control.clock[0]
         known = clock.watch_energy and clock.looks >= energy.FEW  # a mean of so many
         gain = -100 * energy.share_lost(simulation) if known else None
+        why = energy.unknown_work(hub)
+        self._unwatched = f"energy {energy.not_watched(why)}" if why else ""
         limit = "load steps" if simulation.implicit else ruling_limit(simulation)
         self._rows.append(Row(hub.update.step, hub.update.time, hub.update.dt, limit, gain, log))
         self._take()
@@ -131,6 +133,7 @@ class RunPage(Rhythmic):
             "frames": self.frames.listed(),
             "flags": [{"time": time, "text": text} for time, text in self.hub.warned],
             "paused": self._paused,
+            "unwatched": self._unwatched,
             "over": self._over,
         }
         if not seen and self.hub.domain is not None:
