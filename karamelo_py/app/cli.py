@@ -282,7 +282,6 @@ def _parser(command: str) -> tuple[CommandLine, Any]:
                 *RESTART, type=Path, metavar="FILE",
                 help="continue from a file that restart(...) wrote",
             )  # fmt: skip
-        if name == "run":
             script.add_argument(
                 *LIVE, action="store_true",
                 help="show points and curves on a page in a browser, while it runs",
@@ -350,7 +349,12 @@ def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = 
     if options.gpu:
         use_card(hub)
     _direct(hub, options)
-    page = _live_page(hub, script) if not options.checking and options.live else None
+    page = None
+    if not options.checking and options.live:
+        from karamelo_py.app.live.run import RunPage
+
+        page = RunPage(hub, script)
+        hub.console.say(f"live: {page.server.address}")
     presets = dict(options.var)
     if getattr(options, "restart", None) is not None:
         from karamelo_py.run.checkpoint.restart_file import Restart
@@ -359,10 +363,8 @@ def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = 
         given, presets = presets, hub.restart.presets(presets)
         if taken := [f"{name} = {text}" for name, text in presets.items() if name not in given]:
             hub.console.say(f"{', '.join(taken)} taken from {hub.restart.path}, as -var had it")
-    interpreter = Interpreter(hub, presets=presets)
-    restart = hub.restart
-    if restart is not None:
-        interpreter.replay = restart.replay()
+    interpreter, restart = Interpreter(hub, presets=presets), hub.restart
+    interpreter.replay = restart and restart.replay()
     try:
         interpreter.run_file(script)
     except Interrupted as signal:
@@ -379,15 +381,6 @@ def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = 
         hint = f"a further run behind it, or read_restart({restart.path}) in a script of its own"
         hub.console.say(render_message("note", message, hint=hint))
     return 0
-
-
-def _live_page(hub: Hub, script: str) -> Any:
-    """Open the page of a run, and say its address."""
-    from karamelo_py.app.live.run import RunPage
-
-    page = RunPage(hub, script)
-    hub.console.say(f"live: {page.server.address}")
-    return page
 
 
 def _direct(hub: Hub, options: argparse.Namespace) -> None:

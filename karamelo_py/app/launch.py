@@ -5,8 +5,6 @@ first gets the terminal, or whatever output and errors go to, and the signals th
 say what they know that it does not. What mpiexec says is shown only where no process was started.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import select
@@ -442,7 +440,7 @@ def _join(asked: int | None, ends: Callable[[BaseException], None]) -> mpi.MpiCo
     return comm
 
 
-def share(hub: Hub, comm: mpi.MpiComm) -> None:
+def share(hub: "Hub", comm: mpi.MpiComm) -> None:
     """Let all processes step a scene together, of which the first writes. One needs no other."""
     if comm.size > 1:
         hub.settings.comm = comm

@@ -123,29 +123,15 @@ KINEMATICS = {kin.word: kin for kin in (Space(), PlaneStrain(), Axisymmetric(), 
 
 
 def load_path(
-    hub: Hub,
-    ID: str,
-    increments: Annotated[int, Positive],
-    *,
-    exx: float | None = None,
-    eyy: float | None = None,
-    ezz: float | None = None,
-    exy: float | None = None,
-    exz: float | None = None,
-    eyz: float | None = None,
-    gxy: float | None = None,
-    gxz: float | None = None,
-    gyz: float | None = None,
-    sxx: float | None = None,
-    syy: float | None = None,
-    szz: float | None = None,
-    sxy: float | None = None,
-    sxz: float | None = None,
-    syz: float | None = None,
-    volumetric: float | None = None,
-    turn: float = 0.0,
+    hub: Hub, ID: str, increments: Annotated[int, Positive], *,
+    exx: float | None = None, eyy: float | None = None, ezz: float | None = None,
+    exy: float | None = None, exz: float | None = None, eyz: float | None = None,
+    gxy: float | None = None, gxz: float | None = None, gyz: float | None = None,
+    sxx: float | None = None, syy: float | None = None, szz: float | None = None,
+    sxy: float | None = None, sxz: float | None = None, syz: float | None = None,
+    volumetric: float | None = None, turn: float = 0.0,
     duration: Annotated[float, Positive] | None = None,
-) -> None:
+) -> None:  # fmt: skip
     """Describe a piece of a load path: what an element is brought to, from wherever it is.
 
     Strains and stresses are those at the end of the piece; they are reached in equal increments.

@@ -1,7 +1,5 @@
 """Commands that delete, move or replace points of solids."""
 
-from __future__ import annotations
-
 import math
 from typing import Literal
 
@@ -28,7 +26,7 @@ class Solids(tuple):
     script_kind = "the ID of a solid, or all"
 
     @classmethod
-    def from_script(cls, hub: Hub, argument: Argument) -> Solids:
+    def from_script(cls, hub: Hub, argument: Argument) -> "Solids":
         """The solids that `argument` names."""
         if ALL in (argument.text, argument.word()):
             return cls(hub.solids.values())

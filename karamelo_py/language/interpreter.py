@@ -1,7 +1,5 @@
 """Runs statements: keeps variables, finds commands, marks where something is wrong."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -114,7 +112,7 @@ class Interpreter:
             error.others = further_errors(other, error)
             raise
 
-    def _copy(self, hub: Any) -> Interpreter:
+    def _copy(self, hub: Any) -> "Interpreter":
         """Copy the place in the script, on another hub."""
         other = Interpreter(hub, self.presets)
         other.variables = dict(self.variables)

@@ -1,7 +1,5 @@
 """Fields of points and nodes for output, in the order of their ids."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
@@ -21,7 +19,7 @@ from karamelo_py.points.grid import Bounces
 from karamelo_py.points.laws import can, dissipated_energy, energy_density
 from karamelo_py.points.laws.eos import initial_energy, taken_heat
 from karamelo_py.points.laws.further import has_rate
-from karamelo_py.script.errors import ScriptError, unknown
+from karamelo_py.script.errors import ScriptError, table, unknown
 from karamelo_py.script.expressions import Expression
 
 PIECE = 1 << 17  # points that are looked at together
@@ -110,10 +108,6 @@ class Fields(PointTable):
         for rows in self.hub.simulation.nodes.pieces(brought, to_first=to_first):
             yield NodeFields(self.hub, rows)
 
-    def mass_at_nodes(self, group: Any) -> np.ndarray:
-        """(4,) the mass of the nodes of a group, and this times x, y and z; rounded once."""
-        return self.hub.simulation.nodes.mass_of(group)
-
     @property
     def occupied_nodes(self) -> tuple[int, int]:
         """The number of nodes with mass, and the last of them."""
@@ -193,7 +187,7 @@ class ColumnFormula:
             )
 
     @classmethod
-    def from_script(cls, hub: Scene, argument: Argument) -> ColumnFormula:
+    def from_script(cls, hub: Scene, argument: Argument) -> "ColumnFormula":
         """Read the formula that a script's argument stands for."""
         return cls(hub, argument)
 
@@ -204,18 +198,6 @@ class ColumnFormula:
 
 
 # ---- columns that are asked for by name, and may be none ----------------------------------------
-
-# Columns, and other words for what they are together.
-_QUANTITIES = {
-    "s11 s22 s33 s12 s13 s23 seq": ("stress", "sigma", "sig", "p", "pressure"),
-    "seq": ("mises", "vonmises", "von_mises", "svm"),
-    "e11 e22 e33 e12 e13 e23": ("strain", "eps", "epsilon"),
-    "x y z": ("pos", "position", "positions", "coord", "coordinates"),
-    "vx vy vz": ("vel", "velocity", "v"),
-    "fx fy fz": ("force", "forces", "f"),
-    "x y z x0 y0 z0": ("u", "disp", "displacement"),
-    "T": ("temp", "temperature"),
-}
 
 
 def check_columns(columns: Sequence[str], known: Sequence[str], *, first: int) -> None:
@@ -229,7 +211,8 @@ def unknown_column(message: str, name: str, known: Iterable[str], **where: Any) 
     """Make the error for a column that is none of the `known`; `where` it stands."""
     known = list(known)
     error = unknown(message, name, known, **where)
-    quantity = next((q for q, words in _QUANTITIES.items() if name.lower() in words), "")
+    others = table()["columns"].items()
+    quantity = next((columns for columns, words in others if name.lower() in words), "")
     if there := [column for column in quantity.split() if column in known]:
         error.hint = f"did you mean {', '.join(there)}?"
     component = re.fullmatch(r"(s|sigma|stress|e|eps|strain)_?([xyz123])([xyz123])", name.lower())

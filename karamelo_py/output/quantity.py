@@ -1,7 +1,5 @@
 """Quantities that a log line or a plot reads at each output: anything with a name."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -49,7 +47,7 @@ class Quantity:
             )
 
     @classmethod
-    def from_script(cls, hub: Scene, argument: Argument) -> Quantity:
+    def from_script(cls, hub: Scene, argument: Argument) -> "Quantity":
         """Read the quantity that a script's argument means; errors mark the argument."""
         text = argument.text.strip().strip('"')
         try:
@@ -85,7 +83,9 @@ class Quantity:
         """Read the number now, or the word; of the first that is no number the user is told."""
         if self.is_word:
             return self.hub.simulation.ruling_limit
-        number = self._number()
+        source = self._source()
+        formula = hasattr(source, "evaluate")
+        number = float(source.evaluate(self.hub.values)) if formula else source
         if math.isnan(number) and not self._told:
             self._told = True
             self.hub.warn(
@@ -94,12 +94,6 @@ class Quantity:
                 hint="a quotient 0/0, the root of a number below 0, or the like",
             )
         return number
-
-    def _number(self) -> float | int:
-        source = self._source()
-        if hasattr(source, "evaluate"):
-            return float(source.evaluate(self.hub.values))
-        return source
 
     def _source(self) -> Any:
         """Find the formula, the content of the variable, or the number behind the name.

@@ -1,7 +1,5 @@
 """Groups: sets of points or of nodes that fixes, computes and dumps act on."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
@@ -75,7 +73,7 @@ class ParticleGroup(AnyGroup):
     _bits = np.zeros(8, np.uint8)
 
     @classmethod
-    def of(cls, hub: Scene, solid: Solid) -> ParticleGroup:
+    def of(cls, hub: Scene, solid: Solid) -> "ParticleGroup":
         """The points of a solid."""
         group = cls(hub)
         group.id = solid.id

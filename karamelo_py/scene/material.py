@@ -1,7 +1,5 @@
 """Materials and parts of materials that a script has named: entries of catalogues."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from karamelo_py.language import registry
@@ -14,7 +12,7 @@ class MaterialPart(Named):
     `made` is what the style returned: the law, or `laws` by kind where it brings others with it.
     """
 
-    def __init__(self, kind: str, style: str, made: NamedTuple | dict[str, NamedTuple]):
+    def __init__(self, kind: str, style: str, made: "NamedTuple | dict[str, NamedTuple]"):
         self.kind = kind
         self.style = style
         self.laws = made if isinstance(made, dict) else {kind: made}

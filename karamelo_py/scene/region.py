@@ -1,7 +1,5 @@
 """Base of regions: an inside, a bounding box, and perhaps an inverted sense."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 
@@ -36,7 +34,7 @@ class Region(Named):
         hi: Sequence[float],
         *,
         exterior: bool = False,
-        parts: Sequence[Region] = (),
+        parts: "Sequence[Region]" = (),
     ):
         self.hub = hub
         self.domain = require_domain(hub)

@@ -1,7 +1,5 @@
 """Solids: bodies of material points. Where their points are put is said by the styles of solid."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 
@@ -49,7 +47,7 @@ class Solid(Named):
         material: Material,
         h: float,
         T0: float | None,
-        glued_to: Solid | None = None,
+        glued_to: "Solid | None" = None,
     ):
         self.domain = require_domain(hub)
         for name, value in (("h", h), ("T0", T0)):

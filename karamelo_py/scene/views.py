@@ -4,8 +4,6 @@ A view hands out arrays with a row for each node or point of the group. What a h
 by assignment or in place, is written back when it returns; what cannot be changed is read-only.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from itertools import pairwise
 from typing import Any
@@ -48,12 +46,12 @@ class Shown:
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
 
-    def __get__(self, view: View | None, owner: type) -> Any:
+    def __get__(self, view: "View | None", owner: type) -> Any:
         if view is None:
             return self
         return view._handed(self.name, lambda: self.read(view), written=self.write is not None)
 
-    def __set__(self, view: View, value: Any) -> None:
+    def __set__(self, view: "View", value: Any) -> None:
         if self.write is None:
             raise AttributeError(f"{self.name} is read-only")
         now = self.__get__(view, type(view))

@@ -3,8 +3,6 @@
 Remedies are names that are alike, and what says the same here as a word of another program.
 """
 
-from __future__ import annotations
-
 import difflib
 import re
 import tomllib
@@ -77,7 +75,7 @@ class ScriptError(Exception):
     # Where scripts include the one that it is in, the nearest first.
     included: list[Place] = field(default_factory=list)
     # Further mistakes of the script, which do not follow from this one.
-    others: list[ScriptError] = field(default_factory=list)
+    others: "list[ScriptError]" = field(default_factory=list)
     # Where the text of a script is wrong: the statements in which it is not.
     statements: list = field(default_factory=list)
     # Whether the statement it belongs to is known: nothing outside of it may add to it.

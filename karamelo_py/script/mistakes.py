@@ -80,30 +80,7 @@ def open_parenthesis(text: str, start: int) -> Mistake:
 
 # ---- expressions ---------------------------------------------------------------------------------
 
-_REMEDIES = {
-    ";": "one statement per line, without ;",
-    "&": "write && or and",
-    "|": "write || or or",
-    **dict.fromkeys("[]{}", "use parentheses ( )"),
-    "'": 'text stands in double quotes: "..."',
-    "$": "a variable is written by its name alone, without $",
-    "@": "a name consists of letters, digits and _",
-    "\\": "a call may run over several lines inside its parentheses; no \\ is needed",
-    ":": "assign with name = expression",
-    "?": "write if(condition, a, b)",
-    "~": "negate a condition with !",
-    "−": "this is a typographic minus; type -",
-    **dict.fromkeys("–—", "this is a dash; type -"),
-    **dict.fromkeys("×·", "multiply with *"),
-    "÷": "divide with /",
-    "²": "write ^2",
-    "³": "write ^3",
-    ".": "a number has a digit next to its point; a file name or other word stands in quotes here",
-}
-
 _VALUE = "a number, a name or a parenthesis"
-
-
 _OPERATORS = ("OR", "AND", "NOT", "COMPARISON", "SIGN", "TIMES", "POWER")
 _STARTS = ("NUMBER", "NAME", "STRING", "LPAR")
 _ENDS = ("NUMBER", "NAME", "STRING", "RPAR")
@@ -184,7 +161,7 @@ def in_expression(parser: Any, code: str) -> Mistake:
         return at.mistake(
             f"'{at.here}' means nothing in an expression",
             "numbers, names, operators and parentheses",
-            _REMEDIES.get(at.here),
+            table()["signs"].get(at.here),
         )
     if at.here == ",":
         return _comma(at)

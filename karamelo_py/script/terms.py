@@ -1,7 +1,5 @@
 """Terms of formulas: numbers, names and operations on them, as text and as programs."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any
@@ -77,7 +75,7 @@ class Term:
 
     __slots__ = ("names", "operands", "operation", "size", "value")
 
-    def __init__(self, operation: str, operands: tuple[Term, ...], value: Any):
+    def __init__(self, operation: str, operands: "tuple[Term, ...]", value: Any):
         self.operation = operation
         self.operands = operands
         self.value = value

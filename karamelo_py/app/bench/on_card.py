@@ -1,7 +1,5 @@
 """karamelo-py bench --gpu: workloads at sizes of a GPU, measured against its memory's bandwidth."""
 
-from __future__ import annotations
-
 import re
 from collections import defaultdict
 from collections.abc import Iterator, Mapping

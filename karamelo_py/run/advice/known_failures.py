@@ -228,7 +228,7 @@ def warn_about_loads(hub: Hub, steps: float) -> None:
     loads, moves = [], False
     for fix, formulas in given.items():
         some = not all(map(is_zero, formulas))
-        if fix.prescribes_velocity or fix.leads_points or "velocity" in fix.style:
+        if fix.prescribes_velocity or fix.leads_points:
             moves |= some
         elif some:
             loads.append(fix)

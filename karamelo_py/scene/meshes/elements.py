@@ -1,7 +1,5 @@
 """Elements by their corners: which are known, their volumes and centroids, their orientation."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from typing import NamedTuple
@@ -72,7 +70,7 @@ class MeshElements(NamedTuple):
     numbers: np.ndarray  # (n, c) of their nodes
     corners: np.ndarray  # (n, c, d) positions of these
 
-    def mirrored(self, which: np.ndarray) -> MeshElements:
+    def mirrored(self, which: np.ndarray) -> "MeshElements":
         """With the orientation of `which` (n,) of them reversed."""
         order = list(self.shape.mirrored)
         numbers, corners = self.numbers.copy(), self.corners.copy()

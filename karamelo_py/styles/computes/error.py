@@ -1,7 +1,5 @@
 """Computes error and reference: how far values or fields are from formulas or curves."""
 
-from __future__ import annotations
-
 from math import inf
 from typing import Any, Literal
 
@@ -47,7 +45,7 @@ class PointField:
         self.weights = [2.0 if shear and k >= 3 else 1.0 for k in range(len(columns))]
 
     @classmethod
-    def from_script(cls, hub: Scene, argument: Argument) -> PointField:
+    def from_script(cls, hub: Scene, argument: Argument) -> "PointField":
         known = [*hub.fields.particle_names(), *DISPLACEMENTS, *VECTORS, *TENSORS]
         name = argument.words(known)
         if name not in known:

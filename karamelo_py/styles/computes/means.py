@@ -155,7 +155,7 @@ class CenterOfMass(Mean):
 
     def sums(self) -> Sequence[float]:
         on_points = isinstance(self.group, ParticleGroup)
-        return super().sums() if on_points else self.hub.fields.mass_at_nodes(self.group)
+        return super().sums() if on_points else self.hub.simulation.nodes.mass_of(self.group)
 
     def terms(self, points: PointTable) -> list[np.ndarray]:
         mass = points.mass.astype(float)

@@ -118,19 +118,16 @@ class PyPlot(Dump):
         title: str | None = None,
         label: str | None = None,
         only: ColumnFormula | None = None,
-        xmin: float | None = None,
-        xmax: float | None = None,
-        ymin: float | None = None,
-        ymax: float | None = None,
-        zmin: float | None = None,
-        zmax: float | None = None,
+        xmin: float | None = None, xmax: float | None = None,
+        ymin: float | None = None, ymax: float | None = None,
+        zmin: float | None = None, zmax: float | None = None,
         scale: Literal["linear", "log"] = "linear",
         quantile: Annotated[float, In(0, 0.4)] = 0.0,
         dpi: Annotated[int, In(20, 2400)] = DPI,
         fontsize: Annotated[float, In(1, 100)] = 9.0,
         pointsize: Annotated[float, Positive] = 1.0,
         outlines: bool = False,
-    ):
+    ):  # fmt: skip
         if field is not None:
             check_columns([field], hub.fields.particle_names(), first=4)
         super().__init__(hub, every, file, *([] if field is None else [field]))

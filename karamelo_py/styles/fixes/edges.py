@@ -1,7 +1,5 @@
 """Fixes that load the edge of a region: the faces that points show there."""
 
-from __future__ import annotations
-
 import itertools
 from functools import cached_property
 from typing import Literal, NamedTuple
@@ -33,7 +31,7 @@ class Faces(NamedTuple):
     area: np.ndarray  # (m,) per radian around an axis
     middle: np.ndarray  # (m, d)
 
-    def some(self, which: np.ndarray) -> Faces:
+    def some(self, which: np.ndarray) -> "Faces":
         return Faces(*(column[which] for column in self))
 
 

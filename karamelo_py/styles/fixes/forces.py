@@ -260,16 +260,10 @@ class InitialStress(Fix):
     point_by_point = True
 
     def __init__(
-        self,
-        hub: Hub,
-        group: ParticleGroup,
-        sxx: Expression | None,
-        syy: Expression | None,
-        szz: Expression | None,
-        syz: Expression | None,
-        sxz: Expression | None,
-        sxy: Expression | None,
-    ):
+        self, hub: Hub, group: ParticleGroup,
+        sxx: Expression | None, syy: Expression | None, szz: Expression | None,
+        syz: Expression | None, sxz: Expression | None, sxy: Expression | None,
+    ):  # fmt: skip
         super().__init__(hub, group)
         self.formulas = (sxx, syy, szz, syz, sxz, sxy)
         for solid in hub.solids.values():
@@ -283,9 +277,6 @@ class InitialStress(Fix):
 
     def initial_integrate(self, points: PointsView) -> None:
         x, x0 = points.position, points.reference_position
-        given = {
-            name: formula.evaluate_points(self.hub.values, x, x0)
-            for name, formula in zip(NAMES, self.formulas, strict=True)
-            if formula is not None
-        }
-        points.set_stress(given)
+        named = zip(NAMES, self.formulas, strict=True)
+        values = self.hub.values
+        points.set_stress({n: f.evaluate_points(values, x, x0) for n, f in named if f is not None})

@@ -218,17 +218,10 @@ class ImpenetrableSurface(PlaneTool):
     needs_stiffness = True
 
     def __init__(
-        self,
-        hub: Hub,
-        group: ParticleGroup,
-        K: Annotated[Expression, NonNegative],
-        xs: Expression,
-        ys: Expression,
-        zs: Expression,
-        nx: Expression,
-        ny: Expression,
-        nz: Expression,
-    ):
+        self, hub: Hub, group: ParticleGroup, K: Annotated[Expression, NonNegative],
+        xs: Expression, ys: Expression, zs: Expression,
+        nx: Expression, ny: Expression, nz: Expression,
+    ):  # fmt: skip
         super().__init__(hub, group)
         self.K = K
         self.lay((xs, ys, zs), (nx, ny, nz))
@@ -274,17 +267,9 @@ class ContactMinimizePenetrationPlane(PlaneTool):
     impulsive = True
 
     def __init__(
-        self,
-        hub: Hub,
-        solid: Solid,
-        x: Expression,
-        y: Expression,
-        z: Expression,
-        nx: Expression,
-        ny: Expression,
-        nz: Expression,
-        mu: Annotated[float, NonNegative],
-    ):
+        self, hub: Hub, solid: Solid, x: Expression, y: Expression, z: Expression,
+        nx: Expression, ny: Expression, nz: Expression, mu: Annotated[float, NonNegative],
+    ):  # fmt: skip
         super().__init__(hub, ParticleGroup.of(hub, solid))
         self.mu = mu
         judge_friction(hub, mu)
@@ -432,19 +417,35 @@ class Radius(Expression):
         return radius
 
 
-class Indent(ToolFix):
-    """Push points out of a ball (in the plane a disk) with a force that grows as depth squared.
+class BallTool(ToolFix):
+    """Base of balls (in the plane disks), of a `centre` and a radius `R`.
 
     Parameters
     ----------
     kind
         The word ``sphere``.
-    K
-        Acceleration per depth squared: a number or a formula of time.
     R
         Radius of the ball: a number or a formula of time.
     x, y, z
         Its centre: numbers or formulas of time; z is 0 in the plane.
+    """
+
+    published = ("x", "y", "z", "s")
+    R: Expression
+    centre: tuple[Expression, ...]
+
+    def depth_of(self, points: PointTable) -> np.ndarray:
+        """Depth (n,) of points in the ball now."""
+        return self.now(self.R) - np.linalg.norm(self.from_place(points, self.centre), axis=1)
+
+
+class Indent(BallTool):
+    """Push points out of a ball (in the plane a disk) with a force that grows as depth squared.
+
+    Parameters
+    ----------
+    K
+        Acceleration per depth squared: a number or a formula of time.
 
     Example
     -------
@@ -461,26 +462,14 @@ class Indent(ToolFix):
     indent/minimize_penetration, impenetrablesurface
     """
 
-    published = ("x", "y", "z", "s")
-
     def __init__(
-        self,
-        hub: Hub,
-        group: ParticleGroup,
-        kind: Literal["sphere"],
-        K: Annotated[Expression, NonNegative],
-        R: Radius,
-        x: Expression,
-        y: Expression,
-        z: Expression,
-    ):
+        self, hub: Hub, group: ParticleGroup, kind: Literal["sphere"],
+        K: Annotated[Expression, NonNegative], R: Radius,
+        x: Expression, y: Expression, z: Expression,
+    ):  # fmt: skip
         super().__init__(hub, group)
         self.K, self.R = K, R
         self.centre = self.of_time("", (x, y, z))
-
-    def depth_of(self, points: PointTable) -> np.ndarray:
-        """Depth (n,) of points in the ball now."""
-        return self.now(self.R) - np.linalg.norm(self.from_place(points, self.centre), axis=1)
 
     def forces(self, points: PointsView) -> np.ndarray:
         K, R = self.now(self.K, self.R)
@@ -493,17 +482,11 @@ class Indent(ToolFix):
         return size[:, None] * away
 
 
-class IndentMinimizePenetration(ToolFix):
+class IndentMinimizePenetration(BallTool):
     """Press a rigid ball (in the plane a disk) into points, as stiffly as the step allows.
 
     Parameters
     ----------
-    kind
-        The word ``sphere``.
-    R
-        Radius of the ball: a number or a formula of time.
-    x, y, z
-        Its centre: numbers or formulas of time; z is 0 in the plane.
     vx, vy, vz
         Its velocity, which friction needs: the centre does not follow from it.
     mu
@@ -528,30 +511,18 @@ class IndentMinimizePenetration(ToolFix):
     indent, contact/minimize_penetration/plane, contact/minimize_penetration
     """
 
-    published = ("x", "y", "z", "s")
     impulsive = True
 
     def __init__(
-        self,
-        hub: Hub,
-        group: ParticleGroup,
-        kind: Literal["sphere"],
-        R: Annotated[Expression, NonNegative],
-        x: Expression,
-        y: Expression,
-        z: Expression,
-        vx: Expression,
-        vy: Expression,
-        vz: Expression,
-        mu: Annotated[float, NonNegative],
-    ):
+        self, hub: Hub, group: ParticleGroup, kind: Literal["sphere"],
+        R: Annotated[Expression, NonNegative], x: Expression, y: Expression, z: Expression,
+        vx: Expression, vy: Expression, vz: Expression, mu: Annotated[float, NonNegative],
+    ):  # fmt: skip
         super().__init__(hub, group)
         self.R, self.mu = R, mu
         judge_friction(hub, mu)
         self.centre = self.of_time("", (x, y, z))
         self.velocity = self.of_time("v", (vx, vy, vz))
-
-    depth_of = Indent.depth_of
 
     def forces(self, points: PointsView) -> np.ndarray:
         away = self.from_place(points, self.centre)
@@ -594,21 +565,11 @@ class CuttingTool(ToolFix):
     needs_stiffness = True
 
     def __init__(
-        self,
-        hub: Hub,
-        group: ParticleGroup,
-        K: Annotated[Expression, NonNegative],
-        x_tip: Expression,
-        y_tip: Expression,
-        z_tip: Expression,
-        vx: Expression,
-        vy: Expression,
-        vz: Expression,
-        xA: Expression,
-        yA: Expression,
-        xB: Expression,
-        yB: Expression,
-    ):
+        self, hub: Hub, group: ParticleGroup, K: Annotated[Expression, NonNegative],
+        x_tip: Expression, y_tip: Expression, z_tip: Expression,
+        vx: Expression, vy: Expression, vz: Expression,
+        xA: Expression, yA: Expression, xB: Expression, yB: Expression,
+    ):  # fmt: skip
         super().__init__(hub, group)
         if hub.domain.dimension != 2:
             raise ScriptError("the tool is one in the plane", expected="a domain in 2D")
@@ -681,19 +642,11 @@ class MeldTool(ToolFix):
     needs_stiffness = True
 
     def __init__(
-        self,
-        hub: Hub,
-        group: ParticleGroup,
-        K: Annotated[Expression, NonNegative],
-        axis: Literal["x", "y", "z"],
-        half_width: Annotated[Expression, NonNegative],
-        c1: Expression,
-        c2: Expression,
-        theta: Expression,
-        lo: Expression,
-        hi: Expression,
+        self, hub: Hub, group: ParticleGroup, K: Annotated[Expression, NonNegative],
+        axis: Literal["x", "y", "z"], half_width: Annotated[Expression, NonNegative],
+        c1: Expression, c2: Expression, theta: Expression, lo: Expression, hi: Expression,
         Rmax: Annotated[Expression, NonNegative],
-    ):
+    ):  # fmt: skip
         super().__init__(hub, group)
         if hub.domain.dimension != 3:
             raise ScriptError("the tool is one in space", expected="a domain in 3D")

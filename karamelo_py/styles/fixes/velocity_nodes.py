@@ -1,7 +1,5 @@
 """Fixes that give nodes velocities, and the force that holds them (compute reaction)."""
 
-from __future__ import annotations
-
 import re
 from typing import Annotated, Any
 
@@ -71,7 +69,7 @@ class Velocity(Expression):
     bound = ""
 
     @classmethod
-    def from_script(cls, hub: Hub, argument: Argument) -> Velocity:
+    def from_script(cls, hub: Hub, argument: Argument) -> "Velocity":
         first = re.match(r"(leq|geq)\w*", argument.text)
         if not first or argument.knows(first[0]):
             return super().from_script(hub, argument)
