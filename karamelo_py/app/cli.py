@@ -14,15 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from karamelo_py import __version__
-from karamelo_py.app.launch import (
-    ERROR,
-    has_terminal,
-    keep_to_oneself,
-    launch,
-    outcome_of,
-    share,
-    together,
-)
+from karamelo_py.app import launch
 from karamelo_py.app.leaving import SIGNALLED, leaving_at_once
 from karamelo_py.app.options import (
     LIVE,
@@ -67,11 +59,13 @@ RUN_COMMANDS = "add run(n), run_time(T), run_until(...) or run_while(...)"
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit status."""
     arguments = list(sys.argv[1:] if argv is None else argv)
-    keep_to_oneself()
+    launch.keep_to_oneself()
     # A word where a batch system ends the program, outside of runs; launchers say one of several.
     unhandled = [number for number in ENDING if signal.getsignal(number) == signal.SIG_DFL]
     with handled_signals(_end, () if launched()[0] > 1 else unhandled):
-        status, text = outcome_of(lambda: _dispatch(arguments), debugging="--debug" in arguments)
+        status, text = launch.outcome_of(
+            lambda: _dispatch(arguments), debugging="--debug" in arguments
+        )
     if text:
         _complain(text)
     return status
@@ -137,7 +131,7 @@ def _dispatch(arguments: list[str]) -> int:
                 f"karamelo-py {arguments[0]} is of one process, and {size} were started",
                 hint=f"without mpiexec: karamelo-py {arguments[0]} ...",
             )
-        return ERROR
+        return launch.ERROR
     options.command_line = arguments
     if options.act is not _run:  # which imports more before it begins
         begun()
@@ -314,7 +308,7 @@ def _run(options: argparse.Namespace) -> int:
     if launched()[0] > 1 and not options.checking:
         with leaving_at_once():  # before they know of each other
             import_module("karamelo_py.scene.hub")
-        return together(
+        return launch.together(
             options.ranks,
             lambda comm: _carry_out(options, script, comm),
             debugging=options.debug,
@@ -325,7 +319,7 @@ def _run(options: argparse.Namespace) -> int:
                 f"a live page shows a run of one process, and {options.ranks} share this one",
                 hint="--threads N in the place of --ranks, or karamelo-py view --live FOLDER",
             )
-        return launch(options.ranks, options.command_line)
+        return launch.launch(options.ranks, options.command_line)
     return _carry_out(options, script)
 
 
@@ -338,11 +332,11 @@ def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = 
         from karamelo_py.run.runner import Interrupted
         from karamelo_py.scene.hub import Hub
     begun()
-    hub = Hub(Console(quiet=options.quiet, terminal=has_terminal()))
+    hub = Hub(Console(quiet=options.quiet, terminal=launch.has_terminal()))
     hub.settings.threads = options.threads
     hub.settings.ranks = options.ranks or launched()[0]
     if comm is not None:
-        share(hub, comm)
+        launch.share(hub, comm)
     hub.settings.debug = options.debug
     hub.settings.trusts = options.trust_geometries
     hub.checking = options.checking

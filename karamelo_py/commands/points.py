@@ -74,7 +74,10 @@ def delete_particles(
         hub.warn(f"region '{region.id}' holds no points: nothing is deleted")
         return
     if hub.has_run:
-        _delete_later(hub, found)
+        if not hub.rehearsing and hub.interpreter.replay is None:
+            ids = [np.flatnonzero(inside) + solid.first_id for solid, inside in found.items()]
+            present = hub.simulation.present
+            _take_away(hub, np.concatenate([some[present[some]] for some in ids]))
         return
     for solid, inside in found.items():
         refuse_chosen(hub, solid, "delete_particles")
@@ -86,14 +89,6 @@ def delete_particles(
             )
     for solid, inside in found.items():
         replace_points(hub, solid, _chosen(solid, ~inside))
-
-
-def _delete_later(hub: Hub, found: dict[Solid, np.ndarray]) -> None:
-    if hub.rehearsing or hub.interpreter.replay is not None:
-        return
-    simulation = hub.simulation
-    ids = np.concatenate([np.flatnonzero(i) + solid.first_id for solid, i in found.items()])
-    _take_away(hub, ids[simulation.present[ids]])
 
 
 def _delete_where(hub: Hub, solids: Solids, condition: ColumnFormula) -> None:

@@ -6,18 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from karamelo_py.language import registry, signature
+from karamelo_py.language import registry, signature, unknown
 from karamelo_py.language.further_mistakes import errors_of_text, further_errors
 from karamelo_py.language.presets import Presets
 from karamelo_py.language.replay import Record, Replay, spelled
-from karamelo_py.language.unknown import (
-    check_name,
-    defined_later,
-    no_value,
-    unknown_call,
-    unknown_name,
-    unknown_statement,
-)
 from karamelo_py.script import evaluation, syntax
 from karamelo_py.script.errors import Pause, Place, Quit, ScriptError
 from karamelo_py.script.expressions import FIRST, SEEDS, Expression, Value
@@ -70,7 +62,8 @@ class Interpreter:
     def include(self, name: str) -> None:
         """Run another script at this place; the name is relative to the script that asks."""
         path = self.included(name, self.folder)
-        if any(frame.path and _same(frame.path, path) for frame in self.frames):
+        there = path.exists()
+        if any(there and frame.path and frame.path.samefile(path) for frame in self.frames):
             raise ScriptError(
                 f"{name} includes itself",
                 expected="a script that is not in progress already",
@@ -246,7 +239,7 @@ class Interpreter:
         if isinstance(node, syntax.Name) and node.name == "quit":
             raise Quit
         if isinstance(node, syntax.Name) and not self.means_something(node.name):
-            raise unknown_statement(self, node.name)
+            raise unknown.unknown_statement(self, node.name)
         compares = isinstance(node, syntax.BinaryOperation) and node.operator == "=="
         if compares and isinstance(node.left, syntax.Name):
             right = statement.raw.code[node.right.start : node.right.end]
@@ -261,7 +254,7 @@ class Interpreter:
 
     def _assign(self, statement: syntax.Assignment) -> None:
         name = statement.name
-        check_name(name)
+        unknown.check_name(name)
         if name in self.presets:
             return self.presets.stand_for(statement)
         if name not in self.variables and hasattr(self.hub, "warn"):
@@ -290,7 +283,7 @@ class Interpreter:
     def _call(self, statement: syntax.CommandCall) -> None:
         name, raw = statement.name, statement.raw
         if self.hides(name) or not (name in FUNCTIONS or registry.knows("command", name)):
-            raise unknown_call(self, name, statement.place, statement=True)
+            raise unknown.unknown_call(self, name, statement.place, statement=True)
         if registry.knows("command", name):
             arguments = [signature.Argument(raw, self) for raw in statement.arguments]
             signature.call(registry.find("command", name), self.hub, arguments, name)
@@ -324,12 +317,16 @@ class Interpreter:
             return CONSTANTS[name]
         if name in self.hub.values:
             return Expression.seed(name)
-        raise unknown_name(self, name, evaluation.mark(raw, node))
+        raise unknown.unknown_name(self, name, evaluation.mark(raw, node))
 
     def means_something(self, name: str) -> bool:
         """Tell if a name can stand in a script here, be it as a call or further down."""
         known = self.knows(name) or name in WORDS or name in FUNCTIONS
-        return known or registry.knows("command", name) or bool(defined_later(self, name, None))
+        return (
+            known
+            or registry.knows("command", name)
+            or bool(unknown.defined_later(self, name, None))
+        )
 
     def command(self, node: syntax.FunctionCall, raw: syntax.Raw) -> Value:
         """Find the value of a call inside an expression that is not a function."""
@@ -337,11 +334,11 @@ class Interpreter:
         begin = raw.start + node.start
         place = raw.source.place(begin, begin + len(name))
         if not registry.knows("command", name) or self.hides(name):
-            raise unknown_call(self, name, place, statement=False)
+            raise unknown.unknown_call(self, name, place, statement=False)
         target = registry.find("command", name)
         # What gives no value must not be carried out here, least of all a run.
         if getattr(target, "__annotations__", {}).get("return", "") in (None, "None"):
-            raise no_value(name, place)
+            raise unknown.no_value(name, place)
         arguments = [
             signature.Argument(syntax.Raw(raw.source, raw.start + o.start, raw.start + o.end), self)
             for o in node.operands
@@ -354,12 +351,5 @@ class Interpreter:
         if isinstance(value, (int, float)):
             return float(value)
         if not isinstance(value, (str, Expression)):
-            raise no_value(name, place)
+            raise unknown.no_value(name, place)
         return value
-
-
-def _same(a: Path, b: Path) -> bool:
-    try:
-        return a.samefile(b)
-    except OSError:
-        return False

@@ -36,8 +36,6 @@ def _families() -> dict[str, dict[str, list[EntryPoint]]]:
             continue
         styles = table.setdefault(group.removeprefix(PREFIX), {})
         for entry in everything.select(group=group):
-            if entry.value.startswith(PREFIX):
-                continue  # of an installation from when built-in styles were entry points
             known = styles.setdefault(entry.name, [])
             if (entry.value, _origin(entry)) not in [(e.value, _origin(e)) for e in known]:
                 known.append(entry)

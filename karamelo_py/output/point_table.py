@@ -7,16 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.compiler import fields
+from karamelo_py.kernels import export
 from karamelo_py.kernels.arrays import TIMESTEP, Block, Points, Setup, known_to_laws, some_of
-from karamelo_py.kernels.export import (
-    ENERGY,
-    EXPORTED,
-    JACOBIAN,
-    STRAIN,
-    export,
-    export_state,
-    export_velocity_moment,
-)
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.p2g import VelocityBefore
 from karamelo_py.language.scene import Scene
@@ -228,7 +220,8 @@ class PointTable:
     def _exported(self) -> np.ndarray:
         # A kinematics fills its own components: in the plane the fourth is 12, as in space.
         return self._cached(
-            "exported", lambda rows: rows.computed(lambda laws: export_state, EXPORTED)
+            "exported",
+            lambda rows: rows.computed(lambda laws: export.export_state, export.EXPORTED),
         )
 
 
@@ -279,7 +272,7 @@ def _velocity_moment(s: Setup, points: Points) -> np.ndarray:
     kept = fields.field(points.fields, Moment)
     where = points.x[s.control.clock[0].now] if points.home is None else points.home
     moment = np.zeros_like(kept)
-    export_velocity_moment(s.basis, s.kin, s.grids, points.grid, where, kept, moment)
+    export.export_velocity_moment(s.basis, s.kin, s.grids, points.grid, where, kept, moment)
     return moment
 
 
@@ -307,7 +300,7 @@ def from_solids(hub: Scene, ids: np.ndarray, of: Callable, *columns: int) -> np.
 def _column_of_laws(name: str, laws: Any) -> Callable | None:
     """Return what exports a number of each point that its law declares; None of others."""
     what = columns_of(laws).get(name)
-    return None if what is None else partial(export, what, False)
+    return None if what is None else partial(export.export, what, False)
 
 
 def _column(field: np.ndarray, k: int) -> np.ndarray:
@@ -337,11 +330,11 @@ COLUMNS: dict[str, Callable[[PointTable], np.ndarray] | None] = {
     "type": lambda table: table.solid + 1,
     **{name: partial(_of_vector, *where) for name, where in VECTORS.items()},
     **{f"s{name}": partial(_exported, k) for k, name in enumerate(COMPONENTS)},
-    **{f"e{name}": partial(_exported, STRAIN + k) for k, name in enumerate(COMPONENTS)},
-    "seq": lambda table: _von_mises(table._exported[:, :STRAIN]),
-    "volume": lambda table: table.reference_volume * table._exported[:, JACOBIAN],
+    **{f"e{name}": partial(_exported, export.STRAIN + k) for k, name in enumerate(COMPONENTS)},
+    "seq": lambda table: _von_mises(table._exported[:, : export.STRAIN]),
+    "volume": lambda table: table.reference_volume * table._exported[:, export.JACOBIAN],
     "mass": lambda table: table.mass.astype(float),
     **dict.fromkeys(("damage", "damage_init", "bx", "by", "bz", "ep", "epdot", "T")),
-    "ienergy": partial(_exported, ENERGY),
+    "ienergy": partial(_exported, export.ENERGY),
     "gamma": None,
 }

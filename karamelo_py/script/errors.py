@@ -132,18 +132,15 @@ def _marked(place: Place) -> list[str]:
     carets = "^" * max(sum(_width(c) for c in text[start : start + length]), 1)
     number = str(place.line)
     margin = " " * max(len(number), 5)
-    return [f"{number:>5} | {_printable(text)}", f"{margin} | {before}{carets}"]
+    # Control characters could garble the terminal.
+    shown = re.sub(r"[^\t]", lambda c: c[0] if c[0].isprintable() else "\ufffd", text)
+    return [f"{number:>5} | {shown}", f"{margin} | {before}{carets}"]
 
 
 def _width(character: str) -> int:
     if unicodedata.combining(character):
         return 0
     return 2 if unicodedata.east_asian_width(character) in "WF" else 1
-
-
-def _printable(text: str) -> str:
-    """Return `text` with control characters replaced: they could garble the terminal."""
-    return "".join(c if c == "\t" or c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
 
 
 def meant(name: str, names: Iterable[str]) -> str | None:

@@ -12,19 +12,9 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.compiler import formula
+from karamelo_py.script import terms
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.functions import compute_quietly
-from karamelo_py.script.terms import (
-    Term,
-    alike,
-    applied,
-    constant,
-    in_order,
-    is_short,
-    number_text,
-    program,
-    text_of,
-)
 from karamelo_py.script.values import Values
 
 POINT_SEEDS = ("x", "y", "z", "x0", "y0", "z0")
@@ -43,15 +33,15 @@ class Expression:
 
     __slots__ = ("_term",)
 
-    def __init__(self, value: float | Term | Expression):
-        if not isinstance(value, Term):
-            value = value._term if isinstance(value, Expression) else constant(value)
+    def __init__(self, value: float | terms.Term | Expression):
+        if not isinstance(value, terms.Term):
+            value = value._term if isinstance(value, Expression) else terms.constant(value)
         self._term = value
 
     @classmethod
     def seed(cls, name: str) -> Expression:
         """Make the formula that is nothing but a name."""
-        return cls(Term("name", (), name))
+        return cls(terms.Term("name", (), name))
 
     @classmethod
     def from_script(cls, hub: Any, argument: Any) -> Expression:
@@ -65,7 +55,7 @@ class Expression:
 
     def minus(self, other: Expression) -> Expression:
         """Make the formula of the difference."""
-        return Expression(applied("-", self._term, other._term))
+        return Expression(terms.applied("-", self._term, other._term))
 
     @property
     def names(self) -> frozenset[str]:
@@ -86,16 +76,16 @@ class Expression:
     @property
     def text(self) -> str:
         """The formula as it could stand in a script, down to its seeds, unless it is too long."""
-        if not is_short(self._term):
+        if not terms.is_short(self._term):
             return f"a long formula of {', '.join(sorted(self.names)) or 'numbers'}"
-        return text_of(self._term)
+        return terms.text_of(self._term)
 
     def __repr__(self) -> str:
         return f"Expression({self.text})"
 
     def is_like(self, other: Expression) -> bool:
         """Tell if it is the same number as another everywhere, for all that can be seen."""
-        return alike(self._term, other._term)
+        return terms.alike(self._term, other._term)
 
     def evaluate(self, values: Values) -> float:
         """Compute the number it has now; a formula of positions has none."""
@@ -115,11 +105,13 @@ class Expression:
                 return formula.POINT, POINT_SEEDS.index(name)
             return formula.GLOBAL, values.slot(_published(name, values))
 
-        return program(self._term, place)
+        return terms.program(self._term, place)
 
     def program_of(self, seeds: Sequence[str], depth: int) -> formula.Program:
         """Write the formula of numbers that are not published, for a stack of this depth alone."""
-        return program(self._term, lambda name: (formula.POINT, seeds.index(name)), depth=depth)
+        return terms.program(
+            self._term, lambda name: (formula.POINT, seeds.index(name)), depth=depth
+        )
 
     def evaluate_points(
         self, values: Values, x: np.ndarray, x0: np.ndarray | None = None
@@ -158,7 +150,9 @@ class Expression:
             rows[:, k] = columns[name]
         out, scratch = np.empty(len(rows)), np.empty((6 + formula.ROWS, formula.BLOCK))
         now, before = (np.ascontiguousarray(part) for part in (rows[:, :3], rows[:, 3:]))
-        formula.evaluate_all(program(self._term, place), values.array, now, before, out, scratch)
+        formula.evaluate_all(
+            terms.program(self._term, place), values.array, now, before, out, scratch
+        )
         return out
 
 
@@ -171,12 +165,12 @@ def shown(value: Value) -> str:
         return f'"{value}"'
     if isinstance(value, Expression):
         return value.text
-    return number_text(value)
+    return terms.number_text(value)
 
 
-def _evaluate(root: Term, values: Values) -> float:
+def _evaluate(root: terms.Term, values: Values) -> float:
     found: dict[int, float] = {}
-    for term in in_order(root):
+    for term in terms.in_order(root):
         if term.operation == "number":
             result = term.value
         elif term.operation == "name":

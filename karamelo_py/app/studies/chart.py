@@ -18,6 +18,7 @@ from karamelo_py.app.studies.case import options_of, worded
 from karamelo_py.app.studies.curves import Family, Table, column, order, require, sizes
 from karamelo_py.app.studies.study import plain_table, shown, terminal
 from karamelo_py.app.studies.variables import add_axes, along, holds, names, out_file
+from karamelo_py.output.files import write_whole
 from karamelo_py.script.errors import ScriptError
 
 DESCRIPTION = """\
@@ -317,10 +318,7 @@ def write_page(family: Family, path: Path, words: tuple[str, str], title: str) -
         title=html.escape(title), chart=chart, failures=_failures(family, number_of),
         footer=html.escape("; ".join(about)), runs=text, first=first,
     )  # fmt: skip
-    try:
-        path.write_text(page, encoding="utf-8")
-    except OSError as error:
-        raise ScriptError(f"cannot write {path}: {error.strerror or error}") from None
+    write_whole(path, page)
 
 
 def _values(row: Mapping[str, str], family: Family) -> dict[str, str]:

@@ -11,6 +11,7 @@ from karamelo_py.scene.modify import Fix, heat_hook, node_hook
 from karamelo_py.scene.solid import COLD, WARM
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
+from karamelo_py.styles.fixes.velocity_nodes import prescribe_mapped
 
 
 class HeatFix(Fix):
@@ -59,11 +60,6 @@ def hold_node(capacity, T, T_star, flow, value, before, dt, share):
     return T, value, flow, capacity * (value - T_star) / dt
 
 
-def hold_mapped(capacity, T, T_star, flow, value, before, dt, share):
-    """The temperature whose gradient makes heat flow is the value."""
-    return value, value, flow, 0.0
-
-
 class TemperatureNodes(HeatFix):
     """Prescribe the temperature of nodes: hot and cold walls.
 
@@ -87,7 +83,8 @@ class TemperatureNodes(HeatFix):
     temperature_particles, heat_flux_particles, convection_particles, method
     """
 
-    post_heat_to_grid = node_hook(hold_mapped, publishes=False)
+    # The temperature whose gradient makes heat flow is the value.
+    post_heat_to_grid = node_hook(prescribe_mapped, publishes=False)
     post_update_grid_heat = node_hook(hold_node, holds=True)
 
     def __init__(self, hub: Hub, group: NodeGroup, T: Expression):
