@@ -50,8 +50,8 @@ def compare(run, axes, full):
         # The transfer loses a hundredth of what differs between points and grid in each step.
         total = (log.kinetic[-1] + log.spent[-1] + log.stored[-1]) / ENERGY
         yield Row(f"energy at the end over that at first, {what}", (0.85, 1), total, 0.0, "balance")
-    r = np.hypot(b.x, b.y)
-    x, y = np.append(a.x, -r), np.append(a.y, b.z)
-    heat = np.append(a["T"], b["T"])
+    cut = b.y0 < 1.5 * b.y0.min()  # the layer of points beside a plane of symmetry
+    x, y = np.append(a.x, -b.x[cut]), np.append(a.y, b.z[cut])
+    heat = np.append(a["T"], b["T"][cut])
     coloured(axes, 1e6 * x, 1e6 * y, heat, "temperature (K)", limits=(298, 500))
     axes.set(xlabel="in space | axisymmetric, radius (um)", ylabel="height (um)", aspect="equal")

@@ -35,8 +35,10 @@ def compare(run, axes, full):
     # Published are 14 degrees (experiment) and 13 (Wyser et al. 2020).
     angle = repose(x, depth)
     yield Row("angle of repose (degrees)", (13, 14), angle, 0.05, f"{SOURCE}; Wyser et al. 2020")
-    axes.plot(last.x, last.y, ".", ms=1, color="0.7")
-    axes.plot(x, depth, "C0", label="computed surface")
+    # Over four cells: those of one have now more, now fewer points of a sheared heap.
+    smooth = surface(last, RHO, 4 * cell)
+    axes.fill_between(*smooth.T, color="0.93", lw=0)
+    axes.plot(*smooth.T, "C0", label="computed surface")
     axes.plot(*still.T, "C1", label="computed: moved by less than half a millimetre")
     axes.plot(*SURFACE.T, "k.", label="experiment")
     axes.plot(*FAILURE.T, "k+", label="experiment: did not move")

@@ -19,7 +19,7 @@ def compare(run, axes, full):
     reach = 2 * sqrt(KAPPA / CAPACITY * points["TIME"])
     exact = COLD + RISE * np.array([erfc(x / reach) for x in points.x])
     axes.plot(1e3 * points.x, exact, "k-", lw=1, label="exact")
-    axes.plot(1e3 * points.x, points["T"], ".", ms=3, label="computed")
+    axes.plot(1e3 * points.x, points["T"], "o", ms=4, mfc="none", markevery=0.04, label="computed")
     axes.set(xlabel="depth (mm)", ylabel="temperature (K)")
     error = sqrt(np.mean((points["T"] - exact) ** 2)) / RISE
     # Second order in the cell: 0.0016 with 20 cells.

@@ -9,6 +9,7 @@ from comparisons.row import Row
 
 YIELD = 0.98  # GPa, at first
 HARD = 0.98 + 2.0 * 0.85**0.83  # at the strain at which it breaks in shear, 0.05 + 0.8
+TIME = 5e-6  # s, in which the tool goes 0.25 mm
 SMALL = None  # tests/test_paper_scenes.py runs it
 
 
@@ -25,7 +26,7 @@ def merchant(stress, rake):
 def compare(run, axes, full):
     """The published grid takes hours: a quarter of it, and in full that of the scene, too."""
     for refine in (1 / 4, 2 / 5) if full else (1 / 4,):
-        result = run(refine=refine, T=5e-6)
+        result = run(refine=refine, T=TIME)
         log = result.log
         cells = f", {320 * refine:.0f} cells"
         cutting = log.Time > 1e-6
@@ -36,11 +37,12 @@ def compare(run, axes, full):
         spent = (log.Ek[-1] + log.Es[-1] + log.lost[-1]) / work
         yield Row(f"energy over work of the tool{cells}", (0.7, 1.0), spent, 0.05, "balance")
         last = result.snapshots("machining")[-1]
-        cut = (last.y0 > 0.1e-3) & (last.x0 > 1e-3 - 50 * 5e-6)
+        cut = (last.y0 > 0.1e-3) & (last.x0 > 1e-3 - 50 * TIME)
         broken = np.average(last.damage[cut] > 0.99, weights=last.mass[cut])
         yield Row(f"broken share of what was cut{cells}", (0.02, 1), broken, 0.0, "chips come off")
         below = last.y0 < 0.05e-3
         deep = np.average(last.damage[below] > 0.99, weights=last.mass[below])
         yield Row(f"broken share deep below the cut{cells}", 0.0, deep, 0.01, "the piece holds")
     coloured(axes, 1e3 * last.x, 1e3 * last.y, last.ep, "plastic strain (1)", limits=(0, 2))
+    axes.fill([0.75, 0.775, 1], [0.1, 0.35, 0.125], color="0.6", lw=0, label="tool")
     axes.set(xlabel="x (mm)", ylabel="y (mm)", aspect="equal", xlim=(0, 1.2), ylim=(0, 0.6))

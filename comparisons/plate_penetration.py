@@ -34,6 +34,8 @@ def compare(run, axes, full):
     yield Row("speed of the plug (m/s)", V, speed, 0.15, "twice that behind the shock")
     ahead = -last.z[last.type == 2].min() / (15e-6 * V)
     yield Row("place of the front over v t", (0.9, 1.1), ahead, 0.05, "twice that behind the shock")
-    speed = -last.vz / 1e3
-    coloured(axes, 1e3 * last.x, 1e3 * last.z, speed, "speed downwards (km/s)")
-    axes.set(xlabel="x (mm)", ylabel="z (mm)", aspect="equal")
+    cut = last.y < 1e-3  # a cell beside a plane of symmetry, and its image in the other
+    along, across, speed = (1e3 * a[cut] for a in (-last.z, last.x, -last.vz / 1e6))
+    along, across, speed = np.tile(along, 2), np.append(across, -across), np.tile(speed, 2)
+    coloured(axes, along, across, speed, "speed along the flight (km/s)", cmap="cividis")
+    axes.set(xlabel="distance behind the plate (mm)", ylabel="x (mm)", aspect="equal")

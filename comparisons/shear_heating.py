@@ -38,6 +38,6 @@ def compare(run, axes, full):
     yield Row("hottest point (K)", temperature - T0, log.worst_Tmax[-1] - T0, 0.005, source)
     yield Row("plastic strain", ep, log.worst_Epmax[-1], 0.005, source)
     yield Row("dissipated energy (J)", work * L**2, log.lost[-1], 0.005, source)
-    axes.plot(log.sheared, solution(log.sheared)[2], "k--", lw=1, label=source)
-    axes.plot(log.sheared, log.T, lw=1, label="mean of the points")
+    axes.plot(log.sheared, solution(log.sheared)[2], "k-", lw=0.8, label=source)
+    axes.plot(log.sheared, log.T, "o", ms=4, mfc="none", markevery=0.05, label="mean of the points")
     axes.set(xlabel="shear (1)", ylabel="temperature (K)")

@@ -1,20 +1,18 @@
-"""Draw the tables of verification.md: python docs/pictures.py writes docs/_static/*.png."""
+"""Draw tables of verification.md: python docs/pictures.py writes docs/_static/convergence.png."""
 
 from __future__ import annotations
 
 import sys
 from pathlib import Path
 
-import matplotlib
-
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from comparisons.pictures import STYLE
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
+from karamelo_py.app.studies import look
+from karamelo_py.output.files import savefig
+from karamelo_py.output.plots import blank_figure, tidy
 
 DOCS = Path(__file__).parent
+METHODS = ("", "", "", "", "", "", "CPDI R4", "CPDI Q4", "tlmpm linear")  # after those of `look`
 
 
 def rows(start: str) -> list[list[str]]:
@@ -34,35 +32,43 @@ def numbers(cell: str) -> list[float]:
     return [float(word) for word in cell.split(",")] if cell else []
 
 
-def slope(axes, h: list[float], error: float) -> None:
-    """A dashed line of second order through the last point."""
-    axes.plot(h, [error * (x / h[-1]) ** 2 for x in h], "k--", lw=0.8, label="second order")
+def panel(axes, lines: dict[str, tuple[list[float], list[float]]], second: list[float]) -> None:
+    """Errors over cells by method, and a line of second order: from cells and an error to cells."""
+    cells, errors = ([a for line in lines.values() for a in line[k]] for k in (0, 1))
+    look.log_axis(axes.xaxis, min(cells), max(cells), cells)
+    look.log_axis(axes.yaxis, min(errors), max(errors))
+    ends = []
+    for name, (x, y) in lines.items():
+        marker = look.place(name.partition(",")[0], METHODS)
+        colour = look.PALETTE[marker]
+        axes.plot(x, y, color=colour, marker=look.MARKERS[marker], lw=1.5, ms=5)
+        ends.append((x[-1], y[-1], name, colour))
+    first, error, last = second
+    axes.plot([first, last], [error, error * (first / last) ** 2], color="0.4", ls=look.DASHES[1])
+    axes.text(first, error, "second order  ", ha="right", va="center", fontsize=8, color="0.3")
+    tidy(axes)
+    look.direct_labels(axes, ends)
 
 
 def main() -> None:
     """Convergence of the bases on in.axis_aligned, and of domains on in.column."""
-    plt.rcParams.update({**STYLE, "font.size": 9})
-    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 5), layout="constrained")
-    h = [1 / 8, 1 / 16, 1 / 32]
-    for name, _, _, two, _, four, _ in rows("| basis | G = 1e-4"):
-        left.loglog(h, numbers(four or two), "o-", ms=3, label=name)
-    slope(left, h, 4e-3)
-    left.set(
-        title="in.axis_aligned, G = 0.1", xlabel="cell / side (1)", ylabel="relative error (1)"
-    )
-    left.set_ylim(top=50)
-    left.legend(loc="upper left", ncols=2)
+    figure = blank_figure(10.5, 4.6)
+    left, right = figure.subplots(1, 2)
+    square = {
+        name: ([8, 16, 32], numbers(four or two))
+        for name, _, _, two, _, four, _ in rows("| basis | G = 1e-4")
+    }
+    column = {}
     for name, *errors in rows("| cells | 1 | 2"):
-        found = [(1 / 2**k, float(e)) for k, e in enumerate(errors) if e]
-        right.loglog(*zip(*found, strict=True), "o-", ms=3, label=name)
-    slope(right, [1 / 4, 1 / 256], 1e-5)
-    right.set(
-        title="in.column",
-        xlabel="cell / height (1)",
-        ylabel="mean error of the stress / (rho g l0) (1)",
-    )
-    right.legend()
-    figure.savefig(DOCS / "_static" / "convergence.png", dpi=110)
+        found = [(2**k, float(e)) for k, e in enumerate(errors) if e]
+        column[name] = tuple(map(list, zip(*found, strict=True)))
+    panel(left, square, [11, 0.016, 22])
+    panel(right, column, [8, 2e-3, 64])
+    left.set(title="in.axis_aligned, G = 0.1", xlabel="cells / side (1)")
+    left.set(ylabel="relative error of the displacement (1)")
+    right.set(title="in.column", xlabel="cells / height (1)")
+    right.set(ylabel="mean error of the stress / (rho g l0) (1)")
+    savefig(figure, DOCS / "_static" / "convergence.png")
 
 
 if __name__ == "__main__":
