@@ -54,4 +54,6 @@ def compare(run, axes, full):
     x, y = np.append(a.x, -b.x[cut]), np.append(a.y, b.z[cut])
     heat = np.append(a["T"], b["T"][cut])
     coloured(axes, 1e6 * x, 1e6 * y, heat, "temperature (K)", limits=(298, 500))
-    axes.set(xlabel="in space | axisymmetric, radius (um)", ylabel="height (um)", aspect="equal")
+    for at, what in ((-28, "in space"), (28, "axisymmetric")):
+        axes.text(at, 33, what, ha="center", fontsize=8)
+    axes.set(xlabel="radius (um)", ylabel="height (um)", aspect="equal")

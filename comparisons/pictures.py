@@ -55,7 +55,7 @@ def finish(axes: Any, title: str) -> None:
     """A title, real numbers at the ticks, methods in their colours, a legend that hides nothing."""
     axes.set_title(title, fontsize=9)
     named = {line: str(line.get_label()).partition(",")[0] for line in axes.get_lines()}
-    known = {line: word for line, word in named.items() if any(word in f for f in look.FAMILIES)}
+    known = {line: word for line, word in named.items() if look.known(word)}
     for line, method in known.items() if len({*known.values()}) == len(known) else ():
         line.set_color(look.PALETTE[look.place(method) or -1])  # black is what is exact
     for axis, ends in ((axes.xaxis, axes.dataLim.intervalx), (axes.yaxis, axes.dataLim.intervaly)):

@@ -37,5 +37,6 @@ def compare(run, axes, full):
     cut = last.y < 1e-3  # a cell beside a plane of symmetry, and its image in the other
     along, across, speed = (1e3 * a[cut] for a in (-last.z, last.x, -last.vz / 1e6))
     along, across, speed = np.tile(along, 2), np.append(across, -across), np.tile(speed, 2)
-    coloured(axes, along, across, speed, "speed along the flight (km/s)", cmap="cividis")
+    name = "speed along the flight (km/s)"
+    coloured(axes, along, across, speed, name, cmap="plasma", limits=(-2, 9))
     axes.set(xlabel="distance behind the plate (mm)", ylabel="x (mm)", aspect="equal")

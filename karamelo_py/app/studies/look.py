@@ -36,6 +36,11 @@ FAMILIES = (
 )
 
 
+def known(word: str) -> bool:
+    """Tell whether a word has a colour and marker of its own."""
+    return any(word in family for family in FAMILIES)
+
+
 def place(word: str, others: Sequence[str] = ()) -> int:
     """Number the colour and marker of a word: fixed for methods, else in the order of values."""
     for family in FAMILIES:

@@ -267,8 +267,8 @@ def draw_histories(
     axes = figure.subplots()
     ys = np.concatenate([each.y for each in found])
     positive = ys[np.isfinite(ys) & (ys > 0)]
-    logarithmic = not (ys < 0).any() and len(positive) and positive.max() > DECADES * positive.min()
-    if logarithmic:
+    low = -np.inf
+    if not (ys < 0).any() and len(positive) and positive.max() > DECADES * positive.min():
         # What is zero but for round-off stays below the axis.
         top = float(positive.max())
         low = max(float(positive.min()), 1e-16 * top)
@@ -277,8 +277,10 @@ def draw_histories(
     if exact is not None:
         axes.plot(exact.x, exact.y, color="0.6", linewidth=4, zorder=1)
         ends.append((exact.x[-1], exact.y[-1], exact.label, "0.4"))
+    known = [look.place(each.label) for each in found if look.known(each.label)]
+    places = known if len(known) == len(found) else range(1 + (len(found) > 1), len(found) + 2)
     for k, each in enumerate(found):
-        colour = look.PALETTE[(k + 2) % len(look.PALETTE) if len(found) > 1 else 1]
+        colour = look.PALETTE[places[k] % len(look.PALETTE)]
         axes.plot(
             each.x, each.y, color=colour, linestyle=look.DASHES[k % len(look.DASHES)],
             linewidth=1.6, zorder=3,
@@ -287,8 +289,9 @@ def draw_histories(
         if each.stopped:
             axes.plot(each.x[-1], each.y[-1], "X", color=colour, markersize=9, zorder=4)
             name += " (stopped)"
-        last = each.y[-1] if not logarithmic else max(each.y[-1], low)
-        ends.append((each.x[-1], last, name, colour))
+        # What falls below the axis ends where it leaves.
+        last = max(np.flatnonzero(each.y >= low), default=-1)
+        ends.append((each.x[last], max(each.y[last], low), name, colour))
     axes.set(xlabel=words[0], ylabel=words[1])
     axes.set_title(title, loc="left", fontsize=10)
     tidy(axes)
