@@ -7,7 +7,7 @@ from cycler import cycler
 from matplotlib.collections import EllipseCollection
 
 from karamelo_py.app.studies import look
-from karamelo_py.output.pictures import outlines, spacing
+from karamelo_py.output.outlines import outlines, spacing
 from karamelo_py.output.plots import real_ticks
 
 # Black is what is exact or measured.

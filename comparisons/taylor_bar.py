@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from comparisons.pictures import body
+from comparisons.pictures import coloured
 from comparisons.row import Row
 
 SOURCE = "Johnson & Holmquist 1988 (experiment)"
@@ -26,7 +26,7 @@ def compare(run, axes, full):
     ways = {"tlmpm": {}}
     if full:
         ways["ulmpm"] = {"kind": "ulmpm", "ppc": 2, "refine": 1 / 2}
-    found = {}
+    found, drawn = {}, []
     for kind, words in ways.items():
         result = run(**words)
         log = result.log
@@ -39,9 +39,11 @@ def compare(run, axes, full):
         side = 1 if kind == "tlmpm" else -1
         first, *_, last = result.snapshots("taylor_bar")
         cut = np.abs(first.y) < 1.5 * np.abs(first.y).min()  # two layers of points beside the axis
-        body(axes, side * np.abs(1e3 * last.x[cut]), height[cut], kind)
+        drawn.append([side * np.abs(1e3 * last.x[cut]), height[cut], last.ep[cut]])
+        axes.text(side * 6, 13, kind, ha="center", fontsize=8)
     if full:
         for what, a, b in zip(("length", "foot"), found["tlmpm"], found["ulmpm"], strict=True):
             yield Row(f"{what}, tlmpm / ulmpm", 1.0, a / b, 0.02, "two methods")
-    axes.plot([DIAMETER / 2, WAIST / 2, 0], [0, 0.2 * L0, LENGTH], "k+", ms=7, label="experiment")
+    coloured(axes, *np.hstack(drawn), "plastic strain (1)", bar=0.08, limits=(0, 2))
+    axes.plot([DIAMETER / 2, WAIST / 2, 0], [0, 0.2 * L0, LENGTH], "+", color="#d55e00", ms=9, mew=2, label="experiment")
     axes.set(xlabel="radius (mm)", ylabel="height (mm)", aspect="equal", xlim=(-9, 9))
