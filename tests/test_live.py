@@ -292,7 +292,6 @@ def test_a_study_is_followed_and_stopped(tmp_path):
     told = events.next()
     assert told["about"]["names"] == ["N"] and told["left"] == 3.0
     assert told["running"] == [["N = 20", 0.5]]
-    assert told["rows"][0]["command"].endswith("in.bar -var N 10")
     assert told["rows"][0]["seconds"] is None  # which JSON has not
     assert told["cases"] == {"N = 20": {"N": "20"}, "N = 10": {"N": "10"}}
     page.follow([row], [({"N": "30"}, folder)], [({"N": "20"}, folder, 0.7)], of=3, left=3.0)
@@ -300,6 +299,7 @@ def test_a_study_is_followed_and_stopped(tmp_path):
     assert told["cases"] == {"N = 30": {"N": "30"}} and not told["rows"]
     known = json.loads(get(address, "run", title="N%20=%2010"))  # of an earlier study
     assert known["said"] == ["warning: much"]
+    assert known["command"].endswith("in.bar -var N 10")
     run = json.loads(get(address, "run", title="N%20=%2020"))
     assert run["said"] == ["warning: much"] and run["columns"]["Ek"] == [1, 0.25]
     with pytest.raises(urllib.error.HTTPError):
@@ -340,28 +340,50 @@ def parsed(words):
 @pytest.mark.skipif(not shutil.which("chromium"), reason="no browser")
 @pytest.mark.full
 def test_pages_in_a_browser(simulation):
-    """The page loads, news arrive, a click holds the run, another stops the study."""
+    """Points are drawn and moved, news arrive, a click holds the run, another stops the study."""
     sync = pytest.importorskip("playwright.sync_api")
     page = simulation.live()
     study = StudyPage(simulation.hub.folder / "in.bar", ["N"], ["Ek"])
     row = {"N": "10", "Ek": 0.5, "seconds": 1.0, "status": "failed", "reason": "it broke"}
     row["folder"] = "N=10"
-    study.follow([row], [], [], of=1)
+    study.judge(lambda row: {**row, "class": "growing", "why": "Ek grows"}, {"growing": "#f0a53c"})
+    study.follow([row], [({"N": "20"}, simulation.hub.folder)], [], of=2)
     simulation.run(4)
+    drawn = """() => {
+      const gl = picture.gl, [x, y, w, h] = gl.getParameter(gl.VIEWPORT);
+      const pixels = new Uint8Array(4 * w * h);
+      picture.draw(0); gl.readPixels(x, y, w, h, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+      const shown = pixels.filter((value, k) => k % 4 === 2 && value < 200);
+      return [picture.n, shown.length, picture.centre[0]]; }"""
     with sync.sync_playwright() as started:
         browser = started.chromium.launch(
-            executable_path=shutil.which("chromium"), args=["--no-sandbox"]
+            executable_path=shutil.which("chromium"),
+            args=["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"],
         )
         shown = browser.new_page()
         wrong = []
         shown.on("pageerror", lambda error: wrong.append(error))
         shown.goto(page.address)
         shown.get_by_role("status").filter(has_text="step 4").wait_for()
+        shown.get_by_text("48 points").wait_for()
+        count, blue, centre = shown.evaluate(drawn)
+        assert count == 48 and blue > 1000  # pixels that are not yellow or white
+        box = shown.locator("#points").bounding_box()
+        shown.mouse.move(box["x"] + 300, box["y"] + 200)
+        shown.mouse.down()
+        shown.mouse.move(box["x"] + 340, box["y"] + 200)
+        shown.mouse.up()
+        assert shown.evaluate(drawn)[2] < centre  # points went to the right with the hand
+        shown.get_by_label("colours").select_option("vx")
+        shown.wait_for_function("picture.name === 'vx'")
         shown.get_by_role("button", name="Pause").click()
         shown.get_by_role("button", name="Go on").wait_for()
         shown.goto(study.server.address)
         shown.get_by_label("N = 10: failed").click()
         shown.get_by_text("failed: it broke").wait_for()
+        assert shown.evaluate("document.getElementById('chart').data[0].name") == "growing"
+        shown.get_by_label("N = 20: waiting").click()
+        shown.get_by_text("last line of the log: Step 4,").wait_for()
         shown.get_by_role("button", name="Stop the study").click()
         assert study.stopped.wait(20)
         browser.close()

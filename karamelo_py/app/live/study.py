@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import atexit
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +45,7 @@ class StudyPage:
         beside: Path = Path(),
     ):
         self.stopped = threading.Event()
+        self._judged: Callable[[Mapping[str, Any]], Mapping[str, Any]] = dict
         self._script, self._names, self._beside = script, [*names], beside
         self._about = {
             "title": str(script), "names": self._names, "recorded": [*recorded],
@@ -66,6 +67,10 @@ class StudyPage:
         self.server.changed()
         self.server.close()
 
+    def judge(self, judged: Callable, colours: Mapping[str, str]) -> None:
+        """Show the class of each row, and why, by colours of classes: ``judged(row)`` adds them."""
+        self._judged, self._about["classes"] = judged, {**colours}
+
     def follow(
         self,
         rows: Sequence[Mapping[str, Any]],
@@ -76,8 +81,7 @@ class StudyPage:
         """Take what is known: rows of runs that have ended, cases with their folders."""
         for row in rows[len(self._rows) :]:
             case = {name: row[name] for name in self._names}
-            command = f"karamelo-py {self._script} {' '.join(options_of(case))}"
-            self._rows.append({**row, "title": worded(case), "command": command})
+            self._rows.append({**self._judged(row), "title": worded(case)})
             self._cases[worded(case)] = case
             self._folders[worded(case)] = self._beside / row["folder"]
         for case, folder in (*waiting, *((case, folder) for case, folder, _ in running)):
@@ -110,8 +114,14 @@ class StudyPage:
             *said_in(folder / "out.txt").splitlines(),
         ]
         columns = {
-            name: [plain(float(value)) for value in values[:: max(1, len(values) // MOST)]]
+            name: [plain(float(value)) for value in values[_some(len(values))]]
             for name, values in read_log(folder).items()
             if np.issubdtype(values.dtype, np.number)
         }
-        return {"said": said[-LINES:], "columns": columns}
+        command = f"karamelo-py {self._script} {' '.join(options_of(self._cases[words['title']]))}"
+        return {"said": said[-LINES:], "columns": columns, "command": command}
+
+
+def _some(count: int) -> np.ndarray:
+    """Number rows of a log that are drawn, the first and the last among them."""
+    return np.unique(np.linspace(0, count - 1, min(count, MOST)).astype(int))

@@ -122,6 +122,8 @@ def run(options: Any) -> int:
     study.describe(variables=values, energy=energy, bound=options.bound)
     error = shades[0].word if shades else ""
     chart = Map(study, values, axes, energy, options.bound, error, leaders)
+    if study.page:
+        study.page.judge(chart.judged, COLOURS)
     apart = [name in worded for name in axes] + [False] * (2 - len(axes))
     try:
         _, chart.inferred = explore(chart.shape, chart.classify, options.stride, apart)
