@@ -76,9 +76,6 @@ def _is_whole(kind: types.Type) -> bool:
     return isinstance(scalar_of(kind), types.Integer | types.Boolean)
 
 
-# --- operators --------------------------------------------------------------------------------
-
-
 def _unary(kind_of: Callable, write: Callable, result: types.Type | None = None) -> Callable:
     """Make an operation on one number, cast to a type: ``write(builder, kind, value)``."""
 
@@ -323,9 +320,6 @@ def _real_of(kind: types.Type) -> types.Type | None:
     if isinstance(kind, Lanes):
         return None if _is_whole(kind) else kind
     return kind if isinstance(kind, types.Float) else types.float64
-
-
-# --- functions of math ------------------------------------------------------------------------
 
 
 def _call(builder: Any, name: str, result: ir.Type, values: list) -> Any:

@@ -42,9 +42,6 @@ def folder() -> Path:
     return Path(home) / "kernels"
 
 
-# --- telling of what is wrong -------------------------------------------------------------------
-
-
 def _warn(text: str) -> None:
     warnings.warn(text, RuntimeWarning, stacklevel=1)  # once for a text, wherever it comes from
 
@@ -72,9 +69,6 @@ def telling(tell: Callable[[str], None]) -> Iterator[None]:
         yield
     finally:
         _tell = before
-
-
-# --- kernels ------------------------------------------------------------------------------------
 
 
 class KernelFiles:
@@ -209,9 +203,6 @@ def write(path: Path, content: bytes) -> None:
     except BaseException:
         Path(name).unlink(missing_ok=True)
         raise
-
-
-# --- how long it took ---------------------------------------------------------------------------
 
 
 def _times() -> dict[str, float]:

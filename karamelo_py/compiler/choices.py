@@ -27,9 +27,6 @@ class Unknown(Exception):
     """Tell that something a kernel depends on cannot be put into a hash."""
 
 
-# --- implementations of point functions that are in a kernel -----------------------------------
-
-
 class Choice(NamedTuple):
     """Record that a kernel asked a point function for these classes of tags, all by name."""
 

@@ -55,7 +55,7 @@ def implements(function: Callable, *numbers: type, by_type: bool = False) -> Cal
 
 
 def shared(function: Callable) -> Callable:
-    """Mark a helper of point functions: kernels may call it. It may ask what its arguments are."""
+    """Mark a helper that lanes or types of numbers may have in a way of their own: `implements`."""
     return implements(function)(function)
 
 
@@ -125,9 +125,6 @@ def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Calla
         return dispatch
 
     return declare
-
-
-# --- conversions -------------------------------------------------------------------------------
 
 
 def real(value: float, like: Any) -> Any:
@@ -213,9 +210,6 @@ def beside(first: int, steps: int) -> int:
 
 
 implements(beside)(lambda first, steps: types.uint64(first + steps))
-
-
-# --- choices -----------------------------------------------------------------------------------
 
 
 @shared

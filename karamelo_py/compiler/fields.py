@@ -37,7 +37,7 @@ from numba import types
 
 from karamelo_py.compiler import code
 from karamelo_py.compiler.code import I64
-from karamelo_py.compiler.compile import implements, index, real, shared, where
+from karamelo_py.compiler.compile import implements, index, real, where
 from karamelo_py.compiler.tuples import count_in, flat, nested_as
 from karamelo_py.compiler.values import intrinsic
 
@@ -80,6 +80,7 @@ class Field(NamedTuple):
     array: Any
 
     shape = scalar
+    is_followed = True  # its functions of the kinematics: the key of a kernel has the class
 
 
 class StepField(Field):
@@ -197,7 +198,6 @@ def at_nodes(kind: type, kin: Any, count: int, real: type) -> NamedTuple:
     return kind(array)
 
 
-@shared
 def field(fields: tuple, kind: type) -> Any:
     """The array of the field of this class, or None where the scene does not have it."""
     for one in fields:
@@ -209,7 +209,6 @@ def field(fields: tuple, kind: type) -> Any:
 # --- rows of arrays that may be absent --------------------------------------------------------
 
 
-@shared
 def load(array, p, like):
     """Components 0, 1, ... of point `p`, as `like` has them; none where there is no array."""
     if array is None:
@@ -219,13 +218,11 @@ def load(array, p, like):
     return nested_as(like, tuple([array[k, p] for k in range(count_in(like))]))
 
 
-@shared
 def store(array, p, values):
     """Components 0, 1, ... of point `p` become `values`; nothing where there is no array."""
     store_from(array, p, 0, values)
 
 
-@shared
 def store_from(array, p, first, values):
     """Components from `first` on of point `p` become those of `values`; earlier ones stay."""
     if array is not None:
@@ -234,7 +231,6 @@ def store_from(array, p, first, values):
             array[k, p] = values[k]
 
 
-@shared
 def increase(array, p, values):
     """Add `values` to components 0, 1, ... of point `p`; nothing where there is no array."""
     if array is not None:
@@ -242,7 +238,6 @@ def increase(array, p, values):
             array[k, p] += value
 
 
-@shared
 def forget(array, p, which):
     """Make the components of point `p` unknown (NaN) that are above 0 in `which`."""
     if array is not None:
@@ -251,7 +246,6 @@ def forget(array, p, which):
             array[k, p] = where(chosen > 0, real(nan, value), value)
 
 
-@shared
 def load_vector(kin, array, p):
     """The first components of point `p` as a vector."""
     return kin.Vector._make([array[k, p] for k in range(kin.dimension)])
@@ -303,7 +297,6 @@ def _row_in_kernels(address, like, count):
     return row(types.int64, like, types.int64), codegen
 
 
-@shared
 def pick_items(
     address: int, like: Any, order: np.ndarray, room: np.ndarray, c: int, begin: int, end: int
 ) -> None:
@@ -316,7 +309,6 @@ def pick_items(
         room[c, p] = row[index(order[p])]
 
 
-@shared
 def put_items(address: int, like: Any, room: np.ndarray, c: int, begin: int, end: int) -> None:
     """Item p of such a row becomes ``room[c, p]``, from `begin` to `end`."""
     row = _row(address, like, end)

@@ -37,9 +37,6 @@ _HERE = f"{__package__}."  # the text of all these modules is in every key
 _PLAIN = (type(None), bool, int, float, complex, str, bytes, type(Ellipsis), range, slice)
 
 
-# --- types ------------------------------------------------------------------------------------
-
-
 def describe(numba_type: Any) -> str:
     """Describe a type in words that mean the same in every process; tags with their fields."""
     how = type(numba_type).__name__  # held or a value
@@ -60,9 +57,6 @@ def classes_in(numba_type: Any) -> Iterable[type]:
         yield from filter(None, [getattr(numba_type, "instance_class", None)])
         for item in numba_type:
             yield from classes_in(item)
-
-
-# --- what can be reached from a function --------------------------------------------------------
 
 
 def fingerprint(

@@ -12,7 +12,6 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.loops import caller_of, kernel, noinline
 from karamelo_py.compiler.operations import FIRST_BINARY, SELECT, numbered, of_one, of_two
 
@@ -38,9 +37,6 @@ class Program(NamedTuple):
     constants: np.ndarray  # (m,) float64, which CONSTANT instructions push
 
 
-# --- rows of numbers ----------------------------------------------------------------------------
-
-
 @noinline
 def _copy(n, a, b):
     """Copy the first `n` numbers of `b` to `a`."""
@@ -53,7 +49,6 @@ def _fill(n, a, value):
     a[:n] = value
 
 
-@shared
 def _select(n, a, b, c):
     """Replace the first `n` numbers of `a` by those of `b`, or of `c` where they are 0."""
     for i in range(n):
@@ -93,7 +88,6 @@ def _binary(op, n, a, b):
         a[i] = of_two(op, a[i], b[i])
 
 
-@shared
 def _powers(n, a, b):
     """Powers; small whole ones are the common case, and pow costs ten multiplications."""
     power = b[0]

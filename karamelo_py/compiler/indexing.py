@@ -160,9 +160,6 @@ def _part(lowering: Any, array: Value, place: Any, made: types.Array) -> Any:
     return code.make_array(builder, made, data, shape, strides)
 
 
-# --- attributes -------------------------------------------------------------------------------
-
-
 def attribute(lowering: Any, thing: Value, name: str) -> Any:
     """Give an attribute of an array, a record or a number."""
     kind = thing._kind

@@ -67,9 +67,6 @@ def load(unit: Unit) -> list[int]:
         return _loaded[unit.name]
 
 
-# --- compilation ----------------------------------------------------------------------------------
-
-
 class Compilation:
     """Tell of compilation: `listeners` have ``on_start(name)`` and ``on_end()``."""
 

@@ -15,7 +15,7 @@ from numba import types
 
 from karamelo_py.compiler import code
 from karamelo_py.compiler.code import I32, Lanes
-from karamelo_py.compiler.compile import all_lanes, fma, implements, real, shared, where
+from karamelo_py.compiler.compile import all_lanes, fma, implements, real, where
 from karamelo_py.compiler.values import OF_REALS, intrinsic
 
 
@@ -104,7 +104,6 @@ def _scaled(x, n):
     return x(x, x), codegen
 
 
-@shared
 def _series(x, square, coefficients):
     """Sum up a polynomial of `x`, whose `square` is known, in two chains."""
     chains = []
@@ -160,7 +159,6 @@ def _exponential(x):
     return exponential
 
 
-@shared
 def _of_zero(x, y):
     return where(y == 0, real(1, x), where(y < 0, real(inf, x), real(0, x)))
 

@@ -174,9 +174,6 @@ def size_of(*things: Any) -> int:
     return 0
 
 
-# --- functions of numbers ---------------------------------------------------------------------
-
-
 @implements(math.sqrt, Dual)
 def _sqrt(x):
     root = math.sqrt(x.value)

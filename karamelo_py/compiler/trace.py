@@ -30,8 +30,6 @@ from karamelo_py.compiler.flow import Flow
 from karamelo_py.compiler.lowering import Lowering, name_of, numbers_of
 from karamelo_py.compiler.statements import AstFunction, place_in_text
 
-# --- what cannot be compiled ------------------------------------------------------------------
-
 
 class CannotCompile(TypeError):
     """Tell why a function cannot become code of a kernel; what was wrong is its cause."""
@@ -223,9 +221,6 @@ def _refuse_methods(codes: Iterable[python.CodeType], classes: set[type]) -> Non
 def run_for_kernel(dispatch: Callable, arguments: tuple) -> Any:
     """Call a point function for one that nothing sees through, as methods do."""
     return _seen(dispatch)(*arguments)
-
-
-# --- what kernels call ----------------------------------------------------------------------------
 
 
 class _Formula(NamedTuple):

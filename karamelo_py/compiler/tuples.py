@@ -6,7 +6,6 @@ Comprehensions are of lists, which Python makes in two thirds of the time where 
 from karamelo_py.compiler.compile import Weighted, fma, shared
 
 
-@shared
 def flat(nested):
     """The numbers of nested tuples, one after another."""
     numbers = ()
@@ -15,7 +14,6 @@ def flat(nested):
     return numbers
 
 
-@shared
 def nested_as(like, numbers):
     """Numbers one after another, in tuples nested as those of `like`, and of their classes."""
     made, begin = [], 0
@@ -27,7 +25,6 @@ def nested_as(like, numbers):
     return type(like)(*made) if hasattr(like, "_fields") else tuple(made)
 
 
-@shared
 def count_in(nested):
     """Count the numbers in nested tuples."""
     if type(nested) is tuple and not nested:
@@ -35,7 +32,6 @@ def count_in(nested):
     return sum([count_in(item) if isinstance(item, tuple) else 1 for item in nested])
 
 
-@shared
 def put_at(array, i, first, values):
     """array[i, first + k] = values[k]."""
     for k, value in enumerate(values):
@@ -54,7 +50,6 @@ def row(array, i, first, like):
     return tuple([array[i, first + k] for k in range(len(like))])
 
 
-@shared
 def record(table, i):
     """A NamedTuple of arrays, seen at index `i`: the same NamedTuple of scalars.
 
@@ -63,7 +58,6 @@ def record(table, i):
     return type(table)(*[record(c, i) if isinstance(c, tuple) else c[i] for c in table])
 
 
-@shared
 def clear_first(array, i):
     """Set the first number of row `i` of an array that may be absent (None) to zero."""
     if array is not None:

@@ -10,7 +10,6 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.fields import as_rows_of_points, name_of, some_points
 from karamelo_py.compiler.loops import noinline
 from karamelo_py.compiler.tuples import row
@@ -42,25 +41,21 @@ class Nodes(NamedTuple):
 MASS = 0  # of Nodes.sums
 
 
-@shared
 def of_momentum(kin):
     """First component of the momentum in `Nodes.sums`."""
     return 1
 
 
-@shared
 def of_force(kin):
     """First component of the force in `Nodes.sums`."""
     return 2 if kin.dimension == 1 else 4
 
 
-@shared
 def of_change(kin):
     """First component of v* - v in `Nodes.update`; that of v* is 0."""
     return 4 if kin.dimension == 3 else kin.dimension
 
 
-@shared
 def vector_at(kin, records, i, first, like):
     """The components of a record of a node from the `first` on, as a vector."""
     return vector(kin, row(records, i, first, (*like,)))
@@ -90,7 +85,6 @@ class Points(NamedTuple):
     fields: tuple  # declared fields, (components, n)
 
 
-@shared
 def known_to_laws(points):
     """The points with what every scene has of them, and no more.
 
@@ -386,7 +380,6 @@ class Setup(NamedTuple):
     control: Control
 
 
-@shared
 def with_items_of(values, others):
     """Put the items of another NamedTuple in the place of those with their names."""
     new = dict(zip(others._fields, others, strict=True))

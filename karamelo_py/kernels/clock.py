@@ -3,7 +3,7 @@
 from math import inf
 from typing import Any
 
-from karamelo_py.compiler.compile import index, real, shared
+from karamelo_py.compiler.compile import index, real
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import kernel
@@ -15,13 +15,11 @@ from karamelo_py.points.grid import inside
 from karamelo_py.points.kinematics import vector
 
 
-@shared
 def step_size(s: Setup) -> Number:
     """dt of the present step, in the precision of the run: how long points move."""
     return real(s.control.values[DT], s.nodes.sums[0, MASS])
 
 
-@shared
 def last_step_size(s: Setup) -> Number:
     """dt of the step before, which the velocity at the start of this one belongs to.
 
@@ -32,7 +30,6 @@ def last_step_size(s: Setup) -> Number:
     return real(share * s.control.clock[0].last_dt, s.nodes.sums[0, MASS])
 
 
-@shared
 def kick(s: Setup) -> Number:
     """Return the time for which forces act in this step.
 
@@ -43,7 +40,6 @@ def kick(s: Setup) -> Number:
     return real(s.control.clock[0].kick, s.nodes.sums[0, MASS])
 
 
-@shared
 def common_velocity(kin: Tag, clock: Any, like: Number) -> tuple:
     """The velocity that speeds are measured from, in the number type of `like`."""
     return vector(kin, [real(clock.common[0, k], like) for k in range(kin.dimension)])
@@ -131,7 +127,6 @@ def _read_reports(tiling, control):
     clock.new_rate = max(clock.new_rate, rate)
 
 
-@shared
 def read_reports(s: Setup) -> None:
     """Gather the reports of all tiles in the clock: largest rate and move, and any wrong point."""
     clock = s.control.clock[0]
@@ -142,7 +137,6 @@ def read_reports(s: Setup) -> None:
     agree_on_reports(s.control.ranks, s.control)
 
 
-@shared
 def take_reports(clock: Any) -> None:
     """Take over the reports of a sweep of a step."""
     # Points move in one sweep of a step, and their domains may grow in another.
@@ -159,7 +153,6 @@ def all_well(s: Setup, take: Any = take_reports) -> bool:
     return clock.wrong == 0
 
 
-@shared
 def checked_move(frame, kin, grids, points, now, stride, p):
     """Count the cells that point `p` moves by in a step; tell whether it may go as far."""
     grid = record(grids, index(points.grid[p]))
@@ -185,7 +178,6 @@ def _check_points(frame, kin, grids, points, tiling, now, stride, k):
         tiling.report[t, 2] = wrong
 
 
-@shared
 def check_moves(s: Setup, mode: Tag) -> bool:
     """Look at the new positions again, after hooks that may have changed them."""
     clock = s.control.clock[0]

@@ -23,7 +23,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.loops import kernel, noinline
 from karamelo_py.compiler.tuples import record
@@ -121,7 +120,6 @@ def _immovable(contact, n, k):
     return contact.prescribed[n, k] != 0 or contact.rigid[n // contact.stride]
 
 
-@shared
 def _yielding(contact, n, k, per_mass):
     return 0.0 if _immovable(contact, n, k) else per_mass
 
@@ -205,7 +203,6 @@ def _pair_of(contact, kin, nodes, records, n, m):
     return NodePair(n, m, per_n, per_m, of_n - of_m, scatter, vector(kin, yielding), relative)
 
 
-@shared
 def _left(pair, push):
     """The relative velocity once the impulse `push` m grad N has been given."""
     items = zip(pair.relative, pair.outward, pair.yielding, strict=True)
@@ -236,7 +233,6 @@ def _gap(contact, nodes, outward, n, m, where):
     return gap - _reach(contact, nodes, outward, m, where, -1)
 
 
-@shared
 def _directions(contact, kin, nodes, pair):
     """Return directions along which bodies may be apart, beside their normal; zeros for none.
 
@@ -364,7 +360,6 @@ def _take(contact, control, a, i, n, k, impulse, per_mass, x):
         add_to(control.totals, slot - 1 + k, -force)
 
 
-@shared
 def _before(kin, nodes, n, per_mass):
     """Return the velocity of a node at the beginning of the step."""
     return per_mass * vector_at(kin, nodes.sums, n, of_momentum(kin), zero_vector(kin, 0.0))

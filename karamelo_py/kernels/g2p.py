@@ -13,7 +13,6 @@ from karamelo_py.compiler.compile import (
     fma,
     point_function,
     real,
-    shared,
     where,
 )
 from karamelo_py.compiler.fields import field, forget, increase, load_vector, store, store_from
@@ -109,9 +108,6 @@ class SeriesTerm(NamedTuple):
     writes = ("term of series",)
 
 
-# --- gather -----------------------------------------------------------------------------------
-
-
 @point_function()
 def empty(task: arrays.Tag, w: Work, x: tuple) -> tuple:
     """Return the totals of a gather before the first node: zeros."""
@@ -122,7 +118,6 @@ def _empty_move(task, w, x):
     return x - x, x - x, transfers.zero_moment(w.transfer, w.kin, x[0])
 
 
-@shared
 def _is_known(task, w):
     """Return True for a gradient that the transfer may have from v* already."""
     return isinstance(task, StrainInMove) and not isinstance(w.averaging, visit.FBar)
@@ -172,13 +167,11 @@ def _gathered_move(task, w, stencil, k, total):
     return v_pic + N * v, dv_pic + N * dv, moment, *corners
 
 
-@shared
 def moves_corners(basis: arrays.Tag, kin: arrays.Tag) -> bool:
     """Return True for a gather at corners of domains that move with the velocity there."""
     return isinstance(basis, AtCorners) and carried(basis.basis, kin) > 0
 
 
-@shared
 def update_at(kin: arrays.Tag, nodes: arrays.Nodes, i: arrays.Index, like: arrays.Number) -> tuple:
     """v* and v* - v of a node: one record in the plane, two in space."""
     if many_threads() and not isinstance(i, Weighted):  # records that lie side by side
@@ -192,7 +185,6 @@ def update_at(kin: arrays.Tag, nodes: arrays.Nodes, i: arrays.Index, like: array
     return v, arrays.vector_at(kin, nodes.update, i, arrays.of_change(kin), like)
 
 
-@shared
 def add_gradient(w, stencil, k, grad_v):
     """The velocity gradient with the part of the k-th node, where it is gathered at all."""
     if not len(grad_v):
@@ -227,9 +219,6 @@ def _gathered_average_stress(task, w, stencil, k, total):
 def _gathered_series_term(task, w, stencil, k, total):
     i, weight, _ = node_of(w, stencil, k)
     return total + weight * arrays.vector_at(w.kin, field(w.nodes.fields, Series), i, 0, total)
-
-
-# --- update -----------------------------------------------------------------------------------
 
 
 @point_function()
@@ -291,7 +280,6 @@ def _updated_trial_strain(task, w, stencil, p, dt, total, totals, fastest):
     return real(0, dt), fastest
 
 
-@shared
 def increment(dt, grad_v):
     """dl = dt grad v, as numbers: F + dl is a sum of two of them."""
     return grad_v._make(dt * grad_v)
@@ -310,7 +298,6 @@ def _updated_series_term(task, w, stencil, p, dt, total, totals, fastest):
     return real(0, dt), fastest
 
 
-@shared
 def further_reach(basis, kin, grid, before, after):
     """By how many cells the domain of a point reaches further than before."""
     further = extent(basis, kin, grid, after) - extent(basis, kin, grid, before)
@@ -366,7 +353,6 @@ empty_all = visit.for_tags(empty, "w, x")
 gathered_all = visit.for_tags(gathered, "w, stencil, k, totals", each="totals")
 
 
-@shared
 def updated_all(tasks, w, stencil, p, dt, totals, fastest):
     """Update by the tasks in turn: distances add up, and the rate goes from one to the next."""
     moved = real(0, fastest)

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import index, real, shared, where
+from karamelo_py.compiler.compile import index, real, where
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.gpu import counted, raise_to
 from karamelo_py.compiler.lanes import room_for
@@ -122,13 +122,11 @@ def while_steps_go_on(function: Callable) -> Callable:
     return vars(function).setdefault("go_on", go_on)  # one for all launches
 
 
-@shared
 def goes_wrong(fate, number):
     """Note the number of a point that goes wrong: the lowest stays."""
     raise_to(fate, WRONG, BEHIND - float(number))
 
 
-@shared
 def _report(fate, number, moved, rate, stride):
     """Note how a point fared; so written, NaN counts as wrong."""
     if (moved <= stride) & (rate < 1e300):
@@ -138,7 +136,6 @@ def _report(fate, number, moved, rate, stride):
         goes_wrong(fate, number)
 
 
-@shared
 def is_last(s):
     """Check that the present step reaches the end of the run: nothing is summed for a next one."""
     values = s.control.values
@@ -155,7 +152,6 @@ def _is_filled(name: Any, column: int, kin: Any) -> bool:
     )
 
 
-@shared
 def _as_it_is(s):
     return s
 
@@ -184,13 +180,11 @@ class Stage:
 
         self.at = at = row.at or _as_it_is
 
-        @shared
         def context(s):
             whole = last_step_size(s) if of_last_step else step_size(s)
             dt = whole if share == 1 else real(share, whole) * whole
             return sweep.context_of(at(s), dt, row.gathers, row.scatters, row.moves)
 
-        @shared
         def at_point(s, block, p):
             c, points = context(s), block.points
             grid = record(c.grids, index(points.grid[p]))
@@ -203,7 +197,6 @@ class Stage:
         """Make what keeps the load of a point."""
         quantities, scatters = self.row.visit.quantities, self.scatters
 
-        @shared
         def keep(w, p, dt, cells):
             if scatters:
                 for k, number in enumerate(flat(load_all(quantities, w, p, dt))):
@@ -215,7 +208,6 @@ class Stage:
         """Make what a point gives."""
         at_point, quantities = self.at_point, self.row.visit.quantities
 
-        @shared
         def load_of_point(s, block, i):
             c, w = at_point(s, block, index(i))
             return flat(load_all(quantities, w, index(i), c.dt))
@@ -251,7 +243,6 @@ class Stage:
     def _place(self) -> Callable:
         present = self.lists
 
-        @shared
         def place(w, p):
             places = w.places.y if present and w.frame.moves else w.places.where
             return place_at(w.basis, w.kin, places, p)
@@ -291,7 +282,6 @@ class Stage:
         def room_of(name, rooms, otherwise):
             return rooms[filled.index(name)] if name in filled else otherwise
 
-        @shared
         def nodes_for(nodes, rooms):
             return Nodes(
                 room_of("sums", rooms, nodes.sums),
@@ -300,35 +290,29 @@ class Stage:
                 tuple([type(one)(room_of(type(one), rooms, one.array)) for one in nodes.fields]),
             )
 
-        @shared
         def clear(rooms, like):
             for name, column, _ in columns:
                 for k in range(begin, end):
                     room_of(name, rooms, None)[k, column] = like - like
 
-        @shared
         def give(out, stencil, corner, loads):
             seen = stencil if corners == 1 else of_corner(stencil, corner)
             for k in range(begin, end):
                 scattered_all(quantities, out, seen, k, loads)
 
-        @shared
         def put(rooms, boxes, box):
             for j, (name, column, _) in enumerate(columns):
                 for k in range(begin, end):
                     row = j * (end - begin) + k - begin
                     boxes[row, box] = room_of(name, rooms, None)[k, column]
 
-        @shared
         def loaded(w, p, dt, cells):
             like = load_all(quantities, w, p, dt)  # for its shape alone
             return nested_as(like, tuple([cells.loads[k, p] for k in range(len(flat(like)))]))
 
-        @shared
         def rooms_for(like):
             return tuple([room_for(width, (like,) * count) for width in widths])
 
-        @shared
         def in_cell(w, rooms):
             return w._replace(basis=InCell(w.basis), nodes=nodes_for(w.nodes, rooms))
 
@@ -368,7 +352,6 @@ class Stage:
         begin, end = self.nodes_of(part)
         at = self.at
 
-        @shared
         def put(nodes, n, found):
             for (name, column, add), value in zip(columns, found, strict=True):
                 array = getattr(nodes, name) if isinstance(name, str) else field(nodes.fields, name)
@@ -413,7 +396,6 @@ class Stage:
         return mark_nodes
 
 
-@shared
 def _grid_of(grids, n):
     """The grid that node `n` belongs to."""
     g = 0
@@ -423,13 +405,11 @@ def _grid_of(grids, n):
     return record(grids, index(g))
 
 
-@shared
 def _steps_to(s, grid, k):
     """Count the nodes from the first that a point sees to the k-th, by their numbers."""
     return node_number(grid, 0, digits(k, s.basis.line_nodes, s.kin.dimension))
 
 
-@shared
 def _with_cell(s, cells, grid, n, k, begin, end, found):
     """`found` with what a cell gives to node `n`, which its points see as their k-th node."""
     c = n - _steps_to(s, grid, k)
@@ -447,7 +427,6 @@ def _with_cell(s, cells, grid, n, k, begin, end, found):
 # --- lists of the points by cell --------------------------------------------------------------
 
 
-@shared
 def _weight(number):
     """Return a count with a mark of cells that have points."""
     return int(number) + (OCCUPIED if number > 0 else 0)
@@ -500,7 +479,6 @@ def list_point(i, fate, cells):
     cells.order[cells.first[c] + counted(cells.count, c, -1) - 1] = i
 
 
-@shared
 def _point_and_corner(corners, count, listed):
     """The point that is listed, of so many, and which of its corners."""
     return (index(listed), 0) if corners == 1 else (index(listed % count), listed // count)
@@ -509,7 +487,6 @@ def _point_and_corner(corners, count, listed):
 def sort_cell(corners: int) -> Callable:
     """Make what sorts the points of a cell by id, and corners of domains."""
 
-    @shared
     def key(ids, listed):
         p, corner = _point_and_corner(corners, ids.size, listed)
         return ids[p] * corners + corner
@@ -577,7 +554,7 @@ def put_rows(i, fate, rows, room):
 def of_nodes(row: Any) -> Callable:
     """Make what a node does for a row of a task."""
     task, at, length = row.task, row.at or _as_it_is, row.length or kick
-    made = task if callable(task) else shared(lambda s: task)
+    made = task if callable(task) else lambda s: task
 
     def visit_node(i, fate, s, use):
         if use[i] == 0:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import index, shared
+from karamelo_py.compiler.compile import index
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.formula import ROWS, STACK
 from karamelo_py.compiler.gpu import counted, raise_to
@@ -48,7 +48,6 @@ class OwnValues(NamedTuple):
     values: np.ndarray
 
 
-@shared
 def _hooks_with_room(hooks):
     """Return the hooks with room for one member."""
     own = Own(room_for(1, (0,))[0], room_for(1, (0.0,) * (STACK + ROWS + 1)))
@@ -59,14 +58,12 @@ def _hooks_with_room(hooks):
 def _control(count: int) -> Callable:
     """Make what gives a thread its control; `count` values, if it needs some of its own, or 0."""
 
-    @shared
     def own_values(values):
         room = room_for(count, (0.0,))[0]
         for k in range(count):
             room[k] = values[k]
         return room
 
-    @shared
     def control_of(s, copies, i):
         own = copies[index((i // 32) % len(copies))]
         if count:
@@ -88,7 +85,6 @@ def clear_held(i, fate, held):
         held[i, c].slot = 0
 
 
-@shared
 def _member(hooks, h, i):
     begin = hooks.table[h].begin
     return i if begin < 0 else hooks.members[begin + i]
@@ -100,12 +96,10 @@ def count_node(i, fate, nodes, hooks, h, heavy):
         counted(heavy, h, 1)
 
 
-@shared
 def _share(hooks, h, heavy):
     return 1.0 / max(heavy[h], 1) if hooks.table[h].uses_share else 1.0
 
 
-@shared
 def _planar_nodes(nodes):
     """Return the nodes with what walls know of them."""
     fields = tuple([one for one in nodes.fields if type(one) is FrictionalHeat])
@@ -252,7 +246,6 @@ def _setup(s: arrays.Setup) -> Callable:
     fields = len(contact.slot) if isinstance(contact, SeparateFields) else 0
     d = s.kin.dimension
 
-    @shared
     def contact_of(s):
         if fields == 0:
             return s.contact
@@ -260,7 +253,6 @@ def _setup(s: arrays.Setup) -> Callable:
         room = Scratch(own[:, 0], own[:, 1], room_for(d, (0.0,) * fields))
         return with_items_of(s.contact, room)
 
-    @shared
     def setup_of(s, copies, i):
         return with_items_of(s, OwnParts(contact_of(s), _CONTROL(s, copies, i)))
 
@@ -362,7 +354,6 @@ def add_energies(i, fate, s, block, copies, threads):
     _add_all(own, first_row, solid, total)
 
 
-@shared
 def _add_all(own, first_row, solid, total):
     if solid >= 0:
         for k, number in enumerate(total):

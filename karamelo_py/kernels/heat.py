@@ -20,7 +20,6 @@ from karamelo_py.compiler.compile import (
     point_function,
     real,
     round_off,
-    shared,
     where,
 )
 from karamelo_py.compiler.fields import Field, StepField, field, load, load_vector, store, vector
@@ -118,7 +117,6 @@ class Warming(NamedTuple):
     writes = ("state",)
 
 
-@shared
 def at_least_round_off(weight):
     """`weight`, and next to nothing where it is nothing.
 
@@ -126,9 +124,6 @@ def at_least_round_off(weight):
     temperature that the point has there, and what flows to it has to come back.
     """
     return max(weight, round_off(weight))
-
-
-# --- from points to nodes ---------------------------------------------------------------------
 
 
 @load_of.on(HeatContent)
@@ -150,7 +145,6 @@ def _load_of_heat_content(quantity, w, p, like):
     return of_present(p, capacity), of_present(p, conductance), T, _gradient(w, p)
 
 
-@shared
 def _gradient(w, p):
     like = load_vector(w.kin, w.points.v, p)
     return load(field(w.points.fields, HeatGradient), p, like)
@@ -187,9 +181,6 @@ def _scattered_heat_flow(quantity, w, stencil, k, load):
     for axis in range(len(flow)):
         total = fma(flow[axis], gradient[axis], total)
     accumulate(w.nodes.sums, i, of_force(Line()), (total,))
-
-
-# --- from nodes to points ---------------------------------------------------------------------
 
 
 @empty.on(TemperatureGradient)
@@ -260,7 +251,6 @@ def _at_heat_nodes_hooks(hooks, stage, target, s):
     clock.hottest = max(clock.hottest, clock.set_high)
 
 
-@shared
 def heated(kin, points, x):
     """Give what fixes that heat points act on."""
     kinds = Capacity, Temperature, Volume, Supply, TemperatureShare
@@ -268,7 +258,6 @@ def heated(kin, points, x):
     return hook_loop.HeatedPoints(points.id, kin, *own, x)
 
 
-@shared
 def heat_of(points):
     """Give supply and capacity of points."""
     return tuple([field(points.fields, kind) for kind in (Supply, Capacity)])
@@ -298,19 +287,16 @@ def _at_heated_points_hooks(hooks, s):
     clock.coldest += step_size(s) * clock.fall
 
 
-@shared
 def _of_heat(s):
     """The setup with the nodes of heat."""
     return arrays.with_items_of(s, s.heat)
 
 
-@shared
 def at_its_nodes(s):
     """The same for tasks at nodes, which have one component."""
     return _of_heat(s)._replace(kin=Line())
 
 
-@shared
 def _take_factor(clock):
     # What `Warming` reports as a rate is by what factor conduction has become faster.
     clock.heat_limit = clock.heat_reference / clock.new_rate

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import point_function, shared
+from karamelo_py.compiler.compile import point_function
 from karamelo_py.compiler.fields import field, load_vector
 from karamelo_py.compiler.formula import BLOCK, ROWS, STACK, call_evaluate
 from karamelo_py.compiler.held import hold
@@ -114,7 +114,6 @@ class HeatedPoints(NamedTuple):
 # --- the loop ---------------------------------------------------------------------------------
 
 
-@shared
 def _turns(what, k, parts):
     """Return where the turns of thread `k` of so many begin and end, and the step between them."""
     if isinstance(what, (HookedNodes, WholeNodes)):
@@ -125,7 +124,6 @@ def _turns(what, k, parts):
     return k * size, what.ids.size, parts * size
 
 
-@shared
 def _bounds(what, turn, parts):
     """Return from where to before where members are chosen in a turn."""
     if isinstance(what, (HookedNodes, WholeNodes)):
@@ -180,7 +178,6 @@ def _act_on_parts(what, task, hooks, control, dt, h, share, k):
             totals.hand_over(own.totals, control.totals, row)
 
 
-@shared
 def _act_on_all(what, task, hooks, control, dt, h, share):
     """Do `task` with all members of a hook."""
     mode = hooks.mode
@@ -202,7 +199,6 @@ def _act_on_all(what, task, hooks, control, dt, h, share):
 # --- formulas and totals ----------------------------------------------------------------------
 
 
-@shared
 def directions(hooks):
     """Read their number: so that no loop over them is unrolled."""
     return hooks.x0.shape[1]
@@ -273,7 +269,6 @@ def publish_total(hooks, h, control):
 # --- nodes ------------------------------------------------------------------------------------
 
 
-@shared
 def _choose_nodes(what, hooks, h, row, end, member):
     """Choose up to a block of members in use, with mass; how many, and where to go on.
 
@@ -509,13 +504,11 @@ class _NoWhole(NamedTuple):
     whole: tuple
 
 
-@shared
 def without_whole(hooks):
     """Leave functions of whole points out: loops are not compiled anew for each of these."""
     return arrays.with_items_of(hooks, _NoWhole(()))
 
 
-@shared
 def node_hooks(stage, target, kin, grids, nodes, ranges, hooks, control, dt, kept):
     """Call the node functions of `stage` on the members that have mass.
 
@@ -601,7 +594,6 @@ def _add_work_hooks(hooks, s):
 # --- points -----------------------------------------------------------------------------------
 
 
-@shared
 def choose_points(what, hooks, h, p, end):
     """Choose up to a block of members; how many, where to go on. Note places before the step."""
     begin, ids, where = hooks.table[h].begin, what.ids, hooks.scratch
@@ -735,7 +727,6 @@ def _begin_or_end_totals(stage, hooks, control, begin):
                 publish_total(hooks, h, control)
 
 
-@shared
 def point_hooks(stage, blocks, hooks, control, dt):
     """Call the point functions of `stage` on the members in each of `blocks`; sum over them.
 
@@ -748,7 +739,6 @@ def point_hooks(stage, blocks, hooks, control, dt):
     _begin_or_end_totals(stage, hooks, control, False)
 
 
-@shared
 def whole_points(hooks, kin, points, laws, x, heat):
     """Give what each of the functions of whole points acts on."""
     return tuple(
@@ -760,7 +750,6 @@ def whole_points(hooks, kin, points, laws, x, heat):
     )
 
 
-@shared
 def _clear(kin, force, count):
     """Let points bear no force of fixes, until these say so anew."""
     if force is not None:
@@ -769,7 +758,6 @@ def _clear(kin, force, count):
                 force[c, p] = 0
 
 
-@shared
 def corners_that_move(s):
     """Count the corners that stand behind the position of a point, and move with it."""
     return placed(s.basis, s.kin) if s.frame.moves else 0

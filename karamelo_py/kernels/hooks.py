@@ -132,23 +132,16 @@ def written(tag, what, p, found):
     """Write the results of a function of whole points; return the numbers that it publishes."""
 
 
-def _mass(what, law, state, p):
-    return what.points.mass[p]
-
-
-def _velocity(what, law, state, p):
-    return load_vector(what.kin, what.points.v, p)
-
-
-def _position(what, law, state, p):
-    return load_vector(what.kin, what.x, p)
-
-
 def _volume(what, law, state, p):
     return what.points.mass[p] * specific_volume(law) * jacobian(law, what.kin, state)
 
 
-WORDS = {"mass": _mass, "velocity": _velocity, "position": _position, "volume": _volume}
+WORDS = {
+    "mass": lambda what, law, state, p: what.points.mass[p],
+    "velocity": lambda what, law, state, p: load_vector(what.kin, what.points.v, p),
+    "position": lambda what, law, state, p: load_vector(what.kin, what.x, p),
+    "volume": _volume,
+}
 
 
 def _node_mass(what, law, state, n):

@@ -14,7 +14,6 @@ import numpy as np
 from numba import config
 
 from karamelo_py.compiler.algebra import on_numbers
-from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.fields import load, rows_of_points, store
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import kernel
@@ -90,7 +89,6 @@ def nothing_seen(s: Setup, block: Block) -> tuple[Seen, Response]:
     return seen, Response(*rows, np.zeros(PARTS))
 
 
-@shared
 def points_of(count, k):
     """Find the first of `count` points in the k-th part of them."""
     groups = (count + GROUP - 1) // GROUP
@@ -136,7 +134,6 @@ def see(frame, kin, basis, grids, points, laws, now, seen, part):
                     seen.gradients[p, k, j] = pushed
 
 
-@shared
 def gradient_at(kin, seen, p, k):
     """Load the gradient of the k-th node of a point."""
     return gradient(kin, [seen.gradients[p, k, j] for j in range(len(kin.Gradient._fields))])
@@ -161,7 +158,6 @@ def strain(kin, seen, u, response, part):
     response.furthest[part] = most
 
 
-@shared
 def strained_point(kin, points, laws, response, p):
     """Law and state of a point before the step, H, and its reference volume."""
     law, state = state_at(kin, points, laws, p)
@@ -170,14 +166,12 @@ def strained_point(kin, points, laws, response, p):
     return law, state, H, mass * specific_volume(law)
 
 
-@shared
 def nominal_stress(law, kin, state, H, dt):
     """P by the places before the step, per reference volume."""
     after = advance(law, kin, state, large(H) if by_rates(law) else H, dt)
     return kirchhoff_stress(law, kin, after).nominal(I + H)
 
 
-@shared
 def stress_and_tangent(law, kin, state, H, dt):
     """P and dP/dH."""
     P = nominal_stress(law, kin, state, seeded(H), dt)
@@ -289,13 +283,11 @@ def add_forces(kin, seen, stress, f, part):
             f[a, i] = force
 
 
-@shared
 def along(kin, row):
     """Find the direction that a row of a tensor acts along: around an axis that is the radius."""
     return row if row < kin.dimension else 0
 
 
-@shared
 def by_gradient(kin, h, C):
     """df/dH (d t) of a node with gradient h, from dP/dH (t t)."""
     d, places = kin.dimension, kin.Tensor.places
@@ -310,7 +302,6 @@ def by_gradient(kin, h, C):
     )  # fmt: skip
 
 
-@shared
 def by_displacement(kin, D, g):
     """df/du (d d) by the displacement of a node with gradient g, from df/dH (d t) of another."""
     d, places = kin.dimension, kin.Tensor.places

@@ -21,7 +21,6 @@ import numpy as np
 from numba import config
 
 from karamelo_py.compiler.algebra import on_numbers
-from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.fields import load, rows_of_points, store
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import kernel
@@ -59,7 +58,6 @@ def nothing_averaged(kin: Any, block: Block) -> Averages:
     )
 
 
-@shared
 def cofactors(A):
     """J A^-T, the derivatives of J."""
     return det(A) * inv(A).transposed()
@@ -78,7 +76,6 @@ def grow(kin, points, laws, response, averages, part):
         store(averages.cofactors, p, volume * cofactors(A))
 
 
-@shared
 def averaged_stress(law, kin, state, H, ratio, dt):
     """P and q per reference volume, after the increment H and a ratio of volumes."""
     A = I + H
@@ -146,9 +143,6 @@ def bring_mean(kin, response, averages, part):
             response.stress[c, p] += scale * value_of(x)
             for b, slope in enumerate(slopes_of(x, t)):
                 averages.tangent[c * t + b, p] += scale * slope
-
-
-# --- at the nodes -----------------------------------------------------------------------------
 
 
 @by_threads

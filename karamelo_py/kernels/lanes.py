@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import implements, index, shared
+from karamelo_py.compiler.compile import implements, index
 from karamelo_py.compiler.fingerprint import classes_in
 from karamelo_py.compiler.lanes import EightLanes, group, lanes_for, spread
 from karamelo_py.kernels.arrays import Index, Number, Tag
@@ -36,7 +36,6 @@ def _lanes_with(parts, laws, mass):
     return lambda parts, laws, mass: made()
 
 
-@shared
 def points_from(lanes: Tag, q: int, end: int) -> Index:
     """Return the point `q`, or the points in lanes from there on, before `end`."""
     if isinstance(lanes, OneByOne):
@@ -44,7 +43,6 @@ def points_from(lanes: Tag, q: int, end: int) -> Index:
     return group(lanes, q, min(lanes.width, end - q))
 
 
-@shared
 def one_loop_each(lanes: Tag, visit: Any) -> bool:
     """Choose three loops over a stretch of points: gather, update, scatter; else one for all.
 
@@ -57,7 +55,6 @@ def one_loop_each(lanes: Tag, visit: Any) -> bool:
     return not isinstance(lanes, OneByOne) and any(strains) and all(strains)
 
 
-@shared
 def lanes_of_update(lanes: Tag, visit: Any) -> Tag:
     """Choose the lanes of the particle update: in stretches of doubles twice those of the gather.
 
@@ -67,7 +64,6 @@ def lanes_of_update(lanes: Tag, visit: Any) -> Tag:
     return EightLanes() if one_loop_each(lanes, visit) else lanes
 
 
-@shared
 def zero_of(lanes: Tag, like: Number) -> Number:
     """Return 0 as a number of a visit: of the type of `like`, or of lanes of it."""
     return like - like if isinstance(lanes, OneByOne) else spread(lanes, like - like)

@@ -21,7 +21,7 @@ move (not with splines), and that usl strains by dv, which may only cost.
 """
 
 from karamelo_py.compiler import fields
-from karamelo_py.compiler.compile import accumulate, real, shared, where
+from karamelo_py.compiler.compile import accumulate, real, where
 from karamelo_py.kernels.arrays import of_change, vector_at
 from karamelo_py.kernels.visit import law_and_state, nodes_of, straining_node
 from karamelo_py.points import laws, transfers
@@ -46,14 +46,12 @@ class FrictionalHeat(fields.StepField):
     """Heat of friction at a node, per mass: of contact between solids and of walls."""
 
 
-@shared
 def warm_node(rubbed, n, heat):
     """Add `heat` per mass to a node, where the array is there for it."""
     if rubbed is not None:
         rubbed[n, 0] += heat
 
 
-@shared
 def warm_by_friction(rubbed, w, stencil, p, like):
     """Point `p` takes the heat of friction at its nodes by its weights: none is lost."""
     if rubbed is not None:
@@ -68,21 +66,18 @@ def warm_by_friction(rubbed, w, stencil, p, like):
         fields.store(w.points.state, p, laws.with_temperature(law, w.kin, state, T))
 
 
-@shared
 def energy_of(mass, momentum):
     """|momentum|^2 / (2 mass); 0 without mass."""
     least = real(1e-36, mass)
     return where(mass > least, 0.5 * momentum.squared() / max(mass, least), mass - mass)
 
 
-@shared
 def bring_energy(lost, i, mass, momentum):
     """Give node `i` the energy of what a point gives it, where the array `lost` is there for it."""
     if lost is not None:
         accumulate(lost, i, 0, (energy_of(mass, momentum),))
 
 
-@shared
 def warm(w, stencil, p, v):
     """Give point `p` as heat what it has lost on the way to the nodes and back.
 
@@ -100,7 +95,6 @@ def warm(w, stencil, p, v):
         _heat(w, p, reflected[0, p])
 
 
-@shared
 def in_company(w, stencil, p, moment):
     """Return the part of `moment` that point `p` of a gas keeps: none where it is alone.
 
@@ -117,7 +111,6 @@ def in_company(w, stencil, p, moment):
     return max(min(kept, one), mass - mass) * moment
 
 
-@shared
 def _own_share(lost, w, stencil, mass):
     """The share of a point of this mass in what its nodes have, by its weights."""
     share = mass - mass
@@ -126,7 +119,6 @@ def _own_share(lost, w, stencil, mass):
     return share
 
 
-@shared
 def _heat(w, p, gone):
     """Give point `p` the energy per mass that is gone."""
     law, state = law_and_state(w, p)
@@ -135,7 +127,6 @@ def _heat(w, p, gone):
     )
 
 
-@shared
 def reflect(reflected, w, stencil, p, term, k):
     """Take `term`, the k-th of XPIC's series at point `p`, from what is not in the series yet.
 
@@ -155,7 +146,6 @@ def reflect(reflected, w, stencil, p, term, k):
         fields.store(reflected, p, (gone, *rest))
 
 
-@shared
 def gathered_term(w, stencil, term):
     """The present term of XPIC's series at a point."""
     for i, weight, _ in nodes_of(w, stencil):
@@ -163,7 +153,6 @@ def gathered_term(w, stencil, term):
     return term
 
 
-@shared
 def _spread(w, stencil, term):
     """sum_i N_i |w_i - term|^2 of the present term w of XPIC's series."""
     spread = term[0] - term[0]
@@ -172,20 +161,17 @@ def _spread(w, stencil, term):
     return spread
 
 
-@shared
 def term_at(w, i, like):
     """The present term of XPIC's series at a node."""
     return vector_at(w.kin, fields.field(w.nodes.fields, Series), i, 0, like)
 
 
-@shared
 def _before(w, i, like):
     """The velocity of a node before the update."""
     v = vector_at(w.kin, w.nodes.update, i, 0, like)
     return v - vector_at(w.kin, w.nodes.update, i, of_change(w.kin), like)
 
 
-@shared
 def _moment_before(w, stencil, v, moment):
     """Gather the moment of the velocity that the nodes had before the update."""
     nodes = [straining_node(w, stencil, k) for k in range(support(w.basis, w.kin))]
@@ -197,7 +183,6 @@ def _moment_before(w, stencil, v, moment):
     return moment
 
 
-@shared
 def _gone(lost, w, stencil, v, moment):
     """Kinetic energy per mass that a point has lost at the nodes and on the way back."""
     gone = v[0] - v[0]

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import point_function, real, round_off, shared
+from karamelo_py.compiler.compile import point_function, real, round_off
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.tuples import clear_first
 from karamelo_py.kernels import arrays
@@ -89,7 +89,6 @@ def at_node(task: Tag, kin: Tag, nodes: Nodes, n: Index, dt: Number) -> None:
     """Do `task` at node `n`. Nodes without mass stay at rest."""
 
 
-@shared
 def per_mass(nodes: Nodes, n: Index, like: Number) -> Number:
     """One over the mass of a node, 0 where it has none."""
     mass = nodes.sums[n, arrays.MASS]
@@ -141,7 +140,6 @@ def _at_node_sums_to_velocity(task, kin, nodes, n, dt):
         nodes.velocity[n, k] = nodes.sums[n, arrays.of_momentum(kin) + k] * factor
 
 
-@shared
 def unlimited(seen, n, mass, light):
     """The share of its change of velocity that a node shows: all where it is not light."""
     if seen is None:

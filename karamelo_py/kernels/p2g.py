@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from math import nan
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import accumulate, index, of_present, point_function, real, shared
+from karamelo_py.compiler.compile import accumulate, index, of_present, point_function, real
 from karamelo_py.compiler.fields import (
     Field,
     StepField,
@@ -176,18 +176,15 @@ def scattered(quantity: Tag, w: Work, stencil: tuple, k: int, load: tuple) -> No
     """Give the k-th node of the stencil its part."""
 
 
-@shared
 def _moment(w, p, like):
     return load(field(w.points.fields, Moment), p, zero_moment(w.transfer, w.kin, like))
 
 
-@shared
 def _is_apart(w):
     """Return True for rigid points whose nodes have sums of their own for them."""
     return laws.moves_as_told(w.laws) and field(w.nodes.fields, RigidSums) is not None
 
 
-@shared
 def _mass(w, p):
     """The mass that a point gives to the sums of all solids."""
     mass = of_present(p, w.points.mass[p])
@@ -218,7 +215,6 @@ def _scattered_mass_momentum(quantity, w, stencil, k, load):
     accumulate_optional(field(w.nodes.fields, SquaredMass), i, (N * mass * mass,))
 
 
-@shared
 def _mean_stress(kin, law, state, volume):
     """Volume times mean stress, and volume, of a point of reference `volume`."""
     tau = laws.kirchhoff_stress(law, kin, state).mean_of_stretching()
@@ -307,7 +303,6 @@ def _scattered_series_back(quantity, w, stencil, k, load):
     accumulate(field(w.nodes.fields, Series), i, len(u), (*(weight * mass * u),))
 
 
-@shared
 def accumulate_optional(array, i, values):
     """Add to a node, where there is an array for it."""
     if array is not None:
@@ -332,7 +327,6 @@ def columns_of(quantities: tuple, kin: NamedTuple) -> list[tuple[Any, int, int]]
     return [(array, first, end) for (array, end), first in found.items()]
 
 
-@shared
 def given(quantities: tuple, kin: Tag) -> int:
     """Add up the kinds of arrays that take the quantities: 1 the sums, 2 velocities, 4 fields."""
     names = {name for name, _, _ in columns_of(quantities, kin)}
@@ -350,7 +344,6 @@ def _columns(quantities: tuple, kin: NamedTuple) -> Iterator[tuple]:
         yield from ((*columns, kind) for columns in columns_of(chosen, kin))
 
 
-@shared
 def _take_record(quantities, kin, nodes, n, buffers, m, keep):
     """Add what record `m` of the buffers has to node `n`, or put it there; it is zero then."""
     for name, first, end, add in _columns(quantities, kin):
@@ -360,7 +353,6 @@ def _take_record(quantities, kin, nodes, n, buffers, m, keep):
             move_record(array, n, _array(buffers, name), m, first, like, add or keep)
 
 
-@shared
 def _clear_record(quantities, kin, nodes, n):
     """Clear the columns of node `n` that take the quantities, but those that they add to."""
     for name, first, end, add in _columns(quantities, kin):

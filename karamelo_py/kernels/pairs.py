@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import kernel, noinline
@@ -59,7 +58,6 @@ def _body(id, begin1, end1, begin2, end2):
     return 1 if begin2 <= id < end2 else -1
 
 
-@shared
 def _radius(kin, x, points, laws, p):
     law, state = state_at(kin, points, laws, p)
     volume = points.mass[p] * specific_volume(law) * jacobian(law, kin, state)

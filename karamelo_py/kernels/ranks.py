@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.loops import caller_of, kernel
 from karamelo_py.kernels import totals
 from karamelo_py.kernels.p2g import given
@@ -93,7 +92,6 @@ def _take_over_linked(ranks, due):
     _ask_if(due, ranks.address, TAKE, 0, 0)
 
 
-@shared
 def _sweep_tiles(address, s, mode, visit, context, of_border):
     """Sweep over the tiles that other processes wait for, or over the others."""
     for block in s.blocks:

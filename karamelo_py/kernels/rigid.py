@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.loops import kernel, noinline
 from karamelo_py.compiler.tuples import record
@@ -62,7 +61,6 @@ def _impose(kin, nodes, rigid, dt, kept, control, n):
             add_to(control.totals, WORK, float(mass * impulse * velocity))
 
 
-@shared
 def _impose_on_strain(kin, nodes, rigid, n):
     """The same of the velocity that deforms the points."""
     if rigid[n, MASS] > 0:
@@ -70,7 +68,6 @@ def _impose_on_strain(kin, nodes, rigid, n):
             nodes.velocity[n, k] = rigid[n, of_momentum(kin) + k] / rigid[n, MASS]
 
 
-@shared
 def _add_forces(s, block, p):
     """Add the force on a rigid point, and its torque about the origin, to those of its solid."""
     basis, kin, points, totals, d = s.basis, s.kin, block.points, s.control.totals, s.kin.dimension

@@ -4,7 +4,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.fields import pick_items, put_items
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import kernel, noinline
@@ -48,7 +47,6 @@ class SortedOrder(NamedTuple):
     room: np.ndarray  # (2, n) scratch
 
 
-@shared
 def cell_of(grid: Grid, direction: int, at: Number) -> int:
     """The cell of a point that lies so many cells from the corner of the grid.
 
@@ -57,7 +55,6 @@ def cell_of(grid: Grid, direction: int, at: Number) -> int:
     return min(max(int(at), 0), cells_along(grid, direction) - 1)
 
 
-@shared
 def _seen(grid, around, g, direction, at):
     """The first and last nodes of grid `g` that a point at `at` cells may see along a direction."""
     first = cell_of(grid, direction, at - around.reach)

@@ -3,7 +3,7 @@
 All at once go sums along the arms of a stencil, what is affine, and the corners of domains.
 """
 
-from karamelo_py.compiler.compile import all_lanes, point_function, prefetch_records, real, shared
+from karamelo_py.compiler.compile import all_lanes, point_function, prefetch_records, real
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.lanes.records import accumulate_affine
 from karamelo_py.kernels import g2p, p2g
@@ -35,7 +35,6 @@ def affine_part(quantity, w, stencil, load):
     return ()
 
 
-@shared
 def _affine(w, stencil, value, growths):
     """Value at the first node, and growth a node, of `value` at the point and growths a length."""
     arm = reach(w.basis, w.kin, w.grid, stencil, 0)
@@ -45,7 +44,6 @@ def _affine(w, stencil, value, growths):
     return value, tuple([step * growth for growth in growths])
 
 
-@shared
 def _momentum(w, stencil, mass, v, moment):
     """The momentum at the first node, and its growth; () where nobody knows."""
     momentum = mass * v
@@ -87,13 +85,11 @@ def _affine_part_internal_force(quantity, w, stencil, load):
     return w.nodes.sums, of_force(w.kin), *_affine(w, stencil, own, tuple(growths))
 
 
-@shared
 def _beside(a, b):
     """`b` behind `a` and zeros, from the fifth component on."""
     return (*a, *((a[0] - a[0],) * (4 - len(a))), *b)
 
 
-@shared
 def joined(lanes, kin, parts):
     """Momentum and force as one part, where both grow and a register takes both."""
     if isinstance(lanes, OneByOne) or len(parts) != 2 or of_force(kin) != 4:
@@ -107,7 +103,6 @@ def joined(lanes, kin, parts):
     return ((array, first, _beside(a, b), tuple(growths)),)
 
 
-@shared
 def give_affine(lanes, w, stencil, parts):
     """Give the nodes of a stencil what is affine."""
     nodes, weights, _ = zip(*nodes_of(w, stencil), strict=True)
@@ -116,7 +111,6 @@ def give_affine(lanes, w, stencil, parts):
         accumulate_affine(array, nodes, first, weights, value, growths)
 
 
-@shared
 def gathered_by_arms(w):
     """(a,), where what a point keeps is a sum_I N_I v*_I (X_I - x)^T away from walls; else ()."""
     return transfers.by_arms(w.transfer, inverse_spread(w.basis, w.grid))
@@ -150,7 +144,6 @@ def _gathered_at_once_move(task, w, stencil, total):
     return v, total[1] + changes[0], real(factor[0], step) * moment
 
 
-@shared
 def _tails(weights, vectors):
     """Sums of weights times vectors: of the last one, of the last two, ... of all."""
     last = len(weights) - 1
@@ -160,7 +153,6 @@ def _tails(weights, vectors):
     return sums
 
 
-@shared
 def _with_moment(weights, row):
     """Of the sums of the nodes of a row: the sum of the first, and k times that; all the others."""
     first, *others = zip(*row[: len(weights)], strict=True)
@@ -179,7 +171,6 @@ affine_parts = for_tags(affine_part, "w, stencil, loads", each="loads")
 # shows what the nodes around it have, and shares out among them what it is given.
 
 
-@shared
 def all_by_corners(parts, w):
     """Tell whether all tasks or quantities take the weight or gradient of a node as a factor.
 
@@ -196,26 +187,22 @@ def all_by_corners(parts, w):
     return not any(there[name] for names in unless for name in names)
 
 
-@shared
 def _seeing(basis, w):
     """The work with something in the place of the basis."""
     items = zip(w._fields, w, strict=True)
     return type(w)(*[basis if name == "basis" else item for name, item in items])
 
 
-@shared
 def in_block(w):
     """The work of points that see blocks of nodes."""
     return _seeing(InBlock(w.basis), w)
 
 
-@shared
 def shows_corners(tasks, w):
     """Return True if the visit needs the velocities of the corners themselves."""
     return carried(w.basis, w.kin) > 0 and any(isinstance(task, g2p.Move) for task in tasks)
 
 
-@shared
 def gather_corners(tasks, w, stencil, totals):
     """The totals of the tasks over all corners."""
     at = _seeing(AtCorners(w.basis), w)
@@ -224,7 +211,6 @@ def gather_corners(tasks, w, stencil, totals):
     return totals
 
 
-@shared
 def scatter_corners(quantities, w, stencil, loads):
     """Give all corners their parts."""
     at = _seeing(AtCorners(w.basis), w)
@@ -232,23 +218,17 @@ def scatter_corners(quantities, w, stencil, loads):
         p2g.scattered_all(quantities, at, stencil, c, loads)
 
 
-# --- all nodes --------------------------------------------------------------------------------
-
-
-@shared
 def _gather(tasks, w, stencil, totals):
     for k in range(support(w.basis, w.kin)):
         totals = gathered_all(tasks, w, stencil, k, totals)
     return totals
 
 
-@shared
 def _scatter(quantities, w, stencil, loads):
     for k in range(support(w.basis, w.kin)):
         scattered_all(quantities, w, stencil, k, loads)
 
 
-@shared
 def _even(w, stencil, asked):
     """Return True if D^-1 is the same for all points in lanes, or nothing depends on it."""
     return all_lanes(product.evenly(w.basis, w.grid, stencil)) if asked else True
@@ -287,7 +267,6 @@ def _gather_nodes_corner_stencil(stencil, lanes, tasks, w, totals):
     return _gather(tasks, w, stencil, totals)
 
 
-@shared
 def _ask_ahead(tags, w, stencil):
     """Ask the memory for records of nodes behind the last of a stencil: the others were seen."""
     last = entry(w.basis, w.kin, w.grid, stencil, support(w.basis, w.kin) - 1)[0]
@@ -296,7 +275,6 @@ def _ask_ahead(tags, w, stencil):
             prefetch_records(array, last)
 
 
-@shared
 def _gather_parts(tasks, w, stencil, totals):
     """Gather affine parts from all nodes at once, the rest node by node."""
     found = gathered_at_once_all(tasks, w, stencil, totals)
@@ -342,13 +320,11 @@ def _scatter_nodes_corner_stencil(stencil, lanes, quantities, w, loads):
         _scatter(quantities, w, stencil, loads)
 
 
-@shared
 def _scatter_block(lanes, quantities, w, block, loads):
     at = in_block(w)
     _scatter_parts(lanes, quantities, at, block, loads, affine_parts(quantities, at, block, loads))
 
 
-@shared
 def _scatter_parts(lanes, quantities, w, stencil, loads, parts):
     """Scatter affine parts to all nodes at once, the rest node by node."""
     known = tuple([part for part in parts if len(part)])
@@ -359,7 +335,6 @@ def _scatter_parts(lanes, quantities, w, stencil, loads, parts):
         _scatter(tuple([quantities[k] for k in rest]), w, stencil, tuple([loads[k] for k in rest]))
 
 
-@shared
 def gathered_by(lanes: Tag, tasks: tuple, w: Work, stencil: tuple, x: tuple) -> tuple:
     """Gather the totals of the tasks over the nodes of a stencil."""
     return gather_nodes(stencil, lanes, tasks, w, empty_all(tasks, w, x))

@@ -8,7 +8,7 @@ import functools
 from math import sqrt
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import implements, real, shared
+from karamelo_py.compiler.compile import implements, real
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import kernel
@@ -136,8 +136,6 @@ def take_rows(rows: tuple, s: Setup, mode: Tag, hooks: Tag) -> bool:
 _alone: Any = functools.cache(table.one_by_one)
 
 
-# --- loop -------------------------------------------------------------------------------------
-
 DONE, STOPPED, ABOVE_LIMIT, SORT, SHRUNK, GAINED, HEATED = range(7)
 PATIENCE = 50  # steps above the stable limit before a run is stopped
 SMALLEST = 1e-6  # share of the first stable step at which a run is stopped: it would never end
@@ -181,7 +179,6 @@ def _led(mode, scheme, visits, s, hooks, count):
     return run_steps(scheme, visits, mode, s, hooks, count)
 
 
-shared(run_steps)
 _by_team = by_team(_led)
 
 
@@ -207,7 +204,6 @@ def _fastest(frame, kin, points, laws, control):
     clock.rate = max(clock.rate, rate)
 
 
-@shared
 def measure(s: Setup) -> None:
     """The rate of the present state, for the first dt."""
     s.control.clock[0].rate = 0.0

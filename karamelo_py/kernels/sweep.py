@@ -25,7 +25,6 @@ from karamelo_py.compiler.compile import (
     largest,
     point_function,
     real,
-    shared,
     where,
 )
 from karamelo_py.compiler.fields import load, load_vector, store
@@ -97,7 +96,6 @@ class PresentWeights(NamedTuple):
     """The weights of the place after the move."""
 
 
-@shared
 def work_of(s: Context, grid: Grid, nodes: Nodes, block: Block, places: Places) -> Work:
     """Return the arrays and tags of a visit to points of a block; `nodes` are those of `grid`."""
     return Work(
@@ -106,7 +104,6 @@ def work_of(s: Context, grid: Grid, nodes: Nodes, block: Block, places: Places) 
     )  # fmt: skip
 
 
-@shared
 def recompute_stencil(weights: Tag, w: Work, stencil: tuple, p: Index) -> tuple:
     """Return the stencil of the scatter from that of the gather; of reference places it stays."""
     if isinstance(weights, OldWeights) or not w.frame.moves:
@@ -114,7 +111,6 @@ def recompute_stencil(weights: Tag, w: Work, stencil: tuple, p: Index) -> tuple:
     return locate(w.basis, w.kin, w.grid, place_at(w.basis, w.kin, w.places.y, p))
 
 
-@shared
 def stays_in_box(weights: Tag, room: Number, moved: Number) -> bool:
     """Return True while points give to nodes of their tile's box.
 
@@ -123,7 +119,6 @@ def stays_in_box(weights: Tag, room: Number, moved: Number) -> bool:
     return isinstance(weights, OldWeights) or all_lanes(moved <= room)
 
 
-@shared
 def places_of(frame: Tag, points: Points, now: int, then: int) -> Places:
     """Return the places of the weights of a sweep, and of the points before and after it.
 
@@ -133,22 +128,16 @@ def places_of(frame: Tag, points: Points, now: int, then: int) -> Places:
     return Places(weighed, points.x[now], points.x[then])
 
 
-# --- tiles of points ---------------------------------------------------------------------------
-
-
-@shared
 def position_of(w: Work, p: Index) -> tuple:
     """Return the position (d,) of a point, or of points in lanes, before the move."""
     return load_vector(w.kin, w.places.x, p)
 
 
-@shared
 def stencil_of(w: Work, p: Index) -> tuple:
     """Return the stencil of a point, or of points in lanes, before the move."""
     return locate(w.basis, w.kin, w.grid, place_at(w.basis, w.kin, w.places.where, p))
 
 
-@shared
 def scatter_point(
     visit: Visit, lanes: Tag, w: Work, out: Work, stencil: tuple, p: Index, dt: Number
 ) -> None:
@@ -250,7 +239,6 @@ def _visit_nodes(task: Tag, kin: Tag, nodes: Nodes, ranges: np.ndarray, dt: Numb
 # --- threads ----------------------------------------------------------------------------------
 
 
-@shared
 def context_of(s: Setup, dt: Number, gathers: bool, scatters: bool, moves: bool) -> Context:
     """Return the context of a sweep that begins now."""
     clock = s.control.clock[0]
@@ -299,7 +287,6 @@ def sweep_blocks(ranks: Tag, s: Setup, mode: Tag, visit: Visit, context: Context
         sweep_points(mode, visit, context, block)
 
 
-@shared
 def sweep(
     s: Setup, mode: Tag, visit: Visit, dt: Number, gathers: bool, scatters: bool, moves: bool
 ) -> None:
@@ -317,7 +304,6 @@ def sweep(
     sum_given(mode, visit.quantities, s, scatters & (direct == 0))
 
 
-@shared
 def sum_given(mode: Tag, quantities: tuple, s: Setup, due: bool) -> None:
     """Sum at the nodes what the points gave, here and in other processes, if that is due."""
     if len(quantities):

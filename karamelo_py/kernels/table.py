@@ -13,7 +13,7 @@ Averaged volumes, XPIC, heat and contact are rows that a scene adds (`plain`).
 from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import real, shared
+from karamelo_py.compiler.compile import real
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.tuples import clear_first
@@ -255,7 +255,6 @@ class Insulated(NamedTuple):
     rows = ()
 
 
-@shared
 def _clear_radial(s, n):
     nodes, kin = s.nodes, s.kin
     if nodes.sums[n, arrays.MASS] > 0:
@@ -267,7 +266,6 @@ def _clear_radial(s, n):
         clear_first(field(nodes.fields, p2g.Normal), n)
 
 
-@shared
 def _axis_of(grids, g):
     """The range of the nodes on the axis of a grid."""
     first = grids.first[g]
@@ -335,7 +333,6 @@ def at_nodes_with(kind: type, task: Tag) -> Any:
     return lambda s: (NodeTask(task),) if field(s.nodes.fields, kind) is not None else ()
 
 
-@shared
 def light_node(s):
     """Nodal mass below which USL limits the gradient: d (c dt / h)^2 of a point that the node sees.
 

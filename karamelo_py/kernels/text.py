@@ -18,7 +18,7 @@ from llvmlite import ir
 from numba import config, types
 
 from karamelo_py.compiler import code
-from karamelo_py.compiler.compile import fma, index, shared
+from karamelo_py.compiler.compile import fma, index
 from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.values import intrinsic
 
@@ -113,7 +113,6 @@ def write_rows(numbers, integers, is_integer, start, text, at):
     return rows * columns, at
 
 
-@shared
 def _put_integer(text, at, n):
     """Write an integer; return where it ends, or `at` if it is too large."""
     if not -LARGEST_INTEGER < n < LARGEST_INTEGER:
@@ -130,7 +129,6 @@ def _put_integer(text, at, n):
     return at + length
 
 
-@shared
 def _put_number(text, at, x, bits):
     """Write a number with nine significant digits; return where it ends, or `at` if in doubt."""
     begin = at
@@ -175,7 +173,6 @@ def _put_number(text, at, x, bits):
     return at + 4
 
 
-@shared
 def _decimal(x, binary):
     """The nine digits of x > 0 as an integer, 0 if in doubt, and the power of ten of the first.
 
@@ -196,7 +193,6 @@ def _decimal(x, binary):
     return digits, exponent
 
 
-@shared
 def _eight(n):
     """The eight digits of n < 10^8 as the bytes of their text: halves, quarters, eighths."""
     four = n * 109951163 >> 40  # n // 10^4
@@ -207,7 +203,6 @@ def _eight(n):
     return (one | (word - 10 * one) << 8) + ZEROS
 
 
-@shared
 def _without_zeros(word):
     """Count eight digits without the zeros at their end."""
     kept = 8

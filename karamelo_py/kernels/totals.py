@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import point_function, shared
+from karamelo_py.compiler.compile import point_function
 from karamelo_py.compiler.loops import kernel, many_threads, noinline
 from karamelo_py.compiler.threads import add_among
 
@@ -33,7 +33,6 @@ class Alone(NamedTuple):
     """One process has the whole scene."""
 
 
-@shared
 def _grow(totals, row, limb, number):
     """Add to a limb."""
     if many_threads():
@@ -204,7 +203,6 @@ def take_over(ranks, due):
     """Wait for what the tiles of other processes give to nodes in use here."""
 
 
-@shared
 def publish(control, slot, count):
     """The published values from `slot` on become those of their totals."""
     collect(control.ranks, control, slot, count)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import fma, index, point_function, prefetch, real, shared
+from karamelo_py.compiler.compile import fma, index, point_function, prefetch, real
 from karamelo_py.compiler.fields import StepField, SummedField, field, load, load_vector, pair
 from karamelo_py.compiler.tuples import count_in, record, row
 from karamelo_py.kernels.arrays import Index, Nodes, Number, Places, Points, Tag
@@ -40,58 +40,49 @@ class Work(NamedTuple):
     kick: Number  # how long forces act in the step
 
 
-@shared
 def place_at(basis: Tag, kin: Tag, array: np.ndarray, p: Index) -> tuple:
     """Load the place (w,) of point `p`: its position and the shape of its domain."""
     return load(array, p, blank(basis, kin, load_vector(kin, array, p)))
 
 
-@shared
 def node_of(w: Work, stencil: tuple, k: int) -> tuple:
     """Return number i, weight N and gradient of N of the k-th node of a stencil."""
     return entry(w.basis, w.kin, w.grid, stencil, k)
 
 
-@shared
 def straining_node(w: Work, stencil: tuple, k: int) -> tuple:
     """Return the same, with its weight in strains and forces in the place of the gradient."""
     i, N, grad_N = node_of(w, stencil, k)
     return i, N, gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, grad_N)
 
 
-@shared
 def nodes_of(w: Work, stencil: tuple) -> tuple:
     """Return what `node_of` says of all nodes that a point sees."""
     return tuple([node_of(w, stencil, k) for k in range(support(w.basis, w.kin))])
 
 
-@shared
 def law_at(points: Points, laws: NamedTuple, p: Index) -> Tag:
     """Load the law of point `p`, with the parameters of its material."""
     return record(laws, index(points.material[p]))  # type: ignore[arg-type]
 
 
-@shared
 def state_at(kin: Tag, points: Points, laws: NamedTuple, p: Index) -> tuple:
     """Load the law of point `p` and its state."""
     law = law_at(points, laws, p)
     return law, load(points.state, p, initial_state(law, kin, points.mass[p]))
 
 
-@shared
 def law_and_state(w: Work, p: Index) -> tuple:
     """Load the law of point `p` and its state."""
     return state_at(w.kin, w.points, w.laws, p)
 
 
-@shared
 def deformed_state(w: Work, p: Index) -> tuple:
     """Load the law of point `p`, its state, and F as `deformation_of`."""
     law, state = law_and_state(w, p)
     return law, state, deformation_of(w.frame, w.kin, law, state, w.points, p)
 
 
-@shared
 def ask_ahead(w: Work, p: Index, like: Number, apart: bool) -> None:
     """Ask the memory for the data of the next points, in space.
 
@@ -121,16 +112,12 @@ def records_of(tag: Tag, nodes: Nodes) -> np.ndarray | None:
     return None
 
 
-@shared
 def deformation_of(frame: Tag, kin: Tag, law: Tag, state: tuple, points: Points, p: Index) -> tuple:
     """Return the deformation gradient F of a point where the frame needs it, else ()."""
     if frame.moves:
         return ()
     f = load(field(points.fields, DeformationGradient), p, zero(kin, points.mass[p]))
     return f if len(f) else deformation(law, kin, state)
-
-
-# --- loops over tags, written out -------------------------------------------------------------
 
 
 def for_tags(function: Callable, names: str, each: str | None = None) -> Callable:
@@ -141,7 +128,6 @@ def for_tags(function: Callable, names: str, each: str | None = None) -> Callabl
 
     own = names.split(", ").index(each) if each else None
 
-    @shared
     def loop(tags, *arguments):
         if own is None:
             return tuple([function(tag, *arguments) for tag in tags])
@@ -201,13 +187,11 @@ class FBar(NamedTuple):
     node_fields = (NodalMean, NodalStress)
 
 
-@shared
 def no_ratio(w, like):
     """Return the start of the gather of the averaged volume ratio; () where none is averaged."""
     return (real(0, like),) if isinstance(w.averaging, FBar) else ()
 
 
-@shared
 def gathered_ratio(w, stencil, k, total):
     """`total` with the ratio of volumes at the k-th node, where it is averaged."""
     if not len(total):
@@ -217,7 +201,6 @@ def gathered_ratio(w, stencil, k, total):
     return (fma(weight, mean, total[0]),)
 
 
-@shared
 def averaged(w, p, dl, ratio):
     """`dl` with the change of volume that the surroundings have on average, where there is one."""
     if not len(ratio):

@@ -12,7 +12,7 @@ cannot hide what vibrates.
 
 from math import inf
 
-from karamelo_py.compiler.compile import added, all_lanes, of_present, real, shared
+from karamelo_py.compiler.compile import added, all_lanes, of_present, real
 from karamelo_py.compiler.fields import field, load_vector
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import kernel, noinline
@@ -50,13 +50,11 @@ OVERSHOOT = 0.1  # of the range of temperatures that sources allow: more stops t
 BORNE = 4.0
 
 
-@shared
 def solid_of(firsts, number):
     """The solid that a point of this id belongs to."""
     return first_from(firsts, 0, firsts.size, number + 1) - 1
 
 
-@shared
 def energies_of(kin, points, laws, p):
     """Mass and velocity of a point; its energies, kinetic, and stored plus dissipated."""
     law, state = state_at(kin, points, laws, p)
@@ -108,7 +106,6 @@ def _take_work(work, control):
     totals.carry(control.totals[totals.WORK])
 
 
-@shared
 def sum_energies(s, mode):
     """Energies of points, kinetic and stored plus dissipated, and the work into the clock.
 
@@ -125,7 +122,6 @@ def sum_energies(s, mode):
     take_energies(s)
 
 
-@shared
 def take_energies(s):
     """Take over the totals of energies and work into the clock."""
     totals.collect(s.control.ranks, s.control, totals.KINETIC, 3)
@@ -166,7 +162,6 @@ def _add_momentum(control, solid, d):
         control.answer[k] = 0
 
 
-@shared
 def _sum_drift(s):
     """Kinetic energy of the centres of mass of the solids, into the clock; after `sum_energies`."""
     control, d = s.control, s.kin.dimension
@@ -179,7 +174,6 @@ def _sum_drift(s):
     take_drift(s)
 
 
-@shared
 def take_drift(s):
     """Take over the totals of mass and momentum of the solids."""
     control, d = s.control, s.kin.dimension
@@ -194,14 +188,12 @@ def take_drift(s):
     control.clock[0].of_drift = energy
 
 
-@shared
 def _sum_before(s, mode, step):
     """The energies of a step whose next is looked at."""
     sum_energies(s, mode)
     note_before(s.control.clock[0], step)
 
 
-@shared
 def note_before(clock, step):
     """Keep the present energies for the look at the next step."""
     clock.stored_before = clock.stored
@@ -219,7 +211,6 @@ def keeps(first, later, unit, within=WITHIN):
     return later - first <= within * unit
 
 
-@shared
 def unit_of(clock):
     """Unit of the growth of energy: the most that there was, of a drift no more than so."""
     return max(clock.largest_own, DRIFTING * clock.largest_energy, clock.energy_floor)
@@ -288,7 +279,6 @@ def _range_of_heat(kin, points, laws, control):
             clock.own_heat = max(clock.own_heat, float(work) / float(capacity))
 
 
-@shared
 def measure_heat(s):
     """Lowest and highest temperature of all points, into the clock."""
     clock = s.control.clock[0]
@@ -297,7 +287,6 @@ def measure_heat(s):
         _range_of_heat(s.kin, known_to_laws(block.points), block.laws, s.control)
 
 
-@shared
 def look_at_heat(s):
     """Compare all temperatures with what fixes, sources and the initial state allow."""
     clock = s.control.clock[0]
@@ -311,7 +300,6 @@ def look_at_heat(s):
     return clock.T_low >= clock.coldest - room and clock.T_high <= above
 
 
-@shared
 def begin_to_look(s, mode, level, anew):
     """Before a run: the stored energy of the present state, where a look is due after a step.
 
@@ -330,7 +318,6 @@ def begin_to_look(s, mode, level, anew):
         _sum_before(s, mode, step)
 
 
-@shared
 def look(s, mode):
     """Look at the energy where it is due; whether it keeps within its bound."""
     clock = s.control.clock[0]
@@ -346,7 +333,6 @@ def look(s, mode):
     return True
 
 
-@shared
 def look_at_end(s, mode):
     """Look at the energy of the end of an implicit step; whether it keeps within its bound.
 

@@ -3,7 +3,7 @@
 from math import pi, sqrt
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import point_function, shared
+from karamelo_py.compiler.compile import point_function
 from karamelo_py.compiler.powers import power
 from karamelo_py.points.kinematics import Axisymmetric, dot
 
@@ -20,7 +20,6 @@ class MinimizePenetration(NamedTuple):
     friction: float  # coefficient of Coulomb friction
 
 
-@shared
 def face(kin, volume, x):
     """Area that a point of this volume shows to what is around it: the side of a cube.
 
@@ -33,7 +32,6 @@ def face(kin, volume, x):
     return power(volume, 2 / 3) if kin.dimension == 3 else 1
 
 
-@shared
 def radius(kin, volume, x):
     """Radius of the point's body: half the side of a cube of its volume."""
     if isinstance(kin, Axisymmetric):

@@ -7,7 +7,6 @@ needs the deformation gradient F of the points.
 
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.fields import Field, tensor
 from karamelo_py.compiler.powers import power
 from karamelo_py.points.kinematics import I, inv, unit
@@ -43,14 +42,12 @@ class Total(NamedTuple):
     point_fields = (DeformationGradient,)
 
 
-@shared
 def spatial_increment(frame, kin, dl, f):
     """dt grad v from `dl`, dt times the gradient of velocity in the frame, and F before it."""
     # F + dt Fdot = (I + dt Fdot F^-1) F exactly
     return dl if frame.moves else dl @ inv(f)
 
 
-@shared
 def of_places_before(frame, kin, dl):
     """`dl` of the places before a motion, from that of the places after it."""
     # grad v there is grad v here (I - dl)^-1, so that F grows by (I - dl)^-1 exactly. As a product
@@ -58,19 +55,16 @@ def of_places_before(frame, kin, dl):
     return dl @ inv(I - dl) if frame.moves else dl
 
 
-@shared
 def strained(frame, kin, f, dl):
     """F where the frame needs it, after what `spatial_increment` takes from F before it."""
     return f if frame.moves else f + dl
 
 
-@shared
 def force_stress(frame, kin, tau, f):
     """The stress that makes nodal forces, per reference volume."""
     return tau if frame.moves else tau.nominal(f)
 
 
-@shared
 def pulled_back(frame, kin, g, f):
     """The direction of a flux down the gradient `g`, pulled back to the frame.
 
@@ -80,7 +74,6 @@ def pulled_back(frame, kin, g, f):
     return g if frame.moves else inv(f.planar()).left_cauchy_green().dot(g)
 
 
-@shared
 def scaled_increment(frame, kin, dl, f, ratio):
     """`dl` changed such that the volume after it is `ratio` times what it would be."""
     # (I + dl) s - I in space, (F + dl) s - F with respect to the reference
@@ -88,7 +81,6 @@ def scaled_increment(frame, kin, dl, f, ratio):
     return s * dl + (s - 1) * (I if frame.moves else f)
 
 
-@shared
 def inverse_stretch_squared(frame, kin, f, like):
     """(h / size of a deformed cell)^2, one over the least stretch squared: it shortens the step."""
     # The largest eigenvalue of F^-1 F^-T.

@@ -5,7 +5,7 @@ A :class:`Grid` is a row of a table: a scene may have several grids, each with n
 
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import point_function, real, shared, where
+from karamelo_py.compiler.compile import point_function, real, where
 from karamelo_py.compiler.fields import Field, vector
 
 
@@ -31,31 +31,26 @@ class Grid(NamedTuple):
     first_cell: int  # number of its first cell
 
 
-@shared
 def renumbered(grid, first, step_x, step_y):
     """The grid with other numbers of its nodes."""
     return grid._replace(first=first, step_x=step_x, step_y=step_y)
 
 
-@shared
 def pick(direction, a, b, c):
     """The one of three that belongs to a direction; no branch is left where that is a literal."""
     return a if direction == 0 else (b if direction == 1 else c)
 
 
-@shared
 def in_cells(grid, direction, x):
     """Distance from the lower corner of the grid, in cells."""
     return (x - pick(direction, grid.x0, grid.y0, grid.z0)) * grid.inv_h
 
 
-@shared
 def cells_along(grid, direction):
     """Number of cells along a direction."""
     return pick(direction, grid.nx, grid.ny, grid.nz)
 
 
-@shared
 def inside(grid, kin, x):
     """Check that the position `x` lies on the grid."""
     within = x[0] == x[0]
@@ -67,7 +62,6 @@ def inside(grid, kin, x):
     return within
 
 
-@shared
 def node_position(grid, n):
     """(x, y, z) of node `n` of the grid."""
     local = n - grid.first

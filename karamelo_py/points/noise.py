@@ -35,8 +35,6 @@ def borne(basis: Any) -> Borne:
     return getattr(basis, "borne", usual)
 
 
-# --- rules on transfers ---------------------------------------------------------------------------
-
 GROWS = "what the grid does not see of the velocities grows with each cell"
 TURNS = "turns by about {angle:.2g} rad, its rim at {speed:.2g} times the speed of waves"
 WITH = "with {scene.transfer_name} and {scene.basis_name} functions"

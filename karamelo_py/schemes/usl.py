@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import real, shared
+from karamelo_py.compiler.compile import real
 from karamelo_py.kernels import arrays, table
 from karamelo_py.kernels.g2p import Strain
 from karamelo_py.kernels.nodes import UpdateToVelocity
@@ -62,7 +62,6 @@ known_failure(
 )
 
 
-@shared
 def any_node(s):
     """The nodal mass below which this form limits the gradient: none."""
     return UpdateToVelocity(real(0, s.nodes.sums[0, arrays.MASS]))

@@ -114,9 +114,6 @@ def _room_for(points, numbers):
     return array(points, numbers), codegen
 
 
-# --- points that lie one after another ----------------------------------------------------------
-
-
 def _masked(builder: Any, p: Any, width: int) -> Any:
     """Make the mask of the lanes of a group that have a point."""
     numbers = Lanes(types.int64, width)
@@ -255,9 +252,6 @@ def _prefetch(array, at):
     return types.void(array, at), codegen
 
 
-# --- items at numbers in lanes ------------------------------------------------------------------
-
-
 def at_lane(builder, kind, array, of, at, k, *rest):
     """Address of an item of an array; its first index is that of lane `k` of nodes `at`.
 
@@ -319,9 +313,6 @@ def _set(array, at, value):
     if isinstance(array, types.Array) and isinstance(_index_at(at, -1), LaneGroup):
         return _store_points
     return None
-
-
-# --- numbers of nodes -----------------------------------------------------------------------------
 
 
 @implements(is_one, Lanes)

@@ -53,7 +53,7 @@ shape
     :class:`~karamelo_py.points.basis.cpdi.Element`).
 """
 
-from karamelo_py.compiler.compile import point_function, shared
+from karamelo_py.compiler.compile import point_function
 
 
 @point_function()
@@ -122,7 +122,6 @@ def shape_size(basis: type, d: int) -> int:
     return sum(sizes[part] for part in shape)
 
 
-@shared
 def blank(basis, kin, x):
     """A place at position `x` with a shape of zeros."""
     return (*x, *((x[0] - x[0],) * shape_size(type(basis), len(x))))

@@ -153,9 +153,6 @@ class CPGIMP(_Box):
     default_variant = "stretch"
 
 
-# --- weights ----------------------------------------------------------------------------------
-
-
 def box(grid, kin, place, direction, least, most):
     """Centre and both ends of a domain along one direction, in cells, before walls cut it."""
     a = in_cells(grid, direction, place[direction])

@@ -12,7 +12,6 @@ from karamelo_py.compiler.compile import (
     is_one,
     point_function,
     real,
-    shared,
     where,
 )
 from karamelo_py.language.rules import suggestion
@@ -39,7 +38,6 @@ class Stencil(NamedTuple):
     inv_r: float  # 1 / r of an axisymmetric point
 
 
-@shared
 def sees_same_nodes(stencil):
     """Check that the points in all lanes see the same nodes."""
     first, *rest = (is_one(line.first) for line in stencil.lines)
@@ -48,7 +46,6 @@ def sees_same_nodes(stencil):
     return first
 
 
-@shared
 def with_one_node(stencil):
     """The stencil of points that see the same nodes: their numbers have no lanes."""
     lines = tuple(type(line)(first_lane(line.first), *line[1:]) for line in stencil.lines)
@@ -105,9 +102,6 @@ def radius(basis, grid, line):
     return r
 
 
-# --- numbers of nodes -------------------------------------------------------------------------
-
-
 def node_number(grid, first, steps):
     """Number of the node that is so many steps along each direction from node `first`."""
     *others, last = steps
@@ -137,9 +131,6 @@ def digits(k, base, d):
 def item(values, k):
     """Take values[k], where only a run may know k."""
     return values[k]
-
-
-# --- the product ------------------------------------------------------------------------------
 
 
 def each_for_its_own(weights, others):

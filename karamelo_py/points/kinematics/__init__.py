@@ -24,7 +24,7 @@ from typing import NamedTuple
 from numba import config
 
 from karamelo_py.compiler.algebra import algebra
-from karamelo_py.compiler.compile import fma, real, shared
+from karamelo_py.compiler.compile import fma, real
 
 COMPILED = not config.DISABLE_JIT  # interpreted, `fma` rounds twice: nothing has to be remembered
 
@@ -80,13 +80,11 @@ TAGS = (Line, PlaneStrain, Axisymmetric, Space)
 KINEMATICS = {1: Line, 2: PlaneStrain, 3: Space}
 
 
-@shared
 def free_from(kin):
     """First direction in which a body may move as a whole: no radius is one, a constant."""
     return 1 if isinstance(kin, Axisymmetric) else 0
 
 
-@shared
 def planar(kin):
     """The tag whose tensors are plain d x d matrices of the same vectors.
 

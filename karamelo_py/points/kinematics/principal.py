@@ -53,7 +53,6 @@ def principal_in_plane(s):
     return (mean + radius, mean - radius, s.zz), angle
 
 
-@shared
 def jacobi_rotation(a, b, c):
     """Find cosine, sine and tangent of the rotation that makes c vanish in [[a, c], [c, b]]."""
     cotangent = (b - a) / where(c == 0, 1, c + c)
@@ -67,7 +66,6 @@ def jacobi_rotation(a, b, c):
 _SWEEPS = 8
 
 
-@shared
 def principal_in_space(s):
     """See `principal`."""
     # Jacobi's rotations (Golub & Van Loan 2013, section 8.5): directions are right to round-off
@@ -104,7 +102,6 @@ def real_principal(s):
     return [1.0 * x for x in values], directions
 
 
-@shared
 def logarithm_of(s):
     """ln of a symmetric tensor with principal values above 0."""
     values, directions = real_principal(s)
@@ -112,7 +109,6 @@ def logarithm_of(s):
     return from_principal(s, found, directions, tuple([1 / x for x in values]))
 
 
-@shared
 def exponential_of(s):
     """exp of a symmetric tensor."""
     values, directions = real_principal(s)
@@ -120,7 +116,6 @@ def exponential_of(s):
     return from_principal(s, found, directions, found)
 
 
-# --- slopes -----------------------------------------------------------------------------------
 # Jacobi's rotations end where a tensor is diagonal, its slopes need not be. With S' in the frame of
 # the principal directions n, f(S)' = sum_a f_a' n_a n_a
 # + sum_ab (f_a - f_b) / (s_a - s_b) (n_a . S' n_b) (n_a n_b + n_b n_a), a < b

@@ -28,7 +28,7 @@ from collections import namedtuple
 from collections.abc import Callable
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import point_function, real, shared
+from karamelo_py.compiler.compile import point_function, real
 
 
 class Absent(NamedTuple):
@@ -153,7 +153,6 @@ def constrained_velocity(law, own, given):
     return given
 
 
-@shared
 def moves_as_told(law: tuple) -> bool:
     """Return True for laws of rigid bodies."""
     return constrained_velocity.defined(type(law))

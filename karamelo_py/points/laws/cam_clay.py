@@ -232,9 +232,6 @@ def _plastic_flow_slopes(law, q, p, pc):
     )
 
 
-# --- quantities of the law ----------------------------------------------------------------------
-
-
 @laws.kirchhoff_stress.on(CamClay)
 def _kirchhoff_stress_cam_clay(law, kin, state):
     return 2 * law.G * dev(state.e) - pressure(law, state.e) * I

@@ -41,8 +41,6 @@ def initiation(damage, memory):
     """Return the initiation of damage: it grows to 1 before damage begins."""
 
 
-# --- damage_johnson_cook ------------------------------------------------------------------------
-
 # Under triaxialities below this, failure strain is without bounds for most metals.
 _CLOSED = -3.0
 _SMALLEST_FAILURE_STRAIN = 1e-6

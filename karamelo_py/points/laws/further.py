@@ -51,9 +51,6 @@ def part_pressure(part, memory):
     return ()
 
 
-# ---- the same of all ----------------------------------------------------------------------------
-
-
 def initial_further(parts, like):
     """Memory of the first part, and that of the others; () of none."""
     if isinstance(parts, Absent):
@@ -77,8 +74,6 @@ def further_pressure(parts, memory, p):
     own, rest = memory
     return further_pressure(parts.rest, rest, p + sum(part_pressure(parts.part, own)))
 
-
-# --- the rate of plastic strain ------------------------------------------------------------------
 
 # Karamelo smooths over the time in which sound goes through this many cells.
 CELLS = 1000

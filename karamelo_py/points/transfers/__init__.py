@@ -126,9 +126,6 @@ def terms(transfer):
     return 1
 
 
-# --- rules on what points keep beside their velocity ------------------------------------------
-
-
 def _inside_out(moment, scene):
     by_moments = gradient_weight.defined(type(scene.transfer))  # strains, as MLS has them
     growing = not scene.transfer.inverts_spread or by_moments

@@ -47,9 +47,6 @@ def _of_parts(hub: Hub, simulation: Any) -> Words:
     return ((one.reason, one.cure) for one in said)
 
 
-# --- the step ------------------------------------------------------------------------------------
-
-
 def _step(hub: Hub, simulation: Any) -> Words:
     share, limit = hub.update.dt_factor, simulation.limit
     if hub.update.fixed_dt is not None:
@@ -66,9 +63,6 @@ def _step(hub: Hub, simulation: Any) -> Words:
         yield f"set_dt({dt:g}): {times}", f"leave set_dt out, or set_dt({best:.3g})"
     else:
         yield f"dt_factor({hub.update.dt_factor:g}): {times}", f"dt_factor({best / limit:.3g})"
-
-
-# --- what nobody reads ---------------------------------------------------------------------------
 
 
 def _unread(hub: Hub, simulation: Any) -> Words:

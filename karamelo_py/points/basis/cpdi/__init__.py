@@ -21,7 +21,6 @@ from karamelo_py.compiler.compile import (
     index,
     point_function,
     real,
-    shared,
     where,
 )
 from karamelo_py.compiler.tuples import flat, nested_as
@@ -105,9 +104,6 @@ def domain(basis, kin, place):
 @point_function()
 def upright(basis, kin, place):
     """Check that the domain is nowhere folded over: the Jacobian is positive at every corner."""
-
-
-# --- stencils ---------------------------------------------------------------------------------
 
 
 class Corner(NamedTuple):
@@ -236,7 +232,6 @@ def seen_at_corner(kin, stencil, c):
     return item(stencil.corners, c), weight, with_hoop(kin, weight, slopes, stencil.inv_r)
 
 
-@shared
 def of_corner(stencil, c):
     """The stencil with one of its corners alone, the c-th, which a run knows."""
     parts = list(zip(stencil.corners, stencil.weights, stencil.gradients, strict=True))

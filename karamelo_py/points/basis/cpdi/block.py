@@ -39,7 +39,6 @@ def _hats(a):
     return max(1 - a, 0), min(a, 2 - a), max(a - 1, 0)
 
 
-@shared
 def block_of(kin, grid, stencil):
     """The block of a point; () in space."""
     if kin.dimension > 2:
@@ -60,13 +59,11 @@ def block_of(kin, grid, stencil):
     return NodeBlock(tuple(first), weights, tuple(zip(*slopes, strict=True)), holds, stencil)
 
 
-@shared
 def is_whole(block):
     """Check that the points in all lanes see only nodes of their blocks."""
     return len(block) > 0 and all_lanes(block.holds)
 
 
-@shared
 def is_one_block(block):
     """Check that the points in all lanes see only nodes of one block."""
     if len(block) == 0:

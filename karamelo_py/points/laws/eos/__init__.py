@@ -71,9 +71,6 @@ def at_pressure(eos, j, memory, p, heat):
     return ratio_at_pressure(eos, p, heat), memory
 
 
-# --- eos linear ----------------------------------------------------------------------------------
-
-
 class LinearPressure(NamedTuple):
     """Pressure in proportion to the change of volume.
 

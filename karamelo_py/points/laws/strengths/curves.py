@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import real, shared
+from karamelo_py.compiler.compile import real
 from karamelo_py.compiler.formula import CONSTANT, POINT, SPREAD, UNIFORM
 from karamelo_py.compiler.operations import FIRST_BINARY, SELECT, of_one, of_two
 from karamelo_py.language.arguments import Argument
@@ -120,8 +120,6 @@ def _flow_stress_tabulated(strength, memory, known, increment, heat, dt):
     return strength.stress[last], 0 * x
 
 
-# --- formula -------------------------------------------------------------------------------------
-
 SEEDS = ("ep", "epdot", "T")
 DEPTH = 8  # of the stack, a tuple
 
@@ -225,7 +223,6 @@ def _check_formula(law: FlowStress) -> None:
         raise ScriptError("the flow stress is not above 0 at first", argument="Y")
 
 
-@shared
 def value(strength, ep, epdot, T):
     """The formula at a plastic strain, a rate and a temperature, in double precision."""
     stack = (0.0,) * DEPTH  # the top first

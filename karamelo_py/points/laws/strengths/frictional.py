@@ -103,9 +103,6 @@ def _locks(strength, scene):
     return {"place": scene.method.place} if locks else None
 
 
-# --- parameters of soils -------------------------------------------------------------------------
-
-
 def peak_and_residual(surface_of, cohesion, phi, psi, to_cohesion, to_phi, over):
     """Cohesion, friction and dilation at the peak; cohesion, friction at the end, and softening.
 

@@ -90,9 +90,6 @@ def _shear_response_linear_hardening(strength, kin, s, strain, memory, heat, dt)
     return onto_yield_surface(trial, q, flow, x), memory._replace(ep=memory.ep + x), flow * x
 
 
-# --- any hardening -------------------------------------------------------------------------------
-
-
 @point_function()
 def flow_stress(strength, memory, known, increment, heat, dt):
     """Find flow stress and its slope by `increment`, the part of the plastic strain of a step dt.

@@ -189,9 +189,6 @@ def _flow_stress_johnson_cook(strength, memory, known, increment, heat, dt):
     return flow * factor, slope * factor + steeper
 
 
-# --- swift ---------------------------------------------------------------------------------------
-
-
 class Swift(NamedTuple):
     """Hardening by a power of plastic strain, after a plateau.
 
@@ -249,9 +246,6 @@ def _first_guess_swift(strength, memory, hard, q, slope):
 def _flow_stress_swift(strength, memory, before, increment, heat, dt):
     hard, slope = power_law(strength.B, strength.n, memory.ep - strength.C, before, increment)
     return strength.A + hard, slope
-
-
-# --- zerilli-armstrong ---------------------------------------------------------------------------
 
 
 class ZerilliArmstrong(NamedTuple):

@@ -3,7 +3,6 @@
 from math import cos, sin, sqrt
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import shared
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.kinematics import inner
 from karamelo_py.points.kinematics.principal import from_principal, principal
@@ -84,7 +83,6 @@ class MohrCoulomb(NamedTuple):
 frictional(MohrCoulomb)
 
 
-@shared
 def returned_to_plane(s, k, sin_phi, sin_psi, G, K):
     """Principal stresses s1 >= s2 >= s3 on the surface, from those of an elastic trial above it.
 
@@ -158,7 +156,6 @@ def _pressure_response_mohr_coulomb(strength, kin, s, p, K, strain):
     return from_principal(s, shear, directions), -mean
 
 
-@shared
 def of_three(values, k):
     """Take values[k] of a tuple that the compiler keeps in registers."""
     return values[0] if k == 0 else values[1] if k == 1 else values[2]
