@@ -34,7 +34,7 @@ class Choice(NamedTuple):
     classes: tuple[str, ...]
 
 
-point_functions: dict[str, list[Callable]] = {}
+point_functions: dict[str, list[Callable]] = {}  # with `find(classes)` and `tags`, by name
 choosers: dict[Callable, list[Callable]] = {}  # of what kernels choose by type
 of_numbers: dict[Callable, list[Callable]] = {}  # what functions are for types of numbers
 
@@ -42,11 +42,6 @@ of_numbers: dict[Callable, list[Callable]] = {}  # what functions are for types 
 def name_of(thing: Any) -> str:
     """Name a function or class as ``module:qualified name``."""
     return f"{thing.__module__}:{thing.__qualname__}"
-
-
-def declare_point_function(dispatch: Callable) -> None:
-    """Make a point function known by its name; it has ``find(classes)`` and ``tags``."""
-    point_functions.setdefault(name_of(dispatch), []).append(dispatch)
 
 
 # What was asked of a point function, or code of a function that was run.
@@ -96,12 +91,11 @@ def class_name(tag: type | None) -> str:
 def contents(parts: Iterable[Part]) -> tuple[frozenset[Choice], frozenset[python.CodeType]]:
     """Sort what code consists of: choices, and the Python functions that it was made of."""
     codes = {part for part in parts if isinstance(part, python.CodeType)}
-    choices = {part if isinstance(part, Choice) else _choice(*part) for part in {*parts} - codes}
+    choices = {
+        part if isinstance(part, Choice) else Choice(name_of(part[0]), (*map(class_name, part[1]),))
+        for part in {*parts} - codes
+    }
     return frozenset(choices), frozenset(c for c in codes if c.co_filename not in WHOLE)
-
-
-def _choice(dispatch: Callable, classes: tuple) -> Choice:
-    return Choice(name_of(dispatch), tuple(class_name(c) for c in classes))
 
 
 def codes_in(code: python.CodeType) -> list[python.CodeType]:

@@ -198,19 +198,13 @@ def at(builder: Any, pointer: Any, *places: int) -> Any:
 
 def put(builder: Any, kind: types.Type, value: Any, pointer: Any, align: int | None = None) -> None:
     """Store a value."""
-    builder.store(_as_in_memory(builder, kind, value), pointer, align=align)
+    value = _converted(builder, kind, value, memory_type, lambda truth: builder.zext(truth, I8))
+    builder.store(value, pointer, align=align)
 
 
 def get(builder: Any, kind: types.Type, pointer: Any, align: int | None = None) -> Any:
     """Load a value."""
-    return _as_in_register(builder, kind, builder.load(pointer, align=align))
-
-
-def _as_in_memory(builder: Any, kind: types.Type, value: Any) -> Any:
-    return _converted(builder, kind, value, memory_type, lambda truth: builder.zext(truth, I8))
-
-
-def _as_in_register(builder: Any, kind: types.Type, value: Any) -> Any:
+    value = builder.load(pointer, align=align)
     return _converted(builder, kind, value, register_type, lambda byte: builder.trunc(byte, I1))
 
 

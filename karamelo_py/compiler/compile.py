@@ -121,7 +121,7 @@ def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Calla
             return find(classes) is not fallback
 
         dispatch.tags, dispatch.find, dispatch.on, dispatch.defined = tags, find, on, defined
-        choices.declare_point_function(dispatch)
+        choices.point_functions.setdefault(choices.name_of(dispatch), []).append(dispatch)
         return dispatch
 
     return declare

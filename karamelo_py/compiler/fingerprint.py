@@ -18,19 +18,7 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from karamelo_py.compiler.choices import (
-    WHOLE,
-    Choice,
-    Unknown,
-    choosers,
-    class_name,
-    codes_in,
-    found_by_name,
-    is_opaque,
-    name_of,
-    of_numbers,
-    point_functions,
-)
+from karamelo_py.compiler import choices as by_type
 from karamelo_py.compiler.values import Intrinsic
 
 _HERE = f"{__package__}."  # the text of all these modules is in every key
@@ -43,11 +31,11 @@ def describe(numba_type: Any) -> str:
     if isinstance(numba_type, types.BaseTuple) and hasattr(numba_type, "instance_class"):
         items = zip(numba_type.fields, numba_type, strict=True)
         inner = ",".join(f"{name}={describe(item)}" for name, item in items)
-        return f"{how} {class_name(numba_type.instance_class)}({inner})"
+        return f"{how} {by_type.class_name(numba_type.instance_class)}({inner})"
     if isinstance(numba_type, types.BaseTuple):
         return f"{how}({','.join(map(describe, numba_type))},)"
     if isinstance(numba_type, (types.Callable, types.Opaque)) and numba_type != types.none:
-        raise Unknown(str(numba_type))
+        raise by_type.Unknown(str(numba_type))
     return f"{how}:{numba_type}"
 
 
@@ -62,7 +50,7 @@ def classes_in(numba_type: Any) -> Iterable[type]:
 def fingerprint(
     roots: Iterable[Any],
     arguments: Iterable[Any],
-    choices: frozenset[Choice],
+    choices: frozenset[by_type.Choice],
     codes: frozenset[python.CodeType] = frozenset(),
 ) -> str:
     """Hash of all that code made of `roots` depends on, for these types of arguments and choices.
@@ -74,10 +62,10 @@ def fingerprint(
     for argument in arguments:
         ahead += classes_in(argument)
     for choice in sorted(choices):
-        classes = tuple(found_by_name(name) if name else None for name in choice.classes)
-        dispatches = point_functions.get(choice.point_function)
+        classes = tuple(by_type.found_by_name(name) if name else None for name in choice.classes)
+        dispatches = by_type.point_functions.get(choice.point_function)
         if not dispatches:
-            raise Unknown(choice.point_function)
+            raise by_type.Unknown(choice.point_function)
         ahead += [repr(choice), *(dispatch.find(classes) for dispatch in dispatches)]
     digest = hashlib.sha256()
     order: dict[int, int] = {}
@@ -94,12 +82,12 @@ def fingerprint(
         order[id(thing)] = len(order)
         alive.append(thing)
         if codes and isinstance(thing, python.FunctionType):
-            codes -= {*codes_in(thing.__code__)}
+            codes -= {*by_type.codes_in(thing.__code__)}
         words, parts = _look(thing)
         digest.update(f"{words} {len(parts)};".encode())
         ahead.extend(reversed(parts))
     if codes:
-        raise Unknown(f"the way to {min(c.co_qualname for c in codes)}")
+        raise by_type.Unknown(f"the way to {min(c.co_qualname for c in codes)}")
     return digest.hexdigest()
 
 
@@ -122,12 +110,12 @@ def _look(thing: Any) -> tuple[str, list]:
             return kind, parts(thing)
     if hasattr(type(thing), "made_of"):  # a kernel
         return kind, list(thing.made_of)
-    if hasattr(thing, "__name__") and is_opaque(thing):
+    if hasattr(thing, "__name__") and by_type.is_opaque(thing):
         return f"{kind} {getattr(thing, '__module__', '')} {thing.__name__}", []
     try:
         return kind, [type(thing), pickle.dumps(thing)]
     except Exception as error:
-        raise Unknown(f"{thing!r}") from error
+        raise by_type.Unknown(f"{thing!r}") from error
 
 
 _PARTS: dict[Any, Callable] = {
@@ -145,15 +133,18 @@ _PARTS: dict[Any, Callable] = {
 def _function(function: Callable) -> tuple[str, list]:
     if hasattr(function, "find") and hasattr(function, "tags"):
         # Its implementations are in the choices.
-        return f"point function {name_of(function)} {function.tags}", of_numbers.get(function, [])
+        return (
+            f"point function {by_type.name_of(function)} {function.tags}",
+            by_type.of_numbers.get(function, []),
+        )
     if hasattr(function, "inner"):
-        return f"method {name_of(function)}", [function.inner]
-    if is_opaque(function):
-        return f"function {name_of(function)}", []
+        return f"method {by_type.name_of(function)}", [function.inner]
+    if by_type.is_opaque(function):
+        return f"function {by_type.name_of(function)}", []
     code = function.__code__
     digest, names = _code(code)
     parts = [function.__defaults__, function.__kwdefaults__]
-    for name in () if code.co_filename in WHOLE else names:
+    for name in () if code.co_filename in by_type.WHOLE else names:
         value = function.__globals__.get(name, _NOWHERE)
         if value is _NOWHERE:
             continue
@@ -163,13 +154,13 @@ def _function(function: Callable) -> tuple[str, list]:
             parts.append(cell.cell_contents)
         except ValueError:
             parts.append("empty")
-    chosen = map(inspect.unwrap, choosers.get(function, ()))
-    return f"function {digest}", [*parts, *chosen, *of_numbers.get(function, ())]
+    chosen = map(inspect.unwrap, by_type.choosers.get(function, ()))
+    return f"function {digest}", [*parts, *chosen, *by_type.of_numbers.get(function, ())]
 
 
 def _from_module(value: Any, names: tuple[str, ...], above: tuple) -> list:
     """List the things in a module, and in modules of it, that a function's code names."""
-    if not isinstance(value, python.ModuleType) or value in above or is_opaque(value):
+    if not isinstance(value, python.ModuleType) or value in above or by_type.is_opaque(value):
         return []
     found = [vars(value)[name] for name in names if name in vars(value)]
     inner = (_from_module(one, names, (*above, value)) for one in found)
@@ -203,8 +194,8 @@ def _code(code: python.CodeType) -> tuple[str, tuple[str, ...]]:
 
 
 def _class(one: type) -> tuple[str, list]:
-    name = name_of(one)
-    if is_opaque(one) or one.__module__.startswith(_HERE):
+    name = by_type.name_of(one)
+    if by_type.is_opaque(one) or one.__module__.startswith(_HERE):
         return f"class {name}", []
     fields = getattr(one, "_fields", ())
     parts: list = [*one.__bases__, fields]

@@ -19,16 +19,8 @@ from llvmlite import ir
 from numba import types
 
 from karamelo_py.compiler import cache, code, compile_lock, machine
+from karamelo_py.compiler import choices as by_type
 from karamelo_py.compiler.argument_buffer import ArgumentBuffer, plan_for, reader
-from karamelo_py.compiler.choices import (
-    INTERPRETED,
-    Choice,
-    Unknown,
-    choosers,
-    contents,
-    note,
-    parts_noted,
-)
 from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.failing import noting, raise_noted
 from karamelo_py.compiler.held import HeldTuple, hold, item_of
@@ -47,7 +39,9 @@ class Unit(NamedTuple):
     result: types.Type
     code: bytes  # an object file
     needs: tuple  # the units that it calls
-    choices: frozenset[Choice]  # what point functions were asked for, also those of its needs
+    choices: frozenset[
+        by_type.Choice
+    ]  # what point functions were asked for, also those of its needs
     raises: bool  # whether something in it raises exceptions
 
 
@@ -156,7 +150,7 @@ def written(
 
 def _compiled(function: Callable, kinds: tuple, result: types.Type | None) -> tuple[Unit, Any]:
     """Compile a function; the unit, and the Python functions that it was made of."""
-    with compilation(function.__name__), _no_collections(), parts_noted() as parts:
+    with compilation(function.__name__), _no_collections(), by_type.parts_noted() as parts:
         module, result = written(function, kinds, result)
         text = str(module)
         readable = re.sub(r"[^\w.]", "_", function.__qualname__, flags=re.ASCII)
@@ -164,8 +158,8 @@ def _compiled(function: Callable, kinds: tuple, result: types.Type | None) -> tu
         made = machine.compile_text(text.replace(NAME, name))
     unit = Unit(name, result, made, tuple(module.needs.values()), frozenset(), module.raises)
     try:
-        choices, codes = contents(parts)
-    except Unknown as what:
+        choices, codes = by_type.contents(parts)
+    except by_type.Unknown as what:
         return unit, what
     return unit._replace(choices=choices), codes
 
@@ -197,7 +191,7 @@ class Kernel:
         self.units: dict[tuple, Unit] = {}
         self._plans: dict[tuple, tuple] = {}
         builtin(self)(self.in_kernel)
-        if function not in choosers:
+        if function not in by_type.choosers:
             shared(function)
 
     @property
@@ -244,8 +238,8 @@ class Kernel:
             own = formula(self.function, kinds)
             return lowering.call_own(own.name, own.run, kinds, own.result, held)
         unit = self.unit(kinds)
-        note(unit.choices)
-        note([self.function.__code__])
+        by_type.note(unit.choices)
+        by_type.note([self.function.__code__])
         if lowering.builder is None:
             return lowering.wrapped(unit.result, None)
         module = lowering.builder.module
@@ -263,12 +257,12 @@ def kernel(function: Callable) -> Callable:
     No fast mathematics: where products and sums contract would depend on what a loop is inlined
     into. `fma` says where.
     """
-    return function if INTERPRETED else Kernel(function)
+    return function if by_type.INTERPRETED else Kernel(function)
 
 
 def noinline(function: Callable) -> Callable:
     """Mark a function that kernels call, too large to be written into each place that calls it."""
-    if not INTERPRETED:
+    if not by_type.INTERPRETED:
         alone(function)
         shared(function)
     return function
@@ -288,7 +282,7 @@ def address_of(function: Callable, signature: types.Type) -> int:
     another one, and the function is compiled once for all its callers.
     """
     if function not in _addresses:
-        if INTERPRETED:
+        if by_type.INTERPRETED:
             _addresses[function] = address_of_python(function, signature)
         else:
             unit = Kernel(function).unit(signature.args, signature.return_type)
@@ -301,7 +295,7 @@ def address_of_python(function: Callable, signature: types.Type) -> int:
 
     What is raised in it is raised again behind the kernel.
     """
-    if INTERPRETED:
+    if by_type.INTERPRETED:
         _uncompiled.append(function)
         return len(_uncompiled) - 1
     made = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * len(signature.args))(
@@ -315,7 +309,7 @@ def caller_of(signature: Any) -> Callable:
     """Make ``call(address, ...)``, which calls a function of this signature by its address."""
     result, parameters = signature.return_type, signature.args
 
-    if INTERPRETED:
+    if by_type.INTERPRETED:
         return lambda address, *arguments: _uncompiled[address](*arguments)
 
     @intrinsic

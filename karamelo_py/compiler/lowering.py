@@ -9,17 +9,8 @@ from llvmlite import ir
 from numba import typeof, types
 
 from karamelo_py.compiler import arithmetic, code, failing, indexing
+from karamelo_py.compiler import values as traced
 from karamelo_py.compiler.held import HeldTuple, item_of
-from karamelo_py.compiler.values import (
-    BUILTINS,
-    Emitted,
-    HeldValue,
-    Intrinsic,
-    Untraceable,
-    Value,
-    words,
-    writing,
-)
 
 MOST_OPERATIONS = 10_000  # of one formula; beyond, a loop is better left to the compiler
 
@@ -58,7 +49,7 @@ class Lowering:
         if isinstance(kind, types.BaseTuple) and hasattr(kind, "instance_class"):
             self.classes.add(kind.instance_class)
         if isinstance(kind, HeldTuple):
-            return HeldValue(kind, value)
+            return traced.HeldValue(kind, value)
         if isinstance(kind, types.BaseTuple):
             inner = [
                 self.wrapped(item, value and self.builder.extract_value(value, k))
@@ -70,11 +61,11 @@ class Lowering:
             return kind.instance_class
         if isinstance(kind, FunctionType):
             return self.seen(kind.function)
-        return Value(kind, value)
+        return traced.Value(kind, value)
 
     def kind_of(self, thing: Any) -> types.Type:
         """Give the type of what point functions see; whole numbers keep their value in it."""
-        if isinstance(thing, Value | HeldValue):
+        if isinstance(thing, traced.Value | traced.HeldValue):
             return thing._kind
         if isinstance(thing, int):
             return types.literal(thing)
@@ -86,15 +77,15 @@ class Lowering:
             return types.BaseTuple.from_types(kinds, made)
         if thing is None or isinstance(thing, float | np.generic):
             return typeof(thing)
-        if isinstance(thing, Emitted):
+        if isinstance(thing, traced.Emitted):
             return FunctionType(thing.seen)
         if isinstance(thing, type) and issubclass(thing, tuple) and hasattr(thing, "_fields"):
             return types.NamedTupleClass(thing)
-        raise Untraceable(f"{thing!r} is nothing that a kernel knows")
+        raise traced.Untraceable(f"{thing!r} is nothing that a kernel knows")
 
     def lowered(self, thing: Any, wanted: types.Type) -> Any:
         """Give code of what point functions see, in the type `wanted`."""
-        if isinstance(thing, Value | HeldValue):
+        if isinstance(thing, traced.Value | traced.HeldValue):
             return code.cast(self.builder, thing._value, thing._kind, wanted)
         if isinstance(thing, tuple):
             items = [self.lowered(a, k) for a, k in zip(thing, wanted, strict=True)]
@@ -106,10 +97,10 @@ class Lowering:
                 return code.cast(self.builder, made, scalar, wanted)
         return code.nothing()
 
-    def constant(self, array: np.ndarray) -> Value:
+    def constant(self, array: np.ndarray) -> traced.Value:
         """Give an array that is part of the code."""
         kind = typeof(array)
-        return Value(kind, self.builder and code.constant(self.builder, kind, array))
+        return traced.Value(kind, self.builder and code.constant(self.builder, kind, array))
 
     def unify(self, *kinds: types.Type) -> types.Type | None:
         """Give the type of what is of one of several types; None where there is none."""
@@ -127,8 +118,8 @@ class Lowering:
 
     def call(self, function: Callable, arguments: tuple) -> Any:
         """Give what `function` gives for these arguments."""
-        if function in BUILTINS:
-            return BUILTINS[function](self, *arguments)
+        if function in traced.BUILTINS:
+            return traced.BUILTINS[function](self, *arguments)
         if function in _OF_ITEMS and _has_slice(arguments[1]):
             return self.of_item(*arguments)
         found = self.dispatch(function, arguments)
@@ -136,7 +127,7 @@ class Lowering:
             return found
         self.operations += 1
         if self.operations > MOST_OPERATIONS and self.builder is None:
-            raise Untraceable(f"it has more than {MOST_OPERATIONS} operations: take a loop")
+            raise traced.Untraceable(f"it has more than {MOST_OPERATIONS} operations: take a loop")
         if function in _OF_ITEMS:
             return self.of_item(*arguments)
         kinds = tuple(map(self.kind_of, arguments))
@@ -152,7 +143,7 @@ class Lowering:
         """Give the operation that a function is for arguments of these types."""
         key = function, numbers_of(kinds)
         if key not in _operations:
-            if isinstance(function, Intrinsic):
+            if isinstance(function, traced.Intrinsic):
                 _operations[key] = _of_intrinsic(function, kinds)
             else:
                 _operations[key] = arithmetic.operation(function, kinds)
@@ -164,18 +155,18 @@ class Lowering:
             return self.attribute(arguments[0], "shape")[0]
         if function is bool and isinstance(kinds[0], types.BaseTuple | types.NoneType):
             return bool(len(kinds[0])) if isinstance(kinds[0], types.BaseTuple) else False
-        raise Untraceable(
-            f"{name_of(function)} is not defined for ({', '.join(map(words, kinds))})"
+        raise traced.Untraceable(
+            f"{name_of(function)} is not defined for ({', '.join(map(traced.words, kinds))})"
         )
 
     def of_item(self, things: Any, place: Any, *value: Any) -> Any:
         """Read or write an item of an array or of a tuple."""
-        if isinstance(things, Value) and isinstance(things._kind, types.Array):
+        if isinstance(things, traced.Value) and isinstance(things._kind, types.Array):
             do = indexing.put if value else indexing.get
             return do(self, things, place, *value)
-        if isinstance(things, tuple) and isinstance(place, Value) and not value:
+        if isinstance(things, tuple) and isinstance(place, traced.Value) and not value:
             return indexing.item_of_tuple(self, things, place)
-        raise Untraceable(f"{self.kind_of(things)} has no items")
+        raise traced.Untraceable(f"{self.kind_of(things)} has no items")
 
     def in_type_of(self, thing: Any, like: Any) -> Any:
         """Give a whole number as a real one of the type of `like`."""
@@ -183,7 +174,7 @@ class Lowering:
         if isinstance(thing._kind, code.Lanes):
             kind = code.Lanes(kind, thing._kind.width)
         value = self.builder and code.cast(self.builder, thing._value, thing._kind, kind)
-        return Value(kind, value)
+        return traced.Value(kind, value)
 
     def cast(self, thing: Any, kind: types.Type) -> Any:
         """Give what point functions see in the type `kind`."""
@@ -191,7 +182,7 @@ class Lowering:
 
     attribute, set_attribute = indexing.attribute, indexing.set_attribute
 
-    def item(self, held: HeldValue, k: int) -> Any:
+    def item(self, held: traced.HeldValue, k: int) -> Any:
         """Give an item of a held tuple."""
         key = id(held), k
         if key not in self.read:
@@ -218,7 +209,7 @@ class Lowering:
     def give_back(self, run: Callable, kinds: tuple, values: Any, result: types.Type) -> None:
         """Return what `run` gives from the function that is written."""
         given = iter(values)
-        with writing(self):
+        with traced.writing(self):
             found = run(
                 *(self.wrapped(k, None if code.is_empty(k) else next(given)) for k in kinds)
             )
@@ -260,7 +251,7 @@ def _has_slice(place: Any) -> bool:
     return any(isinstance(one, slice) for one in (place if isinstance(place, tuple) else (place,)))
 
 
-def _of_intrinsic(function: Intrinsic, kinds: tuple) -> arithmetic.Operation | None:
+def _of_intrinsic(function: traced.Intrinsic, kinds: tuple) -> arithmetic.Operation | None:
     plain = tuple(map(types.unliteral, kinds))
     found = function.definition(*plain) or function.definition(*kinds)
     if found is None:

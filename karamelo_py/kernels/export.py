@@ -6,18 +6,9 @@ from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.tuples import put_at, record, row
 from karamelo_py.kernels.visit import place_at, state_at
+from karamelo_py.points import laws as law_functions
 from karamelo_py.points.basis import entry, locate, reach, support
 from karamelo_py.points.kinematics import outer, planar, zero
-from karamelo_py.points.laws import (
-    cauchy_stress,
-    elastic_strain,
-    energy_density,
-    jacobian,
-    shown,
-    specific_volume,
-    with_stress,
-    with_temperature,
-)
 
 STRAIN, JACOBIAN, ENERGY = 6, 12, 13
 EXPORTED = 14  # columns: stress, elastic strain (6 each), det F, stored energy of the point
@@ -29,11 +20,11 @@ def export_state(kin, points, laws, out):
     points, laws = at_hand(points), at_hand(laws)
     for p in range(points.mass.size):
         law, state = state_at(kin, points, laws, p)
-        put_at(out, p, 0, cauchy_stress(law, kin, state))
-        put_at(out, p, STRAIN, elastic_strain(law, kin, state))
-        out[p, JACOBIAN] = jacobian(law, kin, state)
-        volume = points.mass[p] * specific_volume(law)
-        out[p, ENERGY] = volume * energy_density(law, kin, state)
+        put_at(out, p, 0, law_functions.cauchy_stress(law, kin, state))
+        put_at(out, p, STRAIN, law_functions.elastic_strain(law, kin, state))
+        out[p, JACOBIAN] = law_functions.jacobian(law, kin, state)
+        volume = points.mass[p] * law_functions.specific_volume(law)
+        out[p, ENERGY] = volume * law_functions.energy_density(law, kin, state)
 
 
 @kernel
@@ -45,8 +36,10 @@ def export(what, times_volume, kin, points, laws, out):
     points, laws = at_hand(points), at_hand(laws)
     for p in range(points.mass.size):
         law, state = state_at(kin, points, laws, p)
-        number = shown(what, law, kin, state)
-        out[p] = points.mass[p] * specific_volume(law) * number if times_volume else number
+        number = law_functions.shown(what, law, kin, state)
+        out[p] = (
+            points.mass[p] * law_functions.specific_volume(law) * number if times_volume else number
+        )
 
 
 @kernel
@@ -60,11 +53,11 @@ def impose_stress(kin, points, laws, chosen, given, stress):
         if not chosen[p]:
             continue
         law, state = state_at(kin, points, laws, p)
-        old = cauchy_stress(law, kin, state)
+        old = law_functions.cauchy_stress(law, kin, state)
         for k in range(len(old)):
             if not given[k]:
                 stress[p, k] = old[k]
-        store(points.state, p, with_stress(law, kin, state, row(stress, p, 0, old)))
+        store(points.state, p, law_functions.with_stress(law, kin, state, row(stress, p, 0, old)))
 
 
 @kernel
@@ -74,7 +67,7 @@ def impose_temperature(kin, points, laws, rows, temperature):
     for k in range(rows.size):
         p = index(rows[k])
         law, state = state_at(kin, points, laws, p)
-        store(points.state, p, with_temperature(law, kin, state, temperature[k]))
+        store(points.state, p, law_functions.with_temperature(law, kin, state, temperature[k]))
 
 
 @kernel

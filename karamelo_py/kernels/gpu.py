@@ -290,31 +290,9 @@ class Stage:
                 tuple([type(one)(room_of(type(one), rooms, one.array)) for one in nodes.fields]),
             )
 
-        def clear(rooms, like):
-            for name, column, _ in columns:
-                for k in range(begin, end):
-                    room_of(name, rooms, None)[k, column] = like - like
-
-        def give(out, stencil, corner, loads):
-            seen = stencil if corners == 1 else of_corner(stencil, corner)
-            for k in range(begin, end):
-                scattered_all(quantities, out, seen, k, loads)
-
-        def put(rooms, boxes, box):
-            for j, (name, column, _) in enumerate(columns):
-                for k in range(begin, end):
-                    row = j * (end - begin) + k - begin
-                    boxes[row, box] = room_of(name, rooms, None)[k, column]
-
         def loaded(w, p, dt, cells):
             like = load_all(quantities, w, p, dt)  # for its shape alone
             return nested_as(like, tuple([cells.loads[k, p] for k in range(len(flat(like)))]))
-
-        def rooms_for(like):
-            return tuple([room_for(width, (like,) * count) for width in widths])
-
-        def in_cell(w, rooms):
-            return w._replace(basis=InCell(w.basis), nodes=nodes_for(w.nodes, rooms))
 
         def scatter_cell(i, fate, s, block, cells):
             if i >= cells.box[cells.box.size - 1] or (only_if_more and is_last(s)):
@@ -324,15 +302,23 @@ class Stage:
             size = block.points.mass.size
             p, corner = _point_and_corner(corners, size, cells.order[first])
             c, w = at_point(s, block, p)
-            rooms = rooms_for(c.dt)
-            clear(rooms, c.dt)
-            out = in_cell(w, rooms)
+            rooms = tuple([room_for(width, (c.dt,) * count) for width in widths])
+            for name, column, _ in columns:
+                for k in range(begin, end):
+                    room_of(name, rooms, None)[k, column] = c.dt - c.dt
+            out = w._replace(basis=InCell(w.basis), nodes=nodes_for(w.nodes, rooms))
             for q in range(first, last):
                 behind = cells.order[min(q + 1, last - 1)]  # asked for ahead
                 stencil = locate(w.basis, w.kin, w.grid, place(w, p))
-                give(out, stencil, corner, loaded(w, p, c.dt, cells))
+                seen = stencil if corners == 1 else of_corner(stencil, corner)
+                loads = loaded(w, p, c.dt, cells)
+                for k in range(begin, end):
+                    scattered_all(quantities, out, seen, k, loads)
                 p, corner = _point_and_corner(corners, size, behind)
-            put(rooms, cells.boxes, index(i))
+            for j, (name, column, _) in enumerate(columns):
+                for k in range(begin, end):
+                    row = j * (end - begin) + k - begin
+                    cells.boxes[row, index(i)] = room_of(name, rooms, None)[k, column]
 
         return scatter_cell
 

@@ -156,11 +156,11 @@ def work_of_loads(i, fate, s, hooks, copies):
 # --- points -----------------------------------------------------------------------------------
 
 
-def clear_force(i, fate, block, d):
+def clear_force(i, fate, s, block):
     """Let a point bear no force of fixes, until these say so anew."""
     force = field(block.points.fields, Force)
     if force is not None:
-        for c in range(d):
+        for c in range(s.kin.dimension):
             force[c, i] = 0
 
 
@@ -360,7 +360,7 @@ def _add_all(own, first_row, solid, total):
             totals.add_to(own, first_row + solid * len(total) + k, number)
 
 
-def add_work(i, fate, block, copies):
+def add_work(i, fate, s, block, copies):
     """Add the work of forces on a point to that of the loads on nodes."""
     work = field(block.points.fields, WorkOfForces)
     if work is not None:

@@ -13,17 +13,9 @@ from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.threads import by_team
+from karamelo_py.kernels import clock as clocks
 from karamelo_py.kernels import table
 from karamelo_py.kernels.arrays import DT, TIME, NoHooks, Setup, Tag
-from karamelo_py.kernels.clock import (
-    all_well,
-    check_moves,
-    common_velocity,
-    finish,
-    kick,
-    last_step_size,
-    step_size,
-)
 from karamelo_py.kernels.hook_loop import at_nodes, at_points
 from karamelo_py.kernels.sweep import sweep, sweep_nodes
 from karamelo_py.kernels.visit import deformation_of, state_at
@@ -63,7 +55,7 @@ def _take(row, s, mode, hooks, more):
     elif isinstance(row, table.NodeTask):
         task = row.task(s) if callable(row.task) else row.task
         here = row.at(s) if row.at else s
-        sweep_nodes(mode, task, here.kin, here.nodes, s.ranges, (row.length or kick)(s))
+        sweep_nodes(mode, task, here.kin, here.nodes, s.ranges, (row.length or clocks.kick)(s))
     elif isinstance(row, table.EachNode):
         row.loop(s)
     elif isinstance(row, table.EachPoint):
@@ -76,7 +68,7 @@ def _take(row, s, mode, hooks, more):
         for k in range(row.count(s)):
             _take_all(row.rows(k), s, mode, hooks, more)
     elif isinstance(row, table.Check):
-        return check_moves(s, mode)
+        return clocks.check_moves(s, mode)
     else:
         return _visit(row, s, mode, more)
     return True
@@ -84,12 +76,12 @@ def _take(row, s, mode, hooks, more):
 
 def _visit(row, s, mode, more):
     """A visit of the points; whether all went well."""
-    whole = last_step_size(s) if row.of_last_step else step_size(s)
+    whole = clocks.last_step_size(s) if row.of_last_step else clocks.step_size(s)
     dt = whole if row.share == 1 else real(row.share, whole) * whole
     scatters = more if row.only_if_more else row.scatters
     here = row.at(s) if row.at else s
     sweep(here, mode, row.visit, dt, row.gathers, scatters, row.moves)
-    return all_well(s, row.reported) if row.reported else True
+    return clocks.all_well(s, row.reported) if row.reported else True
 
 
 def _take_all(rows, s, mode, hooks, more):
@@ -159,7 +151,7 @@ def run_steps(scheme: Tag, visits: Tag, mode: Tag, s: Setup, hooks: Tag, count: 
         last = n + 1 == count or time >= clock.end_time
         if not step(scheme, visits, mode, s, hooks, not last):
             return STOPPED
-        finish(s.control)
+        clocks.finish(s.control)
         if not look(s, mode):
             return GAINED
         if not look_at_heat(s):
@@ -193,7 +185,7 @@ def _fastest(frame, kin, points, laws, control):
     points, laws = at_hand(points), at_hand(laws)
     clock = control.clock[0]
     rate = 0.0
-    common = common_velocity(kin, clock, clock.rate)
+    common = clocks.common_velocity(kin, clock, clock.rate)
     for p in range(points.mass.size):
         law, state = state_at(kin, points, laws, p)
         f = deformation_of(frame, kin, law, state, points, p)

@@ -14,21 +14,8 @@ from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.formula import EVALUATE, GLOBAL, UNIFORM, evaluate_in_table
 from karamelo_py.compiler.gpu import Images, KernelLaunch, known, numbers_of
 from karamelo_py.compiler.trace import forget
-from karamelo_py.kernels import gpu, table
+from karamelo_py.kernels import arrays, gpu, table
 from karamelo_py.kernels import gpu_fixes as fixes
-from karamelo_py.kernels.arrays import (
-    INITIAL_INTEGRATE,
-    ON_UPDATE,
-    ON_VELOCITY,
-    POST_PARTICLES_TO_GRID,
-    SUPPLY_HEAT,
-    TIMESTEP,
-    WHOLE,
-    Hooks,
-    NoHooks,
-    Setup,
-    arrays_of,
-)
 from karamelo_py.kernels.clock import take_reports
 from karamelo_py.kernels.heat import Conducting, at_heat_nodes, at_heated_points, at_its_nodes
 from karamelo_py.kernels.hook_loop import ACT, RUB, add_work
@@ -46,7 +33,7 @@ POLL = 64  # steps between two looks at how far a run is
 REGISTERS = {4: 200, 8: 130}  # words that a thread of a cell sums up, by the size of numbers
 FAR = 1.0  # cells that points go before they are ordered anew in memory
 PARTS = "begin", "step", "last step", "before", "behind", "order"  # of what is launched
-_NONE = NoHooks()
+_NONE = arrays.NoHooks()
 
 
 def arrays_in(thing: Any) -> Iterator[np.ndarray]:
@@ -58,7 +45,7 @@ def arrays_in(thing: Any) -> Iterator[np.ndarray]:
             yield from arrays_in(item)
 
 
-def there(s: Setup) -> Setup:
+def there(s: arrays.Setup) -> arrays.Setup:
     """Leave out of a setup what no card needs: tiles, and the boxes of their nodes."""
     blocks = tuple(block._replace(tiling=()) for block in s.blocks)
     buffers, heat = s.buffers._replace(nodes=s.nodes), s.heat
@@ -91,8 +78,8 @@ class StepsOnCard:
     """
 
     def __init__(
-        self, card: Any, s: Setup, scheme: Any, visits: type, hooks: Hooks | NoHooks = _NONE,
-        functions: Sequence[Callable] = (),
+        self, card: Any, s: arrays.Setup, scheme: Any, visits: type,
+        hooks: arrays.Hooks | arrays.NoHooks = _NONE, functions: Sequence[Callable] = (),
     ):  # fmt: skip
         self.card, self.s, self.hooks, self.functions = card, (s := there(s)), hooks, functions
         forget()  # of other scenes: code on disk would depend on their functions
@@ -118,7 +105,7 @@ class StepsOnCard:
 
     def _steps(self, rows: list) -> tuple[list[KernelLaunch], list[KernelLaunch]]:
         """List the launches of a step, and those of the last of several."""
-        begin, end = self._clear_published(), [self._launch(gpu.finish_step, 1, self.s)]
+        begin, end = self._clear(*self._slots()), [self._launch(gpu.finish_step, 1, self.s)]
         ahead: list[KernelLaunch] = []  # sums for the next step
         own = self._launches(rows, ahead)
         last = [launch for launch in own if launch not in ahead]
@@ -152,7 +139,7 @@ class StepsOnCard:
         self.images.of((self.copies, self.heavy))
         self.images.send([self.copies, self.heavy])
 
-    def _rooms(self, s: Setup, rows: list) -> None:
+    def _rooms(self, s: arrays.Setup, rows: list) -> None:
         """Give room to what cells sum: for the visit that gives most."""
         stages = [self._stage(row) for row in self._plain(rows) if isinstance(row, table.Sweep)]
         most = max((stage.numbers for stage in stages), default=0)
@@ -188,6 +175,10 @@ class StepsOnCard:
         function = gpu.while_steps_go_on(function)
         return KernelLaunch(self.images, function, count, self.fate, *arguments, called=called)
 
+    def _of_points(self, function: Callable, block: Any, *rest: Any, **more: Any) -> KernelLaunch:
+        """Launch a function of the setup and a block, by a thread for each point."""
+        return self._launch(function, block.points.mass.size, self.s, block, *rest, **more)
+
     def _launches(self, rows: list, ahead: list[KernelLaunch] | None = None) -> list[KernelLaunch]:
         """List the launches of rows of a step; `ahead` takes those that serve the next one."""
         found: list[KernelLaunch] = []
@@ -203,8 +194,7 @@ class StepsOnCard:
                 act = fixes.each_point(row.function, self.s)
                 for block in self.s.blocks:
                     if isinstance(block.laws, row.law):
-                        size = block.points.mass.size
-                        found.append(self._launch(act, size, self.s, block, self.copies))
+                        found.append(self._of_points(act, block, self.copies))
             elif isinstance(row, table.Once):
                 found += self._collect(0, len(self.s.control.totals))
                 found.append(self._launch(fixes.once(row.function), 1, self.s))
@@ -213,9 +203,7 @@ class StepsOnCard:
             elif isinstance(row, table.AtPoints):
                 found += self._hooks_on_points(row.stage, row.then)
             elif isinstance(row, table.Check):
-                for block in self.s.blocks:
-                    size = block.points.mass.size
-                    found.append(self._launch(fixes.check_point, size, self.s, block))
+                found += [self._of_points(fixes.check_point, block) for block in self.s.blocks]
                 found.append(self._launch(fixes.take_moves, 1, self.s))
                 found.append(self._launch(gpu.take_reports(take_reports), 1, self.s))
             elif row.function is add_work:
@@ -223,7 +211,7 @@ class StepsOnCard:
             elif row.function is at_heat_nodes:
                 found += self._hooks_on_nodes(*row.arguments, of_heat=True)
             elif row.function is at_heated_points:
-                found += self._hooks_on_points(SUPPLY_HEAT, 0)
+                found += self._hooks_on_points(arrays.SUPPLY_HEAT, 0)
             else:
                 raise TypeError(f"no GPU knows what {row.function.__name__} does in a step")
         return found
@@ -247,32 +235,31 @@ class StepsOnCard:
         if row.gathers:
             gather = self._stage(row).gather()
             for block, cells in zip(self.s.blocks, self.cells, strict=True):
-                yield self._launch(gather, block.points.mass.size, self.s, block, cells)
+                yield self._of_points(gather, block, cells)
             if row.reported:
                 yield self._launch(gpu.take_reports(row.reported), 1, self.s)
 
     def _scatters(self, row: Any, ahead: list[KernelLaunch] | None) -> Iterator[KernelLaunch]:
         s, stage = self.s, self._stage(row)
-        sizes = [block.points.mass.size for block in s.blocks]
-        pairs = list(zip(s.blocks, self.cells, sizes, strict=True))
+        pairs = list(zip(s.blocks, self.cells, strict=True))
         if not stage.scatters:
             return
         if not row.gathers:
             load = stage.load_point()
-            for block, cells, size in pairs:
-                yield self._launch(load, size, s, block, cells)
+            for block, cells in pairs:
+                yield self._of_points(load, block, cells)
         # Points that stay are listed once, before the first step, where something is done then.
         if stage.lists and (s.frame.moves or ahead is None or not self.begin):
             count = stage.count()
-            for block, cells, size in pairs:
-                yield self._launch(count, size, s, block, cells)
+            for block, cells in pairs:
+                yield self._of_points(count, block, cells)
                 yield from self._lists(block, cells)
             yield self._launch(gpu.take_reports(take_reports), 1, s)
             yield self._launch(stage.age(), self.nodes, s, self.use)
             mark = stage.mark()
             for cells in self.cells:
                 yield self._launch(mark, cells.cell.size, s, cells, self.use)
-        for k, (block, cells, _) in enumerate(pairs):
+        for k, (block, cells) in enumerate(pairs):
             for part in range(stage.parts):
                 scatter, sum_up = stage.scatter(part), stage.sum(part, anew=k == part == 0)
                 yield self._launch(scatter, cells.cell.size, s, block, cells)
@@ -300,11 +287,11 @@ class StepsOnCard:
             size = block.points.mass.size
             come_from = self.images.new((size,), np.int32)
             yield self._launch(gpu.order_cell, cells.cell.size, cells, come_from)
-            arrays = [as_rows(self.images.of(array)) for _, array in arrays_of(block.points)]
-            room, most = cells.boxes.reshape(-1), max(rows.nbytes for rows in arrays)
+            tables = [as_rows(self.images.of(array)) for _, array in arrays.arrays_of(block.points)]
+            room, most = cells.boxes.reshape(-1), max(rows.nbytes for rows in tables)
             if room.nbytes < most:  # where cells sum, there is room meanwhile
                 room = self.images.new((-(-most // 8),), np.int64)
-            for rows in arrays:
+            for rows in tables:
                 own = room.view(np.uint8)[: rows.nbytes].view(rows.dtype).reshape(rows.shape)
                 yield self._launch(gpu.take_rows, size, rows, come_from, own)
                 yield self._launch(gpu.put_rows, size, rows, own)
@@ -312,7 +299,7 @@ class StepsOnCard:
     # --- hooks of fixes
 
     def _table(self) -> Any:
-        return () if isinstance(self.hooks, NoHooks) else self.hooks.table
+        return () if isinstance(self.hooks, arrays.NoHooks) else self.hooks.table
 
     def _called(self, h: int) -> dict:
         """Map what is called by its address to the functions of a hook."""
@@ -346,19 +333,19 @@ class StepsOnCard:
         hooks, heavy, copies = self.hooks, self.heavy, self.copies
         s = at_its_nodes(self.s) if of_heat else self.s
         own = [h for h, row in enumerate(self._table()) if row.stage == stage]
-        if own and target == ON_UPDATE and hooks.held.size:
+        if own and target == arrays.ON_UPDATE and hooks.held.size:
             yield self._launch(fixes.clear_held, self.nodes, hooks.held)
         for h in own:
             row, count, called = self._table()[h], self._members(h), self._called(h)
             if row.uses_share:
                 yield self._launch(gpu.clear, 1, heavy, h)
                 yield self._launch(fixes.count_node, count, s.nodes, hooks, h, heavy)
-            if row.address != WHOLE:
+            if row.address != arrays.WHOLE:
                 act = fixes.on_node(target, ACT, self._values(h), of_heat)
                 yield self._launch(act, count, s, hooks, h, heavy, copies, called=called)
-            elif target != ON_VELOCITY:
+            elif target != arrays.ON_VELOCITY:
                 (tag,) = (one for one in hooks.whole if one.row == h)
-                act = fixes.on_whole_node(target, stage == POST_PARTICLES_TO_GRID)
+                act = fixes.on_whole_node(target, stage == arrays.POST_PARTICLES_TO_GRID)
                 yield self._launch(act, count, s, hooks, tag, h, copies, called=called)
             yield from self._publish_at_once(h)
         for h in own:
@@ -372,19 +359,18 @@ class StepsOnCard:
         s, hooks, copies = self.s, self.hooks, self.copies
         own = [h for h, row in enumerate(self._table()) if row.stage == stage]
         for block in s.blocks:
-            size = block.points.mass.size
-            if stage == INITIAL_INTEGRATE and getattr(hooks, "whole", ()):
-                yield self._launch(fixes.clear_force, size, block, s.kin.dimension)
+            if stage == arrays.INITIAL_INTEGRATE and getattr(hooks, "whole", ()):
+                yield self._of_points(fixes.clear_force, block)
             for h in own:
                 called = self._called(h)
-                if self._table()[h].address != WHOLE:
-                    heats, values = stage == SUPPLY_HEAT, self._values(h)
+                if self._table()[h].address != arrays.WHOLE:
+                    heats, values = stage == arrays.SUPPLY_HEAT, self._values(h)
                     act = fixes.on_heated_point(values) if heats else fixes.on_point(then, values)
-                    yield self._launch(act, size, s, block, hooks, h, copies, called=called)
+                    yield self._of_points(act, block, hooks, h, copies, called=called)
                 else:
                     (tag,) = (one for one in hooks.whole if one.row == h)
-                    act = fixes.on_whole_point(then, stage == SUPPLY_HEAT)
-                    yield self._launch(act, size, s, block, hooks, tag, h, copies, called=called)
+                    act = fixes.on_whole_point(then, stage == arrays.SUPPLY_HEAT)
+                    yield self._of_points(act, block, hooks, tag, h, copies, called=called)
         for h in own:
             yield from self._publish_at_once(h)
 
@@ -395,10 +381,6 @@ class StepsOnCard:
             yield self._launch(fixes.work_of_loads, self.nodes, *rest, called=called)
 
     # --- totals, and the watch over energy
-
-    def _clear_published(self) -> list[KernelLaunch]:
-        """Let the totals that hooks publish start from zero."""
-        return self._clear(*self._slots())
 
     def _slots(self) -> tuple[int, int]:
         """The first of the rows of totals that hooks publish, and where they end."""
@@ -430,16 +412,11 @@ class StepsOnCard:
 
     def _publish_at_once(self, h: int) -> list[KernelLaunch]:
         """Publish the totals of a hook behind it, where formulas of others may read them."""
-        slot = int(self._table()[h].slot)
-        if slot < 0 or not self._reads_totals():
+        slot, slots = int(self._table()[h].slot), range(*self._slots())
+        if slot < 0 or all(read not in slots for _, read in self._globals()):
             return []
         publish = self._launch(fixes.publish_hook, 1, self.s, self.hooks, h)
         return [*self._collect(slot, slot + 3), publish]
-
-    def _reads_totals(self) -> bool:
-        """Tell whether a formula of a hook needs what hooks publish."""
-        slots = range(*self._slots())
-        return any(slot in slots for _, slot in self._globals())
 
     def _looks(self) -> tuple[list[KernelLaunch], list[KernelLaunch]]:
         """List the launches of a look at the energy: before, and a step later."""
@@ -451,8 +428,7 @@ class StepsOnCard:
                 threads = -(-block.points.mass.size // gpu.CHUNK)
                 found.append(self._launch(fixes.add_energies, threads, s, block, copies, threads))
             if field(block.points.fields, WorkOfForces) is not None:
-                size = block.points.mass.size
-                found.append(self._launch(fixes.add_work, size, block, copies))
+                found.append(self._of_points(fixes.add_work, block, copies))
         found += [*self._collect(0, WORK + 1), *self._collect(*solids)]
         before, behind = (
             self._launch(function, 1, s) for function in (fixes.look_before, fixes.look_behind)
@@ -493,7 +469,7 @@ class StepsOnCard:
         exchanged = [self.fate, control.clock, control.values, control.totals]
         self.fate[: gpu.DRIFT] = 0
         self.images.send(exchanged)
-        begun, watched = int(control.values[TIMESTEP]), control.clock[0].watch_energy
+        begun, watched = int(control.values[arrays.TIMESTEP]), control.clock[0].watch_energy
         do = self._do
         do["begin"]()
         if self.begin:  # else points are listed in the first step

@@ -9,40 +9,13 @@ import numpy as np
 from karamelo_py.compiler.fields import addresses_of_rows
 from karamelo_py.compiler.lanes import lanes_for
 from karamelo_py.compiler.threads import Serial, Threaded
+from karamelo_py.kernels import arrays as kernel_arrays
 from karamelo_py.kernels import sorting
-from karamelo_py.kernels.arrays import (
-    ADD,
-    CLEAR,
-    TAKE,
-    Block,
-    Buffers,
-    Nodes,
-    Points,
-    Setup,
-    Tiling,
-    arrays_of,
-)
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.sweep import ROUNDING
 from karamelo_py.points.basis import first_node, shape_size
 from karamelo_py.points.kinematics import planar
-from karamelo_py.run.boxes import (
-    Boxes,
-    Reached,
-    buffers_of,
-    extents,
-    grow,
-    joined_spans,
-    numbered,
-    ragged,
-    ranges_of_shares,
-    room_of,
-    rows_of,
-    steps_of,
-    summed,
-    used,
-    without,
-)
+from karamelo_py.run import boxes as grid_boxes
 from karamelo_py.scene.lattice import MAX_NODES, Lattice
 
 # By dimension: cells of a tile of points per direction, and nodes of a tile of nodes. Small boxes
@@ -91,9 +64,9 @@ class Tiles:
         self._nodes = np.array([x.shape[:d] for x in lattices], np.int64)
         self._cells = np.array([x.cells[:d] for x in lattices], np.int64)
         self._first_node = np.array([x.first for x in lattices], np.int64)
-        self._steps = steps_of(self._nodes)
+        self._steps = grid_boxes.steps_of(self._nodes)
         self.shapes = -(-self._cells // self.size)
-        self.first = numbered(self.shapes)
+        self.first = grid_boxes.numbered(self.shapes)
         # Points without a domain reach no further than two cells from those of their tile, contact
         # one more.
         far = 2 if len(lattices) == 1 else 3
@@ -110,13 +83,13 @@ class Tiles:
         self.count = int(self.first[-1])  # of tiles, of all grids
         self._cut = sorting.TileGrid(self.size, self.shapes, self.first)
         tiles = -(-self._nodes // self.node_size)
-        self._tile_steps = steps_of(tiles)
-        self._first_of_nodes = numbered(tiles)
+        self._tile_steps = grid_boxes.steps_of(tiles)
+        self._first_of_nodes = grid_boxes.numbered(tiles)
         # Of all buffers of a scene: count, first and parts.
         self._layout = np.zeros(2, np.int64), np.zeros(1, np.int64), np.zeros((0, 10), np.int64)
 
-    def empty_tiling(self) -> Tiling:
-        return Tiling(
+    def empty_tiling(self) -> kernel_arrays.Tiling:
+        return kernel_arrays.Tiling(
             count=np.array([0, 1, 0]),
             share=np.zeros(SHARES + 1, np.int64),
             order=np.arange(self.count + 1),
@@ -129,34 +102,34 @@ class Tiles:
             report=np.zeros((self.count + 1, 10)),
         )
 
-    def empty_buffers(self, nodes: Nodes, blocks: int) -> Buffers:
+    def empty_buffers(self, nodes: kernel_arrays.Nodes, blocks: int) -> kernel_arrays.Buffers:
         """Buffers for what points of so many blocks give to `nodes`."""
         most = blocks * self._most_rows
         rows = int(most) if most <= AT_ONCE * len(nodes.sums) else 0
         given = tuple(one for one in nodes.fields if getattr(type(one), "summed", False))
         of = nodes._replace(fields=given)
         if not self.direct:
-            of = Nodes(
-                *(room_of(rows, array) for array in of[:-1]),
-                tuple(type(one)(room_of(rows, one.array)) for one in given),
+            of = kernel_arrays.Nodes(
+                *(grid_boxes.room_of(rows, array) for array in of[:-1]),
+                tuple(type(one)(grid_boxes.room_of(rows, one.array)) for one in given),
             )
         self.sets += 1
-        return Buffers(of, *self._layout, self.sets - 1)
+        return kernel_arrays.Buffers(of, *self._layout, self.sets - 1)
 
-    def empty_nodes(self, s: Setup) -> None:
+    def empty_nodes(self, s: kernel_arrays.Setup) -> None:
         """Set the sums of points at the nodes in use to zero."""
-        _empty(s, used(s.spans)[1:])
+        _empty(s, grid_boxes.used(s.spans)[1:])
         if not self.direct:
-            for one in buffers_of(s):
-                for array in summed(one.nodes):
+            for one in grid_boxes.buffers_of(s):
+                for array in grid_boxes.summed(one.nodes):
                     array[: self.rows] = 0
 
-    def sort(self, s: Setup) -> None:
+    def sort(self, s: kernel_arrays.Setup) -> None:
         """Sort all points by tile and find the nodes in use; sums at others become zero.
 
         Those of nodes in use begin anew in the next step, and boxes are zero between two steps.
         """
-        before = used(s.spans)[1:].copy()
+        before = grid_boxes.used(s.spans)[1:].copy()
         clock = s.control.clock[0]
         most, steps = (DIRECT_DRIFT, DIRECT_STEPS) if self.direct else (DRIFT, STEPS)
         limit = min(max(LEAST_DRIFT[self.dimension], steps * clock.pace), most)
@@ -165,10 +138,10 @@ class Tiles:
         occupied = [self._sort_block(s, block) for block in s.blocks]
         self.occupied = len(set().union(*(tiles.tolist() for tiles in occupied)))
         self.lay_out(s)
-        _empty(s, without(before, used(s.spans)[1:]))
+        _empty(s, grid_boxes.without(before, grid_boxes.used(s.spans)[1:]))
         self.sorts += 1
 
-    def _reach(self, s: Setup, block: Block, x: np.ndarray) -> float:
+    def _reach(self, s: kernel_arrays.Setup, block: kernel_arrays.Block, x: np.ndarray) -> float:
         """Bound the distance of points' contributions from their present positions, in cells."""
         far = 0.0
         if len(x) > self.dimension:
@@ -179,11 +152,11 @@ class Tiles:
         beyond = far + drift + getattr(type(s.contact), "looks_beyond", 0)
         return beyond if far < cells else cells  # also where it is not a number
 
-    def _where(self, s: Setup, points: Points) -> np.ndarray:
+    def _where(self, s: kernel_arrays.Setup, points: kernel_arrays.Points) -> np.ndarray:
         """The places (w, n) that weights belong to."""
         return points.x[s.control.clock[0].now] if points.home is None else points.home
 
-    def tiles_of(self, s: Setup, points: Points) -> np.ndarray:
+    def tiles_of(self, s: kernel_arrays.Setup, points: kernel_arrays.Points) -> np.ndarray:
         """(n,) the tile of each point."""
         x, ends = self._where(s, points), np.empty((self.threads, self.count), np.int64)
         tile = np.empty(x.shape[1], np.int64)
@@ -191,7 +164,7 @@ class Tiles:
         sorting.find_tiles(self.mode, len(ends), kin, s.grids, self._cut, x, of, ends, tile)
         return tile
 
-    def _sort_block(self, s: Setup, block: Block) -> np.ndarray:
+    def _sort_block(self, s: kernel_arrays.Setup, block: kernel_arrays.Block) -> np.ndarray:
         """Sort the points of a block; the numbers of the tiles that they are in."""
         points, tiling = block.points, block.tiling
         x = self._where(s, points)
@@ -218,7 +191,7 @@ class Tiles:
         offset = float(first_node(s.basis, s.grids.h[0]))
         around = sorting.Neighbourhood(top, self.per_cell, self.beyond, least, reach, offset)
         kin, of, ids = planar(s.kin), points.grid, points.id
-        rows = addresses_of_rows(array for _, array in arrays_of(points))
+        rows = addresses_of_rows(array for _, array in kernel_arrays.arrays_of(points))
         sorting.sort_points(mode, kin, s.grids, around, self._cut, x, of, ids, found, rows)
         ends = found.ends[-1]
         begins = np.append(0, ends[:-1])
@@ -236,35 +209,37 @@ class Tiles:
             sorting.find_rows(mode, parts, s.kin, s.grids, around, x, tiling, parts)
         return occupied
 
-    def box_bytes(self, s: Setup) -> int:
+    def box_bytes(self, s: kernel_arrays.Setup) -> int:
         if self.direct:
             return 0
-        given = [array for one in buffers_of(s) for array in summed(one.nodes)]
+        given = [
+            array for one in grid_boxes.buffers_of(s) for array in grid_boxes.summed(one.nodes)
+        ]
         return self.rows * sum(array.itemsize * array.shape[1] for array in given)
 
-    def lay_out(self, s: Setup) -> None:
+    def lay_out(self, s: kernel_arrays.Setup) -> None:
         """Lay boxes of all blocks one after another; find the tiles of nodes that they reach."""
         spans, *found = self._rows_to_clear(s) if self.direct else self._parts_to_sum(s)
         s.buffers.count[:] = len(found[1]) - 1, self.direct
         spans = np.concatenate([[[len(spans), 0]], spans])
         rooms = s.spans, s.ranges, *s.buffers[2:4]
         for room, rows in zip(rooms, (spans, *found), strict=True):
-            grow(room, len(rows))
+            grid_boxes.grow(room, len(rows))
             room[: len(rows)] = rows
 
-    def _rows_to_clear(self, s: Setup) -> tuple[np.ndarray, ...]:
+    def _rows_to_clear(self, s: kernel_arrays.Setup) -> tuple[np.ndarray, ...]:
         """As `_parts_to_sum` where points are few: one share, a part for each span."""
         boxes = Tiles._boxes(self, s)
         steps = self._steps[boxes.grid]
         self._tell_buffers(s, 0, 0, self._first_node[boxes.grid], steps)
-        spans = joined_spans(self._parts(boxes.grid, boxes.lo, boxes.hi, 0, steps))
+        spans = grid_boxes.joined_spans(self._parts(boxes.grid, boxes.lo, boxes.hi, 0, steps))
         parts = np.ones((len(spans), 10), np.int64)
         parts[:, 0], parts[:, 4] = spans[:, 0], spans[:, 1] - spans[:, 0]
-        parts[:, 9] = CLEAR
-        ranges = ranges_of_shares(spans, np.zeros(len(spans), np.int64), 1)
+        parts[:, 9] = kernel_arrays.CLEAR
+        ranges = grid_boxes.ranges_of_shares(spans, np.zeros(len(spans), np.int64), 1)
         return spans, ranges, [0, len(spans)], parts
 
-    def _parts_to_sum(self, s: Setup) -> tuple[np.ndarray, ...]:
+    def _parts_to_sum(self, s: kernel_arrays.Setup) -> tuple[np.ndarray, ...]:
         """Spans and ranges of the nodes in tiles that boxes reach; first of each share, and parts.
 
         Nodes are in the order of the shares of points that have most of them: what a thread has
@@ -284,20 +259,20 @@ class Tiles:
         box, tile, begin, end, _ = (array[order] for array in reached)
         starts = np.flatnonzero(np.diff(tile, prepend=-1))
         grid = boxes.grid[box]
-        own_begin, own_end = extents(starts, begin, end)
+        own_begin, own_end = grid_boxes.extents(starts, begin, end)
         more = ((begin[starts] != own_begin) | (end[starts] != own_end)).any(axis=1)
         parts = self._parts(grid, begin, end, first[box], steps[box])
-        parts[:, 9] = ADD
-        parts[starts[~more], 9] = TAKE
+        parts[:, 9] = kernel_arrays.ADD
+        parts[starts[~more], 9] = kernel_arrays.TAKE
         own = self._parts(grid[starts], own_begin, own_end, 0, 0)
         parts = np.insert(parts, starts[more], own[more], axis=0)
         self._see_nodes(tile[starts], grid[starts], own_begin, own_end)
         owner = _evenly(own, beside[order][starts])
         firsts = np.append(starts + np.cumsum(more) - more, len(parts))
-        rows = np.stack(rows_of(own), axis=1)
-        ranges = ranges_of_shares(rows, np.repeat(owner, own[:, 2] * own[:, 3]), SHARES)
+        rows = np.stack(grid_boxes.rows_of(own), axis=1)
+        ranges = grid_boxes.ranges_of_shares(rows, np.repeat(owner, own[:, 2] * own[:, 3]), SHARES)
         firsts = firsts[np.searchsorted(owner, np.arange(SHARES + 1))]
-        return joined_spans(own), ranges, firsts, parts
+        return grid_boxes.joined_spans(own), ranges, firsts, parts
 
     def _beside(self, tile: np.ndarray, grid: np.ndarray) -> np.ndarray:
         """The first of the tiles of nodes (n,) that are of one share with each.
@@ -312,7 +287,7 @@ class Tiles:
         first, along = self._first_of_nodes[grid], self._tile_steps[grid, -2]
         return tile - (tile - first) % along
 
-    def _shares(self, s: Setup) -> np.ndarray:
+    def _shares(self, s: kernel_arrays.Setup) -> np.ndarray:
         """The share of the points of its block that each own tile is in."""
         found = []
         for block in s.blocks:
@@ -323,19 +298,19 @@ class Tiles:
             found.append(share)
         return np.concatenate(found)
 
-    def _boxes(self, s: Setup) -> Boxes:
+    def _boxes(self, s: kernel_arrays.Setup) -> grid_boxes.Boxes:
         d, tilings = self.dimension, [block.tiling for block in s.blocks]
         grid = np.concatenate([one.grid[: one.count[0]] for one in tilings])
         box = np.concatenate([one.box[: one.count[0]] for one in tilings])
         rows = np.concatenate([one.rows[: one.count[0]] for one in tilings])
-        return Boxes(np.arange(len(box)), grid, box[:, :d], box[:, d:], rows)
+        return grid_boxes.Boxes(np.arange(len(box)), grid, box[:, :d], box[:, d:], rows)
 
-    def _reached(self, boxes: Boxes) -> tuple[Boxes, Reached]:
+    def _reached(self, boxes: grid_boxes.Boxes) -> tuple[grid_boxes.Boxes, grid_boxes.Reached]:
         size = self.node_size
         low = boxes.lo // size
         across = boxes.hi // size - low + 1
-        box, left = ragged(np.prod(across, axis=1))
-        places = low[box] + left[:, None] // steps_of(across)[box] % across[box]
+        box, left = grid_boxes.ragged(np.prod(across, axis=1))
+        places = low[box] + left[:, None] // grid_boxes.steps_of(across)[box] % across[box]
         grid = boxes.grid[box]
         tile = self._first_of_nodes[grid] + (places * self._tile_steps[grid]).sum(axis=1)
         begin = np.maximum(places * size, boxes.lo[box])
@@ -348,11 +323,11 @@ class Tiles:
             end[:, 2] = np.minimum(end[:, 2], last)
             some = begin[:, 2] <= end[:, 2]
             box, tile, begin, end = box[some], tile[some], begin[some], end[some]
-        return boxes, Reached(box, tile, begin, end, np.prod(end - begin + 1, axis=1))
+        return boxes, grid_boxes.Reached(box, tile, begin, end, np.prod(end - begin + 1, axis=1))
 
-    def _number(self, s: Setup, boxes: Boxes) -> tuple[np.ndarray, ...]:
+    def _number(self, s: kernel_arrays.Setup, boxes: grid_boxes.Boxes) -> tuple[np.ndarray, ...]:
         """Give each box its rows of the buffers: its number of node 0, and steps (k, d)."""
-        steps = steps_of(boxes.hi - boxes.lo + 1)
+        steps = grid_boxes.steps_of(boxes.hi - boxes.lo + 1)
         ends = np.cumsum(np.prod(boxes.hi - boxes.lo + 1, axis=1))
         begins = np.concatenate([[0], ends])[:-1]
         first = begins - (boxes.lo * steps).sum(axis=1)
@@ -360,12 +335,12 @@ class Tiles:
         self.rows = int(ends[-1]) if len(ends) else 0
         if self.rows > MAX_NODES:
             raise MemoryError(f"tiles of points would need {self.rows} records of nodes")
-        for one in buffers_of(s):
-            for array in summed(one.nodes):
-                grow(array, self.rows)
+        for one in grid_boxes.buffers_of(s):
+            for array in grid_boxes.summed(one.nodes):
+                grid_boxes.grow(array, self.rows)
         return first, steps
 
-    def _tell_buffers(self, s: Setup, begins, ends, first, steps) -> None:
+    def _tell_buffers(self, s: kernel_arrays.Setup, begins, ends, first, steps) -> None:
         """Tell the tiles of all blocks where in the buffers their boxes are; see `Tiling`."""
         columns = np.zeros((len(first), 5), np.int64)
         columns[:, 0], columns[:, 1], columns[:, 2] = begins, ends, first
@@ -388,7 +363,7 @@ class Tiles:
         """
         d = self.dimension
         parts = np.ones((len(grid), 10), np.int64)
-        parts[:, 9] = CLEAR
+        parts[:, 9] = kernel_arrays.CLEAR
         parts[:, 0] = self._first_node[grid] + (begin * self._steps[grid]).sum(axis=1)
         parts[:, 1] = first + (begin * steps).sum(axis=1)
         parts[:, 5 - d : 5] = end - begin + 1
@@ -397,10 +372,10 @@ class Tiles:
         return parts
 
 
-def _empty(s: Setup, spans: np.ndarray) -> None:
+def _empty(s: kernel_arrays.Setup, spans: np.ndarray) -> None:
     """Set the sums of points at the nodes of spans (k, 2) to zero."""
     of = [s.nodes] + ([s.heat.nodes] if isinstance(s.heat, Conducting) else [])
-    arrays = [array for nodes in of for array in summed(nodes)]
+    arrays = [array for nodes in of for array in grid_boxes.summed(nodes)]
     for begin, end in spans.tolist():
         for array in arrays:
             array[begin:end] = 0
@@ -420,7 +395,7 @@ def _evenly(parts: np.ndarray, beside: np.ndarray) -> np.ndarray:
     return share[np.cumsum(firsts) - 1]
 
 
-def in_use(tiling: Tiling) -> list[tuple[str, int]]:
+def in_use(tiling: kernel_arrays.Tiling) -> list[tuple[str, int]]:
     """Names of the arrays of a tiling that a sort changes, and how many rows are in use."""
     tiles = tiling.count[0]
     whole = [(name, len(getattr(tiling, name))) for name in ("count", "share")]

@@ -5,19 +5,9 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+from karamelo_py.kernels import implicit_averaging as loops
 from karamelo_py.kernels.arrays import known_to_laws
 from karamelo_py.kernels.implicit import PARTS
-from karamelo_py.kernels.implicit_averaging import (
-    add_products,
-    add_slopes,
-    average,
-    bring_mean,
-    grow,
-    keep_averaged_stress,
-    nothing_averaged,
-    respond_averaged,
-    sum_at_nodes,
-)
 
 
 class AveragedVolumes:
@@ -32,7 +22,7 @@ class AveragedVolumes:
     def __init__(self, equations: Any):
         self.equations, self.mode = equations, equations.mode
         kin = equations.s.kin
-        self.averages = [nothing_averaged(kin, block) for block in equations.blocks]
+        self.averages = [loops.nothing_averaged(kin, block) for block in equations.blocks]
 
     def _parts(self) -> Any:
         e = self.equations
@@ -47,13 +37,13 @@ class AveragedVolumes:
         """Sum numbers of points at the nodes (m,)."""
         sums = np.zeros(len(self.equations.nodes))
         for _, _, seen, _, averages in self._parts():
-            sum_at_nodes(self.mode, PARTS, seen, getattr(averages, name), sums)
+            loops.sum_at_nodes(self.mode, PARTS, seen, getattr(averages, name), sums)
         return sums
 
     def _grow(self) -> None:
         kin = self.equations.s.kin
         for points, laws, _, response, averages in self._parts():
-            grow(self.mode, PARTS, kin, points, laws, response, averages)
+            loops.grow(self.mode, PARTS, kin, points, laws, response, averages)
         self.volume = self._sums("volume")
         self.volume[self.volume == 0] = 1.0
 
@@ -62,24 +52,24 @@ class AveragedVolumes:
         self._grow()
         ratios = self._sums("grown") / self.volume
         for points, laws, seen, response, averages in self._parts():
-            average(self.mode, PARTS, seen, ratios, averages.ratio)
+            loops.average(self.mode, PARTS, seen, ratios, averages.ratio)
             kin = self.equations.s.kin
-            respond_averaged(self.mode, PARTS, kin, points, laws, dt, response, averages)
+            loops.respond_averaged(self.mode, PARTS, kin, points, laws, dt, response, averages)
         self._bring_mean()
 
     def keep_stress(self) -> None:
         """Find the stresses of the present state."""
         kin = self.equations.s.kin
         for points, laws, _, response, averages in self._parts():
-            keep_averaged_stress(kin, points, laws, response, averages)
+            loops.keep_averaged_stress(kin, points, laws, response, averages)
         self._grow()
         self._bring_mean()
 
     def _bring_mean(self) -> None:
         means = self._sums("pressure") / self.volume
         for _, _, seen, response, averages in self._parts():
-            average(self.mode, PARTS, seen, means, averages.mean)
-            bring_mean(self.mode, PARTS, self.equations.s.kin, response, averages)
+            loops.average(self.mode, PARTS, seen, means, averages.mean)
+            loops.bring_mean(self.mode, PARTS, self.equations.s.kin, response, averages)
 
     def _matrix(self, name: str) -> sp.csr_matrix:
         """Sum tensors of points, times weights and gradients of their nodes: (m, m d)."""
@@ -88,7 +78,7 @@ class AveragedVolumes:
         data = np.zeros(len(columns))
         for _, _, seen, _, averages in self._parts():
             tensors = getattr(averages, name)
-            add_slopes(self.mode, PARTS, e.s.kin, seen, tensors, e.layout, data)
+            loops.add_slopes(self.mode, PARTS, e.s.kin, seen, tensors, e.layout, data)
         m = len(e.nodes)
         return sp.csr_matrix((data, columns, e.d * e.layout.first), (m, m * e.d))
 
@@ -98,6 +88,6 @@ class AveragedVolumes:
         S = sp.diags(1 / self.volume) @ self._matrix("cofactors")
         data = np.zeros(len(e.pairs[1]))
         for _, _, seen, _, averages in self._parts():
-            add_products(self.mode, PARTS, seen, averages.stiffness, e.layout, data)
+            loops.add_products(self.mode, PARTS, seen, averages.stiffness, e.layout, data)
         Z = sp.csr_matrix((data, e.pairs[1], e.layout.first), (m, m))
         return self._matrix("by_ratio").T @ S + S.T @ (self._matrix("of_pressure") + Z @ S)

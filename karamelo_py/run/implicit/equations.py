@@ -10,28 +10,9 @@ from scipy.sparse.csgraph import connected_components
 from karamelo_py.compiler.algebra import on_numbers
 from karamelo_py.compiler.fields import field, rows_of_points
 from karamelo_py.compiler.tuples import record
+from karamelo_py.kernels import implicit as loops
 from karamelo_py.kernels.arrays import MASS, Setup, known_to_laws
 from karamelo_py.kernels.heat import Conductance
-from karamelo_py.kernels.implicit import (
-    PARTS,
-    Pairs,
-    Response,
-    Seen,
-    add_conductance,
-    add_forces,
-    add_stiffness,
-    keep_stress,
-    list_points,
-    mark_pairs,
-    nothing_seen,
-    respond,
-    respond_to_changes,
-    scatter,
-    see,
-    spread,
-    strain,
-    stress_and_tangent,
-)
 from karamelo_py.kernels.visit import FBar
 from karamelo_py.points.kinematics import Axisymmetric
 from karamelo_py.points.laws import can, constrained_velocity, initial_state, specific_volume
@@ -44,7 +25,7 @@ FAR = 0.5  # cells that nodes may go at once towards others, and that for each c
 FOLLOWED, FOLLOWING = ("nodes", "deforming"), ("positions", "rigid_motions", "differences")
 
 
-def valid(seen: Seen) -> np.ndarray:
+def valid(seen: loops.Seen) -> np.ndarray:
     """Tell which nodes (n, s) points have something of."""
     return np.arange(seen.nodes.shape[1]) < seen.count[:, None]
 
@@ -144,23 +125,34 @@ class Equations:
         x, y = self.s.grids.step_x[g], self.s.grids.step_y[g]
         return np.stack([x, y, np.ones_like(x)], 1)[:, : self.d]
 
-    def _seen(self, block: Any) -> tuple[Seen, Response]:
+    def _seen(self, block: Any) -> tuple[loops.Seen, loops.Response]:
         s = self.s
-        seen, response = nothing_seen(s, block)
+        seen, response = loops.nothing_seen(s, block)
         now = int(s.control.clock[0].now)
-        see(self.mode, PARTS, s.frame, s.kin, s.basis, s.grids, block.points, block.laws, now, seen)
+        loops.see(
+            self.mode,
+            loops.PARTS,
+            s.frame,
+            s.kin,
+            s.basis,
+            s.grids,
+            block.points,
+            block.laws,
+            now,
+            seen,
+        )
         return seen, response
 
-    def _led(self, tools: list[tuple[Any, Seen]]) -> tuple[np.ndarray, np.ndarray]:
+    def _led(self, tools: list[tuple[Any, loops.Seen]]) -> tuple[np.ndarray, np.ndarray]:
         """Find the nodes (m,) that see rigid points, and the velocities (m, d) these have there."""
         mass, momentum = np.zeros((len(self.nodes), 1)), np.zeros((len(self.nodes), self.d))
         for block, seen in tools:
-            scatter(seen, block.points.mass, np.ones((1, len(seen.nodes))), mass)
-            scatter(seen, block.points.mass, block.points.v, momentum)
+            loops.scatter(seen, block.points.mass, np.ones((1, len(seen.nodes))), mass)
+            loops.scatter(seen, block.points.mass, block.points.v, momentum)
         led = mass[:, 0] > 0
         return led, np.divide(momentum, mass, out=momentum, where=led[:, None])
 
-    def _numbered(self, seen: Seen) -> Seen:
+    def _numbered(self, seen: loops.Seen) -> loops.Seen:
         """Put numbers of nodes among the unknown ones in the place of those in the grid."""
         most = int(seen.count.max(initial=1))
         number = self.number_of(seen.nodes[:, :most])
@@ -174,7 +166,7 @@ class Equations:
             starts=np.zeros(len(self.nodes) + 1, np.int64),
             entries=np.zeros(int(seen.count.sum()), small),
         )
-        list_points(seen)
+        loops.list_points(seen)
         return seen
 
     def _find_pairs(self, stabilised: bool) -> None:
@@ -183,15 +175,15 @@ class Equations:
         Those of the ghost stabilisation are among them, and each node with itself.
         """
         d, m = self.d, len(self.nodes)
-        reach = max((spread(seen, self.places) for seen, _ in self.parts), default=0)
+        reach = max((loops.spread(seen, self.places) for seen, _ in self.parts), default=0)
         row = 2 * reach + 1
         weights = row ** np.arange(d)[::-1]
         rank = np.full((m, row**d), -1, np.int32)
         middle = int(reach * weights.sum())
-        self.layout = Pairs(self.places @ weights, middle, rank, np.zeros(m + 1, np.int64))
+        self.layout = loops.Pairs(self.places @ weights, middle, rank, np.zeros(m + 1, np.int64))
         rank[:, middle] = 0
         for seen, _ in self.parts:
-            mark_pairs(self.mode, PARTS, seen, self.layout)
+            loops.mark_pairs(self.mode, loops.PARTS, seen, self.layout)
         rows, offsets = np.nonzero(rank == 0)
         shift = np.stack(np.unravel_index(offsets, (row,) * d), 1) - reach
         columns = self.number_of(self.nodes[rows] + (shift * self.steps[rows]).sum(1))
@@ -225,20 +217,20 @@ class Equations:
         """Find the nodal forces (m, d) of displacements (m, d); not finite where a point fails."""
         s = self.s
         for seen, response in self.parts:
-            strain(self.mode, PARTS, s.kin, seen, u, response)
+            loops.strain(self.mode, loops.PARTS, s.kin, seen, u, response)
         if self.averaged is not None:
             self.averaged.respond(dt)
         else:
             for block, (_, response) in zip(self.blocks, self.parts, strict=True):
                 points = known_to_laws(block.points)
-                respond(self.mode, PARTS, s.kin, points, block.laws, dt, response)
+                loops.respond(self.mode, loops.PARTS, s.kin, points, block.laws, dt, response)
         return self._forces()
 
     def _forces(self) -> np.ndarray:
         """Sum the forces (m, d) of the stresses of the points."""
         f = np.zeros((len(self.nodes), self.d))
         for seen, response in self.parts:
-            add_forces(self.mode, PARTS, self.s.kin, seen, response.stress, f)
+            loops.add_forces(self.mode, loops.PARTS, self.s.kin, seen, response.stress, f)
         return f
 
     def furthest(self) -> float:
@@ -273,7 +265,7 @@ class Equations:
             self.averaged.keep_stress()
         else:
             for block, (_, response) in zip(self.blocks, self.parts, strict=True):
-                keep_stress(self.s.kin, block.points, block.laws, response.stress)
+                loops.keep_stress(self.s.kin, block.points, block.laws, response.stress)
         return self._forces()
 
     @cached_property
@@ -306,15 +298,15 @@ class Equations:
             n, done = block.points.mass.size, np.zeros(len(self.nodes), np.int64)
             if self.averaged is not None:
                 tangent = self.averaged.averages[k].tangent
-                add_stiffness(self.mode, PARTS, kin, seen, tangent, 0, n, done, *into)
+                loops.add_stiffness(self.mode, loops.PARTS, kin, seen, tangent, 0, n, done, *into)
                 continue
             points = known_to_laws(block.points)
             tangent = rows_of_points((t * t, min(n, AT_ONCE)), np.float64)
             for first in range(0, n, AT_ONCE):
                 some = first, min(first + AT_ONCE, n)
                 of = points, block.laws, dt, response, *some, tangent
-                respond_to_changes(self.mode, PARTS, kin, *of)
-                add_stiffness(self.mode, PARTS, kin, seen, tangent, *some, done, *into)
+                loops.respond_to_changes(self.mode, loops.PARTS, kin, *of)
+                loops.add_stiffness(self.mode, loops.PARTS, kin, seen, tangent, *some, done, *into)
         if ghost is not None:
             m = len(self.nodes)
             rows = np.repeat(np.arange(m), np.diff(ghost.indptr))
@@ -334,7 +326,7 @@ class Equations:
         for block, (seen, _) in zip(self.blocks, self.parts, strict=True):
             seen.gradients[:] = self._seen(block)[0].gradients
             conductance = field(block.points.fields, Conductance)
-            add_conductance(self.s.kin, seen, conductance, self.layout, data)
+            loops.add_conductance(self.s.kin, seen, conductance, self.layout, data)
         m = len(self.nodes)
         return sp.csr_matrix((data, self.pairs[1], self.layout.first), (m, m))
 
@@ -353,7 +345,7 @@ class Equations:
                 law = record(block.laws, k)
                 rest = kin.Tensor._make([0.0] * len(places))
                 state = initial_state(law, kin, 1.0)
-                _, C = on_numbers(stress_and_tangent)(law, kin, state, rest, 1.0)
+                _, C = on_numbers(loops.stress_and_tangent)(law, kin, state, rest, 1.0)
                 one = C[0][0] if self.d == 1 else 1.3 * (C[0][0] - C[0][places.index((1, 1))])
                 own = float(points.mass[points.material == k].sum() * specific_volume(law))
                 total, volume = total + own * float(one), volume + own
@@ -379,7 +371,7 @@ class Equations:
                 self.blocks, self.parts, moduli.of_laws, strict=True
             ):
                 young, volume = of_laws[:, block.points.material]
-                scatter(seen, block.points.mass, np.stack([volume * young, volume]), sums)
+                loops.scatter(seen, block.points.mass, np.stack([volume * young, volume]), sums)
             none = np.full(len(sums), np.inf)  # of nodes that see gradients only
             means = np.divide(sums[:, 0], sums[:, 1], out=none, where=sums[:, 1] > 0)
             least = means[lines].min(1, initial=np.inf)
