@@ -1,9 +1,11 @@
 """karamelo-py view and plot, and where the files of a run go: what a person does after a run."""
 
 import io
+from itertools import product
 from pathlib import Path
 from types import SimpleNamespace
 
+import meshio
 import numpy as np
 import pytest
 from charts import faults
@@ -17,7 +19,7 @@ from karamelo_py.app import view
 from karamelo_py.app.cli import main
 from karamelo_py.app.plot import read_rows
 from karamelo_py.output import pictures
-from karamelo_py.output.outlines import outlines, wires
+from karamelo_py.output.outlines import Tool, outlines
 from karamelo_py.output.rhythm import ByTime
 from karamelo_py.output.snapshots import Snapshot, read
 from karamelo_py.styles.dumps.hdf5 import Hdf5
@@ -343,7 +345,8 @@ def lines_of_tool(words):
     hub.interpreter.run_text(words)
     (fix,) = hub.fixes.values()
     depth = lambda x: fix.depth_of(SimpleNamespace(position=x))  # noqa: E731
-    return list(wires(depth, np.zeros(3), np.ones(3)))
+    faces = fix.faces_of and fix.faces_of()
+    return list(Tool(depth, faces).lines(np.zeros(3), np.ones(3)))
 
 
 def test_lines_of_a_box_are_its_edges():
@@ -365,6 +368,25 @@ def test_lines_of_a_box_are_its_edges():
         ends = [line.min(axis=0), line.max(axis=0)]
         np.testing.assert_allclose(ends, expected, atol=0.01 * np.ptp(box, axis=0).max())
     assert sorted(faces) == [(axis, end) for axis in range(3) for end in (0, 1)]
+
+
+def test_lines_of_a_mesh_are_its_sharp_edges(tmp_path):
+    """A brick of triangles has twelve, where it has moved to."""
+    x = np.array(list(product((0.1, 0.5), (0.2, 0.4), (0.3, 0.4))))
+    quads = (0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)
+    triangles = [half for a, b, c, d in quads for half in ((a, b, c), (a, c, d))]
+    meshio.write(tmp_path / "brick.stl", meshio.Mesh(x, [("triangle", np.array(triangles))]))
+    found = lines_of_tool(
+        f"""
+        region(brick, stl, "{tmp_path}/brick.stl")
+        fix(press, contact/surface, all, brick, 0, 0.2, 0, 0.1)
+        """
+    )
+    lengths = sorted(np.linalg.norm(line[-1] - line[0]) for line in found)
+    assert lengths == pytest.approx([0.1] * 4 + [0.2] * 4 + [0.4] * 4)
+    at = np.concatenate(found)
+    ends = [at.min(axis=0), at.max(axis=0)]
+    np.testing.assert_allclose(ends, [[0.3, 0.2, 0.4], [0.7, 0.4, 0.5]], atol=1e-6)
 
 
 def test_lines_of_a_ball_are_on_it():

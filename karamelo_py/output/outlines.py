@@ -3,18 +3,40 @@
 from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import pairwise, product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from contourpy import contour_generator
 
+FINE = 300  # steps along the longest side at which the outline of a tool is looked for
 # In space, where tools are drawn by sections: places along each axis where a tool is looked for,
 # steps along a section, halvings of the way to its ends, and sections between these.
-COARSE, SECTION, HALVINGS, BETWEEN = 32, 100, 10, 3
+COARSE, SECTION, HALVINGS, BETWEEN = 24, 80, 8, 3
+SHARP, FLAT = 0.87, 1 - 1e-6  # cosines of the angle between two faces
 # Points whose nearest neighbours are looked for, at least and at most, and distances in between.
 FEW, SAMPLE, DISTANCES = 25, 400, 4_000_000
 
 Depth = Callable[[np.ndarray], np.ndarray]  # in a tool, of places (n, d): (n,)
+
+
+class Tool(NamedTuple):
+    """A wall or a tool: the depth of places in it, and its faces (m, d, d) where it has such."""
+
+    depth: Depth
+    faces: np.ndarray | None = None
+
+    def lines(self, lo: np.ndarray, hi: np.ndarray) -> Iterator[np.ndarray]:
+        """Yield lines (m, d) on its surface, as far as it lies between two corners (d,)."""
+        plane = len(lo) == 2
+        if self.faces is None:
+            yield from zeros(self.depth, lo, hi, FINE) if plane else wires(self.depth, lo, hi)
+            return
+        step = np.linalg.norm(hi - lo) / FINE
+        for start, end in self.faces if plane else edges(self.faces):
+            count = int(np.linalg.norm(end - start) / step) + 2
+            line = start + (end - start) * np.linspace(0, 1, count)[:, None]
+            beyond = ((line < lo) | (line > hi)).any(axis=1)
+            yield from (piece for piece, outside in split(line, beyond) if not outside)
 
 
 def outlines(x: np.ndarray) -> list[np.ndarray]:
@@ -90,6 +112,7 @@ def wires(depth: Depth, lo: np.ndarray, hi: np.ndarray) -> Iterator[np.ndarray]:
         places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
         return depth(places.reshape(-1, 3)).reshape(places.shape[:3])
 
+    first, last = lo, hi
     for _ in range(3):  # closer around the surface
         axes = [np.linspace(*ends, COARSE) for ends in zip(lo, hi, strict=True)]
         depths = on_lattice(axes)
@@ -124,7 +147,8 @@ def wires(depth: Depth, lo: np.ndarray, hi: np.ndarray) -> Iterator[np.ndarray]:
         step = (hi[others] - lo[others]).max() / SECTION
         inset_of = {ends[0]: min(step, apart.sum() / 2), ends[1]: -min(step, apart.sum() / 2)}
         for height in heights:
-            inset = inset_of.get(height, 0.0)
+            cut_off = height in (first[axis], last[axis])
+            inset = 0.0 if cut_off else inset_of.get(height, 0.0)
             section = partial(_section, depth, axis, height + inset)
             for flat in zeros(section, lo[others], hi[others], SECTION):
                 line = np.insert(flat, axis, height + inset, axis=1)
@@ -132,12 +156,37 @@ def wires(depth: Depth, lo: np.ndarray, hi: np.ndarray) -> Iterator[np.ndarray]:
                     part = inset / 2 * along
                     slope = (depth(line + part) - depth(line - part)) / inset
                     shows = abs(inset) < step or np.median(np.abs(slope)) < 0.7
-                else:
+                elif not cut_off:
                     bend = np.abs(depth(line + apart) + depth(line - apart))
                     shows = np.mean(bend > 1e-3 * np.linalg.norm(apart)) > 0.05
-                if shows:
+                if cut_off or shows:
                     line[:, axis] = height
                     yield line
+
+
+def edges(faces: np.ndarray) -> np.ndarray:
+    """Find sharp edges (n, 2, 3) of triangles (m, 3, 3), and sections where they bend a little."""
+    corner = np.unique(faces.reshape(-1, 3), axis=0, return_inverse=True)[1].reshape(-1, 3)
+    normal = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
+    sides = np.sort(corner[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    order = np.lexsort(sides.T)  # two that are the same follow each other
+    shared = (sides[order[:-1]] == sides[order[1:]]).all(axis=1)
+    first, second = order[:-1][shared], order[1:][shared]
+    cosine = np.abs((normal[first // 3] * normal[second // 3]).sum(axis=1))
+    sharp = first[cosine < SHARP]
+    ends = faces[sharp // 3, sharp % 3], faces[sharp // 3, (sharp + 1) % 3]
+    found = [np.stack(ends, axis=1)]
+    bends = (cosine >= SHARP) & (cosine < FLAT)
+    smooth = faces[np.unique(np.concatenate([first[bends], second[bends]]) // 3)]
+    for axis in range(3) if len(smooth) else ():
+        along = smooth[:, :, axis]
+        for height in np.linspace(along.min(), along.max(), BETWEEN + 2)[1:-1]:
+            crossed = (along > height) != (np.roll(along, -1, axis=1) > height)
+            a, b = smooth[crossed], np.roll(smooth, -1, axis=1)[crossed]
+            part = (height - a[:, axis]) / (b[:, axis] - a[:, axis])
+            found.append((a + part[:, None] * (b - a)).reshape(-1, 2, 3))
+    return np.concatenate(found)
 
 
 def _section(depth: Depth, axis: int, height: float, x: np.ndarray) -> np.ndarray:

@@ -25,15 +25,14 @@ from matplotlib.transforms import Transform
 from PIL import Image
 
 from karamelo_py.output.outlines import (
-    Depth,
+    FINE,
     Front,
+    Tool,
     corners,
     outlines,
     shared_out,
     smoothed,
     split,
-    wires,
-    zeros,
 )
 from karamelo_py.output.snapshots import Snapshot
 
@@ -42,7 +41,6 @@ SOLIDS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0
 MOST_IN_LEGEND = 16
 MARGIN = 4  # pixels at both sides of a long title
 MARKS = 1 << 16  # points that are drawn together
-FINE = 300  # steps along the longest side at which the outline of a tool is looked for
 MOST_CELLS = 1 << 23  # of a picture in which hidden points are looked for
 HIDDEN = (0.0, 0.0, 0.0, 0.25)  # colour of lines behind something
 # A circle of this diameter has the area of a unit square.
@@ -82,7 +80,9 @@ class DrawnPoints(Artist):
         super().__init__()
         self.picture = picture
         self.rows = np.empty((3, 0))  # places on paper, a value, in space light
-        self.lines = LineCollection([], colors="black", linewidths=0.1 * picture.options.fontsize)
+        self.lines = LineCollection(
+            [], colors="black", capstyle="round", linewidths=0.1 * picture.options.fontsize
+        )
         picture.axes.add_collection(self.lines, autolim=False)
         self.lines.set_visible(False)
         self.set_zorder(picture.artist.get_zorder())
@@ -167,12 +167,10 @@ class Picture:
             handles=dots, loc="outside right upper", frameon=False, fontsize=self.small
         )
 
-    def show(
-        self, snapshot: Snapshot, side: float, title: str, tools: Sequence[Callable] = ()
-    ) -> None:
+    def show(self, snapshot: Snapshot, side: float, title: str, tools: Sequence[Tool] = ()) -> None:
         """Set the points and the title to draw; `side` is the length of a typical point.
 
-        `tools` give the depth (n,) of points in what is outlined beside the solids.
+        `tools` are outlined beside the solids.
         """
         if not self._laid_out:
             self._lay_out()
@@ -204,10 +202,9 @@ class Picture:
         if self.options.outlines:
             kinds = columns["type"]
             bodies = [x[kinds == kind] for kind in np.unique(kinds)]
-            depths = [lambda x, tool=tool: tool(SimpleNamespace(position=x)) for tool in tools]
-            self._outline(bodies, depths, side)
+            self._outline(bodies, tools, side)
 
-    def _outline(self, bodies: list[np.ndarray], tools: list[Depth], side: float) -> None:
+    def _outline(self, bodies: list[np.ndarray], tools: Sequence[Tool], side: float) -> None:
         """Set the lines around points (n, 3) of bodies, and around tools."""
 
     def _entitle(self, text: str) -> None:
@@ -409,9 +406,9 @@ class PlanePicture(Picture):
             values = (values - self.limits[0]) / (self.limits[1] - self.limits[0])
         return np.array([*x.T[:2], values], np.float32)[:, np.argsort(ids)]
 
-    def _outline(self, bodies: list[np.ndarray], tools: list[Depth], side: float) -> None:
+    def _outline(self, bodies: list[np.ndarray], tools: Sequence[Tool], side: float) -> None:
         ends = np.transpose([self.axes.get_xlim(), self.axes.get_ylim()])
-        lines = [line for tool in tools for line in zeros(tool, *ends, FINE)]
+        lines = [line for tool in tools for line in tool.lines(*ends)]
         self.marks.lines.set_segments(lines + [line for x in bodies for line in outlines(x[:, :2])])
 
     def place(self, rows: np.ndarray) -> None:
@@ -507,7 +504,7 @@ class SpacePicture(PlanePicture):
             return np.ones(len(places), bool)
         return ~Front(places, low, high, cell, 0).hides(places[:, :2], places[:, 2], around=3)
 
-    def _outline(self, bodies: list[np.ndarray], tools: list[Depth], side: float) -> None:
+    def _outline(self, bodies: list[np.ndarray], tools: Sequence[Tool], side: float) -> None:
         low, high = np.transpose([self.axes.get_xlim(), self.axes.get_ylim()])
         fronts = [
             Front(self._project(x), low, high, max(side / 3, (high - low).max() / (2 * FINE)), 2)
@@ -516,15 +513,21 @@ class SpacePicture(PlanePicture):
         found = []  # lines as they are seen, and where they are hidden
         for front in fronts:
             for line in front.outlines():
-                found.append((line, [other.hides(line, front.beside(line)) for other in fronts]))
+                hidden = [other.hides(line, front.beside(line)) for other in fronts]
+                found.append((line, np.any(hidden, axis=0)))
         for tool in tools:
-            for line in wires(tool, self.lo, self.hi):
-                places = self._project(line)
-                # Towards the eye there is the tool itself, where it hides its other side.
-                nearer = line + 0.01 * np.linalg.norm(np.ptp(line, axis=0)) * self.view[2]
-                hidden = [front.hides(places[:, :2], places[:, 2]) for front in fronts]
-                found.append((places[:, :2], [tool(nearer) > 0, *hidden]))
-        pieces = [piece for line, by in found for piece in split(line, np.any(by, axis=0))]
+            if not (lines := list(tool.lines(self.lo, self.hi))):
+                continue
+            at = np.concatenate(lines)
+            # Towards the eye there is the tool itself, where it hides its other side.
+            nearer = at + 0.01 * np.linalg.norm(np.ptp(at, axis=0)) * self.view[2]
+            *places, height = self._project(at).T
+            seen = np.transpose(places)
+            hidden = [tool.depth(nearer) > 0, *(front.hides(seen, height) for front in fronts)]
+            ends = np.cumsum([len(line) for line in lines])[:-1]
+            both = np.split(seen, ends), np.split(np.any(hidden, axis=0), ends)
+            found += zip(*both, strict=True)
+        pieces = [piece for one in found for piece in split(*one)]
         pieces.sort(key=lambda piece: not piece[1])
         self.marks.lines.set_segments([line for line, _ in pieces])
         self.marks.lines.set_color([HIDDEN if hidden else "black" for _, hidden in pieces])

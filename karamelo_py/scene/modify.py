@@ -100,6 +100,7 @@ class Fix(Publisher):
     leads_points = False  # against their forces
     follows_points = False  # pushes points by where they are, as tools do
     depth_of: Any = None  # of points in a tool: (n,), which pictures outline
+    faces_of: Any = None  # of a tool that is made of them: (m, d, d), by their corners now
     accelerates = False  # its formulas are forces per mass, as of weight
     acts_last = False  # after all others at each moment, wherever the script has it
     # Its hooks in Python bring no energy: what they do to points and nodes stores it, passes it on

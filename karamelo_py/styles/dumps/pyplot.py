@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterable
 from functools import cached_property
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Annotated, Any, BinaryIO, Literal
 
 import numpy as np
@@ -196,8 +197,7 @@ class PyPlot(Dump):
             title = f"{self.title}: {title}"
         snapshot = self.snapshot()
         fixes = self.hub.fixes.values() if self.look["outlines"] else ()
-        tools = [fix.depth_of for fix in fixes if fix.depth_of is not None]
-        self._picture.show(snapshot, self.side(snapshot), title, tools)
+        self._picture.show(snapshot, self.side(snapshot), title, tools_of(fixes))
 
     def _make(self) -> Any:
         # Matplotlib takes a third of a second to import: only scenes with pictures pay it.
@@ -248,6 +248,20 @@ class PyPlot(Dump):
         if self.field is not None:
             return self.field
         return "vx" if self.hub.domain.dimension == 1 else "type"
+
+
+def tools_of(fixes: Iterable[Any]) -> list[Any]:
+    """List what is outlined of walls and tools (`output.outlines.Tool`)."""
+    from karamelo_py.output.outlines import Tool
+
+    return [
+        Tool(
+            lambda x, of=fix.depth_of: of(SimpleNamespace(position=x)),
+            fix.faces_of and fix.faces_of(),
+        )
+        for fix in fixes
+        if fix.depth_of is not None
+    ]
 
 
 def look_of(

@@ -360,6 +360,11 @@ class ContactSurface(ToolFix):
         """Depth (n,) of points in the region now."""
         return self.depth(points.position.astype(float) - self.moved(1.0)[0])
 
+    def faces_of(self) -> np.ndarray | None:
+        """Faces (m, d, d) of the region now, if it is made of them."""
+        skin = getattr(self.region, "skin", None)
+        return None if skin is None else skin.faces + self.moved(1.0)[0]
+
     def forces(self, points: PointsView) -> np.ndarray:
         way, velocity = self.moved(points.dt)
         x = points.position.astype(float) - way
