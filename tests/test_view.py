@@ -124,7 +124,7 @@ def test_points_that_move_stay_in_view(tmp_path, monkeypatch):
     hub.update.step, hub.update.time = 5, 0.5
     hub.fields.points["x"] = x + 3
     hub.dumps["d"].write()
-    lo, hi, _ = view._all([tmp_path / "p.pvd"], "vx")
+    lo, hi, _ = view._all([tmp_path / "p.pvd"], "vx", {"field": None, "only": None})
     assert lo[0] < x.min() and hi[0] > x.max() + 3
 
 
@@ -247,6 +247,7 @@ LOOKS = {
     "letters": ('label="stress (Pa)", fontsize=14, dpi=200', {"label": "stress (Pa)",
                 "fontsize": "14", "dpi": "200"}),
     "points": ("pointsize=1.4", {"pointsize": "1.4"}),
+    "formula": ("sqrt(x^2 + y^2)*seq", {"column": "sqrt(x^2 + y^2)*seq"}),
     "outlines": ("outlines=true", {"outlines": "true"}),
 }  # fmt: skip
 
@@ -259,7 +260,7 @@ def test_words_of_pictures_are_the_same_everywhere(run_interpreted, capsys, monk
         2, "fix(v, initial_velocity_particles, all, 30*x^3, 0)",
         "dump(d, all, particle, 10, p.dump, x, y, type, seq)",
         "dump(a, all, pyplot, 10, plain.*.png, 300, 300, seq)",
-        f"dump(b, all, pyplot, 10, own.*.png, 300, 300, seq, {words})",
+        f"dump(b, all, pyplot, 10, own.*.png, 300, 300, {'seq, ' * ('=' in words)}{words})",
         "set_dt(1e-3)", "run(2)",
     )  # fmt: skip
     folder = run_interpreted(text).folder
@@ -274,6 +275,42 @@ def test_words_of_pictures_are_the_same_everywhere(run_interpreted, capsys, monk
     call(capsys, "view", "p.dump", "-c", "seq", "--size", "300", "300", "-o", "w.*.png")
     assert Image.open("v.2.png").size == Image.open(folder / "own.2.png").size
     assert Path("v.2.png").read_bytes() != Path("w.2.png").read_bytes()
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_view_outlines_the_tools_of_a_script(run_interpreted, monkeypatch, capsys, dimension):
+    """With the units, the names and the tool at its time, and no line where there is none."""
+    tool = "fix(ball, indent, all, sphere, 1, 0.1, 0.5, 0.2 + 100*time, {})".format
+    height = "0" if dimension == 2 else "0.5"
+    text = block(
+        dimension, "units(mm, g, ms)", "compute(vmean, probe, all, vx)", tool(height),
+        "dump(d, all, particle, 10, p.dump, vx)", "dump(h, all, hdf5, 10, p.h5, vx)",
+        "dump(own, all, pyplot, 10, own.*.png, 300, 300, vx/2, outlines=true)",
+        "set_dt(1e-3)", "run(2)",
+    )  # fmt: skip
+    folder = run_interpreted(text).folder
+    monkeypatch.chdir(folder)
+    made = []
+    monkeypatch.setattr(
+        pictures, "make", lambda *a, of=pictures.make: made.append(of(*a)) or made[-1]
+    )
+    words = ["view", "-c", "vx/2", "--size", "300", "300", "--outlines", "true"]
+    file = "p.dump" if dimension == 2 else "p.h5"
+    assert call(capsys, *words, file, "--script", "in.script")[::2] == (0, "")
+    status, _, err = call(capsys, *words, file)
+    assert status == 0 and "--script FILE" in err
+    with_tool, without = (sum(map(len, m.marks.lines.get_segments())) for m in made)
+    assert with_tool > without
+    shown = made[0]
+    assert shown.title.get_text() == "step 2, time 0.002 ms"
+    if dimension == 2:
+        assert shown.axes.get_xlabel() == "x (mm)"
+        lines = shown.marks.lines.get_segments()
+        (circle,) = (line for line in lines if np.ptp(line, axis=0).max() < 0.21)
+        assert circle.mean(axis=0) == pytest.approx([0.5, 0.4], abs=0.01)
+    Path("in.results").write_text(text.replace("100*time", "vmean"))
+    status, _, err = call(capsys, *words, "p.dump", "--script", "in.results")
+    assert status == 1 and "the place of fix 'ball' follows from results of the run" in err
 
 
 def test_one_point_does_not_take_all_colours(hub):

@@ -2,6 +2,7 @@
 
 import argparse
 import glob
+import sys
 from collections.abc import Iterable
 from contextlib import suppress
 from itertools import chain
@@ -12,10 +13,11 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.app.catalogue import help_of
-from karamelo_py.app.options import LIVE
+from karamelo_py.app.options import LIVE, add_variables
 from karamelo_py.language import signature
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.language.signature import Argument, Parameter
+from karamelo_py.output.console import Console
 from karamelo_py.output.fields import ColumnFormula, unknown_column
 from karamelo_py.output.files import (
     Frames,
@@ -26,10 +28,12 @@ from karamelo_py.output.files import (
     whole,
 )
 from karamelo_py.output.snapshots import Snapshot, read
+from karamelo_py.output.units import labelled
 from karamelo_py.scene.hub import Hub
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.scene.modify import Fix
+from karamelo_py.script.errors import ScriptError, render_message
 from karamelo_py.script.parser import parse
-from karamelo_py.styles.dumps.pyplot import look_of
+from karamelo_py.styles.dumps.pyplot import look_of, tools_of
 
 DESCRIPTION = """\
 Draw pictures or a movie of dumps of points.
@@ -46,7 +50,16 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="show the dumps and the log of the folder FILE on a page in a browser, while "
         "a run writes them",
     )  # fmt: skip
-    parser.add_argument("-c", "--column", help="column for the colours (default: the solid)")
+    parser.add_argument(
+        "-c", "--column",
+        help="column for the colours, or a formula of columns (default: the solid)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--script", metavar="FILE",
+        help="the script of the run, which tells --outlines of its walls and tools, and the names "
+        "of its solids; dumps hold none",
+    )  # fmt: skip
+    add_variables(parser, "set a variable of the script, as in the run")
     parser.add_argument(
         "-o", "--output", metavar="FILE", type=Path,
         help="picture.*.png, where * becomes the step, or a movie: .gif, or .mp4 where ffmpeg is "
@@ -78,18 +91,20 @@ def run(options: argparse.Namespace) -> int:
     frames = Frames(options.fps)
     # Named by number, 1000 comes after 999.
     files = sorted(_matching(options.files), key=lambda path: (_number(path), path.name))
-    drawn = 0
+    drawn, scene = 0, _scene(options)
     with unwarned():
         picture = look = None
         for snapshot in chain.from_iterable(map(read, files)):
             look = look or _look(snapshot, options)
-            snapshot = _chosen(snapshot, look["only"])
-            picture = picture or _picture(snapshot, files, options, look)
-            time = "" if np.isnan(snapshot.time) else f", time {snapshot.time:.6g}"
+            snapshot = _chosen(snapshot, look)
+            picture = picture or _picture(snapshot, files, options, look, scene)
+            unit = snapshot.units.get("time", "")
+            time = "" if np.isnan(snapshot.time) else f", time {snapshot.time:.6g} {unit}".rstrip()
             # As they stand in the file, whatever their ids.
             snapshot.columns["id"] = np.arange(len(snapshot.columns["x"]))
             title = f"{look['title']}: " if look["title"] else ""
-            picture.show(snapshot, picture.side, f"{title}step {snapshot.step}{time}")
+            tools = _tools(scene, snapshot) if scene and look["outlines"] else ()
+            picture.show(snapshot, picture.side, f"{title}step {snapshot.step}{time}", tools)
             drawn += 1
             if movie:
                 frames.add(lambda file, picture=picture: picture.save_png(file, 1))
@@ -106,7 +121,41 @@ def run(options: argparse.Namespace) -> int:
     if movie:
         frames.save(options.output)
     print(f"{options.output}: {drawn} {'frame' if movie else 'picture'}{'s' * (drawn > 1)}")
+    if look["outlines"] and scene is None:
+        said = "dumps do not tell where walls and tools are: outlines are those of solids alone"
+        hint = "--script FILE, the script of the run, shows its walls and tools, too"
+        print(render_message("note", said, hint=hint), file=sys.stderr)
     return 0
+
+
+def _scene(options: argparse.Namespace) -> Hub | None:
+    """Go through the script of the run, without its steps."""
+    if options.script is None:
+        return None
+    hub = Hub(Console(quiet=True))
+    hub.rehearsing = True
+    Interpreter(hub, dict(options.var)).run_file(options.script)
+    return hub
+
+
+def _tools(scene: Hub, snapshot: Snapshot) -> list[Any]:
+    """List the walls and tools of all runs, where they are at the time of a snapshot."""
+    for name in scene.values.names():
+        scene.values.set(name, np.nan)  # what a run has to find
+    scene.values.set("time", snapshot.time)
+    scene.values.set("timestep", snapshot.step)
+    fixes = [part for part in dict.fromkeys(scene.in_runs) if isinstance(part, Fix)]
+    tools = tools_of(fixes)
+    for fix, tool in zip((fix for fix in fixes if fix.depth_of), tools, strict=True):
+        if np.isnan(tool.depth(scene.domain.lo[None, : scene.domain.dimension])).any():
+            raise ScriptError(
+                f"the place of fix '{fix.id}' follows from results of the run, which are not in "
+                "its script",
+                place=fix.place,
+                expected="walls and tools that move by formulas of time",
+                hint="dump pyplot draws this one during the run",
+            )
+    return tools
 
 
 def _live(folders: list[Path]) -> int:
@@ -148,46 +197,67 @@ def _look(first: Snapshot, options: argparse.Namespace) -> dict[str, Any]:
     names = SimpleNamespace(particle_names=lambda: list(first.columns))
     script = Interpreter(Hub())
     hub = SimpleNamespace(fields=names, values=script.hub.values)
+    (field,) = (word for word in help_of("dump", "pyplot").parameters if word.name == "field")
     look = {}
-    for word in _look_words():
+    for word in [field, *_look_words()]:
         look[word.name] = word.default
-        if (given := getattr(options, word.name)) is not None:
+        option = "column" if word is field else word.name
+        if (given := getattr(options, option)) is not None:
             if word.kind.text.startswith("a word"):
                 look[word.name] = given
                 continue
-            (call,) = parse(f"view({given})", f"--{word.name}")
+            (call,) = parse(f"view({given})", f"--{option}")
             argument = Argument(call.arguments[0], script)
             look[word.name] = signature.convert(hub, word, argument)
     return look
 
 
-def _chosen(snapshot: Snapshot, only: ColumnFormula | None) -> Snapshot:
-    """Choose the points that a condition of columns holds for."""
-    if only is None:
-        return snapshot
-    held = only.holds(SimpleNamespace(particle=snapshot.columns.__getitem__))
-    return snapshot._replace(columns={name: of[held] for name, of in snapshot.columns.items()})
+def _chosen(snapshot: Snapshot, look: dict[str, Any]) -> Snapshot:
+    """Choose the points that are drawn, with the formula that colours them as a column."""
+    columns, field, only = snapshot.columns, look["field"], look["only"]
+    rows = SimpleNamespace(particle=columns.__getitem__)
+    for formula in (field, only):
+        if isinstance(formula, ColumnFormula):
+            formula.hub.values.set("time", snapshot.time)
+    if isinstance(field, ColumnFormula):
+        columns = columns | {field.text: field.of(rows)}
+    if only is not None:
+        held = only.holds(rows)
+        columns = {name: of[held] for name, of in columns.items()}
+    return snapshot._replace(columns=columns)
 
 
 def _picture(
-    first: Snapshot, files: Iterable[Path], options: argparse.Namespace, look: dict[str, Any]
+    first: Snapshot,
+    files: Iterable[Path],
+    options: argparse.Namespace,
+    look: dict[str, Any],
+    scene: Hub | None,
 ) -> Any:
     """Make the empty picture that suits the first snapshot; place and colours suit all of them."""
     from karamelo_py.output import outlines, pictures
 
-    if options.column is not None and options.column not in first.columns:
-        said = f"the dump has no column '{options.column}'"
-        raise unknown_column(said, options.column, first.columns)
+    field = look["field"]
+    column = field.text if isinstance(field, ColumnFormula) else field
+    if column is not None and column not in first.columns:
+        said = f"the dump has no column '{column}'"
+        raise unknown_column(said, column, first.columns)
     # A dump holds zeros where the scene has no direction.
     dimension = 3 if first.columns["z"].any() else 2 if first.columns["y"].any() else 1
-    column = options.column or ("type" if dimension > 1 else "x")
+    column = column or ("type" if dimension > 1 else "x")
     types = np.unique(first.columns["type"]).astype(int) if column == "type" else []
-    words = {name: value for name, value in look.items() if name not in ("only", "title", "dpi")}
+    apart = ("field", "only", "title", "dpi")
+    words = {name: value for name, value in look.items() if name not in apart}
     words["window"] = tuple((words.pop(f"{x}min"), words.pop(f"{x}max")) for x in "xyz")
-    made_look = {"label": column} | look_of(column, dimension, **words)
+    label, length = labelled(column, first.units.get(column, "")), first.units.get("x", "")
+    made_look = {"label": label} | look_of(column, dimension, **words)
+    made_look["lengths"] = f" ({length})" if length else ""
     solids = tuple(f"solid {k}" for k in range(1, max(types, default=0) + 1))
-    lo, hi, span = _all(files, column, look["only"])
+    lo, hi, span = _all(files, column, look)
     domain = SimpleNamespace(dimension=dimension, lo=lo, hi=hi)
+    if scene is not None:
+        domain = scene.domain
+        solids = tuple(scene.solids) if solids else ()
     size = tuple(pixels / DPI for pixels in options.size)
     made = pictures.make(
         domain, size, look["dpi"], pictures.Options(column, solids=solids, **made_look)
@@ -199,7 +269,7 @@ def _picture(
 
 
 def _all(
-    files: Iterable[Path], column: str, only: ColumnFormula | None = None
+    files: Iterable[Path], column: str, look: dict[str, Any]
 ) -> tuple[np.ndarray, np.ndarray, Any]:
     """Find corners around all snapshots, and limits of the values of a column in them."""
     from karamelo_py.output.pictures import grown
@@ -207,7 +277,7 @@ def _all(
     corners, ends = [], []
     for snapshot in chain.from_iterable(map(read, files)):
         corners.append((snapshot.lo, snapshot.hi))
-        snapshot = _chosen(snapshot, only)
+        snapshot = _chosen(snapshot, look)
         values = snapshot.columns.get(column, np.empty(0))
         values = values[np.isfinite(values)]
         ends += [values.min(), values.max()] if len(values) else []

@@ -175,7 +175,7 @@ class ColumnFormula:
 
     def __init__(self, hub: Scene, argument: Argument):
         known = hub.fields.particle_names()
-        self.hub = hub
+        self.hub, self.text = hub, argument.text
         self.formula = Expression(argument.value_with(known))
         self.columns = sorted(self.formula.names & set(known))
         if not self.columns or len(self.columns) > self.MOST:
@@ -191,10 +191,26 @@ class ColumnFormula:
         """Read the formula that a script's argument stands for."""
         return cls(hub, argument)
 
+    def of(self, points: PointTable) -> np.ndarray:
+        """Numbers (n,) that it has for points that there are."""
+        columns = {name: points.particle(name) for name in self.columns}
+        return self.formula.evaluate_columns(self.hub.values, columns)
+
     def holds(self, points: PointTable) -> np.ndarray:
         """(n,) whether it is not 0 for points that there are."""
-        columns = {name: points.particle(name) for name in self.columns}
-        return self.formula.evaluate_columns(self.hub.values, columns) != 0
+        return self.of(points) != 0
+
+
+class ShownColumn(ColumnFormula):
+    """For signatures: the name of a column of dump particle, or a formula of columns."""
+
+    script_kind = "a column of dump particle, or a formula of columns, such as sqrt(vx^2 + vy^2)"
+
+    @classmethod
+    def from_script(cls, hub: Scene, argument: Argument) -> Any:
+        """Read the name, or the formula."""
+        word = argument.word()
+        return word if word is not None and word.isidentifier() else cls(hub, argument)
 
 
 # ---- columns that are asked for by name, and may be none ----------------------------------------

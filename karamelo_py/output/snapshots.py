@@ -2,7 +2,7 @@
 
 import gzip
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from karamelo_py.output.units import LENGTHS, Units
 from karamelo_py.script.errors import ScriptError
 
 
@@ -21,6 +22,7 @@ class Snapshot(NamedTuple):
     columns: dict[str, np.ndarray]  # (n,) by name, with x, y and z among them
     lo: np.ndarray  # (3,) corners of the domain, or around the points where the file does not say
     hi: np.ndarray
+    units: Mapping[str, str] = {}  # by column, and of time, as far as the file says
 
 
 def read(path: Path, first: int = 0) -> Iterator[Snapshot]:
@@ -39,7 +41,7 @@ def read(path: Path, first: int = 0) -> Iterator[Snapshot]:
 
 
 def _lammps(path: Path, first: int) -> Iterator[Snapshot]:
-    opener = gzip.open if path.suffix == ".gz" else open
+    opener, units = (gzip.open if path.suffix == ".gz" else open), None
     with opener(path, "rt", encoding="ascii") as file:
         step, time, count, box = 0, 0.0, 0, np.zeros((3, 2))
         while line := file.readline():
@@ -59,7 +61,13 @@ def _lammps(path: Path, first: int) -> Iterator[Snapshot]:
             elif item[0] == "ATOMS":
                 table = np.loadtxt(file, max_rows=count, ndmin=2) if count else np.empty((0, 99))
                 columns = dict(zip(item[1:], table.T, strict=count > 0))
-                yield Snapshot(step, time, columns, *box.T)
+                named = (
+                    {name: units.of_column(name) for name in (*columns, "time")} if units else {}
+                )
+                yield Snapshot(step, time, columns, *box.T, named)
+            elif item[0] == "UNITS":
+                words = file.readline().split()
+                units = Units(*words) if words[0] in LENGTHS else None  # LAMMPS has other names
             else:
                 file.readline()
 
@@ -71,12 +79,13 @@ def _hdf5(path: Path, first: int) -> Iterator[Snapshot]:
     with h5py.File(path, "r", libver="latest", swmr=True, locking=False) as root:
         names = [name for name in root if root[name].ndim == 2]
         moments = zip(root["step"][first:], root["time"][first:], strict=True)
+        units = {name: root[name].attrs.get("units", "") for name in (*names, "time")}
         for k, (step, time) in enumerate(moments, first):
             columns = {name: root[name][k] for name in names}
             columns |= {name: root[name][:] for name in ("id", "type")}
             there = ~np.isnan(columns["x"])
             columns = {name: column[there] for name, column in columns.items()}
-            yield Snapshot(int(step), float(time), columns, *root.attrs["domain"])
+            yield Snapshot(int(step), float(time), columns, *root.attrs["domain"], units)
 
 
 def _pvd(path: Path, first: int) -> Iterator[Snapshot]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from karamelo_py.language.kinds import In
 from karamelo_py.language.signature import OutputFile, Positive
-from karamelo_py.output.fields import ColumnFormula, check_columns
+from karamelo_py.output.fields import ColumnFormula, ShownColumn, check_columns
 from karamelo_py.output.files import Frames, movie_format, picture_format, savefig, unwarned, whole
 from karamelo_py.output.point_table import PointTable
 from karamelo_py.output.rhythm import Every
@@ -53,8 +53,8 @@ class PyPlot(Dump):
         Size of the picture: up to 50 in inches (of 100 pixels), above that in pixels; from 20 to
         20000 pixels.
     field
-        What colours the points: any column of dump particle. Without it the solid does (in 1D: vx
-        is drawn).
+        What colours the points: any column of dump particle, or a formula of columns, time and
+        published values. Without it the solid does (in 1D: vx is drawn).
     vmin, vmax
         Ends of the colours. Where a picture has values beyond, the bar beside it ends in an arrow.
     cmap
@@ -108,7 +108,7 @@ class PyPlot(Dump):
         file: OutputFile,
         width: Annotated[float, Positive],
         height: Annotated[float, Positive],
-        field: str | None = None,
+        field: ShownColumn | None = None,
         *,
         vmin: float | None = None,
         vmax: float | None = None,
@@ -129,16 +129,17 @@ class PyPlot(Dump):
         pointsize: Annotated[float, Positive] = 1.0,
         outlines: bool = False,
     ):  # fmt: skip
-        if field is not None:
-            check_columns([field], hub.fields.particle_names(), first=4)
-        super().__init__(hub, every, file, *([] if field is None else [field]))
+        self.formula = field if isinstance(field, ShownColumn) else None
+        columns = self.formula.columns if self.formula else [] if field is None else [field]
+        check_columns(columns, hub.fields.particle_names(), first=4)
+        super().__init__(hub, every, file, *columns)
         self.format_of(self.file)
         self.size = (_inches("width", width, dpi), _inches("height", height, dpi))
-        if field is not None:
-            self.warn_of_absent([field], hub.fields.absent_at_points(), "points")
-        self.field, self.title, self.only, self.dpi = field, title, only, dpi
+        self.warn_of_absent(columns, hub.fields.absent_at_points(), "points")
+        self.field = self.formula.text if self.formula else field
+        self.title, self.only, self.dpi = title, only, dpi
         self.look = look_of(
-            field or "vx",
+            self.field or "vx",
             hub.domain.dimension if hub.domain else None,
             vmin=vmin, vmax=vmax, cmap=cmap, azimuth=azimuth, elevation=elevation, axes=axes,
             label=label, window=((xmin, xmax), (ymin, ymax), (zmin, zmax)), scale=scale,
@@ -227,7 +228,10 @@ class PyPlot(Dump):
 
     def _chosen(self, table: PointTable, names: Iterable[str]) -> list[np.ndarray]:
         """Take columns of the points of a table that are drawn."""
-        columns = [table.particle(name) for name in names]
+        of = self.formula
+        columns = [
+            of.of(table) if of and name == of.text else table.particle(name) for name in names
+        ]
         return columns if self.only is None else [c[self.only.holds(table)] for c in columns]
 
     def take_part(self) -> None:
