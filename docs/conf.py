@@ -45,6 +45,7 @@ html_theme = "furo"
 html_title = f"karamelo-py {release}"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
+html_search_scorer = str(HERE / "_ext" / "scorer.js")
 copybutton_exclude = ".linenos, .gp, .go"
 
 

@@ -5,11 +5,14 @@ from __future__ import annotations
 from docutils import nodes
 
 WORDS = {
-    "getting-started": "install pip conda Windows quick start Jupyter resume exit status cache",
+    "getting-started": "install pip conda Windows quick start resume exit status cache read result",
     "tutorial": "Jupyter notebook Python API interface numpy pandas interactive script",
-    "choose": "recommendation best method landslide slope impact crash fluid soil which method",
+    "choose": "recommendation best method landslide slope impact crash fluid soil metal for",
+    "messages/index": "error stop stopped crash end ended abort failed reason time step too large",
     "methods": "shape functions kernel particle grid transfer APIC MLS FLIP PIC time step",
-    "materials": "constitutive model law plasticity elasticity soil metal fluid hyperelastic UMAT",
+    "materials": "constitutive model law plasticity elasticity soil metal fluid hyperelastic own",
+    "units": "unit system consistent SI mm",
+    "versions": "cite citation paper reference",
     "many-processes": "MPI parallel cluster Slurm srun mpiexec OpenMP threads GPU scaling resume",
     "needs": "dry run validate preview memory estimate time step check",
     "studies": "parameter sweep optimisation convergence study sensitivity batch calibrate fit",
@@ -17,7 +20,7 @@ WORDS = {
     "failures": "instability blow up numerical fracture locking hourglass cell crossing null space",
     "implicit": "static quasi-static Newton solver load step equilibrium Newmark large time step",
     "script": "input file syntax variable loop if include language deck",
-    "plugins": "extension user subroutine UMAT VUMAT custom Python hook",
+    "plugins": "extension user subroutine UMAT VUMAT custom Python hook own material law",
     "reference/columns": "output field variable stress strain velocity history von Mises",
     "reference/generated/command/restart": "resume continue checkpoint save state crash recover",
     "reference/generated/command/read_restart": "resume continue checkpoint load state initial",
@@ -30,7 +33,7 @@ WORDS = {
     "reference/generated/command/dump": "output export save results VTK ParaView OVITO HDF5",
     "reference/generated/command/set_output": "thermo log interval print frequency",
     "reference/generated/command/delete_particles": "remove hole excavation construction stage",
-    "reference/generated/fix/velocity_nodes": "boundary condition wall support clamp Dirichlet",
+    "reference/generated/fix/velocity_nodes": "boundary condition hold wall support clamp Dirichlet",
     "reference/generated/fix/body_force": "gravity weight acceleration centrifugal load",
     "reference/generated/fix/edge_traction": "boundary condition Neumann surface load traction",
     "reference/generated/fix/edge_pressure": "boundary condition Neumann pressure surface load",
@@ -45,14 +48,19 @@ WORDS = {
     "reference/generated/scheme/quasi-static": "static equilibrium Newton implicit load step",
 }
 
+# Of questions as people write them, which the search would look for too.
+ASKED = "how do does can i we my me you what which where why run use make it"
+
 
 def add_words(app, doctree) -> None:
     """Put the words of a page where the search indexes them, and nobody sees them.
 
     The search takes what stands between commas as one word; those of the head of a page, too.
     """
-    words = WORDS.get(app.env.docname)
-    if words:
+    name = app.env.docname
+    words = WORDS.get(name, "")
+    if words or name.startswith("howto/"):
+        words = f"{words} {ASKED}"
         doctree.insert(0, nodes.meta(name="keywords", content=words))
     for node in doctree.findall(nodes.meta):
         if node.get("name") == "keywords":
