@@ -1,6 +1,6 @@
 // Search results: how-tos first, the inside of the program and measurements last.
 const ORDER = [
-  [/^howto\//, 20],
+  [/^howto\//, 8],
   [/^(getting-started|choose|materials|units|versions|messages\/index|tutorial)$/, 12],
   [/^reference\/generated\/(command|fix|dump|material)\//, 4],
   [/^(messages|gallery)\/generated\//, -6],
