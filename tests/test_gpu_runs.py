@@ -202,12 +202,14 @@ def test_no_gpu(run_script, monkeypatch):
     monkeypatch.setitem(sys.modules, "cuda.bindings", SimpleNamespace(driver=None))
     monkeypatch.setattr(gpu.Card, "_do", lambda self, name, *rest: 1 / 0)
     said = run_script(squares("run(1)"), "--gpu", status=1).err
-    assert said.startswith("error: there is no NVIDIA GPU with a driver on this machine")
+    assert "error: there is no NVIDIA GPU with a driver on this machine" in said
     assert "hint: leave out --gpu: processors run the same script" in said
     monkeypatch.setitem(sys.modules, "cuda.bindings", None)
     said = run_script(squares("run(1)"), "--gpu", status=1).err
-    assert said.startswith("error: --gpu needs the packages for NVIDIA GPUs")
-    assert "hint: pip install 'karamelo-py[gpu]', or leave out --gpu" in said
+    assert "error: --gpu needs the packages for NVIDIA GPUs" in said
+    assert "hint: pip install '.[gpu]' in the folder of karamelo-py, or leave out --gpu" in said
+    wrong = run_script(squares("run(1)") + "fix(a, nothing, all)\n", "--gpu", status=1).err
+    assert "fix style 'nothing'" in wrong and "GPU" not in wrong
     with pytest.raises(SimulationError, match="--gpu needs the packages"):
         Simulation(squares(), gpu=True)
 

@@ -95,6 +95,7 @@ ELSEWHERE = {
     "stability": ("karamelo_py.app.studies.stability", "Map where a method is stable."),
     "atlas": ("karamelo_py.app.studies.atlas", "Make all charts of a list of studies."),
 }
+OPTIONS = ("gpu", "ranks", "live", "threads")  # of run, which help explains
 COMMANDS = ("run", "check", "styles", "help", *ELSEWHERE)
 
 
@@ -113,6 +114,8 @@ def _dispatch(arguments: list[str]) -> int:
         arguments = ["run", *arguments]
     if first == "help" and len(arguments) == 2 and arguments[1] in COMMANDS[1:]:
         arguments = [arguments[1], "-h"]
+    elif first == "help" and len(arguments) == 2 and arguments[1].lstrip("-").lower() in OPTIONS:
+        arguments = ["run", "-h"]
     elif arguments == ["help"]:
         arguments = ["help", "-h"]
     if arguments[0] in ("run", "check"):
@@ -257,7 +260,7 @@ def _parser(command: str) -> tuple[CommandLine, Any]:
         )  # fmt: skip
         script.add_argument(
             "--gpu", action="store_true",
-            help="let an NVIDIA GPU take the steps (pip install 'karamelo-py[gpu]')",
+            help="let an NVIDIA GPU take the steps (pip install '.[gpu]')",
         )  # fmt: skip
         script.add_argument(
             "--trust-geometries", action="store_true",

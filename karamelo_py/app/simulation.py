@@ -23,7 +23,7 @@ from karamelo_py.app.options import make_folder, threads_option
 from karamelo_py.language import registry, signature
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
-from karamelo_py.run.lower.card import use_card
+from karamelo_py.run.lower.card import take_card, use_card
 from karamelo_py.run.mpi.comm import launched
 from karamelo_py.run.runner import Interrupted
 from karamelo_py.scene.hub import Hub
@@ -267,6 +267,7 @@ class Simulation:
             self._interpreter = Interpreter(hub, presets)
             if script is not None:
                 self._read(script)
+            take_card(hub)
 
     def _claimed(self, out: str | PathLike) -> Path:
         if not isinstance(out, (str, PathLike)):

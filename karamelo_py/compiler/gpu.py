@@ -397,7 +397,7 @@ class Card(_Coded):
         except ImportError:
             raise NoCard(
                 "--gpu needs the packages for NVIDIA GPUs",
-                "pip install 'karamelo-py[gpu]', or leave out --gpu",
+                "pip install '.[gpu]' in the folder of karamelo-py, or leave out --gpu",
             ) from None
         super().__init__()
         self._driver = driver

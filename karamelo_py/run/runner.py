@@ -20,7 +20,7 @@ from karamelo_py.run.advice import known_failures
 from karamelo_py.run.advice.report import report
 from karamelo_py.run.diagnosis import energy
 from karamelo_py.run.lower.build import check_scene
-from karamelo_py.run.lower.card import refuse
+from karamelo_py.run.lower.card import refuse, take_card
 from karamelo_py.run.lower.memory import bytes_per_point
 from karamelo_py.run.mpi.comm import check_same_run, handled_signals
 from karamelo_py.run.recovery import RollBack, Stopped
@@ -138,6 +138,7 @@ def carry_out(hub: Hub, **length: Any) -> None:
         runner.warn(hub.simulation)
         hub.simulation.refuse()
         raise Quit
+    take_card(hub)
     replay = hub.interpreter.replay
     if replay is None or replay.at_end:
         runner.run()

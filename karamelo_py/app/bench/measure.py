@@ -166,7 +166,7 @@ class Solved(NamedTuple):
 
 
 def _name(*tags: Any) -> str:
-    return " + ".join(type(tag).__name__ for tag in tags)
+    return ", ".join(getattr(tag, "says", type(tag).__name__) for tag in tags)
 
 
 @sweep_points.on(Timed)

@@ -101,7 +101,7 @@ def say(name: str, one: OnCard, presets: Mapping[str, str]) -> None:
         f"  {'particle-steps/s':<38} {one.best / 1e6:8.1f} million (median {one.median / 1e6:.1f})"
     )
     print(f"  {'bytes moved per particle-step':<38} {one.bytes_per_particle_step:8.0f}")
-    print(f"  {'share of the memory roofline':<38} {100 * one.roofline:8.1f} %")
+    print(f"  {'share of the memory bandwidth':<38} {100 * one.roofline:8.1f} %")
     print(f"  {'memory of the GPU':<38} {one.bytes_on_card / 1e9:8.2f} GB")
     print(f"  {'compilation':<38} {one.made:8.1f} s")
     for stage, spent in one.stages.items():

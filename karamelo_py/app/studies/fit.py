@@ -27,7 +27,9 @@ squares, and says how surely the measurements determine them.
 A variable with several values is searched between the smallest and the largest, from the middle on;
 one with a single value is passed on. A measurement is a number, or a column of a file over its
 first column, the time. Differences are relative to the largest measured value. The true value is
-within +- with a probability of 95 %, where the differences that remain are independent."""
+within +- with a probability of 95 %, where the differences that remain are independent. There is
+no +- for a value at the end of its range: the measurements ask for a wider one. Runs in the table
+(-o) of the same script, program and options are not repeated; -again repeats them."""
 STEP = 0.01  # of a range, for derivatives: above the noise of points that cross cells
 ENOUGH = 1e-4  # relative change of the misfit, or of the values, at which the search ends
 ALIKE = 0.99  # correlation from which on variables are not told apart
@@ -114,7 +116,7 @@ def add_options(parser: ArgumentParser) -> None:
         help="a log column, as for -record of sweep, and its measured value: a number or "
         "FILE:COLUMN",
     )  # fmt: skip
-    parser.add_argument("-most", type=positive, default=20, help="most steps of the search (20)")
+    parser.add_argument("-most", type=positive, default=20, help="steps of the search at most (20)")
     parser.add_argument("-o", type=Path, default=Path("fit.csv"), help="table of runs (fit.csv)")
 
 
@@ -139,6 +141,8 @@ def run(options: Any) -> int:
         jac=search.slopes, bounds=(0, 1), max_nfev=options.most, ftol=ENOUGH, xtol=ENOUGH,
     )  # fmt: skip
     half, alike = certainty(best.jac, best.fun)
+    at_end = (best.x <= STEP) | (best.x >= 1 - STEP)
+    half[at_end] = np.nan
     table = plain_table(["variable"], ["value", "+-"])
     for k, name in enumerate(search.names):
         value = shown(float(search.case(best.x)[name]))
@@ -147,12 +151,14 @@ def run(options: Any) -> int:
     for k, name in enumerate(search.names):
         if not best.jac[:, k].any():
             print(f"{name} changes nothing that is measured")
-        elif not STEP < best.x[k] < 1 - STEP:
-            print(f"{name} is at the end of its range")
+        elif at_end[k]:
+            print(f"{name} is at the end of its range: search a wider one")
     for a, b in alike:
         print(f"the measurements do not tell {search.names[b]} and {search.names[a]} apart")
     left = f"{np.sqrt(np.mean(best.fun**2)):.3g} of the largest measured value"
-    print(f"what remains is {left} in the mean, after {plural(study.ran, 'run')}")
+    earlier = len(study.rows) - study.ran
+    before = f", and {earlier} of an earlier study (-again repeats them)" if earlier else ""
+    print(f"what remains is {left} in the mean, after {plural(study.ran, 'run')}{before}")
     words = " ".join(f"-var {name} {value}" for name, value in search.case(best.x).items())
     print(f"karamelo-py {options.script} {words}")
     return 0

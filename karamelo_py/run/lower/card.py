@@ -19,19 +19,21 @@ WITHOUT = "leave out --gpu: processors run the same script"
 
 
 def use_card(hub: Hub) -> None:
-    """Let the GPU of this machine take the steps of a scene; it is an error that there is none.
-
-    To check a scene none is needed.
-    """
+    """Let a GPU take the steps of a scene; until the first run a script needs none."""
     settings = hub.settings
     if settings.ranks > 1:
         raise ScriptError(
             f"--gpu: one GPU has all of a scene, and {settings.ranks} processes would share it",
             hint="--gpu by one process, or leave it out",
         )
-    settings.engine = "gpu"
-    with missing_told():
-        settings.card = Counted() if hub.checking else card()
+    settings.engine, settings.card = "gpu", Counted()
+
+
+def take_card(hub: Hub) -> None:
+    """Take the GPU of this machine, where a scene is to run on one; there must be one."""
+    if isinstance(hub.settings.card, Counted) and not hub.checking:
+        with missing_told():
+            hub.settings.card = card()
 
 
 @contextmanager
@@ -40,7 +42,7 @@ def missing_told(hub: Hub | None = None) -> Iterator[None]:
     try:
         yield
     except NoCard as error:
-        raise ScriptError(str(error), hint=error.hint) from None
+        raise ScriptError(str(error), hint=error.hint, complete=True) from None
     except TypeError as error:
         if hub is None:
             raise
