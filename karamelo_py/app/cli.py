@@ -329,12 +329,16 @@ def _run(options: argparse.Namespace) -> int:
 def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = None) -> int:
     """Carry out a script; returns the exit status."""
     with leaving_at_once():
+        import numpy as np
+
         from karamelo_py.language.interpreter import Interpreter
         from karamelo_py.output.console import Console
         from karamelo_py.run.lower.card import use_card
         from karamelo_py.run.runner import Interrupted
         from karamelo_py.scene.hub import Hub
     begun()
+    # Messages of ours say what is wrong.
+    np.seterr(over="ignore", invalid="ignore", divide="ignore")
     hub = Hub(Console(quiet=options.quiet, terminal=launch.has_terminal()))
     hub.settings.threads = options.threads
     hub.settings.ranks = options.ranks or launched()[0]

@@ -126,7 +126,9 @@ def scheme(
         target = registry.find("scheme", style)
         chosen = signature.call(target, hub, arguments, f"scheme {style}")
         check_part(hub, f"scheme {style}", chosen)
-    except ScriptError:
+    except ScriptError as error:
+        if (pair := arguments[-1].keyword() if arguments else None) and not error.hint:
+            error.hint = meant(pair[0], ["start"])
         for name in PUBLISHED:  # who asks for these is not at fault
             hub.values.publish(name)
         raise

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from karamelo_py import __version__
-from karamelo_py.script.errors import FAILURES, ScriptError, instead, meant
+from karamelo_py.script.errors import FAILURES, ScriptError, instead, meant, one_of
 
 PREFIX = "karamelo_py."
 BUILT_IN = Path(__file__).parents[1] / "styles.toml"
@@ -130,7 +130,7 @@ def _entries(family: str, name: str) -> list[EntryPoint]:
         hint = f"'{name}' is a style of {' and of '.join(others)}"
     raise ScriptError(
         f"unknown {family if family == 'command' else family + ' style'} '{name}'",
-        expected="one of " + ", ".join(names(family)) if styles else f"no {family} is installed",
+        expected=one_of(name, names(family), family) if styles else f"no {family} is installed",
         hint=hint,
     )
 

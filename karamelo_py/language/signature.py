@@ -340,8 +340,9 @@ def _guilty(
     error: ScriptError, arguments: Sequence[Argument], bound: dict[str, list[Argument]]
 ) -> Place | None:
     """Find the place of the argument that an error names, or else of the word it quotes."""
-    if isinstance(error.argument, int) and 0 <= error.argument < len(arguments):
-        return arguments[error.argument].place
+    if isinstance(error.argument, int) and error.argument < len(arguments):
+        plain = [argument for argument in arguments if argument.keyword() is None]
+        return (arguments if error.argument >= 0 else plain)[error.argument].place
     if isinstance(error.argument, str) and bound.get(error.argument):
         return bound[error.argument][0].place
     for word in re.findall(r"'([^']+)'", error.message):

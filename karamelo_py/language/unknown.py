@@ -5,7 +5,15 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from karamelo_py.language import registry
-from karamelo_py.script.errors import ScriptError, instead, meant, nearest, of_karamelo, table
+from karamelo_py.script.errors import (
+    ScriptError,
+    instead,
+    meant,
+    nearest,
+    of_karamelo,
+    one_of,
+    table,
+)
 from karamelo_py.script.evaluation import usage
 from karamelo_py.script.expressions import FIRST, SEEDS
 from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, RESERVED, WORDS
@@ -47,7 +55,7 @@ def unknown_call(script: Any, name: str, place: Any, statement: bool) -> ScriptE
     return ScriptError(
         f"unknown {what} '{name}'",
         place=place,
-        expected=f"one of {', '.join(shown)}",
+        expected=one_of(name, shown, "command") if statement else f"one of {', '.join(shown)}",
         hint=NO_BLOCKS if name in BLOCKS else other or meant(name, known),
     )
 

@@ -223,7 +223,8 @@ def fill(
     reaches_out = (lo < ends[0] - domain.tolerance) & np.isfinite(lo) & ~at_side[0]
     reaches_out |= (hi > ends[1] + domain.tolerance) & np.isfinite(hi) & ~at_side[1]
     whole = math.prod(np.maximum(last - first + 1, 0).tolist()) * float(ppc) ** dimension
-    counted = reaches_out.any() and whole <= max(_MAX_COUNTED, 4 * inner)
+    near = max(np.abs(first).max(), np.abs(last).max()) < 2**53  # further cells have no number
+    counted = reaches_out.any() and near and whole <= max(_MAX_COUNTED, 4 * inner)
     if not counted:
         first, last = inner_first, inner_last
     open_lo = np.where(np.isinf(lo) | at_side[0], ends[0] - domain.tolerance, -np.inf)

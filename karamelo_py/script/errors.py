@@ -56,7 +56,8 @@ class ScriptError(Exception):
     place
         Where; filled in by whoever knows it when the raiser does not.
     argument
-        Name or index (from 0) of the argument of a style or command that is to blame;
+        Name or index (from 0, or below 0 from the last without a name) of the argument of a style
+        or command that is to blame;
         `karamelo_py.language.signature.call` turns it into a place.
     expected
         What would have been right.
@@ -147,6 +148,16 @@ def meant(name: str, names: Iterable[str]) -> str | None:
     """Write ``did you mean '...'?`` with the one of `names` most like `name`; None without any."""
     close = nearest(name, names)
     return f"did you mean '{close}'?" if close else None
+
+
+def one_of(name: str, names: Iterable[str], family: str) -> str:
+    """Write ``one of a, b, c``; of many the ones most like `name`, and what lists the family."""
+    names = list(names)
+    if len(names) <= 12:
+        return "one of " + ", ".join(names)
+    close = ", ".join(nearest_few(name, names))
+    listed = f"karamelo-py styles {family} lists all {len(names)}"
+    return f"one of {close}, ... ({listed})" if close else listed
 
 
 def plural(count: float, noun: str) -> str:
