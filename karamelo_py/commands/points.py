@@ -303,7 +303,7 @@ populate_cylindrical_coordinates.syntax = (
 
 def _polar(values: dict, places: dict) -> Placement:
     """The points of all polar cells, slices outermost, then rings, then angles."""
-    check_radius(values["R"], places["R"])
+    check_radius(values["R"], place=places["R"])
     counts = [
         _count(values[name], name, places[name]) if name in values else 1
         for name in ("Ndx", "Ndr", "Ndtheta")

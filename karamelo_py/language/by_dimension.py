@@ -151,9 +151,3 @@ def finite(hub: Scene, value: float, name: str, argument: Any | None = None) -> 
         place=argument.place if argument is not None else None,
         argument=None if argument is not None else name,
     )
-
-
-def place_of(names: Sequence[str], arguments: Sequence[Any], name: str):
-    """Find the place in the script of the argument called `name` (None if it was not given)."""
-    index = list(names).index(name)
-    return arguments[index].place if index < len(arguments) else None

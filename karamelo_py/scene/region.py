@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -9,7 +10,7 @@ from karamelo_py.language.arguments import Named
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
 from karamelo_py.scene.domain import require_domain
-from karamelo_py.script.errors import Place, ScriptError
+from karamelo_py.script.errors import ScriptError
 
 EXTERIOR = "exterior"
 HALVINGS = 12  # of the way on which a surface is looked for
@@ -119,22 +120,20 @@ def split_exterior(arguments: Sequence[Argument]) -> tuple[Sequence[Argument], b
     return arguments, False
 
 
-def check_order(lo: float, hi: float, names: tuple[str, str], place: Place | None) -> None:
-    """Refuse a lower end above the upper one (equal ends are a plane)."""
+def check_order(lo: float, hi: float, names: Sequence[str], argument: int) -> None:
+    """Refuse a lower end, the `argument` of this number, above the upper one behind it."""
     if lo > hi:
         raise ScriptError(
-            f"{names[0]} = {lo:g} is above {names[1]} = {hi:g}",
-            place=place,
-            expected=f"{names[0]} <= {names[1]}",
+            f"{names[argument]} = {lo:g} is above {names[argument + 1]} = {hi:g}",
+            argument=argument,
+            expected=f"{names[argument]} <= {names[argument + 1]}",
         )
 
 
-def check_radius(radius: float, place: Place | None) -> None:
-    """Refuse a radius that is not positive."""
+def check_radius(radius: float, **where: Any) -> None:
+    """Refuse a radius that is not positive; `where` it stands."""
     if radius <= 0:
-        raise ScriptError(
-            f"R = {radius:g} must be above 0", place=place, expected="a radius above 0"
-        )
+        raise ScriptError(f"R = {radius:g} must be above 0", expected="a radius above 0", **where)
 
 
 def below(x: np.ndarray, centre: Sequence[float], axes: Sequence[int], radius: float):

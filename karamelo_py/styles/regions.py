@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from karamelo_py.language.by_dimension import Forms, place_of
+from karamelo_py.language.by_dimension import Forms
 from karamelo_py.language.signature import Argument
 from karamelo_py.scene import region
 from karamelo_py.scene.domain import require_domain
@@ -71,11 +71,10 @@ class BlockRegion(Primitive):
     def __init__(self, hub: Hub, *bounds: Argument):
         given, exterior = region.split_exterior(bounds)
         values = self.forms.read(hub, given, require_domain(hub).dimension)
-        names, ends = tuple(values), tuple(values.values())
+        ends = tuple(values.values())
         self.slabs = [(k // 2, *ends[k : k + 2]) for k in range(0, len(ends), 2)]
         for axis, *slab in self.slabs:
-            pair = names[2 * axis : 2 * axis + 2]
-            region.check_order(*slab, pair, place_of(names, given, pair[0]))
+            region.check_order(*slab, _NAMES, 2 * axis)
         super().__init__(hub, ends[::2], ends[1::2], exterior=exterior)
 
 
@@ -117,7 +116,7 @@ class Cylinder(Primitive):
         values = self.forms.read(hub, given, dimension)
         names = tuple(values)
         self.radius = values["R"]
-        region.check_radius(self.radius, place_of(names, given, "R"))
+        region.check_radius(self.radius, argument=names.index("R"))
         along = "xyz".index(values["axis"]) if dimension == 3 else None
         self.across = tuple(axis for axis in range(dimension) if axis != along)
         self.centre = tuple(values[name] for name in names if name in ("xc", "yc", "c1", "c2"))
@@ -126,7 +125,7 @@ class Cylinder(Primitive):
             lo[axis], hi[axis] = middle - self.radius, middle + self.radius
         if along is not None:
             ends = values["lo"], values["hi"]
-            region.check_order(*ends, ("lo", "hi"), place_of(names, given, "lo"))
+            region.check_order(*ends, names, names.index("lo"))
             lo[along], hi[along] = ends
             self.axis, self.slabs = (along, self.centre), [(along, *ends)]
         super().__init__(hub, lo, hi, exterior=exterior)
@@ -160,7 +159,7 @@ class Sphere(Primitive):
         given, exterior = region.split_exterior(shape)
         values = self.forms.read(hub, given, require_domain(hub).dimension)
         *centre, self.radius = values.values()
-        region.check_radius(self.radius, place_of(tuple(values), given, "R"))
+        region.check_radius(self.radius, argument=len(centre))
         self.across, self.centre = range(len(centre)), np.array(centre)
         lo, hi = self.centre - self.radius, self.centre + self.radius
         super().__init__(hub, lo, hi, exterior=exterior)
