@@ -21,7 +21,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple, TextIO
+from typing import TYPE_CHECKING, Any, BinaryIO, TextIO
 
 from karamelo_py.app.leaving import INTERRUPTED, SIGNALLED
 from karamelo_py.run.mpi import comm as mpi
@@ -57,32 +57,25 @@ A_CORE = 16  # processes at most: who asks for more means another number
 PATIENCE, LONGER = 2.0, 6.0
 
 
-class Outcome(NamedTuple):
-    """The end of a command line."""
-
-    status: int
-    text: str = ""  # what is left to be said
-
-
-def outcome_of(act: Callable[[], int], *, debugging: bool = False) -> Outcome:
-    """Run something and tell how it ends."""
+def outcome_of(act: Callable[[], int], *, debugging: bool = False) -> tuple[int, str]:
+    """Run something; returns its exit status, and what is left to be said."""
     try:
-        return Outcome(act())
+        return act(), ""
     except (KeyboardInterrupt, *FAILURES) as error:
         return _ended_by(error, debugging=debugging)
 
 
-def _ended_by(error: BaseException, *, debugging: bool) -> Outcome:
+def _ended_by(error: BaseException, *, debugging: bool) -> tuple[int, str]:
     if isinstance(error, KeyboardInterrupt):
-        return Outcome(INTERRUPTED, render_message("error", "interrupted"))
+        return INTERRUPTED, render_message("error", "interrupted")
     # Rich makes a SystemExit of it.
     if isinstance(error, BrokenPipeError) or isinstance(error.__context__, BrokenPipeError):
         # Whoever read our output has gone; what was written stays.
         sys.stderr.close()
-        return Outcome(ERROR)
+        return ERROR, ""
     if debugging:
         traceback.print_exception(error)
-    return Outcome(ERROR, _rendered(error))
+    return ERROR, _rendered(error)
 
 
 def _rendered(error: BaseException) -> str:

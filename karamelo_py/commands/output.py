@@ -182,16 +182,13 @@ def log_modify(hub: Hub, style: Literal["default", "custom"], *keys: Logged) -> 
     --------
     set_output
     """
-    if style == "default":
-        if keys:
-            raise ScriptError(
-                "log_modify: default takes no columns",
-                argument="keys",
-                expected="log_modify(default) or log_modify(custom, step, ...)",
-            )
-        hub.output.log.default()
-        return
-    if not keys:
+    if style == "default" and keys:
+        raise ScriptError(
+            "log_modify: default takes no columns",
+            argument="keys",
+            expected="log_modify(default) or log_modify(custom, step, ...)",
+        )
+    if style == "custom" and not keys:
         raise ScriptError(
             "log_modify: custom needs at least one column",
             expected="log_modify(custom, step, dt, time, ...)",

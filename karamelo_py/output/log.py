@@ -37,7 +37,7 @@ class Log(Rhythmic):
         self.every: int | ByTime = 1
         self.file = Path(FILE)
         self.is_asked_for = False  # the file, by a name that the user gives
-        self.columns: list[Quantity] = []
+        self.columns: list[Quantity] = []  # empty: step, dt and time
         self.last_step: int | None = None
         self._file: TextIO | None = None
         # Names and numbers of the lines, where a program wants to have them.
@@ -50,10 +50,6 @@ class Log(Rhythmic):
     def path(self) -> Path:
         """The file of the log."""
         return self.hub.folder / self.file
-
-    def default(self) -> None:
-        """Log step, dt and time."""
-        self.columns = []
 
     def begin(self) -> None:
         """Write the header: to the file where it is new, to the terminal always."""

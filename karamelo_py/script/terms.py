@@ -241,7 +241,7 @@ class _Writer:
         self.uses: list[int] = []
         self.uniform: list[bool] = []
         self.code: list[tuple[int, int]] = []
-        self.constants: dict[_Exact, int] = {}
+        self.constants: dict[str, int] = {}  # in hexadecimal: 0.0 and -0.0 are different numbers
         self.rows: dict[int, int] = {}  # of terms that are kept now
         self.free = list(range(formula.MAX_KEPT))[::-1]
         self.root = self._number(root)
@@ -253,7 +253,7 @@ class _Writer:
         known: dict[tuple, int] = {}
         for term in in_order(root):
             operands = tuple(numbers[id(operand)] for operand in term.operands)
-            value = _Exact(term.value) if term.operation == "number" else term.value
+            value = term.value.hex() if term.operation == "number" else term.value
             key = term.operation, operands, value
             if key not in known:
                 known[key] = len(self.terms)
@@ -306,7 +306,7 @@ class _Writer:
         self._write_or_take(self.root)
         return formula.Program(
             np.array(self.code, dtype=np.int64).reshape(-1, 2),
-            np.array(list(self.constants), dtype=np.float64),
+            np.array([*map(float.fromhex, self.constants)], dtype=np.float64),
         )
 
     def _append(self, operation: int, operand: int, uniform: bool) -> None:
@@ -338,13 +338,3 @@ class _Writer:
                 if self.uniform[operand]:
                     self.code.append((formula.SPREAD, len(operands) - 1 - i))
         self._append(OPERATIONS[operation], 0, same)
-
-
-class _Exact(float):
-    """A float that equals only its own bits: 0.0 and -0.0 are different numbers."""
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, float) and self.hex() == other.hex()
-
-    def __hash__(self) -> int:
-        return hash(self.hex())

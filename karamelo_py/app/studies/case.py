@@ -13,6 +13,7 @@ import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import karamelo_py
@@ -110,14 +111,6 @@ class Stop(Exception):
 
 
 @dataclass
-class Forked:
-    """A process that is a copy of another, by its number, as subprocess.Popen has one."""
-
-    pid: int | None
-    returncode: int | None = None
-
-
-@dataclass
 class Launch:
     """Run the cases of a study."""
 
@@ -183,7 +176,8 @@ class Launch:
             (folder / "out.txt").open("wb") as out,
             (folder / "err.txt").open("wb") as err,
         ):
-            process: Any = Forked(self.warm.start(kind_of(case.values()), words, folder, out, err))
+            pid = self.warm.start(kind_of(case.values()), words, folder, out, err)
+            process: Any = SimpleNamespace(pid=pid, returncode=None)
             if process.pid is None:
                 process = subprocess.Popen(
                     [*PROGRAM, *words], cwd=folder, stdin=subprocess.DEVNULL, stdout=out,
