@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from time import perf_counter
 from typing import Any, NamedTuple
 
-from karamelo_py.app.bench.measure import REPETITIONS, WORKLOADS, Measured, build, traffic
+from karamelo_py.app.bench.measure import REPETITIONS, WORKLOADS, Solved, build, traffic
 from karamelo_py.kernels.gpu import OTHERS, STAGES
 from karamelo_py.kernels.step import DONE
 from karamelo_py.script.errors import ScriptError
@@ -30,12 +30,7 @@ class OnCard(NamedTuple):
     made: float  # seconds until the code of a step was there
     precision: str
 
-    best = Measured.best
-    median = Measured.median
-
-    def record(self) -> dict[str, Any]:
-        """Write what is kept in a file; speeds in particle-steps/s, times in seconds."""
-        return {"best": self.best, "median": self.median} | self._asdict()
+    best, median, record = Solved.best, Solved.median, Solved.record
 
 
 def sizes_of(name: str, presets: Mapping[str, str]) -> Iterator[dict[str, str]]:

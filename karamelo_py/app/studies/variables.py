@@ -16,10 +16,10 @@ from karamelo_py.app.studies.case import Launch
 from karamelo_py.language import registry
 from karamelo_py.output.quantity import KEYWORDS
 from karamelo_py.output.units import Units
-from karamelo_py.script.errors import ScriptError, meant, nearest, plural
+from karamelo_py.script.errors import ScriptError, meant, plural
 from karamelo_py.script.evaluation import evaluate
 from karamelo_py.script.functions import CONSTANTS
-from karamelo_py.script.parser import parse, parse_text, scripts_in
+from karamelo_py.script.parser import parse, parse_text, read_script
 from karamelo_py.script.syntax import Assignment, CommandCall
 from karamelo_py.script.terms import number_of
 
@@ -154,8 +154,7 @@ class ScriptFiles:
     def _read(self, path: Path) -> None:
         if path in self.statements:
             return
-        text = path.read_text(encoding="utf-8", errors="replace")
-        self.statements[path] = list(parse(text, str(path)))
+        self.statements[path] = parse(read_script(path), str(path))
         for call in self.calls("include", path):
             other = path.parent / ", ".join(raw.code for raw in call.arguments).strip().strip('"')
             if other.is_file():
@@ -170,8 +169,7 @@ class ScriptFiles:
 
     def texts(self) -> tuple[str, ...]:
         """Read the text of all files."""
-        files = sorted(self.statements)
-        return tuple(path.read_text(encoding="utf-8", errors="replace") for path in files)
+        return tuple(map(read_script, sorted(self.statements)))
 
     def check(self, names: Iterable[str]) -> None:
         """See that it reads each of these variables."""
@@ -316,21 +314,13 @@ def family(
     options: Any, *, timed: bool = False, repeat: int = 1
 ) -> tuple[dict, ScriptFiles, Launch, int]:
     """Read values of the variables, the script, how to run, and how many at once."""
-    path = options.script
-    if not path.is_file():
-        close = nearest(path.name, scripts_in(path.parent))
-        raise ScriptError(
-            f"there is no file {path}",
-            expected="the name of a script",
-            hint=f"did you mean {path.parent / close}?" if close else None,
-        )
+    script, threads = ScriptFiles(options.script), options.threads or 1
     in_step = {name for group in zipped(options) for name in group}
     values = choices(options.var, in_step)
     if not values:
         raise ScriptError("nothing varies", expected=f"-var {VALUES}")
-    script, threads = ScriptFiles(path), options.threads or 1
     script.check(values)
-    launch = Launch(path, threads, repeat, options.limit, script.texts())
+    launch = Launch(script.path, threads, repeat, options.limit, script.texts())
     if timed and (options.jobs or 1) > 1:
         raise ScriptError("-time runs one at a time", expected="-time without -jobs")
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
