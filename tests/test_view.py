@@ -124,8 +124,11 @@ def test_points_that_move_stay_in_view(tmp_path, monkeypatch):
     hub.update.step, hub.update.time = 5, 0.5
     hub.fields.points["x"] = x + 3
     hub.dumps["d"].write()
-    lo, hi, _ = view._all([tmp_path / "p.pvd"], "vx", {"field": None, "only": None})
+    lo, hi, _ = view._all([tmp_path / "p.pvd"], "vx", {"field": None, "only": None}, PLAIN)
     assert lo[0] < x.min() and hi[0] > x.max() + 3
+    seen = PLAIN | {"window": ((None, x.max() + 1),)}
+    span = view._all([tmp_path / "p.pvd"], "x", {"field": None, "only": None}, seen)[2]
+    assert span[1] < x.max() + 1.5
 
 
 @pytest.mark.parametrize(
@@ -239,6 +242,7 @@ def test_words_of_a_log_are_no_numbers(tmp_path):
     assert np.isnan(rows[0]["limit"])
 
 
+PLAIN = {"window": (), "log": False, "quantile": 0.0}
 LOOKS = {
     "zoom": ("xmin=0, xmax=0.5, ymin=0.2", {"xmin": "0", "xmax": "0.5", "ymin": "0.2"}),
     "only": ("only=x > 0.4", {"only": "x > 0.4"}),
@@ -527,6 +531,8 @@ def test_show_writes_the_format_that_a_name_asks_for(tmp_path):
         sim.show(file=tmp_path / f"s.{ending}")
         assert (tmp_path / f"s.{ending}").read_bytes().startswith(magic)
     assert sim.show(outlines=True).png != sim.show().png
+    for words in ({"label": "stress, in (Pa)"}, {"title": "disk (a), b"}):
+        assert sim.show("seq", **words).png != sim.show("seq").png
 
 
 @pytest.mark.parametrize("ends", [(298.0, 600.0), (-600.0, -298.0)])

@@ -474,6 +474,8 @@ class Simulation:
 
         with _as_simulation_error():
             given = [] if field is None else [field]
+            for name in {"label", "title"} & {*look}:
+                look[name] = look[name] and '"{}"'.format(look[name].strip('"'))
             words = self._words(1, "shown.png", width, height, *given, **look)
             (call,) = parse(f"show({words})", "Simulation.show")
             arguments = [signature.Argument(raw, self._interpreter) for raw in call.arguments]

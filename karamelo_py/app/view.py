@@ -253,7 +253,7 @@ def _picture(
     made_look = {"label": label} | look_of(column, dimension, **words)
     made_look["lengths"] = f" ({length})" if length else ""
     solids = tuple(f"solid {k}" for k in range(1, max(types, default=0) + 1))
-    lo, hi, span = _all(files, column, look)
+    lo, hi, span = _all(files, column, look, made_look)
     domain = SimpleNamespace(dimension=dimension, lo=lo, hi=hi)
     if scene is not None:
         domain = scene.domain
@@ -262,24 +262,25 @@ def _picture(
     made = pictures.make(
         domain, size, look["dpi"], pictures.Options(column, solids=solids, **made_look)
     )
-    if not made_look["log"] and not made_look["quantile"]:
-        made.begin_with(span)
+    made.begin_with(span)
     made.side = outlines.spacing(np.column_stack([first.columns[name] for name in "xyz"]))
     return made
 
 
 def _all(
-    files: Iterable[Path], column: str, look: dict[str, Any]
+    files: Iterable[Path], column: str, look: dict[str, Any], made_look: dict[str, Any]
 ) -> tuple[np.ndarray, np.ndarray, Any]:
     """Find corners around all snapshots, and limits of the values of a column in them."""
-    from karamelo_py.output.pictures import grown
+    from karamelo_py.output.pictures import grown, in_window, within
 
     corners, ends = [], []
     for snapshot in chain.from_iterable(map(read, files)):
         corners.append((snapshot.lo, snapshot.hi))
-        snapshot = _chosen(snapshot, look)
-        values = snapshot.columns.get(column, np.empty(0))
-        values = values[np.isfinite(values)]
+        columns = in_window(_chosen(snapshot, look).columns, made_look["window"])
+        values = columns.get(column, np.empty(0))
+        if made_look["log"]:
+            values = np.log10(values[values > 0])
+        values = within(values, made_look["quantile"])
         ends += [values.min(), values.max()] if len(values) else []
     lo, hi = zip(*corners, strict=True)
     return np.min(lo, axis=0), np.max(hi, axis=0), grown(None, np.array(ends)) if ends else None

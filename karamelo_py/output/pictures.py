@@ -52,6 +52,9 @@ AMBIENT = 0.5  # light from all sides
 LIT = 8  # points, from which on they have a surface
 
 
+Window = Sequence[tuple[float | None, float | None]]
+
+
 class Options(NamedTuple):
     """Options of a picture."""
 
@@ -65,7 +68,7 @@ class Options(NamedTuple):
     elevation: float = 30.0
     axes: bool = True
     lengths: str = ""  # text behind the names of the axes: the unit
-    window: tuple[tuple[float | None, float | None], ...] = ()  # of x, y, z; None: of the domain
+    window: Window = ()  # of x, y, z; None: of the domain
     log: bool = False  # colours go by the logarithm; what is not above 0 has the lowest
     quantile: float = 0.0  # share of the values, at each end, for which limits do not grow
     fontsize: float = 9.0
@@ -174,11 +177,7 @@ class Picture:
         """
         if not self._laid_out:
             self._lay_out()
-        columns = snapshot.columns
-        if self.options.window:
-            corners = zip("xyz", self.domain.lo, self.domain.hi, strict=False)
-            seen = [(columns[name] >= lo) & (columns[name] <= hi) for name, lo, hi in corners]
-            columns = {name: of[np.all(seen, axis=0)] for name, of in columns.items()}
+        columns = in_window(snapshot.columns, self.options.window)
         values = columns[self.options.column]
         if self.options.log:
             with np.errstate(divide="ignore", invalid="ignore"):
@@ -230,10 +229,7 @@ class Picture:
             self._background = None
 
     def _limits(self, values: np.ndarray) -> tuple[float, float]:
-        if share := self.options.quantile:
-            finite = values[np.isfinite(values)]
-            values = np.quantile(finite, [share, 1 - share]) if len(finite) else finite
-        grown_to = grown(self.limits, values)
+        grown_to = grown(self.limits, within(values, self.options.quantile))
         if self.options.symmetric:
             furthest = max(-grown_to[0], grown_to[1])
             grown_to = -furthest, furthest
@@ -261,7 +257,7 @@ class Picture:
     def _lay_out(self) -> None:
         """Find room for the widest labels, once: nothing moves between the pictures of a run."""
         if self.scale is not None:
-            self._apply_limits(-2.5e-5, 2.5e-5)
+            self._apply_limits(*((-5.2, -4.8) if self.options.log else (-2.5e-5, 2.5e-5)))
         for _ in range(2):  # a second time where the aspect of the axes has moved them
             self.figure.draw_without_rendering()
         self.figure.set_layout_engine("none")
@@ -315,7 +311,23 @@ def grown(limits: tuple[float, float] | None, values: np.ndarray) -> tuple[float
     return float(lo), float(hi if hi > lo else lo + unit)
 
 
-def _zoomed(domain: Any, window: Sequence[tuple[float | None, float | None]]) -> Any:
+def within(values: np.ndarray, share: float) -> np.ndarray:
+    """Find the finite values, or the ends of them but for a share at either end."""
+    finite = values[np.isfinite(values)]
+    return np.quantile(finite, [share, 1 - share]) if share and len(finite) else finite
+
+
+def in_window(columns: dict[str, np.ndarray], window: Window) -> dict[str, np.ndarray]:
+    """Choose the rows whose x, y and z lie in a window."""
+    for name, ends in zip("xyz", window, strict=False):
+        for end, out in zip(ends, (np.less, np.greater), strict=True):
+            if end is not None:
+                seen = ~out(columns[name], end)
+                columns = {key: of[seen] for key, of in columns.items()}
+    return columns
+
+
+def _zoomed(domain: Any, window: Window) -> Any:
     """The part of a domain that is shown."""
     if not window:
         return domain
@@ -377,7 +389,7 @@ class PlanePicture(Picture):
                 shown,
                 ax=self.axes,
                 shrink=0.8,
-                ticks=MaxNLocator(7, steps=STEPS),
+                ticks=MaxNLocator(7, steps=STEPS, integer=self.options.log),  # whole decades
                 format=FuncFormatter(_power if self.options.log else _number),
             )
             bar.set_label(self.options.label, fontsize=self.options.fontsize)
