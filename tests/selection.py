@@ -8,22 +8,21 @@ from typing import Any
 import pytest
 
 
-def covering(
-    cases: Iterable[tuple],
-) -> tuple[list[tuple], list[tuple]]:
-    """Split cases into few that have every pair of choices that occurs, and the rest.
+def covering(cases: Iterable[tuple], together: int = 1) -> tuple[list[tuple], list[tuple]]:
+    """Split cases into few that have every choice that occurs, and the rest.
 
-    Each case is a tuple of choices. Greedy: of the cases that bring most pairs, the first of a
-    shuffled list.
+    Each case is a tuple of choices, of which so many occur `together`: with 2 it is every pair.
+    Greedy: of the cases that bring most, the first of a shuffled list.
     """
 
     rest = list(cases)
     Random(0).shuffle(rest)
     number: dict[Any, int] = {}
-    # The pairs of a case as bits of an integer: thousands of cases are compared.
+    # What a case brings as bits of an integer: thousands of cases are compared.
     brings = {
         case: sum(
-            1 << number.setdefault(pair, len(number)) for pair in combinations(enumerate(case), 2)
+            1 << number.setdefault(part, len(number))
+            for part in combinations(enumerate(case), together)
         )
         for case in rest
     }
@@ -35,6 +34,11 @@ def covering(
         rest.remove(best)
         missing &= ~brings[best]
     return chosen, rest
+
+
+def few(values: Iterable, *kept: Any) -> list[Any]:
+    """Values of one parameter: those that are kept run always, the others are marked ``full``."""
+    return [v if v in kept else pytest.param(v, marks=pytest.mark.full) for v in values]
 
 
 def parameters(chosen: Sequence[tuple], rest: Sequence[tuple]) -> list[Any]:

@@ -247,6 +247,7 @@ def test_the_commit_is_that_of_the_repository():
 TWO = ["bench", "disks-20", "disks-80", "--seconds", "0.01", "-var", "N"]
 
 
+@pytest.mark.full
 @pytest.mark.xdist_group("disks")
 def test_each_of_several_workloads_has_a_process(tmp_path, capfd, monkeypatch):
     monkeypatch.chdir(tmp_path)

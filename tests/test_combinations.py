@@ -1,7 +1,7 @@
 """Every combination of method, basis, transfer, scheme and kinematics runs or is refused.
 
-Interpreted: a selection with every pair of choices, and each refusal once; all if ``-m full``.
-Compiled: two, and the selection if ``-m full``.
+Interpreted: a selection with every choice, and each refusal once; all if ``-m full``.
+Compiled: two, and a selection with every pair of choices if ``-m full``.
 """
 
 from itertools import combinations, product
@@ -27,16 +27,21 @@ CASES = [
     (kinematics, *base) for kinematics in KINEMATICS for base in BASES if fits(kinematics, base[2])
 ]
 WAYS = list(product(TRANSFERS, SCHEMES))
-PAIRWISE = [
-    (kinematics, *base, *way)
-    for kinematics, base, *way in covering(
+
+
+def selected(together: int) -> list[tuple[str, ...]]:
+    """Few combinations in which all choices, so many of them `together`, occur."""
+    possible = (
         (kinematics, tuple(base), *way)
         for kinematics, *base in CASES
         for way in WAYS
         if not refused(*base, *way)
-    )[0]
-]
-SELECTED = set(PAIRWISE)
+    )
+    chosen, _ = covering(possible, together)
+    return [(kinematics, *base, *way) for kinematics, base, *way in chosen]
+
+
+PAIRWISE, SELECTED = selected(2), set(selected(1))
 
 
 def those_of(case: tuple[str, ...]) -> list[str]:
@@ -97,16 +102,20 @@ def test_interpreted_in_all_ways(case, state_interpreted, run_interpreted, tmp_p
 
 
 def test_every_pair_is_met():
-    """Every pair of choices that is not refused runs, and all that is refused is tried once."""
-    pairs: dict[bool, set] = {True: set(), False: set()}
+    """Every choice runs, every pair of them if ``-m full``; what is refused is tried once."""
+    met: dict[int, set] = {1: set(), 2: set()}
+    there: dict[int, set] = {1: set(), 2: set()}
     tried = []
     for case, way in product(CASES, WAYS):
         if refused(*case[1:], *way):
             tried += [(*case[1:], *way)] * (way in always(case))
             continue
         choices = case[0], case[1:], *way
-        pairs[way in always(case)].update(combinations(enumerate(choices), 2))
-    assert pairs[False] <= pairs[True]
+        for together, runs in ((1, way in always(case)), (2, (*case, *way) in PAIRWISE)):
+            found = set(combinations(enumerate(choices), together))
+            there[together] |= found
+            met[together] |= found if runs else set()
+    assert met == there
     refusals = [(*base, *way) for base, way in product(BASES, WAYS) if refused(*base, *way)]
     assert sorted(tried) == sorted(refusals)
 

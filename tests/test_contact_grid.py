@@ -5,6 +5,7 @@ from textwrap import dedent
 import numpy as np
 import pytest
 from scenes import SCHEMES, block
+from selection import few
 from states import final_state, same_bits
 
 H = 0.1
@@ -43,7 +44,7 @@ def test_one_solid_is_as_in_ulmpm(state_interpreted, d, scheme):
     assert same_bits(state_interpreted(script), state_interpreted(own))
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("scheme", few(SCHEMES, "usf"))
 def test_blocks_separate_freely(run_interpreted, scheme):
     """Two blocks that touch and move apart do not feel each other; in ulmpm they hold together."""
     lines = ("dt_factor(0.5)", "log_modify(custom, step, va_x, vb_x, k)", "run(6)")
@@ -54,7 +55,7 @@ def test_blocks_separate_freely(run_interpreted, scheme):
     assert abs(stuck.va_x[-1]) < 0.09
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("scheme", few(SCHEMES, "musl", "usl"))
 def test_collision(run_interpreted, scheme):
     """Equal bars exchange their velocities; momentum is kept, forces are equal and opposite.
 
@@ -158,7 +159,7 @@ def test_two_bodies_on_a_third(run_interpreted):
     assert log.b_x[-1] == pytest.approx(-0.25, abs=1e-4)
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("scheme", few(SCHEMES, "musl", "usavg"))
 def test_a_scene_that_grows_between_runs(state_interpreted, scheme):
     """What touched in the last step is known when the arrays are made anew: the same bits."""
     far = "region(far, block, 1.8, 1.9)\nsolid(far, region, far, 2, m, 0.1, 0)"
@@ -259,6 +260,7 @@ def incline(mu: float) -> str:
     """
 
 
+@pytest.mark.full
 @pytest.mark.xdist_group("contact")
 def test_contact_carries_the_weight_of_a_sliding_disk(run_script):
     """The force across the incline is m g cos. How fast the disk slides, comparisons/incline.py."""
@@ -329,7 +331,10 @@ def test_no_friction_across_a_gap(run_interpreted):
 
 
 # Half a cell is closed in 31.25 steps; with splines two cells seem a quarter of a cell thicker.
-@pytest.mark.parametrize(("basis", "apart"), [("linear", 31), ("quadratic-spline", 15)])
+@pytest.mark.parametrize(
+    ("basis", "apart"),
+    [("linear", 31), pytest.param("quadratic-spline", 15, marks=pytest.mark.full)],
+)
 def test_friction_is_a_share_of_the_push(run_script, basis, apart):
     """Coulomb while it slides: in the step in which the gap closes, too, where a part of the
     approach is still free. The rigid base decides the normal, at the edges of the block, too.

@@ -523,6 +523,7 @@ def test_boxes_grow_with_domains(tmp_path, monkeypatch):
     assert same_bits(whole, run(1, "run(13)", "run(13)"))
 
 
+@pytest.mark.full
 def test_torn_apart_in_any_way(state_interpreted):
     """The same interpreted, in pieces and whole; with edges instead of corners, too.
 

@@ -28,7 +28,7 @@ def test_errors_of_the_page_are_shares_of_the_exact_numbers():
         assert shown == pytest.approx(case.error(float(default)), abs=6e-4)
 
 
-@pytest.mark.parametrize("name", ["faces", "punch"])
+@pytest.mark.parametrize("name", ["faces", pytest.param("punch", marks=pytest.mark.full)])
 def test_faces_that_end_beside_each_other(tmp_path, name):
     """Bodies touch as long as a wave runs to the end of the rod and back (St Venant 1867).
 

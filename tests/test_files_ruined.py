@@ -147,6 +147,7 @@ def test_what_else_fails_while_a_file_is_open_is_not_its_damage(run_interpreted)
     assert told.value is full
 
 
+@pytest.mark.full
 @needs_mpi
 @pytest.mark.parametrize("halved", [False, pytest.param(True, marks=pytest.mark.full)])
 def test_few_points_that_one_of_two_processes_has(tmp_path, halved):

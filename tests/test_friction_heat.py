@@ -46,7 +46,9 @@ WALL = f"""region(low, block, INF, INF, INF, 1.1)
         ("ulmpm", WALL),
     ],
 )
-@pytest.mark.parametrize(("factor", "rel"), [(0.1, 0.012), (0.8, 0.05)])
+@pytest.mark.parametrize(
+    ("factor", "rel"), [pytest.param(0.1, 0.012, marks=pytest.mark.full), (0.8, 0.05)]
+)
 def test_heat_is_the_work_of_friction(run_script, method, ground, factor, rel):
     """A block slides: m cp (T - T0) is what its energy lacks (exact), and mu m g s (Coulomb).
 

@@ -65,11 +65,11 @@ def test_a_point_alone_keeps_its_volume(run_interpreted, transfer):
         # Without the heat it is 62, 17, 13 and 18 %; 12, 7, 17 and 8 %. With musl in the place of
         # usavg it is 3.1 and 6.6 %, with usavg 2.5 and 6.2 %. Of the full ones the heat is above.
         pytest.param("PIC", "mechanical", "musl", 0.1, marks=pytest.mark.full),
-        ("APIC", "mechanical", "usl", 0.05),
+        pytest.param("APIC", "mechanical", "usl", 0.05, marks=pytest.mark.full),
         ("TPIC", "mechanical", "usavg", 0.03),
         pytest.param("FLIP", "0.9", "musl", 0.02, marks=pytest.mark.full),
-        ("AFLIP", "0.5", "musl", 0.06),
-        ("TFLIP", "0.9", "usavg", 0.07),
+        pytest.param("AFLIP", "0.5", "musl", 0.06, marks=pytest.mark.full),
+        pytest.param("TFLIP", "0.9", "usavg", 0.07, marks=pytest.mark.full),
         pytest.param("XPIC", "2", "musl", 0.03, marks=pytest.mark.full),
         pytest.param("XPIC", "3", "musl", 0.02, marks=pytest.mark.full),
     ],

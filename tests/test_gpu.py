@@ -50,7 +50,7 @@ def state(simulation):
 @pytest.mark.parametrize(
     ("method", "scheme", "precision"),
     [
-        ("ulmpm, FLIP, linear, 0.99", "musl", "double"),
+        pytest.param("ulmpm, FLIP, linear, 0.99", "musl", "double", marks=pytest.mark.full),
         ("ulmpm, MLS, quadratic-spline", "usl", "single"),
         ("tlmpm, FLIP, linear, 0.99", "usf", "double"),
     ],
@@ -91,7 +91,7 @@ fix(push, velocity_particles, top, 0.1*cos(40*time) + 1e-4*base_y, NULL)
 """
 
 
-@pytest.mark.parametrize("method", ["ulmpm", "tlmpm"])
+@pytest.mark.parametrize("method", ["ulmpm", pytest.param("tlmpm", marks=pytest.mark.full)])
 def test_fixes(method):
     """Walls with friction in common nodes, formulas, forces on points; the balance of energy.
 

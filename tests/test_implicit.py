@@ -168,6 +168,7 @@ BAR = """
 """
 
 
+@pytest.mark.full
 def test_cooks_membrane(run_script):
     """Way of the load 23.96 F/E (Bergan & Felippa 1985): 7.9 and 3.2 % below, on two grids."""
     ways = []
@@ -179,6 +180,7 @@ def test_cooks_membrane(run_script):
     assert 0 < errors[1] < 0.035 and errors[0] / errors[1] > 2
 
 
+@pytest.mark.full
 def test_a_block_flows(run_script):
     """Its centre of gravity sinks as far as in time, 7.9 % of the height, less 5 % of that.
 
@@ -380,6 +382,7 @@ EVERY = """region(every, block, -INF, INF, -INF, INF)
     fix(g, body_force, all, 0, -10)"""
 
 
+@pytest.mark.full
 def test_a_body_falls(run_script):
     """v = g t, behind another scheme, too."""
     out = run_script(AT_REST.format(lines=BEFORE, columns="")).out
@@ -472,6 +475,7 @@ STEEL = """eos(steel, linear, 1, 1000)
     material(m, eos-strength, steel, steel)"""
 
 
+@pytest.mark.full
 def test_a_run_ends_at_the_limit_load(run_script):
     """A bar bears 2/sqrt(3) of its yield stress in plane strain: its ends are pulled by no more."""
     text = patch(BEYOND).replace("pull_x", "F").replace("material(m, linear, 1, 1000, 0.25)", STEEL)

@@ -260,6 +260,7 @@ SQUEEZED = """
 """
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "basis", ["quadratic-spline", pytest.param("cubic-spline", marks=pytest.mark.full)]
 )

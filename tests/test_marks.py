@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import h5py
 import numpy as np
+import pytest
 from scenes import block
 from test_failures import against_a_wall
 
@@ -122,6 +123,7 @@ for script in sys.argv[1:]:
 """
 
 
+@pytest.mark.full
 def test_no_more_states_are_marked_than_a_run_may_go_back_to(tmp_path, starts_are_cheap):
     """Those since the last good one; none where that is the start, as the step is too large.
 

@@ -11,6 +11,8 @@ from karamelo_py.language import registry, rules
 from karamelo_py.script.errors import ScriptError
 
 ROOT = Path(__file__).parent.parent
+# They read the package once, in one process.
+pytestmark = pytest.mark.xdist_group("messages")
 
 
 @pytest.fixture(scope="module")

@@ -69,6 +69,7 @@ def moving(folder: Path, *lines: str, size: float = 0.2) -> Path:
 # --- the same bytes -----------------------------------------------------------------------------
 
 
+@pytest.mark.full
 @needs_mpi
 @pytest.mark.xdist_group("disks")
 @pytest.mark.parametrize("further", [False, pytest.param(True, marks=FULL)])
@@ -241,6 +242,7 @@ def running(folder: Path, *lines: str, **more: str) -> subprocess.Popen:
     return process
 
 
+@pytest.mark.full
 @needs_mpi
 @pytest.mark.parametrize(
     ("rank", "number"),
@@ -269,6 +271,7 @@ time.sleep(60)
 """
 
 
+@pytest.mark.full
 @needs_mpi
 @pytest.mark.parametrize("ranks", [pytest.param("1", marks=FULL), "2"])
 def test_a_signal_before_the_run(tmp_path, ranks):
@@ -328,6 +331,7 @@ def test_a_process_is_stopped(tmp_path):
     assert "stopped" not in err
 
 
+@pytest.mark.full
 @needs_mpi
 @pytest.mark.parametrize("rank", [pytest.param(0, marks=FULL), 1])
 def test_a_process_is_killed(tmp_path, rank):
@@ -507,6 +511,7 @@ PART_OF_ALL = """
 """
 
 
+@pytest.mark.full
 @needs_mpi
 @pytest.mark.parametrize(
     "line, says",

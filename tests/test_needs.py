@@ -220,6 +220,7 @@ def test_a_domain_100_times_larger_takes_no_more_memory(tmp_path):
     assert far - near < 4
 
 
+@pytest.mark.full
 @known_peak
 @pytest.mark.xdist_group("disks")
 def test_a_scene_is_made_in_twice_its_memory(tmp_path, monkeypatch, capsys):

@@ -15,7 +15,7 @@ from scenes import SCHEMES, block
 from states import same_bits
 from test_contact_points import bodies
 from test_heat import HOT, slab
-from test_restart import ways
+from test_restart import some_ways
 
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
@@ -46,7 +46,10 @@ def test_schemes(state_interpreted, tmp_path, scheme, transfer):
     assert shared(state_interpreted, tmp_path, with_files(script, "restart(5, r.*.h5)\n"))
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param("bench", marks=pytest.mark.full), *(name for name in SCENES if name != "bench")],
+)
 def test_every_part(state_interpreted, tmp_path, name):
     """Contact, heat, damage, edges, tools, computes that look back."""
     (tmp_path / "curve.csv").write_text(CURVE, encoding="utf-8")
@@ -55,7 +58,7 @@ def test_every_part(state_interpreted, tmp_path, name):
     assert shared(state_interpreted, tmp_path, with_files(script))
 
 
-@pytest.mark.parametrize("way", ways(), ids=lambda way: " ".join(filter(None, way)))
+@pytest.mark.parametrize("way", some_ways(), ids=lambda way: " ".join(filter(None, way)))
 def test_every_way(state_interpreted, tmp_path, way):
     """Methods, bases, transfers, schemes and kinematics; three ranks."""
     option = way[3]
@@ -82,7 +85,14 @@ NODES = (
 )
 
 
-@pytest.mark.parametrize("method", ["ulmpm", "tlmpm", "ulmpm/contacts"])
+@pytest.mark.parametrize(
+    "method",
+    [
+        pytest.param("ulmpm", marks=pytest.mark.full),
+        pytest.param("tlmpm", marks=pytest.mark.full),
+        "ulmpm/contacts",
+    ],
+)
 def test_nodes_in_pieces(state_interpreted, tmp_path, method):
     """Also what points bring to nodes for a dump alone, and before the first step."""
     script = block(2, *NODES, *MOVING, "run(11)", size=(0.3, 0.2))
@@ -112,7 +122,7 @@ def test_what_is_asked_between_two_runs(state_interpreted, tmp_path):
     assert shared(state_interpreted, tmp_path, script)
 
 
-@pytest.mark.parametrize("dimension", [1, 2, 3])
+@pytest.mark.parametrize("dimension", [1, 2, pytest.param(3, marks=pytest.mark.full)])
 def test_pictures(state_interpreted, tmp_path, dimension):
     """From far to near, with the light of all points; 16 of them after others."""
     script = block(
@@ -150,7 +160,9 @@ TOUCHING = {
 }
 
 
-@pytest.mark.parametrize("changes", [{}, TOUCHING], ids=["one body", "contact"])
+@pytest.mark.parametrize(
+    "changes", [{}, pytest.param(TOUCHING, marks=pytest.mark.full)], ids=["one body", "contact"]
+)
 def test_a_step_that_is_halved(state_interpreted, tmp_path, changes):
     """Each process goes back to what it kept; files hold it, as those of one process do."""
     script = block(2, *HALVED, size=(0.3, 0.2), scheme="usavg" if changes else "musl")
@@ -370,7 +382,7 @@ def test_tiles_are_cut_by_work(monkeypatch, costs, tiles_of_first):
     assert np.count_nonzero(two.owner[:8] == 0) == tiles_of_first
 
 
-@pytest.mark.parametrize("scheme", ["usf", "usavg"])
+@pytest.mark.parametrize("scheme", ["usf", pytest.param("usavg", marks=pytest.mark.full)])
 def test_touching_bodies_on_their_way(state_interpreted, tmp_path, scheme):
     """What contact remembers of a node goes with it from process to process."""
     script = f"""
@@ -393,7 +405,9 @@ run(12)
     assert shared(state_interpreted, tmp_path, with_files(script), ranks=3)
 
 
-@pytest.mark.parametrize("method", ["ulmpm", "ulmpm/contacts"])
+@pytest.mark.parametrize(
+    "method", [pytest.param("ulmpm", marks=pytest.mark.full), "ulmpm/contacts"]
+)
 def test_points_moved_by_python(state_interpreted, tmp_path, method):
     """At the start of a step, in each of them: others have the points then."""
     script = block(

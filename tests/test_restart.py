@@ -20,6 +20,7 @@ import pytest
 from combinations import BASES, MESHED, SCHEMES, TRANSFERS, fits, refused, scene, write_mesh
 from going_on import CURVE, FLY, OUTPUTS, SCENES, SERIAL, arrays, goes_on, same_files, with_files
 from scenes import block
+from selection import covering
 
 from karamelo_py.language import registry
 from karamelo_py.run.checkpoint.arrays import opened, reading
@@ -48,7 +49,13 @@ def test_the_ways_are_all_there():
         assert {way[place] for way in ways()} == set(names)
 
 
-@pytest.mark.parametrize("way", ways(), ids=lambda way: " ".join(filter(None, way)))
+def some_ways() -> list:
+    """Few with every choice; the others if ``-m full``."""
+    chosen, rest = covering(ways())
+    return [*chosen, *(pytest.param(way, marks=pytest.mark.full) for way in rest)]
+
+
+@pytest.mark.parametrize("way", some_ways(), ids=lambda way: " ".join(filter(None, way)))
 def test_every_way(run_interpreted, tmp_path, way):
     """Methods, bases, transfers, schemes and kinematics."""
     option = way[3]

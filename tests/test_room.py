@@ -319,7 +319,9 @@ def test_a_grid_that_no_machine_has_room_for(tmp_path, capsys, monkeypatch):
     assert "Unable to allocate 95.4 GiB" in said and "larger cells" in said
 
 
-@pytest.mark.parametrize(("on_machine", "refused"), [(2, False), (4, True)])
+@pytest.mark.parametrize(
+    ("on_machine", "refused"), [pytest.param(2, False, marks=pytest.mark.full), (4, True)]
+)
 def test_of_processes_those_of_one_machine_count(small, on_machine, refused):
     """Of four with equal shares; half of the scene fits."""
     hub = Hub(Console(quiet=True))

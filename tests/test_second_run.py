@@ -38,7 +38,7 @@ def kernels(folder: Path) -> set[str]:
     "name",
     [
         pytest.param("neo-hookean", marks=pytest.mark.xdist_group("neo-hookean")),
-        pytest.param("identical", marks=pytest.mark.xdist_group("identical")),
+        pytest.param("identical", marks=pytest.mark.full),
         pytest.param("heat_slab", marks=pytest.mark.full),
     ],
 )

@@ -118,6 +118,7 @@ def test_what_is_known_is_not_run_again(folder, capsys):
     assert marked.read_text() != "not run again"
 
 
+@pytest.mark.full
 def test_an_interrupted_sweep_goes_on(folder, capsys):
     words = [
         "in.flight",

@@ -123,6 +123,7 @@ def uneven_steps(count: int, time: float) -> list[float]:
     return (swing * time / swing.sum()).tolist()
 
 
+@pytest.mark.full
 def test_a_ring_converges_with_second_order(state_interpreted):
     """A ring vibrates in its lowest radial mode for a good half period, on grids of 4 and 8 cells.
 

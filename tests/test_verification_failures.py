@@ -119,6 +119,7 @@ def test_flip_keeps_a_sawtooth_pic_and_xpic_take_it_away(run):
     assert modes[2] > 0.996
 
 
+@pytest.mark.full
 def test_flip_rings_behind_a_wave(run):
     """Behind the wave the bar is at rest: FLIP leaves a fifth of the velocity, XPIC a fiftieth."""
     assert run("flip_noise").log.noise[-1] > 0.15
@@ -126,6 +127,7 @@ def test_flip_rings_behind_a_wave(run):
     assert run("flip_noise", transfer="APIC", order="mechanical").log.noise[-1] < 0.1
 
 
+@pytest.mark.full
 @pytest.mark.xdist_group("bar")
 def test_flip_noise_does_not_grow(run_script):
     """The energy of the vibrating bar over 10 periods."""
@@ -162,6 +164,7 @@ def gaps(result):
     return np.diff(points.x[np.argsort(points.x0)]) / 0.5
 
 
+@pytest.mark.full
 def test_a_stretched_bar_breaks_without_reason(run):
     """To three times its length: the force breaks off, and the points gather to lumps.
 
@@ -176,6 +179,7 @@ def test_a_stretched_bar_breaks_without_reason(run):
     assert gaps(whole)[:-2] == pytest.approx(np.full(5, 3.0), rel=0.15)
 
 
+@pytest.mark.full
 def test_quadrilaterals_tangle_and_say_so(run):
     """Q4 ends with a message that names the point and R4; R4 and tlcpdi go on to the end."""
     said = run("cpdi_tangle", status=1).err
@@ -184,6 +188,7 @@ def test_quadrilaterals_tangle_and_say_so(run):
     assert run("cpdi_tangle", kind="tlcpdi").log.Time[-1] == 0.2
 
 
+@pytest.mark.full
 def test_diagonal_boxes_vanish_in_a_turn(run):
     """At 90 degrees points of 1 and 1/2 cell beside a node leave a force of half the stress.
 
@@ -223,6 +228,7 @@ def test_the_step_of_a_lone_point_depends_on_its_place(run):
 # --- Steps --------------------------------------------------------------------------------------
 
 
+@pytest.mark.full
 def test_usl_bears_less_than_the_courant_step(run):
     """Benchmark C11: 0.9 h/c is too much for usl, and right for musl."""
     assert "the step is 1.38 times the stable one" in run("courant", status=1).err
@@ -420,6 +426,7 @@ def touched(log):
     return log.Time[np.abs(log.velocity - 1) > 0.01][0]
 
 
+@pytest.mark.full
 def test_bars_on_one_grid_touch_early_and_stick(run):
     """They touch at t = 2; on one grid earlier by what the functions overlap, 3/2 cells at most.
 
@@ -560,6 +567,7 @@ def test_water_does_not_hold_unless_it_is_told_to(run):
 # --- Order of sums ------------------------------------------------------------------------------
 
 
+@pytest.mark.full
 def test_another_order_of_points_gives_other_bits_and_the_same_numbers(state_interpreted):
     """Solids in another order: round-off. The same order: the same bits (tests/test_identical.py:
     with any number of threads)."""
