@@ -20,12 +20,11 @@ from karamelo_py.kernels.arrays import TIMESTEP, known_to_laws, with_items_of
 from karamelo_py.kernels.clock import checked_move, kick, step_size
 from karamelo_py.kernels.contact import Scratch, SeparateFields
 from karamelo_py.kernels.gpu import MOVED, STATUS, goes_wrong, is_last
-from karamelo_py.kernels.heat import heat_of, heated
+from karamelo_py.kernels.heat import heat_of
 from karamelo_py.kernels.loss import FrictionalHeat
 from karamelo_py.kernels.p2g import Force, WorkOfForces
 from karamelo_py.kernels.step import GAINED
 from karamelo_py.points.kinematics import planar
-from karamelo_py.points.laws import moves_as_told
 
 
 class Own(NamedTuple):
@@ -128,7 +127,6 @@ def on_node(target: int, task: int, values: int, of_heat: bool = False) -> Calla
 
 def on_whole_node(target: int, early: bool) -> Callable:
     """Make the same of a hook on whole nodes; `early` before the update."""
-    control_of = _control(0)
 
     def visit_whole_member(i, fate, s, hooks, tag, h, copies):
         n = _member(hooks, h, i)
@@ -137,7 +135,7 @@ def on_whole_node(target: int, early: bool) -> Callable:
         own = _hooks_with_room(hooks)
         own.chosen[0] = n
         what = hook_loop.WholeNodes(tag, planar(s.kin), s.grids, s.nodes, s.ranges, early, target)
-        hook_loop.act(what, hook_loop.ACT, own, control_of(s, copies, i), float(kick(s)), h, 1, 1.0)
+        hook_loop.act(what, hook_loop.ACT, own, _CONTROL(s, copies, i), float(kick(s)), h, 1, 1.0)
 
     return visit_whole_member
 
@@ -173,42 +171,23 @@ def _act_on_point(what, control_of, i, s, hooks, h, copies):
         )
 
 
-def on_point(then: int, values: int) -> Callable:
-    """Make what a point does for a hook on points; `then` is 1 behind the move."""
+def on_point(what_of: Callable, then: int, values: int) -> Callable:
+    """Make what a point does for a hook on what `what_of` gives; `then` is 1 behind the move."""
     control_of = _control(values)
 
     def visit_point(i, fate, s, block, hooks, h, copies):
-        p, now = block.points, s.control.clock[0].now
-        y = 1 - now if then else now
-        corners = hook_loop.corners_that_move(s)
-        rigid = moves_as_told(block.laws)
-        what = hook_loop.MovingPoints(p.id, p.v, p.mass, p.x[now], p.x[y], corners, rigid)
-        _act_on_point(what, control_of, i, s, hooks, h, copies)
+        _act_on_point(what_of(s, block, then), control_of, i, s, hooks, h, copies)
 
     return visit_point
 
 
-def on_heated_point(values: int) -> Callable:
-    """Make what a point does for a hook that heats points."""
-    control_of = _control(values)
-
-    def visit_heated_point(i, fate, s, block, hooks, h, copies):
-        what = heated(s.kin, block.points, block.points.x[s.control.clock[0].now])
-        _act_on_point(what, control_of, i, s, hooks, h, copies)
-
-    return visit_heated_point
-
-
 def on_whole_point(then: int, heats: bool = False) -> Callable:
     """Make the same of a hook on whole points."""
-    control_of = _control(0)
 
     def visit_whole_point(i, fate, s, block, hooks, tag, h, copies):
-        p, now = block.points, s.control.clock[0].now
-        y = 1 - now if then else now
-        heat = heat_of(p) if heats else ()
-        what = hook_loop.WholePoints(tag, p.id, s.kin, p, block.laws, p.x[y], heat)
-        _act_on_point(what, control_of, i, s, hooks, h, copies)
+        heat = heat_of(block.points) if heats else ()
+        what = hook_loop.whole_points(tag, s, block, then, heat)
+        _act_on_point(what, _CONTROL, i, s, hooks, h, copies)
 
     return visit_whole_point
 

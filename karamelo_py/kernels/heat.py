@@ -251,11 +251,11 @@ def _at_heat_nodes_hooks(hooks, stage, target, s):
     clock.hottest = max(clock.hottest, clock.set_high)
 
 
-def heated(kin, points, x):
+def heated(s, block, then):
     """Give what fixes that heat points act on."""
-    kinds = Capacity, Temperature, Volume, Supply, TemperatureShare
+    points, kinds = block.points, (Capacity, Temperature, Volume, Supply, TemperatureShare)
     own = [field(points.fields, kind) for kind in kinds]
-    return hook_loop.HeatedPoints(points.id, kin, *own, x)
+    return hook_loop.HeatedPoints(points.id, s.kin, *own, points.x[s.control.clock[0].now])
 
 
 def heat_of(points):
@@ -272,16 +272,7 @@ def at_heated_points(hooks, s):
 def _at_heated_points_hooks(hooks, s):
     clock = s.control.clock[0]
     clock.rise = clock.fall = 0.0
-    blocks = tuple(
-        [
-            (
-                heated(s.kin, p, p.x[clock.now]),
-                hook_loop.whole_points(hooks, s.kin, p, laws, p.x[clock.now], heat_of(p)),
-            )
-            for p, laws, _ in s.blocks
-        ]
-    )
-    hook_loop.point_hooks(arrays.SUPPLY_HEAT, blocks, hooks, s.control, step_size(s))
+    hook_loop.point_hooks(arrays.SUPPLY_HEAT, 0, hooks, s, heated, heat_of)
     agree_on_heat(s.control.ranks, s.control)
     clock.hottest += step_size(s) * clock.rise
     clock.coldest += step_size(s) * clock.fall

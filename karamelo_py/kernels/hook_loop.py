@@ -727,27 +727,40 @@ def _begin_or_end_totals(stage, hooks, control, begin):
                 publish_total(hooks, h, control)
 
 
-def point_hooks(stage, blocks, hooks, control, dt):
-    """Call the point functions of `stage` on the members in each of `blocks`; sum over them.
+def point_hooks(stage, then, hooks, s, what_of, heat_of):
+    """Call the point functions of `stage` on the members in each block; sum over them.
 
-    A block is a pair: what functions of one component act on, and those of whole points.
+    ``what_of(s, block, then)`` gives what functions of one component act on, and
+    ``heat_of(points)`` what those of whole points heat.
     """
-    hooks = without_whole(hooks)
-    _begin_or_end_totals(stage, hooks, control, True)
-    for what, whole in blocks:
-        _point_hooks(stage, what, whole, hooks, control, dt)
-    _begin_or_end_totals(stage, hooks, control, False)
+    control, dt, without = s.control, step_size(s), without_whole(hooks)
+    of_points = [tag for tag in hooks.whole if not tag.of_nodes]
+    _begin_or_end_totals(stage, without, control, True)
+    for block in s.blocks:
+        heat = heat_of(block.points)
+        whole = tuple([whole_points(tag, s, block, then, heat) for tag in of_points])
+        _point_hooks(stage, what_of(s, block, then), whole, without, control, dt)
+    _begin_or_end_totals(stage, without, control, False)
 
 
-def whole_points(hooks, kin, points, laws, x, heat):
-    """Give what each of the functions of whole points acts on."""
-    return tuple(
-        [
-            WholePoints(tag, points.id, kin, points, laws, x, heat)
-            for tag in hooks.whole
-            if not tag.of_nodes
-        ]
-    )
+def _positions(s, points, then):
+    """Give the positions before a step, and with `then` those behind it, else the same."""
+    now = s.control.clock[0].now
+    return points.x[now], points.x[1 - now if then else now]
+
+
+def whole_points(tag, s, block, then, heat):
+    """Give what a function of whole points acts on."""
+    points = block.points
+    _, y = _positions(s, points, then)
+    return WholePoints(tag, points.id, s.kin, points, block.laws, y, heat)
+
+
+def moving_points(s, block, then):
+    """Give what point functions act on."""
+    points, rigid = block.points, moves_as_told(block.laws)
+    x, y = _positions(s, points, then)
+    return MovingPoints(points.id, points.v, points.mass, x, y, corners_that_move(s), rigid)
 
 
 def _clear(kin, force, count):
@@ -770,19 +783,7 @@ def at_points(hooks, stage, then, s):
 
 @at_points.on(arrays.Hooks)
 def _at_points_hooks(hooks, stage, then, s):
-    now = s.control.clock[0].now
-    y = 1 - now if then else now
-    corners = corners_that_move(s)
     if stage == arrays.INITIAL_INTEGRATE and len(hooks.whole):
         for block in s.blocks:
             _clear(s.kin, field(block.points.fields, Force), block.points.mass.size)
-    blocks = tuple(
-        [
-            (
-                MovingPoints(p.id, p.v, p.mass, p.x[now], p.x[y], corners, moves_as_told(laws)),
-                whole_points(hooks, s.kin, p, laws, p.x[y], ()),
-            )
-            for p, laws, _ in s.blocks
-        ]
-    )
-    point_hooks(stage, blocks, hooks, s.control, step_size(s))
+    point_hooks(stage, then, hooks, s, moving_points, lambda points: ())

@@ -34,7 +34,7 @@ from numba import types
 
 from karamelo_py.compiler.compile import point_function
 from karamelo_py.compiler.fields import field, load_vector, store, vector
-from karamelo_py.compiler.tuples import flat
+from karamelo_py.compiler.tuples import flat, put_at
 from karamelo_py.kernels import arrays
 from karamelo_py.points.laws import jacobian, specific_volume
 
@@ -144,10 +144,6 @@ WORDS = {
 }
 
 
-def _node_mass(what, law, state, n):
-    return what.nodes.sums[n, arrays.MASS]
-
-
 def _node_velocity(what, law, state, n):
     nodes, kin = what.nodes, what.kin
     if what.before_update:
@@ -158,19 +154,18 @@ def _node_velocity(what, law, state, n):
     return kin.Vector._make(numbers)
 
 
-def _node_update(what, law, state, n):
-    return what.kin.Vector._make([what.nodes.update[n, c] for c in range(what.kin.dimension)])
-
-
-def _node_force(what, law, state, n):
-    first, kin = arrays.of_force(what.kin), what.kin
-    return kin.Vector._make([what.nodes.sums[n, first + c] for c in range(kin.dimension)])
+def _at_node(what, array, n, first):
+    return what.kin.Vector._make([array[n, first + c] for c in range(what.kin.dimension)])
 
 
 NODE_WORDS = {
-    "mass": _node_mass, "velocity": _node_velocity, "velocity_update": _node_update,
-    "force": _node_force,
-}  # fmt: skip
+    "mass": lambda what, law, state, n: what.nodes.sums[n, arrays.MASS],
+    "velocity": _node_velocity,
+    "velocity_update": lambda what, law, state, n: _at_node(what, what.nodes.update, n, 0),
+    "force": lambda what, law, state, n: _at_node(
+        what, what.nodes.sums, n, arrays.of_force(what.kin)
+    ),
+}
 # The moments of hooks on whole nodes, and what they can change beside fields.
 NODE_WRITES = {"post_particles_to_grid": "force", "post_update_grid_state": "velocity_update"}
 
@@ -192,31 +187,24 @@ def _field_reader(item: Any, number: Callable) -> Callable:
 def _node_reader(item: Any) -> Callable:
     """Return what reads an item of a node."""
     if not isinstance(item, type):
-        return NODE_WORDS.get(item, _node_mass)  # others are refused before that
+        return NODE_WORDS.get(item, NODE_WORDS["mass"])  # others are refused before that
     return _field_reader(item, lambda what, k, n: field(what.nodes.fields, item)[n, k])
+
+
+def _write_update(what, n, new):
+    change = arrays.of_change(what.kin)
+    for c in range(what.kin.dimension):
+        what.nodes.update[n, change + c] += new[c] - what.nodes.update[n, c]
+        what.nodes.update[n, c] = new[c]
 
 
 def _node_writer(item: Any) -> Callable:
     """Return what writes an item of a node."""
-
-    def force(what, n, new):
-        for c in range(what.kin.dimension):
-            what.nodes.sums[n, arrays.of_force(what.kin) + c] = new[c]
-
-    def velocity_update(what, n, new):
-        change = arrays.of_change(what.kin)
-        for c in range(what.kin.dimension):
-            what.nodes.update[n, change + c] += new[c] - what.nodes.update[n, c]
-            what.nodes.update[n, c] = new[c]
-
-    def of_field(what, n, new):
-        array = field(what.nodes.fields, item)
-        for k, number in enumerate(flat((new,))):
-            array[n, k] = number
-
     if isinstance(item, type):
-        return of_field
-    return force if item == "force" else velocity_update
+        return lambda what, n, new: put_at(field(what.nodes.fields, item), n, 0, flat((new,)))
+    if item == "force":
+        return lambda what, n, new: put_at(what.nodes.sums, n, arrays.of_force(what.kin), new)
+    return _write_update
 
 
 def _reader(item: Any) -> Callable:

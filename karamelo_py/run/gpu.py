@@ -17,8 +17,14 @@ from karamelo_py.compiler.trace import forget
 from karamelo_py.kernels import arrays, gpu, table
 from karamelo_py.kernels import gpu_fixes as fixes
 from karamelo_py.kernels.clock import take_reports
-from karamelo_py.kernels.heat import Conducting, at_heat_nodes, at_heated_points, at_its_nodes
-from karamelo_py.kernels.hook_loop import ACT, RUB, add_work
+from karamelo_py.kernels.heat import (
+    Conducting,
+    at_heat_nodes,
+    at_heated_points,
+    at_its_nodes,
+    heated,
+)
+from karamelo_py.kernels.hook_loop import ACT, RUB, add_work, moving_points
 from karamelo_py.kernels.hooks import HEAT_FUNCTION, NODE_FUNCTION, POINT_FUNCTION
 from karamelo_py.kernels.p2g import WorkOfForces
 from karamelo_py.kernels.step import DONE, first_rows, rows_of
@@ -358,18 +364,19 @@ class StepsOnCard:
     def _hooks_on_points(self, stage: int, then: int) -> Iterator[KernelLaunch]:
         s, hooks, copies = self.s, self.hooks, self.copies
         own = [h for h, row in enumerate(self._table()) if row.stage == stage]
+        heats = stage == arrays.SUPPLY_HEAT
         for block in s.blocks:
             if stage == arrays.INITIAL_INTEGRATE and getattr(hooks, "whole", ()):
                 yield self._of_points(fixes.clear_force, block)
             for h in own:
                 called = self._called(h)
                 if self._table()[h].address != arrays.WHOLE:
-                    heats, values = stage == arrays.SUPPLY_HEAT, self._values(h)
-                    act = fixes.on_heated_point(values) if heats else fixes.on_point(then, values)
+                    what_of = heated if heats else moving_points
+                    act = fixes.on_point(what_of, then, self._values(h))
                     yield self._of_points(act, block, hooks, h, copies, called=called)
                 else:
                     (tag,) = (one for one in hooks.whole if one.row == h)
-                    act = fixes.on_whole_point(then, stage == arrays.SUPPLY_HEAT)
+                    act = fixes.on_whole_point(then, heats)
                     yield self._of_points(act, block, hooks, tag, h, copies, called=called)
         for h in own:
             yield from self._publish_at_once(h)
