@@ -132,6 +132,16 @@ def test_a_run_is_followed_and_keeps_its_bits(simulation, tmp_path):
     assert (alone / "log.mpm").read_bytes() == (tmp_path / "log.mpm").read_bytes()
 
 
+def test_the_balance_is_told_once_it_is_a_mean(simulation):
+    page = simulation.live()
+    simulation.run(40)
+    rows = Events(page.address).next()["rows"]
+    assert all(row["gain"] is None for row in rows if row["step"] < 20)
+    known = [row["gain"] for row in rows if row["step"] > 21]
+    assert len(known) > 5 and np.allclose(known, 0, atol=0.1)  # percent; the bar flies as a whole
+    page.close()
+
+
 def test_a_run_is_held_taken_on_and_coloured_anew(simulation):
     page = simulation.live()
     post(page.address, "pause")

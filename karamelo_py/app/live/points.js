@@ -100,7 +100,7 @@ class PointView {
     this.centre = this.low.map((low, k) => (low + this.high[k]) / 2);
     this.across = Math.hypot(...span) || 1;
     if (this.d === 3) { this.unit = [0, 0].fill(0.95 * Math.min(width, height) / this.across); return; }
-    const sides = [width / (span[0] || this.across), height / (span[1] || this.across)].map(side => 0.94 * side);
+    const sides = [width / (span[0] || this.across), height / (span[1] || this.across)].map(side => 0.9 * side);
     this.unit = this.d === 1 ? sides : [0, 0].fill(Math.min(...sides));
   }
   get turn() {  // rows: to the right, upwards, to the eye
