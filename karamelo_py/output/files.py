@@ -1,11 +1,12 @@
 """Files that are whole or not there at all; pictures and movies among them."""
 
+import json
 import os
 import shutil
 import subprocess
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from io import BytesIO
 from pathlib import Path
@@ -55,6 +56,13 @@ def write_whole(path: Path, text: str) -> None:
     """Write a text to a file, which holds all of it or what it held before."""
     with whole(path) as file:
         file.write(text.encode())
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """Read what a file of JSON holds; nothing where there is no such file, or half of one."""
+    with suppress(OSError, ValueError):
+        return json.loads(path.read_text(encoding="utf-8"))
+    return {}
 
 
 @contextmanager

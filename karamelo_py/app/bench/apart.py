@@ -23,6 +23,7 @@ import numpy as np
 from karamelo_py.app.bench import measure
 from karamelo_py.app.bench.measure import WORKLOADS, Measured, Solved
 from karamelo_py.app.launch import ERROR, keep_to_oneself, launch, outcome_of, together
+from karamelo_py.output.files import read_json
 from karamelo_py.run.mpi.comm import MpiComm
 from karamelo_py.script.errors import ScriptError
 
@@ -92,7 +93,7 @@ def _found_apart(part: Measurement) -> tuple[int, dict[str, Any]]:
             finally:
                 process.stdin.close()
                 process.wait()
-        return status, json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
+        return status, read_json(file)
 
 
 # ---- several processes --------------------------------------------------------------------------

@@ -20,7 +20,7 @@ from karamelo_py.app.studies import records
 from karamelo_py.app.studies.case import PROGRAM, environment
 from karamelo_py.app.studies.variables import names
 from karamelo_py.output.console import duration
-from karamelo_py.output.files import write_whole
+from karamelo_py.output.files import read_json, write_whole
 from karamelo_py.script.errors import ScriptError, meant, plural
 
 DESCRIPTION = """\
@@ -173,10 +173,8 @@ def make(entry: Entry, place: Path, inputs: Path, *, small: bool, again: bool) -
     lines = entry.lines(str(inputs), small=small)
     key = key_of(lines)
     record = place / KEPT
-    if not again and record.exists():
-        kept = json.loads(record.read_text(encoding="utf-8"))
-        if kept.get("key") == key:
-            return "known"
+    if not again and read_json(record).get("key") == key:
+        return "known"
     place.mkdir(parents=True, exist_ok=True)
     record.unlink(missing_ok=True)
     for path in [*place.glob("*.png"), *place.glob("*.svg")]:
@@ -244,7 +242,7 @@ def part_of_page(entry: Entry, place: Path, shown: Path, inputs: Path) -> str:
         shutil.copyfile(path, target)
         parts.append(f"![{title}](_static/atlas/{entry.name}/{path.name})")
     said = (place / SAID).read_text(encoding="utf-8").replace(str(inputs), "inputs")
-    made = json.loads((place / KEPT).read_text(encoding="utf-8"))
+    made = read_json(place / KEPT)
     version = made.get("versions", {}).get("karamelo-py", karamelo_py.__version__)
     with_what = [f"karamelo-py {version}", made.get("processor"), made.get("date", "")[:10]]
     made_with = "*" + ", ".join(filter(None, with_what)) + "*"

@@ -18,7 +18,7 @@ from typing import Any
 
 import karamelo_py
 from karamelo_py.app.studies.warm import WarmProcesses
-from karamelo_py.output.files import write_whole
+from karamelo_py.output.files import read_json, write_whole
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.terms import number_of
 
@@ -131,10 +131,7 @@ class Launch:
 
     def kept(self, case: Mapping[str, str], folder: Path) -> CaseOutcome | None:
         """Read the outcome of this case in an earlier study, if the same was run in this folder."""
-        try:
-            found = json.loads((folder / KEPT).read_text(encoding="utf-8"))
-        except (OSError, ValueError):
-            return None
+        found = read_json(folder / KEPT)
         if found.get("key") != self.key(case):
             return None
         # Somebody else's doing, which the next time may not come, or a file that was missing.

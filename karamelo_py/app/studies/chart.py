@@ -18,7 +18,7 @@ from karamelo_py.app.studies.case import options_of, worded
 from karamelo_py.app.studies.curves import Family, Table, column, order, require, sizes
 from karamelo_py.app.studies.study import plain_table, shown, terminal
 from karamelo_py.app.studies.variables import add_axes, along, holds, names, out_file
-from karamelo_py.output.files import write_whole
+from karamelo_py.output.files import read_json, write_whole
 from karamelo_py.script.errors import ScriptError
 
 DESCRIPTION = """\
@@ -118,7 +118,7 @@ def run(options: Any) -> int:
 
 def read(path: Path, where: Sequence[str]) -> Table:
     """Read a table, of its rows those that fulfil the conditions."""
-    rows, made = records.read(path), records.beside(path)
+    rows, made = records.read(path), read_json(path.with_suffix(".json"))
     if "folder" not in rows[0] and "variables" not in made:
         raise ScriptError(
             f"{path} does not say which columns are variables",

@@ -3,7 +3,6 @@
 import csv
 import io
 import itertools
-import json
 import os
 import platform
 import re
@@ -237,14 +236,6 @@ def surroundings() -> dict[str, Any]:
         "system": f"{platform.system()} {platform.release()}",
         "versions": versions,
     }
-
-
-def beside(path: Path) -> dict[str, Any]:
-    """Read what a study wrote beside its table, or nothing."""
-    try:
-        return json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
 
 
 def processor() -> str:
