@@ -257,7 +257,7 @@ class Picture:
     def _lay_out(self) -> None:
         """Find room for the widest labels, once: nothing moves between the pictures of a run."""
         if self.scale is not None:
-            self._apply_limits(*((-5.2, -4.8) if self.options.log else (-2.5e-5, 2.5e-5)))
+            self._apply_limits(*((-5.2, -4.8) if self.options.log else (-8e-6, 8e-6)))
         for _ in range(2):  # a second time where the aspect of the axes has moved them
             self.figure.draw_without_rendering()
         self.figure.set_layout_engine("none")
@@ -481,7 +481,8 @@ class SpacePicture(PlanePicture):
             "fontsize": self.small,
         }
         lo, hi = self.lo[axis], self.hi[axis]
-        ticks = MaxNLocator(4, steps=STEPS).tick_values(lo, hi)
+        large = self.options.fontsize / 9
+        ticks = MaxNLocator(max(2, round(4 / large)), steps=STEPS).tick_values(lo, hi)
         # Those of two edges would cover each other at their common end.
         for tick in ticks[abs(ticks - 0.5 * (lo + hi)) < 0.48 * (hi - lo)]:
             at = seen[0] + along * (tick - lo) / (hi - lo)
@@ -490,7 +491,7 @@ class SpacePicture(PlanePicture):
         self.axes.annotate(
             "xyz"[axis] + self.options.lengths,
             seen.mean(axis=0),
-            xytext=tuple(28 * outward),
+            xytext=tuple(28 * large * outward),
             **aligned,
             rotation=90 if axis == 2 else 0,
         )
