@@ -166,18 +166,18 @@ def boundary(hub: Hub, style: Literal["error", "delete", "reflect"]) -> None:
 
     Notes
     -----
-    Points at the edge, not nodes: a body that is to rest against a wall needs fix velocity_nodes
-    there. ``delete`` and ``reflect`` are for what splashes. The first point is told of in a
-    warning, and the end of a run says how many there were.
+    ``delete`` and ``reflect`` are for splashes. A body that rests against a wall needs fix
+    velocity_nodes there. A warning names the first point, and the end of a run says how many there
+    were.
 
-    A deleted point is gone from the step in which it would have left. Dumps leave it out; the ids
-    of the others stay. Each time the program goes back to the last state that it keeps, by a
-    hundred steps at most, and takes these steps again: a run in which points leave in every step
-    takes about six times as long. Hooks in Python are called for these steps again, too.
+    A deleted point is gone from the step in which it would have left. Dumps leave it out. The ids
+    of the others stay. The program then goes back to the last state that it keeps, by a hundred
+    steps at most, and takes these steps again, with their hooks in Python. A run in which points
+    leave in every step takes about six times as long.
 
-    A reflected point keeps its stress and the velocity along the edge. The velocity that turns is
-    that of the point: neighbours that still press outwards may bring it back to the edge, and a
-    body that meets the edge as a whole loses most of its motion across it.
+    A reflected point keeps its stress and the velocity along the edge. Neighbours that still press
+    outwards may bring it back to the edge. A body that meets the edge as a whole loses most of its
+    motion across it.
 
     Methods whose solids have grids of their own (tlmpm, tlcpdi) have no edge.
 

@@ -103,6 +103,7 @@ def scheme(
         What the style asks for; explicit schemes ask for nothing.
     start
         For how much of the first explicit step forces act: all of it (``full``), or ``half``.
+        ``half`` shows velocities and kinetic energies of the time of the log.
 
     Example
     -------
@@ -111,12 +112,12 @@ def scheme(
 
     Notes
     -----
-    In explicit steps places belong to the ends of steps, and velocities to their middles. With
-    ``full`` the velocities that a run starts from are taken for those of half a step before, and
-    those that are shown are as they are: a thrown body is g dt t/2 further than it should be, and
-    kinetic energies lag by half a step. With ``half`` both are of the time that is shown, to second
-    order in the step. Points then carry their last velocity, too. Velocities that are set after the
-    first step, such as ``sim.points["vx"] = values``, are taken for those of half a step before.
+    Positions belong to the ends of explicit steps, and velocities to their middles. With ``full``
+    the initial velocity is that of half a step before the start, and the log shows velocities of
+    half a step before its time. A thrown body is then g dt t/2 further than it should be, and
+    kinetic energies lag by half a step. With ``half`` both are right to second order in the step.
+    Points then store their last velocity, too. Velocities that are set after the first step, such
+    as ``sim.points["vx"] = values``, are those of half a step before.
 
     See Also
     --------

@@ -171,8 +171,8 @@ def log_modify(hub: Hub, style: Literal["default", "custom"], *keys: Logged) -> 
 
     Notes
     -----
-    Between two runs it changes the columns from there on: a line that begins with ``#`` in log.mpm
-    names them, and the rows below have as many numbers as it has names.
+    Between two runs it changes the columns of the following rows. A line in log.mpm that begins
+    with ``#`` has their names.
 
     Example
     -------

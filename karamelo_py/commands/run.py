@@ -45,11 +45,11 @@ def dt_factor(hub: Hub, factor: Annotated[float, Positive]) -> None:
     Parameters
     ----------
     factor
-        Above 0; above 1 a run warns. Without this command the program takes 0.9, and less where a
-        body that drifts would gain energy by that: with linear functions in the updated frame,
-        FLIP or its kin (share above 0.99), and musl or usf 0.4, or 0.2 with one point a cell. While
-        no point has gone a quarter of a cell since the start that is not asked for, and splines
-        take a longer step; a factor is a share of the same stable step at rest as after.
+        Above 0; above 1 a run warns. Without this command the program takes 0.9. It takes less
+        where a body that drifts would gain energy: 0.4, or 0.2 with one point per cell, with linear
+        functions in the updated frame, FLIP with a share above 0.99, and musl or usf. Until a point
+        has moved a quarter of a cell, it takes 0.9, and more with splines. A factor of your own is
+        a share of the stable step of moving bodies all the time.
 
     Example
     -------
@@ -78,18 +78,22 @@ def run(hub: Hub, steps: Annotated[int, NonNegative], *, on_trouble: OnTrouble =
     steps
         How many; exactly so many are taken.
     on_trouble
-        ``stop``, or ``halve``: where a point goes wrong, energy comes from nowhere (from what is
-        otherwise a warning on) or the step gets unstable, the run goes back to its last good state
-        and tries half the step, at most five times, and says so. Log, dumps, curves, and computes
-        that remember (errors, drifts) go back to that state, too: what had been written since is
-        written again. Files and pictures of one step are overwritten when it comes again, or stay
-        where it does not. Points that leave the domain without a gain of energy are no matter of
-        the step: there the run stops (see `boundary`).
+        ``stop``, or ``halve``. With ``halve`` the run goes back to its last good state and halves
+        the step, at most five times, and says so. It does so where a point goes wrong, where
+        energy comes from nowhere (a warning without ``halve``), and where the step gets unstable.
+        Log, dumps, curves and computes go back too, and are written again. Points that leave the
+        domain without a gain of energy stop the run (see `boundary`).
 
     Example
     -------
     run(1000)
     run(1000, on_trouble=halve)
+
+    Notes
+    -----
+    The log shows positions and stresses of the end of a step, and velocities of half a step before.
+    After n steps of a free fall, the kinetic energy is low by the share 1/(n + 1). Velocities and
+    kinetic energies of the time shown: ``scheme(musl, start=half)``.
 
     See Also
     --------
@@ -113,6 +117,10 @@ def run_time(
     Example
     -------
     run_time(3.5)
+
+    Notes
+    -----
+    Kinetic energies of the log are those of half a step before: see `run`.
 
     See Also
     --------
@@ -208,28 +216,26 @@ def restart(hub: Hub, every: EveryOrNever, file: OutputFile | None = None) -> No
 
     Notes
     -----
-    ``karamelo-py SCRIPT -restart FILE`` goes on: the statements of the script are gone through,
-    runs that were over are passed over, and the one that was in progress goes on behind the step of
-    the file. Its results are those of a run that was never interrupted, bit for bit, with any
-    number of threads; the log and the dumps go on in their files, whose later lines are cut off.
-    Up to there the script has to be the same, except for commands that only say how a run
-    goes on or what it writes (set_dt, dt_factor, set_output, dump, plot and the like); how long the
-    last run is may change, as a number in its own line: variables stay what they were, and those
-    that ``-var`` had set are taken from the file. A longer ``run(n)`` has the bits of one that was
-    as long from the beginning. The last two steps of ``run_time(T)`` are shortened alike: a longer
-    one has the bits of one that was as long from the beginning where the file was written before
-    those two.
+    ``karamelo-py SCRIPT -restart FILE`` goes on after the step of the file. The results have the
+    bits of a run that was never interrupted, with any number of threads. The log and the dumps go
+    on in their files. The program cuts off lines that were written after the step.
 
-    A file holds everything that points and nodes carry, what fixes, computes, dumps and plots have
-    seen or added up, and the values that the script has read. It is in HDF5, and whole or not
-    there: a run that is killed leaves the one before. The last state of each run is written, too;
-    that of a run that goes wrong is in last_good.<step>.h5 instead: of one whose energy has grown,
-    the last state in which it had not (to ten steps); of one whose step was above the stable limit
-    from its start on, the state before its first step (none with boundary(delete), or where the run
-    went on from a file with that step). Dumps show the state in which a run was interrupted or went
-    wrong (with such a step: where that is within a hundred steps); a run that goes on takes that
-    out of their files again, but leaves snapshots that have a file of their own (with a ``*`` in
-    the name).
+    The script must stay the same up to this run, with three exceptions. Commands that only say how
+    a run goes on or what it writes may change (set_dt, dt_factor, set_output, dump, plot). The
+    length of the last run may change, as a number in its own line. Variables that ``-var`` had set
+    come from the file. A longer ``run(n)`` has the bits of a run that was as long from the
+    beginning. A longer ``run_time(T)`` has them if the file was written before the last two steps
+    of the shorter run, which are shortened.
+
+    A file holds all fields of points and nodes, all that fixes, computes, dumps and plots remember,
+    and the values that the script has read. It is in HDF5. A killed run leaves the file before it.
+    The last state of each run is written too. A run that goes wrong writes last_good.<step>.h5
+    instead. If its energy has grown, this is the last state before the growth, to ten steps. If its
+    step was above the stable limit from the start, it is the state before the first step. There is
+    none with boundary(delete), or if the run went on from a file with that step.
+
+    Dumps show the state in which a run was interrupted or went wrong. A run that goes on removes
+    this state from files with several snapshots. It leaves snapshots in files of their own.
 
     Example
     -------
@@ -299,12 +305,13 @@ def read_restart(hub: Hub, file: str) -> None:
 
     Notes
     -----
-    The set-up stands before: domain, method and solids as in the script that wrote the file, and
-    the fixes and computes that shall go on. Those that have the ID and style that they had there
-    keep what they have seen, and initial velocities do not act once more. Everything else may be
-    another: materials' constants, fixes, the time step, what is written. Time and step go on from
-    those of the file. Files are begun anew, but for one thing: a picture or movie with the ID and
-    style that it had there, of the same field, goes on with the colours of the pictures before.
+    Write the same domain, method and solids as in the script of the file before this command, and
+    the fixes and computes that shall go on. Fixes and computes with the same ID and style keep what
+    they have seen. Initial velocities do not act again. Everything else may differ: constants of
+    materials, fixes, the time step, outputs. Time and step go on from those of the file.
+
+    The run begins new files. A picture or movie with the same ID, style and field keeps the colours
+    of the pictures before.
 
     Example
     -------

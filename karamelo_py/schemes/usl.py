@@ -15,15 +15,15 @@ from karamelo_py.points.transfers import gradient_weight
 class USL(NamedTuple):
     """The stress follows from the gradient of the updated nodal velocity.
 
-    One visit of the points a step: the fastest scheme. It dissipates a little. A node with next to
-    no mass gets a large velocity, which would show in the gradient: there, and there only, the
-    gradient takes the change of velocity by the share of the mass, below d (c dt / h)^2 times (at
-    most once) the mean mass of the points that the node sees. Momentum is kept.
+    The fastest scheme, because a step visits the points once. It dissipates a little.
 
-    The stable step is shorter than of the other schemes: 0.65 h/c, and 0.4 h/c with one point a
-    cell; 0.7 of that with Bernstein-quadratic. Where points average a mode of the nodes away, its
-    strain alone answers to the forces: e <- (1 - (w dt)^2) e, stable for w dt < sqrt(2) instead
-    of 2.
+    The stable step is 0.65 h/c, and 0.4 h/c with one point per cell. Bernstein-quadratic takes 0.7
+    of that. Points average some modes of the nodes away. Only the strain of such a mode answers to
+    the forces: e <- (1 - (w dt)^2) e, which is stable for w dt < sqrt(2) instead of 2.
+
+    A node with almost no mass gets a large velocity. Below d (c dt / h)^2 times (at most 1) the
+    mean mass of the points that the node sees, the gradient takes the change of its velocity by
+    the ratio of the two masses. Momentum is kept.
 
     Example
     -------

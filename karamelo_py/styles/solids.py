@@ -38,22 +38,11 @@ class RegionSolid(Solid):
     ppc
         Points per cell in each direction: 2 gives 4 points per cell in 2D, 8 in 3D.
     points
-        ``regular``: at equal distances. ``gauss``: at the Gauss points of the cell, whose weights
-        share out the volume. Left out: at equal distances with equal volumes, but for ``ppc`` 3,
-        where the points stand at the Gauss points (as Karamelo has it, with equal volumes). With
-        domains around the points (ugimp, cpgimp, cpdi) those of 3 are at equal distances, too:
-        domains tile the cell. ``cut``: at equal distances, and what the region cuts of the boxes of
-        the points at its edge is left out: these have the volume and stand in the middle of what
-        is left; less than a tenth of a box goes to the nearest point beside it. In ulmpm/contacts
-        this is the default where a face of the region is curved or leans to the grid: with the
-        steps of whole boxes (``regular``, as in Karamelo) bodies hook each other. Round bodies so
-        have their volume (to 0.01 %) and no steps of h/ppc at the rim, which contact would feel.
-        Parts of a region (fins, slots) as thin as a tenth of h/ppc have their mass to 3 %, whatever
-        their direction; where that of thinner ones may be missing, a message says so. A region of a
-        plug-in without a `distance` is looked at along the axes, where thin parts may be missed.
-        The domains that ugimp and cpgimp give to cut
-        points are squares or cubes of the right volume, which do not tile the body at its edge;
-        cpdi refuses them.
+        ``regular``: at equal distances. ``gauss``: at the Gauss points of the cell, with their
+        weights as volumes. ``cut``: at equal distances, with boxes that the edge of the region
+        cuts. Left out: at equal distances, with two exceptions. With ``ppc`` 3 points stand at the
+        Gauss points with equal volumes, as in Karamelo, unless the basis has domains (ugimp,
+        cpgimp, cpdi). In ulmpm/contacts, regions with curved or leaning faces are cut.
 
     Example
     -------
@@ -63,8 +52,16 @@ class RegionSolid(Solid):
 
     Notes
     -----
-    Cells are counted from the lower corner of the domain; in methods that lay a grid for each
-    solid, from the lower corner of the box around the region (open sides end at the domain).
+    Cells are counted from the lower corner of the domain. Methods with a grid for each solid count
+    from the lower corner of the box around the region, whose open sides end at the domain.
+
+    A cut point has the volume of the rest of its box and stands in its middle. A rest of less than
+    a tenth goes to the nearest point. Round bodies then have their volume to 0.01 %, and no steps
+    at the rim, at which bodies in contact hook each other. Fins and slots as thin as a tenth of
+    h/ppc have their mass to 3 %. A message tells where thinner parts may be missing. For a region
+    of a plug-in without `distance` the program looks along the axes, and may miss thin parts. With
+    ugimp and cpgimp, cut points have square domains, which do not tile the body at its edge. cpdi
+    refuses them.
 
     See Also
     --------

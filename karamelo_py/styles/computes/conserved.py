@@ -29,6 +29,10 @@ class KineticEnergy(Energy):
     compute(Ek, kinetic_energy, all)
     log_modify(custom, step, time, Ek)
 
+    Notes
+    -----
+    It is that of half a step before the time of the log, as velocities are (see `scheme`).
+
     See Also
     --------
     strain_energy

@@ -208,11 +208,12 @@ class EdgeTraction(EdgeFix):
 
     Notes
     -----
-    The group's points are boxes that fill the region; those that show a face to the outside in the
-    direction of `side` bear the traction on the area that this face has before the first step. The
-    load keeps size and direction (a dead load), the sum over a plane side is exactly traction times
-    area, and it acts half a box inside the edge. Around an axis, area and force belong to a radian.
     Publishes the sum as ID_x, ID_y, ID_z.
+
+    The points of the group are boxes that fill the region. Boxes with a face to the outside in the
+    direction of `side` bear the traction on the area of this face before the first step. The load
+    keeps its size and direction (a dead load) and acts half a box inside the edge. The sum over a
+    plane side is exactly traction times area. Around an axis, area and force belong to a radian.
 
     See Also
     --------

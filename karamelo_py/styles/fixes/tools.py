@@ -302,19 +302,20 @@ class ContactSurface(ToolFix):
 
     Notes
     -----
-    Points are balls with the radius of half the side of a cube of their present volume. Where one
-    reaches p into the region it gets the force m (v / dt + p / (10 dt^2)) out of it, with the speed
-    v at which it approaches, but none that pulls: that stops it within one step, and takes a tenth
-    of p out. Friction is mu times that, along the slip on the moving region, and at most what stops
-    it. The way out is where the depth falls fastest. It is known down to a cell below the surface:
-    a point that comes deeper, or to the middle of a thin region, ends the run. A region does not
-    turn.
-
-    A block slides down a slope of 20 degrees with 1.54 in tlmpm, and 1.56 in ulmpm (exact 1.541,
-    mu = 0.2; points=cut, or 1.53 and 1.55 without), and its energy is balanced to 0.3 %. It sinks
-    in by ten times the force on a point over m / dt^2, there by a twentieth of a cell.
-
     Publishes the force on the points as ID_x, ID_y, ID_z.
+
+    Points are balls. Their radius is half the side of a cube of their present volume. A point that
+    reaches p into the region, and approaches with the speed v, gets the force
+    m (v / dt + p / (10 dt^2)) out of it. This stops the point within one step and removes a tenth
+    of p. The force never pulls. Friction is mu times this force, against the slip on the moving
+    region, and at most what stops the slip.
+
+    The force acts in the direction in which the depth falls fastest. A point deeper than a cell, or
+    in the middle of a thin region, ends the run. A region does not turn.
+
+    A block on a slope of 20 degrees with mu = 0.2 has the acceleration 1.54 in tlmpm and 1.56 in
+    ulmpm (exact 1.541; points=cut). Its energy is balanced to 0.3 %. It sinks in by ten times the
+    force on a point over m / dt^2, here a twentieth of a cell.
 
     See Also
     --------

@@ -88,9 +88,9 @@ class VelocityNodes(Fix):
         and published values. NULL leaves a component free. With ``leq`` or ``geq`` in front of it
         the velocity is an upper or a lower bound: nodes that keep within it are free.
     mu
-        Coefficient of friction (Coulomb): a number or a formula. In the directions that are NULL
-        the wall is at rest, and nodes that it holds or bounds rub along it, with a force of at most
-        mu times that across it. Nodes that are held, not bounded, rub where they pull, too.
+        Coefficient of friction (Coulomb): a number or a formula. The wall is at rest in the
+        directions that are NULL. Nodes that it holds or bounds rub along it, with a force of at
+        most mu times the force across it. Nodes that are held, not bounded, rub under tension too.
 
     Example
     -------
@@ -102,15 +102,18 @@ class VelocityNodes(Fix):
 
     Notes
     -----
-    Publishes the reaction, the force that holds the nodes, as ID_x, ID_y, ID_z, friction among it.
-    The work of friction heats the points, where they have a temperature; the wall takes none of it.
-    Where several such fixes hold a node in one direction, the last of them decides: the whole
-    reaction of that node is its, and it alone rubs. A bound that a node keeps within holds nothing.
-    Planes of such nodes inside the grid are walls as its ends are: splines are modified in cells
-    beside faces all of whose nodes are held or bounded. A group should reach as far as the last
-    cell in which a body has points.
+    Publishes ID_x, ID_y, ID_z: the force that holds the nodes, with friction. The work of friction
+    heats points that have a temperature. The wall takes no heat.
+
+    Several such fixes may hold a node in one direction. The last one decides: it has the whole
+    reaction of the node, and only it rubs. A bound that a node keeps within exerts no force.
+
+    A plane of such nodes inside the grid is a wall, as the ends of the grid are. Splines are
+    modified in cells beside faces whose nodes are all held or bounded. A group should reach as far
+    as the last cell in which a body has points.
+
     In ulmpm/contacts a solid whose cells have all corners in the group is held by all nodes that
-    its points see, where all components are given.
+    its points see, if all components are given.
 
     See Also
     --------

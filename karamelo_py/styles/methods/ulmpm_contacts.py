@@ -61,40 +61,39 @@ class ULMPMContacts(Method):
 
     Notes
     -----
-    Publishes the contact force on every solid as ContactForce_ID_x, ContactForce_ID_y,
-    ContactForce_ID_z, with the solid's ID: the sum of m dv/dt over its nodes, and its torque about
-    the origin as ContactTorque_ID_x and so on. Solids that are glued together share a field and its
-    force.
+    Publishes the contact force on every solid (the sum of m dv/dt over its nodes) as
+    ContactForce_ID_x, ContactForce_ID_y, ContactForce_ID_z, with the solid's ID. Publishes its
+    torque about the origin as ContactTorque_ID_x and so on. Solids that are glued together share a
+    field and its force.
 
-    Where a surface is follows from the mean place of the points that a node sees, as of layers of
-    points whose outermost is half their size below a plane surface (Nairn 2013, "Modeling imperfect
-    interfaces in the material point method using multimaterial methods"). It is exact for plane
-    surfaces along the grid. Bodies with curved or leaning faces have points that are cut there
-    (points=cut), unless their solid says otherwise. Of whole squares (points=regular) a rim has
-    steps, and is met up to half a step early or late: a block that should slide down a slope of 20
-    degrees sticks, and force and stress of a pressed disk are of first order
-    (in.hertz), and finer points help as much as finer cells. With
-    Bernstein-quadratic functions no gap is known: contact is felt as soon as two solids have mass
-    at one node. A node at a surface loses what it has of the motion of approach: bars of 4, 8 and
-    16 cells that collide lose 15, 11 and 4 % of the kinetic energy.
+    The gap follows from the mean position of the points that a node sees. The outermost layer of
+    points lies half its size below the surface (Nairn 2013, "Modeling imperfect interfaces in the
+    material point method using multimaterial methods"). This is exact for plane surfaces along the
+    grid. Solids with curved or leaning faces have cut points there (points=cut), unless the line
+    ``solid`` says otherwise. Whole squares (points=regular) make steps in such a face: a block on a
+    slope of 20 degrees sticks. With Bernstein-quadratic functions the gap is unknown, and contact
+    begins as soon as two solids have mass at one node.
 
-    A base that does not move is a rigid solid, or one whose cells have all corners in the group of
-    a fix velocity_nodes that gives all components: then the nodes beyond, which its points see with
-    splines and domains, are held, too. With splines a base should be three cells thick: the surface
-    of a thinner one seems higher by a quarter of a cell or less.
+    A node at a surface loses its velocity of approach. Bars of 4, 8 and 16 cells that collide lose
+    15, 11 and 4 % of the kinetic energy.
 
-    The normal at a node is one for both solids, so that they get opposite impulses and momentum is
-    kept: from the sums of m grad N of the two, averaged over the nodes around with the weights 1/4,
-    1/2, 1/4 along each axis; mostly that of the solid whose sums scatter less, which is the face
-    where the corner of one lies on the face of the other, and that alone of a solid with a
-    prescribed velocity, but where its face ends. Solids are apart, too, if they are along an axis
-    of the grid. Where more than two solids meet at a node, every pair that approaches
-    takes its impulse from the same velocities, reduced where a solid is in several pairs, and what
-    remains is taken again, up to 16 times: the order in which solids are defined does not matter,
-    and momentum is kept. Nodes that fix velocity_nodes holds are not moved by contact; what they
-    would have taken is added to the reaction that the fix publishes. Bardenhagen, Guilkey, Roessig,
-    Brackbill, Witzel & Foster 2001, "An improved contact algorithm for the material point method
-    and application to stress propagation in granular material".
+    For a base that does not move, use a rigid solid, or a fix velocity_nodes that gives all
+    components and has all corners of its cells in its group. With splines a base should be three
+    cells thick. The surface of a thinner one seems higher by up to a quarter of a cell.
+
+    Both solids at a node have one normal, so that their impulses are opposite and momentum is kept.
+    It comes from the sums of m grad N of both, averaged over the neighbouring nodes with the
+    weights 1/4, 1/2, 1/4 along each axis. The solid whose sums scatter less counts most: the face
+    where a corner lies on a face. A solid with a prescribed velocity counts alone, except at the
+    end of its face. Solids that are apart along an axis of the grid are not in contact.
+
+    At a node of more than two solids, every approaching pair takes its impulse from the same
+    velocities. The impulse is smaller for solids in several pairs. The rest is removed in up to 16
+    passes. The order of the solids in the script has no effect. Contact does not move nodes that
+    fix velocity_nodes holds. Their impulse goes into the reaction of that fix.
+
+    Bardenhagen, Guilkey, Roessig, Brackbill, Witzel & Foster 2001, "An improved contact algorithm
+    for the material point method and application to stress propagation in granular material".
 
     See Also
     --------
