@@ -1,4 +1,4 @@
-"""Motion through the grid that a body bears: it feeds what the grid does not see of velocities.
+"""Motion through the grid that a body bears: it adds to noise that the grid does not see.
 
 Measured with disks of rubber and of metal, 4 to 16 cells across the radius, that vibrate by 0.01 to
 2 % while they drift or turn (docs/energy-measurements.md).
@@ -35,7 +35,7 @@ def borne(basis: Any) -> Borne:
     return getattr(basis, "borne", usual)
 
 
-GROWS = "what the grid does not see of the velocities grows with each cell"
+GROWS = "noise of the velocities that the grid does not see grows with each cell"
 TURNS = "turns by about {angle:.2g} rad, its rim at {speed:.2g} times the speed of waves"
 WITH = "with {scene.transfer_name} and {scene.basis_name} functions"
 

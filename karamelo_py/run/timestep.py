@@ -221,8 +221,7 @@ def what_follows(hub: Hub, simulation: Any, step: float) -> str:
     borne = _borne(hub, simulation)
     if step <= borne:
         return (
-            f" of bodies that go from cell to cell, which gain energy; at rest up to {borne:.4g} "
-            "is stable"
+            f" of bodies that cross cells, which gain energy; at rest up to {borne:.4g} is stable"
         )
     if step <= LOST * borne:
         return ": the run may blow up, by where points lie in the cells, and be stopped then"

@@ -25,7 +25,7 @@ steady_moment
     whether D of the affine transfers stays away from zero everywhere;
 gradient_jumps
     whether gradients jump at the faces of cells (not, where a class does not say): points that move
-    from cell to cell then feed energy to a body, the less the smaller the step;
+    from cell to cell then add energy to a body, the less the smaller the step;
 courant_still, courant_total
     the stable step over h/c while points are where they were, in the updated frame, and in the
     total one (1, where a class does not say);

@@ -92,7 +92,7 @@ def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
     if keeping < timestep.USUAL and share > keeping * (1 + 1e-9):
         points = " with one point a cell" if timestep.sparse(hub) else ""
         return (
-            f"points that go from cell to cell: {transfer}, {functions} and {scheme}{points} at "
+            f"points that cross cells: {transfer}, {functions} and {scheme}{points} at "
             f"{share:.2g} of the stable step",
             f"{_step_of(hub, simulation, keeping)}, scheme(usavg), or {smooth}",
         )
@@ -103,7 +103,7 @@ def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
     if fed is not None and fed.share > 0:
         return fed.reason, fed.cure
     if moves and jumps:
-        return f"points that go from cell to cell: the gradients of {functions} jump", smooth
+        return f"points that cross cells: the gradients of {functions} jump", smooth
     if share > 0.3 and (hub.update.fixed_dt or hub.update.dt_factor):
         return "a step that is too large", f"{_step_of(hub, simulation, 0.3)} or less"
     return "no cause that is known to do that", "another basis, transfer or scheme to compare with"
@@ -116,7 +116,7 @@ def _gain_of_implicit_steps(hub: Hub) -> tuple[str, str]:
     if method.frame.moves and getattr(method.basis, "gradient_jumps", False):
         functions = f"{method.basis_name} functions"
         return (
-            f"points that go from cell to cell: the gradients of {functions} jump",
+            f"points that cross cells: the gradients of {functions} jump",
             f"quadratic-spline, method tlmpm, or {smaller}",
         )
     return "steps that strain or turn points much at once", smaller
@@ -206,13 +206,13 @@ def cause_of_loss(hub: Hub) -> tuple[str, str]:
         )
     if method.fields_per_solid:
         return (
-            "collisions: nodes of a surface lose what they have of the motion of approach",
+            "collisions: nodes of a surface lose their velocity of approach",
             "finer cells, of which collisions take less",
         )
     if method.frame.moves and getattr(method.basis, "gradient_jumps", False):
         return (
-            f"points that go from cell to cell, where the gradients of {method.basis_name} "
-            "functions jump, and velocities that differ from point to point",
+            f"points that cross cells, where the gradients of {method.basis_name} "
+            "functions jump, and velocity differences within a cell",
             "quadratic-spline, or method tlmpm for a solid",
         )
     if getattr(update.scheme, "implicit", False):
@@ -222,8 +222,8 @@ def cause_of_loss(hub: Hub) -> tuple[str, str]:
         )
     if method.frame.moves:
         return (
-            "waves and fronts that the cells do not resolve: velocities differ from point to point "
-            "where the grid sees none",
+            "waves and fronts that the cells do not resolve: the grid does not see velocity "
+            "differences within a cell",
             "finer cells, TPIC or APIC, or method tlmpm for a solid",
         )
     return "waves that the cells do not resolve", "finer cells"
