@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 from numba import config
 
-from karamelo_py.compiler import cache, choices, fingerprint, loops
-from karamelo_py.compiler.compile import point_function, shared
+from karamelo_py.compiler import cache, choices, fingerprint
+from karamelo_py.compiler.compile import point_function
 from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.threads import Threaded, shared_out
 from karamelo_py.kernels.step import step
@@ -399,10 +399,12 @@ def test_what_threads_do_is_followed(tmp_path, monkeypatch):
     def put(tag, out, i):
         out[i] = answer(tag)
 
-    put_all = shared_out(shared(put))
+    put_all = shared_out(put)
     found = []
     contents = choices.contents
-    monkeypatch.setattr(loops, "contents", lambda parts: found.append(contents(parts)) or found[-1])
+    monkeypatch.setattr(
+        choices, "contents", lambda parts: found.append(contents(parts)) or found[-1]
+    )
     out = np.zeros(3)
     kernel(lambda mode, tag, out: put_all(mode, out.size, tag, out))(Threaded(), Tag(), out)
     assert out.tolist() == [42, 42, 42]

@@ -186,7 +186,7 @@ def _count_up(out, factor, k):
     out.a[k] += factor * k
 
 
-_counted = shared_out(noinline(_count_up))
+_counted = shared_out(_count_up)
 
 
 @kernel

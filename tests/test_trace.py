@@ -8,7 +8,7 @@ import pytest
 from listening import listening
 from numba import config
 
-from karamelo_py.compiler import choices, loops
+from karamelo_py.compiler import choices
 from karamelo_py.compiler.compile import fma, point_function, real, shared, where
 from karamelo_py.compiler.held import hold
 from karamelo_py.compiler.loops import kernel
@@ -186,7 +186,9 @@ def test_what_was_run_is_followed(tmp_path, monkeypatch):
     made = kernel(caller)
     found = []
     contents = choices.contents
-    monkeypatch.setattr(loops, "contents", lambda parts: found.append(contents(parts)) or found[0])
+    monkeypatch.setattr(
+        choices, "contents", lambda parts: found.append(contents(parts)) or found[0]
+    )
     made(Square(1.0), 2.0)
     chosen, codes = found[0]
     assert choices.Choice(f"{__name__}:value_of", (f"{__name__}:Square",)) in chosen

@@ -22,9 +22,9 @@ from numba import types
 from karamelo_py.compiler import code, machine
 from karamelo_py.compiler.argument_buffer import ArgumentBuffer, plan_for
 from karamelo_py.compiler.cache import KernelFiles
-from karamelo_py.compiler.choices import INTERPRETED, Unknown, choosers, contents, parts_noted
+from karamelo_py.compiler.choices import INTERPRETED, Unknown, contents, parts_noted
 from karamelo_py.compiler.code import I32, I64
-from karamelo_py.compiler.compile import implements, shared
+from karamelo_py.compiler.compile import implements
 from karamelo_py.compiler.fingerprint import fingerprint
 from karamelo_py.compiler.held import HeldTuple, item_of
 from karamelo_py.compiler.loops import ENTRY, NAME, compilation, in_one, written
@@ -109,11 +109,6 @@ def aligned_record(array, i, count):
         return code.make_tuple(builder, result, numbers)
 
     return result(array, types.int64, count), codegen
-
-
-def known(function: Callable) -> Callable:
-    """Let kernels know a function."""
-    return function if function in choosers else shared(function)
 
 
 # --- code -------------------------------------------------------------------------------------
@@ -202,7 +197,7 @@ def text_of(
     """
     with in_one(called or {}):
         entry = _as_threads if on_card else _as_loop
-        module, _ = written(known(function), (types.int64, *kinds), types.none, entry)
+        module, _ = written(function, (types.int64, *kinds), types.none, entry)
     if module.needs or module.raises:
         raise TypeError(f"{function.__qualname__} calls what no thread can call")
     text = str(module)
@@ -218,7 +213,7 @@ def numbers_of(function: Callable, arguments: tuple) -> int:
     """Count the numbers that a function of a thread gives for the rest of its arguments."""
     kinds = plan_for(arguments).types
     with in_one({}):
-        found = formula(known(function), (*kinds, types.int64))
+        found = formula(function, (*kinds, types.int64))
     return len(found.result)
 
 
@@ -276,7 +271,7 @@ class _Coded:
         """Read code from the disk, or make it and write it there."""
         beside = tuple(called.values())
         try:  # what it is made of, but for choices by type
-            own = fingerprint([known(function), *beside], kinds, frozenset())
+            own = fingerprint([function, *beside], kinds, frozenset())
         except Unknown:
             return self._compiled(function, kinds, called)[0]
         files = KernelFiles(function, lambda code: code, f"{self.processor} {own}", beside)

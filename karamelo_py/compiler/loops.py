@@ -191,8 +191,6 @@ class Kernel:
         self.units: dict[tuple, Unit] = {}
         self._plans: dict[tuple, tuple] = {}
         builtin(self)(self.in_kernel)
-        if function not in by_type.choosers:
-            shared(function)
 
     @property
     def made_of(self) -> tuple:
@@ -326,6 +324,6 @@ def caller_of(signature: Any) -> Callable:
         if not own:
             return lowering.call(by_address, (address, *arguments))
         pairs = zip(arguments, parameters, strict=True)
-        return lowering.call(own, tuple([lowering.cast(a, kind) for a, kind in pairs]))
+        return lowering.seen(own)(*[lowering.cast(a, kind) for a, kind in pairs])
 
     return call

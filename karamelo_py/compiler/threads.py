@@ -231,7 +231,6 @@ def _regardless(lowering: Any, function: Callable, *arguments: Any) -> Any:
         lowering.regardless = False
 
 
-@shared
 def _do_part(task, arguments, begin, end):
     for number in range(begin, end):
         _call(task, arguments, number)
@@ -357,8 +356,8 @@ def _distribute(team, count, task, arguments):
 
 def shared_out(function: Callable) -> Callable:
     """Make ``f(mode, count, ...)``: ``function(..., k)`` for each k below `count`."""
+    noinline(function)
 
-    @shared
     def loop(mode, count, *arguments):
         if isinstance(mode, Threaded) and not INTERPRETED:
             _distribute(mode.team, count, *_task(function, arguments))
@@ -375,7 +374,7 @@ def by_threads(share: Callable) -> Callable:
     The threads of `mode` divide these numbers among them.
     """
     names = ["mode", "count", *inspect.signature(share).parameters][:-1]
-    loop = shared_out(noinline(share))
+    loop = shared_out(share)
 
     def all_shares(*arguments):
         loop(*arguments)
@@ -405,7 +404,6 @@ def by_team(function: Callable) -> Callable:
             write(team + _RESULT, _regardless(inner, mode, *given))
             write(team + _STATE, _ENDED)
 
-    @shared
     def run(mode, *arguments):
         if INTERPRETED or not isinstance(mode, Threaded):
             return inner(mode, *arguments)

@@ -314,6 +314,8 @@ def _chosen(dispatch: Callable, kinds: tuple) -> Callable | None:
     for one in _number_types(kinds):
         if dispatch in one.implements:
             return one.implements[dispatch]
+    if dispatch not in choosers:
+        return dispatch
     for chooser in choosers[dispatch]:
         found = chooser(*kinds)
         if found is not None:

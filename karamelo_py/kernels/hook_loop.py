@@ -156,7 +156,6 @@ def _act_on_part(what, task, hooks, control, dt, h, share, k, parts):
 
 
 @shared_out
-@noinline
 def _act_on_parts(what, task, hooks, control, dt, h, share, k):
     """Act in the part of thread `k`, with a scratch and totals of its own: totals do not round."""
     own = record(hooks.apart, k)

@@ -106,7 +106,6 @@ def _begin_tiles(found):
 
 
 @shared_out
-@noinline
 def _order_parts(found, k):
     """Put the k-th part of the points into their places; what begins at `ends` ends there then."""
     ends, tile, order = found.ends, found.tile, found.order
@@ -118,7 +117,6 @@ def _order_parts(found, k):
 
 
 @shared_out
-@noinline
 def _order_in_all_tiles(kin, grids, around, tiles, x, of, ids, found, k):
     """Sort the points of each tile of the k-th share by the first node that they see, then by id.
 
@@ -193,7 +191,6 @@ def find_rows(kin, grids, around, x, tiling, parts, k):
 
 
 @shared_out
-@noinline
 def _pick_all_rows(rows, first, last, order, room, parts, k):
     """Copy the k-th part of the rows from `first` to `last` to `room`, in order."""
     begin, end = order.size * k // parts, order.size * (k + 1) // parts
@@ -205,7 +202,6 @@ def _pick_all_rows(rows, first, last, order, room, parts, k):
 
 
 @shared_out
-@noinline
 def _put_all_rows(rows, first, last, room, parts, k):
     """Copy the k-th part of these rows back."""
     begin, end = room.shape[1] * k // parts, room.shape[1] * (k + 1) // parts

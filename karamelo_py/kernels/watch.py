@@ -66,7 +66,6 @@ def energies_of(kin, points, laws, p):
 
 
 @shared_out
-@noinline
 def _look_at_shares(kin, points, laws, tiling, firsts, k):
     """Energies, mass and momentum of the points of each tile of the k-th share, for its report."""
     points, laws, tiling = at_hand(points), at_hand(laws), at_hand(tiling)

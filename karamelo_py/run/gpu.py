@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
 
-from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.formula import EVALUATE, GLOBAL, UNIFORM, evaluate_in_table
-from karamelo_py.compiler.gpu import Images, KernelLaunch, known, numbers_of
+from karamelo_py.compiler.gpu import Images, KernelLaunch, numbers_of
 from karamelo_py.compiler.trace import forget
 from karamelo_py.kernels import arrays, gpu, table
 from karamelo_py.kernels import gpu_fixes as fixes
@@ -69,12 +68,8 @@ def as_rows(image: np.ndarray) -> np.ndarray:
     return as_strided(image.view(whole), (rows, image.shape[-1]), strides)
 
 
-@shared
 def _no_formula(*_):
     """Evaluate nothing, for hooks whose formulas are numbers."""
-
-
-shared(evaluate_in_table)
 
 
 class StepsOnCard:
@@ -310,7 +305,7 @@ class StepsOnCard:
     def _called(self, h: int) -> dict:
         """Map what is called by its address to the functions of a hook."""
         signatures = (NODE_FUNCTION, POINT_FUNCTION, HEAT_FUNCTION)
-        own: dict = dict.fromkeys(signatures, known(self.functions[h]))
+        own: dict = dict.fromkeys(signatures, self.functions[h])
         # Code on disk asks for all that was traced.
         own["others"] = (*self.functions, evaluate_in_table, _no_formula)
         return {**own, EVALUATE: evaluate_in_table if self._has_formulas(h) else _no_formula}

@@ -13,7 +13,7 @@ import numpy as np
 from numba import config
 
 from karamelo_py.app.launch import share
-from karamelo_py.compiler.compile import index, shared
+from karamelo_py.compiler.compile import index
 from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.threads import Serial, Threaded, shared_out
 from karamelo_py.kernels.clock import finish
@@ -386,12 +386,10 @@ def traffic(simulation: Simulation) -> tuple[float, float, int]:
     return total / simulation.count, held, sum(recorder.regions)
 
 
-def _triad_part(a, b, c, factor, parts, k):
+@shared_out
+def _triad_parts(a, b, c, factor, parts, k):
     for i in range(a.size * k // parts, a.size * (k + 1) // parts):
         a[index(i)] = b[index(i)] + factor * c[index(i)]
-
-
-_triad_parts = shared_out(shared(_triad_part))
 
 
 @kernel
