@@ -21,6 +21,7 @@ from karamelo_py.app.live.folder import FolderPage
 from karamelo_py.app.live.frames import Frame, KeptFrames
 from karamelo_py.app.live.study import StudyPage
 from karamelo_py.app.studies import study as studies
+from karamelo_py.script.errors import ScriptError
 
 pytest.importorskip("plotly")
 
@@ -200,6 +201,17 @@ def test_a_warning_is_a_flag(simulation):
     flags = Events(page.address).next()["flags"]
     assert "water runs uphill" in flags[0]["text"] and flags[0]["time"] == 0
     page.close()
+
+
+def test_an_error_that_ends_a_run_is_a_flag(simulation):
+    page = simulation.live()
+    with pytest.raises(ScriptError):
+        try:
+            raise ScriptError("water runs out")
+        finally:
+            page._page.end()
+    told = page._page._news(0)[1]
+    assert told["over"] and "water runs out" in told["flags"][0]["text"]
 
 
 def test_a_script_is_run_with_a_page_that_stops_it(tmp_path, monkeypatch, capsys):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import time
 from collections.abc import Mapping
 from contextlib import suppress
@@ -16,6 +17,7 @@ from karamelo_py.output.rhythm import Rhythmic
 from karamelo_py.run.diagnosis import energy
 from karamelo_py.run.timestep import ruling_limit
 from karamelo_py.scene.hub import Hub
+from karamelo_py.script.errors import ScriptError
 
 GRACE = 10.0  # seconds that a run is held while no page is open, which may be loaded anew
 
@@ -80,7 +82,12 @@ class RunPage(Rhythmic):
         self._wait()
 
     def end(self) -> None:
-        """Bring the last news to open pages, and answer them until they are closed."""
+        """Bring the last news to open pages, an error that ends the run among them.
+
+        They are answered until they are closed.
+        """
+        if isinstance(error := sys.exception(), ScriptError):
+            self.hub.warned.append((self.hub.update.time, error.render()))
         self._over = True
         self.server.changed()
         self.server.flush()

@@ -146,7 +146,7 @@ class Study:
     def _show(self, queue: Sequence[tuple], running: Sequence[Mapping], display: _Display) -> None:
         """Bring the page up to date; who has stopped the study there has interrupted it."""
         of = self.most or display.count + len(self.rows) - display.finished
-        left = None if self.most else display.left([case for case, _ in queue], running)
+        left = display.left([case for case, _ in queue], running)
         places = [(case, self.folder / folder_name(case), display.since(case)) for case in running]
         rows = list(self.rows.values())
         self.page.follow(rows, queue, places, of=of, most=bool(self.most), left=left)
