@@ -32,12 +32,11 @@ def method(
     basis
         The functions of the nodes; with the cpdi methods ``linear``.
     options
-        The numbers that the transfer asks for (the share of FLIP, the order of XPIC), then those of
-        the basis and of the method; and, in any order, words that one of the three knows:
-        ``mechanical`` (the default) or ``thermo-mechanical`` (heat flows between points, too),
-        ``gradient-enhanced`` (FLIP maps the gradient of velocity too), the variant of cpgimp
-        (``det``, ``diagonal``, ``stretch`` or ``corners``), and the shape of the domains of the
-        cpdi methods (``R4``, ``Q4``, ``R8``, ``H8``, ``T3``, ``Tet4``). The page of each says more.
+        First the numbers of the transfer (the share of FLIP, the order of XPIC), then those of the
+        basis and of the method. Words stand in any order. ``thermo-mechanical``: heat flows between
+        points (``mechanical``, the default: it does not). ``gradient-enhanced``: FLIP maps the
+        gradient of velocity too. ``det``, ``diagonal``, ``stretch`` or ``corners``: the variant of
+        cpgimp. ``R4``, ``Q4``, ``R8``, ``H8``, ``T3`` or ``Tet4``: the domains of the cpdi methods.
 
     Example
     -------
@@ -52,12 +51,13 @@ def method(
     Comes before the first solid.
 
     ``thermo-mechanical``: before each update of momentum, heat flows between the points of
-    materials with a temperature (``linear`` and ``neo-hookean`` with cp and kappa,
-    ``eos-strength`` with a temperature; others take no part). Points take changes of the nodes'
-    temperature (FLIP, whatever the transfer of velocity): nothing is smeared but by conduction.
-    Without it points only heat by their own work. Conduction has a stable step of its own,
-    h^2/(4 d) rho cp/kappa in d dimensions, which `dt` keeps too. Bodies that share nodes share
-    heat; else it leaves a body only where a fix says so.
+    materials with a temperature. These are ``linear``, ``neo-hookean`` and ``hencky`` with cp and
+    kappa, and ``eos-strength`` with a temperature. Points take the changes of the nodes'
+    temperature (FLIP, for any transfer of velocity), so that only conduction smears temperatures.
+    Conduction has a stable step of its own, h^2/(4 d) rho cp/kappa in d dimensions, which `dt`
+    keeps too. Heat flows between bodies that share nodes. Otherwise it leaves a body only by a fix.
+
+    Without that word, points only heat by their own work.
 
     See Also
     --------

@@ -32,9 +32,9 @@ Tolerance = Constraint("from 1e-14 to 0.01", lambda value: 1e-14 <= value <= 0.0
 class QuasiStatic(NamedTuple):
     """Load steps without inertia: each ends in equilibrium, found by Newton's method.
 
-    Loads are formulas of `time`, which is no more than a parameter here: a step of the run is a
-    load step. The tangent is exact for every law and basis, so that Newton's method converges
-    quadratically. A step that does not converge is done in halves.
+    A step of the run is a load step. Loads are formulas of `time`, which is only a parameter of the
+    load. The tangent is exact for every law and basis, so that Newton's method converges
+    quadratically. The program divides a step that does not converge.
 
     Parameters
     ----------
@@ -67,8 +67,8 @@ class QuasiStatic(NamedTuple):
     `residual` and `parts` of the last step: corrections, the share of the forces that was left,
     and how many parts the step was done in.
 
-    A step is done in parts where points would go further than half a cell to nodes that move
-    otherwise, or that fixes hold and nothing saw.
+    The program also divides a step in which points would move more than half a cell towards nodes
+    that move otherwise, or that fixes hold and that had no points.
     """
 
     implicit = True

@@ -9,11 +9,13 @@ from karamelo_py.kernels.g2p import Strain
 class USF(NamedTuple):
     """The stress follows from the nodal velocity at the start of the step, before the forces.
 
-    That velocity has led the points to where they are, so that in the updated frame F grows by
-    (I - dt grad v)^-1; as first published, by I + dt grad v, it gains energy and turning bodies
-    shrink. Stress, volume and strain that are shown after a step are those of the places that it
-    began with; of usavg, half of that. A law of rate (linear, the strengths) takes what turns by an
-    angle w dt in a step for a compression by (w dt)^2/2, as with musl; with usavg, by half of that.
+    This velocity has moved the points to their present positions. In the updated frame F therefore
+    grows by (I - dt grad v)^-1. The published increment I + dt grad v gains energy and shrinks
+    turning bodies.
+
+    The log shows stress, volume and strain of the positions at the beginning of a step (with usavg,
+    half of the increment). For a law in rate form, a turn by the angle w dt in a step is a
+    compression by (w dt)^2/2, as with musl, and half of that with usavg.
 
     Example
     -------

@@ -36,8 +36,8 @@ class Hencky(Hyperelastic):
     is Hooke's law in the strains that add up, and the elastic part of most soil plasticity at
     large strain.
 
-    A temperature T other than that at the start, T0, adds the stress -3 K alpha (T - T0), K the
-    bulk modulus; the elastic strain is without the expansion alpha (T - T0).
+    A temperature T adds the stress -3 K alpha (T - T0), with the bulk modulus K and the temperature
+    T0 at the start. The elastic strain does not contain the expansion alpha (T - T0).
 
     See Also
     --------

@@ -43,8 +43,8 @@ class LinearElastic(ElasticLaw):
     per cent a hyperelastic law such as neo-hookean is the better model. One dimension means
     uniaxial strain, as plane strain and space have it.
 
-    A temperature T other than that at the start, T0, adds the stress -3 K alpha (T - T0), K the
-    bulk modulus; the elastic strain is without the expansion alpha (T - T0).
+    A temperature T adds the stress -3 K alpha (T - T0), with the bulk modulus K and the temperature
+    T0 at the start. The elastic strain does not contain the expansion alpha (T - T0).
 
     See Also
     --------

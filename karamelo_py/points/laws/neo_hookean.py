@@ -35,8 +35,8 @@ class NeoHookean(Hyperelastic):
     First Piola-Kirchhoff stress P = G (F - F^-T) + lambda ln(det F) F^-T; stored energy
     W = G/2 (tr F^T F - 3) - G ln J + lambda/2 (ln J)^2 (Bonet & Wood 2008, section 6.4.3).
 
-    A temperature T other than that at the start, T0, adds the stress -3 K alpha (T - T0), K the
-    bulk modulus; the elastic strain is without the expansion alpha (T - T0).
+    A temperature T adds the stress -3 K alpha (T - T0), with the bulk modulus K and the temperature
+    T0 at the start. The elastic strain does not contain the expansion alpha (T - T0).
 
     See Also
     --------

@@ -78,9 +78,8 @@ class ASFLIP(NamedTuple):
     alpha
         Share of FLIP.
     beta
-        Strength of separation: the share of what a point's velocity has beyond the
-        grid's, after the step, that moves it, too, where the material is not compressed. 0 is
-        AFLIP.
+        Strength of separation: the share of the velocity of a point relative to the grid that
+        also moves the point, where the material is not compressed. 0 is AFLIP.
 
     Example
     -------
@@ -89,9 +88,9 @@ class ASFLIP(NamedTuple):
 
     Notes
     -----
-    A solid that bears tension is not compressed, and does not come apart: its points lose their
-    places. Two elastic rings that meet at 30 m/s rebound at 22.5 m/s with AFLIP, and with a share
-    of 0.97 at 22.2 (beta = 0.1), 18.4 (0.3), 13.7 (0.5), 7.5 (0.7) and 2.7 (1).
+    The points of a solid under tension lose their order, although it does not come apart. Two
+    elastic rings that meet at 30 m/s rebound at 22.5 m/s with AFLIP. With a share of 0.97 they
+    rebound at 22.2 (beta = 0.1), 18.4 (0.3), 13.7 (0.5), 7.5 (0.7) and 2.7 m/s (1).
     """
 
     alpha: Annotated[float, Share]

@@ -182,10 +182,10 @@ class GridDump(OfNodes, LammpsDump):
     Each row begins with the node's number (``id``, from 0, z fastest, then y, then x) and the
     number of its grid (``type``, from 1). Positions are always written.
 
-    With ulmpm and ulcpdi there is one grid. tlmpm and tlcpdi have one for each solid, in the order
-    of the solids, which stays over the reference shape of its solid; ulmpm/contacts has the grid of
-    the domain once for each velocity field, so that several rows have the same position. The nodes
-    of all grids are written, those of the second after those of the first, with ids that go on.
+    The nodes of all grids are written, one grid after another, with ids that go on. ulmpm and
+    ulcpdi have one grid. tlmpm and tlcpdi have one for each solid, over its reference shape.
+    ulmpm/contacts has the grid of the domain once for each velocity field, so several rows have the
+    same position.
 
     Example
     -------

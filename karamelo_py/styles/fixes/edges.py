@@ -254,13 +254,16 @@ class EdgePressure(EdgeFix):
 
     Notes
     -----
-    Each face that a point of the group shows to the outside of the region gets the pressure times
-    the area that it has before the first step, inwards. Points are boxes, so that a curved edge has
-    steps: the forces along each axis are those on the projected area, as they are on the smooth
-    edge; those of points=cut bear the load of the smooth edge itself. They keep size and direction.
-    A part of an edge is that of a region of its own:
+    Publishes the sum as ID_x, ID_y, ID_z.
+
+    Points are boxes. Each of their faces to the outside of the region gets the pressure, inwards,
+    on its area before the first step. The forces keep their size and direction. A curved edge has
+    steps, but the forces along each axis are those of the projected area, as on the smooth edge.
+    With points=cut they are those of the smooth edge itself. Around an axis, forces belong to a
+    radian.
+
+    For a part of an edge use a region of its own. A region such as
     ``region(top, block, 0, 1, 0.9, 1)`` has other sides as well, where the group may have to end.
-    Around an axis, forces belong to a radian. Publishes the sum as ID_x, ID_y, ID_z.
 
     See Also
     --------

@@ -195,18 +195,18 @@ class LocalDamping(Fix):
 
     Notes
     -----
-    f - alpha |f| sign(v), component by component, in the place of the force f of a node (Cundall
-    1987). Where forces balance there is no damping: the state of rest is that without it, whatever
-    the stiffness, and steady motion is not braked. A scene takes some ten periods of its slowest
-    vibration to come to rest with 0.8.
+    The force f of a node becomes f - alpha |f| sign(v), component by component (Cundall 1987).
+    Where forces balance there is no damping. The state of rest is therefore that without damping,
+    for any stiffness, and steady motion is not braked. With 0.8 a scene comes to rest within some
+    ten periods of its slowest vibration.
 
-    It acts after all other fixes, wherever it stands: nodes that are held, or move as told at a
-    constant speed, are not braked, and their reactions are those of the scene. Publishes the sum of
-    what it adds as ID_x, ID_y, ID_z.
+    It acts after all other fixes, wherever it stands in the script. Held nodes, and nodes with a
+    prescribed constant speed, are not braked, and their reactions are right. Publishes the sum of
+    the added forces as ID_x, ID_y, ID_z.
 
-    In method ulmpm/contacts it acts before solids push each other, so that bodies in contact stick
-    like by friction, anywhere between 1 - alpha and 1 + alpha of the load: there alpha has to go
-    to 0, as 0.8*max(1 - time/T, 0) does.
+    In method ulmpm/contacts it acts before solids push each other. Bodies in contact then stick as
+    with friction, between 1 - alpha and 1 + alpha of the load. Let alpha go to 0 there, as
+    0.8*max(1 - time/T, 0) does.
 
     See Also
     --------

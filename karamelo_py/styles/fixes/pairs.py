@@ -157,22 +157,22 @@ class ContactMinimizePenetration(PairContact):
 
     Notes
     -----
-    Points are balls with the radius R of half the side of a cube of their present volume (in the
-    plane a square, in axisymmetry one at the distance r from the axis). Two that are closer than
-    R1 + R2 get the forces that take them apart within one step, if both were free: m1 m2 / (m1 +
-    m2) p / dt^2 for the penetration p = R1 + R2 - |x2 - x1|. Friction is mu times that, along the
-    slip, and at most what stops the slip of two free points (de Vaucorbeil & Nguyen 2021,
-    "Modelling contacts with a total Lagrangian material point method").
+    Publishes the force on solid1 as ID_x, ID_y, ID_z. The force on solid2 is the opposite.
 
-    A surface of balls is rough: sliding is braked by riding from ball to ball, too. A block of two
-    points a cell and direction is braked by 0.19, 0.49, 0.53 and 0.46 of its weight with mu = 0,
-    0.3, 0.5 and 1; faces that lean to the grid hook each other (a block on a slope of 20 degrees
-    sticks with mu = 0; with points=cut it accelerates by 2.8 for 3.4). Therefore a coefficient that
-    is given is warned of: method ulmpm/contacts gives it.
+    Points are balls. Their radius R is half the side of a cube of their present volume (in the
+    plane a square). Two points closer than R1 + R2 get the force m1 m2 / (m1 + m2) p / dt^2, with
+    the penetration p = R1 + R2 - |x2 - x1|. It separates two free points within one step. Friction
+    is mu times this force, against the slip, and at most what stops the slip of two free points (de
+    Vaucorbeil & Nguyen 2021, "Modelling contacts with a total Lagrangian material point method").
 
-    With many processes the first looks for pairs, among the points of all that may touch.
-    Publishes the force on solid1 as ID_x, ID_y, ID_z; that on solid2 is the opposite. Pairs are
-    found by cells: the cost grows with the number of points.
+    A surface of balls is rough and brakes sliding. A block with two points per cell and direction
+    is braked by 0.19, 0.49, 0.53 and 0.46 of its weight with mu = 0, 0.3, 0.5 and 1. Faces that
+    lean to the grid hook each other. On a slope of 20 degrees with mu = 0 a block sticks, and with
+    points=cut it accelerates by 2.8 instead of 3.4. The program therefore warns of a coefficient.
+    Method ulmpm/contacts gives the right friction.
+
+    Pairs are found by cells, so the cost grows with the number of points. With many processes the
+    first one searches, among the points of all that may touch.
 
     See Also
     --------
