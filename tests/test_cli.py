@@ -132,6 +132,11 @@ def test_help_of_subcommands(subcommand, capsys):
     assert (capsys.readouterr().out == explained) is not command_of_scripts
 
 
+def test_help_finds_options_of_runs(capsys):
+    assert main(["help", "gpu"]) == 0
+    assert "--gpu" in capsys.readouterr().out
+
+
 def test_help_of_bench_lists_what_it_measures(capsys):
     assert main(["bench", "--help"]) == 0
     explained = capsys.readouterr().out
