@@ -25,7 +25,7 @@ from karamelo_py.app.options import (
     threads_option,
 )
 from karamelo_py.run.mpi.comm import ENDING, MpiComm, handled_signals, launched
-from karamelo_py.script.errors import ScriptError, nearest, render_message
+from karamelo_py.script.errors import ScriptError, nearest, render_message, table
 
 if TYPE_CHECKING:  # which takes most of the time that the program needs to begin
     from karamelo_py.scene.hub import Hub
@@ -47,12 +47,6 @@ karamelo-py SCRIPT [-var NAME VALUE] [--threads N] [--ranks N] [--gpu]
                           [--trust-geometries] [--quiet] [--debug]
        karamelo-py COMMAND ..."""
 RESTART = ("-restart", "--restart")
-# Of mpirun, make and LAMMPS; what they ask for is said otherwise here.
-MPI_OPTIONS = {
-    "-np": "--ranks", "--np": "--ranks", "-n": "--ranks",
-    "-j": "--threads", "-t": "--threads", "-nt": "--threads",
-    "-sf": "--threads", "-pk": "--threads",
-}  # fmt: skip
 RUN_COMMANDS = "add run(n), run_time(T), run_until(...) or run_while(...)"
 
 
@@ -176,7 +170,8 @@ def _surplus(arguments: list[str], words: list[str], parser: CommandLine) -> Scr
             expected="--ranks for a script (karamelo-py SCRIPT --ranks N), check or bench",
         )
     close = nearest(option, parser.options()) if option else None
-    if (same := MPI_OPTIONS.get((option or "").rstrip("0123456789"))) in parser.options():
+    same = table()["options"].get((option or "").rstrip("0123456789"))
+    if same in parser.options():
         close = f"{same} N"
     hint = f"did you mean {close}?" if close else None
     value = words[words.index(option) + 1 :] if option in words else []

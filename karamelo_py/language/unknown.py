@@ -17,7 +17,7 @@ from karamelo_py.script.errors import (
 from karamelo_py.script.evaluation import usage
 from karamelo_py.script.expressions import FIRST, SEEDS
 from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, RESERVED, WORDS
-from karamelo_py.script.mistakes import BLOCKS, NO_BLOCKS
+from karamelo_py.script.mistakes import NO_BLOCKS
 from karamelo_py.script.syntax import Assignment, CommandCall, Statement
 
 MEANINGS = {
@@ -56,7 +56,7 @@ def unknown_call(script: Any, name: str, place: Any, statement: bool) -> ScriptE
         f"unknown {what} '{name}'",
         place=place,
         expected=one_of(name, shown, "command") if statement else f"one of {', '.join(shown)}",
-        hint=NO_BLOCKS if name in BLOCKS else other or meant(name, known),
+        hint=NO_BLOCKS if name in table()["blocks"] else other or meant(name, known),
     )
 
 

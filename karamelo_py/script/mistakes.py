@@ -274,7 +274,7 @@ def _side_by_side(at: _Stop) -> Mistake:
     hint = None
     if at.after_call and at.kind == "NAME":
         hint = "multiply with *; two statements stand on two lines"
-        hint = NO_BLOCKS if at.before[0] in BLOCKS else hint
+        hint = NO_BLOCKS if at.before[0] in table()["blocks"] else hint
     elif before.type == "NUMBER" and at.kind == "NAME" and not code[end:].strip():
         hint = "numbers stand without units"
     return at.mistake(
@@ -284,15 +284,12 @@ def _side_by_side(at: _Stop) -> Mistake:
     )
 
 
-BLOCKS = (
-    "for", "while", "if", "else", "elif", "def", "do", "import", "loop", "label", "next", "jump",
-)  # fmt: skip
 NO_BLOCKS = "there are no loops and blocks; if(condition, a, b) chooses a value"
 
 
 def _block_or_call(name: str, words: list[str]) -> str:
     """Write the line to stand instead of ``name word word``."""
-    if name in BLOCKS:
+    if name in table()["blocks"]:
         return NO_BLOCKS
     if own := line_of(name, words):
         return own
