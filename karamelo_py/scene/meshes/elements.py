@@ -54,13 +54,6 @@ _EDGES = {
          *((6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))),
     ),
 }  # fmt: skip
-# Elements of higher order begin with the corners of these.
-OF_HIGHER_ORDER = {
-    "line3": "line", "line4": "line", "triangle6": "triangle", "triangle7": "triangle",
-    "triangle10": "triangle", "quad8": "quad", "quad9": "quad", "quad16": "quad",
-    "tetra10": "tetra", "tetra20": "tetra", "hexahedron20": "hexahedron",
-    "hexahedron24": "hexahedron", "hexahedron27": "hexahedron",
-}  # fmt: skip
 
 
 class MeshElements(NamedTuple):
@@ -121,9 +114,9 @@ def bulge_of(mesh: meshio.Mesh, group: str | int | None = None) -> float:
     """Find how far nodes in the middle of edges lie beside these, over their length, at most."""
     found = 0.0
     for name, _, nodes in chosen_cells(mesh, group):
-        first = len(SHAPES[OF_HIGHER_ORDER[name]].mirrored) if name in _EDGES else 0
+        corners = _by_corners(name, nodes)[1].shape[1]
         for k, (a, b) in enumerate(_EDGES.get(name, ())):
-            a, b, middle = (mesh.points[nodes[:, i]] for i in (a, b, first + k))
+            a, b, middle = (mesh.points[nodes[:, i]] for i in (a, b, corners + k))
             length = np.linalg.norm(b - a, axis=1)
             beside = np.linalg.norm(middle - (a + b) / 2, axis=1)
             found = max(found, float((beside / np.maximum(length, np.finfo(float).tiny)).max()))
@@ -131,10 +124,9 @@ def bulge_of(mesh: meshio.Mesh, group: str | int | None = None) -> float:
 
 
 def _by_corners(name: str, nodes: np.ndarray) -> tuple[str, np.ndarray]:
-    """The elements with their corners alone: type and nodes (n, c)."""
-    name = OF_HIGHER_ORDER.get(name, name)
-    shape = SHAPES.get(name)
-    return name, nodes if shape is None else nodes[:, : len(shape.mirrored)]
+    """The elements with their corners alone, which come first: type and nodes (n, c)."""
+    shape = SHAPES.get(name.rstrip("0123456789"))
+    return (shape.name, nodes[:, : len(shape.mirrored)]) if shape else (name, nodes)
 
 
 def _once(numbers: np.ndarray) -> np.ndarray:
