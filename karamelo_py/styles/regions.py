@@ -16,7 +16,7 @@ _NAMES = ("xlo", "xhi", "ylo", "yhi", "zlo", "zhi")
 
 
 class Primitive(region.Region):
-    """Base of block, cylinder and sphere: between planes across some axes, round along others."""
+    """Base of shapes with an exact depth: between planes across some axes, round along others."""
 
     slabs: Sequence[tuple] = ()  # axis, lower and upper end of each
     across: Sequence[int] = ()  # the axes along which it is round, with a centre and a radius
@@ -165,7 +165,7 @@ class Sphere(Primitive):
         super().__init__(hub, lo, hi, exterior=exterior)
 
 
-class Plane(region.Region):
+class Plane(Primitive):
     """All on one side of a plane, in 2D of a line; the plane belongs to it.
 
     Parameters
@@ -214,9 +214,6 @@ class Plane(region.Region):
     @property
     def aligned(self) -> bool:
         return np.count_nonzero(self.normal) == 1
-
-    def contains(self, x: np.ndarray) -> np.ndarray:
-        return self.distance(x, np.inf) >= -self.tolerance
 
     def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
         depth = np.zeros(len(x))

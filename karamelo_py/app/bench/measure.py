@@ -285,10 +285,14 @@ def _waits(simulation: Simulation) -> np.ndarray:
 
 
 def timed_steps(simulation: Simulation, count: int) -> float:
-    """Take `count` steps; returns the seconds."""
+    """Take `count` steps; returns the seconds, until a card has done them."""
+    card = simulation.hub.settings.card
+    wait = card.wait if card else lambda: None
+    wait()
     begun = time.perf_counter()
     if simulation.advance(count) != DONE:
         raise ScriptError("a workload went wrong")
+    wait()
     return time.perf_counter() - begun
 
 

@@ -1,21 +1,24 @@
 """karamelo-py bench --gpu: workloads at sizes of a GPU, measured against its memory's bandwidth."""
 
-import re
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from time import perf_counter
 from typing import Any, NamedTuple
 
-from karamelo_py.app.bench.measure import REPETITIONS, WORKLOADS, Solved, build, traffic
+from karamelo_py.app.bench.apart import grown
+from karamelo_py.app.bench.measure import (
+    REPETITIONS,
+    WORKLOADS,
+    Solved,
+    build,
+    timed_steps,
+    traffic,
+)
 from karamelo_py.kernels.gpu import OTHERS, STAGES
-from karamelo_py.kernels.step import DONE
-from karamelo_py.script.errors import ScriptError
 
 USUAL = ("disks-320", "disks-320-mls-single", "block-3d-mls-single", "block-3d-mls", "bar-3d-ul")
 MOST = 200  # steps of a repetition: nothing leaves the scenes in five
 SIZES = (1e6, 4e6, 16e6)  # points, where no variable is set
-DIMENSIONS = {"disks": 2, "dam": 2}  # of workloads; of the others 3
-FINENESS = "N", "coarser"  # variables that say how fine a scene is, how coarse
 
 
 class OnCard(NamedTuple):
@@ -35,22 +38,13 @@ class OnCard(NamedTuple):
 
 def sizes_of(name: str, presets: Mapping[str, str]) -> Iterator[dict[str, str]]:
     """The variables of a workload at each of `SIZES`; as they are, where one is set."""
-    script = WORKLOADS[name].script
-    known = [
-        (v, m[1]) for v in FINENESS if (m := re.search(rf"^{v} = (.*)$", script, re.MULTILINE))
-    ]
-    if "coarser" in script and not known:
-        known = [("coarser", "1")]
-    if not known or set(presets) & set(FINENESS):
+    if {"N", "coarser"} & {*presets}:
         yield dict(presets)
         return
-    ((variable, value),) = known
-    d = next((d for word, d in DIMENSIONS.items() if name.startswith(word)), 3)
     count = build(WORKLOADS[name], 1, presets).count
     for size in SIZES:
-        finer = (size / count) ** (1 / d)
-        number = round(int(value) * finer) if variable == "N" else float(value) / finer
-        yield {**presets, variable: f"{number:.6g}"}
+        ((variable, value),) = grown(WORKLOADS[name].script, presets, size / count).items()
+        yield {**presets, variable: f"{float(value):.6g}"}
 
 
 def measured(
@@ -62,19 +56,9 @@ def measured(
     simulation.compile()
     made = perf_counter() - begun
     per_step = traffic(simulation)[0]
-
-    def timed(count: int) -> float:
-        card.wait()
-        begun = perf_counter()
-        status = simulation.advance(count)
-        card.wait()
-        if status != DONE:
-            raise ScriptError(f"{name}: a workload went wrong")
-        return perf_counter() - begun
-
-    timed(WORKLOADS[name].lead + 5)
-    count = min(max(5, int(seconds / REPETITIONS / (timed(20) / 20))), MOST)
-    rates = [simulation.count * count / timed(count) for _ in range(REPETITIONS)]
+    timed_steps(simulation, WORKLOADS[name].lead + 5)
+    count = min(max(5, int(seconds / REPETITIONS / (timed_steps(simulation, 20) / 20))), MOST)
+    rates = [simulation.count * count / timed_steps(simulation, count) for _ in range(REPETITIONS)]
     steps = simulation.launches()
     stages: dict[str, float] = defaultdict(float)
     for launch, spent in steps.seconds_of_step():
