@@ -201,6 +201,27 @@ def test_a_method_has_its_colour_in_every_chart():
     assert len(set(methods.values())) == len(methods)
 
 
+def test_curves_have_the_colours_of_their_methods_and_names_where_they_leave_the_axis(monkeypatch):
+    """An energy that falls by 20 decades leaves an axis of 16 where it is 1e-16."""
+    drawn = []
+    monkeypatch.setattr(pictures, "savefig", lambda figure, path: drawn.append(figure))
+    time = np.linspace(0, 1, 101)
+    fallen = pictures.History(time, 10 ** (-20 * time), "PIC")
+    kept = pictures.History(time, np.ones(101), "FLIP")
+    pictures.draw_histories([kept, fallen], None, ("time (s)", "energy (1)"), "", None)
+    axes = drawn[0].axes[0]
+    curves = [line for line in axes.lines if len(line.get_xdata()) == 101]
+    assert [line.get_color() for line in curves] == [
+        look.PALETTE[look.place(name)] for name in ("FLIP", "PIC")
+    ]
+    lead = next(line for line in axes.lines if line.get_color() == curves[1].get_color()
+                and len(line.get_xdata()) == 3)  # fmt: skip
+    x, y = (axes.transAxes + axes.transData.inverted()).transform(
+        [lead.get_xdata()[0], lead.get_ydata()[0]]
+    )
+    assert x == pytest.approx(0.8) and y == pytest.approx(1e-16)
+
+
 def test_no_two_lines_look_alike():
     """Of cpgimp and stretch the numbers add up to those of linear and mechanical."""
     cantilevers = [
