@@ -240,13 +240,19 @@ def test_a_script_is_run_with_a_page_that_stops_it(tmp_path, monkeypatch, capsys
 
 def test_frames_are_bounded(monkeypatch):
     monkeypatch.setattr(frames, "COUNT", 8)
+    monkeypatch.setattr(frames, "SEEN", 0)
     columns = {name: np.arange(25.0) for name in ("x", "y", "seq")}
     kept = KeptFrames()
     for step in range(30):
         kept.add(Frame.of_columns(step, 0.1 * step, "xy", "seq", columns.__getitem__))
     listed = kept.listed()
-    assert [frame[1] for frame in listed] == [0, 8, 16, 24, 29]  # evenly, and the newest
+    states = [0, 4, 8, 12, 16, 20, 24, 28, 29]
+    assert [frame[1] for frame in listed] == states  # evenly, and the newest
     assert listed[-1][4] == 25
+    monkeypatch.setattr(frames, "SEEN", 1e9)
+    for step in (30, 31):  # a page may be about to ask for them
+        kept.add(Frame.of_columns(step, 0.1 * step, "xy", "seq", columns.__getitem__))
+    assert [frame[1] for frame in kept.listed()] == [*states, 30, 31]
     assert kept.answer({"k": "-1"}) is None
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import threading
+import time
+from collections import deque
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,6 +15,7 @@ PAGE = Path(__file__).with_name("run.html")
 POINTS = 1_000_000  # of a frame, about, at most
 BYTES = 1 << 29  # of all frames
 COUNT = 400
+SEEN = 1.0  # seconds in which a page asks for what it was told of
 
 
 class Frame(NamedTuple):
@@ -57,25 +60,30 @@ class KeptFrames:
     def __init__(self) -> None:
         self._kept: dict[int, Frame] = {}
         self._next, self._every = 0, 1
+        self._new: deque[tuple[int, float]] = deque()  # numbers, and when they came
         self._lock = threading.Lock()
 
     def add(self, frame: Frame) -> None:
         """Keep a frame."""
         with self._lock:
-            if (self._next - 1) % self._every:  # the newest so far was only that
-                self._kept.pop(self._next - 1, None)
+            now = time.perf_counter()
             self._kept[self._next] = frame
-            size = sum(each.numbers.nbytes for each in self._kept.values())
-            if len(self._kept) > COUNT or size > BYTES:
-                self._every *= 2
-                for number in [k for k in self._kept if k % self._every and k != self._next]:
-                    del self._kept[number]
+            self._new.append((self._next, now))
             self._next += 1
+            while self._new[0][1] < now - SEEN:
+                self._new.popleft()
+            size = sum(each.numbers.nbytes for each in self._kept.values())
+            stay = sum(not k % self._every for k in self._kept)
+            self._every *= 2 if stay > COUNT or size > BYTES else 1
+            first = self._new[0][0]
+            for number in [k for k in self._kept if k % self._every and k < first]:
+                del self._kept[number]
 
     def drop_last(self) -> None:
         """Forget the newest frame, whose number the next one has."""
         with self._lock:
             self._next, _ = self._kept.popitem()
+            self._new.pop()
 
     def listed(self) -> list[list]:
         """List number, step, time, column and count of each frame."""
