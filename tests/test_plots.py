@@ -61,10 +61,11 @@ def test_two_axes_and_units(hub):
     hub.output.units = Units("mm", "g", "ms")
     hub.computes["Ek"] = SimpleNamespace(style="kinetic_energy", published=("s",))
     quantities = Quantity(hub, "time"), Quantity(hub, "Es_s")
-    hub.output.plots.add("stored", PlottedCurve(1, *quantities, side="right", scale="log"))
+    axis = {"side": "right", "scale": "log", "label": "stored (mJ)"}
+    hub.output.plots.add("stored", PlottedCurve(1, *quantities, **axis))
     hub.run(5)
     svg = (hub.folder / "energies.svg").read_text()
-    for word in ("time (ms)", "Ek_s (mJ)", "Es_s", "Ek", "stored (right)"):
+    for word in ("time (ms)", "Ek_s (mJ)", "stored (mJ)", "Ek", "stored (right)"):
         assert f"<!-- {word} -->" in svg
     # Powers of ten are written as formulas.
     assert re.search(r"<!-- \$\\mathdefault\{10\^\{", svg)

@@ -173,6 +173,8 @@ def test_plot_draws_columns_of_a_log(tmp_path, monkeypatch, capsys, name):
     assert (status, out) == (0, "p.svg\n")
     svg = (tmp_path / "p.svg").read_text()
     assert "<!-- Step -->" in svg and "<!-- dt (right) -->" in svg and "<!-- Time -->" in svg
+    assert call(capsys, "plot", name, "dt", "--label", "step (s)", "-o", "p.svg")[0] == 0
+    assert "<!-- step (s) -->" in (tmp_path / "p.svg").read_text()
     for arguments, remedy in [
         ([name, "Stepp"], "did you mean 'Step'?"),
         (["gone.mpm", "Step"], "No such file"),

@@ -75,6 +75,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--right", nargs="+", default=[], metavar="Y", help="columns on a second axis, at the right"
     )
+    parser.add_argument("--label", help="text at the left axis, such as 'energy (J)'")
     parser.add_argument("--log-scale", action="store_true", help="logarithmic y axes")
     parser.add_argument(
         "-o", "--output", type=Path, default=Path("log.png"), metavar="FILE",
@@ -110,8 +111,9 @@ def run(options: argparse.Namespace) -> int:
     for side, names in (("left", options.columns), ("right", options.right)):
         for name in names:
             curve = PlottedCurve(
-                1, SimpleNamespace(name=options.x), SimpleNamespace(name=name), side, scale
-            )
+                1, SimpleNamespace(name=options.x), SimpleNamespace(name=name), side, scale,
+                options.label if side == "left" else None,
+            )  # fmt: skip
             curve.points = [
                 (row[options.x], row[name]) for row in rows if name in row and options.x in row
             ]

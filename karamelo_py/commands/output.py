@@ -205,6 +205,7 @@ def plot(
     *,
     axis: Literal["left", "right"] = "left",
     scale: Literal["linear", "log"] = "linear",
+    label: str | None = None,
 ) -> None:
     """Plot one quantity against another, in the picture that save_plot names.
 
@@ -222,6 +223,9 @@ def plot(
         The side of the axis of y: ``right`` for a second one, with limits of its own.
     scale
         ``log`` for a logarithmic axis of y; numbers that are not positive are left out.
+    label
+        What is written at the axis of y, such as "energy (J)"; the name of y when left out, with
+        its unit where there is one.
 
     Example
     -------
@@ -235,7 +239,7 @@ def plot(
     plots = hub.output.plots
     if ID in plots:
         raise ScriptError(f"plot ID '{ID}' is already used", argument="ID", expected="another ID")
-    curve = PlottedCurve(every, x, y, axis, scale)
+    curve = PlottedCurve(every, x, y, axis, scale, label)
     curve.place = hub.place
     plots.add(ID, curve)
 

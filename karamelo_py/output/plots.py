@@ -16,19 +16,22 @@ from karamelo_py.script.errors import Place
 class PlottedCurve(Rhythmic):
     """One curve: `y` against `x`, a point at every `every` steps.
 
-    `side` is that of the axis of y, left or right; `scale` is linear or log.
+    `side` is that of the axis of y, left or right; `scale` is linear or log; `label` stands at that
+    axis, the name of y when left out.
     """
 
     remembers = ("points",)
 
     def __init__(
-        self, every: int, x: Quantity, y: Quantity, side: str = "left", scale: str = "linear"
-    ):
+        self, every: int, x: Quantity, y: Quantity, side: str = "left", scale: str = "linear",
+        label: str | None = None,
+    ):  # fmt: skip
         self.every = every
         self.x = x
         self.y = y
         self.side = side
         self.scale = scale
+        self.label = label
         self.points: list[tuple[float, float]] = []
         self.last_step: int | None = None
         self.id = y.name
@@ -103,7 +106,8 @@ def _over_one_axis(
         marker = "o" if len(x) < 3 else None
         label = f"{curve.id} (right)" if side == "right" else curve.id
         lines += axes.plot(x, y, color=f"C{k}", label=label, linewidth=1.4, marker=marker)
-    axes.set_ylabel(", ".join(dict.fromkeys(labelled(curve.y.name) for curve in curves)))
+    labels = (curve.label or labelled(curve.y.name) for curve in curves)
+    axes.set_ylabel(", ".join(dict.fromkeys(labels)))
     axes.margins(x=0.01)
     if any(curve.scale == "log" for curve in curves):
         axes.set_yscale("log", nonpositive="mask")
