@@ -257,7 +257,7 @@ class Picture:
     def _lay_out(self) -> None:
         """Find room for the widest labels, once: nothing moves between the pictures of a run."""
         if self.scale is not None:
-            self._apply_limits(*((-5.2, -4.8) if self.options.log else (-8e-6, 8e-6)))
+            self._apply_limits(*((-5.2, -4.8) if self.options.log else (-2.5e-4, 2.5e-4)))
         for _ in range(2):  # a second time where the aspect of the axes has moved them
             self.figure.draw_without_rendering()
         self.figure.set_layout_engine("none")
@@ -346,12 +346,15 @@ def make(domain: Any, size: tuple[float, float], dpi: int, options: Options) -> 
 
 
 def _number(value: float, _: Any = None) -> str:
-    return f"{value:.8g}"
+    if value == 0 or 1e-4 <= abs(value) < 1e6:
+        return f"{value:.8g}"
+    short = np.format_float_scientific(value, precision=7, trim="-", exp_digits=1)
+    return short.replace("+", "")  # 2.5e6
 
 
 def _power(value: float, _: Any = None) -> str:
     """Write the number that a place on a logarithmic scale stands for."""
-    return f"{10.0**value:.3g}"
+    return _number(float(f"{10.0**value:.3g}"))
 
 
 def _arrows(shown: ScalarMappable, of_bar: Transform) -> list[Polygon]:
