@@ -10,7 +10,7 @@ WORDS = {
     "choose": "recommendation best method landslide slope impact crash fluid soil metal for",
     "messages/index": "error stop stopped crash ended abort failed reason time step too large",
     "methods": "shape functions kernel particle grid transfer APIC MLS FLIP PIC time step",
-    "materials": "constitutive model law plasticity elasticity soil metal fluid hyperelastic own",
+    "materials": "constitutive model law plasticity elasticity soil metal fluid own my",
     "units": "unit system consistent SI mm",
     "versions": "cite citation paper reference",
     "many-processes": "MPI parallel cluster Slurm srun mpiexec OpenMP threads GPU scaling resume",
@@ -51,6 +51,8 @@ WORDS = {
 # Of questions as people write them, which the search would look for too.
 ASKED = "how do does can i we my me you what which where why run use make it"
 
+ASKED_OF = ("choose", "getting-started", "messages/index", "tutorial", "units", "versions")
+
 
 def add_words(app, doctree) -> None:
     """Put the words of a page where the search indexes them, and nobody sees them.
@@ -59,8 +61,9 @@ def add_words(app, doctree) -> None:
     """
     name = app.env.docname
     words = WORDS.get(name, "")
-    if words or name.startswith("howto/"):
+    if name.startswith("howto/") or name in ASKED_OF:
         words = f"{words} {ASKED}"
+    if words:
         doctree.insert(0, nodes.meta(name="keywords", content=words))
     for node in doctree.findall(nodes.meta):
         if node.get("name") == "keywords":
