@@ -101,9 +101,7 @@ class RateMemory(NamedTuple):
     ep: Any  # plastic strain, -1 where none is known yet
 
 
-@initial_part.on(PlasticRate)
-def _initial_part_plastic_rate(part, like):
-    return RateMemory(0.0, -1.0)
+initial_part.on(PlasticRate)(lambda part, like: RateMemory(0.0, -1.0))
 
 
 @part_after.on(PlasticRate)
@@ -114,9 +112,7 @@ def _part_after_plastic_rate(part, memory, law, kin, j, s, memories, dt):
     return RateMemory(max(memory.rate + change, 0), ep)
 
 
-@laws.shown.on(Smoothed)
-def _shown_smoothed(what, law, kin, state):
-    return last_memory(state.m.further).rate
+laws.shown.on(Smoothed)(lambda what, law, kin, state: last_memory(state.m.further).rate)
 
 
 def last_memory(memories):

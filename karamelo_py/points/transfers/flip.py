@@ -88,14 +88,8 @@ def _in_step_flip_per_time(transfer, kept):
 
 def take_nodal_velocity(transfer: type) -> None:
     """Let the points of `transfer` take the velocity of the nodes after the step, as PIC's do."""
-
-    @lost_shares.on(transfer)
-    def _lost_shares_transfer(transfer, like):
-        return 1.0, 1.0
-
-    @updated_velocity.on(transfer)
-    def _updated_velocity_transfer(transfer, v, v_pic, dv):
-        return v_pic
+    lost_shares.on(transfer)(lambda transfer, like: (1.0, 1.0))
+    updated_velocity.on(transfer)(lambda transfer, v, v_pic, dv: v_pic)
 
 
 def blend(transfer: type) -> None:

@@ -65,10 +65,6 @@ class XPIC(NamedTuple):
     in_lanes = True
 
 
-@updated_velocity.on(XPIC)
-def _updated_velocity_xpic(transfer, v, v_pic, dv):
-    # kernels.table.sum_series has put the sum of the series, with the change, in the place of dv.
-    return dv
-
-
+# kernels.table.sum_series has put the sum of the series, with the change, in the place of dv.
+updated_velocity.on(XPIC)(lambda transfer, v, v_pic, dv: dv)
 terms.on(XPIC)(lambda transfer: transfer.order)

@@ -23,7 +23,7 @@ from karamelo_py.run.implicit.inertia import Motion, Rest
 from karamelo_py.run.implicit.newton import Broken, Failed, Loose, Newton, TooFar, Wrong, counted
 from karamelo_py.run.implicit.prescribed import prescribed
 from karamelo_py.run.implicit.solvers import Singular, release
-from karamelo_py.run.implicit.tools import Tool, tools_of
+from karamelo_py.run.implicit.tools import PushingTool, tools_of
 from karamelo_py.schemes.quasi_static import PUBLISHED
 from karamelo_py.script.errors import Place, ScriptError
 
@@ -419,7 +419,7 @@ class Equilibrium(NamedTuple):
 
     equations: Equations
     inertia: Rest | Motion
-    pushing: list[Contact | Tool]
+    pushing: list[Contact | PushingTool]
     u: np.ndarray
     fixed: np.ndarray  # which components fixes hold
     reaction: np.ndarray

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from karamelo_py.run.implicit import solvers
 from karamelo_py.run.implicit.contact import Contact
 from karamelo_py.run.implicit.equations import FAR, Equations, Moduli
-from karamelo_py.run.implicit.tools import Tool
+from karamelo_py.run.implicit.tools import PushingTool
 
 ROUNDING = 50 * float(np.finfo(float).eps)  # of sums of some dozens of terms
 ASTRAY = 1e4  # times as far as points may go: nothing holds them
@@ -90,7 +90,7 @@ class Newton:
         equations: Equations,
         free: np.ndarray,
         inertia: Any,
-        pushing: list[Contact | Tool],
+        pushing: list[Contact | PushingTool],
         external: np.ndarray,
         dt: float,
         seconds: dict[str, float],

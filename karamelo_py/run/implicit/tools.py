@@ -21,7 +21,7 @@ class Displaced:
         return getattr(self.view, name)
 
 
-class Tool:
+class PushingTool:
     """The force of a fix on the points of its group, by where they are."""
 
     def __init__(self, fix: Fix, equations: Equations, simulation: Any):
@@ -74,7 +74,7 @@ class Tool:
         self.fix.publish_components(self.view.total(self.force))
 
 
-def tools_of(equations: Equations, simulation: Any) -> list[Tool]:
+def tools_of(equations: Equations, simulation: Any) -> list[PushingTool]:
     """Find the tools of a scene."""
     fixes = simulation.hub.fixes.values()
-    return [Tool(fix, equations, simulation) for fix in fixes if fix.follows_points]
+    return [PushingTool(fix, equations, simulation) for fix in fixes if fix.follows_points]
