@@ -30,10 +30,9 @@ CREATE_DOMAIN_WITHOUT_H = Forms(
 def dimension(hub: Hub, dimensions: Argument, *bounds: Argument) -> None:
     """Set the number of dimensions, the domain and the cell size of its grid.
 
-    The domain is a box that holds everything; points that leave it end the
-    run, unless boundary says otherwise. In 1D strain is
-    uniaxial, in 2D it is plane (unit thickness). The grid starts at the lower corner and covers
-    the whole domain, whose sides need not be multiples of the cell size.
+    The domain is a box that holds everything. A point that leaves it ends the run, unless boundary
+    says otherwise. Strain is uniaxial in 1D, and plane (unit thickness) in 2D. The grid starts at
+    the lower corner and covers the whole domain. Its sides need not be multiples of the cell size.
 
     Parameters
     ----------

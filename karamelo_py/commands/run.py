@@ -268,8 +268,8 @@ def write_restart(hub: Hub, file: OutputFile) -> None:
 
     Notes
     -----
-    ``karamelo-py SCRIPT -restart FILE`` goes on behind this line, where a further run may stand;
-    those before it stay as long as they were.
+    ``karamelo-py SCRIPT -restart FILE`` goes on after this line. A further run may stand there. The
+    length of the runs before it must not change.
 
     Example
     -------

@@ -93,26 +93,23 @@ class Python(Fix):
 
     Notes
     -----
-    The function is called with a view of the group: arrays with a row for each member (position,
-    velocity, mass, force ... of points; position, velocity, velocity_update, mass, force ... of
-    nodes), and dt and time. What it changes in them is taken over. What it returns is published: a
-    number as ID, up to three as ID_x, ID_y, ID_z. The page on plug-ins says more of these views.
+    The function gets a view of the group: dt, time, and arrays with a row for each member. Points
+    have position, velocity, mass, force and more; nodes have position, velocity, velocity_update,
+    mass, force and more. The program takes over what the function changes in them. It publishes
+    what the function returns: a number as ID, up to three as ID_x, ID_y, ID_z. The page on plug-ins
+    says more of these views. A step costs some ten microseconds more, and the time of the function.
 
-    Every step comes back to Python for it, which takes some ten microseconds and the time of the
-    function.
+    With many processes all points are gathered in each step. Write ``pull.point_by_point = True``
+    after a function that looks at each point or node on its own and moves no points. Each process
+    then calls it for its own points, in any order. ``points.total(terms)`` sums terms (n,) or
+    (n, k) over all.
 
-    With many processes all points are gathered for it in each step. A function that looks at each
-    point or node on its own, and moves no points, says so by ``pull.point_by_point = True`` behind
-    it: then each process calls it for its own, in any order, and sums over all are
-    ``points.total(terms)``, of terms (n,) or (n, k).
-
-    What the function keeps from step to step goes into files to go on from where it is named:
-    ``remembers = ("taken", "left")`` in the module names variables of the module, and in the class
-    of an object that is called, attributes of the object. Numbers, texts, arrays, generators of
-    NumPy, and lists, tuples, sets and dictionaries of these can be kept. Of other such data there
-    that has changed since the fix was made a warning tells when the first such file is written.
-    What lies elsewhere is not seen: in defaults of arguments, other objects, other modules, or
-    ``np.random`` itself.
+    Restart files hold what the function keeps from step to step, where it is named.
+    ``remembers = ("taken", "left")`` names variables in the module, or attributes in the class of
+    an object that is called. These can be kept: numbers, texts, arrays, generators of NumPy, and
+    lists, tuples, sets and dictionaries of these. The first restart file warns of other such data
+    that has changed. The program does not see defaults of arguments, other objects, other modules,
+    and ``np.random`` itself.
 
     Example
     -------
