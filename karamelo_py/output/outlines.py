@@ -127,7 +127,7 @@ def wires(depth: Depth, lo: np.ndarray, hi: np.ndarray) -> Iterator[np.ndarray]:
         def cut(depths: np.ndarray, axis: int = axis) -> np.ndarray:
             """Tell of each section whether the surface crosses it."""
             within = np.moveaxis(depths, axis, 0).reshape(depths.shape[axis], -1) > 0
-            return within.any(axis=1) & ~within.all(axis=1)
+            return np.asarray(within.any(axis=1) & ~within.all(axis=1))
 
         there = np.flatnonzero(cut(depths))
         ends = []
