@@ -208,7 +208,7 @@ def test_no_gpu(run_script, monkeypatch):
     said = run_script(squares("run(1)"), "--gpu", status=1).err
     assert "error: --gpu needs the packages for NVIDIA GPUs" in said
     assert "hint: pip install '.[gpu]' in the folder of karamelo-py, or leave out --gpu" in said
-    wrong = run_script(squares("run(1)") + "fix(a, nothing, all)\n", "--gpu", status=1).err
+    wrong = run_script(squares("run(1)", "fix(a, nothing, all)"), "--gpu", status=1).err
     assert "fix style 'nothing'" in wrong and "GPU" not in wrong
     with pytest.raises(SimulationError, match="--gpu needs the packages"):
         Simulation(squares(), gpu=True)
