@@ -376,6 +376,22 @@ def test_outlines_show_solids_and_tools():
     ]  # fmt: skip
 
 
+def test_outlines_go_on_beyond_a_window():
+    """A disk of which the right half is shown has the whole circle: its cut is no edge."""
+    own = np.arange(0.01, 1, 0.02)
+    x = np.stack(np.meshgrid(own, own), -1).reshape(-1, 2)
+    x = x[np.linalg.norm(x - 0.5, axis=1) < 0.4]
+    columns = dict(zip("xyz", (*x.T, 0 * x[:, 0]), strict=True))
+    columns |= {"id": np.arange(len(x)), "type": np.ones(len(x)), "seq": x[:, 0]}
+    domain = SimpleNamespace(dimension=2, lo=np.zeros(2), hi=np.ones(2))
+    options = pictures.Options("seq", "seq", window=((0.5, None),), outlines=True)
+    picture = pictures.make(domain, (3, 3), 100, options)
+    picture.show(Snapshot(0, 0.0, columns, domain.lo, domain.hi), 0.02, "")
+    (line,) = picture.marks.lines.get_segments()
+    assert np.linalg.norm(line - 0.5, axis=1) == pytest.approx(0.4, abs=0.02)
+    assert picture.marks.rows.shape[1] == np.count_nonzero(x[:, 0] >= 0.5)
+
+
 def test_no_outlines_on_a_line(run_interpreted):
     text = block(1, "dump(d, all, pyplot, 10, p.png, 300, 300, outlines=true)", "run(1)")
     err = run_interpreted(text, status=1).err

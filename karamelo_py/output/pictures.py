@@ -136,6 +136,7 @@ class Picture:
             self.axes.set_axis_off()
         self._add_legend()
 
+    cuts = False  # whether its window cuts bodies open
     _prepare: Callable[[], Any]  # sets up axes and returns the artist that shows the points
     # Lists what shows of points at x (n, 3), in the order in which they are drawn.
     _rows: Callable[[np.ndarray, np.ndarray, np.ndarray, float], np.ndarray]
@@ -199,6 +200,9 @@ class Picture:
         x = np.column_stack([columns[name] for name in "xyz"])
         self.marks.rows = self._rows(columns["id"], x, values, side)
         if self.options.outlines:
+            if not self.cuts:
+                columns = snapshot.columns
+                x = np.column_stack([columns[name] for name in "xyz"])
             kinds = columns["type"]
             bodies = [x[kinds == kind] for kind in np.unique(kinds)]
             self._outline(bodies, tools, side)
@@ -440,6 +444,8 @@ class PlanePicture(Picture):
 
 class SpacePicture(PlanePicture):
     """3D: the points seen from outside, the farthest first, in the frame of the domain."""
+
+    cuts = True
 
     def _prepare(self) -> Any:
         self.lo, self.hi = np.asarray(self.domain.lo, float), np.asarray(self.domain.hi, float)
