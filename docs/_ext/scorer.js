@@ -1,8 +1,8 @@
 // Search results: how-tos first, the inside of the program and measurements last.
 const ORDER = [
   [/^howto\//, 8],
-  [/^(choose|materials|messages\/index)$/, 12],
-  [/^(getting-started|units|versions|tutorial)$/, 4],
+  [/^(choose|messages\/index)$/, 12],
+  [/^(getting-started|materials|units|versions|tutorial)$/, 4],
   [/^reference\/generated\/(command|fix|dump|material)\//, 4],
   [/^(messages|gallery)\/generated\//, -6],
   [/^(atlas|balance|comparison|defaults|verification|[\w-]+-measurements|study-verdicts)$/, -8],

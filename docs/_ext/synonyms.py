@@ -42,7 +42,7 @@ WORDS = {
     "reference/generated/fix/python": "user subroutine callback function hook",
     "reference/generated/dump/vtk": "VTK export ParaView VTU PVD visualisation",
     "reference/generated/dump/grid-vtk": "VTK export ParaView grid nodes visualisation",
-    "reference/generated/dump/movie": "animation film video gif mp4 visualisation",
+    "reference/generated/dump/movie": "make animation film video gif mp4 visualisation",
     "reference/generated/dump/pyplot": "figure image picture plot png visualisation",
     "reference/generated/material/rigid": "rigid body tool indenter obstacle",
     "reference/generated/scheme/quasi-static": "static equilibrium Newton implicit load step",
