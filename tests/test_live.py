@@ -19,8 +19,10 @@ from karamelo_py.app.live import frames
 from karamelo_py.app.live import run as run_pages
 from karamelo_py.app.live.folder import FolderPage
 from karamelo_py.app.live.frames import Frame, KeptFrames
+from karamelo_py.app.live.server import Server
 from karamelo_py.app.live.study import StudyPage
 from karamelo_py.app.studies import study as studies
+from karamelo_py.output.console import Console
 from karamelo_py.script.errors import ScriptError
 
 pytest.importorskip("plotly")
@@ -212,6 +214,20 @@ def test_an_error_that_ends_a_run_is_a_flag(simulation):
             page._page.end()
     told = page._page._news(0)[1]
     assert told["over"] and "water runs out" in told["flags"][0]["text"]
+
+
+@pytest.mark.parametrize(
+    ("terminal", "end", "waits"), [(True, "", 1), (False, "", 0), (True, "run(none)\n", 0)]
+)
+def test_a_page_waits_to_be_opened_at_a_terminal(tmp_path, monkeypatch, terminal, end, waits):
+    """Not in a batch job, nor before an error is told."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "in.bar").write_text(BAR + "run(2)\n" + end, encoding="utf-8")
+    monkeypatch.setattr(Console, "terminal", terminal)
+    stayed = []
+    monkeypatch.setattr(Server, "stay", lambda server: stayed.append(server.address))
+    assert main(["in.bar", "--live", "--quiet", "--threads", "1"]) == bool(end)
+    assert len(stayed) == waits
 
 
 def test_a_script_is_run_with_a_page_that_stops_it(tmp_path, monkeypatch, capsys):

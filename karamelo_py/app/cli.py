@@ -359,17 +359,18 @@ def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = 
         given, presets = presets, hub.restart.presets(presets)
         if taken := [f"{name} = {text}" for name, text in presets.items() if name not in given]:
             hub.console.say(f"{', '.join(taken)} taken from {hub.restart.path}, as -var had it")
-    interpreter, restart = Interpreter(hub, presets=presets), hub.restart
+    interpreter, restart, finished = Interpreter(hub, presets=presets), hub.restart, False
     interpreter.replay = restart and restart.replay()
     try:
         interpreter.run_file(script)
+        finished = True
     except Interrupted as signal:
         _complain("interrupted: the log and the dumps are complete up to here")
         return SIGNALLED + signal.args[0]
     finally:
         hub.output.log.close()
         if page is not None:
-            page.end()
+            page.end(waits=finished)
     if not hub.rehearsed:
         _tell_of_no_run(hub, script)
     elif restart is not None and restart.is_over(hub):

@@ -81,21 +81,26 @@ class RunPage(Rhythmic):
         self.server.changed()
         self._wait()
 
-    def end(self) -> None:
+    def end(self, *, waits: bool = False) -> None:
         """Bring the last news to open pages, an error that ends the run among them.
 
-        They are answered until they are closed.
+        They are answered until they are closed. At a terminal a page that nobody has opened `waits`
+        for that, if it is to.
         """
+        server = self.server
         if isinstance(error := sys.exception(), ScriptError):
             self.hub.warned.append((self.hub.update.time, error.render()))
         self._over = True
-        self.server.changed()
-        self.server.flush()
-        if self.server.watched:
-            self.hub.console.say("the live page stays until it is closed (Ctrl-C ends it)")
+        server.changed()
+        server.flush()
+        waits = waits and self.hub.console.terminal and not server.opened
+        if server.watched or waits:
+            self.hub.console.say(
+                f"live: {server.address} stays until it is closed (Ctrl-C ends it)"
+            )
             with suppress(KeyboardInterrupt):
-                self.server.stay()
-        self.server.close()
+                server.stay()
+        server.close()
 
     def detach(self) -> None:
         """End the page; the run goes on without."""

@@ -57,6 +57,7 @@ class Server:
         self.version = 0
         self._changed = threading.Condition()
         self._shown: dict[int, int] = {}  # the version that each open page has
+        self.opened = False  # by any page so far
         self.token = secrets.token_urlsafe(16)
         self._http = _Quiet(("127.0.0.1", 0), _handler(self))
         self.address = f"http://127.0.0.1:{self._http.server_address[1]}/{self.token}/"
@@ -81,9 +82,9 @@ class Server:
             )
 
     def stay(self) -> None:
-        """Go on answering as long as a page is open."""
+        """Go on answering until a page has been open, and none is any more."""
         with self._changed:
-            self._changed.wait_for(lambda: not self._shown)
+            self._changed.wait_for(lambda: self.opened and not self._shown)
 
     def close(self) -> None:
         """Bring the last news, and end."""
@@ -102,7 +103,7 @@ class Server:
                 seen, told = self.news(seen)
                 write(b"data: " + json.dumps(told).encode() + b"\n\n")
                 with self._changed:
-                    self._shown[key] = version
+                    self._shown[key], self.opened = version, True
                     self._changed.notify_all()
                 time.sleep(0.1)  # more often nobody sees
         finally:
