@@ -20,6 +20,7 @@ from karamelo_py.app.cli import main
 from karamelo_py.app.studies import records
 from karamelo_py.app.studies.advise import Adviser, Candidate, ChoiceRuns, forecast, sureness
 from karamelo_py.app.studies.curves import Family, Table, column, errors
+from karamelo_py.output.files import read_json
 
 SIZES = "points", "steps"
 ROOT = Path(__file__).resolve().parent.parent
@@ -182,7 +183,7 @@ def sweep(name: str, scene: Scene) -> tuple[Table, str]:
     words = [str(ROOT / scene.script), *scene.words.split(), "-record", scene.accuracy]
     with contextlib.redirect_stdout(io.StringIO()):
         main(["sweep", *words, "-jobs", "1", "-o", str(path)])
-    variables = [*records.beside(path)["variables"]]
+    variables = [*read_json(path.with_suffix(".json"))["variables"]]
     return Table(records.read(path), variables, path), scene.accuracy.partition("=")[0]
 
 
