@@ -266,6 +266,11 @@ def test_orders_have_their_sign_by_the_work_of_runs_not_by_noise_of_their_times(
 def test_lines_that_end_together_share_a_name():
     """Four of one colour have one; another colour, and another place, have their own."""
     axes = blank_figure(8.4, 5.2).subplots()
+    axes.plot([0, 5], [0, 1])  # as autoscaled, of which nobody has asked before
+    look.direct_labels(axes, [(5, 1, "linear", "k")])
+    at = axes.lines[-1].get_xdata()
+    assert at[0] == pytest.approx(1.05 / 1.1) and [*at[1:]] == [1.0, 1.03]
+    axes.texts[0].remove()
     axes.set(xlim=(0, 1), ylim=(0, 1))
     ends = [(1, 0.5 + 0.001 * k, f"linear, {word}", "k") for k, word in enumerate(look.FAMILIES[3])]
     ends += [(1, 0.5, "cpgimp, musl", "g"), (1, 0.8, "linear, musl, alpha = 1", "k")]
@@ -278,6 +283,7 @@ def test_round_ticks():
     assert look.log_ticks(0.9, 55) == [1, 2, 5, 10, 20, 50]
     assert look.log_ticks(1e-7, 1) == pytest.approx([10.0**k for k in range(-7, 1)])
     assert look.log_ticks(2.1e-3, 4.6e-3) == pytest.approx([2.5e-3, 3e-3, 3.5e-3, 4e-3, 4.5e-3])
+    assert len(look.log_ticks(9.77e-7, 1.2e-6)) >= 3  # 9.8 and 10 would touch: 1.05, 1.1, ...
     assert tick_text(0.02) == "0.02" and tick_text(1e-7) == "$10^{-7}$"
     # Linear axes, too, say what is there.
     for top, said in ((2e-5, r"$5\cdot10^{-6}$"), (4e8, "$10^{8}$"), (2, "0.5")):
@@ -320,6 +326,8 @@ def test_small_errors_by_chance_are_hollow_and_off_the_front(monkeypatch):
     bars = [each for each in axes.collections if len(each.get_segments())]
     ends = bars[0].get_segments()[0][:, 0]
     assert ends == pytest.approx([0.095, 0.105])  # the spread of 10 % about 0.1 s
+    longest = max(float(each.get_segments()[-1][:, 0].max()) for each in bars)
+    assert longest == pytest.approx(1.05 * 6.4) and axes.get_xlim()[1] > longest
     # A variable that changes no number of points refines nothing.
     rows = [{**row, "points": "5"} for row in lucky_rows()]
     assert not any(

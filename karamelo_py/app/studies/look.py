@@ -122,10 +122,11 @@ def log_ticks(low: float, high: float) -> list[float]:
         [k / 5 for k in range(5, 50)], [k / 20 for k in range(20, 200)],
     ):  # fmt: skip
         ticks = [lead * 10.0**k for k in exponents if k % every == 0 for lead in leads]
-        ticks = [tick for tick in ticks if low * (1 - 1e-9) <= tick <= high * (1 + 1e-9)]
-        if len(ticks) >= 3:
+        inside = [tick for tick in ticks if low * (1 - 1e-9) <= tick <= high * (1 + 1e-9)]
+        found = _thinned(inside, low, high)
+        if len(found) >= 3:
             break
-    return _thinned(ticks, low, high)
+    return found
 
 
 def _thinned(ticks: Sequence[float], low: float, high: float) -> list[float]:
@@ -178,6 +179,7 @@ def direct_labels(axes: Any, ends: Sequence[tuple[float, float, str, str]]) -> N
     """
     if not ends:
         return
+    axes.autoscale_view()  # limits are known from here on
     to_axes = axes.transData + axes.transAxes.inverted()
     names: dict[tuple[str, str, int, int], list[str]] = {}
     found: dict[tuple[str, str, int, int], Any] = {}

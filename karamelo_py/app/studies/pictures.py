@@ -11,6 +11,7 @@ from karamelo_py.app.plot import read_log
 from karamelo_py.app.studies import look
 from karamelo_py.app.studies.curves import (
     Family,
+    GroupedRuns,
     Table,
     column,
     label,
@@ -37,8 +38,9 @@ def lines(family: Family, path: Path, words: tuple[str, str], title: str = "") -
     xs = np.concatenate([line.across[line.shown] for line in family.lines])
     ys = np.concatenate([line.error[line.shown] for line in family.lines])
     failed = [line.across[~line.shown & convergence] for line in family.lines]
+    bars = np.concatenate([_bars(family, line)[line.shown] for line in family.lines])
     if not family.linear:
-        ends = _ends(np.concatenate([xs, *failed]))
+        ends = _ends(np.concatenate([xs + bars, np.where(xs > bars, xs - bars, xs), *failed]))
         look.log_axis(axes.xaxis, *ends, list(xs) if convergence else None)
     elif family.words:
         axes.set_xticks(range(len(family.words)), family.words)
@@ -59,11 +61,9 @@ def lines(family: Family, path: Path, words: tuple[str, str], title: str = "") -
                 px[lucky], py[lucky], marker=look.MARKERS[marker], linestyle="", color=colour,
                 markerfacecolor="white", markersize=5.5, zorder=4,
             )  # fmt: skip
-            spread = column(line.rows, f"{family.cost}_spread")[line.shown][way]
-            if not convergence and np.isfinite(spread).any():
+            if (bar := _bars(family, line)[line.shown][way]).any():
                 axes.errorbar(
-                    px, py, xerr=np.nan_to_num(spread) / 2, fmt="none", ecolor=colour,
-                    elinewidth=1, capsize=3, zorder=2,
+                    px, py, xerr=bar, fmt="none", ecolor=colour, elinewidth=1, capsize=3, zorder=2,
                 )  # fmt: skip
             last = int(np.argmax(px))
             ends.append((px[last], py[last], line.label, colour))
@@ -76,6 +76,12 @@ def lines(family: Family, path: Path, words: tuple[str, str], title: str = "") -
     tidy(axes)
     _footnote(figure, family)
     savefig(figure, path)
+
+
+def _bars(family: Family, line: GroupedRuns) -> np.ndarray:
+    """Half the spread of repeated costs, 0 where there is none."""
+    spread = column(line.rows, f"{family.cost}_spread")
+    return np.zeros(len(spread)) if family.convergence else np.nan_to_num(spread) / 2
 
 
 def _gone(axes: Any, marks: Sequence[tuple[float, str]]) -> None:
@@ -295,7 +301,6 @@ def draw_histories(
     axes.set(xlabel=words[0], ylabel=words[1])
     axes.set_title(title, loc="left", fontsize=10)
     tidy(axes)
-    figure.canvas.draw()  # limits are known from here on
     look.direct_labels(axes, ends)
     savefig(figure, path)
 

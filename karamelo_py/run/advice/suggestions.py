@@ -10,7 +10,6 @@ import numpy as np
 from karamelo_py.language.rules import Advice
 from karamelo_py.output.rhythm import ByTime
 from karamelo_py.run.advice.facts import SceneFacts, is_zero, script_text
-from karamelo_py.run.timestep import own_step
 from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import plural
@@ -18,7 +17,6 @@ from karamelo_py.script.errors import plural
 Words = Iterator[tuple[str, str]]  # the cost, and what to write instead
 
 AXES = "xyz"
-SMALL_STEP = 0.4  # of the stable one; scripts with moderate reserve are left alone
 NEARLY_INCOMPRESSIBLE = 0.4  # Poisson's ratio from where on linear functions lock
 MANY_POINTS = 4  # a cell and direction
 LARGE = 100_000  # points from where on their numbers are read from memory
@@ -29,14 +27,13 @@ POINT, LINE, PICTURE, DRAWING, FILE, NUMBER = 1e-7, 5e-4, 0.02, 0.5, 3e-4, 3e-7
 LONG = 0.5  # seconds of output that count
 # Errors of inputs/in.sod: 3.18 % with 0.3 of the stable step and 4 points a cell, 3.50 % with 0.9
 # of it, 4.05 % with 2 points as well.
-OF_STEPS = "longer steps move results, those of a shock tube by a tenth"
 OF_POINTS = "fewer points move results, those of a shock tube by a sixth with half of them"
 
 
 def suggestions(hub: Hub, simulation: Any) -> list[Advice]:
     """Find all that is known to be paid for without need, before anything has run."""
     rules = (
-        *(_step, _unread, _unused, _of_parts, _averaging, _flat, _round, _mirrored, _points),
+        *(_unread, _unused, _of_parts, _averaging, _flat, _round, _mirrored, _points),
         *(_precision, _output),
     )
     return [Advice("", *words) for rule in rules for words in rule(hub, simulation)]
@@ -45,24 +42,6 @@ def suggestions(hub: Hub, simulation: Any) -> list[Advice]:
 def _of_parts(hub: Hub, simulation: Any) -> Words:
     said = SceneFacts(hub, simulation, inf).advice("suggestion")
     return ((one.reason, one.cure) for one in said)
-
-
-def _step(hub: Hub, simulation: Any) -> Words:
-    share, limit = hub.update.dt_factor, simulation.limit
-    if hub.update.fixed_dt is not None:
-        dt = simulation.dt
-    elif share is not None:
-        dt = share * limit  # not what the end of a short run makes of it
-    else:
-        return  # the program's own
-    best = own_step(hub, simulation)
-    if not 0 < dt < SMALL_STEP * best < np.inf:
-        return
-    times = f"{best / dt:.3g} times as many steps as the program's own step asks for; {OF_STEPS}"
-    if hub.update.fixed_dt is not None:
-        yield f"set_dt({dt:g}): {times}", f"leave set_dt out, or set_dt({best:.3g})"
-    else:
-        yield f"dt_factor({hub.update.dt_factor:g}): {times}", f"dt_factor({best / limit:.3g})"
 
 
 def _unread(hub: Hub, simulation: Any) -> Words:
