@@ -242,6 +242,7 @@ def test_numbers_along_a_short_logarithmic_axis_do_not_touch(low, span):
     figure = blank_figure(8.4, 5.2)
     axes = figure.subplots()
     look.log_axis(axes.xaxis, low, low * span)
+    axes.set_ylim(0, 1)
     look.direct_labels(axes, [(low, 1, "quadratic-spline", "k")])
     figure.draw_without_rendering()
     boxes = [text.get_window_extent() for text in axes.get_xticklabels() if text.get_text()]

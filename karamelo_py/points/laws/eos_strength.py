@@ -8,7 +8,6 @@ remembers (`Memory`), and the dissipated energy where there is any. Parts of oth
 a plug-in's, are chained (`karamelo_py.points.laws.further`).
 """
 
-import re
 from math import inf, isinf, log, sqrt
 from typing import Any, ClassVar, Literal, NamedTuple
 
@@ -174,14 +173,13 @@ def _idle_damage(law, scene):
 
 def _idle_heat(law, scene):
     """Tell that strength, pressure and damage depend on no temperature, and no one reads it."""
-    if re.search(r"average_temperature|(\b|_)T(max)?\b", scene.text):
-        return False
     softening = getattr(law.strength, "softening", Absent())
     softens = not isinstance(softening, Absent) or not isinf(getattr(law.strength, "Tm", inf))
     pressures = getattr(law.eos, "thermal", 0), getattr(law.temperature, "alpha", 1)
     presses = any(number != 0 for number in pressures)
     wears = getattr(law.damage, "D5", 0) != 0
-    return not (isinstance(law.temperature, Absent) or softens or presses or wears)
+    acts = isinstance(law.temperature, Absent) or softens or presses or wears
+    return not (acts or scene.reads_temperature)
 
 
 suggestion(

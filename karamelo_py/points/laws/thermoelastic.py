@@ -33,9 +33,11 @@ class Thermoelastic(NamedTuple):
 
 suggestion(
     Thermoelastic,
-    when=lambda law, scene: not scene.hub.update.thermal,
-    cost="material {owner.id} has a temperature, and no heat flows",
-    instead="leave cp, kappa and alpha out, or method(..., thermo-mechanical)",
+    when=lambda law, scene: (
+        not (scene.hub.update.thermal or scene.reads_temperature or law.heat.alpha)
+    ),
+    cost="material {owner.id} has a temperature, no heat flows, and nobody reads it",
+    instead="leave cp and kappa out, or method(..., thermo-mechanical)",
 )
 
 

@@ -1,5 +1,6 @@
 """Facts of a scene before a run, which rules judge: its parts, and how its solids move."""
 
+import re
 from collections.abc import Iterator
 from functools import cached_property
 from itertools import chain
@@ -79,6 +80,11 @@ class SceneFacts:
     def text(self) -> str:
         """The text of the script, without comments."""
         return script_text(self.hub)
+
+    @property
+    def reads_temperature(self) -> bool:
+        """Tell whether the script has a word for a temperature of its points."""
+        return bool(re.search(r"average_temperature|(\b|_)T(max)?\b", self.text))
 
     @cached_property
     def motions(self) -> list[BodyMotion]:

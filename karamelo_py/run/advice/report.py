@@ -51,8 +51,8 @@ def report(hub: Hub, end_time: float = inf) -> None:
     else:
         say(f"first dt       {simulation.dt:.6g} (stable limit {simulation.limit:.6g})")
         say(f"               {words_of_share(hub)}")
-        if own := words_of_own_step(hub, simulation):
-            say(f"own dt         {own}")
+        if step := words_of_own_step(hub, simulation):
+            say(f"own dt         {step}")
         say(f"limited by     {ruling_limit(simulation)}")
     if simulation.moves:
         why = unknown_work(hub)

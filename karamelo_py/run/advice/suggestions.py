@@ -18,22 +18,18 @@ Words = Iterator[tuple[str, str]]  # the cost, and what to write instead
 
 AXES = "xyz"
 NEARLY_INCOMPRESSIBLE = 0.4  # Poisson's ratio from where on linear functions lock
-MANY_POINTS = 4  # a cell and direction
 LARGE = 100_000  # points from where on their numbers are read from memory
 RESOLVED = 1000  # times the distance of neighbouring singles: what a step moves points by, at least
 # Seconds of a core (Intel Xeon): a point in a step of linear functions, a line of the log, a
 # picture and the first one, a file of points and a number in it.
 POINT, LINE, PICTURE, DRAWING, FILE, NUMBER = 1e-7, 5e-4, 0.02, 0.5, 3e-4, 3e-7
 LONG = 0.5  # seconds of output that count
-# Errors of inputs/in.sod: 3.18 % with 0.3 of the stable step and 4 points a cell, 3.50 % with 0.9
-# of it, 4.05 % with 2 points as well.
-OF_POINTS = "fewer points move results, those of a shock tube by a sixth with half of them"
 
 
 def suggestions(hub: Hub, simulation: Any) -> list[Advice]:
     """Find all that is known to be paid for without need, before anything has run."""
     rules = (
-        *(_unread, _unused, _of_parts, _averaging, _flat, _round, _mirrored, _points),
+        *(_unread, _unused, _of_parts, _averaging, _flat, _round, _mirrored),
         *(_precision, _output),
     )
     return [Advice("", *words) for rule in rules for words in rule(hub, simulation)]
@@ -144,7 +140,8 @@ def _flat(hub: Hub, simulation: Any) -> Words:
             named = "" if k == d - 1 else f", with {kept} called {' and '.join(AXES[: d - 1])}"
             yield (
                 f"all solids are the same along {AXES[k]}, in which nothing moves: {layers} times "
-                f"the points of {'plane strain' if d == 3 else 'a line'}",
+                f"the points of {'plane strain' if d == 3 else 'a line'}, which has the forces and "
+                f"energies of a {'thickness' if d == 3 else 'cross-section'} of 1",
                 f"dimension({d - 1}, {', '.join(given)}, {domain.h:g}){named}",
             )
             return
@@ -267,7 +264,8 @@ def _mirrored(hub: Hub, simulation: Any) -> Words:
         ):
             yield (
                 f"the scene is the same on both sides of {AXES[k]} = {middle:g}: twice the points "
-                "(unless it is to buckle or to break unevenly)",
+                "(unless it is to buckle or to break unevenly); energies are halved, and functions "
+                "wider than linear ones move results by some per cent on coarse grids",
                 f"half of it, and the nodes at {AXES[k]} = {middle:g} held in {AXES[k]}",
             )
             return
@@ -332,17 +330,6 @@ def _output(hub: Hub, simulation: Any) -> Words:
             f"output takes some {output:.1g} s of a core, and the steps {stepping:.1g} s: "
             f"{plural(lines, 'line')} of the log, {plural(tables, 'table')} of points, "
             f"{plural(round(pictures), 'picture')}",
-            "less often, or none of it where a study runs the scene many times",
+            "less often, or none of it where a study runs the scene many times (errors over the "
+            "history are those at outputs)",
         )
-
-
-def _points(hub: Hub, simulation: Any) -> Words:
-    for solid in hub.solids.values():
-        ppc = getattr(solid, "ppc", 0)
-        if ppc >= MANY_POINTS:
-            each = ppc**hub.domain.dimension
-            yield (
-                f"solid {solid.id} has {each} points a cell; more than two a direction gain little "
-                f"once points have moved; {OF_POINTS}",
-                f"2 or 3 points a direction, and finer cells for what {each} cost",
-            )
