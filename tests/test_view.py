@@ -19,6 +19,7 @@ from karamelo_py.app import view
 from karamelo_py.app.cli import main
 from karamelo_py.app.plot import read_rows
 from karamelo_py.output import pictures
+from karamelo_py.output.files import savefig
 from karamelo_py.output.outlines import Tool, outlines
 from karamelo_py.output.rhythm import ByTime
 from karamelo_py.output.snapshots import Snapshot, read
@@ -374,6 +375,24 @@ def test_outlines_show_solids_and_tools():
             [0.2, 0.7, 0.4, 0.9], [0.6, 0.7, 0.8, 0.9], [0.65, 0.05, 0.95, 0.35],
         )
     ]  # fmt: skip
+
+
+def test_many_points_are_pixels_among_lines(tmp_path, monkeypatch):
+    """An .svg of more points than are drawn together has one picture of them, and no circles."""
+    x = np.linspace(0.1, 0.9, 100)
+    columns = {"id": np.arange(100), "x": x, "y": x, "z": 0 * x, "seq": x}
+    domain = SimpleNamespace(dimension=2, lo=np.zeros(2), hi=np.ones(2))
+    found = []
+    for marks in (100, 99):
+        monkeypatch.setattr(pictures, "MARKS", marks)
+        picture = pictures.make(domain, (3, 3), 100, pictures.Options("seq", "seq"))
+        picture.show(Snapshot(0, 0.0, columns, domain.lo, domain.hi), 0.01, "")
+        savefig(picture.figure, tmp_path / "s.svg")
+        text = (tmp_path / "s.svg").read_text()
+        assert "<!-- seq -->" in text
+        found.append((text.count("<image"), text.count("<use")))
+    (images, circles), (more_images, fewer) = found
+    assert more_images == images + 1 and fewer <= circles - 100
 
 
 def test_outlines_go_on_beyond_a_window():

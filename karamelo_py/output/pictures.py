@@ -95,11 +95,15 @@ class DrawnPoints(Artist):
         """Draw them."""
         if not self.get_visible():
             return
-        artist = self.picture.artist
+        artist, many = self.picture.artist, self.rows.shape[1] > MARKS
         artist.set_visible(True)
+        if many:  # pixels also in .pdf and .svg, which no viewer would show with so many circles
+            renderer.start_rasterizing()
         for first in range(0, self.rows.shape[1], MARKS):
             self.picture.place(self.rows[:, first : first + MARKS])
             artist.draw(renderer)
+        if many:
+            renderer.stop_rasterizing()
         artist.set_visible(False)
         self.lines.set_visible(True)
         self.lines.draw(renderer)
