@@ -504,6 +504,22 @@ def test_what_acts_on_one_side_more_is_no_mirror(advice, more):
     assert "both sides" not in advice(plane(more=more))
 
 
+def test_half_of_a_scene_gives_the_results_of_the_whole(state_interpreted):
+    """With linear functions, a falling square whose floor holds it: the points beyond x = 4."""
+    floor = "region(floor, block, -INF, INF, -INF, 2)\ngroup(floor, nodes, region, floor, all)\n"
+    more = floor + "fix(floor, velocity_nodes, floor, 0, 0)\nfix(w, body_force, all, 0, -3)"
+    whole = plane(more=more, law="neo-hookean, 1, 100, 0.3").replace("run(1)", "run(12)")
+    middle = "region(mid, block, -INF, 4, -INF, INF)\ngroup(mid, nodes, region, mid, all)\n"
+    half = whole.replace("dimension(2, 0,", "dimension(2, 4,").replace(
+        "run(12)", middle + "fix(mid, velocity_nodes, mid, 0, NULL)\nrun(12)"
+    )
+    all_of, right = (state_interpreted(text, "x", "y", "s22", "vx") for text in (whole, half))
+    for name in right:
+        beyond = np.sort(all_of[name][all_of["x"] > 4])
+        assert np.ptp(beyond) > 0
+        assert np.sort(right[name]) == pytest.approx(beyond, rel=1e-9, abs=1e-12)
+
+
 def test_no_mirror_between_nodes(advice):
     assert "both sides" not in advice(plane(more=PULLED, n=3))
 
