@@ -12,8 +12,8 @@ SMALL = None  # tests/test_paper_scenes.py runs it
 def beam(E):
     """Deflection (mm) of the free end of a plate held above, under the pressure of water at rest.
 
-    Euler and Bernoulli: q L^4/(8 E I) for the even part, 11 q L^4/(120 E I) for what grows to q at
-    the free end; plus what shear adds, 6/5 of the moment of the load over G A.
+    Euler and Bernoulli: q L^4/(8 E I) for the constant part, 11 q L^4/(120 E I) for the part that
+    grows to q at the free end. Shear adds 6/5 of the moment of the load over G A.
     """
     even, grown = RHO * G * (DEPTH - LENGTH), RHO * G * LENGTH
     bending = E / (1 - NU**2) * THICK**3 / 12

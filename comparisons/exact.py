@@ -79,9 +79,9 @@ class AxisAligned:
 class Vortex:
     """The generalised vortex: a ring 0.75 <= R <= 1.25 turned by alpha = G sin(pi t / T) h(R).
 
-    h = 1 - 8 s^2 + 16 s^4 with s = (R - 1) / 0.5; it and its slope vanish at both edges of the
-    ring, which are free of traction. Every point moves on a circle; F is a rotation times a simple
-    shear, so J = 1.
+    h = 1 - 8 s^2 + 16 s^4 with s = (R - 1) / 0.5. h and its slope vanish at both edges of the ring,
+    which are free of traction. Every point moves on a circle. F is a rotation times a simple shear,
+    so J = 1.
 
     Source: Kamojjala, Brannon, Sadeghirad & Guilkey 2015, Engineering with Computers 31. The
     body force of two published codes has + in the last term of b_t; see tests/test_exact.py.
@@ -236,8 +236,8 @@ def elastica(load: float, steps: int = 400) -> tuple[float, float]:
 def incline_acceleration(angle: float, friction: float, g: float, inertia: float = 0.5) -> float:
     """Acceleration along an incline of a round body with moment of inertia `inertia` m R^2.
 
-    It rolls if tan(angle) <= mu (1 + 1 / inertia), for a disk 3 mu, with g sin / (1 + inertia);
-    else it slides with g (sin - mu cos).
+    It rolls if tan(angle) <= mu (1 + 1 / inertia), for a disk 3 mu. It rolls with
+    g sin / (1 + inertia), and slides with g (sin - mu cos).
     """
     if tan(angle) <= friction * (1 + 1 / inertia):
         return g * sin(angle) / (1 + inertia)
@@ -290,8 +290,8 @@ def hertz_stress(x: np.ndarray, depth: np.ndarray, force: float, half: float) ->
 def hertz_load(approach: float, R: float, modulus: float) -> float:
     """Force per length that brings a plane nearer to the axis of a cylinder by `approach`.
 
-    approach = 2 P / (pi E*) (ln(4 R / a) - 1/2) with half the width a = sqrt(4 P R / (pi E*)) of
-    the contact, of a cylinder between two planes (Johnson 1985, Contact Mechanics, section 5.6).
+    For a cylinder between two planes, approach = 2 P / (pi E*) (ln(4 R / a) - 1/2). Half the width
+    of the contact is a = sqrt(4 P R / (pi E*)) (Johnson 1985, Contact Mechanics, section 5.6).
     """
     low, high = 0.0, modulus * R
     for _ in range(100):
@@ -305,10 +305,10 @@ def hertz_load(approach: float, R: float, modulus: float) -> float:
 def spiral_slip(beta: float, phi: float) -> tuple[float, np.ndarray]:
     """Weight times height over cohesion at which a slope fails, and where it slips, (n, 2).
 
-    The best bound by a body that turns on a logarithmic spiral through the toe of a slope inclined
-    by `beta`, of soil with the friction and dilatancy `phi`, in radians (Chen 1975, Limit Analysis
-    and Soil Plasticity, section 9.2). Places are relative to the toe, over the height; the slope
-    lies at x < 0.
+    The best upper bound by a body that turns on a logarithmic spiral through the toe of the slope
+    (Chen 1975, Limit Analysis and Soil Plasticity, section 9.2). `beta` is the inclination, `phi`
+    friction and dilatancy, in radians. Positions are relative to the toe, over the height. The
+    slope lies at x < 0.
     """
     t = tan(phi)
     first, last = np.radians(np.arange(0, 90, 0.1)), np.radians(np.arange(45, 150, 0.1))[:, None]

@@ -35,9 +35,9 @@ def beside(last, cell):
 def compare(run, axes, full):
     """Force and stress on finer and finer grids, and with finer points on one of them.
 
-    With whole squares of points the rim has steps of 1 / ppc of a cell, whatever the functions, so
-    that the plane is met up to half a step too early or late, a quarter on average; with squares
-    that are cut at the rim, a quarter of that is granted.
+    With whole squares of points the rim has steps of 1 / ppc of a cell. The plane is met up to half
+    a step too early or late, a quarter on average. With squares that are cut at the rim, a quarter
+    of that is allowed.
     """
     cases = [("linear", 2, "cut", (16, 32))]
     if full:

@@ -15,8 +15,8 @@ SMALL = {"refine": 1 / 2}
 def solution(gamma):
     """Plastic strain, its work per volume, and the temperature after a shear gamma.
 
-    The shear strain gamma is q/(sqrt(3) G) elastic and sqrt(3) ep plastic, q = Y + H ep, which
-    leaves out the turn of the elastic strain, of the order q/G.
+    The shear strain gamma is q/(sqrt(3) G) elastic and sqrt(3) ep plastic, with q = Y + H ep. This
+    neglects the rotation of the elastic strain, of the order q/G.
     """
     shear_modulus = E / (2 * (1 + NU))
     ep = np.maximum(0, (gamma / sqrt(3) - Y / (3 * shear_modulus)) / (1 + H / (3 * shear_modulus)))

@@ -6,8 +6,8 @@ SMALL = None  # with fewer cells it is another bar
 
 
 def compare(run, axes, full):
-    """Lowest point. The published number lies between an upper face that is clamped and one that
-    may slide, 1.66 and 1.76 m by the finite elements of the tests; the script clamps it."""
+    """Lowest point. The finite elements of the tests give 1.66 m if the upper face is clamped, and
+    1.76 m if it may slide. The published number lies between. The script clamps it."""
     log = run(refine=2).log
     lowest = log.tip_s.argmax()
     source = "finite elements (benchmark, see docs/verification.md)"

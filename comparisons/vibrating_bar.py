@@ -20,9 +20,10 @@ def frequency(time, v):
 def compare(run, axes, full):
     """FLIP, linear functions, 25 cells.
 
-    Lumping and hats change omega by (k h)^2 / 24 with k h = pi / 50: 2e-4; masses that the free end
-    shares with an empty node count as up to h/4 of length, 1 % of it, but of second order in k h
-    where the wave has no slope.
+    Lumped masses and linear functions change omega by (k h)^2 / 24 with k h = pi / 50: 2e-4. The
+    free end shares mass with an empty node. This acts like up to h/4 of length, 1 %, but is of
+    second order in k h, because the wave has no slope there.
+
     """
     log = run().log
     omega, source = bar_frequency(25, 100, 1), "first mode (exact)"
