@@ -202,7 +202,7 @@ def test_no_gpu(run_script, monkeypatch):
     monkeypatch.setitem(sys.modules, "cuda.bindings", SimpleNamespace(driver=None))
     monkeypatch.setattr(gpu.Card, "_do", lambda self, name, *rest: 1 / 0)
     said = run_script(squares("run(1)"), "--gpu", status=1).err
-    assert "error: there is no NVIDIA GPU with a driver on this machine" in said
+    assert said.startswith("error: there is no NVIDIA GPU with a driver on this machine\n")
     assert "hint: leave out --gpu: processors run the same script" in said
     monkeypatch.setitem(sys.modules, "cuda.bindings", None)
     said = run_script(squares("run(1)"), "--gpu", status=1).err

@@ -172,6 +172,7 @@ def test_groups_by_name():
         NodeGroup.from_script(hub, arguments("p")[0])
     assert "group 'p' is a group of particles" in str(caught.value)
     assert "a group of nodes" in caught.value.expected
+    assert caught.value.hint == "all, or group(p_nodes, nodes, region, ...)"
     with pytest.raises(ScriptError) as caught:
         AnyGroup.from_script(hub, arguments("q")[0])
     assert caught.value.place.column == 3

@@ -424,6 +424,12 @@ WRONG = [
 ]
 
 
+def test_check_says_that_nothing_is_held(run_interpreted):
+    said = run_interpreted(patch("fix(pull, body_force, all, 1, 0)"), command="check", status=1).err
+    assert "step 1, time 0: solid 's' is held by nothing, and there is no inertia" in said
+    assert "error: " not in run_interpreted(patch(HELD), command="check").err
+
+
 @pytest.mark.parametrize(("lines", "message", "marked"), WRONG)
 def test_refusals(run_script, lines, message, marked):
     result = run_script(patch(lines), status=1)

@@ -45,11 +45,11 @@ def dt_factor(hub: Hub, factor: Annotated[float, Positive]) -> None:
     Parameters
     ----------
     factor
-        Above 0; above 1 a run warns. Without this command the program takes 0.9. It takes less
-        where a body that drifts would gain energy: 0.4, or 0.2 with one point per cell, with linear
-        functions in the updated frame, FLIP with a share above 0.99, and musl or usf. Until a point
-        has moved a quarter of a cell, it takes 0.9, and more with splines. A factor of your own is
-        a share of the stable step of moving bodies all the time.
+        Above 0; above what is stable a run warns. Without this command the program takes 0.9. It
+        takes less where a body that drifts would gain energy: 0.4, or 0.2 with one point per cell,
+        with linear functions in the updated frame, FLIP with a share above 0.99, and musl or usf.
+        Until a point has moved a quarter of a cell, it takes 0.9, and more with splines. A factor
+        of your own is a share of the stable step of moving bodies all the time.
 
     Example
     -------

@@ -198,7 +198,8 @@ class Interpreter:
             raise
         except ScriptError as error:
             del self.record.statements[done:]
-            error.place = error.place or statement.place
+            if not error.complete:
+                error.place = error.place or statement.place
             self.presets.blame(statement, error)
             for wrong in (error, *error.others):
                 wrong.included = wrong.included or self._including(depth - 1)

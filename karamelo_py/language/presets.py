@@ -83,7 +83,7 @@ class Presets(dict[str, str]):
     def blame(self, statement: Statement, error: ScriptError) -> None:
         """Say so where a mistake may come from them: from numbers, or texts in their place."""
         place = error.place
-        if place != statement.place and not error.hint:
+        if place not in (None, statement.place) and not error.hint:
             marked = place.text[place.column - 1 : place.column - 1 + place.length]
             if given := ", ".join(f"-var {name} {self[name]}" for name in self._in(marked)):
                 error.hint = f"{marked} comes from {given}"

@@ -26,7 +26,7 @@ from karamelo_py.run.mpi.comm import check_same_run, handled_signals
 from karamelo_py.run.recovery import RollBack, Stopped
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.tiles import DIRECT_UP_TO
-from karamelo_py.run.timestep import ruling_limit, words_of_own_step, words_of_share
+from karamelo_py.run.timestep import ruling_limit, stable_step, words_of_own_step, words_of_share
 from karamelo_py.scene import boundary
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.plugins import attributed
@@ -137,6 +137,8 @@ def carry_out(hub: Hub, **length: Any) -> None:
         report(hub, runner.end_time)
         runner.warn(hub.simulation)
         hub.simulation.refuse()
+        if hub.simulation.implicit:
+            hub.simulation.load_steps.refuse_all_loose()
         raise Quit
     take_card(hub)
     replay = hub.interpreter.replay
@@ -355,7 +357,7 @@ class Runner:
         hub, why = self.hub, energy.unknown_work(self.hub)
         own = words_of_own_step(hub, simulation)
         of_waves = {
-            "stable dt": simulation.limit,
+            "stable dt": stable_step(hub, simulation, simulation.limit),
             **({"own dt": own} if own else {}),
             "limited by": f"{ruling_limit(simulation)}; {words_of_share(hub)}",
         }

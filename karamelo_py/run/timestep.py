@@ -238,6 +238,11 @@ def words_of_own_step(hub: Hub, simulation: Any) -> str:
     return f"{step:.6g}" + (far if after < step else "")
 
 
+def stable_step(hub: Hub, simulation: Any, limit: float) -> float:
+    """The stable step where a script asks for one: `limit`, or what the program's own is of."""
+    return max(limit, own_step(hub, simulation) / USUAL)
+
+
 def own_step_instead(hub: Hub, command: str = "") -> str:
     """Say what to write in the place of a step that is too large, by the command for it."""
     if command == "set_dt" or (not command and hub.update.fixed_dt is not None):
@@ -255,7 +260,8 @@ def words_of_share(hub: Hub) -> str:
     """Say what share of the stable step is taken, and what it means."""
     asked, keeping = hub.update.dt_factor, keeping_share(hub)
     if hub.update.fixed_dt is not None:
-        share = hub.update.fixed_dt / hub.simulation.limit
+        limit = stable_step(hub, hub.simulation, hub.simulation.limit)
+        share = hub.update.fixed_dt / limit
         words = f"{share:.3g} of the stable step"
     elif asked is None:
         clock = hub.simulation.control.clock[0]

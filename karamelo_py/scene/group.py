@@ -59,7 +59,8 @@ class AnyGroup(Named):
             raise ScriptError(
                 f"group '{group.id}' is a group of {group.kind}",
                 place=argument.place,
-                expected=f"a group of {cls.kind}: group(ID, {cls.kind}, region, ...)",
+                expected=f"a group of {cls.kind}",
+                hint=f"all, or group({group.id}_{cls.kind}, {cls.kind}, region, ...)",
             )
         return group
 

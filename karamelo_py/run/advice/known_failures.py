@@ -131,6 +131,9 @@ def warn_about_steps(
         asked = step.fixed_dt or (step.dt_factor or 0) * limit
         if step.scene != present.scene or not asked > limit * (1 + 1e-12):
             continue
+        stable = timestep.stable_step(hub, simulation, limit)
+        if not asked > stable * (1 + 1e-12):
+            continue
         name = timestep.step_by_script(step.fixed_dt, step.dt_factor)
         command = name.split()[0]
         words = f"the step {asked:.4g} of {command} is "
@@ -144,9 +147,9 @@ def warn_about_steps(
             words += f"above the stable limit {limit:.4g} of conduction; "
             words += f"beyond {BORNE:g} times that temperatures swing"
         else:
-            words += f"above the stable limit {limit:.4g}"
+            words += f"above the stable limit {stable:.4g}"
             words += timestep.what_follows(hub, simulation, asked)
-            if step.fixed_dt and asked > MIXED * limit:
+            if step.fixed_dt and asked > MIXED * stable:
                 words += f"; {mixed_units(hub, simulation)}"
                 hint = f"{UNITS}. If they are as they should be, {hint}"
         if hub.update.first_time(name) or (again and step is present):

@@ -17,7 +17,12 @@ from karamelo_py.run.lower.card import memory_there, refusals
 from karamelo_py.run.lower.memory import known, memory_of, node_fields, nodes_in_use, point_fields
 from karamelo_py.run.mpi.plan import report_lines
 from karamelo_py.run.simulation import Simulation
-from karamelo_py.run.timestep import ruling_limit, words_of_own_step, words_of_share
+from karamelo_py.run.timestep import (
+    ruling_limit,
+    stable_step,
+    words_of_own_step,
+    words_of_share,
+)
 from karamelo_py.scene import machine_memory
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
@@ -49,7 +54,8 @@ def report(hub: Hub, end_time: float = inf) -> None:
     if simulation.implicit:
         _say_of_equations(say, simulation, nodes)
     else:
-        say(f"first dt       {simulation.dt:.6g} (stable limit {simulation.limit:.6g})")
+        stable = stable_step(hub, simulation, simulation.limit)
+        say(f"first dt       {simulation.dt:.6g} (stable limit {stable:.6g})")
         say(f"               {words_of_share(hub)}")
         if step := words_of_own_step(hub, simulation):
             say(f"own dt         {step}")

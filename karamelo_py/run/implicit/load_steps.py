@@ -15,6 +15,7 @@ from karamelo_py.kernels.totals import WORK, add_to, carry
 from karamelo_py.kernels.watch import look_at_end
 from karamelo_py.points.kinematics import free_from
 from karamelo_py.points.laws import can, constrained_velocity
+from karamelo_py.run.boxes import used
 from karamelo_py.run.diagnosis.explain import no_number
 from karamelo_py.run.implicit.conduction import conduct
 from karamelo_py.run.implicit.contact import Contact, contact_of
@@ -395,10 +396,20 @@ class LoadSteps:
             ]
             how = f"is not held along {loose[0]}" if loose else "can turn"
             how = how if len(held) else "is held by nothing"
-            raise self._error(
-                f"solid '{self._solid_at(equations, own)}' {how}, and there is no inertia",
-                "fix velocity_nodes, or scheme(newmark) for bodies that move",
-            )
+            raise self._loose(self._solid_at(equations, own), how)
+
+    def _loose(self, solid: str, how: str) -> ScriptError:
+        return self._error(
+            f"solid '{solid}' {how}, and there is no inertia",
+            "fix velocity_nodes, or scheme(newmark) for bodies that move",
+        )
+
+    def refuse_all_loose(self) -> None:
+        """Refuse, before any step, a scene in which no fix holds a node that points give to."""
+        s, held = self.simulation.setup, self.held().any(1)
+        rigid = any(can(block.laws, constrained_velocity) for block in s.blocks)
+        if not (self.dynamic or rigid or any(held[a:b].any() for a, b in used(s.spans)[1:])):
+            raise self._loose(next(iter(self.simulation.hub.solids)), "is held by nothing")
 
     def _solid_at(self, equations: Equations, chosen: np.ndarray) -> str:
         """Name the solid of a point that sees some of the chosen nodes (m,)."""
