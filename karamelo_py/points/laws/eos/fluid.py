@@ -1,6 +1,6 @@
 """eos fluid and ideal-gas: liquids by Tait's equation, gases whose energy follows from work."""
 
-from math import inf
+from math import inf, sqrt
 from typing import Annotated, Any, NamedTuple
 
 from karamelo_py.compiler.compile import round_off
@@ -223,6 +223,23 @@ known_failure(
     reason="pressures of 1 and {ratio:.3g} meet, and behind the shock {what}",
     cure="method(ulmpm, FLIP, quadratic-spline, 1), scheme(usavg), and Q1=2, Q2=0.2 in eos "
     "ideal-gas: within 0.1 % for ratios up to 100000",
+)
+
+
+def _sound(eos, scene):
+    jumps = scene.moves and getattr(scene.basis, "gradient_jumps", False)
+    if not jumps or scene.pressure_ratio >= STEP:
+        return None
+    return {"place": scene.method.place, "speed": sqrt(1 - 1 / eos.gamma)}
+
+
+known_failure(
+    IdealGas,
+    "sound in a gas",
+    when=_sound,
+    reason="where points stay in their cells, their volumes change and those of the cells do not: "
+    "with {scene.basis_name} functions sound has {speed:.2g} of its speed",
+    cure="ugimp, cpgimp or quadratic-spline in the place of the basis, or method tlmpm",
 )
 
 
