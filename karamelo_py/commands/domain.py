@@ -169,10 +169,10 @@ def boundary(hub: Hub, style: Literal["error", "delete", "reflect"]) -> None:
     velocity_nodes there. A warning names the first point, and the end of a run says how many there
     were.
 
-    A deleted point is gone from the step in which it would have left. Dumps leave it out. The ids
-    of the others stay. The program then goes back to the last state that it keeps, by a hundred
-    steps at most, and takes these steps again, with their hooks in Python. A run in which points
-    leave in every step takes about six times as long.
+    The program deletes a point before the step in which it would leave. Dumps omit it. Other ids
+    stay. The program goes back to its last kept state, by a hundred steps at most. It repeats these
+    steps with their hooks in Python. A run in which points leave in every step takes about six
+    times as long.
 
     A reflected point keeps its stress and the velocity along the edge. Neighbours that still press
     outwards may bring it back to the edge. A body that meets the edge as a whole loses most of its
@@ -279,9 +279,9 @@ def solid(hub: Hub, ID: str, kind: StyleOf("solid"), *arguments: Argument) -> No
         Where the points come from.
     arguments
         What the style asks for, see the page of the style. For ``region``:
-        ``regionID, ppc, material, h[, T0]``, the region to fill, the points per cell in each
-        direction, the material, the cell size (that of the domain), and the initial temperature
-        (that of the material when left out). For ``mesh``: ``file, material, h[, T0]``.
+        ``regionID, ppc, material, h[, T0]``: the region to fill, the points per cell in each
+        direction, the material, the cell size of the domain, and the initial temperature (default:
+        the material's). For ``mesh``: ``file, material, h[, T0]``.
 
     Example
     -------
@@ -351,9 +351,9 @@ def group(
 ) -> None:
     """Name a set of points or of nodes.
 
-    Which points belong to it is decided here, once, by their reference positions. Nodes belong to
-    it by their positions; where solids have nodes of their own, those of solids that are made
-    later do, too, unless solids are named. The group ``all`` of everything is always there.
+    Points belong to a group by their reference positions when the line is read. Nodes belong by
+    their positions. Own nodes of solids that are made later also belong, unless solids are named.
+    The group ``all`` always exists.
 
     Parameters
     ----------

@@ -216,10 +216,10 @@ def internal_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expressio
 
     Notes
     -----
-    Of nodes: the sum of what points bring to them, which is the divergence of stress and what
-    fixes put on the points (contact, tools, tractions). At nodes that are held and hardly
-    accelerate it is the opposite of the reaction. Of points: the rate of their momentum in the
-    last step, sum m a. Before the first step it is 0.
+    Of nodes: the sum of what points give to them, the divergence of stress and the forces of fixes
+    on points (contact, tools, tractions). At held nodes that hardly accelerate it is the opposite
+    of the reaction. Of points: the rate of their momentum in the last step, sum m a. Before the
+    first step it is 0.
 
     See Also
     --------

@@ -147,18 +147,18 @@ def load_path(
         Strain: the sum of the increments, so ln(length over first length) with many of them. Shear
         strain is that of the tensor, half the angle.
     gxy, gxz, gyz
-        Angle of simple shear, twice the strain of the tensor: gxy moves x along y and turns the
-        point by half of it, where exy does not turn it.
+        Angle of simple shear, twice the strain of the tensor. gxy moves x along y and turns the
+        point by half of it. exy does not turn the point.
     sxx, syy, szz, sxy, sxz, syz
-        Cauchy stress, tension positive; the strain of this component is found for it.
+        Cauchy stress, tension positive. The program finds the strain of this component.
     volumetric
         exx + eyy + ezz: the normal strains that are not named share what it takes.
     turn
         Angle about z by which the point turns meanwhile, in radians. Strains and stresses are
         about axes that do not turn.
     duration
-        How long it takes, 1 when left out, for laws that depend on the rate of strain. Alone it
-        holds the point where it is.
+        Duration, by default 1, for laws that depend on the rate of strain. Alone it holds the
+        point.
 
     Example
     -------
@@ -236,8 +236,8 @@ def element(
         Which strains there can be: ``3D``; ``plane-strain`` (none out of the plane xy);
         ``axisymmetric`` (x the radius, y the axis, z around it); ``1D`` (exx only).
     tangent
-        Whether the tangent of the last increment is printed: derivatives of the Cauchy stress by
-        strains, and by angles of shear, which are twice the strain of the tensor.
+        Whether to print the tangent of the last increment: derivatives of the Cauchy stress by
+        strains and angles of shear. These angles are twice the strain of the tensor.
 
     Example
     -------
@@ -250,16 +250,15 @@ def element(
     Notes
     -----
     The table has the form of the log, and a row for each increment: time; strain exx ...; Cauchy
-    stress sxx ...; pressure p and von Mises stress q; J = det F; the stored energy and the work of
-    the stress, per reference volume; and what the law has beside that, such as ep, the equivalent
-    plastic strain. The last row is published as ID_exx, ID_sxx and so on.
+    stress sxx ...; pressure p and von Mises stress q; J = det F; stored energy and work of the
+    stress per reference volume; columns of the law, such as the equivalent plastic strain ep. The
+    last row is published as ID_exx, ID_sxx and so on.
 
     The law gets dt grad v as in a run, so that det F of n increments e is (1 + e)^n. An increment
-    of a turn is skew to first order; to second order it has the form in which it stores the least
-    energy, since laws in rate form and laws in F take different ones for rigid. Strains whose
-    stress is prescribed follow from Newton's iteration with the exact tangent of the law; an
-    increment that does not converge is halved, up to eight times. Where that fails, files show what
-    was reached.
+    of a turn is skew to first order. Its second order stores the least energy, because laws in rate
+    form and laws in F differ on what is rigid. Newton's method with the exact tangent finds the
+    strains of prescribed stresses. It halves an increment that does not converge, up to eight
+    times. If that fails, the files show the increments so far.
 
     See Also
     --------

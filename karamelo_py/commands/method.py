@@ -113,11 +113,11 @@ def scheme(
     Notes
     -----
     Positions belong to the ends of explicit steps, and velocities to their middles. With ``full``
-    the initial velocity is that of half a step before the start, and the log shows velocities of
-    half a step before its time. A thrown body is then g dt t/2 further than it should be, and
-    kinetic energies lag by half a step. With ``half`` both are right to second order in the step.
-    Points then store their last velocity, too. Velocities that are set after the first step, such
-    as ``sim.points["vx"] = values``, are those of half a step before.
+    the initial velocity belongs to half a step before the start. The log shows velocities half a
+    step early. A thrown body is then g dt t/2 further than it should be, and kinetic energies lag
+    by half a step. With ``half`` both are right to second order in the step. Points then store
+    their last velocity, too. Velocities that are set after the first step, such as
+    ``sim.points["vx"] = values``, are those of half a step before.
 
     See Also
     --------

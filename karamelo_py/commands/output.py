@@ -222,10 +222,9 @@ def plot(
     axis
         The side of the axis of y: ``right`` for a second one, with limits of its own.
     scale
-        ``log`` for a logarithmic axis of y; numbers that are not positive are left out.
+        ``log`` for a logarithmic axis of y. It omits numbers that are not positive.
     label
-        What is written at the axis of y, such as "energy (J)"; the name of y when left out, with
-        its unit where there is one.
+        Label of the axis of y, such as "energy (J)". The default is the name of y with its unit.
 
     Example
     -------
@@ -281,10 +280,10 @@ def units(
 ) -> None:
     """Name the consistent units of the scene, for labels of pictures and plots, dumps and banner.
 
-    No number changes by it: a scene in mm, g, ms has forces in N, stresses in MPa and energies in
-    mJ, whether it says so or not. A warning tells before the first step of a material whose
-    density or speed of waves would be that of no real one in these units (densities of 10 to
-    100000 kg/m^3, of gases from 0.001 on; speeds of 1 m/s to 50 km/s).
+    No number changes. A scene in mm, g, ms has forces in N, stresses in MPa and energies in mJ. The
+    program warns before the first step of densities and wave speeds that no real material has.
+    These are densities outside 10 to 100000 kg/m^3 (gases: below 0.001), and speeds outside 1 m/s
+    to 50 km/s.
 
     Parameters
     ----------

@@ -45,8 +45,8 @@ def delete_particles(
     by
         The word ``region`` or ``where``.
     chosen
-        ID of a region, whose points go (as for groups, where they were at first counts); or, after
-        ``where``, a formula of columns of dump particle: points go where it is not 0.
+        ID of a region, whose points are deleted by their reference positions. After ``where``: a
+        formula of columns of dump particle. Points are deleted where it is not 0.
 
     Example
     -------
@@ -55,10 +55,10 @@ def delete_particles(
 
     Notes
     -----
-    With ``where`` it stands between runs. What has gone is told, with its mass and its energy.
-    Before the first run the other points are numbered anew, so that it comes before the groups of
-    particles and the contact fixes of these solids. Between runs the others keep their numbers.
-    All points of a solid cannot be deleted before the first run.
+    With ``where`` it stands between runs. The program prints the mass and energy of the deleted
+    points. Before the first run it numbers the other points anew. Then the command comes before the
+    groups of particles and contact fixes of these solids. Between runs numbers stay. All points of
+    a solid cannot be deleted before the first run.
 
     See Also
     --------
@@ -248,7 +248,7 @@ def populate_cylindrical_coordinates(
     solid
         ID of the solid. It keeps its material and its cell size.
     region
-        ID of the region that keeps the points that lie in it; the others are dropped.
+        ID of the region. Points outside it are dropped.
     lattice
         In 2D ``c1, c2, R, Ndr, Ndtheta, T0``: the centre, the outer radius, the number of rings,
         the number of points in each ring, and the initial temperature. In 3D
@@ -262,12 +262,11 @@ def populate_cylindrical_coordinates(
 
     Notes
     -----
-    Ring j = 0, 1, ... has the radius ``r = (j + 1/2) dr`` with ``dr = R / Ndr``, its points stand
-    at the angles ``k dtheta`` with ``dtheta = 2 pi / Ndtheta``, and slice i in the middle of its
-    length, ``lo + (i + 1/2) dx`` with ``dx = (hi - lo) / Ndx``. Every point has the volume of its
-    polar cell, ``r dr dtheta dx``, and all of them together have ``pi R^2 (hi - lo)`` (in 2D
-    ``pi R^2``). Karamelo puts the rings at ``j dr`` with a point in the centre, and slices at
-    ``lo + i dx``, whose volumes do not add up to that.
+    Ring j = 0, 1, ... has the radius ``r = (j + 1/2) dr`` with ``dr = R / Ndr``. Its points have
+    the angles ``k dtheta`` with ``dtheta = 2 pi / Ndtheta``. Slice i lies at ``lo + (i + 1/2) dx``
+    with ``dx = (hi - lo) / Ndx``. Every point has the volume of its polar cell, ``r dr dtheta dx``.
+    The sum is ``pi R^2 (hi - lo)`` (in 2D ``pi R^2``). Karamelo puts rings at ``j dr`` with a point
+    in the centre, and slices at ``lo + i dx``. Their volumes do not give this sum.
 
     Comes before the first run, and before the groups that choose from these points. T0 replaces
     the temperature of the solid.

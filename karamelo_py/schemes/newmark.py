@@ -17,18 +17,16 @@ class Surplus(Field):
 class Newmark(NamedTuple):
     """Steps in time that no wave limits: each ends in balance with inertia (Newmark 1959).
 
-    The step is that of `set_dt`. Vibrations that it does not resolve stay, neither damped nor
-    resolved, unless `gamma` is above 1/2, `rho` below 1, or the rule is that of Euler.
-    Accelerations at the beginning of a step are those of the forces there; with `rho` those of the
-    rule.
+    The step is that of `set_dt`. Vibrations that it does not resolve stay undamped, unless `gamma`
+    is above 1/2, `rho` is below 1, or the rule is that of Euler. Accelerations at the beginning of
+    a step are those of the forces there; with `rho` those of the rule.
 
     Parameters
     ----------
     beta, gamma
-        Of displacement and velocity: u = dt v + dt^2 ((1/2 - beta) a + beta a'),
-        v' = v + dt ((1 - gamma) a + gamma a'). 1/4 and 1/2, if not given: the trapezoidal
-        rule, which keeps the energy of linear bodies. Gamma above 1/2 damps, the more the higher
-        the frequency.
+        Of displacement and velocity: u = dt v + dt^2 ((1/2 - beta) a + beta a'), v' = v + dt ((1 -
+        gamma) a + gamma a'). The defaults, 1/4 and 1/2, are the trapezoidal rule. It keeps the
+        energy of linear bodies. Gamma above 1/2 damps, high frequencies most.
     rule
         ``newmark``, or ``euler``: the backward rule of Euler, which damps all vibrations.
     rho

@@ -64,11 +64,11 @@ class QuasiStatic(NamedTuple):
     Notes
     -----
     Velocities are zero after a step, and so are kinetic energies. A script can show `iterations`,
-    `residual` and `parts` of the last step: corrections, the share of the forces that was left,
-    and how many parts the step was done in.
+    `residual` and `parts` of the last step: corrections, remaining share of the forces, and number
+    of parts.
 
     The program also divides a step in which points would move more than half a cell towards nodes
-    that move otherwise, or that fixes hold and that had no points.
+    with another motion, or towards held nodes without points.
     """
 
     implicit = True

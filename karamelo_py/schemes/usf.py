@@ -14,8 +14,8 @@ class USF(NamedTuple):
     turning bodies.
 
     The log shows stress, volume and strain of the positions at the beginning of a step (with usavg,
-    half of the increment). For a law in rate form, a turn by the angle w dt in a step is a
-    compression by (w dt)^2/2, as with musl, and half of that with usavg.
+    half of the increment). With a law in rate form, a turn by the angle w dt in a step compresses
+    by (w dt)^2/2, as with musl. usavg has half of that.
 
     Example
     -------

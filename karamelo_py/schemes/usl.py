@@ -19,11 +19,11 @@ class USL(NamedTuple):
 
     The stable step is 0.65 h/c, and 0.4 h/c with one point per cell. Bernstein-quadratic takes 0.7
     of that. Points average some modes of the nodes away. Only the strain of such a mode answers to
-    the forces: e <- (1 - (w dt)^2) e, which is stable for w dt < sqrt(2) instead of 2.
+    forces: e <- (1 - (w dt)^2) e. This is stable for w dt < sqrt(2) instead of 2.
 
-    A node with almost no mass gets a large velocity. Below d (c dt / h)^2 times (at most 1) the
-    mean mass of the points that the node sees, the gradient takes the change of its velocity by
-    the ratio of the two masses. Momentum is kept.
+    A node with almost no mass gets a large velocity. The limit is the mean mass of the points that
+    it sees times d (c dt / h)^2, at most 1. Below it, the gradient takes the change of velocity by
+    the ratio of both masses. Momentum is kept.
 
     Example
     -------
@@ -73,8 +73,8 @@ any_node.goes_through = UpdateToVelocity.goes_through  # type: ignore[attr-defin
 class USLUnlimited(NamedTuple):
     """As usl, without the limit at nodes with next to no mass: as first published.
 
-    A point that has just entered a cell gives the node ahead little mass and much force, and gets
-    the strain of f dt / m from there. To show what the limit is for.
+    A point that has just entered a cell gives the node ahead little mass and much force. It gets
+    the strain of f dt / m from there. This shows the use of the limit.
 
     Example
     -------

@@ -68,9 +68,9 @@ class MeshRegion(Enclosed):
 
     Notes
     -----
-    Elements are lines in 1D, triangles and quadrilaterals in 2D, tetrahedra and hexahedra in 3D,
-    and those of higher order by their corners; their faces belong to them. Faces of hexahedra that
-    are not plane count as two triangles. In 2D the mesh lies in the plane z = 0.
+    Elements are lines in 1D, triangles and quadrilaterals in 2D, tetrahedra and hexahedra in 3D.
+    Elements of higher order count by their corners. Faces belong to elements. Faces of hexahedra
+    that are not plane count as two triangles. In 2D the mesh lies in the plane z = 0.
 
     See Also
     --------
@@ -139,9 +139,9 @@ class STL(Enclosed):
 
     Notes
     -----
-    The surface must be closed: every edge belongs to two triangles. A part inside of another one
-    is a cavity. A position is inside if a ray from it along z crosses the surface an odd number of
-    times; edges and vertices on the ray make no difference.
+    The surface must be closed: every edge belongs to two triangles. A part inside of another one is
+    a cavity. A position is inside if a ray from it along z crosses the surface an odd number of
+    times. Edges and vertices on the ray do not matter.
 
     See Also
     --------
@@ -178,8 +178,8 @@ class STL(Enclosed):
 class MeshSolid(Solid):
     """A body with one point in each element of a mesh.
 
-    The point stands at the centroid of its element and has its volume, which is exact for every
-    shape (times x where the domain is axisymmetric).
+    The point lies at the centroid of its element and has its exact volume, for every shape (times x
+    in axisymmetric domains).
 
     Parameters
     ----------

@@ -171,9 +171,9 @@ class Plane(Primitive):
     Parameters
     ----------
     plane
-        A position on the plane and a direction across it, which points into the region (of any
-        length): in 2D ``x, y, nx, ny``; in 3D ``x, y, z, nx, ny, nz``. A last word ``exterior``
-        makes the region the other side.
+        A position on the plane and a normal of any length, which points into the region: in 2D
+        ``x, y, nx, ny``; in 3D ``x, y, z, nx, ny, nz``. A last word ``exterior`` makes the region
+        the other side.
 
     Example
     -------

@@ -30,10 +30,10 @@ class _Box(NamedTuple):
 class UGIMP(_Box):
     """Uniform GIMP: a point stands for a box of constant size (Bardenhagen & Kober 2004).
 
-    Weights are the averages of the hat functions over [x - l, x + l] in each direction, with l the
-    half size that the point starts with: smooth, and only as wide as the point. Where the material
-    stretches much, gaps open between the boxes; cpgimp lets them grow. A wall cuts the box, and
-    the point then acts from the centre of what is left.
+    Weights are the averages of the linear functions over [x - l, x + l] in each direction. l is the
+    initial half size of the point. Where the material stretches much, gaps open between the boxes.
+    cpgimp lets the boxes grow. A wall cuts the box, and the point then acts from the centre of what
+    is left.
 
     Example
     -------
@@ -104,10 +104,10 @@ class CPGIMPStretch(_Following):
 class CPGIMPCorners(_Following):
     """Boxes as wide as their corners, moved by the grid, lie apart on average.
 
-    With the displacements u of the 2^d corners c, on the side s_c = -1 or 1 of the point in
-    direction i, l_i <- l_i + sum_c s_ci u_ci / 2^d (after Coombs et al. 2020, "On Lagrangian
-    mechanics and the implicit material point method for large deformation elasto-plasticity").
-    Corners beyond a wall go as the velocity in the last cell goes on.
+    l_i <- l_i + sum_c s_ci u_ci / 2^d, with the displacements u of the 2^d corners c. s_ci = -1 or
+    1 is the side of the corner in direction i (after Coombs et al. 2020, "On Lagrangian mechanics
+    and the implicit material point method for large deformation elasto-plasticity"). Beyond a wall
+    the velocity of the last cell is extrapolated.
 
     Example
     -------
@@ -121,15 +121,14 @@ class CPGIMPCorners(_Following):
 class CPGIMP(_Box):
     """Contiguous-particle GIMP: a point stands for a box that deforms with it.
 
-    As ugimp, but the box follows the deformation (Bardenhagen & Kober 2004), in one of four ways:
-    ``det`` (its volume follows), ``diagonal`` (F_ii, for bodies that do not turn: a turn by 90
-    degrees makes the box vanish), ``stretch`` (U_ii of the right stretch, the default) or
-    ``corners`` (its corners go with the grid). Boxes stay boxes along the axes: for much shear,
-    the cpdi methods have parallelograms and quadrilaterals.
+    Like ugimp, but the box follows the deformation (Bardenhagen & Kober 2004): ``det`` (its
+    volume), ``diagonal`` (F_ii; a turn by 90 degrees makes the box vanish), ``stretch`` (U_ii of
+    the right stretch, the default) or ``corners`` (its corners move with the grid). Boxes stay
+    aligned with the axes. For large shear, the cpdi methods have parallelograms and quadrilaterals.
 
-    Weights count a half size between 0.001 and 1 cell: beyond one cell the points lie so far apart
-    that the body falls to pieces numerically anyway. Under total Lagrangian methods, nothing
-    deforms, and cpgimp is ugimp.
+    Weights use half sizes between 0.001 and 1 cell. Beyond one cell, points lie so far apart that
+    the body breaks numerically anyway. In total Lagrangian methods no box deforms, and cpgimp is
+    ugimp.
 
     Parameters
     ----------

@@ -14,8 +14,8 @@ SMALL_SHARE = 0.3  # of the stable step, with which impacts keep the energy
 class Linear(NamedTuple):
     """Linear hat functions on the grid's nodes: the basis of the first MPM (Sulsky et al. 1994).
 
-    The cheapest basis. Its gradient jumps at cell faces, so a stressed point that crosses one
-    changes the nodal forces by the order of its stress (the cell-crossing error).
+    The cheapest basis. Its gradient jumps at cell faces. A stressed point that crosses one changes
+    the nodal forces by the order of its stress (cell-crossing error).
 
     Example
     -------

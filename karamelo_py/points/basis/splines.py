@@ -144,9 +144,9 @@ of_splines(
 class CubicSpline(NamedTuple):
     """Cubic B-splines, modified at the walls of the grid (Steffen, Kirby & Berzins 2008).
 
-    The smoothest of the splines and the most costly: 16 nodes in 2D, 64 in 3D. At a wall, the node
-    beyond it is taken to go on linearly from the two inside: phi(-1) = 2 phi(0) - phi(1), which
-    gives their four types of boundary functions.
+    The smoothest of the splines and the most costly: 16 nodes in 2D, 64 in 3D. Beyond a wall, nodal
+    values are extrapolated linearly: phi(-1) = 2 phi(0) - phi(1). This gives their four types of
+    boundary functions.
 
     Example
     -------

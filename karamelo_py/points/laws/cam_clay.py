@@ -51,20 +51,21 @@ class CamClay(NamedTuple):
     Notes
     -----
     Stresses are Kirchhoff's, J times Cauchy's: p = p0 exp(-tr(e)/kappa), s = 2 G dev(e), with the
-    logarithmic elastic strain e. The yield surface is q^2/M^2 + p (p - pc) = 0, plastic flow is
-    normal to it, and pc rises with plastic compression v as exp(v/(lam - kappa)) (Roscoe & Burland
+    logarithmic elastic strain e. The yield surface is q^2/M^2 + p (p - pc) = 0. Plastic flow is
+    normal to it. pc rises with plastic compression v as exp(v/(lam - kappa)) (Roscoe & Burland
     1968; in logarithmic strains and volumes Borja & Tamagnini 1998, "Cam-Clay plasticity part III",
     Comput. Methods Appl. Mech. Eng. 155). A step ends on the surface, whatever its size.
 
-    Without drainage p = p0 ((M^2 + eta^2)/M^2)^-(1 - kappa/lam), eta = q/p, of clay that begins at
-    p0 = pc: p0 2^-(1 - kappa/lam) at the critical state. Dump columns ep, equivalent plastic
-    strain, and pc. Where fix initial_stress puts a stress outside of the surface, pc is what takes
-    the surface there. There is no tension: p only tends to 0.
+    Undrained clay that starts at p0 = pc has p = p0 ((M^2 + eta^2)/M^2)^-(1 - kappa/lam) with eta =
+    q/p. At the critical state this is p0 2^-(1 - kappa/lam). Dump columns: equivalent plastic
+    strain ep, and pc. If fix initial_stress gives a stress outside the surface, pc moves the
+    surface there. p tends to 0, but there is no tension.
 
-    At a free surface something has to balance p0: nodes that hold the other sides and
-    ``fix(cover, edge_traction, all, b, yhi, 0, -100e3)`` at the top, or ``fix(cell, edge_pressure,
-    all, b, 100e3)`` all around; b is the region that the solid fills. Else the first step lets go
-    of p0. Where fix initial_stress puts another stress, the load is that of its normal component.
+    At a free surface a load must balance p0. Hold the other sides and write
+    ``fix(cover, edge_traction, all, b, yhi, 0, -100e3)`` at the top, or
+    ``fix(cell, edge_pressure, all, b, 100e3)`` all around. b is the region of the solid. Otherwise
+    the first step releases p0. If fix initial_stress gives another stress, the load is its normal
+    component.
 
     See Also
     --------

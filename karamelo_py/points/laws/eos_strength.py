@@ -110,12 +110,11 @@ class EosStrength(NamedTuple):
     Notes
     -----
     sigma = s - p I. The deviatoric stress s turns with the point (Jaumann rate; Hughes & Winget
-    1980), or is 2 G times the deviator of the logarithmic elastic strain (Simo 1992); both are the
-    same where steps are small, but in large shear that stays elastic. The elastic strain is that of
-    s and, with J the volume over the reference volume,
-    ln J / 3; of soils, J is its elastic part. The strain energy is what unloading would give back;
-    plastic work is not in it, compute dissipated_energy measures it. Where fix initial_stress sets
-    a pressure, the points get the volume that has this pressure.
+    1980), or is 2 G times the deviator of the logarithmic elastic strain (Simo 1992). With small
+    steps both agree, except in large elastic shear. The elastic strain is that of s plus ln J / 3.
+    J is the volume over the reference volume; for soils, its elastic part. The strain energy is
+    what unloading gives back, without plastic work, which compute dissipated_energy measures. If
+    fix initial_stress sets a pressure, points get the volume that has this pressure.
 
     See Also
     --------

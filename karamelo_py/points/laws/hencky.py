@@ -31,10 +31,10 @@ class Hencky(Hyperelastic):
     Notes
     -----
     Kirchhoff stress tau = 2 G ln V + lambda ln(det F) I with the left stretch V, ln V = 1/2 ln F
-    F^T; stored energy W = G ln V : ln V + lambda/2 (ln J)^2 (Hencky 1928; Anand 1979, "On H.
+    F^T. Stored energy W = G ln V : ln V + lambda/2 (ln J)^2 (Hencky 1928; Anand 1979, "On H.
     Hencky's approximate strain-energy function for moderate deformations", J. Appl. Mech. 46). It
-    is Hooke's law in the strains that add up, and the elastic part of most soil plasticity at
-    large strain.
+    is Hooke's law in the strains that add up, and the elastic part of most soil plasticity at large
+    strain.
 
     A temperature T adds the stress -3 K alpha (T - T0), with the bulk modulus K and the temperature
     T0 at the start. The elastic strain does not contain the expansion alpha (T - T0).

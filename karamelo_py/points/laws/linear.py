@@ -38,10 +38,9 @@ class LinearElastic(ElasticLaw):
 
     Notes
     -----
-    sigma' = R sigma R^T + 2 G d + lambda tr(d) I, with d the strain increment and R the rotation
-    increment of the step (Jaumann rate; Hughes & Winget 1980). For strains of more than some ten
-    per cent a hyperelastic law such as neo-hookean is the better model. One dimension means
-    uniaxial strain, as plane strain and space have it.
+    sigma' = R sigma R^T + 2 G d + lambda tr(d) I (Jaumann rate; Hughes & Winget 1980). d is the
+    strain increment and R the rotation increment of the step. For strains above ten per cent a
+    hyperelastic law such as neo-hookean is the better model. One dimension means uniaxial strain.
 
     A temperature T adds the stress -3 K alpha (T - T0), with the bulk modulus K and the temperature
     T0 at the start. The elastic strain does not contain the expansion alpha (T - T0).

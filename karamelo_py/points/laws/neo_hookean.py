@@ -32,8 +32,8 @@ class NeoHookean(Hyperelastic):
 
     Notes
     -----
-    First Piola-Kirchhoff stress P = G (F - F^-T) + lambda ln(det F) F^-T; stored energy
-    W = G/2 (tr F^T F - 3) - G ln J + lambda/2 (ln J)^2 (Bonet & Wood 2008, section 6.4.3).
+    First Piola-Kirchhoff stress P = G (F - F^-T) + lambda ln(det F) F^-T. Stored energy W = G/2 (tr
+    F^T F - 3) - G ln J + lambda/2 (ln J)^2 (Bonet & Wood 2008, section 6.4.3).
 
     A temperature T adds the stress -3 K alpha (T - T0), with the bulk modulus K and the temperature
     T0 at the start. The elastic strain does not contain the expansion alpha (T - T0).

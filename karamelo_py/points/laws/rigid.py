@@ -25,10 +25,10 @@ class Rigid(NamedTuple):
     gives it. Forces, contact and velocities of nodes do not change it. There is no stress, and no
     limit of the time step but that a point stays within a cell.
 
-    In ulmpm and ulcpdi nodes that see points of the body have its velocity, whatever its density;
-    in ulmpm/contacts contact does not move it. These methods publish the force on it as
-    ContactForce_ID_x, ContactForce_ID_y, ContactForce_ID_z, with the ID of the solid, and the
-    torque about the origin as ContactTorque_ID_x and so on.
+    In ulmpm and ulcpdi nodes that see points of the body have its velocity, whatever its density.
+    In ulmpm/contacts contact does not move it. These methods publish the force on the solid ID as
+    ContactForce_ID_x, ContactForce_ID_y, ContactForce_ID_z. The torque about the origin is
+    ContactTorque_ID_x and so on.
 
     Domains of points that deform with the grid (CPDI, cpgimp) would not stay rigid, and are
     refused.

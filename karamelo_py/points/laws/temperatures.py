@@ -78,9 +78,9 @@ class PlasticWork(NamedTuple):
 
     Notes
     -----
-    T grows by chi/(rho0 cp) times the plastic work per volume before deformation; the pressure
-    grows by alpha (T - T0): a warm body that cannot expand is under pressure. The column T of dumps
-    shows the temperature.
+    T grows by chi/(rho0 cp) times the plastic work per volume before deformation. The pressure
+    grows by alpha (T - T0), so a warm body that cannot expand is under pressure. The column T of
+    dumps shows the temperature.
 
     See Also
     --------

@@ -29,9 +29,8 @@ class APIC(NamedTuple):
     Conserves linear and angular momentum to round-off, and damps what lies below a cell (Jiang et
     al. 2015).
 
-    With functions whose D vanishes at nodes (linear, Bernstein-quadratic) and a grid that the
-    points move through, the velocity that deforms the points leaves the moments out, which needs
-    musl; usl and usf are refused.
+    With functions whose D vanishes at nodes (linear, Bernstein-quadratic) in the updated frame, the
+    velocity that deforms the points omits the moments. This needs musl. usl and usf are refused.
 
     Example
     -------
@@ -69,17 +68,17 @@ class AFLIP(NamedTuple):
 class ASFLIP(NamedTuple):
     """AFLIP whose points move with velocities of their own where they come apart.
 
-    Points that the grid holds together come apart sooner: for granular flow and splashes
-    (Fei et al. 2021, section 5). Where the material is compressed, by more than a thousandth of its
-    volume, points go with the grid as in all other transfers, so that they keep their order.
+    For granular flow and splashes: points that the grid holds together separate sooner (Fei et al.
+    2021, section 5). Where the material is compressed by more than a thousandth of its volume,
+    points move with the grid and keep their order.
 
     Parameters
     ----------
     alpha
         Share of FLIP.
     beta
-        Strength of separation: the share of the velocity of a point relative to the grid that
-        also moves the point, where the material is not compressed. 0 is AFLIP.
+        Strength of separation: the share of a point's velocity relative to the grid that also moves
+        it, where the material is not compressed. 0 is AFLIP.
 
     Example
     -------

@@ -57,8 +57,8 @@ class FLIP(NamedTuple):
 class FLIPPerTime(NamedTuple):
     """FLIP whose damping goes with time: alpha is the share of a stable step.
 
-    A shorter step keeps alpha^(dt / stable dt). FLIP takes the share 1 - alpha in each step,
-    whatever it is: with half the step vibrations are damped twice as much in the same time.
+    A shorter step keeps alpha^(dt / stable dt). FLIP takes the share 1 - alpha in each step of any
+    size. Half the step then damps vibrations twice as much in the same time.
 
     Parameters
     ----------

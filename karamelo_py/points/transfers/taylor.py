@@ -20,11 +20,10 @@ from karamelo_py.points.transfers.flip import Share, blend, take_nodal_velocity
 class TPIC(NamedTuple):
     """v_p = v_pic, and the gradient of velocity L_p travels with the point.
 
-    A Taylor expansion of the velocity around the point: less damping than PIC, and no D to invert
+    A Taylor expansion of the velocity around the point. It damps less than PIC and inverts no D
     (Nakamura, Matsumura & Mizutani 2023, "Taylor particle-in-cell transfer and kernel correction
     for material point method"). With functions whose D vanishes at nodes (linear,
-    Bernstein-quadratic), in a grid that the points move through, a body that drifts gains energy
-    without bounds.
+    Bernstein-quadratic), a drifting body in the updated frame gains energy without bounds.
 
     Example
     -------
@@ -61,10 +60,10 @@ class TFLIP(NamedTuple):
 class MLS(NamedTuple):
     """APIC; N_I D^-1 (X_I - x), a moving least squares fit, stands for the gradient everywhere.
 
-    The point keeps the velocity gradient C = B D^-1, and its force on a node is
-    -V sigma N_I D^-1 (X_I - x) (Hu et al. 2018, "A moving least squares material point method",
-    eqs. 16 to 18). Angular momentum is conserved to round-off where D is constant: with splines,
-    more than a cell away from the walls.
+    The point keeps the velocity gradient C = B D^-1. Its force on a node is -V sigma N_I D^-1 (X_I
+    - x) (Hu et al. 2018, "A moving least squares material point method", eqs. 16 to 18). Angular
+    momentum is conserved to round-off where D is constant: with splines, more than a cell away from
+    the walls.
 
     Example
     -------

@@ -41,10 +41,10 @@ class Series(SummedField):
 class XPIC(NamedTuple):
     """v_p = (I - (I - S S+)^m) v_p + sum N_I (v*_I - v_I): m = 1 is PIC, m without end is FLIP.
 
-    S maps nodes to points and S+ points to nodes by mass. Noise in the null space goes in a few
-    steps, the motion that the grid sees stays (Hammerquist & Nairn 2017, "A new method for material
-    point method particle updates that reduces noise and enhances stability", eq. 24). The terms
-    w_0 = S+ v, w_k = w_(k-1) - S+ S w_(k-1) are summed at the nodes. Every order beyond the first
+    S maps nodes to points and S+ points to nodes by mass. A few steps remove noise in the null
+    space. The motion that the grid sees stays (Hammerquist & Nairn 2017, "A new method for material
+    point method particle updates that reduces noise and enhances stability", eq. 24). The terms w_0
+    = S+ v, w_k = w_(k-1) - S+ S w_(k-1) are summed at the nodes. Every order beyond the first
     visits the points once more a step.
 
     Parameters

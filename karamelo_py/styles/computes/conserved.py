@@ -130,8 +130,8 @@ class EnergyBalance(Compute):
     Parameters
     ----------
     work
-        Work that loads have done on the group since the start, as far as it is known: a formula of
-        time and published values; 0 without it.
+        Known work of loads on the group since the start: a formula of time and published values.
+        The default is 0.
 
     Example
     -------
@@ -141,12 +141,11 @@ class EnergyBalance(Compute):
 
     Notes
     -----
-    Publishes ID, the sum; ID_total, the energies without the work; and ID_drift, the change of ID
-    since the first output, relative to the largest of kinetic, stored and dissipated energy and
-    work so far. Velocities lie half a step beside positions, so that a drift of the order of dt is
-    that of the way of counting (a third in a body of a few cells); the end of a run says by how
-    much the energies of one time have changed. The energy that affine transfers keep within points
-    is not in it.
+    Publishes ID, the sum, and ID_total, the energies without the work. ID_drift is the change of ID
+    since the first output over the largest kinetic, stored or dissipated energy or work so far.
+    Velocities lie half a step beside positions, which gives a drift of the order of dt (a third in
+    a body of a few cells). The end of a run prints the change between energies of equal times. The
+    energy that affine transfers keep within points is not included.
 
     See Also
     --------
@@ -196,8 +195,8 @@ class LinearMomentum(Momentum):
 
     Notes
     -----
-    Publishes ID_x, ID_y, ID_z, and ID_drift, the length of the change since the first output
-    relative to the largest sum m |v| so far.
+    Publishes ID_x, ID_y, ID_z, and ID_drift: the length of the change since the first output over
+    the largest sum m |v| so far.
 
     See Also
     --------
@@ -225,11 +224,11 @@ class AngularMomentum(Momentum):
 
     Notes
     -----
-    Publishes ID_x, ID_y, ID_z, and ID_drift, the length of the change since the first output
-    relative to the largest sum m |x - c| |v| so far.
+    Publishes ID_x, ID_y, ID_z, and ID_drift: the length of the change since the first output over
+    the largest sum m |x - c| |v| so far.
 
-    With an affine transfer (APIC) points carry angular momentum in their moment of velocity too:
-    it is part of the sum, which the transfer then conserves.
+    Affine transfers (APIC) also keep angular momentum in the moment of velocity of points. The sum
+    contains it, and the transfer conserves this sum.
 
     See Also
     --------

@@ -160,9 +160,9 @@ class Error(Compared, Compute):
         field: ``displacement``, ``velocity``, ``stress``, ``strain``.
     expression
         The exact value: a formula of x, y, z (present position), x0, y0, z0 (first position), time,
-        and published values. For a whole field one for each component, as many as are known, in the
-        order x, y, z or 11, 22, 33, 12, 13, 23; NULL leaves a component out. Then, in any order,
-        the norm, ``L1``, ``L2`` (without a word) or ``max``, and ``absolute`` (without a word) or
+        and published values. For a whole field: one formula per known component, in the order x, y,
+        z or 11, 22, 33, 12, 13, 23. NULL leaves a component out. Then, in any order, the norm,
+        ``L1``, ``L2`` (without a word) or ``max``, and ``absolute`` (without a word) or
         ``relative``.
 
     Example
@@ -175,12 +175,12 @@ class Error(Compared, Compute):
     -----
     With e the length of the difference at a point (of a tensor: sqrt(e_ij e_ij)) and V0 the volume
     of the point at first: L1 = sum V0 e / sum V0, L2 = sqrt(sum V0 e^2 / sum V0), max = max e.
-    ``relative`` divides by the same norm of the exact values; while they vanish, by the largest so
-    far, and before there was any, the result is inf.
+    ``relative`` divides by the same norm of the exact values. While they vanish it divides by the
+    largest so far. Before the first it gives inf.
 
-    Publishes ID, the error now; ID_max, the largest of the outputs so far; and ID_history, the same
-    norm over points and over all time so far (relative: of the whole history, so that moments at
-    which the exact values vanish do no harm). An output counts with the time since the one before.
+    Publishes ID, the error now; ID_max, the largest of the outputs so far; and ID_history, the norm
+    over points and all time so far. With ``relative`` both norms cover the whole history, so exact
+    values may vanish at times. An output counts with the time since the one before.
 
     See Also
     --------
@@ -245,13 +245,13 @@ class Reference(Compared, Compute):
     Parameters
     ----------
     subject
-        A value (``v_x``, a variable, a formula of values) is compared over time; the points of a
-        group, or ``all``, over a coordinate.
+        A value (``v_x``, a variable, a formula of values), compared over time. Or a group of points
+        or ``all``, compared over a coordinate.
     file
-        Columns of numbers, with commas, semicolons or blanks between them, and their names in the
-        first row (or named 1, 2, ... where there is no such row); lines that begin with # are
-        comments. The first column is the time or, for points, the coordinate, whose name it bears:
-        x, y, z, x0, y0, z0 or any other column of points.
+        Columns of numbers, with commas, semicolons or blanks between them. The first row has their
+        names; without it they are named 1, 2, ... Lines that begin with # are comments. The first
+        column is the time. For points it is the coordinate of that name: x, y, z, x0, y0, z0 or any
+        other column of points.
     column
         The column of the file to compare with; for points also the column of the points, such as
         s11 or vx.
@@ -270,10 +270,10 @@ class Reference(Compared, Compute):
     -----
     The curve is linear between its rows. What lies beyond its ends is not compared.
 
-    Of a value, ID is the norm of its difference over the time so far, each output with the time
-    since the one before; ID_now is the difference now and ID_curve the curve now.
-    Of points, ID is the norm over the points now, each with its volume at first, ID_now is the
-    same, and ID_curve the mean of the curve at the points.
+    Of a value, ID is the norm of its difference over the time so far. Each output counts with the
+    time since the one before. ID_now is the difference now, ID_curve the curve now. Of points, ID
+    and ID_now are the norm over the points now, weighted by initial volumes. ID_curve is the mean
+    of the curve at the points.
 
     See Also
     --------

@@ -55,8 +55,8 @@ class AverageStress(Mean):
 
     Notes
     -----
-    The mean is over the present volume: sum V sigma / sum V, which for a body at rest follows from
-    the forces on its surface alone. 0 for a group without points.
+    The mean is over the present volume: sum V sigma / sum V. For a body at rest it follows from the
+    forces on its surface alone. A group without points gives 0.
 
     See Also
     --------

@@ -75,8 +75,8 @@ class PyPlot(Dump):
     scale
         log: colours go by the logarithm of the column.
     quantile
-        Share of the values that may lie beyond either end of the colours, such as 0.01: single
-        points with large values do not take all colours.
+        Share of the values that may lie beyond either end of the colours, such as 0.01. It keeps
+        single large values from taking all colours.
     dpi
         Pixels per inch. A picture of 600 pixels is 6 inches wide, and has 1800 with 300.
     fontsize

@@ -198,9 +198,9 @@ class EdgeTraction(EdgeFix):
         The side that is loaded, by the direction in which it looks: xlo and xhi for left and right,
         ylo and yhi, zlo and zhi.
     traction
-        tx, ty, tz, as many as the domain has dimensions: force per area, numbers or formulas of x,
-        y, z (the place of the edge before the first step), time and published values. NULL leaves a
-        component alone.
+        tx, ty, tz, as many as the domain has dimensions: force per area. Numbers or formulas of x,
+        y, z (initial position of the edge), time and published values. NULL leaves a component
+        alone.
 
     Example
     -------

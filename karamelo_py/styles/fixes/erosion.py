@@ -31,13 +31,12 @@ class Erosion(Fix):
 
     Notes
     -----
-    Published are the sums since the start: ID_points, their number, ID_mass, and ID_energy, their
-    kinetic and stored energy and what they had dissipated. The balance of energy counts this as
-    work of the fix.
+    Publishes sums since the start: ID_points, ID_mass, and ID_energy, the kinetic, stored and
+    dissipated energy of the deleted points. The balance of energy counts this as work of the fix.
 
-    A column means that of the point also where the script has a variable of this name. Points go
-    between two steps, after every step whose number is a multiple of `every`; rows of log and dumps
-    at this step are without them.
+    A column name means the column even if the script has a variable of that name. Points are
+    deleted after each step whose number is a multiple of `every`. Log and dumps at this step omit
+    them.
 
     See Also
     --------

@@ -139,10 +139,9 @@ class ForceParticles(PointForces):
 
     Notes
     -----
-    A point of mass m gets m/M of the force, M the mass of the group: where the formula depends on
-    the place, of the force there. The load goes with the points wherever they move, as that of
-    fix force_nodes does not. In an axisymmetric scene forces belong to a radian. Publishes the sum
-    as ID_x, ID_y, ID_z.
+    A point of mass m gets m/M of the force at its position. M is the mass of the group. The load
+    goes with the points wherever they move, as that of fix force_nodes does not. In an axisymmetric
+    scene forces belong to a radian. Publishes the sum as ID_x, ID_y, ID_z.
 
     See Also
     --------

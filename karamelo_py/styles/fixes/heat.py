@@ -139,7 +139,7 @@ class HeatFluxParticles(HeatFix):
     group
         Group of points: one layer of them along the surface.
     q
-        Heat per area and time, negative where it leaves the body: a number or a formula of x, y, z,
+        Heat per area and time, negative where it leaves the body. A number or a formula of x, y, z,
         x0, y0, z0, time and published values.
 
     Example
@@ -148,9 +148,9 @@ class HeatFluxParticles(HeatFix):
 
     Notes
     -----
-    A point shows one face to what is around it, the side of a cube of its volume; in one dimension
-    that is the whole section. A point at an edge of the body, with two faces outside, needs a fix
-    for each; around an axis the face is at the radius of the point, somewhat inside the surface.
+    A point has one face to the outside, the side of a cube of its volume. In one dimension that is
+    the whole section. A point at an edge of the body has two faces outside and needs two fixes. In
+    axisymmetric scenes the face is at the radius of the point, somewhat inside the surface.
     Publishes the heat per time (in two dimensions per thickness, per radian where axisymmetric) as
     ID_s.
 

@@ -65,9 +65,9 @@ class CheckSolution(Fix):
 
     Notes
     -----
-    Publishes ID_s = sqrt(sum V0 |u - u_exact|^2 / sum V0), the error now;
-    ID_x = sum dt sum V0 |u - u_exact|^2 and ID_y = sum dt sum V0 |u_exact|^2 over the outputs so
-    far; and ID_z = sqrt(ID_x / ID_y), the relative error of the whole history.
+    Publishes ID_s = sqrt(sum V0 |u - u_exact|^2 / sum V0), the error now; ID_x = sum dt sum V0 |u -
+    u_exact|^2 and ID_y = sum dt sum V0 |u_exact|^2 over the outputs so far; ID_z = sqrt(ID_x /
+    ID_y), the relative error of the history.
     """
 
     syntax = "group, ux[, uy[, uz]]"

@@ -160,16 +160,16 @@ class ContactMinimizePenetration(PairContact):
     Publishes the force on solid1 as ID_x, ID_y, ID_z. The force on solid2 is the opposite.
 
     Points are balls. Their radius R is half the side of a cube of their present volume (in the
-    plane a square). Two points closer than R1 + R2 get the force m1 m2 / (m1 + m2) p / dt^2, with
-    the penetration p = R1 + R2 - |x2 - x1|. It separates two free points within one step. Friction
-    is mu times this force, against the slip, and at most what stops the slip of two free points (de
-    Vaucorbeil & Nguyen 2021, "Modelling contacts with a total Lagrangian material point method").
+    plane a square). Their penetration is p = R1 + R2 - |x2 - x1|. Two points with p > 0 get the
+    force m1 m2 / (m1 + m2) p / dt^2. It separates two free points within one step. Friction is mu
+    times this force, against the slip. It never reverses the slip of two free points (de Vaucorbeil
+    & Nguyen 2021, "Modelling contacts with a total Lagrangian material point method").
 
-    A surface of balls is rough and brakes sliding. A block with two points per cell and direction
-    is braked by 0.19, 0.49, 0.53 and 0.46 of its weight with mu = 0, 0.3, 0.5 and 1. Faces that
-    lean to the grid hook each other. On a slope of 20 degrees with mu = 0 a block sticks, and with
-    points=cut it accelerates by 2.8 instead of 3.4. The program therefore warns of a coefficient.
-    Method ulmpm/contacts gives the right friction.
+    A surface of balls is rough and brakes sliding. With two points per cell and direction and mu =
+    0, 0.3, 0.5 and 1, 0.19, 0.49, 0.53 and 0.46 of its weight brake a block. Faces that lean to the
+    grid hook each other. On a slope of 20 degrees with mu = 0 a block sticks, and with points=cut
+    it accelerates by 2.8 instead of 3.4. The program therefore warns of a coefficient. Method
+    ulmpm/contacts gives the right friction.
 
     Pairs are found by cells, so the cost grows with the number of points. With many processes the
     first one searches, among the points of all that may touch.
@@ -230,13 +230,13 @@ class ContactHertz(PairContact):
     Notes
     -----
     Points are balls with the radius R of half the side of a cube of their present volume (in the
-    plane a square). Two that are closer than R1 + R2, by p, push each other with 4/3 E* sqrt(R
-    p^3) in space and pi/4 E* sqrt(R p^3) otherwise, where R = R1 R2 / (R1 + R2) and 1/E* = (1 -
-    nu1^2)/E1 + (1 - nu2^2)/E2. The force is that of single points: bodies get closer than the sum
-    of the radii before it is large, and a fast one may pass through.
+    plane a square). Two points that overlap by p repel each other with 4/3 E* sqrt(R p^3) in space
+    and pi/4 E* sqrt(R p^3) otherwise. Here R = R1 R2 / (R1 + R2) and 1/E* = (1 - nu1^2)/E1 + (1 -
+    nu2^2)/E2. The force is that of single points. Bodies overlap before it is large, and a fast
+    body may pass through.
 
-    Publishes the force on solid1 as ID_x, ID_y, ID_z; that on solid2 is the opposite.
-    With many processes the first looks for pairs, among the points of all that may touch.
+    Publishes the force on solid1 as ID_x, ID_y, ID_z. The force on solid2 is the opposite. With
+    many processes the first one searches the pairs of all points that may touch.
 
     See Also
     --------

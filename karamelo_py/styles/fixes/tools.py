@@ -118,7 +118,7 @@ class NeumannBcMech(ToolFix):
     group
         Group of points: one layer of them along the surface.
     traction
-        tx, ty, tz, as many as the domain has dimensions: force per area, numbers or formulas of x,
+        tx, ty, tz, as many as the domain has dimensions: force per area. Numbers or formulas of x,
         y, z, x0, y0, z0, time and published values. NULL leaves a component alone.
 
     Example
@@ -127,10 +127,10 @@ class NeumannBcMech(ToolFix):
 
     Notes
     -----
-    A point shows one face to what is around it, the side of a cube of its present volume: V^(2/3)
-    in space, V^(1/2) in the plane, the whole section in one dimension; around an axis the face is
-    at the radius of the point, somewhat inside the surface. Points lie half a side inside of the
-    surface where the load acts in fact. Publishes the total force as ID_x, ID_y, ID_z.
+    A point has one face to the outside, the side of a cube of its present volume: V^(2/3) in space,
+    V^(1/2) in the plane, the whole section in one dimension. In axisymmetric scenes the face is at
+    the radius of the point. Points lie half a side inside the surface on which the real load acts.
+    Publishes the total force as ID_x, ID_y, ID_z.
 
     See Also
     --------
@@ -206,9 +206,9 @@ class ImpenetrableSurface(PlaneTool):
 
     Notes
     -----
-    A point at the depth p = n.(xs - x) > 0 gets the force K G (1 - D) p V^(1/d) along the normal,
-    with the shear modulus G and the damage D of its material, its present volume V and the number
-    of dimensions d. Publishes the force on the points as ID_x, ID_y, ID_z.
+    A point at the depth p = n.(xs - x) > 0 gets the force K G (1 - D) p V^(1/d) along the normal. G
+    is the shear modulus, D the damage, V the present volume and d the number of dimensions.
+    Publishes the force on the points as ID_x, ID_y, ID_z.
 
     See Also
     --------
@@ -253,9 +253,9 @@ class ContactMinimizePenetrationPlane(PlaneTool):
     Notes
     -----
     Points are balls with the radius rp of half the side of a cube of their present volume. Where
-    one reaches p = rp - n.(x - xq) into the plane it gets the force m p / dt^2, which takes a free
-    point out within one step. Friction is mu times that, against the slip, and at most what stops
-    it (de Vaucorbeil & Nguyen 2021). A plane that moves does so without dragging.
+    one reaches p = rp - n.(x - xq) > 0 into the plane it gets the force m p / dt^2. This takes a
+    free point out within one step. Friction is mu times that, against the slip, and at most stops
+    it (de Vaucorbeil & Nguyen 2021). A moving plane does not drag.
 
     Publishes the force on the solid as ID_x, ID_y, ID_z.
 
@@ -286,9 +286,9 @@ class ContactSurface(ToolFix):
     Parameters
     ----------
     region
-        What pushes points out: a region with an inside, such as a mesh of elements of volume (in
-        the plane of area), a closed STL surface, or a plane; with the word ``exterior`` a mould. It
-        holds no points, and costs none.
+        The region that pushes points out. It needs an inside: a mesh of solid elements (in the
+        plane of area elements), a closed STL surface, or a plane. With the word ``exterior`` it is
+        a mould.
     mu
         Coefficient of friction (Coulomb); 0 when left out.
     way
@@ -304,11 +304,11 @@ class ContactSurface(ToolFix):
     -----
     Publishes the force on the points as ID_x, ID_y, ID_z.
 
-    Points are balls. Their radius is half the side of a cube of their present volume. A point that
-    reaches p into the region, and approaches with the speed v, gets the force
-    m (v / dt + p / (10 dt^2)) out of it. This stops the point within one step and removes a tenth
-    of p. The force never pulls. Friction is mu times this force, against the slip on the moving
-    region, and at most what stops the slip.
+    Points are balls. Their radius is half the side of a cube of their present volume. A point at
+    the depth p that approaches with the speed v gets the force m (v / dt + p / (10 dt^2)) out of
+    the region. This stops the point within one step and removes a tenth of p. The force never
+    pulls. Friction is mu times this force, against the slip on the moving region, and at most what
+    stops the slip.
 
     The force acts in the direction in which the depth falls fastest. A point deeper than a cell, or
     in the middle of a thin region, ends the run. A region does not turn.
@@ -459,9 +459,9 @@ class Indent(BallTool):
 
     Notes
     -----
-    A point at the distance r < R from the centre gets the force m K (R - r)^2 away from it, as
-    ``fix indent`` of LAMMPS has it, but per mass. Publishes the force on the points as ID_x, ID_y,
-    ID_z and the number of those that it pushes as ID_s.
+    A point at the distance r < R from the centre gets the force m K (R - r)^2 away from it.
+    ``fix indent`` of LAMMPS does the same, but not per mass. Publishes the force on the points as
+    ID_x, ID_y, ID_z and the number of pushed points as ID_s.
 
     See Also
     --------
@@ -505,12 +505,12 @@ class IndentMinimizePenetration(BallTool):
     Notes
     -----
     Points are balls, too, with the radius rp of half the side of a cube of their present volume.
-    Where one reaches p = R + rp - r into the ball, r from its centre, it gets the force m p / dt^2,
-    which takes a free point out within one step. Friction is mu times that, along the slip, and at
-    most what stops the slip (de Vaucorbeil & Nguyen 2021).
+    One at the distance r from the centre overlaps by p = R + rp - r. With p > 0 it gets the force m
+    p / dt^2. This takes a free point out within one step. Friction is mu times that, against the
+    slip, and at most stops it (de Vaucorbeil & Nguyen 2021).
 
-    Publishes the force on the points as ID_x, ID_y, ID_z and the area of contact, one face of the
-    cube for each point that touches, as ID_s.
+    Publishes the force on the points as ID_x, ID_y, ID_z and the area of contact as ID_s. Each
+    touching point counts as one face of its cube.
 
     See Also
     --------
@@ -559,9 +559,9 @@ class CuttingTool(ToolFix):
 
     Notes
     -----
-    The tool is what lies between the two faces. A point in it, at the depth p from the nearer face,
-    gets the force K G (1 - D) p out of that face, with the shear modulus G and the damage D of its
-    material (de Vaucorbeil & Nguyen 2021). Publishes the force on the points as ID_x, ID_y, ID_z.
+    The tool lies between the two faces. A point in it, at the depth p from the nearer face, gets
+    the force K G (1 - D) p out of that face (de Vaucorbeil & Nguyen 2021). G is the shear modulus
+    and D the damage. Publishes the force on the points as ID_x, ID_y, ID_z.
 
     See Also
     --------
@@ -637,7 +637,7 @@ class MeldTool(ToolFix):
     Notes
     -----
     The tool is a cylinder without its channel. A point in it gets the force K G (1 - D) times the
-    shortest way out: into the channel, out of the cylinder, or below its end; G is the shear
+    shortest way out: into the channel, out of the cylinder, or below its end. G is the shear
     modulus and D the damage. Publishes the force on the points as ID_x, ID_y, ID_z.
 
     See Also

@@ -112,8 +112,8 @@ class VelocityNodes(Fix):
     modified in cells beside faces whose nodes are all held or bounded. A group should reach as far
     as the last cell in which a body has points.
 
-    In ulmpm/contacts a solid whose cells have all corners in the group is held by all nodes that
-    its points see, if all components are given.
+    In ulmpm/contacts, if the fix gives all components and all corners of a solid's cells are in the
+    group, all nodes of the solid are held.
 
     See Also
     --------
@@ -247,8 +247,8 @@ class Reaction(Compute):
 
     Notes
     -----
-    The sum of the reactions of the fixes velocity_nodes in the group: where two of them hold the
-    same nodes, the sum is the force of both, whatever they share. Before the first step it is 0.
+    The sum of the reactions of the fixes velocity_nodes in the group. Where two fixes hold the same
+    nodes, it is the force of both. Before the first step it is 0.
 
     See Also
     --------

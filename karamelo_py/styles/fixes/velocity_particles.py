@@ -55,9 +55,9 @@ class VelocityParticles(VelocityOfPoints):
 
     Notes
     -----
-    Publishes the force that holds the points as ID_x, ID_y, ID_z. Where several such fixes lead a
-    point in one direction, the last of them decides, and over initial velocities and held nodes,
-    too; a run says so before its first step.
+    Publishes the force that holds the points as ID_x, ID_y, ID_z. If several such fixes act on a
+    point in one direction, the last one decides. It also overrides initial velocities and held
+    nodes. A run warns of this before its first step.
 
     See Also
     --------
@@ -87,8 +87,8 @@ class InitialVelocityParticles(VelocityOfPoints):
 
     Notes
     -----
-    Points of transfers that keep a gradient or moment of velocity (APIC, TPIC and their kin) get
-    that of the formulas, too, so that the first step changes nothing in an affine motion.
+    With transfers that keep a gradient or moment of velocity (APIC, TPIC and others), points also
+    get that of the formulas. The first step then keeps an affine motion.
 
     See Also
     --------

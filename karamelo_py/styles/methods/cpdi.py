@@ -83,8 +83,8 @@ class Convected(Method):
 class ULCPDI(Convected, ULMPM):
     """CPDI: every point has a domain that deforms with it, and sees the nodes around its corners.
 
-    All solids share one grid. A body does not break between points, however far it stretches, and
-    no force jumps when a point crosses a cell face (Sadeghirad et al. 2011, 2013).
+    All solids share one grid. A body does not break between points, however far it stretches.
+    Forces do not jump when a point crosses a cell face (Sadeghirad et al. 2011, 2013).
 
     ``R4`` and ``R8``
         parallelograms and parallelepipeds that follow the deformation of their point: robust;

@@ -27,8 +27,8 @@ class ULMPM(Method):
     Notes
     -----
     Publishes the force on every rigid solid as ContactForce_ID_x, ContactForce_ID_y,
-    ContactForce_ID_z, with the solid's ID, and its torque about the origin as ContactTorque_ID_x
-    and so on: about a place c it is ContactTorque_ID - c x ContactForce_ID.
+    ContactForce_ID_z, with the solid's ID. Its torque about the origin is ContactTorque_ID_x and so
+    on. About a place c it is ContactTorque_ID - c x ContactForce_ID.
     """
 
     def welcome(self, hub: Hub, solid: Solid) -> None:

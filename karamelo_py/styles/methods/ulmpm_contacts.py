@@ -50,10 +50,9 @@ def heat_shares(laws: Sequence[NamedTuple], *, conducting: bool) -> np.ndarray:
 class ULMPMContacts(Method):
     """Updated Lagrangian MPM with contact: each solid has a velocity field of its own on the grid.
 
-    Solids move freely until the gap between them is closed while they approach each other; then
-    they push each other along their common normal, and separate freely again. Contact is
-    frictionless unless fix contact/friction says otherwise for a pair of solids. Rigid solids do
-    not give way.
+    Solids move freely until they approach each other and the gap between them is closed. Then they
+    push each other along their common normal. They separate freely. Contact is frictionless unless
+    fix contact/friction says otherwise for a pair of solids. Rigid solids do not give way.
 
     Example
     -------
@@ -77,8 +76,8 @@ class ULMPMContacts(Method):
     A node at a surface loses its velocity of approach. Bars of 4, 8 and 16 cells that collide lose
     15, 11 and 4 % of the kinetic energy.
 
-    For a base that does not move, use a rigid solid, or a fix velocity_nodes that gives all
-    components and has all corners of its cells in its group. With splines a base should be three
+    For a fixed base, use a rigid solid or fix velocity_nodes. The fix must give all components, and
+    its group must contain all corners of the cells of the base. With splines a base should be three
     cells thick. The surface of a thinner one seems higher by up to a quarter of a cell.
 
     Both solids at a node have one normal, so that their impulses are opposite and momentum is kept.

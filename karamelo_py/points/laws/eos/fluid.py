@@ -36,11 +36,10 @@ class Tait(NamedTuple):
 
     Notes
     -----
-    p = K ((rho/rho0)^gamma - 1) (Cole 1948; Monaghan 1994). The speed of sound is
-    sqrt(K gamma/rho0) at zero pressure. A smaller K than that of the liquid allows longer time
-    steps, and the density stays within 1 % where no speed is above a tenth of that of sound.
-    Where a liquid splashes, drops that are pulled apart swell and cling together by tension:
-    ``tension=0`` lets them go.
+    p = K ((rho/rho0)^gamma - 1) (Cole 1948; Monaghan 1994). The speed of sound is sqrt(K
+    gamma/rho0) at zero pressure. A smaller K than that of the liquid allows longer time steps. The
+    density stays within 1 % if speeds stay below a tenth of the speed of sound. In splashes,
+    tension makes drops swell and cling together. ``tension=0`` lets them separate.
 
     See Also
     --------
@@ -151,13 +150,13 @@ class IdealGas(NamedTuple):
 
     Notes
     -----
-    p = (gamma - 1) rho e, and de = -p dv with the volume v per mass: along an adiabat e grows as
-    rho^(gamma - 1), which each step follows exactly. Viscous work heats the gas, and so does the
-    kinetic energy that PIC, FLIP, APIC, MLS and TPIC take. Where there are shocks, Q1 = 2 and
-    Q2 = 0.2 are usual.
+    p = (gamma - 1) rho e, and de = -p dv with the volume v per mass. Along an adiabat e grows as
+    rho^(gamma - 1). Each step follows this exactly. Viscous work heats the gas, and so does the
+    kinetic energy that PIC, FLIP, APIC, MLS and TPIC take. Where there are shocks, Q1 = 2 and Q2 =
+    0.2 are usual.
 
-    The gas presses on what is around it from the first step: a free surface expands. Fix
-    initial_stress sets the pressure by the energy, and leaves the volume.
+    The gas has pressure from the first step, so a free surface expands. Fix initial_stress sets the
+    pressure by the energy, and leaves the volume.
 
     See Also
     --------

@@ -49,15 +49,14 @@ class Shock(NamedTuple):
     Notes
     -----
     With mu = rho/rho0 - 1, p = rho0 c0^2 mu (1 + mu) / (1 - (S - 1) mu)^2 + Gamma rho0 cv (T - Tr)
-    for T above Tr (Meyers 1994, chapter 5): the curve of the shocked states, shifted by the heat of
-    plastic work. There is heat where the material has a temperature. In tension the first part is
-    rho0 c0^2 mu. The curve has a pole at (S - 1) mu = 1; from where S (1 - rho0/rho) = 0.9 the
-    pressure goes on along the tangent.
+    for T above Tr (Meyers 1994, chapter 5). This is the Hugoniot curve, shifted by the heat of
+    plastic work. Materials without a temperature have no such heat. In tension the first part is
+    rho0 c0^2 mu. The curve has a pole at (S - 1) mu = 1. Beyond S (1 - rho0/rho) = 0.9 the pressure
+    follows the tangent.
 
-    Where the material is compressed at a rate d < 0 of its volume, the viscous pressure
-    rho h (Q1 h d^2 - Q2 c d) is added, with the cell size h and the speed of sound c (von Neumann &
-    Richtmyer 1950; Landshoff 1955). It spreads a shock over a few cells, and the time step takes
-    account of it.
+    Where the volume shrinks at a rate d < 0, the viscous pressure rho h (Q1 h d^2 - Q2 c d) is
+    added (von Neumann & Richtmyer 1950; Landshoff 1955). h is the cell size and c the speed of
+    sound. It spreads a shock over a few cells, and shortens the time step.
 
     See Also
     --------

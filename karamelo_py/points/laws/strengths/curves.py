@@ -27,9 +27,9 @@ class Tabulated(NamedTuple):
     G
         Shear modulus.
     curve
-        Plastic strain and flow stress, in turn, from strain 0 on; or the name of a file with a line
-        for each point, the two numbers with blanks or a comma between. Lines that begin with #
-        are comments.
+        Plastic strain and flow stress, in turn, from strain 0 on. Or the name of a file with a line
+        for each point: two numbers with blanks or a comma between. Lines that begin with # are
+        comments.
 
     Example
     -------
@@ -177,10 +177,10 @@ class FlowStress(NamedTuple):
 
     Notes
     -----
-    Each step solves q = 3 G x + Y for the plastic strain x of the step, with Y at its end, by
-    Newton's method with a slope from differences. Y may fall with plastic strain, but not by 3 G or
-    more for each unit of it, and counts as 0 where it is below. A formula is interpreted: it
-    costs no compilation of its own, and some ten times the time of a law that is compiled.
+    Each step solves q = 3 G x + Y for its plastic strain x, with Y at its end, by Newton's method
+    with a slope from differences. Y may fall with plastic strain, but by less than 3 G per unit. A
+    negative Y counts as 0. A formula is interpreted. It needs no compilation, and ten times the
+    time of a compiled law.
 
     See Also
     --------

@@ -43,10 +43,10 @@ class LinearHardening(NamedTuple):
 
     Notes
     -----
-    Where the von Mises stress q = sqrt(3/2 s:s) of an elastic step is above the yield stress Y, the
-    equivalent plastic strain (the column ep of dumps) grows by (q - Y)/(3 G + H) and the deviatoric
-    stress s shrinks to the yield stress (radial return; Wilkins 1964; de Souza Neto et al. 2008,
-    section 7.3).
+    If the von Mises stress q = sqrt(3/2 s:s) of an elastic step exceeds the yield stress Y, the
+    equivalent plastic strain (dump column ep) grows by (q - Y)/(3 G + H). The deviatoric stress s
+    shrinks to the yield stress (radial return; Wilkins 1964; de Souza Neto et al. 2008, section
+    7.3).
 
     See Also
     --------

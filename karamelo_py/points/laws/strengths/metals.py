@@ -49,8 +49,7 @@ class JohnsonCook(NamedTuple):
     Y = (A + B ep^n) (1 + C ln(rate/epsdot0)) (1 - T*^m), T* = (T - Tr)/(Tm - Tr) (Johnson & Cook
     1983). At and below the reference rate the second factor is 1; without a temperature the third
     one is. Each step solves for the plastic strain with the flow stress at its end and the rate of
-    the step, which has one solution whatever the size of the step; the temperature is that of its
-    beginning.
+    the step. There is one solution for any step size. The temperature is that of its beginning.
 
     See Also
     --------
