@@ -536,11 +536,11 @@ class SpacePicture(PlanePicture):
             Front(self._project(x), low, high, max(side / 3, (high - low).max() / (2 * FINE)), 2)
             for x in bodies
         ]
-        found = []  # lines as they are seen, and where they are hidden
+        found = []  # lines of each, as they are seen in one row, their heights and what it hides
         for front in fronts:
-            for line in front.outlines():
-                hidden = [other.hides(line, front.beside(line)) for other in fronts]
-                found.append((line, np.any(hidden, axis=0)))
+            if lines := front.outlines():
+                seen = np.concatenate(lines)
+                found.append((lines, seen, front.beside(seen), False))
         for tool in tools:
             if not (lines := list(tool.lines(self.lo, self.hi))):
                 continue
@@ -548,12 +548,13 @@ class SpacePicture(PlanePicture):
             # Towards the eye there is the tool itself, where it hides its other side.
             nearer = at + 0.01 * np.linalg.norm(np.ptp(at, axis=0)) * self.view[2]
             *places, height = self._project(at).T
-            seen = np.transpose(places)
-            hidden = [tool.depth(nearer) > 0, *(front.hides(seen, height) for front in fronts)]
+            found.append((lines, np.transpose(places), height, tool.depth(nearer) > 0))
+        pieces = []
+        for lines, seen, height, behind in found:
+            hidden = behind | np.any([front.hides(seen, height) for front in fronts], axis=0)
             ends = np.cumsum([len(line) for line in lines])[:-1]
-            both = np.split(seen, ends), np.split(np.any(hidden, axis=0), ends)
-            found += zip(*both, strict=True)
-        pieces = [piece for one in found for piece in split(*one)]
+            for one in zip(np.split(seen, ends), np.split(hidden, ends), strict=True):
+                pieces += split(*one)
         pieces.sort(key=lambda piece: not piece[1])
         self.marks.lines.set_segments([line for line, _ in pieces])
         self.marks.lines.set_color([HIDDEN if hidden else "black" for _, hidden in pieces])
