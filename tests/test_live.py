@@ -205,11 +205,12 @@ def test_a_warning_is_a_flag(simulation):
     page.close()
 
 
-def test_an_error_that_ends_a_run_is_a_flag(simulation):
+@pytest.mark.parametrize("kind", [ScriptError, OSError, SystemExit])
+def test_an_error_that_ends_a_run_is_a_flag(simulation, kind):
     page = simulation.live()
-    with pytest.raises(ScriptError):
+    with pytest.raises(kind):
         try:
-            raise ScriptError("water runs out")
+            raise kind("water runs out")
         finally:
             page._page.end()
     told = page._page._news(0)[1]
@@ -270,6 +271,10 @@ def test_frames_are_bounded(monkeypatch):
         kept.add(Frame.of_columns(step, 0.1 * step, "xy", "seq", columns.__getitem__))
     assert [frame[1] for frame in kept.listed()] == [*states, 30, 31]
     assert kept.answer({"k": "-1"}) is None
+    for column in ("x", "y"):  # chosen one after the other, where no state came in between
+        kept.replace_last(lambda column=column: Frame(31, 3.1, column, np.zeros((3, 25)), 25))
+    assert [frame[1] for frame in kept.listed()] == [*states, 30, 31]
+    assert kept.listed()[-1][0] == 31 and kept.listed()[-1][3] == "y"
 
 
 def test_points_are_thinned_alike_in_each_state(monkeypatch):
@@ -313,7 +318,17 @@ def test_a_folder_is_followed(simulation, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(folder_pages, "FILES", 2)
     few = FolderPage(tmp_path)  # the third file is read later
     assert len(Events(few.server.address).next()["frames"]) == 2
-    assert few.look() and len(Events(few.server.address).next()["frames"]) == 3
+    counts = iter(range(100, 109))  # rows of a log that grows all the time
+
+    def pause(_):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(folder_pages, "read_log", lambda _: {"Step": np.arange(next(counts))})
+        patch.setattr(folder_pages, "time", SimpleNamespace(sleep=pause))
+        with pytest.raises(KeyboardInterrupt):
+            few.follow()
+    assert next(counts) == 101 and len(Events(few.server.address).next()["frames"]) == 3
     few.server.close()
     (tmp_path / "empty").mkdir()
     for name, said in (("empty", "neither a log nor a dump"), ("nowhere", "is no folder")):

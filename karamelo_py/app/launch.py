@@ -75,10 +75,10 @@ def _ended_by(error: BaseException, *, debugging: bool) -> tuple[int, str]:
         return ERROR, ""
     if debugging:
         traceback.print_exception(error)
-    return ERROR, _rendered(error)
+    return ERROR, rendered(error)
 
 
-def _rendered(error: BaseException) -> str:
+def rendered(error: BaseException) -> str:
     """Write an exception for the user: no traceback, also where the fault is not the user's."""
     if isinstance(error, ScriptError):
         return error.render()

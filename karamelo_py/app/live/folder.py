@@ -17,7 +17,7 @@ from karamelo_py.app.plot import read_log
 from karamelo_py.output.snapshots import Snapshot, read
 from karamelo_py.script.errors import ScriptError
 
-PAUSE = 0.5  # seconds between looks into the folder, where nothing is new
+PAUSE = 0.5  # seconds between looks into the folder, once all files are read
 FILES = 8  # that are read at a look: what they hold is seen before all are read
 WHOLE = (".h5", ".hdf5", ".pvd")  # dumps that hold many states
 
@@ -41,7 +41,7 @@ class FolderPage:
         self._widths: dict[str, int] = {}  # columns, by names of dumps
         self._log: dict[str, np.ndarray] = {}
         self._columns: list[str] = []
-        self._dimension, self._column = 2, ""
+        self._dimension, self._column, self._more = 2, "", False
         self.look()
         if not self._states and not self._log:
             raise ScriptError(
@@ -57,7 +57,7 @@ class FolderPage:
         while True:
             if self.look():
                 self.server.changed()
-            else:
+            if not self._more:
                 time.sleep(PAUSE)
 
     def look(self) -> bool:
@@ -79,6 +79,7 @@ class FolderPage:
                 self._seen[path], files = changed, files + 1
             except (ScriptError, OSError):  # it is being written, or has gone
                 continue
+        self._more = files == FILES
         return grown or len(self._states) > before
 
     def _dumps(self) -> list[Path]:

@@ -79,11 +79,11 @@ class KeptFrames:
             for number in [k for k in self._kept if k % self._every and k < first]:
                 del self._kept[number]
 
-    def drop_last(self) -> None:
-        """Forget the newest frame, whose number the next one has."""
+    def replace_last(self, take: Callable[[], Frame]) -> None:
+        """Keep a frame, taken while nobody else takes one, in place of the newest."""
         with self._lock:
-            self._next, _ = self._kept.popitem()
-            self._new.pop()
+            self._kept[self._next - 1] = take()
+            self._new[-1] = (self._next - 1, time.perf_counter())
 
     def listed(self) -> list[list]:
         """List number, step, time, column and count of each frame."""

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from typing import NamedTuple
 
+from karamelo_py.app.launch import rendered
 from karamelo_py.app.live import frames
 from karamelo_py.app.live.frames import Frame, KeptFrames, plain
 from karamelo_py.app.live.server import Server
@@ -17,7 +18,7 @@ from karamelo_py.output.rhythm import Rhythmic
 from karamelo_py.run.diagnosis import energy
 from karamelo_py.run.timestep import ruling_limit
 from karamelo_py.scene.hub import Hub
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.errors import FAILURES
 
 GRACE = 10.0  # seconds that a run is held while no page is open, which may be loaded anew
 
@@ -77,7 +78,7 @@ class RunPage(Rhythmic):
         self._unwatched = f"energy {energy.not_watched(why)}" if why else ""
         limit = "load steps" if simulation.implicit else ruling_limit(simulation)
         self._rows.append(Row(hub.update.step, hub.update.time, hub.update.dt, limit, gain, log))
-        self._take()
+        self.frames.add(self._taken())
         self.server.changed()
         self._wait()
 
@@ -88,8 +89,8 @@ class RunPage(Rhythmic):
         for that, if it is to.
         """
         server = self.server
-        if isinstance(error := sys.exception(), ScriptError):
-            self.hub.warned.append((self.hub.update.time, error.render()))
+        if isinstance(error := sys.exception(), FAILURES):
+            self.hub.warned.append((self.hub.update.time, rendered(error)))
         self._over = True
         server.changed()
         server.flush()
@@ -108,10 +109,10 @@ class RunPage(Rhythmic):
         self._paused = False
         self.server.close()
 
-    def _take(self) -> None:
+    def _taken(self) -> Frame:
         update, read = self.hub.update, self.hub.fields.particle
         axes = "xyz"[: self.hub.domain.dimension]
-        self.frames.add(Frame.of_columns(update.step, update.time, axes, self._column, read))
+        return Frame.of_columns(update.step, update.time, axes, self._column, read)
 
     def _wait(self) -> None:
         shown, left = self._column, time.perf_counter()
@@ -129,8 +130,7 @@ class RunPage(Rhythmic):
         self._once = False
 
     def _take_again(self) -> None:
-        self.frames.drop_last()
-        self._take()
+        self.frames.replace_last(self._taken)
         self.server.changed()
 
     # ---- in threads of the server ---------------------------------------------------------------
