@@ -242,6 +242,17 @@ def test_the_line_of_the_own_step_is_whole():
     assert map.line("own_dt") == pytest.approx([1.2, 1.35, 1.5])  # no run in the middle row
 
 
+@pytest.mark.parametrize("drift", [0, 1e-15, 1e-3])
+def test_an_axis_that_scales_both_steps_has_no_line(drift):
+    """Of a ratio that round-off alone, or next to nothing, turns: 1 is reached nowhere near."""
+    map = stability.Map(None, {"N": ["4", "8"]}, ["N"], "", 2.0)
+    for ratio in (0.4, 2.5):
+        map.found = {(i, 0): {"dt": ratio, "own_dt": 1 + drift * i} for i in range(2)}
+        assert map.line("own_dt") == [None]
+    map.found = {(i, 0): {"dt": 1 + drift * i, "own_dt": 1} for i in range(2)}
+    assert map.line("own_dt") == [4 if drift == 1e-3 else None]
+
+
 # Edges over the unit square, and how many runs of 400 they may cost. The first two are those of a
 # lone point under usl as first published (inputs/failures/in.isolated_point): stable below
 # sqrt(2 xi (1 - xi)) of the Courant limit.

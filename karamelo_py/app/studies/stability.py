@@ -6,7 +6,7 @@ from argparse import ArgumentParser
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from itertools import pairwise
-from math import ceil, inf, isfinite, log, nan, prod
+from math import ceil, exp, inf, isclose, isfinite, log, nan, prod
 from pathlib import Path
 from typing import Any
 
@@ -310,17 +310,17 @@ class Map:
     def _crossing(self, points: Sequence[tuple[float, float]]) -> float | None:
         """Find where a ratio is 1, between its known values or beyond them, within the map."""
         for (xa, a), (xb, b) in pairwise(points):
-            if (a - 1) * (b - 1) <= 0 and a != b:
+            if (a - 1) * (b - 1) <= 0 and not isclose(a, b, rel_tol=1e-6):
                 return xa + (1 - a) / (b - a) * (xb - xa)
         if len(points) < 2 or self.x[0] <= 0:
             return None
         first_is_near = abs(points[0][1] - 1) < abs(points[-1][1] - 1)
         (xa, a), (xb, b) = points[:2] if first_is_near else points[-2:]
-        if a == b:
+        if isclose(a, b, rel_tol=1e-6):  # both steps go with the variable, up to round-off
             return None
-        at = xa * (xb / xa) ** (log(1 / a) / log(b / a))
+        at = log(xa) - log(xb / xa) * log(a) / log(b / a)
         low, *_, high = edges(self.x)
-        return at if low <= at <= high else None
+        return exp(at) if at <= log(high) and exp(at) >= low else None
 
     def margins(self) -> list[float]:
         """Divide the largest stable step by the program's, in each row that has an edge."""
