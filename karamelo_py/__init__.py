@@ -3,11 +3,12 @@
 from importlib import import_module
 
 __version__ = "0.1.0"
-__all__ = ["KarameloWarning", "Simulation", "SimulationError"]
+__all__ = ["KarameloWarning", "Simulation", "SimulationError", "read_rows"]
 
 
 def __getattr__(name):
     """Import what is for programs only when one asks for it: the command line starts faster."""
     if name in __all__:
-        return getattr(import_module("karamelo_py.app.simulation"), name)
+        home = "plot" if name == "read_rows" else "simulation"
+        return getattr(import_module(f"karamelo_py.app.{home}"), name)
     raise AttributeError(f"module 'karamelo_py' has no attribute '{name}'")

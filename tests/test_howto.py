@@ -3,7 +3,9 @@
 import re
 from pathlib import Path
 
+import pandas
 import pytest
+from scenes import block
 
 HOWTO = Path(__file__).parent.parent / "docs" / "howto"
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```", re.S | re.M)
@@ -42,3 +44,25 @@ def test_scripts_of_how_tos_run(run_interpreted, tmp_path, page, script):
     done = run_interpreted(short)
     told = [line for line in done.err.splitlines() if "warning" in line]
     assert told == []
+
+
+def test_a_log_and_a_dump_are_read_in_python(run_interpreted, monkeypatch):
+    """The block of the page, of a log whose columns change between runs, with a word in a row."""
+    ((_, body),) = (
+        found for found in FENCE.findall((HOWTO / "paraview.md").read_text("utf-8"))
+        if found[0] == "python"
+    )  # fmt: skip
+    script = block(
+        2, "dump(a, all, hdf5, 10, points.h5, vx, vy, seq)", "set_dt(1e-3)",
+        "log_modify(custom, step, time, dt, limit)", "run(2)",
+        "log_modify(custom, time, dt)", "run(2)",
+    )  # fmt: skip
+    monkeypatch.chdir(run_interpreted(script).folder)
+    known = {}
+    exec(body, known)
+    log = known["log"]
+    assert list(log["Time"]) == pytest.approx([0, 1e-3, 2e-3, 2e-3, 3e-3, 4e-3], abs=1e-12)
+    assert list(log["Step"][:3]) == [0, 1, 2] and log["Step"][3:].isna().all()
+    assert list(log["dt"][1:]) == [1e-3] * 5 and log["limit"].isna().all()
+    assert re.search(r"^1 .* set_dt$", Path("log.mpm").read_text(), re.M)
+    assert isinstance(log, pandas.DataFrame) and known["points"].sizes["id"] > 1
