@@ -43,8 +43,8 @@ class QuasiStatic(NamedTuple):
     iterations
         How often a step is corrected before it is done in halves.
     solver
-        Of the linear equations: ``direct``, ``amg`` (conjugate gradients with algebraic
-        multigrid), or ``auto``: amg from 5000 unknowns on in the plane if the matrix is symmetric,
+        Of the linear equations: ``direct``, ``amg`` (conjugate gradients with algebraic multigrid),
+        or ``auto``. auto takes amg from 5000 unknowns on in the plane if the matrix is symmetric,
         and from 2000 on in space.
     stabilisation
         Share of Young's modulus by which jumps of the gradient at the border of a body are
@@ -68,7 +68,7 @@ class QuasiStatic(NamedTuple):
     of parts.
 
     The program also divides a step in which points would move more than half a cell towards nodes
-    with another motion, or towards held nodes without points.
+    that move otherwise, or held nodes without points.
     """
 
     implicit = True

@@ -140,11 +140,11 @@ class PointsSolid(Solid):
     Parameters
     ----------
     table
-        Name of a file of columns of numbers with a row of names: ``x``, ``y``, ``z`` (as many as
-        there are dimensions), ``volume`` (in the plane for a thickness of 1, in an axisymmetric
-        domain the area in the plane), and perhaps velocities (``vx`` ...), temperatures (``T``) and
-        Cauchy stresses (``s11`` ..., of materials in rate form). In Python a dictionary of arrays,
-        or a DataFrame.
+        Name of a file of columns of numbers with a row of names. Required: ``x``, ``y``, ``z`` (one
+        per dimension), and ``volume`` (in the plane for a thickness of 1, in axisymmetric domains
+        the area in the plane). Optional: velocities (``vx`` ...), temperatures (``T``), Cauchy
+        stresses (``s11`` ..., of materials in rate form). In Python a dictionary of arrays, or a
+        DataFrame.
     GlueToSolid
         As in solid region.
 

@@ -71,11 +71,11 @@ class JohnsonCookDamage(NamedTuple):
 
     Notes
     -----
-    The failure strain is (d1 + d2 exp(d3 t)) (1 + d4 ln(rate/epsdot0)) (1 + d5 T*), T* = (T - Tr) /
-    (Tm - Tr) (Johnson & Cook 1985). At and below the reference rate the second factor is 1. Without
-    a temperature the third one is 1. w is the sum of plastic strain over failure strain (dump
-    column damage_init). From w = 1 on the damage D (dump column damage) grows to 1 as 10 (w - 1).
-    With t below -3 nothing fails. d1 may be negative. Failure strains are at least 1e-6.
+    The failure strain is (d1 + d2 exp(d3 t)) (1 + d4 ln(rate/epsdot0)) (1 + d5 T*) with T* = (T -
+    Tr) / (Tm - Tr) (Johnson & Cook 1985). At and below the reference rate the second factor is 1.
+    Without a temperature the third one is 1. w is the sum of plastic strain over failure strain
+    (dump column damage_init). From w = 1 on the damage D (dump column damage) grows to 1 as 10 (w -
+    1). With t below -3 nothing fails. d1 may be negative. Failure strains are at least 1e-6.
 
     D reduces the deviatoric stress and tension, not pressure in compression: sigma = (1 - D) s - p
     I, with p times 1 - D in tension. The rest of the intact material flows on plastically. The

@@ -39,8 +39,8 @@ def viscous_speed(viscosity, q, density, sound):
 def damped(squared, a):
     """Square of c' = sqrt(c^2 + a^2) + a, from c^2 and a = nu / h.
 
-    Viscosity nu damps the shortest wave of a cell by xi = nu / (c h), which takes c dt / h down to
-    sqrt(1 + xi^2) - xi (Belytschko et al. 2014, eq. 6.3.10): as if c were c'.
+    Viscosity nu damps the shortest wave of a cell by xi = nu / (c h). This reduces c dt / h to
+    sqrt(1 + xi^2) - xi (Belytschko et al. 2014, eq. 6.3.10), as if c were c'.
     """
     speed = sqrt(squared + a * a) + a
     return speed * speed

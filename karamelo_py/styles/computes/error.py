@@ -58,8 +58,8 @@ class PointField:
 class Norm:
     """The size of a difference: L1, L2 or max, as it is or relative to the same norm of the exact.
 
-    Over a history the time since the last output weighs a difference, so that a history does not
-    depend on how often it is looked at.
+    In a history the time since the last output weighs each difference. The result then does not
+    depend on the number of outputs.
     """
 
     remembers = ("_sums", "_duration", "_time", "history", "largest", "_exact")

@@ -182,8 +182,8 @@ class GridDump(OfNodes, LammpsDump):
     Each row begins with the node's number (``id``, from 0, z fastest, then y, then x) and the
     number of its grid (``type``, from 1). Positions are always written.
 
-    The nodes of all grids are written, one grid after another, with ids that go on. ulmpm and
-    ulcpdi have one grid. tlmpm and tlcpdi have one for each solid, over its reference shape.
+    The dump writes the nodes of all grids, one after another, with continuous ids. ulmpm and ulcpdi
+    have one grid. tlmpm and tlcpdi have one for each solid, over its reference shape.
     ulmpm/contacts has the grid of the domain once for each velocity field, so several rows have the
     same position.
 

@@ -165,11 +165,11 @@ class ContactMinimizePenetration(PairContact):
     times this force, against the slip. It never reverses the slip of two free points (de Vaucorbeil
     & Nguyen 2021, "Modelling contacts with a total Lagrangian material point method").
 
-    A surface of balls is rough and brakes sliding. With two points per cell and direction and mu =
-    0, 0.3, 0.5 and 1, 0.19, 0.49, 0.53 and 0.46 of its weight brake a block. Faces that lean to the
-    grid hook each other. On a slope of 20 degrees with mu = 0 a block sticks, and with points=cut
-    it accelerates by 2.8 instead of 3.4. The program therefore warns of a coefficient. Method
-    ulmpm/contacts gives the right friction.
+    A surface of balls is rough and brakes sliding. The force on a block (two points per cell and
+    direction) is 0.19, 0.49, 0.53 and 0.46 of its weight with mu = 0, 0.3, 0.5 and 1. Faces that
+    lean to the grid hook each other. On a slope of 20 degrees with mu = 0 a block sticks, and with
+    points=cut it accelerates by 2.8 instead of 3.4. The program therefore warns of a coefficient.
+    Method ulmpm/contacts gives the right friction.
 
     Pairs are found by cells, so the cost grows with the number of points. With many processes the
     first one searches, among the points of all that may touch.

@@ -216,8 +216,8 @@ PAIRS = (0, 0), (1, 0), (0, 1), (1, 1)
 class H8(cpdi.CarriedDomain):
     """Trilinear hexahedra of eight corners, which neighbouring points move alike.
 
-    Weights and gradients are the exact means over the hexahedron: 2 x 2 x 2 Gauss points integrate
-    up to the third power along each direction, and N det J is one, grad N det J less.
+    Weights and gradients are the exact means over the hexahedron. 2 x 2 x 2 Gauss points integrate
+    cubic functions along each direction. N det J is cubic, grad N det J of lower order.
 
     Example
     -------

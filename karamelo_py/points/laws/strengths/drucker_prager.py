@@ -57,13 +57,13 @@ class DruckerPrager(NamedTuple):
 
     Notes
     -----
-    sqrt(s:s/2) <= xi c + eta p (Drucker & Prager 1952). compression: xi = 6 cos(phi)/(sqrt(3) (3 -
-    sin(phi))), eta = 6 sin(phi)/(sqrt(3) (3 - sin(phi))); extension: the same with 3 + sin(phi);
-    plane-strain: xi = 3/sqrt(9 + 12 tan(phi)^2), eta = xi tan(phi) (de Souza Neto et al. 2008,
-    section 6.4). Dilatancy has the factor eta of psi. Tension beyond -p = tension, or the apex, is
-    cut off. The plastic change of volume is kept, and pressure follows from the elastic part of J.
-    While strength falls, a step uses that of its beginning. Where it falls, results depend on the
-    size of the cells.
+    sqrt(s:s/2) <= xi c + eta p (Drucker & Prager 1952; de Souza Neto et al. 2008, section 6.4).
+    With compression xi = 6 cos(phi)/(sqrt(3) (3 - sin(phi))) and eta = 6 sin(phi)/(sqrt(3) (3 -
+    sin(phi))). With extension 3 + sin(phi) replaces 3 - sin(phi). With plane-strain xi = 3/sqrt(9 +
+    12 tan(phi)^2) and eta = xi tan(phi). Dilatancy has the factor eta of psi. Tension beyond -p =
+    tension, or the apex, is cut off. The plastic change of volume is kept, and pressure follows
+    from the elastic part of J. While strength falls, a step uses that of its beginning. Where it
+    falls, results depend on the size of the cells.
 
     See Also
     --------

@@ -278,8 +278,8 @@ class ZerilliArmstrong(NamedTuple):
 
     Notes
     -----
-    Y = C0 + (C1 + C2 sqrt(ep)) exp(-C3 T + C4 T ln(rate/epsdot0)) + C5 ep^n, with C2 = 0 for bcc
-    and C1 = C5 = 0 for fcc metals (Zerilli & Armstrong 1987). Without rate the thermal part is
+    Y = C0 + (C1 + C2 sqrt(ep)) exp(-C3 T + C4 T ln(rate/epsdot0)) + C5 ep^n (Zerilli & Armstrong
+    1987). C2 is 0 for bcc metals, C1 and C5 are 0 for fcc metals. Without rate the thermal part is
     nothing, so that the strength of a body at rest is C0 + C5 ep^n. Each step solves for the
     plastic strain with the flow stress at its end and the rate of the step.
 

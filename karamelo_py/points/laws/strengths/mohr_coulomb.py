@@ -38,12 +38,12 @@ class MohrCoulomb(NamedTuple):
     Notes
     -----
     s1 - s3 + (s1 + s3) sin(phi) <= 2 c cos(phi), with s1 the largest and s3 the smallest principal
-    stress (tension positive). A stress beyond is brought back in principal stresses: to the plane,
-    an edge (two equal principal stresses) or the apex of the surface, p = -c cot(phi), in tension
-    (Simpson 2017, Practical Finite Element Modeling in Earth Science using Matlab, section 11.4; de
-    Souza Neto et al. 2008, section 8.2). The plastic change of volume is kept, and pressure follows
-    from the elastic part of J. While strength falls, a step uses that of its beginning. Where it
-    falls, results depend on the size of the cells.
+    stress (tension positive). A stress beyond the surface returns in principal stresses: to a
+    plane, an edge (two equal principal stresses) or, in tension, the apex p = -c cot(phi) (Simpson
+    2017, Practical Finite Element Modeling in Earth Science using Matlab, section 11.4; de Souza
+    Neto et al. 2008, section 8.2). The plastic change of volume is kept, and pressure follows from
+    the elastic part of J. While strength falls, a step uses that of its beginning. Where it falls,
+    results depend on the size of the cells.
 
     See Also
     --------

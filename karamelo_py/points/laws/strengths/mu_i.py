@@ -40,11 +40,11 @@ class MuI(NamedTuple):
 
     Notes
     -----
-    sqrt(s:s/2) = mu(I) p in flow, mu = mu_s + (mu_2 - mu_s)/(I0/I + 1), I = gamma' d sqrt(rho_s/p)
-    with the plastic shear rate gamma' (Jop, Forterre & Pouliquen 2006). Below mu_s p the response
-    is elastic. Steps of any size solve a quadratic equation for the shear stress at their end
-    (Dunatunga & Kamrin 2015). Grains below the initial density are apart. They bear nothing until
-    the density is back. Flow keeps the volume. The column ``inertial`` of dumps is I.
+    sqrt(s:s/2) = mu(I) p in flow, with mu = mu_s + (mu_2 - mu_s)/(I0/I + 1) (Jop, Forterre &
+    Pouliquen 2006). I = gamma' d sqrt(rho_s/p), with the plastic shear rate gamma'. Below mu_s p
+    the response is elastic. Steps of any size solve a quadratic equation for the shear stress at
+    their end (Dunatunga & Kamrin 2015). Grains below the initial density are apart. They bear
+    nothing until the density is back. Flow keeps the volume. The column ``inertial`` of dumps is I.
 
     See Also
     --------
