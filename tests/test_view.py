@@ -148,12 +148,23 @@ def test_points_that_move_stay_in_view(tmp_path, monkeypatch):
         (["p.dump", "--xmin", "2", "--xmax", "1"], "above xmin"),
         (["p.dump", "--scale", "log", "--vmin", "0"], "above 0"),
         (["p.dump", "--quantile", "0.6"], "from 0 to 0.4"),
+        (["p.dump", "-c", ""], "--column takes one value, not ''"),
+        (["p.dump", "-c", "vx, x"], "--column takes one value, not 'vx, x'"),
+        (["p.dump", "--xmin", ""], "--xmin takes one value"),
+        (["p.dump", "--xmin", "0, 5"], "--xmin takes one value"),
+        (["p.dump", "--size", "0", "0"], "pixels from 20"),
+        (["p.dump", "-o", "p.gif", "--fps", "0"], "number above 0"),
+        (["p.dump", "-var", "N", "4"], "--script FILE"),
+        (["p.dump", "--only", "type == 9"], "--only: no point of these dumps is left"),
+        (["p.dump", "--xmin", "1e9"], "--xmin: no point of these dumps is left"),
+        (["q.dump", "-o", "q.png"], "-o q.*.png"),
         ([], "FILE"),
     ],
 )
 def test_view_says_what_is_wrong(tmp_path, monkeypatch, capsys, arguments, remedy):
     monkeypatch.chdir(tmp_path)
     Particle(FakeHub(tmp_path), 1, "p.dump", "vx").write()
+    (tmp_path / "q.dump").write_text(2 * (tmp_path / "p.dump").read_text())
     for ending in ("", ".h5", ".vtu", ".pvd"):
         (tmp_path / f"text{ending}").write_text("no dump at all\n")
     status, _, err = call(capsys, "view", *arguments)
@@ -316,6 +327,11 @@ def test_view_outlines_the_tools_of_a_script(run_interpreted, monkeypatch, capsy
         (circle,) = (line for line in lines if np.ptp(line, axis=0).max() < 0.21)
         assert circle.mean(axis=0) == pytest.approx([0.5, 0.4], abs=0.01)
     Path("in.results").write_text(text.replace("100*time", "vmean"))
+    status, _, err = call(capsys, *words, file, "--script", "in.script", "--only", "type == 9")
+    assert status == 1 and "no point" in err  # not that the scene is on a line
+    Path("in.flat").write_text(block(dimension - 1))
+    status, _, err = call(capsys, *words, file, "--script", "in.flat")
+    assert status == 1 and f"{dimension - 1} dimension" in err and f"the dump {dimension}" in err
     status, _, err = call(capsys, *words, "p.dump", "--script", "in.results")
     assert status == 1 and "the place of fix 'ball' follows from results of the run" in err
 

@@ -3,9 +3,9 @@
 import argparse
 import glob
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
-from itertools import chain
+from itertools import chain, islice
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.app.catalogue import help_of
-from karamelo_py.app.options import LIVE, add_variables
+from karamelo_py.app.options import LIVE, above_zero, add_variables
 from karamelo_py.language import signature
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.language.signature import Argument, Parameter
@@ -31,9 +31,9 @@ from karamelo_py.output.snapshots import Snapshot, read
 from karamelo_py.output.units import labelled
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
-from karamelo_py.script.errors import ScriptError, render_message
+from karamelo_py.script.errors import ScriptError, plural, render_message
 from karamelo_py.script.parser import parse
-from karamelo_py.styles.dumps.pyplot import look_of, tools_of
+from karamelo_py.styles.dumps.pyplot import LEAST_PIXELS, MOST_PIXELS, look_of, tools_of
 
 DESCRIPTION = """\
 Draw pictures or a movie of dumps of points.
@@ -66,12 +66,20 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "installed (default: view.*.png); .pdf and .svg, too", default=Path("view.*.png"),
     )  # fmt: skip
     parser.add_argument(
-        "--size", nargs=2, type=int, default=[600, 500], metavar=("WIDTH", "HEIGHT")
+        "--size", nargs=2, type=_pixels, default=[600, 500], metavar=("WIDTH", "HEIGHT")
     )
     for word in _look_words():
         said = word.description.replace("%", "%%")
         parser.add_argument(f"--{word.name}", metavar=word.name.upper(), help=said)
-    parser.add_argument("--fps", type=float, default=25.0, help="frames per second of a movie")
+    parser.add_argument("--fps", type=above_zero, default=25.0, help="frames per second of a movie")
+
+
+def _pixels(text: str) -> int:
+    """Read the width or height of a picture, as dump pyplot has it."""
+    if not text.isdecimal() or not LEAST_PIXELS <= int(text) <= MOST_PIXELS:
+        said = f"'{text}' is no number of pixels from {LEAST_PIXELS} to {MOST_PIXELS}"
+        raise argparse.ArgumentTypeError(said)
+    return int(text)
 
 
 def _look_words() -> list[Parameter]:
@@ -92,12 +100,18 @@ def run(options: argparse.Namespace) -> int:
     # Named by number, 1000 comes after 999.
     files = sorted(_matching(options.files), key=lambda path: (_number(path), path.name))
     drawn, scene = 0, _scene(options)
+    if not movie and "*" not in options.output.name and len(list(islice(_all_in(files), 2))) > 1:
+        raise ScriptError(
+            f"{options.output} is one picture, and these are dumps of several moments",
+            expected="a name with *, which becomes the step, or a movie (.gif, .mp4)",
+            hint=f"-o {options.output.stem}.*{options.output.suffix}",
+        )
     with unwarned():
         picture = look = None
-        for snapshot in chain.from_iterable(map(read, files)):
+        for snapshot in _all_in(files):
             look = look or _look(snapshot, options)
-            snapshot = _chosen(snapshot, look)
             picture = picture or _picture(snapshot, files, options, look, scene)
+            snapshot = _chosen(snapshot, look)
             unit = snapshot.units.get("time", "")
             time = "" if np.isnan(snapshot.time) else f", time {snapshot.time:.6g} {unit}".rstrip()
             # As they stand in the file, whatever their ids.
@@ -131,6 +145,11 @@ def run(options: argparse.Namespace) -> int:
 def _scene(options: argparse.Namespace) -> Hub | None:
     """Go through the script of the run, without its steps."""
     if options.script is None:
+        if options.var:
+            raise ScriptError(
+                f"-var {options.var[0][0]} sets a variable of a script, and there is none here",
+                expected="--script FILE, the script of the run, beside it",
+            )
         return None
     hub = Hub(Console(quiet=True))
     hub.rehearsing = True
@@ -187,6 +206,11 @@ def _matching(names: Iterable[Path]) -> set[Path]:
     return found
 
 
+def _all_in(files: Iterable[Path]) -> Iterator[Snapshot]:
+    """Read the snapshots in files, those of one after those of another."""
+    return chain.from_iterable(map(read, files))
+
+
 def _number(path: Path) -> int:
     digits = "".join(c if c.isdigit() else " " for c in path.name).split()
     return int(digits[-1]) if digits else -1
@@ -207,6 +231,10 @@ def _look(first: Snapshot, options: argparse.Namespace) -> dict[str, Any]:
                 look[word.name] = given
                 continue
             (call,) = parse(f"view({given})", f"--{option}")
+            if len(call.arguments) != 1:
+                raise ScriptError(
+                    f"--{option} takes one value, not '{given}'", expected=word.kind.text
+                )
             argument = Argument(call.arguments[0], script)
             look[word.name] = signature.convert(hub, word, argument)
     return look
@@ -237,13 +265,21 @@ def _picture(
     """Make the empty picture that suits the first snapshot; place and colours suit all of them."""
     from karamelo_py.output import outlines, pictures
 
-    field = look["field"]
+    # A dump holds zeros where the scene has no direction.
+    dimension = 3 if first.columns["z"].any() else 2 if first.columns["y"].any() else 1
+    if scene is not None:
+        if dimension > scene.domain.dimension:
+            has = plural(scene.domain.dimension, "dimension")
+            raise ScriptError(
+                f"the script has {has}, the dump {dimension}",
+                expected="the script of the run that has written the dump",
+            )
+        dimension = scene.domain.dimension  # points of a scene in space may all have z = 0
+    first, field = _chosen(first, look), look["field"]
     column = field.text if isinstance(field, ColumnFormula) else field
     if column is not None and column not in first.columns:
         said = f"the dump has no column '{column}'"
         raise unknown_column(said, column, first.columns)
-    # A dump holds zeros where the scene has no direction.
-    dimension = 3 if first.columns["z"].any() else 2 if first.columns["y"].any() else 1
     column = column or ("type" if dimension > 1 else "x")
     types = np.unique(first.columns["type"]).astype(int) if column == "type" else []
     apart = ("field", "only", "title", "dpi")
@@ -273,14 +309,21 @@ def _all(
     """Find corners around all snapshots, and limits of the values of a column in them."""
     from karamelo_py.output.pictures import grown, in_window, within
 
-    corners, ends = [], []
-    for snapshot in chain.from_iterable(map(read, files)):
+    corners, ends, there, left = [], [], 0, 0
+    for snapshot in _all_in(files):
         corners.append((snapshot.lo, snapshot.hi))
         columns = in_window(_chosen(snapshot, look).columns, made_look["window"])
+        there, left = there + len(snapshot.columns["x"]), left + len(columns["x"])
         values = columns.get(column, np.empty(0))
         if made_look["log"]:
             values = np.log10(values[values > 0])
         values = within(values, made_look["quantile"])
         ends += [values.min(), values.max()] if len(values) else []
+    if there and not left:
+        ways = ("only", *(x + end for x in "xyz" for end in ("min", "max")))
+        given = [f"--{way}" for way in ways if look[way] is not None]
+        raise ScriptError(
+            f"{', '.join(given)}: no point of these dumps is left", hint="leave one of these out"
+        )
     lo, hi = zip(*corners, strict=True)
     return np.min(lo, axis=0), np.max(hi, axis=0), grown(None, np.array(ends)) if ends else None
