@@ -22,8 +22,8 @@ def set_dt(hub: Hub, dt: Annotated[float, Positive]) -> None:
     Parameters
     ----------
     dt
-        Time step. Above the stable limit (cell size over wave speed plus velocity; less with scheme
-        usl) a run warns; above four times that of conduction it does not begin.
+        Time step. A run warns above the stable limit: cell size over wave speed plus velocity, less
+        with scheme usl. Above four times the limit of conduction it does not begin.
 
     Example
     -------
@@ -45,11 +45,11 @@ def dt_factor(hub: Hub, factor: Annotated[float, Positive]) -> None:
     Parameters
     ----------
     factor
-        Above 0; above what is stable a run warns. Without this command the program takes 0.9. It
-        takes less where a body that drifts would gain energy: 0.4, or 0.2 with one point per cell,
-        with linear functions in the updated frame, FLIP with a share above 0.99, and musl or usf.
-        Until a point has moved a quarter of a cell, it takes 0.9, and more with splines. A factor
-        of your own is a share of the stable step of moving bodies all the time.
+        Above 0. A run warns of unstable factors. The default is 0.9. It is 0.4 (0.2 with one point
+        per cell) where a drifting body would gain energy: linear functions in the updated frame,
+        FLIP above 0.99, and musl or usf. Until a point has moved a quarter of a cell, the default
+        is 0.9, and more with splines. A factor of your own always refers to the stable step of
+        moving bodies.
 
     Example
     -------
@@ -305,10 +305,10 @@ def read_restart(hub: Hub, file: str) -> None:
 
     Notes
     -----
-    Write the same domain, method and solids as in the script of the file before this command, and
-    the fixes and computes that shall go on. Fixes and computes with the same ID and style keep what
-    they have seen. Initial velocities do not act again. Everything else may differ: constants of
-    materials, fixes, the time step, outputs. Time and step go on from those of the file.
+    Before this command, write the domain, method and solids of the script of the file, and the
+    fixes and computes to continue. Those with the same ID and style keep their values. Initial
+    velocities do not act again. Everything else may differ: constants of materials, fixes, the time
+    step, outputs. Time and step go on from those of the file.
 
     The run begins new files. A picture or movie with the same ID, style and field keeps the colours
     of the pictures before.

@@ -11,41 +11,39 @@ place
 stencil
     whatever `locate` returned.
 
-A basis that is the product of one function a direction gives only `along` and calls
-:func:`karamelo_py.points.basis.product.register`, which also gives it what is usual of these
-attributes that every class has:
+A basis that is a product of one function per direction gives only `along` and calls
+:func:`karamelo_py.points.basis.product.register`. This also sets the defaults of these attributes:
 
 cells
-    how many cells the nodes that points of one cell may see span (1: those of its corners only);
+    number of cells that the nodes of all points of a cell span (1: the corners of the cell only);
 nodes_per_cell
     1, or 2 where there are nodes between the corners of cells;
 least_nodes
-    the smallest number of nodes a direction of the grid must have;
+    smallest number of nodes of the grid per direction;
 steady_moment
     whether D of the affine transfers stays away from zero everywhere;
 gradient_jumps
-    whether gradients jump at the faces of cells (not, where a class does not say): points that move
-    from cell to cell then add energy to a body, the less the smaller the step;
+    whether gradients jump at the faces of cells (default: no). Points that cross cells then add
+    energy to a body. A smaller step adds less;
 courant_still, courant_total
-    the stable step over h/c while points are where they were, in the updated frame, and in the
-    total one (1, where a class does not say);
+    the stable step over h/c while points stay at their places, in the updated frame, and in the
+    total frame (default: 1);
 courant_strained_first
-    the most of `courant_still` where the strain comes before the forces, as in usf (no bound, where
-    a class does not say);
+    bound of `courant_still` where the strain comes before the forces, as in usf (default: none);
 lone
-    of functions with smooth gradients, h^2 / D and the most of h^2 sum_I |grad N_I|^2 / N_I a
-    direction, away from walls: what makes a point stiff that has its nodes for itself;
+    stiffness of a point with no other point at its nodes, for functions with smooth gradients: h^2
+    / D and the largest h^2 sum_I |grad N_I|^2 / N_I per direction, away from walls;
 bears_drift
-    whether bodies that drift keep their energy with the step of bodies at rest, with musl and usf
-    too (not, where a class does not say);
+    whether drifting bodies keep their energy with the step of bodies at rest, also with musl and
+    usf (default: no);
 borne
-    how far bodies drift and turn with them and keep their energy (`noise.Borne`; that of functions
-    that are like them, where a class does not say);
+    how far bodies may drift and turn and keep their energy (`noise.Borne`; default: that of similar
+    functions);
 steep_edge
-    whether |grad N|^2 / N exceeds 2 / h^2 a direction where a weight vanishes: usl then limits what
-    light nodes do to the strain.
+    whether |grad N|^2 / N exceeds 2 / h^2 per direction where a weight vanishes. usl then limits
+    the effect of light nodes on the strain.
 
-A basis whose points have domains says what a place keeps of them, and so where the arrays begin:
+A basis whose points have domains lists what a place keeps of them, and thus the initial arrays:
 
 shape
     names of its parts, in their order: ``half_size`` (d numbers), ``half_edges`` (d vectors),

@@ -11,8 +11,8 @@ the arguments. Where a script gives other numbers than the law computes with, a 
 has the arguments and returns the law; `checked`, a method, refuses what no annotation can, and
 returns the law or a simpler one that means the same.
 
-A law that says ``in_lanes``, as all its parts do, is computed for several points at once: its point
-functions do not branch over numbers of a point, but `where`; those that do are named in
+A law that says ``in_lanes``, as all its parts do, is computed for several points at once. Its point
+functions do not branch on numbers of a point, but `where`; those that do are named in
 ``scalarised``. Points of other laws are visited one by one.
 
 A law that says ``rebounds`` bears tension and gives back all the work that it was given; of a

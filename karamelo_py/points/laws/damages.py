@@ -1,9 +1,9 @@
 """Damage of one point: the share D of its strength that is gone.
 
 A damage is a NamedTuple of parameters (its class is the tag), a part of a composed law
-(`karamelo_py.points.laws.eos_strength`): the stress is 1 - D times that of the intact
-material, but for pressure, which also rubble bears. Equation of state and strength know nothing of
-it, so that it enters once. What it remembers is its memory, a tuple.
+(`karamelo_py.points.laws.eos_strength`): the stress is 1 - D times that of the intact material,
+except for pressure. Equation of state and strength do not depend on it, so it enters once. What it
+remembers is its memory, a tuple.
 """
 
 from typing import Annotated, Any, NamedTuple

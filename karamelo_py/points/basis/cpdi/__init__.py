@@ -8,8 +8,8 @@ at the corners x_c (Sadeghirad, Brannon & Burghardt 2011; Sadeghirad, Brannon & 
 with the means w_c and g_c, over the domain, of the function of corner c and of its gradient. The
 domains tile the body however far it stretches, so that it does not break between points.
 
-A family of domains derives from `ConvectedDomain` and gives only :func:`domain`; one whose corners
-are kept and go with the grid derives from `CarriedDomain` and gives `upright`, too.
+A family of domains derives from `ConvectedDomain` and gives only :func:`domain`. Domains with
+stored corners that move with the grid derive from `CarriedDomain`, and give `upright`, too.
 """
 
 from math import inf
@@ -44,10 +44,10 @@ class Element(NamedTuple):
 class ConvectedDomain(NamedTuple):
     """Base of these bases, of 2^d corners; they add `dimension` and `shape`.
 
-    Arms of the affine transfers begin at the weighted centre x = sum_I N_I X_I. Where that is not
-    the point (corners beyond the grid; quadrilaterals and hexahedra that are no parallelograms),
-    linear momentum stays exact, and angular momentum is that about these centres: what the points
-    themselves show wanders by a thousandth of what it does with FLIP (a spinning square, Q4).
+    Arms of the affine transfers begin at the weighted centre x = sum_I N_I X_I. The centre is not
+    the point if corners lie beyond the grid, or in quadrilaterals and hexahedra that are no
+    parallelograms. Linear momentum stays exact, and angular momentum belongs to the centres. That
+    of the points then varies by a thousandth of its variation with FLIP (a spinning square, Q4).
     """
 
     cells = 3
