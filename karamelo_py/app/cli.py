@@ -332,7 +332,7 @@ def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = 
         from karamelo_py.run.runner import Interrupted
         from karamelo_py.scene.hub import Hub
     begun()
-    # Messages of ours say what is wrong.
+    # Errors of the program replace NumPy's warnings.
     np.seterr(over="ignore", invalid="ignore", divide="ignore")
     hub = Hub(Console(quiet=options.quiet, terminal=launch.has_terminal()))
     hub.settings.threads = options.threads

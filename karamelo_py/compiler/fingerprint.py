@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from karamelo_py.compiler import choices as by_type
+from karamelo_py.compiler import choices
 from karamelo_py.compiler.values import Intrinsic
 
 _HERE = f"{__package__}."  # the text of all these modules is in every key
@@ -31,11 +31,11 @@ def describe(numba_type: Any) -> str:
     if isinstance(numba_type, types.BaseTuple) and hasattr(numba_type, "instance_class"):
         items = zip(numba_type.fields, numba_type, strict=True)
         inner = ",".join(f"{name}={describe(item)}" for name, item in items)
-        return f"{how} {by_type.class_name(numba_type.instance_class)}({inner})"
+        return f"{how} {choices.class_name(numba_type.instance_class)}({inner})"
     if isinstance(numba_type, types.BaseTuple):
         return f"{how}({','.join(map(describe, numba_type))},)"
     if isinstance(numba_type, (types.Callable, types.Opaque)) and numba_type != types.none:
-        raise by_type.Unknown(str(numba_type))
+        raise choices.Unknown(str(numba_type))
     return f"{how}:{numba_type}"
 
 
@@ -50,10 +50,10 @@ def classes_in(numba_type: Any) -> Iterable[type]:
 def fingerprint(
     roots: Iterable[Any],
     arguments: Iterable[Any],
-    choices: frozenset[by_type.Choice],
+    chosen: frozenset[choices.Choice],
     codes: frozenset[python.CodeType] = frozenset(),
 ) -> str:
-    """Hash of all that code made of `roots` depends on, for these types of arguments and choices.
+    """Hash all that code made of `roots` depends on, for types of arguments and what was chosen.
 
     Raises `Unknown` where something cannot be followed, or is no longer there, and where one of
     `codes` is not among what is followed.
@@ -61,11 +61,11 @@ def fingerprint(
     ahead = [*roots]
     for argument in arguments:
         ahead += classes_in(argument)
-    for choice in sorted(choices):
-        classes = tuple(by_type.found_by_name(name) if name else None for name in choice.classes)
-        dispatches = by_type.point_functions.get(choice.point_function)
+    for choice in sorted(chosen):
+        classes = tuple(choices.found_by_name(name) if name else None for name in choice.classes)
+        dispatches = choices.point_functions.get(choice.point_function)
         if not dispatches:
-            raise by_type.Unknown(choice.point_function)
+            raise choices.Unknown(choice.point_function)
         ahead += [repr(choice), *(dispatch.find(classes) for dispatch in dispatches)]
     digest = hashlib.sha256()
     order: dict[int, int] = {}
@@ -82,12 +82,12 @@ def fingerprint(
         order[id(thing)] = len(order)
         alive.append(thing)
         if codes and isinstance(thing, python.FunctionType):
-            codes -= {*by_type.codes_in(thing.__code__)}
+            codes -= {*choices.codes_in(thing.__code__)}
         words, parts = _look(thing)
         digest.update(f"{words} {len(parts)};".encode())
         ahead.extend(reversed(parts))
     if codes:
-        raise by_type.Unknown(f"the way to {min(c.co_qualname for c in codes)}")
+        raise choices.Unknown(f"the way to {min(c.co_qualname for c in codes)}")
     return digest.hexdigest()
 
 
@@ -110,12 +110,12 @@ def _look(thing: Any) -> tuple[str, list]:
             return kind, parts(thing)
     if hasattr(type(thing), "made_of"):  # a kernel
         return kind, list(thing.made_of)
-    if hasattr(thing, "__name__") and by_type.is_opaque(thing):
+    if hasattr(thing, "__name__") and choices.is_opaque(thing):
         return f"{kind} {getattr(thing, '__module__', '')} {thing.__name__}", []
     try:
         return kind, [type(thing), pickle.dumps(thing)]
     except Exception as error:
-        raise by_type.Unknown(f"{thing!r}") from error
+        raise choices.Unknown(f"{thing!r}") from error
 
 
 _PARTS: dict[Any, Callable] = {
@@ -134,17 +134,17 @@ def _function(function: Callable) -> tuple[str, list]:
     if hasattr(function, "find") and hasattr(function, "tags"):
         # Its implementations are in the choices.
         return (
-            f"point function {by_type.name_of(function)} {function.tags}",
-            by_type.of_numbers.get(function, []),
+            f"point function {choices.name_of(function)} {function.tags}",
+            choices.of_numbers.get(function, []),
         )
     if hasattr(function, "inner"):
-        return f"method {by_type.name_of(function)}", [function.inner]
-    if by_type.is_opaque(function):
-        return f"function {by_type.name_of(function)}", []
+        return f"method {choices.name_of(function)}", [function.inner]
+    if choices.is_opaque(function):
+        return f"function {choices.name_of(function)}", []
     code = function.__code__
     digest, names = _code(code)
     parts = [function.__defaults__, function.__kwdefaults__]
-    for name in () if code.co_filename in by_type.WHOLE else names:
+    for name in () if code.co_filename in choices.WHOLE else names:
         value = function.__globals__.get(name, _NOWHERE)
         if value is _NOWHERE:
             continue
@@ -154,13 +154,13 @@ def _function(function: Callable) -> tuple[str, list]:
             parts.append(cell.cell_contents)
         except ValueError:
             parts.append("empty")
-    chosen = map(inspect.unwrap, by_type.choosers.get(function, ()))
-    return f"function {digest}", [*parts, *chosen, *by_type.of_numbers.get(function, ())]
+    chosen = map(inspect.unwrap, choices.choosers.get(function, ()))
+    return f"function {digest}", [*parts, *chosen, *choices.of_numbers.get(function, ())]
 
 
 def _from_module(value: Any, names: tuple[str, ...], above: tuple) -> list:
     """List the things in a module, and in modules of it, that a function's code names."""
-    if not isinstance(value, python.ModuleType) or value in above or by_type.is_opaque(value):
+    if not isinstance(value, python.ModuleType) or value in above or choices.is_opaque(value):
         return []
     found = [vars(value)[name] for name in names if name in vars(value)]
     inner = (_from_module(one, names, (*above, value)) for one in found)
@@ -194,8 +194,8 @@ def _code(code: python.CodeType) -> tuple[str, tuple[str, ...]]:
 
 
 def _class(one: type) -> tuple[str, list]:
-    name = by_type.name_of(one)
-    if by_type.is_opaque(one) or one.__module__.startswith(_HERE):
+    name = choices.name_of(one)
+    if choices.is_opaque(one) or one.__module__.startswith(_HERE):
         return f"class {name}", []
     fields = getattr(one, "_fields", ())
     parts: list = [*one.__bases__, fields]

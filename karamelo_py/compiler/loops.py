@@ -18,9 +18,9 @@ from typing import Any, NamedTuple
 from llvmlite import ir
 from numba import types
 
-from karamelo_py.compiler import cache, code, compile_lock, machine
-from karamelo_py.compiler import choices as by_type
+from karamelo_py.compiler import cache, choices, code, compile_lock, machine
 from karamelo_py.compiler.argument_buffer import ArgumentBuffer, plan_for, reader
+from karamelo_py.compiler.choices import Choice
 from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.failing import noting, raise_noted
 from karamelo_py.compiler.held import HeldTuple, hold, item_of
@@ -39,9 +39,7 @@ class Unit(NamedTuple):
     result: types.Type
     code: bytes  # an object file
     needs: tuple  # the units that it calls
-    choices: frozenset[
-        by_type.Choice
-    ]  # what point functions were asked for, also those of its needs
+    choices: frozenset[Choice]  # what point functions were asked for, also those of its needs
     raises: bool  # whether something in it raises exceptions
 
 
@@ -150,7 +148,7 @@ def written(
 
 def _compiled(function: Callable, kinds: tuple, result: types.Type | None) -> tuple[Unit, Any]:
     """Compile a function; the unit, and the Python functions that it was made of."""
-    with compilation(function.__name__), _no_collections(), by_type.parts_noted() as parts:
+    with compilation(function.__name__), _no_collections(), choices.parts_noted() as parts:
         module, result = written(function, kinds, result)
         text = str(module)
         readable = re.sub(r"[^\w.]", "_", function.__qualname__, flags=re.ASCII)
@@ -158,10 +156,10 @@ def _compiled(function: Callable, kinds: tuple, result: types.Type | None) -> tu
         made = machine.compile_text(text.replace(NAME, name))
     unit = Unit(name, result, made, tuple(module.needs.values()), frozenset(), module.raises)
     try:
-        choices, codes = by_type.contents(parts)
-    except by_type.Unknown as what:
+        found, codes = choices.contents(parts)
+    except choices.Unknown as what:
         return unit, what
-    return unit._replace(choices=choices), codes
+    return unit._replace(choices=found), codes
 
 
 def _write_entry(module: ir.Module, main: ir.Function, kinds: tuple, result: types.Type) -> None:
@@ -236,8 +234,8 @@ class Kernel:
             own = formula(self.function, kinds)
             return lowering.call_own(own.name, own.run, kinds, own.result, held)
         unit = self.unit(kinds)
-        by_type.note(unit.choices)
-        by_type.note([self.function.__code__])
+        choices.note(unit.choices)
+        choices.note([self.function.__code__])
         if lowering.builder is None:
             return lowering.wrapped(unit.result, None)
         module = lowering.builder.module
@@ -255,12 +253,12 @@ def kernel(function: Callable) -> Callable:
     No fast mathematics: where products and sums contract would depend on what a loop is inlined
     into. `fma` says where.
     """
-    return function if by_type.INTERPRETED else Kernel(function)
+    return function if choices.INTERPRETED else Kernel(function)
 
 
 def noinline(function: Callable) -> Callable:
     """Mark a function that kernels call, too large to be written into each place that calls it."""
-    if not by_type.INTERPRETED:
+    if not choices.INTERPRETED:
         alone(function)
         shared(function)
     return function
@@ -280,7 +278,7 @@ def address_of(function: Callable, signature: types.Type) -> int:
     another one, and the function is compiled once for all its callers.
     """
     if function not in _addresses:
-        if by_type.INTERPRETED:
+        if choices.INTERPRETED:
             _addresses[function] = address_of_python(function, signature)
         else:
             unit = Kernel(function).unit(signature.args, signature.return_type)
@@ -293,7 +291,7 @@ def address_of_python(function: Callable, signature: types.Type) -> int:
 
     What is raised in it is raised again behind the kernel.
     """
-    if by_type.INTERPRETED:
+    if choices.INTERPRETED:
         _uncompiled.append(function)
         return len(_uncompiled) - 1
     made = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * len(signature.args))(
@@ -307,7 +305,7 @@ def caller_of(signature: Any) -> Callable:
     """Make ``call(address, ...)``, which calls a function of this signature by its address."""
     result, parameters = signature.return_type, signature.args
 
-    if by_type.INTERPRETED:
+    if choices.INTERPRETED:
         return lambda address, *arguments: _uncompiled[address](*arguments)
 
     @intrinsic

@@ -311,8 +311,14 @@ def _raised(x, y, made):
     )
 
 
-implements(real, Dual)(lambda value, like: real(value, like.value))
-implements(round_off, Dual)(lambda like: round_off(like.value))
+@implements(real, Dual)
+def _real(value, like):
+    return real(value, like.value)
+
+
+@implements(round_off, Dual)
+def _round_off(like):
+    return round_off(like.value)
 
 
 @implements(fma, Dual)

@@ -376,13 +376,12 @@ def by_threads(share: Callable) -> Callable:
     names = ["mode", "count", *inspect.signature(share).parameters][:-1]
     loop = shared_out(share)
 
+    @functools.wraps(share, updated=())  # marks stay with the share
     def all_shares(*arguments):
         loop(*arguments)
 
     kinds = [inspect.Parameter(name, inspect.Parameter.POSITIONAL_OR_KEYWORD) for name in names]
     all_shares.__signature__ = inspect.Signature(kinds)  # type: ignore[attr-defined]
-    for name in ("__name__", "__qualname__", "__module__", "__doc__"):
-        setattr(all_shares, name, getattr(share, name))
     return kernel(all_shares)
 
 

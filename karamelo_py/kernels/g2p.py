@@ -135,7 +135,11 @@ empty.on(TrialStrain)(lambda task, w, x: zero(w.kin, x[0]))
 
 
 empty.on(SetMeanStress)(lambda task, w, x: real(0, x[0]))
-empty.on(SeriesTerm)(lambda task, w, x: x - x)
+
+
+@empty.on(SeriesTerm)
+def _empty_series_term(task, w, x):
+    return x - x
 
 
 visit.records_of.on(Move)(lambda task, nodes: nodes.update)

@@ -9,6 +9,7 @@ each run, and do not depend on how points lie in memory.
 `fate` holds how the points fared (doubles); threads of steps behind one that ended do nothing.
 """
 
+import functools
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -110,6 +111,7 @@ def nodes_in_cell(basis: Any, kin: Any) -> int:
 # --- visits of points -------------------------------------------------------------------------
 
 
+@functools.cache  # one for all launches
 def while_steps_go_on(function: Callable) -> Callable:
     """Make what a thread does for as long as steps go on: nothing behind one that ended."""
 
@@ -119,7 +121,7 @@ def while_steps_go_on(function: Callable) -> Callable:
 
     for name in ("__name__", "__qualname__", "__module__"):
         setattr(go_on, name, getattr(function, name))
-    return vars(function).setdefault("go_on", go_on)  # one for all launches
+    return go_on
 
 
 def goes_wrong(fate, number):

@@ -159,7 +159,7 @@ def strain(kin, seen, u, response, part):
 
 
 def strained_point(kin, points, laws, response, p):
-    """Law and state of a point before the step, H, and its reference volume."""
+    """Load law and state of a point before the step, H, and its reference volume."""
     law, state = state_at(kin, points, laws, p)
     mass = points.mass[p]
     H = load(response.increment, p, zero(kin, mass))

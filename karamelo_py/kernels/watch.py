@@ -56,7 +56,7 @@ def solid_of(firsts, number):
 
 
 def energies_of(kin, points, laws, p):
-    """Mass and velocity of a point; its energies, kinetic, and stored plus dissipated."""
+    """Find mass and velocity of a point; its energies, kinetic, and stored plus dissipated."""
     law, state = state_at(kin, points, laws, p)
     mass = real(of_present(p, points.mass[p]), 0.0)
     v = tuple([real(x, 0.0) for x in load_vector(kin, points.v, p)])

@@ -192,7 +192,7 @@ class ColumnFormula:
         return cls(hub, argument)
 
     def of(self, points: PointTable) -> np.ndarray:
-        """Numbers (n,) that it has for points that there are."""
+        """Evaluate the formula for each of the points that there are, (n,)."""
         columns = {name: points.particle(name) for name in self.columns}
         return self.formula.evaluate_columns(self.hub.values, columns)
 

@@ -29,7 +29,8 @@ class Tool(NamedTuple):
         """Yield lines (m, d) on its surface, as far as it lies between two corners (d,)."""
         plane = len(lo) == 2
         if self.faces is None:
-            yield from zeros(self.depth, lo, hi, FINE) if plane else wires(self.depth, lo, hi)
+            found = zeros(self.depth, lo, hi, FINE) if plane else section_lines(self.depth, lo, hi)
+            yield from found
             return
         step = np.linalg.norm(hi - lo) / FINE
         for start, end in self.faces if plane else edges(self.faces):
@@ -40,9 +41,9 @@ class Tool(NamedTuple):
 
 
 def outlines(x: np.ndarray) -> list[np.ndarray]:
-    """Lines (m, 2) where half of the material of points x (n, 2) ends.
+    """Draw lines (m, 2) where half of the material of points x (n, 2) ends.
 
-    Each point is shared out to the nodes of cells of its size, over three of them: a node at the
+    Each point is scattered to the nodes of cells of its size, over three of them: a node at the
     surface gets half as much as those within the body beside it.
     """
     cell = spacing(x, 4)
@@ -50,7 +51,7 @@ def outlines(x: np.ndarray) -> list[np.ndarray]:
         return []
     lo = x.min(axis=0) - 4 * cell
     at = (x - lo) / cell
-    filled = smoothed(shared_out(at, tuple((at.max(axis=0) + 6).astype(int))))
+    filled = smoothed(scattered(at, tuple((at.max(axis=0) + 6).astype(int))))
     within = _largest(filled, 2)
     share = np.divide(filled, within, out=np.zeros_like(filled), where=within > 0)
     across, up = (low + cell * np.arange(n) for low, n in zip(lo, filled.shape, strict=True))
@@ -66,8 +67,8 @@ def corners(at: np.ndarray, shape: tuple[int, ...]) -> Iterator[tuple[np.ndarray
         yield np.ravel_multi_index(tuple(node.T), shape), np.prod(1 - abs(at - node), axis=1)
 
 
-def shared_out(at: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """Share places (n, d) out to the nodes around them."""
+def scattered(at: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """Scatter places (n, d) to the nodes around them, by linear weights."""
     found = np.zeros(int(np.prod(shape)))
     for node, weight in corners(at, shape):
         found += np.bincount(node, weight, len(found))
@@ -92,7 +93,7 @@ def smoothed(values: np.ndarray) -> np.ndarray:
 
 
 def zeros(depth: Depth, lo: np.ndarray, hi: np.ndarray, fine: int) -> list[np.ndarray]:
-    """Lines (m, 2) between corners (2,) where a depth is 0; `fine` steps along the longer side."""
+    """Draw lines (m, 2) where a depth is 0 between corners (2,), of `fine` steps the longer way."""
     steps = np.ceil(fine * (hi - lo) / (hi - lo).max()).astype(int)
     x, y = (np.linspace(*ends) for ends in zip(lo, hi, steps + 1, strict=True))
     places = np.stack(np.meshgrid(x, y), axis=-1)
@@ -101,67 +102,98 @@ def zeros(depth: Depth, lo: np.ndarray, hi: np.ndarray, fine: int) -> list[np.nd
     return lines
 
 
-def wires(depth: Depth, lo: np.ndarray, hi: np.ndarray) -> Iterator[np.ndarray]:
+def section_lines(depth: Depth, lo: np.ndarray, hi: np.ndarray) -> Iterator[np.ndarray]:
     """Yield lines (m, 3) on the surface of a tool, as far as it lies between two corners (3,).
 
     They are sections across each axis: at the ends, where faces meet, and between where the surface
     bends. A box has its edges, a ball circles.
     """
+    lattice = _lattice_around(depth, lo, hi)
+    for axis in range(3) if lattice else ():
+        ends = _ends(depth, lattice, axis)
+        if ends and ends[0] < ends[1]:
+            yield from _sections(depth, lattice, axis, ends, (lo[axis], hi[axis]))
 
-    def on_lattice(axes: list) -> np.ndarray:
-        places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-        return depth(places.reshape(-1, 3)).reshape(places.shape[:3])
 
-    first, last = lo, hi
-    for _ in range(3):  # closer around the surface
+class _Lattice(NamedTuple):
+    """Hold places around a surface by coordinates along each axis, their depths, closer bounds."""
+
+    axes: list[np.ndarray]
+    depths: np.ndarray
+    lo: np.ndarray
+    hi: np.ndarray
+
+
+def _on_lattice(depth: Depth, axes: list[np.ndarray]) -> np.ndarray:
+    """Find the depths (n, m, k) of places by their coordinates along each axis."""
+    places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    return depth(places.reshape(-1, 3)).reshape(places.shape[:3])
+
+
+def _lattice_around(depth: Depth, lo: np.ndarray, hi: np.ndarray) -> _Lattice | None:
+    """Find the bounds of a surface between two corners (3,), closer and closer, if it is there."""
+    for _ in range(3):
         axes = [np.linspace(*ends, COARSE) for ends in zip(lo, hi, strict=True)]
-        depths = on_lattice(axes)
+        depths = _on_lattice(depth, axes)
         away = np.abs(depths)
         near = np.nonzero(away < min(np.linalg.norm((hi - lo) / (COARSE - 1)), away.max()))
         if not len(near[0]):
-            return
+            return None
         lo = np.array([a[max(k.min() - 1, 0)] for a, k in zip(axes, near, strict=True)])
         hi = np.array([a[min(k.max() + 1, COARSE - 1)] for a, k in zip(axes, near, strict=True)])
-    for axis, along in enumerate(np.eye(3)):
+    return _Lattice(axes, depths, lo, hi)
 
-        def cut(depths: np.ndarray, axis: int = axis) -> np.ndarray:
-            """Tell of each section whether the surface crosses it."""
-            within = np.moveaxis(depths, axis, 0).reshape(depths.shape[axis], -1) > 0
-            return np.asarray(within.any(axis=1) & ~within.all(axis=1))
 
-        there = np.flatnonzero(cut(depths))
-        ends = []
-        for k, beyond in ((there[0], -1), (there[-1], 1)) if len(there) else ():
-            inner, outer = axes[axis][[k, np.clip(k + beyond, 0, COARSE - 1)]]
-            for _ in range(HALVINGS):
-                middle = [(inner + outer) / 2]
-                crossed = cut(on_lattice([*axes[:axis], middle, *axes[axis + 1 :]]))[0]
-                inner, outer = (middle[0], outer) if crossed else (inner, middle[0])
-            ends.append(inner)
-        if not ends or not ends[0] < ends[1]:
-            continue
-        others = [k for k in range(3) if k != axis]
-        heights = np.linspace(*ends, BETWEEN + 2)
-        apart = (heights[1] - heights[0]) / 2 * along
-        # Depths below an end are known where they are larger than a step of the section.
-        step = (hi[others] - lo[others]).max() / SECTION
-        inset_of = {ends[0]: min(step, apart.sum() / 2), ends[1]: -min(step, apart.sum() / 2)}
-        for height in heights:
-            cut_off = height in (first[axis], last[axis])
-            inset = 0.0 if cut_off else inset_of.get(height, 0.0)
-            section = partial(_section, depth, axis, height + inset)
-            for flat in zeros(section, lo[others], hi[others], SECTION):
-                line = np.insert(flat, axis, height + inset, axis=1)
-                if inset:  # do other faces meet that at the end?
-                    part = inset / 2 * along
-                    slope = (depth(line + part) - depth(line - part)) / inset
-                    shows = abs(inset) < step or np.median(np.abs(slope)) < 0.7
-                elif not cut_off:
-                    bend = np.abs(depth(line + apart) + depth(line - apart))
-                    shows = np.mean(bend > 1e-3 * np.linalg.norm(apart)) > 0.05
-                if cut_off or shows:
-                    line[:, axis] = height
-                    yield line
+def _crossed(depths: np.ndarray, axis: int) -> np.ndarray:
+    """Tell of each section across an axis (n,) whether the surface crosses it."""
+    within = np.moveaxis(depths, axis, 0).reshape(depths.shape[axis], -1) > 0
+    return np.asarray(within.any(axis=1) & ~within.all(axis=1))
+
+
+def _ends(depth: Depth, lattice: _Lattice, axis: int) -> list[float]:
+    """Find the two ends of a surface along an axis, by halvings; none where no section has it."""
+    axes, there = lattice.axes, np.flatnonzero(_crossed(lattice.depths, axis))
+    ends = []
+    for k, beyond in ((there[0], -1), (there[-1], 1)) if len(there) else ():
+        inner, outer = axes[axis][[k, np.clip(k + beyond, 0, COARSE - 1)]]
+        for _ in range(HALVINGS):
+            middle = np.array([(inner + outer) / 2])
+            depths = _on_lattice(depth, [*axes[:axis], middle, *axes[axis + 1 :]])
+            inner, outer = (middle[0], outer) if _crossed(depths, axis)[0] else (inner, middle[0])
+        ends.append(inner)
+    return ends
+
+
+def _sections(
+    depth: Depth, lattice: _Lattice, axis: int, ends: list[float], cuts: tuple[float, float]
+) -> Iterator[np.ndarray]:
+    """Yield the lines (m, 3) of sections across an axis, from end to end, that show the surface.
+
+    All those do that lie in one of the planes which cut it off.
+    """
+    others = [k for k in range(3) if k != axis]
+    lo, hi = lattice.lo[others], lattice.hi[others]
+    heights = np.linspace(*ends, BETWEEN + 2)
+    apart = (heights[1] - heights[0]) / 2 * np.eye(3)[axis]
+    # Depths below an end are known where they are larger than a step of the section.
+    step = (hi - lo).max() / SECTION
+    inset_of = {ends[0]: min(step, apart.sum() / 2), ends[1]: -min(step, apart.sum() / 2)}
+    for height in heights:
+        cut_off = height in cuts
+        inset = 0.0 if cut_off else inset_of.get(height, 0.0)
+        section = partial(_section, depth, axis, height + inset)
+        for flat in zeros(section, lo, hi, SECTION):
+            line = np.insert(flat, axis, height + inset, axis=1)
+            if inset:  # do other faces meet that at the end?
+                part = inset / 2 * np.eye(3)[axis]
+                slope = (depth(line + part) - depth(line - part)) / inset
+                shows = abs(inset) < step or np.median(np.abs(slope)) < 0.7
+            elif not cut_off:
+                bend = np.abs(depth(line + apart) + depth(line - apart))
+                shows = np.mean(bend > 1e-3 * np.linalg.norm(apart)) > 0.05
+            if cut_off or shows:
+                line[:, axis] = height
+                yield line
 
 
 def edges(faces: np.ndarray) -> np.ndarray:
@@ -195,7 +227,7 @@ def _section(depth: Depth, axis: int, height: float, x: np.ndarray) -> np.ndarra
 
 
 class Front:
-    """Heights of what is nearest to the eye, of points seen at x (n, 3), by cells of the picture.
+    """Keep the heights of what is nearest to the eye, of points seen at x (n, 3), by cells.
 
     A point fills its cell and those beside it; up to twice as many `gaps` between them are closed.
     """
@@ -211,7 +243,7 @@ class Front:
         return tuple(np.clip((x[:, :2] - self.low) / self.cell, 0, last).astype(int).T)
 
     def beside(self, x: np.ndarray) -> np.ndarray:
-        """Heights at lines (n, 2) around the points."""
+        """Find the heights of lines (n, 2) around the points."""
         return _largest(self.height, 2)[self._cells(x)]
 
     def outlines(self) -> list[np.ndarray]:

@@ -30,7 +30,7 @@ from karamelo_py.output.outlines import (
     Tool,
     corners,
     outlines,
-    shared_out,
+    scattered,
     smoothed,
     split,
 )
@@ -571,7 +571,7 @@ class SpacePicture(PlanePicture):
         cell = max(1.5 * side, size.max() / 120, np.finfo(float).tiny)
         at = (x - lo) / cell + 2
         shape = tuple((at.max(axis=0) + 3).astype(int))
-        slopes = [slope.ravel() for slope in np.gradient(smoothed(shared_out(at, shape)))]
+        slopes = [slope.ravel() for slope in np.gradient(smoothed(scattered(at, shape)))]
         around = list(corners(at[some], shape))
         normal = -np.transpose([sum(w * slope[k] for k, w in around) for slope in slopes])
         length = np.linalg.norm(normal, axis=1)

@@ -112,7 +112,9 @@ def _part_after_plastic_rate(part, memory, law, kin, j, s, memories, dt):
     return RateMemory(max(memory.rate + change, 0), ep)
 
 
-laws.shown.on(Smoothed)(lambda what, law, kin, state: last_memory(state.m.further).rate)
+@laws.shown.on(Smoothed)
+def _shown_smoothed(what, law, kin, state):
+    return last_memory(state.m.further).rate
 
 
 def last_memory(memories):

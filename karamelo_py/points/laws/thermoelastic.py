@@ -99,7 +99,10 @@ def _kirchhoff_stress_thermoelastic(law, kin, state):
 
 def of_elastic_law(function) -> None:
     """Let a function of a state be that of the elastic law."""
-    function.on(Thermoelastic)(lambda law, kin, state: function(law.elastic, kin, state.elastic))
+
+    @function.on(Thermoelastic)
+    def _of_elastic_law(law, kin, state):
+        return function(law.elastic, kin, state.elastic)
 
 
 of_elastic_law(laws.jacobian)

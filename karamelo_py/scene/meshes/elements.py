@@ -124,7 +124,7 @@ def bulge_of(mesh: meshio.Mesh, group: str | int | None = None) -> float:
 
 
 def _by_corners(name: str, nodes: np.ndarray) -> tuple[str, np.ndarray]:
-    """The elements with their corners alone, which come first: type and nodes (n, c)."""
+    """Reduce elements to their corners, which come first: type and nodes (n, c)."""
     shape = SHAPES.get(name.rstrip("0123456789"))
     return (shape.name, nodes[:, : len(shape.mirrored)]) if shape else (name, nodes)
 

@@ -7,7 +7,17 @@ from karamelo_py.compiler.compile import round_off
 from karamelo_py.compiler.powers import logarithm, power
 from karamelo_py.language.rules import known_failure
 from karamelo_py.language.signature import NonNegative, Positive
-from karamelo_py.points.laws import eos as equations
+from karamelo_py.points.laws.eos import (
+    at_pressure,
+    bulk_modulus,
+    compressed,
+    compression_energy,
+    initial_energy,
+    pressure,
+    ratio_at_pressure,
+    stored_heat,
+    taken_heat,
+)
 from karamelo_py.points.laws.viscosity import artificial_viscosity
 from karamelo_py.script.errors import ScriptError
 
@@ -99,29 +109,27 @@ known_failure(
 )
 
 
-@equations.pressure.on(Tait)
+@pressure.on(Tait)
 def _pressure_tait(eos, j, memory, heat):
     return max(eos.K * (power(j, -eos.gamma) - 1), -eos.tension)
 
 
-@equations.bulk_modulus.on(Tait)
+@bulk_modulus.on(Tait)
 def _bulk_modulus_tait(eos, j, memory, heat):
     return eos.K * eos.gamma * power(j, -eos.gamma)
 
 
-@equations.compression_energy.on(Tait)
+@compression_energy.on(Tait)
 def _compression_energy_tait(eos, j, memory):
     exponent = 1 - eos.gamma
-    whole = (
-        j if eos.tension >= eos.K else min(j, equations.ratio_at_pressure(eos, -eos.tension, ()))
-    )
+    whole = j if eos.tension >= eos.K else min(j, ratio_at_pressure(eos, -eos.tension, ()))
     grown = -logarithm(whole) if exponent == 0 else (1 - power(whole, exponent)) / exponent
     energy = eos.K * (grown - (1 - whole))
     # From there on at constant tension.
     return energy + eos.tension * (j - whole) if j > whole else energy
 
 
-@equations.ratio_at_pressure.on(Tait)
+@ratio_at_pressure.on(Tait)
 def _ratio_at_pressure_tait(eos, p, heat):
     # Tension of K would need an infinite volume.
     borne = max(p, -eos.tension)
@@ -248,38 +256,38 @@ class InternalEnergy(NamedTuple):
     E: Any  # per reference volume
 
 
-equations.initial_energy.on(IdealGas)(lambda eos, like: InternalEnergy(eos.energy))
-equations.stored_heat.on(IdealGas)(lambda eos, loss: loss)
+initial_energy.on(IdealGas)(lambda eos, like: InternalEnergy(eos.energy))
+stored_heat.on(IdealGas)(lambda eos, loss: loss)
 
 
-@equations.compressed.on(IdealGas)
+@compressed.on(IdealGas)
 def _compressed_ideal_gas(eos, memory, before, j, heating):
     # dE = -p dJ has the solution E J^(gamma - 1) = const, whatever the size of the step.
     return InternalEnergy(memory.E * power(before / j, eos.gamma - 1) + heating)
 
 
-@equations.taken_heat.on(IdealGas)
+@taken_heat.on(IdealGas)
 def _taken_heat_ideal_gas(eos, memory, heat):
     # A moment may hold a little more than there was: a cold gas does not pay all of that at once.
     return (max(heat, -0.1 * memory.E),)
 
 
-@equations.pressure.on(IdealGas)
+@pressure.on(IdealGas)
 def _pressure_ideal_gas(eos, j, memory, heat):
     return (eos.gamma - 1) * memory.E / j
 
 
-@equations.bulk_modulus.on(IdealGas)
+@bulk_modulus.on(IdealGas)
 def _bulk_modulus_ideal_gas(eos, j, memory, heat):
     return eos.gamma * (eos.gamma - 1) * memory.E / j
 
 
-@equations.compression_energy.on(IdealGas)
+@compression_energy.on(IdealGas)
 def _compression_energy_ideal_gas(eos, j, memory):
     return memory.E - eos.energy
 
 
-@equations.at_pressure.on(IdealGas)
+@at_pressure.on(IdealGas)
 def _at_pressure_ideal_gas(eos, j, memory, p, heat):
     # The volume stays, the energy follows; a gas bears no tension.
     return j, InternalEnergy(max(p, 0) * j / (eos.gamma - 1))
