@@ -75,7 +75,18 @@ def lenient() -> int:
     return sum(line.count('"') // 2 for line in re.findall(r"^disable_error_code = .*", text, re.M))
 
 
+def lambdas() -> int:
+    """Implementations of point functions without a name, in ``f.on(Tag)(lambda ...)``."""
+    calls = (node for _, node in nodes(ast.Call) if isinstance(node.func, ast.Call))
+    return sum(
+        getattr(call.func.func, "attr", "") == "on" and isinstance(call.args[0], ast.Lambda)
+        for call in calls
+        if call.args
+    )
+
+
 COUNTS = {
+    "point functions that are lambdas": lambdas,
     "functions named `_`": unnamed_functions,
     "names that several classes have": lambda: len(shared_class_names()),
     "docstrings that begin with a question": riddles,
