@@ -323,7 +323,8 @@ def _all(
         ways = ("only", *(x + end for x in "xyz" for end in ("min", "max")))
         given = [f"--{way}" for way in ways if look[way] is not None]
         raise ScriptError(
-            f"{', '.join(given)}: no point of these dumps is left", hint="leave one of these out"
+            f"{', '.join(given)}: no point of these dumps is left",
+            hint="leave it out, or choose more points",
         )
     lo, hi = zip(*corners, strict=True)
     return np.min(lo, axis=0), np.max(hi, axis=0), grown(None, np.array(ends)) if ends else None

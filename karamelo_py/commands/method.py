@@ -130,6 +130,7 @@ def scheme(
     except ScriptError as error:
         if (pair := arguments[-1].keyword() if arguments else None) and not error.hint:
             error.hint = meant(pair[0], ["start"])
+            error.expected = "start=full or start=half" if error.hint else error.expected
         for name in PUBLISHED:  # who asks for these is not at fault
             hub.values.publish(name)
         raise
