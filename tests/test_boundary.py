@@ -124,7 +124,7 @@ def test_the_gradient_of_a_reflected_point_is_a_mirror_image(d):
     assert turned(tuple(np.diag(R)), ()) == ()
 
 
-@pytest.mark.parametrize("d", [1, 2, pytest.param(3, marks=pytest.mark.full)])
+@pytest.mark.parametrize("d", few((1, 2, 3), 1, 2))
 def test_a_single_point_is_deleted_or_reflected_at_the_lower_edge(run_interpreted, d):
     script = single(d, "reflect", "run(100)").replace("all, 9.7", "all, -9.7")
     last = run_interpreted(script).dump("d.100.LAMMPS")
@@ -179,7 +179,7 @@ def test_the_same_bits_in_pieces(state_interpreted, how, scheme):
 
 
 # Compiled, points are reflected in test_lanes.py.
-@pytest.mark.parametrize("how", ["delete", pytest.param("reflect", marks=pytest.mark.full)])
+@pytest.mark.parametrize("how", few(("delete", "reflect"), "delete"))
 @pytest.mark.xdist_group("boundary")
 def test_the_same_bits_on_two_threads(tmp_path, monkeypatch, how):
     monkeypatch.chdir(tmp_path)

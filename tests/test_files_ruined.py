@@ -149,7 +149,7 @@ def test_what_else_fails_while_a_file_is_open_is_not_its_damage(run_interpreted)
 
 @pytest.mark.full
 @needs_mpi
-@pytest.mark.parametrize("halved", [False, pytest.param(True, marks=pytest.mark.full)])
+@pytest.mark.parametrize("halved", [False, True])
 def test_few_points_that_one_of_two_processes_has(tmp_path, halved):
     """Files of two are those of one, and two go on from them; lines and warnings come once."""
     lines = HALVED if halved else ("set_dt(0.004)", "run(8)")

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numba import config
+from selection import few
 
 from karamelo_py.compiler.gpu import Emulator
 from karamelo_py.kernels.arrays import arrays_of
@@ -91,7 +92,7 @@ fix(push, velocity_particles, top, 0.1*cos(40*time) + 1e-4*base_y, NULL)
 """
 
 
-@pytest.mark.parametrize("method", ["ulmpm", pytest.param("tlmpm", marks=pytest.mark.full)])
+@pytest.mark.parametrize("method", few(("ulmpm", "tlmpm"), "ulmpm"))
 def test_fixes(method):
     """Walls with friction in common nodes, formulas, forces on points; the balance of energy.
 

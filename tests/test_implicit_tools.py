@@ -261,9 +261,7 @@ SQUEEZED = """
 
 
 @pytest.mark.full
-@pytest.mark.parametrize(
-    "basis", ["quadratic-spline", pytest.param("cubic-spline", marks=pytest.mark.full)]
-)
+@pytest.mark.parametrize("basis", ["quadratic-spline", "cubic-spline"])
 def test_splines_rub(run_script, basis):
     """Nodes beside the body, which bear next to nothing, slide: Newton's method ends."""
     log_of = run_script(SQUEEZED, "-var", "basis", basis).log

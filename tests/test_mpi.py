@@ -28,7 +28,6 @@ needs_mpi = pytest.mark.skipif(
     MPIEXEC is None or find_spec("mpi4py") is None or sys.platform == "win32",
     reason="needs mpi4py and mpiexec: pip install '.[mpi]'",
 )
-FULL = pytest.mark.full
 PROGRAM = [sys.executable, "-m", "karamelo_py.app.start"]
 FILES = (
     "dump(d, all, particle, 10, d.txt, x, y, vx, s11)", "dump(n, all, grid/hdf5, 20, n.h5, mass)",
@@ -72,7 +71,7 @@ def moving(folder: Path, *lines: str, size: float = 0.2) -> Path:
 @pytest.mark.full
 @needs_mpi
 @pytest.mark.xdist_group("disks")
-@pytest.mark.parametrize("further", [False, pytest.param(True, marks=FULL)])
+@pytest.mark.parametrize("further", [False, True])
 def test_compiled_in_the_plane(tmp_path, further):
     """Two processes, which both compile; three go `further` from their file.
 
@@ -245,12 +244,7 @@ def running(folder: Path, *lines: str, **more: str) -> subprocess.Popen:
 @pytest.mark.full
 @needs_mpi
 @pytest.mark.parametrize(
-    ("rank", "number"),
-    [
-        (None, signal.SIGTERM),
-        pytest.param(1, signal.SIGTERM, marks=FULL),
-        pytest.param(1, signal.SIGINT, marks=FULL),
-    ],
+    ("rank", "number"), [(None, signal.SIGTERM), (1, signal.SIGTERM), (1, signal.SIGINT)]
 )
 def test_a_signal(tmp_path, rank, number):
     """As with one process: the last state, whole files, 128 + its number; whoever gets it."""
@@ -273,7 +267,7 @@ time.sleep(60)
 
 @pytest.mark.full
 @needs_mpi
-@pytest.mark.parametrize("ranks", [pytest.param("1", marks=FULL), "2"])
+@pytest.mark.parametrize("ranks", ["1", "2"])
 def test_a_signal_before_the_run(tmp_path, ranks):
     """One message, and nothing is left behind."""
     (tmp_path / "slow.py").write_text(SLOW, encoding="utf-8")
@@ -290,7 +284,7 @@ def test_a_signal_before_the_run(tmp_path, ranks):
 
 @pytest.mark.full
 @needs_mpi
-@pytest.mark.parametrize("words", [pytest.param((), marks=FULL), ("--ranks", "2")])
+@pytest.mark.parametrize("words", [(), ("--ranks", "2")])
 def test_a_signal_amid_the_first_picture(tmp_path, words):
     """It is drawn, and the run takes no step."""
     path = moving(tmp_path, "dump(d, all, pyplot, 1000, d.*.png, 30, 30, vx)", "run(2)")
@@ -333,7 +327,7 @@ def test_a_process_is_stopped(tmp_path):
 
 @pytest.mark.full
 @needs_mpi
-@pytest.mark.parametrize("rank", [pytest.param(0, marks=FULL), 1])
+@pytest.mark.parametrize("rank", [0, 1])
 def test_a_process_is_killed(tmp_path, rank):
     process = running(tmp_path)
     os.kill(_pids(process.pid)[rank], signal.SIGKILL)
@@ -404,7 +398,7 @@ if os.environ.get("OMPI_COMM_WORLD_RANK") == "1":
 @pytest.mark.parametrize(
     "function",
     [
-        pytest.param("simulation.Simulation._advance", marks=FULL),
+        "simulation.Simulation._advance",
         "partition.SharedTiles.give",
         "conserved.LinearMomentum.terms",
     ],
@@ -442,7 +436,7 @@ FAILS = "def push(points):\n    if points.time > 0.01:\n        points.force[999
     "line, says",
     [
         ("dump(d, all, particle, 5, d.*.txt, x)", "Read-only file system"),
-        pytest.param("dump(d, all, vtk, 5, d.*.vtu)", "Read-only file system", marks=FULL),
+        ("dump(d, all, vtk, 5, d.*.vtu)", "Read-only file system"),
         ("restart(5, r.*.h5)", "Read-only file system"),
         ("fix(f, python, all, fails.push)", "index 99999 is out of bounds"),
     ],
@@ -516,17 +510,9 @@ PART_OF_ALL = """
 @pytest.mark.parametrize(
     "line, says",
     [
-        pytest.param(
-            "second and points.total(points.mass)",
-            "to its end on one process, and to a total on",
-            marks=pytest.mark.full,  # test_ranks.py has it of a function
-        ),
+        ("second and points.total(points.mass)", "to its end on one process, and to a total on"),
         ("self.publish('x', points.position[:, 0].sum())", "fix drag: air_x is "),
-        pytest.param(
-            "self.publish('x', points.total(points.mass))",
-            "",
-            marks=pytest.mark.full,  # likewise
-        ),
+        ("self.publish('x', points.total(points.mass))", ""),
     ],
 )
 def test_a_plug_in_looks_at_its_part_alone(tmp_path, line, says):

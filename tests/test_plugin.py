@@ -15,6 +15,7 @@ from conftest import interpreting
 from going_on import goes_on, same_files
 from plugged import PLUGIN, install
 from scenes import block
+from selection import few
 
 pytestmark = [pytest.mark.xdist_group("plugin"), pytest.mark.usefixtures("starts_are_cheap")]
 PYTHON = sys.executable  # which compiles, too
@@ -264,7 +265,7 @@ run({steps})
 """
 
 
-@pytest.mark.parametrize("style", ["air_drag", pytest.param("node_drag", marks=pytest.mark.full)])
+@pytest.mark.parametrize("style", few(("air_drag", "node_drag"), "air_drag"))
 def test_a_force_by_the_whole_velocity(run_interpreted, style):
     """dv/dt = -c |v| v: v = v0/(1 + c |v0| t), of first order in dt."""
     done = run_interpreted(AIR.format(steps=100).replace("air_drag", style))
@@ -382,9 +383,7 @@ def dose_of(x0, steps):
     return 2e-3 * np.exp(-x0 / 5) * (1 - q**steps) / (1 - q)
 
 
-@pytest.mark.parametrize(
-    "cut", [pytest.param("run(100)", marks=pytest.mark.full), "run(41)\nrun(59)"]
-)
+@pytest.mark.parametrize("cut", few(("run(100)", "run(41)\nrun(59)"), "run(41)\nrun(59)"))
 def test_a_field_of_a_fix_and_its_column(run_interpreted, cut):
     done = run_interpreted(IRRADIATED + cut)
     for step, left in ((50, 8), (100, 4)):
@@ -420,11 +419,10 @@ LATE = """
 region(late, block, 1, 1.5, 0.75, 1.25)
 solid(late, region, late, 2, m, 0.25)
 """
+GROWING = f"run(15){LATE}run(15)"
 
 
-@pytest.mark.parametrize(
-    "cut", [pytest.param("run(30)", marks=pytest.mark.full), f"run(15){LATE}run(15)"]
-)
+@pytest.mark.parametrize("cut", few(("run(30)", GROWING), GROWING))
 def test_a_field_of_nodes_and_its_column(state_interpreted, run_interpreted, tmp_path, cut):
     """Free flight: all nodes that the body has come over know its speed, exactly."""
     goes_on(run_interpreted, FLYING + cut)

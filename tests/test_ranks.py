@@ -12,6 +12,7 @@ import pytest
 from combinations import MESHED, scene, write_mesh
 from going_on import CURVE, SCENES, same_files, with_files
 from scenes import SCHEMES, block
+from selection import few
 from states import same_bits
 from test_contact_points import bodies
 from test_heat import HOT, slab
@@ -46,10 +47,7 @@ def test_schemes(state_interpreted, tmp_path, scheme, transfer):
     assert shared(state_interpreted, tmp_path, with_files(script, "restart(5, r.*.h5)\n"))
 
 
-@pytest.mark.parametrize(
-    "name",
-    [pytest.param("bench", marks=pytest.mark.full), *(name for name in SCENES if name != "bench")],
-)
+@pytest.mark.parametrize("name", few(SCENES, *(name for name in SCENES if name != "bench")))
 def test_every_part(state_interpreted, tmp_path, name):
     """Contact, heat, damage, edges, tools, computes that look back."""
     (tmp_path / "curve.csv").write_text(CURVE, encoding="utf-8")
@@ -85,14 +83,7 @@ NODES = (
 )
 
 
-@pytest.mark.parametrize(
-    "method",
-    [
-        pytest.param("ulmpm", marks=pytest.mark.full),
-        pytest.param("tlmpm", marks=pytest.mark.full),
-        "ulmpm/contacts",
-    ],
-)
+@pytest.mark.parametrize("method", few(("ulmpm", "tlmpm", "ulmpm/contacts"), "ulmpm/contacts"))
 def test_nodes_in_pieces(state_interpreted, tmp_path, method):
     """Also what points bring to nodes for a dump alone, and before the first step."""
     script = block(2, *NODES, *MOVING, "run(11)", size=(0.3, 0.2))
@@ -122,7 +113,7 @@ def test_what_is_asked_between_two_runs(state_interpreted, tmp_path):
     assert shared(state_interpreted, tmp_path, script)
 
 
-@pytest.mark.parametrize("dimension", [1, 2, pytest.param(3, marks=pytest.mark.full)])
+@pytest.mark.parametrize("dimension", few((1, 2, 3), 1, 2))
 def test_pictures(state_interpreted, tmp_path, dimension):
     """From far to near, with the light of all points; 16 of them after others."""
     script = block(
@@ -160,9 +151,7 @@ TOUCHING = {
 }
 
 
-@pytest.mark.parametrize(
-    "changes", [{}, pytest.param(TOUCHING, marks=pytest.mark.full)], ids=["one body", "contact"]
-)
+@pytest.mark.parametrize("changes", few(({}, TOUCHING), {}), ids=["one body", "contact"])
 def test_a_step_that_is_halved(state_interpreted, tmp_path, changes):
     """Each process goes back to what it kept; files hold it, as those of one process do."""
     script = block(2, *HALVED, size=(0.3, 0.2), scheme="usavg" if changes else "musl")
@@ -382,7 +371,7 @@ def test_tiles_are_cut_by_work(monkeypatch, costs, tiles_of_first):
     assert np.count_nonzero(two.owner[:8] == 0) == tiles_of_first
 
 
-@pytest.mark.parametrize("scheme", ["usf", pytest.param("usavg", marks=pytest.mark.full)])
+@pytest.mark.parametrize("scheme", few(("usf", "usavg"), "usf"))
 def test_touching_bodies_on_their_way(state_interpreted, tmp_path, scheme):
     """What contact remembers of a node goes with it from process to process."""
     script = f"""
@@ -405,9 +394,7 @@ run(12)
     assert shared(state_interpreted, tmp_path, with_files(script), ranks=3)
 
 
-@pytest.mark.parametrize(
-    "method", [pytest.param("ulmpm", marks=pytest.mark.full), "ulmpm/contacts"]
-)
+@pytest.mark.parametrize("method", few(("ulmpm", "ulmpm/contacts"), "ulmpm/contacts"))
 def test_points_moved_by_python(state_interpreted, tmp_path, method):
     """At the start of a step, in each of them: others have the points then."""
     script = block(

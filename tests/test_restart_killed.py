@@ -35,7 +35,7 @@ def started(folder: Path, *options: str) -> subprocess.Popen:
 @pytest.mark.full
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows ends processes otherwise")
 @pytest.mark.xdist_group("neo-hookean")
-@pytest.mark.parametrize("kills", [3, pytest.param(100, marks=pytest.mark.full)])
+@pytest.mark.parametrize("kills", [3, 100])
 def test_killed_at_any_moment(tmp_path, kills):
     """SIGKILL: every file is readable, and what goes on is as if nothing had happened."""
     whole = tmp_path / "whole"
