@@ -256,14 +256,25 @@ SPLASH = """
 """
 
 
-@pytest.mark.full
-def test_going_back_leaves_no_contact_behind(run_script):
+# Nearer to the block and to the edge, in a fifth of the cells and a quarter of the steps.
+NEARER = {
+    "0, 10, 0.01": "1.4, 2.5, 0.01", "block, 1, 1.02": "block, 1.5, 1.52",
+    "9.325, 9.335": "2.345, 2.355", "run(99)": "run(25)",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("nearer", few((NEARER, {}), NEARER))
+def test_going_back_leaves_no_contact_behind(run_interpreted, nearer):
     """The splash leaves some steps after the bullet has hit; the run goes back to before the hit.
 
     Nothing of the first try may be left on the nodes. A group without points shows 0.
     """
-    stays = run_script(SPLASH.format(v=0), folder="stays").log
-    leaves = run_script(SPLASH.format(v=50), folder="leaves").log
+    text = SPLASH
+    for old, new in nearer.items():
+        assert old in text
+        text = text.replace(old, new)
+    stays = run_interpreted(text.format(v=0), folder="stays").log
+    leaves = run_interpreted(text.format(v=50), folder="leaves").log
     assert stays.b_x[-1] < 0  # the bullet has hit
     assert (leaves.a_x[-1], leaves.b_x[-1]) == (stays.a_x[-1], stays.b_x[-1])
     assert leaves.c_x[0] == 50 and leaves.c_x[-1] == 0

@@ -382,10 +382,9 @@ EVERY = """region(every, block, -INF, INF, -INF, INF)
     fix(g, body_force, all, 0, -10)"""
 
 
-@pytest.mark.full
-def test_a_body_falls(run_script):
+def test_a_body_falls(run_interpreted):
     """v = g t, behind another scheme, too."""
-    out = run_script(AT_REST.format(lines=BEFORE, columns="")).out
+    out = run_interpreted(AT_REST.format(lines=BEFORE, columns="")).out
     last = [line.split() for line in out.splitlines() if line[:2] == "18"][-1]
     assert float(last[2]) == pytest.approx(0.125 * (0.1 * float(last[1])) ** 2, rel=2e-2)
 
@@ -492,6 +491,22 @@ def test_a_run_ends_at_the_limit_load(run_script):
     assert result.log["F"][-1] == pytest.approx(2 / sqrt(3), rel=0.01)
     result = run_script(text.replace("limit=stop", "limit=error"), *words, status=1, folder="error")
     assert "there is no equilibrium" in result.err
+
+
+def test_a_cell_bears_its_limit_load(run_interpreted):
+    """The points at the end, h/4 within the cell, pull its nodes there by 3/4 of their force.
+
+    Eight corrections are enough, or no number of them is.
+    """
+    text = patch(BEYOND).replace("pull_x", "F").replace("material(m, linear, 1, 1000, 0.25)", STEEL)
+    text = text.replace("0, 1.4, 0, 1, 0.1", "0, 2, 0, 2, 1").replace("m, 0.1", "m, 1")
+    text = text.replace("0.95, INF", "0.5, INF")
+    text = text.replace("quasi-static", "quasi-static, limit=stop, stabilisation=0, iterations=8")
+    result = run_interpreted(text)
+    assert "limit load: no equilibrium beyond time 3.0" in result.out
+    assert 0.75 * result.log["F"][-1] == pytest.approx(2 / sqrt(3), rel=0.01)
+    error = run_interpreted(text.replace("limit=stop", "limit=error"), status=1, folder="error")
+    assert "there is no equilibrium" in error.err
 
 
 def test_multigrid_solves_as_a_direct_solver(run_script):

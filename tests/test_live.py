@@ -2,11 +2,14 @@
 
 import json
 import os
+import re
 import shutil
+import subprocess
 import threading
 import urllib.error
 import urllib.request
 from contextlib import contextmanager
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -105,6 +108,30 @@ def test_a_page_answers_only_behind_its_secret_word(simulation):
     page.close()
     with pytest.raises(urllib.error.URLError):
         get(page.address)
+
+
+def test_all_that_pages_load_is_there_and_can_be_read(simulation, tmp_path):
+    """The files of both pages, whole; their code is that of JavaScript (where Node.js is there)."""
+    run, study = simulation.live(), StudyPage(simulation.hub.folder / "in.bar", ["N"], ["Ek"])
+    source = Path(run_pages.__file__).parent
+    for address, name, more in (
+        (run.address, "run.html", ["plotly.js", "points.js"]),
+        (study.server.address, "study.html", ["plotly.js"]),
+    ):
+        page = get(address)
+        assert page == (source / name).read_bytes()
+        text = page.decode()
+        assert re.findall(r'<script src="(.*?)">', text) == more
+        assert get(address, "points.js") == (source / "points.js").read_bytes()
+        codes = {"points.js": get(address, "points.js").decode()}
+        codes["inline.js"] = "".join(re.findall(r"<script>(.*?)</script>", text, re.S))
+        for file, code in codes.items():
+            assert len(code) > 1000, file
+            (tmp_path / file).write_text(code, encoding="utf-8")
+            if shutil.which("node"):
+                subprocess.run(["node", "--check", file], cwd=tmp_path, check=True)
+    run.close()
+    study.server.close()
 
 
 def test_a_run_is_followed_and_keeps_its_bits(simulation, tmp_path):

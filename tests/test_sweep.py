@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 
 import numpy as np
@@ -16,6 +17,7 @@ import pytest
 from karamelo_py.app.cli import main
 from karamelo_py.app.plot import read_log
 from karamelo_py.app.studies import case, records, study, variables, warm
+from karamelo_py.app.studies.case import Launch
 from karamelo_py.script.errors import ScriptError
 
 # A block in free flight: its velocity is 3 times the word's factor, and it leaves where it is told.
@@ -116,6 +118,37 @@ def test_what_is_known_is_not_run_again(folder, capsys):
     marked.write_text("not run again", encoding="utf-8")
     assert main([*command, "-again"]) == 0
     assert marked.read_text() != "not run again"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows interrupts otherwise")
+@pytest.mark.usefixtures("starts_are_cheap")
+def test_a_sweep_that_is_interrupted_amid_a_run_goes_on(folder, monkeypatch, capsys):
+    """Ctrl-C in the second of two runs, which ends; in a process of its own if ``-m full``."""
+    words = ["in.flight", "-var", "speed=3,4", "-var", "steps=4000000", "-jobs", "1"]
+    (folder / "in.flight").write_text(
+        SCRIPT.replace("run(steps)", "run(if(speed == 3, 4, steps))"), encoding="utf-8"
+    )
+    log = folder / "sweep" / "speed=4,steps=4000000" / "log.mpm"
+    run, begun = Launch.run, []
+
+    def press():
+        until = time.monotonic() + 60
+        while not log.exists() and time.monotonic() < until:
+            time.sleep(0.01)
+        signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
+
+    def counted(launch, case, place):
+        begun.append(case["speed"])
+        if begun == ["3", "4"]:
+            threading.Thread(target=press).start()
+        return run(launch, case, place)
+
+    monkeypatch.setattr(Launch, "run", counted)
+    assert main(["sweep", *words]) == 130
+    assert "1 of 2 runs are in sweep.csv; the same command goes on" in capsys.readouterr().err
+    assert main(["sweep", *words, "-limit", "0.3"]) == 0
+    assert begun == ["3", "4", "4"]
+    assert [row["status"] for row in records.read(folder / "sweep.csv")] == ["done", "too long"]
 
 
 @pytest.mark.full

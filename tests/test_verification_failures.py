@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from conftest import INPUTS
 from scenes import SCHEMES
-from selection import parameters
+from selection import few, parameters
 from states import same_bits
 from verification import LINEAR, QUADRATIC, TOTAL, errors_on, run_scene, table
 
@@ -119,12 +119,17 @@ def test_flip_keeps_a_sawtooth_pic_and_xpic_take_it_away(run):
     assert modes[2] > 0.996
 
 
-@pytest.mark.full
-def test_flip_rings_behind_a_wave(run):
+@pytest.mark.parametrize(
+    ("size", "flip", "xpic", "apic"),
+    # In a shorter bar the front of the wave, which takes some cells, is a larger part.
+    parameters([({"L": 10}, 0.2, 0.08, 0.15)], [({}, 0.15, 0.025, 0.1)]),
+)
+def test_flip_rings_behind_a_wave(run, size, flip, xpic, apic):
     """Behind the wave the bar is at rest: FLIP leaves a fifth of the velocity, XPIC a fiftieth."""
-    assert run("flip_noise").log.noise[-1] > 0.15
-    assert run("flip_noise", cure=1).log.noise[-1] < 0.025
-    assert run("flip_noise", transfer="APIC", order="mechanical").log.noise[-1] < 0.1
+    assert run("flip_noise", **size).log.noise[-1] > flip
+    assert run("flip_noise", **size, cure=1).log.noise[-1] < xpic
+    way = {"transfer": "APIC", "order": "mechanical"}
+    assert run("flip_noise", **size, **way).log.noise[-1] < apic
 
 
 @pytest.mark.full
@@ -164,19 +169,20 @@ def gaps(result):
     return np.diff(points.x[np.argsort(points.x0)]) / 0.5
 
 
-@pytest.mark.full
-def test_a_stretched_bar_breaks_without_reason(run):
+# A shorter and softer one takes a quarter of the steps, which are as many per passage of a wave.
+@pytest.mark.parametrize("size", few(({"L": 3, "T": 3, "E": 25}, {}), {"L": 3, "T": 3, "E": 25}))
+def test_a_stretched_bar_breaks_without_reason(run, size):
     """To three times its length: the force breaks off, and the points gather to lumps.
 
     Total Lagrangian the stress is the exact one of neo-Hookean tension within a tenth (the last
     cell, which is pulled, drags its neighbour less than it should), and distances grow alike.
     """
-    broken = run("numerical_fracture")
+    broken = run("numerical_fracture", **size)
     assert np.abs(broken.log.stress[-1]) < 0.2 * broken.log.exact[-1]
-    assert gaps(broken).max() > 3 * np.median(gaps(broken))
-    whole = run("numerical_fracture", cure=1)
+    assert gaps(broken).max() > 2.5 * np.median(gaps(broken))
+    whole = run("numerical_fracture", **size, cure=1)
     assert whole.log.stress[5:] == pytest.approx(whole.log.exact[5:], rel=0.15)
-    assert gaps(whole)[:-2] == pytest.approx(np.full(5, 3.0), rel=0.15)
+    assert gaps(whole)[:-2] == pytest.approx(3.0, rel=0.15)
 
 
 @pytest.mark.full
@@ -188,6 +194,20 @@ def test_quadrilaterals_tangle_and_say_so(run):
     assert run("cpdi_tangle", kind="tlcpdi").log.Time[-1] == 0.2
 
 
+def test_a_small_square_tangles_and_says_so(run_interpreted):
+    """16 points, stirred faster and in larger steps: Q4 folds within 8, R4 goes on."""
+    text = (FAILURES / "in.cpdi_tangle").read_text(encoding="utf-8")
+    for old, new in {
+        "0.4, 0.7, 0.4, 0.7": "0.5, 0.7, 0.5, 0.7", "3*sin(": "5*sin(",
+        "dt_factor(0.5)": "dt_factor(0.9)", "run_time(0.2)": "run_time(0.11)",
+    }.items():  # fmt: skip
+        assert old in text
+        text = text.replace(old, new)
+    said = run_interpreted(text, status=1).err
+    assert "is tangled: one of its corners folds over" in said and "R4 in the place of Q4" in said
+    assert run_interpreted(text, "-var", "cure", "1").log.Time[-1] == 0.11
+
+
 @pytest.mark.full
 def test_diagonal_boxes_vanish_in_a_turn(run):
     """At 90 degrees points of 1 and 1/2 cell beside a node leave a force of half the stress.
@@ -197,6 +217,22 @@ def test_diagonal_boxes_vanish_in_a_turn(run):
     """
     assert run("cpgimp_turn").log.force[-1] == pytest.approx(0.5, rel=0.06)
     assert run("cpgimp_turn", steps=15, cure=1).log.force[-1] < 0.06
+
+
+def test_diagonal_boxes_vanish_in_a_small_turn(run_interpreted):
+    """Nine cells, which the node in the middle sees none beyond, in 8 steps.
+
+    Found: 0.43 and 0.05; such steps are less of a turn, by which the box is not quite gone.
+    """
+    text = (FAILURES / "in.cpgimp_turn").read_text(encoding="utf-8")
+    for old, new in {
+        ", -2, 2)": ", -1, 2)", "block, 0, 2": "block, 0, 1", "steps = 30": "steps = 8",
+    }.items():  # fmt: skip
+        assert old in text
+        text = text.replace(old, new)
+    failure, cure = (run_interpreted(text, "-var", "cure", c).log.force[-1] for c in "01")
+    assert failure == pytest.approx(0.5, rel=0.15)
+    assert cure < 0.06
 
 
 # --- Tiny masses --------------------------------------------------------------------------------
@@ -426,16 +462,17 @@ def touched(log):
     return log.Time[np.abs(log.velocity - 1) > 0.01][0]
 
 
-@pytest.mark.full
-def test_bars_on_one_grid_touch_early_and_stick(run):
+# Shorter bars feel each other for less time, softer ones take fewer steps, which are longer.
+@pytest.mark.parametrize(("size", "late"), parameters([({"L": 2, "E": 25}, 0.2)], [({}, 0.15)]))
+def test_bars_on_one_grid_touch_early_and_stick(run, size, late):
     """They touch at t = 2; on one grid earlier by what the functions overlap, 3/2 cells at most.
 
     Bars that touch and are moved apart do not feel each other but on one grid.
     """
-    assert 2 - 1.5 < touched(run("early_contact").log) < 2 - 0.5
-    # The points' balls touch when the bars do, to within a step.
-    assert touched(run("early_contact", cure=1).log) == pytest.approx(2, abs=0.15)
-    apart = partial(run, "early_contact", gap=0, v=-0.5)
+    assert 2 - 1.5 < touched(run("early_contact", **size).log) < 2 - 0.5
+    # The points' balls touch when the bars do, to within a line of the log: two steps.
+    assert touched(run("early_contact", **size, cure=1).log) == pytest.approx(2, abs=late)
+    apart = partial(run, "early_contact", **size, gap=0, v=-0.5)
     assert apart().log.velocity.min() < 0.2
     for cure in ({"cure": 1}, {"kind": "ulmpm/contacts"}):
         assert apart(**cure).log.velocity == pytest.approx(1, abs=1e-12)
@@ -567,11 +604,12 @@ def test_water_does_not_hold_unless_it_is_told_to(run):
 # --- Order of sums ------------------------------------------------------------------------------
 
 
-@pytest.mark.full
-def test_another_order_of_points_gives_other_bits_and_the_same_numbers(state_interpreted):
+@pytest.mark.parametrize("steps", few((4, 30), 4))
+def test_another_order_of_points_gives_other_bits_and_the_same_numbers(state_interpreted, steps):
     """Solids in another order: round-off. The same order: the same bits (tests/test_identical.py:
     with any number of threads)."""
     text = (FAILURES / "in.order_of_sums").read_text(encoding="utf-8")
+    text = text.replace("run(30)", f"run({steps})")
     columns = ("x", "y", "vx", "vy")
     there, again, other = (
         state_interpreted(text.replace("cure  = 0", f"cure  = {cure}"), *columns)
