@@ -208,11 +208,15 @@ def _along_cubic_spline(basis, kin, grid, place, direction):
         bulk = where(below | above, False, bulk)
     if all_lanes(bulk):
         return line
-    return where(bulk, line, at_wall(grid, a, cell, last, below, above))
+    other = at_wall(grid, a, cell, last, below, above, inside=len(walls) > 0)
+    return where(bulk, line, other)
 
 
-def at_wall(grid, a, cell, last, below, above):
-    """The modified functions of a cell at a wall; nodes that make up the four have no weight."""
+def at_wall(grid, a, cell, last, below, above, inside):
+    """The modified functions of a cell at a wall; nodes that make up the four have no weight.
+
+    Without walls `inside` the grid only its one cell is between two.
+    """
     first = max(min(cell - 1, last - 3), 0)
     between = hats(grid, a, cell, first, 4)  # what is left of both walls at once
     between = between._replace(affine=between.gradients)
@@ -228,7 +232,8 @@ def at_wall(grid, a, cell, last, below, above):
         tuple([where(behind, *pair) for pair in zip((0, *of), (*of, 0), strict=True)])
         for of in (n, g, c)
     ]
-    return where(below & above, between, product.Along(first, a - first, n, g, c))
+    line = product.Along(first, a - first, n, g, c)
+    return where(below & above, between, line) if inside else line
 
 
 def beside_wall(grid, t):
