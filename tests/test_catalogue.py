@@ -99,6 +99,8 @@ def test_help_finds_an_argument_and_what_it_may_be(capsys, word):
         ("contact", ["fix contact/friction", "fix contact/surface", "method ulmpm/contacts"]),
         ("Gravity", ["fix body_force"]),
         ("sand", ["strength drucker-prager"]),
+        ("Landslide", ["strength drucker-prager"]),
+        ("hold a wall", ["fix velocity_nodes"]),
         ("heat", ["fix heat_flux_particles", "command temperature"]),
     ],
 )

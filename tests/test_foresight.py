@@ -525,6 +525,25 @@ def test_units_are_named_where_the_step_is_far_above_the_stable_one(
     assert ("in mm, t, s 1e-9" in result.err) == told
 
 
+@pytest.mark.parametrize("command", ["run", "check"])
+@pytest.mark.parametrize(
+    ("lines", "told"),
+    [
+        (["run_time(1e-4)"], True),
+        (["run_time(1e-4)", "run_time(0.02)"], False),
+        (["run_time(0.02)"], False),
+        (["run_time(0)"], False),
+        (["run(1)"], False),
+    ],
+)
+def test_one_step_for_the_whole_run_is_told(run_interpreted, command, lines, told):
+    """Waves of 8.2 cross cells of 0.1 in 0.012."""
+    start = "fix(v, initial_velocity_particles, all, 0.01, 0)"
+    said = run_interpreted(block(2, start, *lines), command=command).err
+    assert ("one step covers the whole run, where one of 0.012" in said) == told
+    assert ("units of densities, moduli, lengths and times may be mixed" in said) == told
+
+
 @pytest.mark.parametrize(("v", "told"), [(-100, False), (-1000, True)])
 def test_speeds_that_no_solid_bears_are_told(run_interpreted, v, told):
     """Waves of 8.2 there."""

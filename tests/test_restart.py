@@ -489,6 +489,10 @@ def test_a_file_in_a_folder_below_is_shown(run_interpreted):
     shutil.copy(folder / "r.2.h5", below)
     said = run_interpreted(f"{FLY}read_restart(r.2.h5)", status=1, folder="other").err
     assert "hint: there is out/r.2.h5" in said
+    (below.parent / "z").mkdir()
+    shutil.copy(folder / "r.2.h5", below.parent / "z")
+    said = run_interpreted(FLY, "-out", "out", "-restart", "r.2.h5", status=1, folder="other").err
+    assert "hint: there is out/r.2.h5" in said
 
 
 def test_files_that_are_gone_begin_anew(run_interpreted):

@@ -282,6 +282,15 @@ def test_syntax(text, column, part, tmp_path):
     check("good = 1\n" + text, 1, column, part, tmp_path)
 
 
+@pytest.mark.parametrize("before", ["", "** Job name: bar\n**\n"])
+def test_an_input_file_of_abaqus_is_told_in_one_message(before, tmp_path):
+    with pytest.raises(ScriptError) as caught:
+        run(before + "*Heading\n A bar\n*Node\n1, 0., 0.\n*End Step", tmp_path)
+    said = caught.value.render()
+    assert "error: this is an input file of Abaqus" in said and "| *Heading\n" in said
+    assert said.count("error: ") == 1 and "hint: docs/howto/from-abaqus.md" in said
+
+
 @pytest.mark.parametrize(("text", "column", "part"), [*NAMES, *VALUES])
 def test_names_and_values(text, column, part, tmp_path):
     check("# nothing\n" + text, 1, column, part, tmp_path)

@@ -71,7 +71,7 @@ def test_a_sweep_is_a_table_that_pandas_reads(folder, capsys):
         axis=None
     )
     assert (good["bytes_per_particle"] > 8 * 5).all() and (good["dt"] == 0.01).all()
-    assert bad["reason"].str.contains("unknown basis style 'cubic'").all()
+    assert bad["reason"].str.contains("unknown basis style 'cubic'; did you mean 'cubic-").all()
     assert (folder / good["folder"].iloc[0] / "log.mpm").exists()
     out = capsys.readouterr().out
     assert "2 of 4 runs are done, 2 are not" in out

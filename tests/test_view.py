@@ -145,6 +145,13 @@ def test_points_that_move_stay_in_view(tmp_path, monkeypatch):
         (["p.dump", "-o", "p.jpg"], ".pdf"),
         (["p.dump", "--cmap", "rainbows"], "rainbows"),
         (["p.dump", "--only", "vxx > 0"], "vxx"),
+        (
+            ["p.dump", "--only", "type = 2"],
+            "| type = 2\n      |      ^\nexpected: name = expression",
+        ),
+        (["p.dump", "--only", "type = 2"], "hint: compare with =="),
+        (["p.dump", "--outlines", "yes"], "| yes\n"),
+        (["p.dump", "--outlines"], "expected: --outlines true|false"),
         (["p.dump", "--xmin", "2", "--xmax", "1"], "above xmin"),
         (["p.dump", "--scale", "log", "--vmin", "0"], "above 0"),
         (["p.dump", "--quantile", "0.6"], "from 0 to 0.4"),

@@ -10,7 +10,7 @@ from karamelo_py.language import registry
 from karamelo_py.language.help import Help, describe
 from karamelo_py.language.signature import Parameter
 from karamelo_py.output.console import Console
-from karamelo_py.script.errors import ScriptError, meant
+from karamelo_py.script.errors import ScriptError, meant, table
 
 COMMAND = "command"
 STYLES_USAGE = "karamelo-py styles [FAMILY]"
@@ -74,7 +74,7 @@ def print_styles(given: Sequence[str]) -> int:
     return 0
 
 
-def print_help(given: Sequence[str]) -> int:
+def print_help(given: Sequence[str], commands: Iterable[str] = ()) -> int:
     """Explain what a name means, or a family and a name; returns the exit status."""
     if len(given) > 2:
         raise ScriptError(f"too many arguments: {' '.join(given)}", expected=HELP_USAGE)
@@ -100,7 +100,8 @@ def print_help(given: Sequence[str]) -> int:
         page.rows([(f"{family} {style}", family, style) for family, style in related])
     if found or related:
         return 0
-    raise _unknown("command or style", name, {n for f in families() for n in registry.names(f)})
+    names = {n for f in families() for n in registry.names(f)}
+    raise _unknown("command or style", name, names.union(commands))
 
 
 def _family(word: str) -> str:
@@ -169,14 +170,18 @@ def _explain(family: str, name: str) -> int:
 
 
 def _about(word: str) -> list[tuple[str, str]]:
-    """Find commands and styles by a part of their name, then by their summary, else their text."""
-    begins = re.compile(rf"(?<![^\W_]){re.escape(word)}", re.IGNORECASE)
+    """Find commands and styles by parts of their name, then by their summary, else their text."""
+    words = [part for part in word.split() if len(part) > 2] or [word]  # without a, of, ...
+    topics = {like: topic for topic, alike in table()["topics"].items() for like in alike}
+    sought = [re.escape(topics.get(part.lower(), part)) for part in words]
+    begins = [re.compile(rf"(?<![^\W_]){part}", re.IGNORECASE) for part in sought]
     found: list[list[tuple[str, str]]] = [[], [], [], []]
     for family in families():
         for name in registry.names(family):
             summary, broken = _summary(family, name)
             text = "" if broken else registry.find(family, name).__doc__ or ""
-            places = (k for k, said in enumerate((name, summary, text)) if begins.search(said))
+            said = name, f"{name} {summary}", f"{name} {text}"
+            places = (k for k in range(3) if all(each.search(said[k]) for each in begins))
             found[next(places, 3)].append((family, name))
     return found[0] + found[1] or found[2]
 

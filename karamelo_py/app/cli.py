@@ -9,6 +9,7 @@ import re
 import signal
 import sys
 from collections.abc import Callable, Sequence
+from difflib import SequenceMatcher
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -25,7 +26,7 @@ from karamelo_py.app.options import (
     threads_option,
 )
 from karamelo_py.run.mpi.comm import ENDING, MpiComm, handled_signals, launched
-from karamelo_py.script.errors import ScriptError, nearest, render_message, table
+from karamelo_py.script.errors import ScriptError, meant, nearest, render_message, table
 
 if TYPE_CHECKING:  # which takes most of the time that the program needs to begin
     from karamelo_py.scene.hub import Hub
@@ -119,6 +120,13 @@ def _dispatch(arguments: list[str]) -> int:
         options, surplus = parser.parse_known_args(arguments)
     except SystemExit:  # argparse has shown what was asked for
         return 0
+    except ScriptError as error:
+        if "are required" in error.message:  # what is missing may be misspelt
+            known = commands.choices[arguments[0]].options()
+            odd = [word for word in arguments if word[:1] == "-" and word not in known]
+            said = (f"{word}: {near}" for word in odd if (near := meant(word, known)))
+            error.hint = next(said, None)
+        raise
     if surplus:
         raise _surplus(arguments, surplus, commands.choices.get(arguments[0], parser))
     size, rank = launched()
@@ -172,11 +180,12 @@ def _surplus(arguments: list[str], words: list[str], parser: CommandLine) -> Scr
     close = nearest(option, parser.options()) if option else None
     same = table()["options"].get((option or "").rstrip("0123456789"))
     if same in parser.options():
-        close = f"{same} N"
+        close = same + " N" * (same != "--only")
     hint = f"did you mean {close}?" if close else None
     value = words[words.index(option) + 1 :] if option in words else []
     if (
         same is None
+        and not (close and SequenceMatcher(None, option, close).ratio() > 0.75)
         and option
         and option[1:].isidentifier()
         and value
@@ -283,7 +292,7 @@ def _parser(command: str) -> tuple[CommandLine, Any]:
     styles = add("styles", lambda given: _catalogue().print_styles(given.family), summary)
     styles.add_argument("family", metavar="FAMILY", nargs="*", help="fix, compute, region, ...")
     summary = "Explain a command or a style."
-    explain = add("help", lambda given: _catalogue().print_help(given.words), summary, HELP)
+    explain = add("help", lambda o: _catalogue().print_help(o.words, COMMANDS), summary, HELP)
     explain.add_argument("words", metavar="WORD", nargs="*")
     for name, (module, summary) in ELSEWHERE.items():
         found = import_module(module) if name == command else None
@@ -355,7 +364,7 @@ def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = 
     if getattr(options, "restart", None) is not None:
         from karamelo_py.run.checkpoint.restart_file import Restart
 
-        hub.restart = Restart(options.restart)
+        hub.restart = Restart(options.restart, options.out)
         given, presets = presets, hub.restart.presets(presets)
         if taken := [f"{name} = {text}" for name, text in presets.items() if name not in given]:
             hub.console.say(f"{', '.join(taken)} taken from {hub.restart.path}, as -var had it")

@@ -33,6 +33,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
 from karamelo_py.script.errors import ScriptError, plural, render_message
 from karamelo_py.script.parser import parse
+from karamelo_py.script.syntax import Raw, Source
 from karamelo_py.styles.dumps.pyplot import LEAST_PIXELS, MOST_PIXELS, look_of, tools_of
 
 DESCRIPTION = """\
@@ -70,7 +71,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     for word in _look_words():
         said = word.description.replace("%", "%%")
-        parser.add_argument(f"--{word.name}", metavar=word.name.upper(), help=said)
+        metavar = "|".join(word.kind.words) or word.name.upper()
+        parser.add_argument(f"--{word.name}", metavar=metavar, help=said)
     parser.add_argument("--fps", type=above_zero, default=25.0, help="frames per second of a movie")
 
 
@@ -235,7 +237,7 @@ def _look(first: Snapshot, options: argparse.Namespace) -> dict[str, Any]:
                 raise ScriptError(
                     f"--{option} takes one value, not '{given}'", expected=word.kind.text
                 )
-            argument = Argument(call.arguments[0], script)
+            argument = Argument(Raw(Source(given, f"--{option}"), 0, len(given)), script)
             look[word.name] = signature.convert(hub, word, argument)
     return look
 

@@ -198,8 +198,7 @@ class Interpreter:
             raise
         except ScriptError as error:
             del self.record.statements[done:]
-            if not error.complete:
-                error.place = error.place or statement.place
+            error.place = error.place or (None if error.complete else statement.place)
             self.presets.blame(statement, error)
             for wrong in (error, *error.others):
                 wrong.included = wrong.included or self._including(depth - 1)

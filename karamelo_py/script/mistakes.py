@@ -19,10 +19,16 @@ _PUNCTUATION = re.compile(
 )
 # A comment of C in the line that ends there.
 _SLASHES = re.compile(r"(?:^|[ \t)])//[^\n]*\Z", re.MULTILINE)
+# Empty lines and comments of Abaqus, and a keyword: no script begins with one.
+_KEYWORD = re.compile(r"(?:\s|\*\*.*\n)*(\*[A-Za-z]+)")
 
 
 def check_characters(text: str) -> None:
-    """Refuse characters that no part of a script may contain outside quotes and comments."""
+    """Refuse files of Abaqus, and what no script may contain outside quotes and comments."""
+    first = _KEYWORD.match(text)
+    if first and first[1].lower() in table()["abaqus"].split():
+        hint = "docs/howto/from-abaqus.md says it in this language; solid mesh reads its mesh"
+        raise Mistake("this is an input file of Abaqus", *first.span(1), "a script", hint)
     if text.isascii() and text.isprintable():
         return
     for match in _PUNCTUATION.finditer(text):
@@ -211,8 +217,8 @@ def _equals(at: _Stop) -> Mistake:
         hint = f"a formula needs no arguments: {first} = {rest}"
         place = first.start_pos, before.end_pos
         return Mistake("only a name can stand left of '='", *place, expected, hint)
-    hint = "compare with ==" if at.opened else None
-    if all(token.type in ("NAME", "NUMBER", *_OPERATORS) for token in tokens):
+    hint = "compare with ==" if at.opened or len(tokens) == 1 else None
+    if len(tokens) > 1 and all(token.type in ("NAME", "NUMBER", *_OPERATORS) for token in tokens):
         hint = "a name begins with a letter and has letters, digits and _ only"
     return at.mistake("'=' cannot stand here", expected, hint)
 

@@ -35,7 +35,7 @@ def read_script(path: Path) -> str:
         data = path.read_bytes()
     except FileNotFoundError:
         parent = path.parent
-        close = difflib.get_close_matches(path.name, scripts_in(parent), n=1, cutoff=0.7)
+        close = difflib.get_close_matches(path.name, scripts_in(parent), n=1, cutoff=0.75)
         where = "" if parent.is_dir() else f": the folder {parent} does not exist"
         raise ScriptError(
             f"there is no file {path}{where}",

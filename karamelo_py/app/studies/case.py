@@ -32,6 +32,7 @@ _FACT = re.compile(
 # Of a script's first run.
 _FIRST = "points", "nodes", "nodes per point", "bytes per particle", "dt", "stable dt", "own dt"
 _MESSAGE = re.compile(r"(?:^|: )(warning|error): (.*)")
+_MEANT = re.compile(r"error: .*\n(?:.+\n)*?hint: (did you mean .*)")
 _NOT_ITS_OWN = re.compile(r"internal error|another run is writing")
 # Before the first step as well, and no mistake of a script: larger scenes, longer steps.
 _TOO_MUCH = re.compile(r"memory|times the stable one")
@@ -196,6 +197,7 @@ class Launch:
             others = _NOT_ITS_OWN, _TOO_MUCH
             if "points" not in facts and not any(each.search(outcome.reason) for each in others):
                 outcome.status = "refused"
+                outcome.reason += "; ".join(["", *_MEANT.findall(outcome.complaint)[:1]])
         return outcome
 
     def _wait(self, process: Any, begun: float) -> tuple[float | None, bool]:

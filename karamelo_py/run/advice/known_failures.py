@@ -127,12 +127,10 @@ def warn_about_steps(
     """Say so once (or `again`) where this or a later step is above the stable limit."""
     present, limit = step_of(hub, halves), simulation.limit_moving
     of_heat = float(simulation.control.clock[0].heat_limit)
+    stable = timestep.stable_step(hub, simulation, limit)
     for step in (present, *hub.later[len(hub.runs) :]):
         asked = step.fixed_dt or (step.dt_factor or 0) * limit
-        if step.scene != present.scene or not asked > limit * (1 + 1e-12):
-            continue
-        stable = timestep.stable_step(hub, simulation, limit)
-        if not asked > stable * (1 + 1e-12):
+        if step.scene != present.scene or not asked > stable * (1 + 1e-12):
             continue
         name = timestep.step_by_script(step.fixed_dt, step.dt_factor)
         command = name.split()[0]
@@ -200,6 +198,10 @@ def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> Non
     refuse_endless_speeds(hub, simulation)
     scene = SceneFacts(hub, simulation, duration)
     scene.duration += _gone(hub, simulation) + _duration_of_later(hub, simulation)
+    one = 0 < scene.duration <= simulation.dt * (1 + 1e-9) and isfinite(simulation.limit)
+    if one and timestep.ruling_limit(simulation) == "end" and hub.update.first_time("one step"):
+        words = f"one step covers the whole run, where one of {simulation.limit:.3g} is stable"
+        hub.warn(f"{words}; {mixed_units(hub, simulation)}", hint=UNITS)
     if scene.waves > 0 and timestep.blows_up(hub, simulation):
         scene.duration = 0.0  # it never comes so far
     warn_about_steps(hub, simulation, halves)

@@ -17,12 +17,7 @@ from karamelo_py.run.lower.card import memory_there, refusals
 from karamelo_py.run.lower.memory import known, memory_of, node_fields, nodes_in_use, point_fields
 from karamelo_py.run.mpi.plan import report_lines
 from karamelo_py.run.simulation import Simulation
-from karamelo_py.run.timestep import (
-    ruling_limit,
-    stable_step,
-    words_of_own_step,
-    words_of_share,
-)
+from karamelo_py.run.timestep import ruling_limit, stable_step, words_of_own_step, words_of_share
 from karamelo_py.scene import machine_memory
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material

@@ -184,12 +184,12 @@ def is_restart(path: Path) -> bool:
 class Restart:
     """The content of a file; of those that a ``*`` stands for, of the largest number."""
 
-    def __init__(self, path: Path):
+    def __init__(self, path: Path, out: Path | None = None):
         import h5py
 
-        self.path = path = _latest(path)
+        self.path = path = _latest(path, out)
         if not path.is_file():
-            raise _no_file(path)
+            raise _no_file(path, out)
         what = f"{path} is no file that this program can go on from"
         try:
             with h5py.File(path, "r", locking=False) as root:
@@ -271,20 +271,21 @@ class Restart:
         return PartStates(kept, arrays, values)
 
 
-def _latest(path: Path) -> Path:
+def _latest(path: Path, out: Path | None) -> Path:
     if "*" not in path.name or path.exists():
         return path
     pattern = re.compile(re.escape(path.name).replace(r"\*", r"(\d+)", 1))
     there = path.parent.iterdir() if path.parent.is_dir() else ()
     found = [(int(match[1]), one) for one in there if (match := pattern.fullmatch(one.name))]
     if not found:
-        raise _no_file(path)
+        raise _no_file(path, out)
     return max(found)[1]
 
 
-def _no_file(path: Path) -> ScriptError:
+def _no_file(path: Path, out: Path | None) -> ScriptError:
     """Return the error for a file that is missing: -out has put its like below, perhaps."""
-    below = sorted(path.parent.glob(f"*/{path.name}")) if path.parent.is_dir() else ()
+    below = sorted(path.parent.glob(f"*/{path.name}")) if path.parent.is_dir() else []
+    below += sorted(out.glob(path.name)) if out and path.name else []
     return ScriptError(
         f"there is no file {path}",
         argument="file",
