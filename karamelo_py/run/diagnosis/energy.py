@@ -62,7 +62,7 @@ def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
     moves, jumps = method.frame.moves, getattr(method.basis, "gradient_jumps", False)
     if simulation.implicit:
         return _gain_of_implicit_steps(hub)
-    share = simulation.dt / simulation.limit
+    share = simulation.dt / timestep.stable_step(hub, simulation, simulation.limit)
     keeping = timestep.keeping_share(hub)
     smooth = "a basis with smooth gradients (quadratic-spline), or method tlmpm"
     if share > 1 + 1e-9:
