@@ -334,14 +334,17 @@ def test_a_law_in_rate_form_is_named(run_script):
 
 
 def test_all_advise_the_same_step(tmp_path, capsys, run_interpreted):
-    """What `check`, the warning before a run and the error that ends it say to write instead."""
+    """`check`, the warning before a run and the error that ends it name one step."""
     words = [TRAVEL, "set_dt({})", "set_output(100)", "run(400)"]
     script = block(2, *words, size=(0.3, 0.3))
     path = tmp_path / "in.script"
     path.write_text(script.format(1e-9), encoding="utf-8")
     assert main(["check", str(path)]) == 0
-    own = re.search(r"set_dt\(1e-09\).*?(set_dt\(\S+\))", capsys.readouterr().out, re.S)[1]
-    limit = float(own[len("set_dt(") : -1]) / 0.4  # the share of FLIP 1, linear, musl
+    *_, step = re.findall(r"[\d.]+", re.search(r"^own dt +(.*)$", capsys.readouterr().out, re.M)[1])
+    own, limit = (
+        f"set_dt({float(step):.3g})",
+        float(step) / 0.4,
+    )  # the share of FLIP 1, linear, musl
     result = run_interpreted(script.format(2.1 * limit), status=1)
     warned, ended = result.err.split("error: ")
     assert f"hint: {own} or less" in warned
