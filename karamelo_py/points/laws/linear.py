@@ -7,8 +7,6 @@ from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, det, inner, nothing, sym, symmetric_tensor, tr
 from karamelo_py.points.laws.elastic import ElasticLaw
-from karamelo_py.points.laws.parameters import lame_parameters
-from karamelo_py.points.laws.thermoelastic import expanding
 
 
 class LinearElastic(ElasticLaw):
@@ -67,7 +65,7 @@ class LinearElastic(ElasticLaw):
     ):
         """The law from Young's modulus and Poisson's ratio; with a temperature where it has one."""
         law = cls if rate == "jaumann" else FixedFrame
-        return expanding(law(1 / rho, *lame_parameters(E, nu)), cp, kappa, alpha)
+        return super(LinearElastic, law).given(rho, E, nu, cp, kappa, alpha)
 
 
 class FixedFrame(LinearElastic):
