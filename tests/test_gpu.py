@@ -5,6 +5,7 @@ import pytest
 from numba import config
 from selection import few
 
+from karamelo_py.compiler import values
 from karamelo_py.compiler.gpu import Emulator
 from karamelo_py.kernels.arrays import arrays_of
 from karamelo_py.language.interpreter import Interpreter
@@ -117,6 +118,20 @@ def test_fixes(method):
     assert clocks[0].looks == clocks[1].looks == 5
     for name in ("kinetic", "stored", "work", "balance", "of_drift"):
         assert clocks[0][name] == pytest.approx(clocks[1][name], rel=1e-9, abs=1e-12), name
+
+
+def test_kernels_of_the_processor_on_disk(monkeypatch, tmp_path):
+    """What asks for the larger of two numbers is found where nothing else was compiled before.
+
+    Formulas of two fixes have one signature; the first has no condition, the second has one.
+    """
+    hub, one = begun(WATER)
+    values.branching.clear()
+    monkeypatch.setenv("KARAMELO_PY_CACHE", str(tmp_path))
+    hooks = one.hooks, one.python.functions
+    steps = StepsOnCard(Emulator(), one.setup, hub.update.scheme, type(one.visits), *hooks)
+    steps.send()
+    assert steps.advance(1) == 0
 
 
 def test_order_in_memory_changes_nothing():

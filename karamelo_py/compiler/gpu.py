@@ -27,8 +27,8 @@ from karamelo_py.compiler.code import I32, I64
 from karamelo_py.compiler.compile import implements
 from karamelo_py.compiler.fingerprint import fingerprint
 from karamelo_py.compiler.held import HeldTuple, item_of
-from karamelo_py.compiler.loops import ENTRY, NAME, compilation, in_one, written
-from karamelo_py.compiler.trace import formula
+from karamelo_py.compiler.loops import ENTRY, NAME, compilation, written
+from karamelo_py.compiler.trace import formula, in_one
 from karamelo_py.compiler.values import intrinsic
 
 THREADS = 128  # of a block
@@ -193,7 +193,7 @@ def text_of(
 ) -> tuple[str, str]:
     """Write a function of a thread for the rest of its arguments; name and text of the module.
 
-    `called` as in `loops.in_one`.
+    `called` as in `trace.in_one`.
     """
     with in_one(called or {}):
         entry = _as_threads if on_card else _as_loop

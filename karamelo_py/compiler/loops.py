@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 from llvmlite import ir
 from numba import types
 
-from karamelo_py.compiler import cache, choices, code, compile_lock, machine
+from karamelo_py.compiler import cache, choices, code, compile_lock, machine, trace
 from karamelo_py.compiler.argument_buffer import ArgumentBuffer, plan_for, reader
 from karamelo_py.compiler.choices import Choice
 from karamelo_py.compiler.compile import shared
@@ -93,32 +93,14 @@ def _no_collections() -> Iterator[None]:
             gc.enable()
 
 
-_whole: dict[Any, Callable] | None = None  # where a module has all that it calls: see `in_one`
-
-
-@contextmanager
-def in_one(called: dict[Any, Callable]) -> Iterator[None]:
-    """Write modules of threads of a GPU meanwhile, which have all that they call.
-
-    Kernels are written into what calls them, and so is what is else called by its address:
-    `called` has the function for each signature.
-    """
-    global _whole
-    before, _whole = _whole, called
-    try:
-        yield
-    finally:
-        _whole = before
-
-
 def many_threads() -> bool:
-    """Tell whether thousands of others may write to the same number meanwhile: see `in_one`."""
+    """Tell whether thousands of others may write to one number meanwhile: see `trace.in_one`."""
     return False
 
 
 @builtin(many_threads)
 def _many_threads(lowering: Any) -> bool:
-    return _whole is not None
+    return trace.in_one_module()
 
 
 def written(
@@ -230,7 +212,7 @@ class Kernel:
         """Write a call from another kernel."""
         held = [lowering.call(hold, (argument,)) for argument in arguments]
         kinds = tuple(types.unliteral(lowering.kind_of(one)) for one in held)
-        if _whole is not None:
+        if trace.in_one_module():
             own = formula(self.function, kinds)
             return lowering.call_own(own.name, own.run, kinds, own.result, held)
         unit = self.unit(kinds)
@@ -318,7 +300,7 @@ def caller_of(signature: Any) -> Callable:
 
     @in_kernels
     def call(lowering, address, *arguments):
-        own = _whole and _whole.get(signature)
+        own = trace.called_in_one(signature)
         if not own:
             return lowering.call(by_address, (address, *arguments))
         pairs = zip(arguments, parameters, strict=True)

@@ -17,6 +17,7 @@ import itertools
 import types as python
 from collections import namedtuple
 from collections.abc import Callable, Hashable, Iterable, Iterator
+from contextlib import contextmanager
 from traceback import walk_tb
 from typing import Any, NamedTuple
 
@@ -237,6 +238,32 @@ _formulas: dict[tuple, _Formula | None] = {}
 MOST_FORMULAS = 4000  # that are kept: some 12 kB each, 800 for a scene with contact
 _begun: set[tuple] = set()  # of what is written now
 _own: set[Callable] = set()  # functions that are not written into what calls them
+_called: tuple | None = None  # where a module has all that it calls: see `in_one`
+
+
+@contextmanager
+def in_one(called: dict[Any, Callable]) -> Iterator[None]:
+    """Write modules of threads of a GPU meanwhile, which have all that they call.
+
+    Kernels are written into what calls them, and so is what is else called by its address:
+    `called` has the function for each signature.
+    """
+    global _called
+    before, _called = _called, tuple(called.items())
+    try:
+        yield
+    finally:
+        _called = before
+
+
+def in_one_module() -> bool:
+    """Tell whether a module has all that it calls."""
+    return _called is not None
+
+
+def called_in_one(signature: Any) -> Callable | None:
+    """Give what is written in the place of a call by address; None if nothing is."""
+    return dict(_called or ()).get(signature)
 
 
 def _is_plain(thing: Any) -> bool:
@@ -271,7 +298,7 @@ def _written(dispatch: Callable, kinds: tuple) -> _Formula | None:
 
 def formula(dispatch: Callable, kinds: tuple) -> _Formula | None:
     """Find what to run for arguments of these types; None if nothing is chosen."""
-    key = dispatch, numbers_of(kinds)
+    key = dispatch, numbers_of(kinds), _called
     if len(_formulas) > MOST_FORMULAS and not values.at_work():
         forget()
     while key not in _formulas:

@@ -12,7 +12,6 @@ from numpy.lib.stride_tricks import as_strided
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.formula import EVALUATE, GLOBAL, UNIFORM, evaluate_in_table
 from karamelo_py.compiler.gpu import Images, KernelLaunch, numbers_of
-from karamelo_py.compiler.trace import forget
 from karamelo_py.kernels import arrays, gpu, table
 from karamelo_py.kernels import gpu_fixes as fixes
 from karamelo_py.kernels.clock import take_reports
@@ -83,7 +82,6 @@ class StepsOnCard:
         hooks: arrays.Hooks | arrays.NoHooks = _NONE, functions: Sequence[Callable] = (),
     ):  # fmt: skip
         self.card, self.s, self.hooks, self.functions = card, (s := there(s)), hooks, functions
-        forget()  # of other scenes: code on disk would depend on their functions
         self.images = Images(card)
         self.fate = np.zeros(5)
         self.images.of(self.fate)
