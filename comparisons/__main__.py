@@ -32,6 +32,7 @@ PICTURES = DOCS / "_static" / "comparison"
 INPUTS = HERE.parent / "inputs"
 TOOLS = (
     "__main__",
+    "atlas",
     "balance",
     "cost",
     "defaults",
