@@ -108,3 +108,17 @@ def test_lines_of_the_rooms():
         lines[room_of(path)] += len(path.read_text("utf-8").splitlines())
     print("", *(f"{n:6} {room}" for room, n in lines.most_common()), sep="\n")
     assert sum(lines.values()) <= LIMITS["lines of Python"]
+
+
+def test_functions_of_kernels_are_named_as_no_method():
+    """The tracer tells methods of laws and schemes, which it refuses, by their names."""
+    functions, methods = set(), set()
+    for path, tree in trees().items():
+        if room_of(path) == "kernels":
+            functions |= {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+        elif room_of(path) == "schemes" or "laws" in path.parts:
+            classes = (node for node in tree.body if isinstance(node, ast.ClassDef))
+            own = (node for one in classes for node in one.body)
+            methods |= {node.name for node in own if isinstance(node, ast.FunctionDef)}
+    assert len(functions) > 100 and "given" in methods
+    assert not functions & methods

@@ -327,7 +327,7 @@ def columns_of(quantities: tuple, kin: NamedTuple) -> list[tuple[Any, int, int]]
     return [(array, first, end) for (array, end), first in found.items()]
 
 
-def given(quantities: tuple, kin: Tag) -> int:
+def arrays_given(quantities: tuple, kin: Tag) -> int:
     """Add up the kinds of arrays that take the quantities: 1 the sums, 2 velocities, 4 fields."""
     names = {name for name, _, _ in columns_of(quantities, kin)}
     fields = any(not isinstance(name, str) for name in names)

@@ -11,7 +11,7 @@ from numba import types
 
 from karamelo_py.compiler.loops import caller_of, kernel
 from karamelo_py.kernels import totals
-from karamelo_py.kernels.p2g import given
+from karamelo_py.kernels.p2g import arrays_given
 from karamelo_py.kernels.sweep import sweep_blocks, visit_shares
 
 CALL = types.int64(types.int64, types.int64, types.int64)
@@ -111,5 +111,5 @@ def _sweep_blocks_linked(ranks, s, mode, visit, context):
     _sweep_tiles(address, s, mode, visit, context, True)
     if len(visit.quantities):
         due = context.scatters & (s.buffers.count[1] == 0)
-        _ask_if(due, address, GIVE, s.buffers.number, given(visit.quantities, s.kin))
+        _ask_if(due, address, GIVE, s.buffers.number, arrays_given(visit.quantities, s.kin))
     _sweep_tiles(address, s, mode, visit, context, False)

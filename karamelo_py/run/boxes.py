@@ -129,7 +129,7 @@ def buffers_of(s: Setup) -> list[Buffers]:
 
 
 def chosen_of(nodes: Nodes, what: int) -> list[np.ndarray]:
-    """The arrays that points give to, of the kinds that `what` names (kernels.p2g.given)."""
+    """The arrays that points give to, of the kinds that `what` names (kernels.p2g.arrays_given)."""
     sums, velocity, *rest = summed(nodes)
     return [sums] * (what & 1) + [velocity] * (what >> 1 & 1) + rest * (what >> 2 & 1)
 

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.kernels.arrays import NoHooks, Setup, Tiling, arrays_of
-from karamelo_py.kernels.p2g import given
+from karamelo_py.kernels.p2g import arrays_given
 from karamelo_py.kernels.step import step
 from karamelo_py.kernels.sweep import sum_buffers, sweep_nodes, sweep_points
 from karamelo_py.run.boxes import Boxes, chosen_of, no_nodes
@@ -47,7 +47,7 @@ sweep_nodes.on(_Sums)(lambda mode, task, kin, nodes, ranges, dt: None)
 @sum_buffers.on(_Sums)
 def _sum_buffers_sums(mode, quantities, s, due):
     if due:
-        mode.found.append((given(quantities, s.kin), s.nodes))
+        mode.found.append((arrays_given(quantities, s.kin), s.nodes))
 
 
 class _PretendedComm(SerialComm):
