@@ -34,6 +34,7 @@ TOOLS = (
     "__main__",
     "atlas",
     "balance",
+    "bench",
     "cost",
     "defaults",
     "exact",

@@ -1,1 +1,0 @@
-"""karamelo-py bench: known scenes, and how fast this machine runs them."""
