@@ -3,6 +3,7 @@
 import gc
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -11,6 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from textwrap import dedent
+from typing import Any
 
 import numpy as np
 import pytest
@@ -165,6 +167,28 @@ def state_interpreted(tmp_path, _interpreter) -> Callable[..., dict[str, np.ndar
             return dict(arrays)
 
     return run
+
+
+BROWSERS = "chromium", "chromium-browser", "google-chrome", "chrome"  # as commands
+
+
+@pytest.fixture
+def browser() -> Iterator[Any]:
+    """Chromium without a window: that of Playwright, or one that is installed."""
+    sync = pytest.importorskip("playwright.sync_api", reason="no Playwright to lead a browser")
+    drawing = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"]  # WebGL without a card
+    with sync.sync_playwright() as started:
+        for path in (None, *filter(None, map(shutil.which, BROWSERS))):
+            try:
+                found = started.chromium.launch(executable_path=path, args=drawing)
+            except sync.Error as error:
+                why = str(error).splitlines()[0]
+            else:
+                break
+        else:
+            pytest.skip(f"no browser: {why}")
+        yield found
+        found.close()
 
 
 @pytest.fixture(scope="session")

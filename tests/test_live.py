@@ -423,11 +423,8 @@ def parsed(words):
     return parser.parse_args(words)
 
 
-@pytest.mark.skipif(not shutil.which("chromium"), reason="no browser")
-@pytest.mark.full
-def test_pages_in_a_browser(simulation):
+def test_pages_in_a_browser(simulation, browser):
     """Points are drawn and moved, news arrive, a click holds the run, another stops the study."""
-    sync = pytest.importorskip("playwright.sync_api")
     page = simulation.live()
     study = StudyPage(simulation.hub.folder / "in.bar", ["N"], ["Ek"])
     row = {"N": "10", "Ek": 0.5, "seconds": 1.0, "status": "failed", "reason": "it broke"}
@@ -441,38 +438,36 @@ def test_pages_in_a_browser(simulation):
       picture.draw(0); gl.readPixels(x, y, w, h, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
       const shown = pixels.filter((value, k) => k % 4 === 2 && value < 200);
       return [picture.n, shown.length, picture.centre[0]]; }"""
-    with sync.sync_playwright() as started:
-        browser = started.chromium.launch(
-            executable_path=shutil.which("chromium"),
-            args=["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"],
-        )
-        shown = browser.new_page()
-        wrong = []
-        shown.on("pageerror", lambda error: wrong.append(error))
-        shown.goto(page.address)
-        shown.get_by_role("status").filter(has_text="step 4").wait_for()
-        shown.get_by_text("48 points").wait_for()
-        count, blue, centre = shown.evaluate(drawn)
-        assert count == 48 and blue > 1000  # pixels that are not yellow or white
-        box = shown.locator("#points").bounding_box()
-        shown.mouse.move(box["x"] + 300, box["y"] + 200)
-        shown.mouse.down()
-        shown.mouse.move(box["x"] + 340, box["y"] + 200)
-        shown.mouse.up()
-        assert shown.evaluate(drawn)[2] < centre  # points went to the right with the hand
-        shown.get_by_label("colours").select_option("vx")
-        shown.wait_for_function("picture.name === 'vx'")
-        shown.get_by_role("button", name="Pause").click()
-        shown.get_by_role("button", name="Go on").wait_for()
-        shown.goto(study.server.address)
-        shown.get_by_label("N = 10: failed").click()
-        shown.get_by_text("failed: it broke").wait_for()
-        assert shown.evaluate("document.getElementById('chart').data[0].name") == "growing"
-        shown.get_by_label("N = 20: waiting").click()
-        shown.get_by_text("last line of the log: Step 4,").wait_for()
-        shown.get_by_role("button", name="Stop the study").click()
-        assert study.stopped.wait(20)
-        browser.close()
+    shown = browser.new_page()
+    wrong = []
+    shown.on("pageerror", lambda error: wrong.append(error))
+    shown.goto(page.address)
+    shown.get_by_role("status").filter(has_text="step 4").wait_for()
+    shown.get_by_text("48 points").wait_for()
+    simulation.run(2)
+    shown.get_by_role("status").filter(has_text="step 6").wait_for()
+    count, blue, centre = shown.evaluate(drawn)
+    assert count == 48 and blue > 1000  # pixels that are not yellow or white
+    box = shown.locator("#points").bounding_box()
+    shown.mouse.move(box["x"] + 300, box["y"] + 200)
+    shown.mouse.down()
+    shown.mouse.move(box["x"] + 340, box["y"] + 200)
+    shown.mouse.up()
+    assert shown.evaluate(drawn)[2] < centre  # points went to the right with the hand
+    shown.get_by_label("colours").select_option("vx")
+    shown.wait_for_function("picture.name === 'vx'")
+    shown.get_by_role("button", name="Pause").click()
+    shown.get_by_role("button", name="Go on").wait_for()
+    shown.goto(study.server.address)
+    shown.get_by_label("N = 10: failed").click()
+    shown.get_by_text("failed: it broke").wait_for()
+    assert shown.evaluate("document.getElementById('chart').data[0].name") == "growing"
+    shown.get_by_label("N = 20: waiting").click()
+    shown.get_by_text("last line of the log: Step 6,").wait_for()
+    study.follow([row, {**row, "N": "20", "status": "done"}], [], [], of=2)
+    shown.get_by_label("N = 20: done").wait_for()
+    shown.get_by_role("button", name="Stop the study").click()
+    assert study.stopped.wait(20)
     assert not wrong
     page.close()
     study.server.close()
