@@ -88,7 +88,7 @@ def compare(name: str, folder: Path, full: bool) -> list[Row]:
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(figsize=(6, 4), layout="constrained")
         rows = list(module.compare(run, axes, full))
-        finish(axes, f"in.{name}")
+        finish(axes, module.__doc__)
         figure.savefig((PICTURES if full else folder) / f"{name}.png", dpi=110, bbox_inches="tight")
     plt.close(figure)
     return rows

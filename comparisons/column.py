@@ -3,6 +3,7 @@
 import numpy as np
 
 from comparisons.row import Row
+from karamelo_py.app.studies import look
 
 SMALL = None  # orders take several grids; tests/test_verification.py has other properties
 WEIGHT = 80 * 9.81 * 10
@@ -21,5 +22,5 @@ def compare(run, axes, full):
     yield Row("order of the stress", 2.0, order, 0.15, "Wyser et al. 2020")
     yield Row("error with 64 cells", 0.0, errors[-1], 3e-4, "equilibrium (exact)")
     axes.loglog(cells, errors, "o-", label="CPDI Q4")
-    axes.loglog(cells, errors[0] * (16 / np.array(cells)) ** 2, "k--", lw=0.8, label="second order")
+    look.slope(axes, [(cells, errors)], -2)
     axes.set(xlabel="cells (1)", ylabel="mean error of the stress / (rho g l0) (1)")

@@ -1,5 +1,6 @@
 """How pictures of comparisons look: as charts of studies do, also in grey."""
 
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -51,16 +52,21 @@ def body(axes: Any, x: Any, y: Any, label: str) -> None:
         axes.fill(*line.T, color="0.93", lw=0)
 
 
-def finish(axes: Any, title: str) -> None:
-    """A title, real numbers at the ticks, methods in their colours, a legend that hides nothing."""
-    axes.set_title(title, fontsize=9)
+def finish(axes: Any, about: str) -> None:
+    """A title, real numbers at the ticks, methods in their colours, a legend that hides nothing.
+
+    The title is the first line of `about`, up to its colon: the body and what happens to it.
+    """
+    title = about.splitlines()[0].partition(":")[0].rstrip(".")
+    axes.set_title(fill(title, 70), fontsize=9)
     named = {line: str(line.get_label()).partition(",")[0] for line in axes.get_lines()}
     known = {line: word for line, word in named.items() if look.known(word)}
     for line, method in known.items() if len({*known.values()}) == len(known) else ():
         line.set_color(look.PALETTE[look.place(method) or -1])  # black is what is exact
     for axis, ends in ((axes.xaxis, axes.dataLim.intervalx), (axes.yaxis, axes.dataLim.intervaly)):
         if axis.get_scale() == "log":
-            look.log_axis(axis, *ends)
+            drawn = [a for line in axes.get_lines() for a in line.get_data()[axis is axes.yaxis]]
+            look.log_axis(axis, *ends, drawn if all(float(a).is_integer() for a in drawn) else None)
         real_ticks(axis)
     marked = [line for line in axes.get_lines() if line.get_marker() == "o"]
     for line, mark in zip(marked, look.MARKERS, strict=False):

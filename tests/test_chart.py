@@ -3,7 +3,6 @@
 import itertools
 import json
 import re
-import shutil
 import subprocess
 import sys
 from itertools import combinations
@@ -16,7 +15,7 @@ from hypothesis import strategies as st
 from karamelo_py.app.cli import main
 from karamelo_py.app.studies import look, pictures
 from karamelo_py.app.studies.curves import Family, Table, order
-from karamelo_py.output.plots import blank_figure, tick_text, tidy
+from karamelo_py.output.plots import blank_figure, tick_texts, tidy
 
 ORDERS = {"linear": 1, "quadratic-spline": 2, "cubic-spline": 4}
 
@@ -236,7 +235,7 @@ def test_no_two_lines_look_alike():
 
 
 @pytest.mark.parametrize("span", [1.1, 1.5, 2.1, 4, 9.3, 30, 400, 1e8, 1e30])
-@pytest.mark.parametrize("low", [1, 0.0021, 5.7e7])
+@pytest.mark.parametrize("low", [1, 0.0021, 1.3e-4, 5.7e7])
 def test_numbers_along_a_short_logarithmic_axis_do_not_touch(low, span):
     """As drawn: no box of a number reaches into that of the next."""
     figure = blank_figure(8.4, 5.2)
@@ -285,17 +284,34 @@ def test_round_ticks():
     assert look.log_ticks(1e-7, 1) == pytest.approx([10.0**k for k in range(-7, 1)])
     assert look.log_ticks(2.1e-3, 4.6e-3) == pytest.approx([2.5e-3, 3e-3, 3.5e-3, 4e-3, 4.5e-3])
     assert len(look.log_ticks(9.77e-7, 1.2e-6)) >= 3  # 9.8 and 10 would touch: 1.05, 1.1, ...
-    assert tick_text(0.02) == "0.02" and tick_text(1e-7) == "$10^{-7}$"
     # Linear axes, too, say what is there.
-    for top, said in ((2e-5, r"$5\cdot10^{-6}$"), (4e8, "$10^{8}$"), (2, "0.5")):
+    few = r"$5\cdot10^{-6}$", r"$5\cdot10^{4}$"
+    for top, said in ((2e-5, few[0]), (2.5e5, few[1]), (4e8, "$10^{8}$"), (2, "0.5")):
         figure = blank_figure(7.0, 4.0)
         axes = figure.subplots()
         axes.set_xlim(0, top)
         tidy(axes)
         figure.canvas.draw()
-        assert said in [label.get_text() for label in axes.get_xticklabels()]
+        labels = [label.get_text() for label in axes.get_xticklabels()]
+        assert said in labels
+        assert all(("10^" in label) == ("10^" in said) for label in labels if label != "0")
         assert not axes.xaxis.get_offset_text().get_text()
-    assert tick_text(2e-7) == r"$2\cdot10^{-7}$"
+
+
+@pytest.mark.parametrize(
+    ("ticks", "said"),
+    [
+        ([5e-4, 1e-3, 0.02, 0], ["0.0005", "0.001", "0.02", "0"]),
+        ([2e-7, 1e-3, 0.1], [r"$2\cdot10^{-7}$", "$10^{-3}$", "$10^{-1}$"]),
+        ([0, 5e4, 1e5], ["0", r"$5\cdot10^{4}$", "$10^{5}$"]),
+    ],
+)
+def test_numbers_of_an_axis_have_one_style(ticks, said):
+    assert tick_texts(ticks) == said
+    axes = blank_figure(7.0, 4.0).subplots()
+    positive = [tick for tick in ticks if tick]
+    look.log_axis(axes.xaxis, positive[0], positive[-1], positive)
+    assert axes.xaxis.get_major_formatter().format_ticks(positive) == tick_texts(positive)
 
 
 def lucky_rows():
@@ -425,25 +441,17 @@ def test_a_page_without_plotly_is_refused_before_the_table(table, monkeypatch, c
     assert "pip install '.[studies]'" in said.err
 
 
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
-
-
-@pytest.mark.full
-@pytest.mark.skipif(not any(map(shutil.which, BROWSERS)), reason="no browser to look with")
-def test_a_page_comes_to_life_in_a_browser(table):
-    """What Chromium makes of the file: a chart of all runs with a value, and the facts of one."""
+def test_a_page_comes_to_life_in_a_browser(table, browser):
+    """A chart of all runs with a value, and the facts of one; those of another after a click."""
     assert main(["chart", "sweep.csv", "-accuracy", "err", "-by", "basis", "-o", "page.html"]) == 0
     front = Family(Table(rows(), ["N", "basis"]), "err", "seconds").front()
-    browser = next(filter(None, map(shutil.which, BROWSERS)))
-    command = [browser, "--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=5000"]
-    done = subprocess.run(
-        [*command, f"--user-data-dir={table / 'profile'}", "--dump-dom", str(table / "page.html")],
-        capture_output=True, text=True, timeout=120, check=True,
-    )  # fmt: skip
-    points = re.findall(r'<path class="point[ "]', done.stdout)
+    page = browser.new_page()
+    page.goto((table / "page.html").as_uri())
+    page.get_by_role("heading", name="N = 80, basis = cubic-spline").wait_for()
     # 11 runs have a value; those of them that none beats are in the band as well.
-    assert len(points) == 11 + len(front)
-    assert "<h2>N = 80, basis = cubic-spline</h2>" in done.stdout
+    assert page.locator("path.point").count() == 11 + len(front)
+    page.get_by_role("link", name="N = 80, basis = linear").click()
+    page.get_by_role("heading", name="N = 80, basis = linear").wait_for()
 
 
 @pytest.mark.parametrize(

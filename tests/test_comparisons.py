@@ -25,7 +25,7 @@ def found(run_script, name: str, full: bool) -> list[Row]:
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(figsize=(6, 4), layout="constrained")
         rows = list(comparison.compare(run, axes, full))
-        finish(axes, f"in.{name}")
+        finish(axes, comparison.__doc__)
     wrong = faults(figure)
     plt.close(figure)
     assert wrong == []

@@ -1,6 +1,6 @@
 """Plots of logged quantities, drawn with Matplotlib when a run ends, and the look of all plots."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import floor, log10
 from pathlib import Path
 from typing import Any
@@ -128,10 +128,13 @@ def blank_figure(width: float, height: float) -> Any:
     return figure
 
 
-def tick_text(a: float, _: Any = None) -> str:
-    """Write a number at an axis: 0.02, 500, 3·10^-7."""
-    if a == 0 or 1e-3 <= abs(a) < 1e5:
-        return f"{a:g}"
+def tick_texts(numbers: Sequence[float]) -> list[str]:
+    """Write the numbers of one axis in one style: 0.02, 500, or 10^-7, 3·10^-7."""
+    plain = all(a == 0 or 1e-4 <= abs(a) < 1e5 for a in numbers)
+    return [f"{a:g}" if plain or a == 0 else _power(a) for a in numbers]
+
+
+def _power(a: float) -> str:
     exponent = floor(log10(abs(a)) + 1e-9)
     lead = a / 10**exponent
     tens = f"10^{{{exponent}}}"
@@ -147,7 +150,8 @@ def real_ticks(axis: Any) -> None:
             largest = abs(self.axis.get_view_interval()).max()
             if largest == 0 or 1e-3 <= largest < 1e5:
                 return super().__call__(x, pos)
-            return tick_text(float(f"{x / largest:.12f}") * largest)
+            whole = float(f"{x / largest:.12f}") * largest
+            return _power(whole) if whole else "0"
 
     if type(axis.get_major_formatter()) is ScalarFormatter:
         whole = WholeNumbers(useOffset=False)

@@ -19,6 +19,7 @@ from karamelo_py.app.studies.curves import Family, Table, column, order, require
 from karamelo_py.app.studies.study import plain_table, shown, terminal
 from karamelo_py.app.studies.variables import add_axes, along, holds, names, out_file
 from karamelo_py.output.files import read_json, write_whole
+from karamelo_py.output.plots import tick_texts
 from karamelo_py.script.errors import ScriptError
 
 DESCRIPTION = """\
@@ -299,7 +300,7 @@ def write_page(family: Family, path: Path, words: tuple[str, str], title: str) -
         ticks = look.log_ticks(*(drawn.min(), drawn.max()) if len(drawn) else (1.0, 10.0))
         if 2 <= len(ticks) <= 14:
             figure.layout[axis].tickvals = ticks
-            figure.layout[axis].ticktext = [f"{tick:g}" for tick in ticks]
+            figure.layout[axis].ticktext = [_in_html(text) for text in tick_texts(ticks)]
     if family.words:
         figure.update_xaxes(tickvals=[*range(len(family.words))], ticktext=family.words)
     runs = [_about(row, family, family.table.path.parent, k) for k, row in enumerate(rows)]
@@ -319,6 +320,12 @@ def write_page(family: Family, path: Path, words: tuple[str, str], title: str) -
         footer=html.escape("; ".join(about)), runs=text, first=first,
     )  # fmt: skip
     write_whole(path, page)
+
+
+def _in_html(text: str) -> str:
+    """Write a number of an axis, a power of ten as Matplotlib has it, for a page."""
+    plain = text.strip("$").replace(r"\cdot", "·")
+    return plain.replace("^{", "<sup>").replace("}", "</sup>")
 
 
 def _values(row: Mapping[str, str], family: Family) -> dict[str, str]:

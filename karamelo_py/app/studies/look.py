@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.app.studies.case import COLUMNS
-from karamelo_py.output.plots import tick_text
+from karamelo_py.output.plots import tick_texts
 from karamelo_py.script.terms import number_of
 
 # After Okabe & Ito, for eyes that see colours differently; each has a marker of its own, so that a
@@ -140,7 +140,7 @@ def _thinned(ticks: Sequence[float], low: float, high: float) -> list[float]:
 
 def log_axis(axis: Any, low: float, high: float, values: Sequence[float] | None = None) -> None:
     """Make an axis logarithmic, with real numbers at its ticks; `values` if they are few."""
-    from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+    from matplotlib.ticker import FixedFormatter, FixedLocator, NullLocator
 
     axes = axis.axes
     (axes.set_xscale if axis.axis_name == "x" else axes.set_yscale)("log")
@@ -149,11 +149,39 @@ def log_axis(axis: Any, low: float, high: float, values: Sequence[float] | None 
     (axes.set_xlim if axis.axis_name == "x" else axes.set_ylim)(low, high)
     distinct = sorted(set(values or ()))
     few = 0 < len(distinct) <= 9
-    axis.set_major_locator(
-        FixedLocator(_thinned(distinct, low, high) if few else log_ticks(low, high))
-    )
+    ticks = _thinned(distinct, low, high) if few else log_ticks(low, high)
+    axis.set_major_locator(FixedLocator(ticks))
     axis.set_minor_locator(NullLocator())
-    axis.set_major_formatter(FuncFormatter(tick_text))
+    axis.set_major_formatter(FixedFormatter(tick_texts(ticks)))
+
+
+def slope(axes: Any, lines: Sequence[tuple[Any, Any]], exponent: float) -> None:
+    """Draw a triangle of y = x^exponent below lines, each its x and y, on logarithmic axes."""
+    p, falls = abs(exponent), exponent < 0
+    logs = [np.log([x, y]) for x, y in lines]
+    low, high = min(x.min() for x, _ in logs), max(x.max() for x, _ in logs)
+    bottom, top = np.log(axes.get_ylim())
+    left = low + 0.5 * (high - low)
+    right = min(left + 0.25 * (high - low), left + 0.3 * (top - bottom) / p)
+    below = []
+    for x, y in logs:
+        rank = np.argsort(x)
+        at = [each for each in np.linspace(left, right, 9) if x.min() <= each <= x.max()]
+        below += [*np.interp(at, x[rank], y[rank])]
+    head = min(below, default=bottom) - 0.05 * (top - bottom)
+    foot = head - p * (right - left)
+    corner = left if falls else right
+    shape = np.exp([(corner, head), (corner, foot), (right + left - corner, foot)])
+    axes.fill(*shape.T, facecolor="0.93", edgecolor="0.4", linewidth=0.8, zorder=1)
+    axes.annotate(
+        f"{p:g}", (np.exp(corner), np.exp((head + foot) / 2)), xytext=(-4 if falls else 4, 0),
+        textcoords="offset points", ha="right" if falls else "left", va="center", fontsize=8,
+    )  # fmt: skip
+    axes.annotate(
+        "1", (np.exp((left + right) / 2), np.exp(foot)), xytext=(0, -3),
+        textcoords="offset points", ha="center", va="top", fontsize=8,
+    )  # fmt: skip
+    axes.set_ylim(bottom=np.exp(min(bottom, foot - 0.07 * (top - bottom))))
 
 
 def apart(wanted: Sequence[float], gap: float, low: float, high: float) -> np.ndarray:

@@ -22,7 +22,7 @@ from karamelo_py.app.studies.curves import (
 )
 from karamelo_py.app.studies.study import plain_table, shown, terminal
 from karamelo_py.output.files import savefig
-from karamelo_py.output.plots import blank_figure, tick_text, tidy
+from karamelo_py.output.plots import blank_figure, tick_texts, tidy
 from karamelo_py.script.errors import ScriptError, plural, unknown
 from karamelo_py.script.terms import number_of
 
@@ -97,38 +97,13 @@ def _gone(axes: Any, marks: Sequence[tuple[float, str]]) -> None:
 
 
 def _slope(axes: Any, family: Family) -> None:
-    """Draw a triangle below all lines, with the order that is the middle one of them, in halves."""
+    """Draw a triangle with the order that is the middle one of all lines, in halves."""
     lines = [line for line in family.lines if len(set(line.x[line.shown])) > 1]
     sure = [line for line in lines if not line.lucky.any()] or lines
     fits = [order(line.x[line.shown], line.error[line.shown]).exponent for line in sure]
-    p = round(2 * float(np.median(np.abs(fits)))) / 2 if fits else 0
-    if p == 0:
-        return
-    falls = np.median(fits) < 0
-    logs = [np.log([line.x[line.shown], line.error[line.shown]]) for line in lines]
-    low, high = min(x.min() for x, _ in logs), max(x.max() for x, _ in logs)
-    bottom, top = np.log(axes.get_ylim())
-    left = low + 0.5 * (high - low)
-    right = min(left + 0.25 * (high - low), left + 0.3 * (top - bottom) / p)
-    below = []
-    for x, y in logs:
-        rank = np.argsort(x)
-        at = [each for each in np.linspace(left, right, 9) if x.min() <= each <= x.max()]
-        below += [*np.interp(at, x[rank], y[rank])]
-    head = min(below, default=bottom) - 0.05 * (top - bottom)
-    foot = head - p * (right - left)
-    corner = left if falls else right
-    shape = np.exp([(corner, head), (corner, foot), (right + left - corner, foot)])
-    axes.fill(*shape.T, facecolor="0.93", edgecolor="0.4", linewidth=0.8, zorder=1)
-    axes.annotate(
-        f"{p:g}", (np.exp(corner), np.exp((head + foot) / 2)), xytext=(-4 if falls else 4, 0),
-        textcoords="offset points", ha="right" if falls else "left", va="center", fontsize=8,
-    )  # fmt: skip
-    axes.annotate(
-        "1", (np.exp((left + right) / 2), np.exp(foot)), xytext=(0, -3),
-        textcoords="offset points", ha="center", va="top", fontsize=8,
-    )  # fmt: skip
-    axes.set_ylim(bottom=np.exp(min(bottom, foot - 0.07 * (top - bottom))))
+    if p := round(2 * float(np.median(np.abs(fits)))) / 2 if fits else 0:
+        drawn = [(line.x[line.shown], line.error[line.shown]) for line in lines]
+        look.slope(axes, drawn, float(np.copysign(p, np.median(fits))))
 
 
 def _ends(values: np.ndarray) -> tuple[float, float]:
@@ -206,7 +181,7 @@ def heat(
     figure.supylabel(words[1], fontsize=10)
     ticks = look.log_ticks(float(norm.vmin), float(norm.vmax))
     bar = figure.colorbar(mesh, ax=list(all_axes), label=family.error_label)
-    bar.set_ticks(ticks, labels=[tick_text(tick) for tick in ticks])
+    bar.set_ticks(ticks, labels=tick_texts(ticks))
     bar.minorticks_off()
     figure.suptitle(title, fontsize=10, x=0.02, ha="left")
     savefig(figure, path)

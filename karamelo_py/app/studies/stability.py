@@ -20,7 +20,7 @@ from karamelo_py.app.studies.curves import usable
 from karamelo_py.app.studies.study import Study, live_page
 from karamelo_py.kernels import watch
 from karamelo_py.output.files import savefig
-from karamelo_py.output.plots import blank_figure, tick_text
+from karamelo_py.output.plots import blank_figure, tick_texts
 from karamelo_py.script.errors import ScriptError, plural
 from karamelo_py.script.terms import number_of
 
@@ -442,7 +442,7 @@ class Map:
         bar = figure.colorbar(mesh, ax=axes, location="bottom", shrink=0.6, aspect=30)
         bar.set_label(f"{self.error} where it is stable", fontsize=8)
         ticks = look.log_ticks(float(low), float(high)) if high > low else [float(low)]
-        bar.set_ticks(ticks, labels=[tick_text(tick) for tick in ticks])
+        bar.set_ticks(ticks, labels=tick_texts(ticks))
         bar.minorticks_off()
 
 
