@@ -20,7 +20,7 @@ from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.threads import Threaded, shared_out
 from karamelo_py.kernels.step import step
 from karamelo_py.output.console import Console
-from karamelo_py.run.runner import Timings, _about
+from karamelo_py.run.runner import Timings
 from karamelo_py.scene.hub import Hub
 
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
@@ -424,27 +424,13 @@ def test_code_that_nothing_leads_to_is_not_kept():
 # --- the wait -----------------------------------------------------------------------------------
 
 
-def test_times(tmp_path, monkeypatch):
-    monkeypatch.setenv("KARAMELO_PY_CACHE", str(tmp_path))
-    (tmp_path / "kernels").mkdir()
-    assert cache.time_for("disks") is None
-    cache.keep_time("disks", 12.0)
-    cache.keep_time("slab", 20.0)
-    assert cache.time_for("disks") == 12.0
-    assert cache.time_for("another") == 20.0
-    (tmp_path / "kernels" / "times.json").write_text("{")
-    assert cache.time_for("disks") is None
-
-
 def test_the_wait_is_told_once_before_the_banner(tmp_path, monkeypatch):
-    """What it is, how long it took the last time, that it happens once; not if nobody waits."""
+    """What it is, and that it happens once; not if nobody waits."""
     monkeypatch.setenv("KARAMELO_PY_CACHE", str(tmp_path))
     out = io.StringIO()
     hub = Hub(Console(out))
     hub.domain, hub.update = SimpleNamespace(dimension=2), SimpleNamespace(words="ulmpm", time=0.0)
     wait = Timings(hub).telling_of_compilation
-    monkeypatch.setattr(os, "cpu_count", lambda: 4)
-    monkeypatch.setattr(os, "getloadavg", lambda: (2.0, 0, 0), raising=False)
     with wait():
         assert out.getvalue() == ""
         one, other = fresh(), fresh()
@@ -452,20 +438,11 @@ def test_the_wait_is_told_once_before_the_banner(tmp_path, monkeypatch):
         other(Tag())
     line = "Compiling the loops of this kind of scene, once (the next run starts at once) ...\n"
     assert out.getvalue() == line
-    cache.keep_time(next(iter(cache._times())), 12.3)
     with wait():
         one(Tag())
         assert out.getvalue() == line
         kernel(lambda tag: answer(tag))(Tag())
-    assert "once: about 12 s (the next run starts at once) ..." in out.getvalue()
-    # Eight others and this on four processors.
-    monkeypatch.setattr(os, "getloadavg", lambda: (8.0, 0, 0), raising=False)
-    with wait():
-        kernel(lambda tag: answer(tag) + 1)(Tag())
-    assert "once: 12 s to 28 s, as others use the processors (the next" in out.getvalue()
-    assert _about(0.6) == "about 1 s"  # 0.6 s to 1.4 s
-    # So short a wait was not for all of it.
-    assert list(cache._times().values()) == [12.3]
+    assert out.getvalue() == 2 * line
 
 
 def test_a_folder_that_cannot_be_used_is_warned_of_in_a_run(tmp_path, monkeypatch):

@@ -8,7 +8,6 @@ it were not there, and the user told once.
 
 import contextlib
 import hashlib
-import json
 import os
 import pickle
 import platform
@@ -33,7 +32,6 @@ ROOM = 400e6  # bytes; of what takes more, the files that were used least recent
 
 _ENDING, _LOCK = ".kernel", ".lock"
 _OURS = re.compile(r"[\w.]+-[0-9a-f]{24}-[0-9a-f]{24}\.kernel")
-_TIMES = "times.json"
 
 
 def folder() -> Path:
@@ -203,26 +201,3 @@ def write(path: Path, content: bytes) -> None:
     except BaseException:
         Path(name).unlink(missing_ok=True)
         raise
-
-
-def _times() -> dict[str, float]:
-    try:
-        times = json.loads((folder() / _TIMES).read_text(encoding="utf-8"))
-        return {str(key): float(value) for key, value in times.items()}
-    except (OSError, ValueError, TypeError, AttributeError):
-        return {}
-
-
-def time_for(scene: str) -> float | None:
-    """Seconds of a processor that a scene, or else the last one, took to be compiled."""
-    times = _times()
-    return times.get(scene, next(reversed(times.values()), None))
-
-
-def keep_time(scene: str, seconds: float) -> None:
-    """Keep for the next time how long compilation took."""
-    times = _times()
-    times.pop(scene, None)
-    times[scene] = round(seconds, 1)
-    with contextlib.suppress(OSError):  # told of by the kernels
-        write(folder() / _TIMES, json.dumps(dict(list(times.items())[-200:])).encode())

@@ -1,6 +1,5 @@
 """One run command: steps in chunks, outputs when they are due, and an eye on what goes wrong."""
 
-import os
 import signal
 import time
 from collections.abc import Iterator
@@ -14,7 +13,6 @@ import numpy as np
 
 from karamelo_py.compiler import cache
 from karamelo_py.compiler.loops import compilation
-from karamelo_py.output.console import duration
 from karamelo_py.points.basis import support
 from karamelo_py.run.advice import known_failures
 from karamelo_py.run.advice.report import report
@@ -33,16 +31,8 @@ from karamelo_py.scene.plugins import attributed
 from karamelo_py.script.errors import Pause, Quit, ScriptError, render_message
 
 PATIENCE = 0.3  # seconds between two looks, about: for Ctrl-C and the progress bar
+COMPILING = "Compiling the loops of this kind of scene, once (the next run starts at once) ..."
 ANOTHER_FOLDER = "the environment variable KARAMELO_PY_CACHE names another folder"
-
-
-def _about(seconds: float) -> str:
-    """Estimate the time for so many seconds of work; longer where others want the processor."""
-    wanted = 1 + (os.getloadavg()[0] if hasattr(os, "getloadavg") else 0)
-    longest = seconds * max(1.0, wanted / (os.cpu_count() or 1))
-    if longest < 1.5 * seconds or duration(longest) == duration(seconds):
-        return f"about {duration(seconds)}"
-    return f"{duration(seconds)} to {duration(longest)}, as others use the processors"
 
 
 def _clocks() -> np.ndarray:
@@ -71,37 +61,23 @@ class Timings:
 
     @contextmanager
     def telling_of_compilation(self) -> Iterator[None]:
-        """Say so when kernels are compiled, how long it may take, and count the time."""
-        hub = self.hub
-        # Roughly the loops of a scene, for how long they take to compile.
-        parts = {type(one).__name__ for one in (*hub.materials.values(), *hub.fixes.values())}
-        parts |= {str(hub.settings.precision), f"threads={hub.settings.threads}"}
-        scene = f"{hub.domain.dimension}D {hub.update.words} {' '.join(sorted(parts))}"
-        expected = cache.time_for(scene)
-        about = f": {_about(expected)}" if expected else ""
-        self._words = (
-            f"Compiling the loops of this kind of scene, once{about}"
-            " (the next run starts at once) ..."
-        )
+        """Say so when kernels are compiled, and count the time."""
+        self._told = False
         try:
             compilation.listeners.append(self)
-            with cache.telling(partial(hub.warn, hint=ANOTHER_FOLDER)):
+            with cache.telling(partial(self.hub.warn, hint=ANOTHER_FOLDER)):
                 yield
         finally:
             compilation.listeners.remove(self)
-            spent = self.on["compilation"][1]
-            # Where most was in the cache already, the time says nothing about the whole.
-            if spent > 0.5 * (expected or 0.0):
-                cache.keep_time(scene, spent)
 
     def on_start(self, _: str) -> None:
         """Note that a kernel is compiled, or another process does, and this one waits for it."""
         self._depth += 1
         if self._depth == 1:
             self._begun = _clocks()
-            if self._words:
-                self.hub.console.say(self._words)
-                self._words = ""
+            if not self._told:
+                self.hub.console.say(COMPILING)
+                self._told = True
 
     def on_end(self) -> None:
         self._depth -= 1
