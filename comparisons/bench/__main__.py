@@ -27,7 +27,7 @@ from karamelo_py.app.options import above_zero, add_variables, threads_option
 from karamelo_py.app.plot import read_text
 from karamelo_py.app.studies.records import surroundings
 from karamelo_py.app.studies.variables import out_file
-from karamelo_py.compiler.gpu import NoCard, card
+from karamelo_py.compiler.gpu import NoCard, bandwidth, card
 from karamelo_py.output.files import write_whole
 from karamelo_py.script.errors import ScriptError, unknown
 
@@ -148,7 +148,7 @@ def _on_card(
         gpu = card()
     except NoCard as error:
         raise ScriptError(str(error), hint=error.hint) from None
-    copied = on_card.bandwidth(gpu)
+    copied = bandwidth(gpu)
     print(f"{gpu.name}, copies of memory {copied / 1e9:.0f} GB/s, read and written")
     about = {"commit": commit(), "card": gpu.name, "bandwidth": copied, "seconds": options.seconds}
     found: dict[str, Any] = {"kind": KIND, **surroundings(), **about, "workloads": {}}

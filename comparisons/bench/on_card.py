@@ -2,7 +2,6 @@
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
-from statistics import median
 from time import perf_counter
 from typing import Any, NamedTuple
 
@@ -15,30 +14,11 @@ from comparisons.bench.measure import (
     timed_steps,
     traffic,
 )
+from karamelo_py.kernels.gpu import OTHERS, STAGES
 
 USUAL = ("disks-320", "disks-320-mls-single", "block-3d-mls-single", "block-3d-mls", "bar-3d-ul")
 MOST = 200  # steps of a repetition: nothing leaves the scenes in five
 SIZES = (1e6, 4e6, 16e6)  # points, where no variable is set
-
-# The stages of a step that functions of threads belong to.
-STAGES = {
-    "gather_point": "gather from the nodes, update of points",
-    "load_point": "loads of points",
-    "scatter_cell": "sums of cells",
-    "sum_node": "sums at nodes",
-    "visit_node": "updates of nodes",
-    "visit_member": "fixes at nodes",
-    "visit_whole_member": "fixes at nodes",
-    "visit_point": "fixes at points",
-    "visit_whole_point": "fixes at points",
-    "visit_each_node": "contact, axis",
-    "visit_each_point": "contact, axis",
-    **dict.fromkeys(
-        ("count_point", "sum_counts", "sum_sums", "sum_before", "place_list", "list_point",
-         "sort_cell", "age_node", "mark_nodes"), "lists of points by cell",
-    ),
-}  # fmt: skip
-OTHERS = "clock, reports, totals"
 
 
 class OnCard(NamedTuple):
@@ -54,15 +34,6 @@ class OnCard(NamedTuple):
     precision: str
 
     best, median, record = Solved.best, Solved.median, Solved.record
-
-
-def bandwidth(card: Any, size: int = 1 << 30) -> float:
-    """Measure how fast a card copies memory: bytes read and written a second."""
-    here, there = card.allocate(size), card.allocate(size)
-    fastest = min(card.seconds_of([lambda: card.copy(there, here, size)] * 5))
-    card.free(here)
-    card.free(there)
-    return 2 * size / fastest
 
 
 def sizes_of(name: str, presets: Mapping[str, str]) -> Iterator[dict[str, str]]:
@@ -89,12 +60,9 @@ def measured(
     count = min(max(5, int(seconds / REPETITIONS / (timed_steps(simulation, 20) / 20))), MOST)
     rates = [simulation.count * count / timed_steps(simulation, count) for _ in range(REPETITIONS)]
     steps = simulation.launches()
-    for launch in steps.begin:
-        launch()
-    times = [card.seconds_of(steps.step) for _ in range(5)]
     stages: dict[str, float] = defaultdict(float)
-    for launch, taken in zip(steps.step, zip(*times, strict=True), strict=True):
-        stages[STAGES.get(launch.name, OTHERS)] += median(taken)
+    for launch, spent in steps.seconds_of_step():
+        stages[STAGES.get(launch.name, OTHERS)] += spent
     found = OnCard(
         simulation.count, rates, per_step, max(rates) * per_step / copied, steps.images.size,
         dict(sorted(stages.items(), key=lambda item: -item[1])), made,

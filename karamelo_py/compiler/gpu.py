@@ -225,6 +225,15 @@ def assembled(text: str, processor: str) -> str:
 # --- what runs it -----------------------------------------------------------------------------
 
 
+def bandwidth(card: Any, size: int = 1 << 30) -> float:
+    """Measure how fast a card copies memory: bytes read and written a second."""
+    here, there = card.allocate(size), card.allocate(size)
+    fastest = min(card.seconds_of([lambda: card.copy(there, here, size)] * 5))
+    card.free(here)
+    card.free(there)
+    return 2 * size / fastest
+
+
 class Code(NamedTuple):
     """Keep the code of a function of threads, as :class:`~karamelo_py.compiler.loops.Unit` does."""
 

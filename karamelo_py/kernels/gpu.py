@@ -43,6 +43,27 @@ WARP = 32  # threads that read memory at once
 OCCUPIED = 1 << 40  # in the sums of `CellLists.sums`: a cell with points, beside their number
 
 
+# The stages of a step that functions of threads belong to, as `comparisons.bench` names them.
+STAGES = {
+    "gather_point": "gather from the nodes, update of points",
+    "load_point": "loads of points",
+    "scatter_cell": "sums of cells",
+    "sum_node": "sums at nodes",
+    "visit_node": "updates of nodes",
+    "visit_member": "fixes at nodes",
+    "visit_whole_member": "fixes at nodes",
+    "visit_point": "fixes at points",
+    "visit_whole_point": "fixes at points",
+    "visit_each_node": "contact, axis",
+    "visit_each_point": "contact, axis",
+    **dict.fromkeys(
+        ("count_point", "sum_counts", "sum_sums", "sum_before", "place_list", "list_point",
+         "sort_cell", "age_node", "mark_nodes"), "lists of points by cell",
+    ),
+}  # fmt: skip
+OTHERS = "clock, reports, totals"
+
+
 class CellLists(NamedTuple):
     """The points of a block by cell; N is the number of nodes, n that of points.
 
