@@ -34,7 +34,6 @@ TOOLS = (
     "__main__",
     "atlas",
     "balance",
-    "bench",
     "cost",
     "defaults",
     "exact",

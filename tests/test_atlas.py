@@ -134,7 +134,7 @@ def test_the_atlas_of_the_pages_names_scripts_and_commands_that_exist():
     assert len({entry.name for entry in entries}) == len(entries)
     parser = argparse.ArgumentParser()
     commands = parser.add_subparsers()
-    for name in ("sweep", "chart", "stability", "advise"):
+    for name in ("sweep", "chart", "stability", "bench", "advise"):
         importlib.import_module(ELSEWHERE[name][0]).add_options(commands.add_parser(name))
     for entry in entries:
         for small in (False, True):

@@ -8,6 +8,7 @@ import warnings
 import pytest
 from scenes import block
 
+from karamelo_py.app.bench.measure import WORKLOADS
 from karamelo_py.app.cli import main
 from karamelo_py.app.simulation import Simulation
 
@@ -118,7 +119,7 @@ def test_an_unknown_subcommand(capsys):
     assert "did you mean 'karamelo-py check'?" in capsys.readouterr().err
 
 
-SUBCOMMANDS = ("help", "styles", "check", "run", "sweep", "chart", "advise", "stability")
+SUBCOMMANDS = ("bench", "help", "styles", "check", "run", "sweep", "chart", "advise", "stability")
 
 
 @pytest.mark.parametrize("subcommand", SUBCOMMANDS)
@@ -134,6 +135,13 @@ def test_help_of_subcommands(subcommand, capsys):
 def test_help_finds_options_of_runs(capsys):
     assert main(["help", "gpu"]) == 0
     assert "--gpu" in capsys.readouterr().out
+
+
+def test_help_of_bench_lists_what_it_measures(capsys):
+    assert main(["bench", "--help"]) == 0
+    explained = capsys.readouterr().out
+    for name, workload in WORKLOADS.items():
+        assert f"  {name} " in explained and workload.title in explained
 
 
 @pytest.mark.parametrize("option", ["-var", "--var", "-v"])

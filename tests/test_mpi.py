@@ -135,9 +135,8 @@ def test_scenes(tmp_path, name):
 @pytest.mark.full
 def test_bench(tmp_path):
     """Shares of waiting are shares; each process has steps of its own to do."""
-    file = str(tmp_path / "a.json")
-    words = "disks-80", "--ranks", "2", "--seconds", "0.2", "-o", file
-    process = started(ROOT, sys.executable, "-m", "comparisons.bench", *words, compiled=True)
+    words = (*PROGRAM, "bench", "disks-80", "--ranks", "2", "--seconds", "0.2", "-o", "a.json")
+    process = started(tmp_path, *words, compiled=True)
     _, err = process.communicate(timeout=500)
     assert process.returncode == 0, err
     text = (tmp_path / "a.json").read_text(encoding="utf-8")

@@ -80,6 +80,7 @@ def _complain(text: str) -> None:
 # Subcommands with a module of their own, which is imported when it is asked for: DESCRIPTION,
 # add_options(parser) and run(options), which returns the exit status.
 ELSEWHERE = {
+    "bench": ("karamelo_py.app.bench.command", "Measure the speed of this machine."),
     "view": ("karamelo_py.app.view", "Draw pictures or a movie of dumps."),
     "plot": ("karamelo_py.app.plot", "Draw curves of a log."),
     "sweep": ("karamelo_py.app.studies.study", "Run a script with many values of its variables."),
@@ -173,7 +174,7 @@ def _surplus(arguments: list[str], words: list[str], parser: CommandLine) -> Scr
     if option == "--ranks":
         return ScriptError(
             f"karamelo-py {command} is of one process",
-            expected="--ranks for a script (karamelo-py SCRIPT --ranks N) or check",
+            expected="--ranks for a script (karamelo-py SCRIPT --ranks N), check or bench",
         )
     close = nearest(option, parser.options()) if option else None
     same = table()["options"].get((option or "").rstrip("0123456789"))

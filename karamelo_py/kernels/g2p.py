@@ -1,7 +1,7 @@
 """Grid to points: what a visit of the points gathers from the nodes, and what follows from it.
 
-A task names, for `karamelo-py check` and `comparisons.bench`, the fields of points and of nodes
-that it goes through.
+A task names, for `karamelo-py check` and `bench`, the fields of points and of nodes that it goes
+through.
 """
 
 from math import inf, sqrt

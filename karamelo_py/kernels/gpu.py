@@ -43,7 +43,7 @@ WARP = 32  # threads that read memory at once
 OCCUPIED = 1 << 40  # in the sums of `CellLists.sums`: a cell with points, beside their number
 
 
-# The stages of a step that functions of threads belong to, as `comparisons.bench` names them.
+# The stages of a step that functions of threads belong to, as `karamelo-py bench` names them.
 STAGES = {
     "gather_point": "gather from the nodes, update of points",
     "load_point": "loads of points",

@@ -5,7 +5,7 @@ A scheme names its rows once, stage by stage, as its class attribute ``rows``. F
 - the staged step, in which fixes act on points between the stages;
 - the fused step, with as few visits of the points as the rows allow: tasks and scatters that
   nothing separates share a visit, and the first scatter joins the last visit of the step before;
-- what `karamelo-py check` says of a step, and the traffic that `comparisons.bench` counts.
+- what `karamelo-py check` says of a step, and the traffic that `karamelo-py bench` counts.
 
 Averaged volumes, XPIC, heat and contact are rows that a scene adds (`plain`).
 """

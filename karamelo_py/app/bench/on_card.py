@@ -1,12 +1,12 @@
-"""Workloads at sizes of a GPU, measured against the bandwidth of its memory (--gpu)."""
+"""karamelo-py bench --gpu: workloads at sizes of a GPU, measured against its memory's bandwidth."""
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from time import perf_counter
 from typing import Any, NamedTuple
 
-from comparisons.bench.apart import grown
-from comparisons.bench.measure import (
+from karamelo_py.app.bench.apart import grown
+from karamelo_py.app.bench.measure import (
     REPETITIONS,
     WORKLOADS,
     Solved,

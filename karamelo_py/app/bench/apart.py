@@ -1,12 +1,11 @@
-"""Workloads measured by processes of their own: of several workloads, and with --ranks.
+"""Workloads measured by processes of their own: karamelo-py bench of several, and with --ranks.
 
 What workloads before it leave in memory has no part in the speed of one then. This module is the
-program of such a process, too: ``python -m comparisons.bench.apart``. It takes a `Measurement`
+program of such a process, too: ``python -m karamelo_py.app.bench.apart``. It takes a `Measurement`
 in JSON as its argument, writes what it finds to a file, and ends with the process that has started
 it, which closes its input then.
 """
 
-import contextlib
 import json
 import os
 import re
@@ -21,16 +20,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from comparisons.bench import measure
-from comparisons.bench.measure import WORKLOADS, Measured, Solved
+from karamelo_py.app.bench import measure
+from karamelo_py.app.bench.measure import WORKLOADS, Measured, Solved
 from karamelo_py.app.launch import ERROR, keep_to_oneself, launch, outcome_of, together
 from karamelo_py.output.files import read_json
 from karamelo_py.run.mpi.comm import MpiComm
 from karamelo_py.script.errors import ScriptError
 
 _SIGNALS = {one.value: one.name for one in signal.Signals}
-MODULE = "comparisons.bench.apart"
-ROOT = Path(__file__).parents[2]  # where a Python that is started finds it
+MODULE = "karamelo_py.app.bench.apart"
 COMMAND = (sys.executable, "-m", MODULE)
 # With --ranks, unless workloads are named: those whose scaling has an aim.
 USUAL = ("disks-320", "block-3d-mls", "bar-3d-ul", "dam-break")
@@ -77,7 +75,7 @@ def measured_apart(part: Measurement) -> Measured | Solved | int:
 
 def _found_apart(part: Measurement) -> tuple[int, dict[str, Any]]:
     """Measure with processes of their own; their exit status, and what they have found."""
-    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(ROOT):
+    with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "found.json"
         words = [json.dumps(part._replace(file=str(file)))]
         if part.ranks > 1:

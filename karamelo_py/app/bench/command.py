@@ -1,4 +1,4 @@
-"""python -m comparisons.bench: how fast this machine runs known scenes.
+"""The subcommand karamelo-py bench: how fast this machine runs known scenes.
 
 Speeds are of the fastest of several repetitions; they are meant for comparison within one run of
 this command, since machines are shared and their clocks change.
@@ -7,22 +7,15 @@ this command, since machines are shared and their clocks change.
 import json
 import re
 import subprocess
-import sys
-from argparse import (
-    ArgumentParser,
-    ArgumentTypeError,
-    Namespace,
-    RawDescriptionHelpFormatter,
-)
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Mapping
 from math import inf
 from pathlib import Path
 from typing import Any
 
 import karamelo_py
-from comparisons.bench import apart, measure, on_card
-from comparisons.bench.measure import WORKLOADS
-from karamelo_py.app.launch import outcome_of
+from karamelo_py.app.bench import apart, measure, on_card
+from karamelo_py.app.bench.measure import WORKLOADS
 from karamelo_py.app.options import above_zero, add_variables, threads_option
 from karamelo_py.app.plot import read_text
 from karamelo_py.app.studies.records import surroundings
@@ -43,10 +36,8 @@ workloads:
 {chr(10).join(f"  {name:<{WIDTH}}  {w.title}" for name, w in WORKLOADS.items())}"""
 
 
-def command_line() -> ArgumentParser:
-    """Make the parser of the command line."""
-    parser = ArgumentParser("python -m comparisons.bench", description=DESCRIPTION)
-    parser.formatter_class = RawDescriptionHelpFormatter
+def add_options(parser: ArgumentParser) -> None:
+    """Add what the subcommand takes."""
     parser.add_argument("workloads", nargs="*", metavar="WORKLOAD")
     add_variables(parser, "set a variable of the scenes, such as N, their fineness")
     parser.add_argument(
@@ -71,17 +62,6 @@ def command_line() -> ArgumentParser:
     parser.add_argument(
         "--against", type=Path, metavar="FILE", help="compare with what -o has written before"
     )
-    parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
-    return parser
-
-
-def main(words: list[str] | None = None) -> int:
-    """Run the command line; returns the exit status."""
-    options = command_line().parse_args(words)
-    status, text = outcome_of(lambda: run(options), debugging=options.debug)
-    if text:
-        print(text, file=sys.stderr, flush=True)
-    return status
 
 
 def run(options: Namespace) -> int:
@@ -238,7 +218,7 @@ def commit() -> str | None:
 
 def read(path: Path) -> dict[str, Any]:
     """Read a bench that was written before."""
-    expected = "a file that -o has written"
+    expected = "a file that karamelo-py bench -o has written"
     text = read_text(path, expected)
     try:
         found = json.loads(text)
@@ -284,7 +264,3 @@ def _differences(now: Mapping[str, Any], then: Mapping[str, Any]) -> list[str]:
         for word in ours | theirs
         if ours.get(word) != theirs.get(word)
     ]
-
-
-if __name__ == "__main__":
-    sys.exit(main())

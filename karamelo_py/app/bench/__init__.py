@@ -1,0 +1,1 @@
+"""karamelo-py bench: known scenes, and how fast this machine runs them."""
