@@ -32,7 +32,6 @@ PICTURES = DOCS / "_static" / "comparison"
 INPUTS = HERE.parent / "inputs"
 TOOLS = (
     "__main__",
-    "atlas",
     "balance",
     "cost",
     "defaults",

@@ -17,7 +17,6 @@ import meshio
 import numpy as np
 import pytest
 
-from comparisons import atlas
 from karamelo_py.app import catalogue, cli
 from karamelo_py.language import registry
 from karamelo_py.language.interpreter import Interpreter
@@ -198,17 +197,11 @@ def test_command_lines_of_pages_are_understood(page):
                 assert re.search(rf"^{name} *=", text, re.M), line
         if words[0] == "chart":
             assert set(map(str, options.tables)) <= set(made), line
+        if words[0] == "atlas":
+            assert (ROOT / options.atlas).exists(), line
+            for name in (options.only or "").split(","):
+                assert any(entry.startswith(name) for entry in ENTRIES), line
         made.append(str(getattr(options, "o", "")))
-
-
-def test_command_lines_of_the_atlas_are_understood():
-    """Its options, and the entries that are named."""
-    line = re.compile(r"^`?python -m comparisons\.atlas ([^`\n]+)", re.M)
-    found = [words for page in PAGES for words in line.findall(page.read_text("utf-8"))]
-    assert len(found) >= 4
-    for words in found:
-        only = atlas.command_line().parse_args(shlex.split(words)).only
-        assert any(entry.startswith(only) for entry in ENTRIES), words
 
 
 def test_scenes_are_refined_by_variables_that_they_have():

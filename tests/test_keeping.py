@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from comparisons import atlas
 from karamelo_py.app.cli import main
+from karamelo_py.app.studies import atlas
 from karamelo_py.app.studies.keeping import judge, look_at
 
 ROOT = Path(__file__).parent.parent
@@ -63,7 +63,7 @@ def test_the_energy_table_reduced(tmp_path, monkeypatch, capsys, starts_are_chea
     PIC takes what nodes have averaged away in every step: it damps by its definition.
     """
     monkeypatch.chdir(tmp_path)
-    entries, _ = atlas.read()
+    entries, _ = atlas.read(ROOT / "docs" / "atlas.toml")
     assert {e.name for e in entries} >= {"energy/FLIP", "energy/transfers"}
     entry = next(e for e in entries if e.name == "energy/transfers")
     entry.small.update(periods="1", transfers="PIC,TPIC", schemes=",".join(ORDERS))

@@ -1,11 +1,36 @@
-"""python -m comparisons.atlas [-only NAMES]: make pictures and tables of docs/atlas.md again.
+"""karamelo-py atlas: makes again what a page shows, each picture by commands for everybody."""
 
-`docs/atlas.toml` lists them with the commands of karamelo-py that make each. What is done is not
-done again; an interrupted atlas goes on where it stopped when the same command is given again.
+import hashlib
+import json
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import time
+import tomllib
+from argparse import ArgumentParser
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
 
-  python -m comparisons.atlas -list
-  python -m comparisons.atlas -only failures
-  python -m comparisons.atlas -page docs/atlas.md
+import karamelo_py
+from karamelo_py.app.plot import read_text
+from karamelo_py.app.studies import records
+from karamelo_py.app.studies.case import PROGRAM, environment
+from karamelo_py.app.studies.variables import names
+from karamelo_py.output.console import duration
+from karamelo_py.output.files import read_json, write_whole
+from karamelo_py.script.errors import ScriptError, meant, plural
+
+DESCRIPTION = """\
+Makes the pictures and tables of an atlas again: a file (TOML) that lists them with the commands of
+karamelo-py that make each. What is done is not done again; an interrupted atlas goes on where it
+stopped when the same command is given again.
+
+  karamelo-py atlas docs/atlas.toml -list
+  karamelo-py atlas docs/atlas.toml -only failures
+  karamelo-py atlas docs/atlas.toml -page docs/atlas.md
 
 An entry has a name, a text, and commands that run in a folder of its own; {inputs} is the folder
 `inputs` of the atlas, and other words in braces are values of the entry, or its smaller values:
@@ -21,32 +46,7 @@ An entry has a name, a text, and commands that run in a folder of its own; {inpu
   small = {sizes = "0.2,0.4"}
 
 Runs that do not end well are named, and the exit status is 1, unless the entry says ends_early =
-true: that they do is what it shows.
-"""
-
-import argparse
-import hashlib
-import json
-import os
-import re
-import shlex
-import shutil
-import subprocess
-import sys
-import time
-import tomllib
-from dataclasses import dataclass, field
-from pathlib import Path
-
-import karamelo_py
-from karamelo_py.app.studies import records
-from karamelo_py.app.studies.case import PROGRAM, environment
-from karamelo_py.app.studies.variables import names
-from karamelo_py.output.console import duration
-from karamelo_py.output.files import read_json, write_whole
-from karamelo_py.script.errors import plural
-
-ATLAS = Path(__file__).parent.parent / "docs" / "atlas.toml"
+true: that they do is what it shows."""
 KEPT = "entry.json"
 SAID = "said.txt"
 PICTURES = (".png", ".svg")
@@ -74,21 +74,38 @@ class Entry:
     def lines(self, inputs: str, *, small: bool) -> list[str]:
         """Fill values into the commands."""
         words = {"inputs": inputs, **self.whole, **(self.small if small else {})}
-        return [command.format(**words) for command in self.commands]
+        try:
+            return [command.format(**words) for command in self.commands]
+        except (KeyError, IndexError, ValueError) as error:
+            raise ScriptError(
+                f"entry '{self.name}': no value for {error}",
+                expected="whole = {" + str(error).strip("'") + ' = "..."}',
+            ) from None
 
 
-def read(path: Path = ATLAS) -> tuple[list[Entry], Path]:
+def read(path: Path) -> tuple[list[Entry], Path]:
     """Read the entries of an atlas, and its folder of scripts."""
-    found = tomllib.loads(path.read_text("utf-8"))
-    entries = [Entry(**each) for each in found["entry"]]
-    return entries, (path.parent / found["inputs"]).resolve()
+    try:
+        found = tomllib.loads(read_text(path))
+    except tomllib.TOMLDecodeError as error:
+        raise ScriptError(f"{path} is not TOML: {error}") from None
+    entries = []
+    for each in found.get("entry", []):
+        try:
+            entries.append(Entry(**each))
+        except TypeError as error:
+            raise ScriptError(
+                f"{path}: an entry with {str(error).split(') ')[-1]}",
+                expected="name, text, commands, whole, small, interpreted, page, ends_early",
+            ) from None
+    if not entries:
+        raise ScriptError(f"{path} has no entries", expected="[[entry]] with name and commands")
+    return entries, (path.parent / found.get("inputs", "inputs")).resolve()
 
 
-def command_line() -> argparse.ArgumentParser:
-    """Make the parser of the command line."""
-    parser = argparse.ArgumentParser(prog="python -m comparisons.atlas", description=__doc__)
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument("atlas", type=Path, nargs="?", default=ATLAS, help="list of entries")
+def add_options(parser: ArgumentParser) -> None:
+    """Add what the subcommand takes."""
+    parser.add_argument("atlas", type=Path, help="the list of entries, such as docs/atlas.toml")
     parser.add_argument("-only", default="", metavar="NAMES", help="entries or groups: NAME,NAME")
     parser.add_argument("-small", action="store_true", help="use the smaller values of the entries")
     parser.add_argument("-again", action="store_true", help="repeat what is done")
@@ -99,18 +116,21 @@ def command_line() -> argparse.ArgumentParser:
     parser.add_argument(
         "-page", type=Path, help="page to write; its pictures go to _static/atlas beside it"
     )
-    return parser
 
 
-def main(words: list[str] | None = None) -> int:
+def run(options: Any) -> int:
     """Do what the command line says; returns the exit status."""
-    parser = command_line()
-    options = parser.parse_args(words)
     entries, inputs = read(options.atlas)
     asked = names(options.only)
-    known = {name for entry in entries for name in (entry.group, entry.name)}
-    if unknown := [name for name in asked if name not in known]:
-        parser.error(f"-only {','.join(unknown)}: no such entry (-list shows all)")
+    groups = {entry.group for entry in entries}
+    known = [*groups, *(entry.name for entry in entries)]
+    for name in asked:
+        if name not in known:
+            raise ScriptError(
+                f"-only {name}: no such entry",
+                expected="one of " + ", ".join(sorted(groups)) + " (-list shows all)",
+                hint=meant(name, known),
+            )
     chosen = [e for e in entries if not asked or e.name in asked or e.group in asked]
     if options.list:
         for entry in chosen:
@@ -195,7 +215,7 @@ def write_page(page: Path, entries: list[Entry], folder: Path, inputs: Path) -> 
     shown = page.parent / "_static" / "atlas"
     parts = [
         "# Atlas of accuracy and stability",
-        "Written by `python -m comparisons.atlas`, by the commands that stand below pictures.",
+        "Written by `karamelo-py atlas`, by the commands that stand below pictures.",
     ]
     group = ""
     for entry in entries:
@@ -240,7 +260,3 @@ def abridged(said: str) -> str:
     found = [line for line in lines[last + 1 :] if not _RUN.match(line)]
     orders = next((k for k, line in enumerate(found) if line.startswith("orders, of")), 0)
     return "\n".join([*commands, *found[orders:]])
-
-
-if __name__ == "__main__":
-    sys.exit(main())
