@@ -299,32 +299,6 @@ def test_a_signal_amid_the_first_picture(tmp_path, words):
     assert sorted(path.name for path in (tmp_path / "run").iterdir()) == ["d.0.png", "log.mpm"]
 
 
-SOON = """
-from karamelo_py.app import launch
-launch.LOOK, launch.STANDS = 0.1, 0.5
-"""
-
-
-@pytest.mark.full
-@needs_mpi
-@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
-def test_a_process_is_stopped(tmp_path):
-    """All wait: the user is told which; a signal ends them with the last state, that one too."""
-    (tmp_path / "sitecustomize.py").write_text(SOON, encoding="utf-8")
-    folders = os.pathsep.join([str(tmp_path), os.environ["PYTHONPATH"]])
-    process = running(tmp_path, PYTHONPATH=folders)
-    pid = _pids(process.pid)[1]
-    os.kill(pid, signal.SIGSTOP)
-    stands = f"process 2 of 2 (pid {pid}) is stopped"
-    while stands not in (said := process.stderr.readline()):
-        assert said, "it ended"
-    process.send_signal(signal.SIGTERM)
-    _out, err = process.communicate(timeout=120)
-    assert process.returncode == 128 + signal.SIGTERM, err
-    assert err.count("interrupted: the log and the dumps are complete") == 1
-    assert "stopped" not in err
-
-
 @pytest.mark.full
 @needs_mpi
 @pytest.mark.parametrize("rank", [0, 1])

@@ -47,8 +47,6 @@ OPEN_MPI = {
 PAGES = {"GLIBC_TUNABLES": "glibc.malloc.hugetlb=1"}
 PAUSE = 0.05  # seconds between two looks at mpiexec
 GRACE = 2.0  # seconds that processes have to end after it
-LONGEST = 15.0  # ... after one of them has failed; twice that where mpiexec does not heed
-LOOK, STANDS = 1.0, 10.0  # seconds between two looks at processes, and until one is told of
 AT_ONCE = 3  # so many signals end all without waiting for the step
 LONGEST_FOLDER = 70  # of a socket, whose name may not be long
 A_CORE = 16  # processes at most: who asks for more means another number
@@ -133,10 +131,7 @@ class Launcher:
         self.reports: dict[int, dict[str, Any]] = {}
         self.lost: list[dict[str, Any]] = []  # ended without a report, in this order
         self.over = False  # the first has done all
-        self.failed = 0.0  # when one has told that it failed
         self.signals: list[int] = []
-        self.stopped: dict[int, float] = {}  # since when; infinite when the user knows
-        self.looked = 0.0
         self.process: Any = None
 
     def run(self) -> int:
@@ -152,8 +147,6 @@ class Launcher:
             )  # fmt: skip
             while self.process.poll() is None:
                 self._listen()
-                self._tell_of_those_that_stand()
-                self._end_those_that_stay()
             end = time.monotonic() + GRACE
             while self.links and time.monotonic() < end:
                 self._listen()
@@ -170,47 +163,11 @@ class Launcher:
     def _pass_on(self, number: int, _: Any) -> None:
         self.signals.append(number)
         first = next((link for link, one in self.links.items() if one.get("rank") == 0), None)
-        for one in self._stopped():  # the run ends with their part of its last state
-            os.kill(one["pid"], signal.SIGCONT)
         if first is not None and 0 not in self.reports and len(self.signals) < AT_ONCE:
             with suppress(OSError):
                 first.sendall(bytes([number]))
         elif self.process is not None:
             self.process.terminate()
-
-    def _end_those_that_stay(self) -> None:
-        """End mpiexec where a process has failed long ago, and others have not seen it."""
-        if any(one["status"] for one in self.reports.values()):
-            self.failed = self.failed or time.monotonic()
-            late = time.monotonic() - self.failed
-            if late > 2 * LONGEST:
-                self.process.kill()
-            elif late > LONGEST:
-                self.process.terminate()
-
-    def _stopped(self) -> list[dict[str, Any]]:
-        """Find processes that somebody has stopped, as far as the system tells."""
-        found = []
-        for one in filter(None, self.links.values()):
-            with suppress(OSError):
-                state = Path(f"/proc/{one['pid']}/stat").read_text().rpartition(")")[2].split()[0]
-                found += [one] * (state == "T")
-        return found
-
-    def _tell_of_those_that_stand(self) -> None:
-        """Say so where all wait for a process that somebody has stopped."""
-        now = time.monotonic()
-        if now < self.looked + LOOK:
-            return
-        self.looked, stopped = now, self._stopped()
-        self.stopped = {one["pid"]: self.stopped.get(one["pid"], now) for one in stopped}
-        for one in stopped:
-            pid = one["pid"]
-            if now - self.stopped[pid] > STANDS:
-                self.stopped[pid] = inf
-                who = f"process {one['rank'] + 1} of {self.ranks} (pid {pid})"
-                text = f"{who} is stopped: all wait for it"
-                self._say(render_message("warning", text, hint=f"kill -CONT {pid}"))
 
     def _listen(self) -> None:
         ready, *_ = select.select([self.door, *self.links], [], [], PAUSE)
