@@ -24,6 +24,7 @@ extensions = [
     "reference_pages",
     "gallery",
     "messages",
+    "choose",
     "script_lexer",
     "source_links",
     "synonyms",

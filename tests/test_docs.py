@@ -1,9 +1,11 @@
 """README, documentation and docstrings: what they show is right."""
 
+import html
 import inspect
 import json
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -26,6 +28,7 @@ from karamelo_py.script.functions import FUNCTIONS
 from karamelo_py.script.parser import parse
 
 ROOT = Path(__file__).parent.parent
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 ROOMS = [ROOT / "docs" / "house.md", *sorted((ROOT / "docs" / "house").glob("*.md"))]
 SITE = [*(ROOT / "docs" / "howto").glob("*.md"), ROOT / "docs" / "messages" / "index.md"]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), *ROOMS[1:], *sorted(SITE)]
@@ -235,51 +238,90 @@ def test_links_of_pages_lead_somewhere():
                 assert name in names, (page, part)
 
 
-def questions():
-    """The three questions of choose.md: the answers to each, and rows of answers and a line."""
-    head = (ROOT / "docs" / "choose.md").read_text("utf-8").partition("## Why")[0]
-    numbered = re.findall(r"^\d\. (.*?)(?=^\d\. |\n\n)", head, re.S | re.M)
-    cells = re.findall(r"^\| ([^|`]+) \| (\w+) \| (\w+) \| (.+) \|$", head, re.M)
-    rows = [(*(cell.split(", ") for cell in three), line) for *three, line in cells]
-    return [re.findall(r"`(\w+)`", question) for question in numbered], rows
+sys.path.insert(0, str(ROOT / "docs" / "_ext"))
+import choose  # noqa: E402  (only now is it found)
+
+sys.path.pop(0)
+CHOICES = choose.choices(ROOT / "docs" / "choose.md")
+
+
+def chosen(rows, given):
+    """The number of the first row that has the answers."""
+    fits = (
+        all(
+            word in cell or cell == ["any"]
+            for word, cell in zip(given, row["answers"], strict=True)
+        )
+        for row in rows
+    )
+    return list(fits).index(True)
 
 
 def test_every_answer_to_the_questions_leads_to_a_method():
     """One row has each set of answers first, and no row is out of reach."""
-    answers, rows = questions()
+    answers = [[word for word, _ in one["answers"]] for one in CHOICES["questions"]]
     assert [len(one) for one in answers] == [4, 2, 4]
-    taken = set()
-    for given in product(*answers):
-        fits = [
-            k
-            for k, (*cells, _) in enumerate(rows)
-            if all(word in cell or cell == ["any"] for word, cell in zip(given, cells, strict=True))
-        ]
-        assert fits, given
-        taken.add(fits[0])
-    assert taken == set(range(len(rows)))
+    taken = {chosen(CHOICES["rows"], given) for given in product(*answers)}
+    assert taken == set(range(len(CHOICES["rows"])))
+    page = (ROOT / "docs" / "choose.md").read_text("utf-8").partition("## Why")[0]
+    assert page.count("| `method(") == len(CHOICES["rows"])
 
 
 @pytest.mark.parametrize(
-    "row", questions()[1], ids=lambda row: "-".join([*row[0], *row[1], *row[2]])
+    ("lines", "d"),
+    [(row["lines"], d) for row in CHOICES["rows"] for d in (2, 3)[: 1 + ("R8" in str(row))]],
+    ids=str,
 )
-def test_lines_of_the_questions_are_understood(row, tmp_path):
-    """Two solids with the method, and with the fix between them, and a run of one step."""
-    *_, text = row
-    hub = Hub()
-    hub.console.quiet = hub.rehearsing = True
-    hub.folder = tmp_path
-    lines = re.findall(r"`(\w+\(.*?\))`", text)
-    lines += ["dimension(2, 0, 1, 0, 1, 0.1)", "material(rubber, neo-hookean, 1000, 1e5, 0.3)"]
-    for name, lo, hi in (("left", 0.2, 0.4), ("right", 0.5, 0.7)):
-        lines.append(f"region({name}, block, {lo}, {hi}, 0.3, 0.5)")
-        lines.append(f"solid({name}, region, {name}, 2, rubber, 0.1)")
-    if "minimize_penetration" in text:
-        lines.append("fix(touch, contact/minimize_penetration, left, right, 0.3)")
-    Interpreter(hub).run_text("\n".join([*lines, "run(1)"]))
-    kind, transfer, basis = re.search(r"method\(([^,]+), (\w+), ([^,)]+)", text).groups()
-    assert registry.find("method", kind) is type(hub.update.method)
-    assert registry.knows("transfer", transfer) and registry.knows("basis", basis)
+def test_lines_of_the_form_run(run_interpreted, lines, d):
+    """Two solids with the method, with fixes behind them, and a step."""
+    lines = [line.replace("R4", "R8") if d == 3 else line for line in lines]
+    fixes = [line for line in lines if line.startswith("fix")]
+    script = [line for line in lines if line not in fixes]
+    ends = ", ".join((d - 1) * ["0.2, 0.6"])
+    script += [f"dimension({d}, {', '.join(d * ['0, 1'])}, 0.2)"]
+    script += ["material(rubber, neo-hookean, 1000, 1e5, 0.3)"]
+    for name, lo, hi in (("left", 0.2, 0.4), ("right", 0.6, 0.8)):
+        script.append(f"region({name}, block, {lo}, {hi}, {ends})")
+        script.append(f"solid({name}, region, {name}, {2 if d == 2 else 1}, rubber, 0.2)")
+    run_interpreted("\n".join([*script, *fixes, "run(1)"]))
+
+
+def test_the_form_has_the_table_of_the_page(tmp_path):
+    choose.write_choices(ROOT / "docs" / "choose.md", tmp_path / "generated" / "choose.js")
+    text = (tmp_path / "generated" / "choose.js").read_text("utf-8")
+    found = json.loads(text.removeprefix("const CHOICES = ").removesuffix(";\n"))
+    assert found == json.loads(json.dumps(CHOICES))
+
+
+@pytest.mark.skipif(not any(map(shutil.which, BROWSERS)), reason="no browser to look with")
+def test_the_form_writes_the_lines_of_the_table(tmp_path):
+    """All answers in Chromium, clicked one after another."""
+    docs = ROOT / "docs"
+    choose.write_choices(docs / "choose.md", tmp_path / "choose.js")
+    form = re.search(
+        r"^```{raw} html\n(.*?)^<script", (docs / "choose.md").read_text("utf-8"), re.S | re.M
+    )
+    answers = [[word for word, _ in one["answers"]] for one in CHOICES["questions"]]
+    given = f"const given = {json.dumps([*product(*answers)])};"
+    script = """
+      const found = given.map((words) => {
+        words.forEach((word, k) => form.elements[`question-${k}`].forEach((one) => {
+          if (one.value === word) one.click();
+        }));
+        return document.getElementById("choose-lines").textContent.trim();
+      });
+      document.body.textContent = "FOUND " + JSON.stringify(found) + " END";
+    """
+    scripts = (tmp_path / "choose.js", docs / "_static" / "choose.js")
+    parts = [f"<script>{path.read_text('utf-8')}</script>" for path in scripts]
+    page = tmp_path / "page.html"
+    page.write_text("\n".join([form[1], *parts, f"<script>{given}{script}</script>"]), "utf-8")
+    browser = next(filter(None, map(shutil.which, BROWSERS)))
+    command = [browser, "--headless", "--no-sandbox", "--disable-gpu", "--dump-dom", page.as_uri()]
+    seen = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True).stdout
+    found = json.loads(html.unescape(re.search("FOUND (.*) END", seen, re.S)[1]))
+    rows = CHOICES["rows"]
+    assert found == ["\n".join(rows[chosen(rows, given)]["lines"]) for given in product(*answers)]
 
 
 @pytest.mark.parametrize(("family", "name"), STYLES, ids=[f"{f}-{n}" for f, n in STYLES])
