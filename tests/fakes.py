@@ -65,6 +65,8 @@ class FakeFields:
     def particle_names(self):
         return list(self.points)
 
+    shown_names = particle_names
+
     def particle(self, name):
         return self.points[name].copy()
 

@@ -100,7 +100,7 @@ def test_what_cannot_be_found_is_told(folder, capsys, words, said):
     [
         (["-var", "speed=1,5", "-match", "c_x"], "-match c_x"),
         (["-var", "speed=1,5", "-match", "c_x=none.csv:x"], "there is no file 'none.csv'"),
-        (["-var", "speed=1,5", "-match", "c_x=flight.csv:y"], "expected: one of time x"),
+        (["-var", "speed=1,5", "-match", "c_x=flight.csv:y"], "expected: one of time, x"),
         (["-var", "speed=1,5", "-match", "q=2"], "does not log 'q'"),
         (["-var", "speed=3", "-match", "c_x=2"], "two numbers for each variable"),
         (["-var", "speed=a,b", "-match", "c_x=2"], "two numbers for each variable"),

@@ -23,6 +23,7 @@ from karamelo_py.output.files import savefig
 from karamelo_py.output.outlines import Tool, outlines
 from karamelo_py.output.rhythm import ByTime
 from karamelo_py.output.snapshots import Snapshot, read
+from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.dumps.hdf5 import Hdf5
 from karamelo_py.styles.dumps.lammps import Particle, ParticleGz
 from karamelo_py.styles.dumps.pyplot import PyPlot
@@ -115,6 +116,10 @@ def test_colours_mean_the_same_in_all_pictures(tmp_path, monkeypatch, capsys):
     assert (tmp_path / "c.0.png").read_bytes() != (tmp_path / "a.0.png").read_bytes()
 
 
+def as_it_is(snapshot):
+    return snapshot
+
+
 def test_points_that_move_stay_in_view(tmp_path, monkeypatch):
     """A .pvd has no domain: the picture shows where the points are at any time."""
     monkeypatch.chdir(tmp_path)
@@ -125,10 +130,11 @@ def test_points_that_move_stay_in_view(tmp_path, monkeypatch):
     hub.update.step, hub.update.time = 5, 0.5
     hub.fields.points["x"] = x + 3
     hub.dumps["d"].write()
-    lo, hi, _ = view._all([tmp_path / "p.pvd"], "vx", {"field": None, "only": None}, PLAIN)
+    words = {"field": None, "only": None}
+    lo, hi, _ = view._all([tmp_path / "p.pvd"], "vx", words, PLAIN, as_it_is)
     assert lo[0] < x.min() and hi[0] > x.max() + 3
     seen = PLAIN | {"window": ((None, x.max() + 1),)}
-    span = view._all([tmp_path / "p.pvd"], "x", {"field": None, "only": None}, seen)[2]
+    span = view._all([tmp_path / "p.pvd"], "x", words, seen, as_it_is)[2]
     assert span[1] < x.max() + 1.5
 
 
@@ -165,6 +171,10 @@ def test_points_that_move_stay_in_view(tmp_path, monkeypatch):
         (["p.dump", "--only", "type == 9"], "--only: no point of these dumps is left"),
         (["p.dump", "--xmin", "1e9"], "--xmin: no point of these dumps is left"),
         (["q.dump", "-o", "q.png"], "-o q.*.png"),
+        (["p.dump", "q.dump"], "p.dump and q.dump both have step 0"),
+        (["p.dump", "--only", "not tool"], "--script FILE the groups, solids and variables"),
+        (["p.dump", "-c", "tool"], "--script FILE the groups"),
+        (["p.dump", "--title", "load {load} N"], "a log beside the dumps (log.mpm, log.csv)"),
         ([], "FILE"),
     ],
 )
@@ -300,6 +310,84 @@ def test_words_of_pictures_are_the_same_everywhere(run_interpreted, capsys, monk
     call(capsys, "view", "p.dump", "-c", "seq", "--size", "300", "300", "-o", "w.*.png")
     assert Image.open("v.2.png").size == Image.open(folder / "own.2.png").size
     assert Path("v.2.png").read_bytes() != Path("w.2.png").read_bytes()
+
+
+@pytest.fixture
+def shown(monkeypatch):
+    """What pictures show, one after another: numbers of points and titles."""
+    found = []
+
+    def show(self, snapshot, side, title, tools=(), of=pictures.Picture.show):
+        of(self, snapshot, side, title, tools)
+        found.append((self.marks.rows.shape[1], title))
+
+    monkeypatch.setattr(pictures.Picture, "show", show)
+    return found
+
+
+SETS = """
+    compute(v, probe, all, vx)
+    twice = 2*v
+    region(low, block, 0.3, 0.6, 0, 0.35)
+    region(top, block, 0.3, 0.6, 0.45, 0.5)
+    group(part, particles, region, low, all)
+    group(part, particles, region, top, all)
+    region(other, block, 0.8, 0.9, 0.3, 0.4)
+    solid(second, region, other, 2, rubber, 0.1)
+    log_modify(custom, step, time, twice)
+    set_output(2)
+    set_dt(1e-3)
+"""
+
+
+# Of a group of two parts, 12 of 24 points, and a solid of 4 more.
+CHOSEN = {
+    "only=not part": 16, "only=not second": 24, "only=part && x < 0.35": 2,
+    "part": 28, "second + 2*part": 28, "only=vx > twice/3": 24,
+    'title="v {twice/2} of {1+1} $a_{2}$"': 28,
+}  # fmt: skip
+FAST = "fix(f, initial_velocity_particles, all, 0.1*(x < 0.7), 0)"
+
+
+def test_groups_and_solids_are_left_out_by_name(shown):
+    """In sim.show, which draws as dump pyplot does, before the first step."""
+    sim = Simulation(block(2, SETS, "run(2)"))
+    for word, count in CHOSEN.items():
+        name, _, value = word.partition("=")
+        keyword = {name: value.strip('"')} if name in ("only", "title") else {"field": word}
+        if "twice" not in word or name == "title":
+            sim.show(**keyword)
+            assert shown[-1][0] == count, word
+    assert shown[-1][1] == "v 0 of 2 $a_{2}$: step 0, time 0"
+    with pytest.raises(ScriptError, match="unknown name 'partt'") as caught:
+        sim.show(only="not partt")
+    assert caught.value.hint == "did you mean 'part'?"
+
+
+def test_view_knows_groups_solids_and_values_by_name(run_interpreted, monkeypatch, capsys, shown):
+    """With the script of the run, and the log beside the dumps."""
+    own = 'dump(d, all, movie, 9, d.gif, 1, 1, 2*part, only=not second, title="{v} m/s")'
+    text = block(2, SETS, FAST, own, "dump(p, all, particle, 9, p.*.dump, vx)", "run(2)")
+    monkeypatch.chdir(run_interpreted(text).folder)
+    view = ["view", "p.2.dump", "-o", "v.png", "--size", "100", "100"]
+    for word, count in CHOSEN.items():
+        name, _, value = word.partition("=")
+        option = [f"--{name}", value.strip('"')] if name in ("only", "title") else ["-c", word]
+        status, _, err = call(capsys, *view, *option, "--script", "in.script")
+        assert (status, err) == (0, "") and shown[-1][0] == count, word
+    v = 0.1 * 24 / 28
+    assert shown[-1][1].startswith(f"v {v:.6g} of 2 $a_{{2}}$: step 2")
+    # Without a script the log knows its columns.
+    only = ["--only", "vx > twice/3"]
+    assert call(capsys, *view, *only)[0] == 0 and shown[-1][0] == 24
+    Path("log.mpm").write_text("Step Time twice\n0 0 0\n")
+    assert "twice at step 2 is a value that dumps do not hold" in call(capsys, *view, *only)[2]
+    Path("log.mpm").unlink()
+    err = call(capsys, *view, *only, "--script", "in.script")[2]
+    assert "log_modify(custom, step, time, v) in the script" in err
+    Path("in.small").write_text(block(2))
+    err = call(capsys, *view, "--script", "in.small")[2]
+    assert "the script has 24 points, the dump 28" in err
 
 
 @pytest.mark.parametrize("dimension", [2, 3])

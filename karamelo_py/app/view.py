@@ -2,9 +2,11 @@
 
 import argparse
 import glob
+import re
 import sys
-from collections.abc import Iterable, Iterator
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from functools import partial
 from itertools import chain, islice
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,6 +16,7 @@ import numpy as np
 
 from karamelo_py.app.catalogue import help_of
 from karamelo_py.app.options import LIVE, above_zero, add_variables
+from karamelo_py.app.plot import read_rows
 from karamelo_py.language import signature
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.language.signature import Argument, Parameter
@@ -27,11 +30,14 @@ from karamelo_py.output.files import (
     unwarned,
     whole,
 )
+from karamelo_py.output.point_table import members, named_sets
+from karamelo_py.output.quantity import Caption
 from karamelo_py.output.snapshots import Snapshot, read
 from karamelo_py.output.units import labelled
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
 from karamelo_py.script.errors import ScriptError, plural, render_message
+from karamelo_py.script.expressions import GLOBAL_SEEDS
 from karamelo_py.script.parser import parse
 from karamelo_py.script.syntax import Raw, Source
 from karamelo_py.styles.dumps.pyplot import LEAST_PIXELS, MOST_PIXELS, look_of, tools_of
@@ -57,8 +63,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--script", metavar="FILE",
-        help="the script of the run, which tells --outlines of its walls and tools, and the names "
-        "of its solids; dumps hold none",
+        help="the script of the run, which tells of its walls and tools (--outlines), its groups "
+        "and solids (--only \"not tool\") and its variables; dumps hold none",
     )  # fmt: skip
     add_variables(parser, "set a variable of the script, as in the run")
     parser.add_argument(
@@ -102,6 +108,7 @@ def run(options: argparse.Namespace) -> int:
     # Named by number, 1000 comes after 999.
     files = sorted(_matching(options.files), key=lambda path: (_number(path), path.name))
     drawn, scene = 0, _scene(options)
+    log = _log_beside(files, scene)
     if not movie and "*" not in options.output.name and len(list(islice(_all_in(files), 2))) > 1:
         raise ScriptError(
             f"{options.output} is one picture, and these are dumps of several moments",
@@ -111,15 +118,18 @@ def run(options: argparse.Namespace) -> int:
     with unwarned():
         picture = look = None
         for snapshot in _all_in(files):
-            look = look or _look(snapshot, options)
-            picture = picture or _picture(snapshot, files, options, look, scene)
-            snapshot = _chosen(snapshot, look)
+            if picture is None:
+                with _telling_of_names(options):
+                    look = _look(snapshot, options, scene)
+                    chosen = partial(_chosen, look, scene, log)
+                    picture = _picture(snapshot, files, options, look, scene, chosen)
+            snapshot = chosen(snapshot)
             unit = snapshot.units.get("time", "")
             time = "" if np.isnan(snapshot.time) else f", time {snapshot.time:.6g} {unit}".rstrip()
             # As they stand in the file, whatever their ids.
             snapshot.columns["id"] = np.arange(len(snapshot.columns["x"]))
             title = f"{look['title']}: " if look["title"] else ""
-            tools = _tools(scene, snapshot) if scene and look["outlines"] else ()
+            tools = _tools(scene) if options.script and look["outlines"] else ()
             picture.show(snapshot, picture.side, f"{title}step {snapshot.step}{time}", tools)
             drawn += 1
             if movie:
@@ -137,34 +147,57 @@ def run(options: argparse.Namespace) -> int:
     if movie:
         frames.save(options.output)
     print(f"{options.output}: {drawn} {'frame' if movie else 'picture'}{'s' * (drawn > 1)}")
-    if look["outlines"] and scene is None:
+    if look["outlines"] and options.script is None:
         said = "dumps do not tell where walls and tools are: outlines are those of solids alone"
         hint = "--script FILE, the script of the run, shows its walls and tools, too"
         print(render_message("note", said, hint=hint), file=sys.stderr)
     return 0
 
 
-def _scene(options: argparse.Namespace) -> Hub | None:
-    """Go through the script of the run, without its steps."""
-    if options.script is None:
-        if options.var:
-            raise ScriptError(
-                f"-var {options.var[0][0]} sets a variable of a script, and there is none here",
-                expected="--script FILE, the script of the run, beside it",
-            )
-        return None
+@contextmanager
+def _telling_of_names(options: argparse.Namespace) -> Iterator[None]:
+    """Tell with an unknown name where those come from that dumps do not have."""
+    try:
+        yield
+    except ScriptError as error:
+        known = re.match("did you mean|log_modify", error.hint or "")
+        if re.search("unknown name|has no column", error.message) and not known:
+            error.hint = "a log beside the dumps (log.mpm, log.csv) knows the values of its columns"
+            if options.script is None:
+                error.hint += ", and --script FILE the groups, solids and variables of the run"
+        raise
+
+
+def _scene(options: argparse.Namespace) -> Hub:
+    """Go through the script of the run, without its steps; the scene is empty without a script."""
+    if options.script is None and options.var:
+        raise ScriptError(
+            f"-var {options.var[0][0]} sets a variable of a script, and there is none here",
+            expected="--script FILE, the script of the run, beside it",
+        )
     hub = Hub(Console(quiet=True))
     hub.rehearsing = True
-    Interpreter(hub, dict(options.var)).run_file(options.script)
+    Interpreter(hub, dict(options.var))
+    if options.script is not None:
+        hub.interpreter.run_file(options.script)
     return hub
 
 
-def _tools(scene: Hub, snapshot: Snapshot) -> list[Any]:
-    """List the walls and tools of all runs, where they are at the time of a snapshot."""
-    for name in scene.values.names():
-        scene.values.set(name, np.nan)  # what a run has to find
-    scene.values.set("time", snapshot.time)
-    scene.values.set("timestep", snapshot.step)
+def _log_beside(files: list[Path], scene: Hub) -> dict[int, dict[str, float]]:
+    """Read the log beside the dumps, by step: formulas know the names of its columns."""
+    rows = []
+    for name in ("log.mpm", "log.csv") if files else ():
+        with suppress(ScriptError):
+            rows += [row for row in read_rows(files[0].parent / name) if "Step" in row]
+    for name in filter(str.isidentifier, dict.fromkeys(name for row in rows for name in row)):
+        scene.interpreter.variables.pop(name, None)  # of a formula the log has the value
+        if name not in scene.values:
+            scene.values.publish(name)
+    return {int(row["Step"]): row for row in rows}
+
+
+def _tools(scene: Hub) -> list[Any]:
+    """List the walls and tools of all runs, where they are now."""
     fixes = [part for part in dict.fromkeys(scene.in_runs) if isinstance(part, Fix)]
     tools = tools_of(fixes)
     for fix, tool in zip((fix for fix in fixes if fix.depth_of), tools, strict=True):
@@ -174,7 +207,7 @@ def _tools(scene: Hub, snapshot: Snapshot) -> list[Any]:
                 "its script",
                 place=fix.place,
                 expected="walls and tools that move by formulas of time",
-                hint="dump pyplot draws this one during the run",
+                hint="a log beside the dumps that has them, or dump pyplot during the run",
             )
     return tools
 
@@ -218,11 +251,13 @@ def _number(path: Path) -> int:
     return int(digits[-1]) if digits else -1
 
 
-def _look(first: Snapshot, options: argparse.Namespace) -> dict[str, Any]:
+def _look(first: Snapshot, options: argparse.Namespace, scene: Hub) -> dict[str, Any]:
     """Read the words of dump pyplot as a script's."""
-    names = SimpleNamespace(particle_names=lambda: list(first.columns))
-    script = Interpreter(Hub())
-    hub = SimpleNamespace(fields=names, values=script.hub.values)
+    columns = list(first.columns)
+    names = SimpleNamespace(
+        particle_names=lambda: columns, shown_names=lambda: [*columns, *named_sets(scene)]
+    )
+    hub = SimpleNamespace(fields=names, values=scene.values)
     (field,) = (word for word in help_of("dump", "pyplot").parameters if word.name == "field")
     look = {}
     for word in [field, *_look_words()]:
@@ -237,20 +272,44 @@ def _look(first: Snapshot, options: argparse.Namespace) -> dict[str, Any]:
                 raise ScriptError(
                     f"--{option} takes one value, not '{given}'", expected=word.kind.text
                 )
-            argument = Argument(Raw(Source(given, f"--{option}"), 0, len(given)), script)
+            argument = Argument(Raw(Source(given, f"--{option}"), 0, len(given)), scene.interpreter)
             look[word.name] = signature.convert(hub, word, argument)
+    if look["title"] is not None:
+        look["title"] = Caption(scene, look["title"])
     return look
 
 
-def _chosen(snapshot: Snapshot, look: dict[str, Any]) -> Snapshot:
-    """Choose the points that are drawn, with the formula that colours them as a column."""
+def _chosen(
+    look: dict[str, Any], scene: Hub, log: dict[int, dict[str, float]], snapshot: Snapshot
+) -> Snapshot:
+    """Choose the points that are drawn, with the formula that colours them as a column.
+
+    The scene has the time of the snapshot then, and the values of its log.
+    """
     columns, field, only = snapshot.columns, look["field"], look["only"]
-    rows = SimpleNamespace(particle=columns.__getitem__)
-    for formula in (field, only):
-        if isinstance(formula, ColumnFormula):
-            formula.hub.values.set("time", snapshot.time)
+    values, row = scene.values, log.get(snapshot.step, {})
+    for name in values.names():
+        values.set(name, row.get(name, np.nan))  # what a run has to find
+    values.set("time", snapshot.time)
+    values.set("timestep", snapshot.step)
+    formulas = [one.formula for one in (field, only) if isinstance(one, ColumnFormula)]
+    for name in set().union(*(one.names for one in (*formulas, *filter(None, [look["title"]])))):
+        if name not in GLOBAL_SEEDS and name in values and np.isnan(values.get(name)):
+            raise ScriptError(
+                f"{name} at step {snapshot.step} is a value that dumps do not hold",
+                expected="a log beside the dumps, with its column and a line for each of them",
+                hint=f"log_modify(custom, step, time, {name}) in the script of the run",
+            )
+    numbers = columns["id"].astype(np.int64) - 1
+
+    def column(name: str) -> np.ndarray:
+        return columns[name] if name in columns else members(scene, name, numbers)
+
+    rows = SimpleNamespace(particle=column)
     if isinstance(field, ColumnFormula):
         columns = columns | {field.text: field.of(rows)}
+    elif field in named_sets(scene):
+        columns = {field: column(field)} | columns
     if only is not None:
         held = only.holds(rows)
         columns = {name: of[held] for name, of in columns.items()}
@@ -262,26 +321,29 @@ def _picture(
     files: Iterable[Path],
     options: argparse.Namespace,
     look: dict[str, Any],
-    scene: Hub | None,
+    scene: Hub,
+    chosen: Callable[[Snapshot], Snapshot],
 ) -> Any:
     """Make the empty picture that suits the first snapshot; place and colours suit all of them."""
     from karamelo_py.output import outlines, pictures
 
     # A dump holds zeros where the scene has no direction.
     dimension = 3 if first.columns["z"].any() else 2 if first.columns["y"].any() else 1
-    if scene is not None:
-        if dimension > scene.domain.dimension:
-            has = plural(scene.domain.dimension, "dimension")
-            raise ScriptError(
-                f"the script has {has}, the dump {dimension}",
-                expected="the script of the run that has written the dump",
-            )
+    if options.script is not None:
+        has = [("dimension", scene.domain.dimension, dimension)]
+        count = sum(solid.count for solid in scene.solids.values())
+        has += [("point", count, max(first.columns["id"], default=0))] if count else []
+        for noun, of_script, of_dump in has:
+            if of_dump > of_script:
+                raise ScriptError(
+                    f"the script has {plural(of_script, noun)}, the dump {of_dump:.0f}",
+                    expected="the script of the run that has written the dump, and its -var",
+                )
         dimension = scene.domain.dimension  # points of a scene in space may all have z = 0
-    first, field = _chosen(first, look), look["field"]
+    first, field = chosen(first), look["field"]
     column = field.text if isinstance(field, ColumnFormula) else field
     if column is not None and column not in first.columns:
-        said = f"the dump has no column '{column}'"
-        raise unknown_column(said, column, first.columns)
+        raise unknown_column(f"the dump has no column '{column}'", column, first.columns)
     column = column or ("type" if dimension > 1 else "x")
     types = np.unique(first.columns["type"]).astype(int) if column == "type" else []
     apart = ("field", "only", "title", "dpi")
@@ -291,9 +353,9 @@ def _picture(
     made_look = {"label": label} | look_of(column, dimension, **words)
     made_look["lengths"] = f" ({length})" if length else ""
     solids = tuple(f"solid {k}" for k in range(1, max(types, default=0) + 1))
-    lo, hi, span = _all(files, column, look, made_look)
+    lo, hi, span = _all(files, column, look, made_look, chosen)
     domain = SimpleNamespace(dimension=dimension, lo=lo, hi=hi)
-    if scene is not None:
+    if options.script is not None:
         domain = scene.domain
         solids = tuple(scene.solids) if solids else ()
     size = tuple(pixels / DPI for pixels in options.size)
@@ -306,15 +368,27 @@ def _picture(
 
 
 def _all(
-    files: Iterable[Path], column: str, look: dict[str, Any], made_look: dict[str, Any]
+    files: Iterable[Path],
+    column: str,
+    look: dict[str, Any],
+    made_look: dict[str, Any],
+    chosen: Callable[[Snapshot], Snapshot],
 ) -> tuple[np.ndarray, np.ndarray, Any]:
     """Find corners around all snapshots, and limits of the values of a column in them."""
     from karamelo_py.output.pictures import grown, in_window, within
 
     corners, ends, there, left = [], [], 0, 0
-    for snapshot in _all_in(files):
+    file_of: dict[int, Path] = {}
+    of_files = ((path, snapshot) for path in files for snapshot in read(path))
+    for path, snapshot in of_files:
+        if file_of.setdefault(snapshot.step, path) != path:
+            raise ScriptError(
+                f"{file_of[snapshot.step]} and {path} both have step {snapshot.step}: one picture "
+                "would take the place of the other",
+                hint="view one dump after the other, each with a name of its own: -o FILE.*.png",
+            )
         corners.append((snapshot.lo, snapshot.hi))
-        columns = in_window(_chosen(snapshot, look).columns, made_look["window"])
+        columns = in_window(chosen(snapshot).columns, made_look["window"])
         there, left = there + len(snapshot.columns["x"]), left + len(columns["x"])
         values = columns.get(column, np.empty(0))
         if made_look["log"]:

@@ -407,7 +407,7 @@ def group(
                 expected=f"{members.kind}, or another ID",
             )
         if hub.rehearsing:  # The real group gets its members when the script comes here.
-            members = copy.copy(members)
+            members = hub.groups[ID] = copy.copy(members)
     else:
         members = hub.groups.add(ID, KINDS[kind](hub))
     found = members.add(region, solids or None)

@@ -8,7 +8,7 @@ from copy import copy
 from typing import Any
 
 from karamelo_py.language.scene import Scene
-from karamelo_py.script.errors import Place, ScriptError, meant, nearest_few
+from karamelo_py.script.errors import Place, ScriptError, meant, one_of
 from karamelo_py.script.expressions import Expression, Value
 from karamelo_py.script.parser import parse_expression
 from karamelo_py.script.syntax import Raw
@@ -112,9 +112,8 @@ class Argument:
             if unknown := re.fullmatch(r"unknown name '(\w+)'", error.message):
                 numbers = self.numbers()
                 others = ", ".join(numbers) or "none so far"
-                close = nearest_few(unknown[1], seeds) if len(seeds) > 12 else []
-                few = [*close, "..."] if close else seeds
-                known = f"{', '.join(few)}, or a number that the script has set ({others})"
+                few = one_of(unknown[1], seeds)
+                known = f"{few}, or a number that the script has set ({others})"
                 hint = meant(unknown[1], [*seeds, *numbers]) or f"set it first: {unknown[1]} = ..."
                 error.expected, error.hint = known, hint
             raise

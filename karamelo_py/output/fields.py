@@ -80,6 +80,10 @@ class Fields(PointTable):
         own = [*sorted(self.columns_of_laws()), *declared_columns(self.hub, "point_fields")]
         return list(dict.fromkeys([*point_table.COLUMNS, *own]))
 
+    def shown_names(self) -> list[str]:
+        """Names that `particle` knows, with groups of points and solids: 1 for theirs, else 0."""
+        return list(dict.fromkeys([*self.particle_names(), *point_table.named_sets(self.hub)]))
+
     def node_names(self) -> list[str]:
         """Names that `node` knows."""
         own = declared_columns(self.hub, "node_fields")
@@ -168,13 +172,18 @@ SUMMED = {
 
 
 class ColumnFormula:
-    """For signatures: a formula of columns of dump particle, time and published values."""
+    """For signatures: a formula of columns of dump particle, time and published values.
+
+    The name of a group of points or a solid is a column, too: 1 for its points and 0 for others.
+    """
 
     script_kind = "a condition of columns of dump particle, such as damage > 0.9"
     MOST = 6
 
     def __init__(self, hub: Scene, argument: Argument):
-        known = hub.fields.particle_names()
+        columns = hub.fields.particle_names()
+        sets = [name for name in hub.fields.shown_names() if not argument.knows(name)]
+        known = list(dict.fromkeys([*columns, *sets]))
         self.hub, self.text = hub, argument.text
         self.formula = Expression(argument.value_with(known))
         self.columns = sorted(self.formula.names & set(known))
@@ -183,7 +192,7 @@ class ColumnFormula:
             raise ScriptError(
                 f"'{argument.text}' has {many} of dump particle",
                 place=argument.place,
-                expected=f"1 to {self.MOST} of {', '.join(known)}",
+                expected=f"1 to {self.MOST} of {', '.join(columns)}",
             )
 
     @classmethod

@@ -214,6 +214,8 @@ class PointTable:
             kind, k = shown[name]
             if (array := self._rows.declared(kind)) is not None:
                 return _column(array, k)
+        elif name in named_sets(self.hub):
+            return members(self.hub, name, self.numbers)
         return np.zeros(self.count)
 
     @property
@@ -245,6 +247,20 @@ def declared_columns(hub: Scene, attribute: str) -> dict[str, tuple[type, int]]:
         for k, column in enumerate(fields.columns_of(kind)):
             found.setdefault(column, (kind, k))
     return found
+
+
+def named_sets(hub: Scene) -> list[str]:
+    """List the groups of points and the solids: as a column, each is 1 for its points, else 0."""
+    groups = [name for name, group in hub.groups.items() if group.kind == "particles"]
+    return [*groups, *hub.solids]
+
+
+def members(hub: Scene, name: str, numbers: np.ndarray) -> np.ndarray:
+    """Tell of points, by their numbers (n,) from 0, which belong to a group or solid: 1, else 0."""
+    if name in hub.groups:
+        return hub.groups[name].has(numbers).astype(float)
+    solid = hub.solids[name]
+    return ((numbers >= solid.first_id) & (numbers < solid.first_id + solid.count)).astype(float)
 
 
 def absent(columns: dict[str, Callable | None], present: set[str] = frozenset()) -> list[str]:

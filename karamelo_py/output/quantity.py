@@ -1,12 +1,14 @@
 """Quantities that a log line or a plot reads at each output: anything with a name."""
 
 import math
+import re
 from typing import Any
 
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
 from karamelo_py.script.errors import ScriptError, meant, table
 from karamelo_py.script.expressions import POINT_SEEDS
+from karamelo_py.script.syntax import Raw, Source
 
 KEYWORDS = {"step": "Step", "dt": "dt", "time": "Time"}
 LIMIT = "limit"  # the log shows the name of what limits the step
@@ -112,6 +114,34 @@ class Quantity:
         if isinstance(source, str):
             raise ScriptError(f"'{self.name}' is text, not a number")
         return source
+
+
+class Caption:
+    """A text in which ``{name}`` or ``{formula}`` is the number it has when the text is shown."""
+
+    PIECE = re.compile(r"\$[^$]*\$|{([^{}]+)}")  # in dollars: mathematics of Matplotlib
+
+    def __init__(self, hub: Scene, text: str):
+        self.text, self.quantities = text, {}
+        for piece in filter(None, self.PIECE.findall(text)):
+            argument = Argument(Raw(Source(piece, "title"), 0, len(piece)), hub.interpreter)
+            try:
+                self.quantities[piece] = Quantity.from_script(hub, argument)
+            except ScriptError as error:
+                error.place, error.argument = None, "title"
+                raise
+
+    @property
+    def names(self) -> set[str]:
+        """The names that its numbers follow from."""
+        sources = ((one.name, one._source()) for one in self.quantities.values())
+        return {name for own, of in sources for name in getattr(of, "names", [own])}
+
+    def __str__(self) -> str:
+        def shown(found: re.Match) -> str:
+            return f"{self.quantities[found[1]].read():.6g}" if found[1] else found[0]
+
+        return self.PIECE.sub(shown, self.text)
 
 
 class Logged(Quantity):

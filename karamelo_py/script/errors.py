@@ -150,12 +150,14 @@ def meant(name: str, names: Iterable[str]) -> str | None:
     return f"did you mean '{close}'?" if close else None
 
 
-def one_of(name: str, names: Iterable[str], family: str) -> str:
+def one_of(name: str, names: Iterable[str], family: str = "") -> str:
     """Write ``one of a, b, c``; of many the ones most like `name`, and what lists the family."""
-    names = list(names)
-    if len(names) <= 12:
-        return "one of " + ", ".join(names)
+    names = list(dict.fromkeys(names))
     close = ", ".join(nearest_few(name, names))
+    if len(names) <= 12 or not (close or family):
+        return "one of " + ", ".join(names)
+    if not family:
+        return f"one of {close}, ..."
     listed = f"karamelo-py styles {family} lists all {len(names)}"
     return f"one of {close}, ... ({listed})" if close else listed
 
@@ -167,9 +169,8 @@ def plural(count: float, noun: str) -> str:
 
 def unknown(message: str, name: str, known: Iterable[str], **where: Any) -> ScriptError:
     """Make the error for a `name` that is none of the `known`; `where` it stands."""
-    known = list(dict.fromkeys(known))
-    expected = f"one of {' '.join(known)}"
-    return ScriptError(message, expected=expected, hint=meant(name, known), **where)
+    known = list(known)
+    return ScriptError(message, expected=one_of(name, known), hint=meant(name, known), **where)
 
 
 def nearest_few(name: str, names: Iterable[str]) -> list[str]:

@@ -14,6 +14,7 @@ from karamelo_py.language.signature import OutputFile, Positive
 from karamelo_py.output.fields import ColumnFormula, ShownColumn, check_columns
 from karamelo_py.output.files import Frames, movie_format, picture_format, savefig, unwarned, whole
 from karamelo_py.output.point_table import PointTable
+from karamelo_py.output.quantity import Caption
 from karamelo_py.output.rhythm import Every
 from karamelo_py.output.snapshots import Snapshot
 from karamelo_py.output.units import labelled
@@ -54,7 +55,8 @@ class PyPlot(Dump):
         20000 pixels.
     field
         What colours the points: any column of dump particle, or a formula of columns, time and
-        published values. Without it the solid does (in 1D: vx is drawn).
+        published values. The name of a group or solid is a column, too: 1 for its points, 0 for
+        others. Without it the solid does (in 1D: vx is drawn).
     vmin, vmax
         Ends of the colours. Where a picture has values beyond, the bar beside it ends in an arrow.
     cmap
@@ -64,12 +66,13 @@ class PyPlot(Dump):
     axes
         false: without axes and numbers.
     title
-        What is written above, in front of step and time.
+        What is written above, in front of step and time. A name or formula in braces becomes the
+        number it has then, as in "force {press_y} N".
     label
         What is written beside the colours, such as "stress (MPa)"; the column when left out.
     only
-        A condition of columns of dump particle: other points are left out. It slices a body and
-        leaves solids out, which `type` counts from 1.
+        A condition of columns as in `field`: other points are left out. It slices a body and leaves
+        groups and solids out, as in ``not tool && y > 0``.
     xmin, xmax, ymin, ymax, zmin, zmax
         Ends of what is shown; those of the domain when left out.
     scale
@@ -91,7 +94,7 @@ class PyPlot(Dump):
     Example
     -------
     dump(d3, all, pyplot, 100, picture.*.png, 500, 500, seq, vmin=0, vmax=2e5)
-    dump(d4, all, pyplot, 100, paper.*.pdf, 5, 4, seq, only=type == 1 && x > 0, quantile=0.01)
+    dump(d4, all, pyplot, 100, paper.*.pdf, 5, 4, seq, only=s1 && x > 0, quantile=0.01)
 
     See Also
     --------
@@ -131,13 +134,13 @@ class PyPlot(Dump):
     ):  # fmt: skip
         self.formula = field if isinstance(field, ShownColumn) else None
         columns = self.formula.columns if self.formula else [] if field is None else [field]
-        check_columns(columns, hub.fields.particle_names(), first=4)
+        check_columns(columns, hub.fields.shown_names(), first=4)
         super().__init__(hub, every, file, *columns)
         self.format_of(self.file)
         self.size = (_inches("width", width, dpi), _inches("height", height, dpi))
         self.warn_of_absent(columns, hub.fields.absent_at_points(), "points")
         self.field = self.formula.text if self.formula else field
-        self.title, self.only, self.dpi = title, only, dpi
+        self.title, self.only, self.dpi = title and Caption(hub, title), only, dpi
         self.look = look_of(
             self.field or "vx",
             hub.domain.dimension if hub.domain else None,
