@@ -209,9 +209,9 @@ def test_wrong_groups(ID, of, solids, says):
 def test_a_rehearsal_leaves_groups_alone():
     hub = scene()
     group(hub, "g", "particles", "region", hub.regions["r1"], "all")
-    hub.rehearsing = True
-    group(hub, "g", "particles", "region", hub.regions["r2"], "all")
-    assert len(hub.groups["g"]) == 16
+    rehearsed = hub.rehearsal()
+    group(rehearsed, "g", "particles", "region", hub.regions["r2"], "all")
+    assert (len(hub.groups["g"]), len(rehearsed.groups["g"])) == (16, 32)
 
 
 def test_results_that_a_rehearsal_does_not_have_pass_silently():

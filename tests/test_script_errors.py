@@ -139,7 +139,7 @@ COMMANDS = [
     ("fix(f, body_force, all, 0, -1, 0, 7)", 35, "4 components, and space has 3"),
     ("scheme(musl, strat=half)", 14, "did you mean 'start'?"),
     ("scheme(musl, strat=half)", 14, "expected: start=full or start=half"),
-    ("dump(d, all, pyplot, 1, d.*.png, 300, 300, 2*vxx)", 46, "expected: vx, ..., or a number"),
+    ("dump(d, all, pyplot, 1, d.*.png, 300, 300, 2*vxx)", 46, "expected: one of vx, ..., or"),
     ("fix(f, body_force, all, 0, -9.81*)", 33, "ends after '*'"),
     ("fix(f, body_force, all, 0, 1/0)", 30, "division by zero"),
     ("fix(f, body_force, all, 0, dt=3)", 28, "leave out 'dt ='"),
