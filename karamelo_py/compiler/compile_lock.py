@@ -26,45 +26,39 @@ waiting = contextlib.nullcontext  # within it a process waits: to the user it is
 @contextlib.contextmanager
 def lock(path: Path) -> Iterator[None]:
     """Hold the lock on `path`, if it can be had in time; others have done their work then."""
-    file = _taken(path) if fcntl else None
-    try:
+    with contextlib.ExitStack() as held:
+        with contextlib.suppress(OSError):  # nothing can be written there, or nothing locked
+            _take(path, held)
         yield
-    finally:
-        if file is not None:
-            # Who waits has this very file open, and finds the kernel when it has the lock.
-            path.unlink(missing_ok=True)
-            fcntl.flock(file, fcntl.LOCK_UN)  # for a process that was forked meanwhile, too
-            os.close(file)
 
 
-def _taken(path: Path) -> int | None:
-    """Open the file of a lock that is held now; None where there is none to be had."""
+def _take(path: Path, held: contextlib.ExitStack) -> None:
+    """Take the lock; `held` gives it back."""
     global waits
-    file = None
-    with contextlib.suppress(OSError):  # nothing can be written there, or nothing locked
-        path.parent.mkdir(parents=True, exist_ok=True)
-        file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
-        if _locked(file):
-            return file
-        if waits:
-            with waiting():
-                waits = _locked_in_time(file)
-            if waits:
-                return file
-    if file is not None:
-        os.close(file)
-    return None
+    if fcntl is None:
+        return
+    path.parent.mkdir(parents=True, exist_ok=True)
+    file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+    held.callback(os.close, file)
+    if not _locked(file, 0.0):
+        if not waits:
+            return
+        with waiting():
+            waits = _locked(file, PATIENCE)
+        if not waits:
+            return
+    held.callback(fcntl.flock, file, fcntl.LOCK_UN)  # for a process that was forked meanwhile, too
+    # Who waits has this very file open, and finds the kernel when it has the lock.
+    held.callback(path.unlink, missing_ok=True)
 
 
-def _locked(file: int) -> bool:
-    with contextlib.suppress(BlockingIOError):
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        return True
-    return False
-
-
-def _locked_in_time(file: int) -> bool:
-    end = time.monotonic() + PATIENCE
-    while not (locked := _locked(file)) and time.monotonic() < end:
+def _locked(file: int, patience: float) -> bool:
+    """Lock a file within so many seconds; whether that was possible."""
+    end = time.monotonic() + patience
+    while True:
+        with contextlib.suppress(BlockingIOError):
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return True
+        if time.monotonic() >= end:
+            return False
         time.sleep(PAUSE)
-    return locked
