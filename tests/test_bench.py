@@ -268,18 +268,6 @@ def test_each_of_several_workloads_has_a_process(tmp_path, capfd, monkeypatch):
     assert "h = 1/N" in err and "Traceback" not in err
 
 
-@pytest.mark.xdist_group("disks")
-def test_the_process_of_a_workload_ends_with_bench():
-    """Also where that is killed, and can tell nobody."""
-    part = apart.Measurement("disks-320", 1, {}, 600.0, 1e9, False)
-    with subprocess.Popen(
-        [*apart.COMMAND, json.dumps(part)],
-        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-    ) as process:  # fmt: skip
-        assert process.communicate() == (b"", b"")
-    assert process.returncode == 0
-
-
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="there are no such signals here")
 def test_a_process_that_somebody_ends(capfd, monkeypatch):
     monkeypatch.setattr(measure, "bandwidth", lambda threads, size=1: 2e10)
@@ -291,23 +279,17 @@ def test_a_process_that_somebody_ends(capfd, monkeypatch):
 
 
 def test_an_interrupt_ends_the_process_of_a_workload(capfd, monkeypatch):
-    """Ctrl-C comes to the one process that waits."""
-    begun, waited = [], []
+    """Ctrl-C comes to the one process that waits, which ends the other."""
+    begun = []
 
     class Interrupted(subprocess.Popen):
-        def __init__(self, *arguments, **options):
-            super().__init__(*arguments, **options)
+        def communicate(self, *arguments, **options):
             begun.append(self)
-
-        def wait(self, timeout=None):
-            if self not in waited:
-                waited.append(self)
-                raise KeyboardInterrupt
-            return super().wait(timeout)
+            raise KeyboardInterrupt
 
     monkeypatch.setattr(measure, "bandwidth", lambda threads, size=1: 2e10)
     monkeypatch.setattr(apart, "COMMAND", (sys.executable, "-c", "import time; time.sleep(600)"))
-    monkeypatch.setattr(apart.subprocess, "Popen", Interrupted)
+    monkeypatch.setattr(subprocess, "Popen", Interrupted)
     monkeypatch.setattr(command, "commit", lambda: None)  # of which another process tells
     assert main([*TWO, "10"]) == 130
     assert capfd.readouterr().err == "error: interrupted\n"
