@@ -409,8 +409,12 @@ def _change_nodes(what, hooks, control, dt, h, count, share):
                 hooks.loads[n, c] += force - old_force  # see _work_at_nodes
                 nodes.sums[n, arrays.of_force(kin) + c] = force
             elif target == arrays.ON_UPDATE:
-                # Impulse times the mean of the velocities before and after it.
-                work = 0.5 * mass * (star - old_star + kept * (old - v)) * (v + star)
+                # Impulse times the mean of the velocities before and after it; of what holds the
+                # node, as one that a bound stops has not moved with the wall before.
+                moved = v + star
+                if hooks.table[h].uses_before and star == hooks.scratch[VALUE, q]:
+                    moved = hooks.scratch[BEFORE, q] + star
+                work = 0.5 * mass * (star - old_star + kept * (old - v)) * moved
                 clock = control.clock[0]
                 clock.set_low, clock.set_high = min(clock.set_low, star), max(clock.set_high, star)
                 nodes.update[n, c] = star
