@@ -254,10 +254,14 @@ def change_of_energy(hub: Hub, simulation: Any) -> dict[str, str]:
     if not clock.watch_energy or clock.looks <= FEW:
         return {}
     # Since the first balance, not `first_few`, which `forget_growth` changes.
-    share, takers = -100 * share_lost(simulation), taken_by(hub)
+    share, takers, by = -100 * share_lost(simulation), taken_by(hub), ""
     words = "of the largest since the start (kinetic + stored + dissipated - work)"
-    take = "takes" if len(takers) == 1 else "take"
-    by = f"; {' and '.join(takers)} {take} some" if takers and share < -1 else ""
+    if takers and share < -1:
+        often = takers[-1].startswith("transfer") and not hasattr(hub.update.transfer, "per_time")
+        if hub.update.method.fields_per_solid or any(fix.impulsive for fix in hub.fixes.values()):
+            takers.append("collisions")  # see `cause_of_loss`
+        by = f"; {' and '.join(takers)} {'takes' if len(takers) == 1 else 'take'} some"
+        by += ", the transfer more with shorter steps" * often
     return {"energy": f"{share:+.2f} % {words}{by}"}
 
 
