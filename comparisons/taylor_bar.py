@@ -22,7 +22,7 @@ def shape(snapshots):
 
 
 def compare(run, axes, full):
-    """Length, foot and waist by tlmpm with one point a cell; in full by ulmpm with eight, too."""
+    """Length, foot and waist by tlmpm with one point per cell; in full by ulmpm with eight, too."""
     ways = {"tlmpm": {}}
     if full:
         ways["ulmpm"] = {"kind": "ulmpm", "ppc": 2, "refine": 1 / 2}

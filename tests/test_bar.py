@@ -48,7 +48,7 @@ def test_flip_holds_frequency_and_energy(run_script):
     the strains of 0.6 % add as much. Stress and velocity follow each other as in symplectic Euler,
     so their energy swings by omega dt / 2 = 2.8 %. Its mean over a period does not grow (0.2 %: the
     periods are cut at whole log lines, 1/22 of a period) and falls by less than 1 % in ten periods,
-    where PIC loses ten times as much in one (lumped masses cost FLIP 0.06 % a period).
+    where PIC loses ten times as much in one (lumped masses cost FLIP 0.06 % per period).
     """
     log = run_script(bar(2, "FLIP, linear, 1", 100, "neo-hookean"), "--threads", "1").log
     assert log.v_x[0] == pytest.approx(2 / pi * AMPLITUDE, rel=1e-3)  # midpoint rule

@@ -250,7 +250,7 @@ def types(basis, r, kind):
 @pytest.mark.parametrize("basis", [QuadraticSpline, CubicSpline])
 @pytest.mark.parametrize("size", [3, 4, 7])
 def test_splines_are_those_of_karamelo(basis, size):
-    """From four nodes a direction on, where Karamelo's are a partition of unity."""
+    """From four nodes per direction on, where Karamelo's are a partition of unity."""
     _, grid = made(basis, Line(), (size, 1, 1))
     for a in np.linspace(0, size, 97):
         nodes, weights, *_ = stencil_of(basis, Line(), grid, (LO[0] + a * H,))

@@ -109,7 +109,7 @@ def test_what_is_said(capsys, monkeypatch):
     monkeypatch.setattr(measure, "bandwidth", lambda threads, size=1: 1e9)
     assert main(["bench", "disks-20", "--seconds", "0.01"]) == 0
     out = capsys.readouterr().out
-    assert "disks-20: two disks, 20 cells a side; 416 points" in out
+    assert "disks-20: two disks, 20 cells per side; 416 points" in out
     # Two places, velocity, mass; det F and four stresses; numbers of point, law and grid.
     assert re.search(rf"bytes per particle +{3 * 16 + 8 + 5 * 8 + 16}\n", out)
     speed, other, ratio = (
@@ -137,7 +137,7 @@ def test_an_unknown_scene(capsys):
 
 
 def fake(speeds=(1e6, 3e6, 2e6), place=0.1, of_points=8e-4, of_nodes=1e-4, waits=0.0):
-    """What could be measured of 3000 points: the fastest repetition takes 1 ms a step."""
+    """What could be measured of 3000 points: the fastest repetition takes 1 ms per step."""
     points, nodes = {"Move": of_points}, {"Update": of_nodes}
     return Measured(3000, list(speeds), 112, 350.0, 0.4, place, points, nodes, waits, "double")
 
@@ -181,7 +181,7 @@ def test_load_steps_are_timed(tmp_path, monkeypatch, capsys):
     assert one["points"] == 32 and one["unknowns"] > 8 and one["corrections"] >= 2
     assert sum(one["stages"].values()) == pytest.approx(1)
     assert min(one["stages"].values()) > 0
-    assert "seconds a load step" in capsys.readouterr().out
+    assert "seconds per load step" in capsys.readouterr().out
 
 
 def test_a_file_and_a_comparison_with_it(faked, capsys):

@@ -27,7 +27,7 @@ def test_what_the_two_disks_need(check):
     out = check(INPUTS / "in.two_disks")
     assert re.search(r"points\s+416 in 2 solid", out)
     assert re.search(r"nodes\s+441 \(21 x 21 x 1\)", out)
-    # A tile has 24 cells a side; points may come to reach all nodes of the square around both.
+    # A tile has 24 cells per side; points may come to reach all nodes of the square around both.
     used = re.search(r"tiles\s+1 of 1 hold points, (\d+) nodes are in use", out)
     assert 2 * 9**2 <= int(used[1]) <= 441  # each disk spans 9 x 9 nodes
     assert re.search(r"boxes of tiles 0 MiB", out)  # few points give straight to the nodes

@@ -113,7 +113,7 @@ STRESS = "fix(s, initial_stress, all, 5*cos(9*x0), 3, 0, 0, 0, 2*sin(50*x0*y0))"
 def test_apic_conserves_angular_momentum(run_interpreted, stress):
     """To round-off (ten digits are logged), stressed or not (Jiang, Schroeder & Teran 2017)."""
     log = run_interpreted(spinning("APIC", 8, stress=stress)).log
-    # sum m r^2 of the points, by NumPy: 4 points a cell, offsets of a quarter of a cell
+    # sum m r^2 of the points, by NumPy: 4 points per cell, offsets of a quarter of a cell
     places = 0.025 + 0.05 * np.arange(24)
     x, y = np.meshgrid(places - 0.6, places - 0.6)
     squares = (x**2 + y**2)[x**2 + y**2 <= 0.04 + 1e-9]

@@ -13,7 +13,7 @@ MINIMIZE = "contact/minimize_penetration, a, b, 0"
 
 def bodies(gap: float, contact: str, *lines: str, d: int = 1, n: int = 4, v: float = 0.1,
            E: float = 100, ppc: int = 2, method: str = "tlmpm") -> str:  # fmt: skip
-    """Two cubes of n cells a side, `gap` apart, that move towards each other at `v` each."""
+    """Two cubes of n cells per side, `gap` apart, that move towards each other at `v` each."""
     side = f", 0.5, {0.5 + n * H}" * (d - 1)
     zeros = ", 0" * (d - 1)
     a, b = 0.5 + n * H, 0.5 + n * H + gap
@@ -79,7 +79,7 @@ def test_no_pair_is_missed(d, overlap):
 
 
 def two_points(contact: str, d: int, *, other: float = 0) -> str:
-    """A point a cell: cubes of one cell that overlap by 0.01 = p; R = 0.05 each."""
+    """A point per cell: cubes of one cell that overlap by 0.01 = p; R = 0.05 each."""
     dump = "dump(d, all, particle, 1, d.*.LAMMPS, x, bx, by, mass)"
     slip = f"fix(s, initial_velocity_particles, b, -0.1, {other}{', 0' * (d - 2)})" if d > 1 else ""
     log = "log_modify(custom, step, c_x, c_y)"

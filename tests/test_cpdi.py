@@ -77,7 +77,7 @@ def stencil_of(basis, kin, grid, place):
 def gauss_means(corners, signs):
     """Means of the multilinear functions of the corners and of their gradients, by quadrature.
 
-    Six Gauss points a direction, more than the products need; written with loops over corners.
+    Six Gauss points per direction, more than the products need; written with loops over corners.
     """
     d = corners.shape[1]
     at, weight = np.polynomial.legendre.leggauss(6)

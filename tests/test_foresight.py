@@ -288,7 +288,7 @@ def test_metals_that_drift_are_told(run_interpreted, strength, v, told):
         ("quadratic-spline", 2.1, "", True),  # 1.17
         ("ugimp", 2.1, "", True),  # 1.16
         ("quadratic-spline", 1.5, "scheme(usavg)", False),
-        ("cubic-spline", 1.05, "", False),  # 1.08 with one point a cell
+        ("cubic-spline", 1.05, "", False),  # 1.08 with one point per cell
     ],
 )
 def test_bodies_faster_than_waves_are_told(run_interpreted, functions, mach, more, told):

@@ -177,7 +177,7 @@ def test_two_bodies(run_interpreted, scheme):
     assert not log.Ek.any()
     if scheme == "musl":
         assert log.left[-1] == pytest.approx(17.5, rel=0.01)
-    else:  # the same as with musl: bodies at rest conduct once a step
+    else:  # the same as with musl: bodies at rest conduct once per step
         other = run_interpreted(text.replace(f"scheme({scheme})", "scheme(musl)"), folder="musl")
         assert log.left[-1] == other.log.left[-1]
 

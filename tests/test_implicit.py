@@ -117,7 +117,7 @@ def test_published_columns(run_script, column, cells, most):
 def test_elastica(run_script, law):
     """Tip of a beam that bends by 80 % of its length (Bisshopp & Drucker 1945).
 
-    Laws in rate form do so, too: points turn by up to 10 degrees a step.
+    Laws in rate form do so, too: points turn by up to 10 degrees per step.
     """
     # Cells of a quarter of the height: 1 % of the length, as AMPLE has it (tip 0.813 to 0.821).
     words = "-var", "law", law, "-var", "steps", "20", "-var", "ppc", "2"
@@ -221,7 +221,7 @@ def test_a_bar_swings_at_its_period(run_script):
 
 
 def test_a_bar_swings_in_steps_of_a_hundred_cells(run_script):
-    """The trapezoidal rule turns by 2 atan(w dt/2) a step, and keeps the energy.
+    """The trapezoidal rule turns by 2 atan(w dt/2) per step, and keeps the energy.
 
     Points have less of it on the way, by the acceleration that the end of a step has still to give.
     """
@@ -232,7 +232,7 @@ def test_a_bar_swings_in_steps_of_a_hundred_cells(run_script):
 
 
 def generalized_alpha(rho: float, turn: float, count: int) -> np.ndarray:
-    """Velocities and energies (count + 1, 2) of one vibration that turns by `turn` a step.
+    """Velocities and energies (count + 1, 2) of one vibration that turns by `turn` per step.
 
     Those of the first are 1. Chung & Hulbert 1993, eqs. 12 to 25.
     """
@@ -250,7 +250,7 @@ def generalized_alpha(rho: float, turn: float, count: int) -> np.ndarray:
 
 @pytest.mark.parametrize("rho", [0, 0.8])
 def test_generalized_alpha_keeps_what_a_step_resolves(run_script, rho):
-    """The first mode of a bar, 40 steps a period, as a single vibration (Chung & Hulbert 1993).
+    """The first mode of a bar, 40 steps per period, as a single vibration (Chung & Hulbert 1993).
 
     Small, as strains of 1 % change the period; cells of 1/4000 of a wave change it by 4e-5.
     """
@@ -264,7 +264,7 @@ def test_generalized_alpha_keeps_what_a_step_resolves(run_script, rho):
 
 
 def test_generalized_alpha_damps_what_a_step_does_not_resolve(run_script):
-    """Of a mode that vibrates 5 times a step 0.8^40 are left after 20 steps, next to nothing."""
+    """Of a mode that vibrates 5 times per step 0.8^40 are left after 20 steps, next to nothing."""
     text = (INPUTS / "in.slow_bar").read_text()
     one = "v0*sin(PI*x0/(2*L))"
     text = text.replace(one, f"{one} + v0*sin(201*PI*x0/(2*L))")
@@ -277,7 +277,7 @@ def test_generalized_alpha_damps_what_a_step_does_not_resolve(run_script):
 
 
 def test_rules_that_damp(run_script):
-    """Euler's rule: 1/(1 + (w dt)^2) a step; gamma 0.6: 0.1 (w dt)^2 of it (Hughes 2000, 9.1)."""
+    """Euler's rule: 1/(1 + (w dt)^2) per step; gamma 0.6: 0.1 (w dt)^2 of it (Hughes 2000, 9.1)."""
     for words, rate in (
         (("rule", "euler"), 1.0),
         (("gamma", "0.6", "-var", "beta", "0.3025"), 0.1),
@@ -320,7 +320,7 @@ def test_the_energy_of_newmark_is_watched(run_script, led):
 
 
 def test_energy_that_a_step_loses_is_told(run_script):
-    """Vibrations of five periods a step lose it on the way to the nodes; rho is known to damp."""
+    """Vibrations of five periods per step lose it on the way to the nodes; rho is known to damp."""
     one = "v0*sin(PI*x0/(2*L))"
     text = (INPUTS / "in.slow_bar").read_text()
     text = text.replace(one, f"{one} + v0*sin(201*PI*x0/(2*L))")

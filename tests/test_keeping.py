@@ -169,7 +169,7 @@ def test_what_drifts_is_told_as_the_table_says(run_interpreted, variables, energ
     values = {"n": variables[4], "basis": "linear"}
     for word in variables.split(", ")[1:]:
         name, _, value = word.rpartition(" ")
-        if word == "one point a cell":
+        if word == "one point per cell":
             values["ppc"] = "1"
         elif name == "strain":
             values["strain"] = value

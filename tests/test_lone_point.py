@@ -49,7 +49,7 @@ def test_above_the_limit_it_does_not(run_interpreted):
 def test_the_step_is_named_as_the_cause(run_interpreted, scheme, borne):
     """Also where the point swells, and the present limit is above the step: h/c of that is large.
 
-    At 0.85 h/c, above what a lone point bears (0.9 of its limit) and usl with one point a cell.
+    At 0.85 h/c, above what a lone point bears (0.9 of its limit) and usl with one point per cell.
     """
     script = SCRIPT.replace("TRANSFER", "MLS").replace("STEP", f"set_dt({0.85 * 0.1 / C})")
     done = run_interpreted(f"scheme({scheme})\n{script}", status=1)

@@ -162,7 +162,7 @@ def test_a_kernel_has_the_code_of_what_is_there_and_no_other(run_script):
 # --- Bytes of every script -----------------------------------------------------------------------
 
 SCRIPTS = sorted(path.name for path in INPUTS.glob("in.*") if path.name != "in.element")
-# Sizes do not matter for bytes a point; large scenes are made small here.
+# Sizes do not matter for bytes per point; large scenes are made small here.
 SMALL = {"in.taylor_bar": "1/3", "in.vertical_bar": "1/2", "in.taylor_bar_227": "1/2"}
 
 
@@ -178,7 +178,7 @@ def listed() -> dict[str, int]:
 
 @pytest.mark.parametrize("script", SCRIPTS)
 def test_bytes_of_a_point_are_those_that_are_listed(lowered, script):
-    """Guards against growth: who adds a number a point has to say so in docs/needs.md."""
+    """Guards against growth: who adds a number per point has to say so in docs/needs.md."""
     if script == "in.cantilever_tets":
         pytest.importorskip("gmsh", exc_type=(ImportError, OSError))
     small = {"refine": SMALL[script]} if script in SMALL else {}
@@ -481,7 +481,7 @@ def test_space_for_what_is_round(advice):
 
 def test_wide_functions_where_no_point_crosses(advice):
     said = advice(plane(method="tlmpm, FLIP, cubic-spline, 1"))
-    assert "cubic-spline sees 16 nodes a point" in said and "which see 4" in said
+    assert "cubic-spline sees 16 nodes per point" in said and "which see 4" in said
     assert advice(plane(method="ulmpm, FLIP, cubic-spline, 1")) == ""
 
 
@@ -536,7 +536,7 @@ def test_double_precision_of_a_large_scene(lowered):
         for v in (100.0, 1.0)
     ]
     assert len(said[0]) == 1 and "0.6 of the memory" in said[0][0]
-    assert not said[1]  # 1e-3 a step, where singles near 162 lie 1.5e-5 apart
+    assert not said[1]  # 1e-3 per step, where singles near 162 lie 1.5e-5 apart
 
 
 def test_output_that_takes_longer_than_the_steps(lowered):

@@ -333,7 +333,7 @@ def hub_in_tiles(monkeypatch, *lines: str) -> Hub:
 
 
 def test_what_two_pass_on(monkeypatch):
-    """A bar from cell 4 to 20 in tiles of 4 cells, two points a cell, linear functions.
+    """A bar from cell 4 to 20 in tiles of 4 cells, two points per cell, linear functions.
 
     The last point before the border is at 11.75 cells, and may go one further: it sees node 13 at
     most. The first one behind it, at 12.25, sees node 11 at least. Three nodes are in use by both.

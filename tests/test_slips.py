@@ -191,7 +191,7 @@ def test_a_probe_of_no_point(run_interpreted):
 def test_many_points_a_cell(run_interpreted):
     text = block(2, "set_dt(1e-9)", "run(1)").replace("box, 2, rubber", "box, 11, rubber")
     said = run_interpreted(text).err
-    assert "11 points a cell and direction are 121 in each cell" in said
+    assert "11 points per cell and direction are 121 in each cell" in said
 
 
 def test_points_without_memory_are_not_counted():

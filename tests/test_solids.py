@@ -78,7 +78,7 @@ def test_first_point_of_karamelos_dump():
 @pytest.mark.parametrize("ppc", [1, 2, 3, 4, 5])
 @pytest.mark.parametrize("dimension", [1, 2, 3])
 def test_places_and_order(dimension, ppc):
-    hub = SmallHub(dimension, 0.1, 0.75, 0.2)  # 4 cells a side, the last one cut by the domain
+    hub = SmallHub(dimension, 0.1, 0.75, 0.2)  # 4 cells per side, the last one cut by the domain
     ball = hub.region("r", Sphere, *[0.45] * dimension, 0.28)
     solid = hub.solid("s", ball, ppc=ppc)
     want = karamelo_points(ball, hub.domain, ppc, dimension)

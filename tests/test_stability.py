@@ -463,7 +463,7 @@ def settled(result) -> bool:
 
 @pytest.mark.parametrize(("which", "least", "most"), [("musl", 3, 10), ("usavg", 0.8, 1.2)])
 def test_the_noise_of_a_drift_grows_at_any_step_but_with_usavg(run_script, which, least, most):
-    """By the largest eigenvalue of the linear steps of one cell: times 1.006 to 1.008 a step.
+    """By the largest eigenvalue of the linear steps of one cell: times 1.006 to 1.008 per step.
 
     What of the noise grows so shows after some 200 steps.
     """

@@ -204,7 +204,7 @@ def test_runs_follow_each_other(run_interpreted):
 
 
 def test_a_scheme_brings_its_stable_step(run_interpreted):
-    """usl with two points a cell takes 0.65 of the steps of the others."""
+    """usl with two points per cell takes 0.65 of the steps of the others."""
     lines = ["dt_factor(0.9)", "set_output(1)", LOG, "run(1)", "scheme(usl)", "run(1)"]
     log = run_interpreted(block(1, *lines)).log
     assert log.dt[-1] == pytest.approx(0.65 * log.dt[0], rel=1e-3)

@@ -79,7 +79,7 @@ def test_fast_points_give_to_their_boxes(state_interpreted, kind):
     Sums are grouped by boxes: the same to round-off, which grows by the steps.
     """
     script = passing(**KINDS.get(kind, {}))
-    if kind == "space":  # one point a cell, in long tiles
+    if kind == "space":  # one point per cell, in long tiles
         for line, other in IN_SPACE.items():
             assert line in script
             script = script.replace(line, other)
@@ -127,8 +127,8 @@ def push(points):
 def test_points_that_python_moves_in_a_step_are_sorted(
     state_interpreted, tmp_path, method, scheme, moment
 ):
-    """Beyond their boxes, by three cells a step where it begins and ends, between as far as points
-    may go. Forces that grow as speeds act on all alike: dv/dt = v, and bodies stay rigid.
+    """Beyond their boxes, by three cells per step where it begins and ends, between as far as
+    points may go. Forces that grow as speeds act on all alike: dv/dt = v, and bodies stay rigid.
     """
     by = (0.31, 0.17) if moment.endswith("integrate") else (0.025, 0.075)
     (tmp_path / "leaps.py").write_text(LEAPS.format(by=by))

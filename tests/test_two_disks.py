@@ -72,7 +72,7 @@ def test_scripts_as_others_write_them(run_script, karamelo, name, kinetic):
     """The published forms of the script have no word for rate=none: their stress turns along.
 
     The points turn a little during the contact; Karamelo leaves their stress behind. Turned, the
-    rebound comes about 15 ms later; kinetic energy changes by up to 6.8 a second then (Karamelo's
+    rebound comes about 15 ms later; kinetic energy changes by up to 6.8 per second then (Karamelo's
     history), so 15 ms are worth up to 3.9 % of the 2.6 at the start.
     """
     result = run_script(INPUTS / f"in.two_disks_{name}", "-var", "N_log", "250")

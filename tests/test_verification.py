@@ -70,7 +70,7 @@ def test_axis_aligned_in_one_dimension(run_script, way):
     assert errors[-1] < 0.015
 
 
-# What cures cell crossing: (way, points a cell along each direction). Splines integrate points
+# What cures cell crossing: (way, points per cell along each direction). Splines integrate points
 # that lie unevenly, and quadratic ones need more of them than cubic ones.
 CURES = [
     (QUADRATIC, 4),
@@ -97,7 +97,7 @@ def test_cures_of_cell_crossing_keep_second_order(run_script, way, ppc):
 )
 @pytest.mark.xdist_group("neo-hookean")
 def test_order_is_lost_when_points_cross_cells(run_script, way, least):
-    """With two points a direction. Hats (Steffen et al. 2008) and Bernstein functions have kinks.
+    """With two points per direction. Hats (Steffen et al. 2008) and Bernstein functions have kinks.
 
     Boxes that do not stretch leave gaps, and quadratic splines see too few points: both gain from
     8 to 16 cells and lose it again from 16 to 32.

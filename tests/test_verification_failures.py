@@ -103,7 +103,7 @@ def kept(run, mode, steps, **variables):
 
 
 def test_flip_keeps_a_sawtooth_pic_and_xpic_take_it_away(run):
-    """Hammerquist & Nairn 2017: a sawtooth of two points a cell is nothing on the nodes.
+    """Hammerquist & Nairn 2017: a sawtooth of two points per cell is nothing on the nodes.
 
     FLIP never changes it; PIC and XPIC take it away in a step. Of the first mode PIC loses most
     in 20 steps, and XPIC the less the higher its order.
@@ -252,7 +252,7 @@ def test_a_node_with_next_to_no_mass_does_no_harm(run, scheme):
 
 
 def test_the_step_of_a_lone_point_depends_on_its_place(run):
-    """The energy is multiplied by (1 - (w dt)^2)^2 a step, w^2 = (c/h)^2/(xi (1 - xi))."""
+    """The energy is multiplied by (1 - (w dt)^2)^2 per step, w^2 = (c/h)^2/(xi (1 - xi))."""
     for xi in (0.02, 0.1, 0.3, 0.5, 0.97):
         growth = run("isolated_point", xi=xi).log.growth
         # c dt / h = 0.9 times 0.4; the step follows a wave speed that changes with the strain.
@@ -333,8 +333,8 @@ def shaken(run_interpreted, scheme, ppc, factor, method="tlmpm, FLIP, linear, 1"
 def test_usl_has_a_stable_step_of_its_own(run_interpreted, ppc):
     """Strain that points average away follows e <- (1 - (w dt)^2) e with usl.
 
-    That is stable for w dt < sqrt(2), where the other schemes have 2. One point a cell: w^2 h^2 is
-    at most 4 (2 lambda + 2 mu) / rho in the plane, stable below 0.59 h/c at nu = 0.3.
+    That is stable for w dt < sqrt(2), where the other schemes have 2. One point per cell: w^2 h^2
+    is at most 4 (2 lambda + 2 mu) / rho in the plane, stable below 0.59 h/c at nu = 0.3.
     """
     above = (0.9 if ppc == 2 else 0.75) / USL.courant[ppc == 1]
     assert "from nowhere" in shaken(run_interpreted, "usl", ppc, above, status=1)
@@ -353,7 +353,7 @@ SHAKEN = [
 ]
 
 
-# Its limit differs between one point a cell and more.
+# Its limit differs between one point per cell and more.
 BY_TURNS = [(method, 2 - k % 2) for k, method in enumerate(SHAKEN)]
 OTHERS = [way for way in product(SHAKEN, (1, 2, 3)) if way not in BY_TURNS]
 
@@ -448,7 +448,7 @@ def test_one_point_a_cell_is_too_few_where_points_cross(run):
 @pytest.mark.full
 @pytest.mark.parametrize(("way", "most"), table((LINEAR, 0.1), (QUADRATIC, 0.1), (TOTAL, 0.1)))
 def test_points_per_cell(run_script, way, most):
-    """Where points stay in their cells the solution is seen with 1, 2 and 3 points a direction."""
+    """Where points stay in their cells 1, 2 and 3 points per direction show the solution."""
     for ppc in (1, 2, 3):
         (error,) = errors_on(run_script, "axis_aligned", way, (1,), G=1e-4, ppc=ppc)
         assert error < most, ppc

@@ -251,7 +251,7 @@ run_time(170{words})
 
 @pytest.mark.parametrize("v", [0.05, 0.1])
 def test_half_the_step_where_energy_grows(run_script, v):
-    """A bar with one point a cell goes through the grid; nothing acts on it: its energy stays.
+    """A bar with one point per cell goes through the grid; nothing acts on it: its energy stays.
 
     Growth by a tenth is borne before it is told, as much in the hundred steps that a state is good
     for; with 0.9 of the stable step the bar is stopped or comes apart.

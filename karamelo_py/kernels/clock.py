@@ -48,7 +48,7 @@ def common_velocity(kin: Tag, clock: Any, like: Number) -> tuple:
 NEXT_TO_NOTHING = 1e-9  # of a step
 ROUNDING = 1e-6  # of a step: what additions of a million steps may be off
 
-# Points that cross cells add energy to a body, by so much a cell, and the more the longer
+# Points that cross cells add energy to a body, by so much per cell, and the more the longer
 # the step. Until they have gone so far, in cells, a scene takes the steps of bodies at rest.
 STILL = 0.25
 # Where a common drift does not count as it is in the step, none moves a point by more cells.

@@ -29,7 +29,7 @@ from karamelo_py.points.basis import support
 from karamelo_py.points.transfers.xpic import Reflected, Series
 
 # Share of the mass at its nodes from where on a point loses its moment, to the power of dimensions:
-# of points one a cell that stand on nodes it is 0.594 with quadratic splines, and less of others.
+# of points one per cell that stand on nodes it is 0.594 with quadratic splines, and less of others.
 ALONE = 0.6
 
 

@@ -24,7 +24,7 @@ from karamelo_py.points.transfers import Moment, gradient_weight, zero_moment
 
 
 class Work(NamedTuple):
-    """Arrays and tags of a visit to a point; made once a tile."""
+    """Arrays and tags of a visit to a point; made once per tile."""
 
     frame: Tag
     kin: Tag
@@ -86,7 +86,7 @@ def deformed_state(w: Work, p: Index) -> tuple:
 def ask_ahead(w: Work, p: Index, like: Number, apart: bool) -> None:
     """Ask the memory for the data of the next points, in space.
 
-    Those that keep moments of velocity are visited once a step, with all they have: that is more
+    Those that keep moments of velocity are visited once per step, with all they have: that is more
     arrays side by side than a processor sees the pattern of. So is what the update of a stretch of
     points needs (`apart`), while it gathers.
     """

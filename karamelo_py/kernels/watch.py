@@ -46,7 +46,7 @@ ENERGIES, OF_SOLID = 3, 5  # columns of the reports of tiles
 HEAT_NOISE = 1e-4  # of a temperature: what does not count where all are alike
 OVERSHOOT = 0.1  # of the range of temperatures that sources allow: more stops the run
 # Steps so many times the stable one of conduction are borne: what nodes do not show of the points'
-# temperatures is levelled (measured with two points a cell: 4 and 5.8 with and without convection).
+# temperatures is levelled (measured with 2 points per cell: 4 and 5.8 with and without convection).
 BORNE = 4.0
 
 

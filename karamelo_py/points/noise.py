@@ -11,7 +11,7 @@ from karamelo_py.language.rules import known_failure
 
 
 class Borne(NamedTuple):
-    """Cells crossed times c dt/h up to which energy is kept, with two points a cell or one."""
+    """Cells crossed times c dt/h up to which energy is kept, with two points per cell or one."""
 
     drift: tuple[float, float]  # by the centre of mass in the plane and in space, musl and usf
     line: float  # by how much less that is in 1D
@@ -87,7 +87,7 @@ def _turn(transfer: Any, scene: Any) -> dict[str, Any] | None:
     if turn is None:
         return None
     if scene.sparse:
-        cure = f"{scene.corners} points a cell, {cure}"
+        cure = f"{scene.corners} points per cell, {cure}"
     elif turn.noisy:
         cure = f"quadratic-spline in the place of the basis, {cure}"
     ends = "loses points at its rim" if turn.torn else "gains a tenth of its energy or more"

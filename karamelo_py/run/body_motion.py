@@ -109,7 +109,7 @@ def _pieces(simulation: Any, d: int) -> Iterator[tuple[int, np.ndarray, np.ndarr
 
 
 SLOW = 0.01  # of the speed of waves, up to where nothing is fed in any time that was tried
-TORN = 9.0, 14.0  # angle, in radian, that a body bears with one point a cell: FLIP, moments
+TORN = 9.0, 14.0  # angle, in radian, that a body bears with one point per cell: FLIP, moments
 
 
 class Noise(NamedTuple):

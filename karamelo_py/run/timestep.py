@@ -27,7 +27,7 @@ BOXES = 6.0  # weight of a common drift in the steps of boxes
 LOST = 2.05  # times the stable step, beyond which everything is lost that was tried
 NO_LIMITS = ("set_dt", "end")  # of stability
 LONE = 0.9  # of the stable step of a lone point: one that swells is stiffer
-DAMPED = 0.5  # the least, with one point a cell, where a share of the nodal velocity damps
+DAMPED = 0.5  # the least, with one point per cell, where a share of the nodal velocity damps
 
 
 def one_a_cell(solid: Any) -> bool:
@@ -36,7 +36,7 @@ def one_a_cell(solid: Any) -> bool:
 
 
 def sparse(hub: Hub) -> bool:
-    """Tell whether a solid has about one point a cell and direction."""
+    """Tell whether a solid has about one point per cell and direction."""
     return any(map(one_a_cell, hub.solids.values()))
 
 
@@ -130,8 +130,8 @@ def own_weight_of_drift(hub: Hub) -> float:
     """Weight of the common velocity of all in the step that the program takes of itself.
 
     1 as in the rule of the language, h/(c + |v|). What drifts by boxes (ugimp, cpgimp), two and
-    more a cell, gains the more the faster it is: by edges of shaken bars and blocks at 0.05 to 0.5
-    of the speed of waves.
+    more per cell, gains the more the faster it is: by edges of shaken bars and blocks at 0.05 to
+    0.5 of the speed of waves.
     """
     if bears_drift(hub):
         return 0.0
@@ -173,7 +173,7 @@ def own_step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
     """The stable step over h/c, and the share of it that the program takes of itself.
 
     `still`: while no point has gone as far as `STILL`. The stable step is that of scheme, basis and
-    points a cell.
+    points per cell.
     """
     method, share = hub.update.method, keeping_share(hub)
     # Transfers of moments bear 1.3 h/c with quadratic splines, 1.5 with cubic ones.

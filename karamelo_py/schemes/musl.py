@@ -19,7 +19,7 @@ class MUSL(NamedTuple):
 
     maps_velocity_again = True
     courant = (1.0, 1.0)
-    # Shares of the stable step that a drifting body keeps its energy with, 2 and 1 points a cell,
+    # Shares of the stable step that a drifting body keeps its energy with, 2 and 1 points per cell,
     # with smooth gradients, with those that jump, and with nodes within the cells (docs/energy.md).
     keeping = ((0.9, 0.9), (0.4, 0.2), (0.2, 0.2))
     rows = (

@@ -9,7 +9,7 @@ from karamelo_py.kernels.g2p import SecondStrain, Strain
 class USAVG(NamedTuple):
     """Half of the strain from the nodal velocity before the forces, half from the one of musl.
 
-    Energy is kept best, for two updates of the stress a step (Nairn 2003, "Material point method
+    Energy is kept best, for two updates of the stress per step (Nairn 2003, "Material point method
     calculations with explicit cracks"). The two halves make the whole increment of F.
 
     Example

@@ -31,7 +31,7 @@ class USL(NamedTuple):
     """
 
     courant = (0.65, 0.4)
-    damps = True  # what vibrates, with two points a cell and direction
+    damps = True  # what vibrates, with two points per cell and direction
     node_fields = (SquaredMass,)
     rows = (
         table.BEGIN,

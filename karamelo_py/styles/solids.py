@@ -21,7 +21,7 @@ from karamelo_py.scene.solid import Solid, own_grids
 from karamelo_py.scene.tables import FileColumns
 from karamelo_py.script.errors import ScriptError
 
-MANY = 10  # points a cell and direction that nobody needs
+MANY = 10  # points per cell and direction that nobody needs
 
 
 class RegionSolid(Solid):
@@ -103,7 +103,7 @@ class RegionSolid(Solid):
             )
         if ppc > MANY:
             hub.warn(
-                f"{ppc} points a cell and direction are {ppc**domain.dimension:.3g} in each cell",
+                f"{ppc} points per cell and direction are {ppc**domain.dimension:.3g} in each cell",
                 hint="2 or 3, as a rule; smaller cells make more points, too",
             )
         kin = KINEMATICS[domain.dimension]()

@@ -189,7 +189,7 @@ def _print(name: str, one: measure.Measured | measure.Solved, *, published: bool
 
 def _print_solved(one: measure.Solved) -> None:
     print(f"  {'unknowns':<34} {one.unknowns:8d}")
-    print(f"  {'seconds a load step':<34} {one.points / one.best:8.3f} (median "
+    print(f"  {'seconds per load step':<34} {one.points / one.best:8.3f} (median "
           f"{one.points / one.median:.3f})")  # fmt: skip
     print(f"  {'corrections a load step':<34} {one.corrections:8.1f}")
     for stage, share in one.stages.items():

@@ -42,7 +42,7 @@ class Workload(NamedTuple):
     script: str
     # Steps before the measuring begins.
     lead: int = 3
-    # Published million particle-steps a second of Karamelo (C++) on one core of a small AMD EPYC.
+    # Published million particle-steps per second of Karamelo (C++) on one core of a small AMD EPYC.
     karamelo: float | None = None
 
 

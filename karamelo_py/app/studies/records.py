@@ -1,4 +1,4 @@
-"""The table of a study: one row a run, as CSV, and what it was made with beside it."""
+"""The table of a study: one row per run, as CSV, and what it was made with beside it."""
 
 import csv
 import io

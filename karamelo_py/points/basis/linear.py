@@ -1,4 +1,4 @@
-"""Linear hat functions: two nodes a direction, 1 - |x - X_I| / h."""
+"""Linear hat functions: two nodes per direction, 1 - |x - X_I| / h."""
 
 from typing import NamedTuple
 
@@ -60,9 +60,9 @@ known_failure(
     Linear,
     "hourglasses",
     when=lambda basis, scene: not scene.moves and scene.d > 1 and bool(scene.single),
-    reason="one point a cell (solid '{scene.single[0]}') with linear functions that never move "
+    reason="one point per cell (solid '{scene.single[0]}') with linear functions that never move "
     "feels no hourglass: its nodes may go to and fro without any force",
-    cure="{scene.corners} points a cell, or Bernstein-quadratic in the place of the basis",
+    cure="{scene.corners} points per cell, or Bernstein-quadratic in the place of the basis",
 )
 
 

@@ -1,4 +1,4 @@
-"""Bases that are a product of one function a direction: hats, splines, uniform GIMP.
+"""Bases that are a product of one function per direction: hats, splines, uniform GIMP.
 
 The one-dimensional part is the point function `along`; everything else is the same product for any
 number of directions.
@@ -184,7 +184,7 @@ def _affine_weight_product(basis, kin, grid, stencil, k):
 
 
 def register(basis: type, width: int) -> None:
-    """Give `basis` (a class with `along`, `width` nodes a direction) every point function.
+    """Give `basis` (a class with `along`, `width` nodes per direction) every point function.
 
     And the attributes of its kind that it does not have itself.
     """
@@ -201,12 +201,12 @@ def register(basis: type, width: int) -> None:
 
 
 def wide(basis: type) -> None:
-    """Let functions of four nodes a direction be judged where no point crosses cells."""
+    """Let functions of four nodes per direction be judged where no point crosses cells."""
     suggestion(
         basis,
         when=_seen,
-        cost="{scene.basis_name} sees {nodes} nodes a point; in a total Lagrangian method no point "
-        "crosses cells, and linear functions, which see {scene.corners}, are of the same order",
+        cost="{scene.basis_name} sees {nodes} nodes per point; in a total Lagrangian method no "
+        "point crosses cells, and linear functions, which see {scene.corners}, have the same order",
         instead="linear in method(...); karamelo-py sweep shows the errors of both",
     )
 

@@ -1,4 +1,4 @@
-"""B-splines, modified at the walls of the grid: three or four nodes a direction.
+"""B-splines, modified at the walls of the grid: three or four nodes per direction.
 
 Where nodes inside the grid are held, they make walls, too (:class:`AtWalls`). Then there is a class
 of its own with the same functions, so that scenes without such walls ask for none.

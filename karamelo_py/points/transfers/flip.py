@@ -123,7 +123,7 @@ def swings(transfer: type) -> None:
         reason="a body will vibrate by about {scene.vibration.strain:.1g} of strain for about "
         "{scene.vibration.periods:.0f} periods, and with {scene.transfer_name} elastic bodies that "
         "do so while they move through the grid break after 2 to 50 periods (by 0.14, drifting)",
-        cure="method tlmpm, or scheme(usl) with two points a cell and direction, which damps",
+        cure="method tlmpm, or scheme(usl) with two points per cell and direction, which damps",
     )
 
 

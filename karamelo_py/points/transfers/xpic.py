@@ -45,7 +45,7 @@ class XPIC(NamedTuple):
     space. The motion that the grid sees stays (Hammerquist & Nairn 2017, "A new method for material
     point method particle updates that reduces noise and enhances stability", eq. 24). The terms w_0
     = S+ v, w_k = w_(k-1) - S+ S w_(k-1) are summed at the nodes. Every order beyond the first
-    visits the points once more a step.
+    visits the points once more per step.
 
     Parameters
     ----------

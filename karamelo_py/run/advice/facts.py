@@ -50,7 +50,7 @@ class SceneFacts:
         solids = hub.solids.values()
         # Of laws that store all work, and bear tension.
         self.elastic = [s for s in solids if getattr(s.material.law, "rebounds", False)]
-        # About one point a cell and direction.
+        # About one point per cell and direction.
         self.single = [s.id for s in solids if timestep.one_a_cell(s)]
         self.sparse = bool(self.single)
 
@@ -114,7 +114,7 @@ class SceneFacts:
 
     @property
     def locks(self) -> bool:
-        """Tell whether hat functions are to keep the volume of several points a cell, each."""
+        """Tell whether hat functions are to keep the volume of several points per cell, each."""
         hats = self.linear or bool(getattr(self.basis, "shape", ()))
         return hats and self.d > 1 and not (self.sparse or self.hub.update.anti_locking)
 

@@ -17,7 +17,7 @@ from karamelo_py.scene.hub import Hub
 
 LOSS = 0.05  # of the largest energy, at the end of a run: more is told; WITHIN before the end
 TOLD = 2  # windows of growth one after another, of which a run tells
-WHOLE = "more points a cell, a finer grid, cpgimp or ulcpdi, or method tlmpm"
+WHOLE = "more points per cell, a finer grid, cpgimp or ulcpdi, or method tlmpm"
 
 
 def not_watched(why: str) -> str:
@@ -90,7 +90,7 @@ def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
     if update.anti_locking and moves:
         return "averaged volumes (F-bar) in the updated frame", "leave anti_volumetric_locking out"
     if keeping < timestep.USUAL and share > keeping * (1 + 1e-9):
-        points = " with one point a cell" if timestep.sparse(hub) else ""
+        points = " with one point per cell" if timestep.sparse(hub) else ""
         return (
             f"points that cross cells: {transfer}, {functions} and {scheme}{points} at "
             f"{share:.2g} of the stable step",

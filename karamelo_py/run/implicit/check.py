@@ -16,7 +16,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
 from karamelo_py.script.errors import Place, ScriptError
 
-# Moments of fixes that implicit steps have; those of plug-ins may be called more than once a step.
+# Moments of fixes that implicit steps have; those of plug-ins may be called more often per step.
 _MOMENTS = "initial_integrate", "post_particles_to_grid", "post_update_grid_state"
 _OF_HEAT = "post_heat_to_grid", "supply_heat", "post_update_grid_heat"
 _OF_PLUGINS = _MOMENTS[1:]
@@ -106,8 +106,8 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
             )
         elif len(fix.solids) > 1 and fix.friction is None:
             yield (
-                f"cannot work with fix {fix.style}, which finds its force once a step, before the "
-                "points have moved",
+                f"cannot work with fix {fix.style}, which finds its force once per step, before "
+                "the points have moved",
                 f"method ulmpm/contacts, or {_EXPLICIT}",
                 fix.place,
             )

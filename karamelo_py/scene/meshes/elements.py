@@ -156,7 +156,7 @@ def measured(elements: MeshElements) -> tuple[MeshElements, np.ndarray, np.ndarr
     """The elements with positive orientation, their volumes (n,) and their centroids (n, d).
 
     Volume and centroid are those of the region that the map of the element covers, faces that are
-    not plane included: integrals of det J and x det J by 2 Gauss points a direction, which is
+    not plane included: integrals of det J and x det J by 2 Gauss points per direction, which is
     exact, since both are polynomials of degree 3 at most in each natural coordinate. An element
     that is flat or twisted is an error.
     """

@@ -26,7 +26,7 @@ class PlainUSL(NamedTuple):
     scheme(plain-usl)
     """
 
-    courant = (0.65, 0.4)  # the stable step over h/c, and with one point a cell
+    courant = (0.65, 0.4)  # the stable step over h/c, and with one point per cell
     rows = (
         AtPoints(INITIAL_INTEGRATE, 0),
         SUMS,  # mass, momentum and force to the nodes

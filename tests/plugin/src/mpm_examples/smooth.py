@@ -1,4 +1,4 @@
-"""basis smooth: hats with rounded slopes, a product of one function a direction."""
+"""basis smooth: hats with rounded slopes, a product of one function per direction."""
 
 from typing import Annotated, NamedTuple
 
