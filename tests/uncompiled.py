@@ -6,6 +6,7 @@ answers with one JSON line.
 """
 
 import contextlib
+import ctypes
 import functools
 import gc
 import io
@@ -65,6 +66,26 @@ def save_state(request: dict) -> int:
     return 0
 
 
+def trouble_emulator() -> None:
+    """Let threads of an emulated GPU come in any order, and its memory hold NaN at first."""
+    import numpy as np
+
+    from karamelo_py.compiler.gpu import Emulator
+
+    allocate, chance = Emulator.allocate, np.random.default_rng(1)
+
+    def with_rubbish(emulator: Emulator, size: int) -> int:
+        at = allocate(emulator, size)
+        ctypes.memset(at, 0xFF, size)  # whole numbers are -1
+        return at
+
+    def shuffled(emulator: Emulator, entry, arguments: tuple, count: int) -> None:
+        for i in chance.permutation(count).tolist():
+            entry(i, *arguments)
+
+    Emulator.allocate, Emulator.launch = with_rubbish, shuffled
+
+
 def main() -> None:
     """Serve requests until the input ends."""
     requests, answers = sys.stdin, sys.stdout
@@ -74,6 +95,7 @@ def main() -> None:
 
     cli._parser = functools.cache(cli._parser)  # a third of what a tiny scene takes
     gc.freeze()  # scenes make many objects, among which alone cycles have to be looked for
+    trouble_emulator()
     # Which package it is: the first line.
     print(karamelo_py.__file__, flush=True)
     # Interpreted arithmetic warns about what compiled kernels pass over in silence.
