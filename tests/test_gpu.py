@@ -5,8 +5,8 @@ import pytest
 from numba import config
 from selection import few
 
-from karamelo_py.compiler import values
 from karamelo_py.compiler.gpu import Emulator
+from karamelo_py.compiler.trace import forget
 from karamelo_py.kernels.arrays import arrays_of
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
@@ -126,7 +126,7 @@ def test_kernels_of_the_processor_on_disk(monkeypatch, tmp_path):
     Formulas of two fixes have one signature; the first has no condition, the second has one.
     """
     hub, one = begun(WATER)
-    values.branching.clear()
+    forget()
     monkeypatch.setenv("KARAMELO_PY_CACHE", str(tmp_path))
     hooks = one.hooks, one.python.functions
     steps = StepsOnCard(Emulator(), one.setup, hub.update.scheme, type(one.visits), *hooks)

@@ -303,9 +303,7 @@ class StepsOnCard:
     def _called(self, h: int) -> dict:
         """Map what is called by its address to the functions of a hook."""
         signatures = (NODE_FUNCTION, POINT_FUNCTION, HEAT_FUNCTION)
-        own: dict = dict.fromkeys(signatures, self.functions[h])
-        # Code on disk asks for all that was traced.
-        own["others"] = (*self.functions, evaluate_in_table, _no_formula)
+        own = dict.fromkeys(signatures, self.functions[h])
         return {**own, EVALUATE: evaluate_in_table if self._has_formulas(h) else _no_formula}
 
     def _has_formulas(self, h: int) -> bool:
