@@ -1,18 +1,21 @@
 """Point functions that kernels run once and write down, and those that they refuse."""
 
+import contextlib
+import ctypes
 import math
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 from listening import listening
-from numba import config
+from numba import config, typeof, types
 
 from karamelo_py.compiler import choices
 from karamelo_py.compiler.compile import fma, point_function, real, shared, where
 from karamelo_py.compiler.held import hold
-from karamelo_py.compiler.loops import kernel
-from karamelo_py.compiler.trace import CannotCompile
+from karamelo_py.compiler.loops import address_of, kernel, written
+from karamelo_py.compiler.lowering import Lowering
+from karamelo_py.compiler.trace import CannotCompile, forget
 from karamelo_py.language.faults import cause_of, place_in
 
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
@@ -98,6 +101,7 @@ def adder(increment):
 
 
 two_more = adder(2)
+KINDS = typeof(Root(2.0)), types.float64
 
 
 def compiled_for(function, *arguments):
@@ -331,6 +335,70 @@ def test_what_nothing_follows_is_refused(function, arguments, reason):
 
     with pytest.raises(CannotCompile, match=reason):
         kernel(caller)(*arguments)
+
+
+def through(function):
+    """A function that calls another."""
+    return lambda *arguments: function(*arguments)
+
+
+def test_what_is_refused_once_is_refused_again():
+    """Also what functions call that lie in the closures of others."""
+
+    def scaled(weight, x):
+        return weight.times(x)
+
+    deep = through(through(through(scaled)))
+    for _ in range(2):
+        test_what_nothing_follows_is_refused(deep, (Weight(2.0), 1.0), "'times' is a method")
+
+
+def spelled(x, positive):
+    len(f"{x is None}")  # what is walked through has no such text
+    return x if positive else -x
+
+
+def test_a_failure_leaves_nothing_behind():
+    """A function that cannot be walked through where it asks is run where it need not."""
+    with pytest.raises(CannotCompile, match="no text with numbers in it"):
+        kernel(lambda x: spelled(x, x > 0))(1.0)
+    assert kernel(lambda x: spelled(x, True))(2.0) == 2.0
+
+
+def test_an_interrupt_leaves_nothing_behind(monkeypatch):
+    """Ctrl-C at any of the operations of a function, each a moment later than the one before."""
+
+    def caller(tag, x):
+        return value_of(tag, x) + third_power(x)
+
+    left, call = [0], Lowering.call
+
+    def interrupted(*arguments):
+        left[0] -= 1
+        if left[0] == 0:
+            raise KeyboardInterrupt
+        return call(*arguments)
+
+    monkeypatch.setattr(Lowering, "call", interrupted)
+    texts = {str(written(caller, KINDS)[0])}
+    for moment in range(1, 30, 4):
+        forget()
+        left[0] = moment
+        with contextlib.suppress(KeyboardInterrupt):
+            written(caller, KINDS)
+        left[0] = 0
+        texts.add(str(written(caller, KINDS)[0]))
+    assert len(texts) == 1
+
+
+def test_an_address_is_that_of_a_signature():
+    def doubled(x):
+        return x + x
+
+    kinds = types.float64, types.float32
+    addresses = [address_of(doubled, kind(kind)) for kind in kinds]
+    for address, number in zip(addresses, (ctypes.c_double, ctypes.c_float), strict=True):
+        assert ctypes.CFUNCTYPE(number, number)(address)(0.1) == 2 * number(0.1).value
 
 
 def test_constants_are_what_the_compiler_makes_of_them():

@@ -270,6 +270,27 @@ def test_what_is_raised():
         made(7)
 
 
+def test_ctrl_c_behind_what_was_raised():
+    """The kernels that are called next know nothing of it."""
+
+    def caller(n):
+        return checked(n)
+
+    made = kernel(caller)
+    made(2)
+    ((kinds, (plan, entry, *rest)),) = made._plans.items()
+
+    def interrupted(*given):
+        entry(*given)
+        raise KeyboardInterrupt
+
+    made._plans[kinds] = plan, interrupted, *rest
+    with pytest.raises((ValueError, KeyboardInterrupt)):
+        made(3)
+    made._plans[kinds] = plan, entry, *rest
+    assert made(2) == 2
+
+
 def test_attributes_of_records():
     def caller(records, x):
         for k in range(records.size):
@@ -313,3 +334,67 @@ def test_a_file_that_has_changed_is_not_read(tmp_path, monkeypatch):
 
     with pytest.raises(CannotCompile, match="its file has changed since Python read it"):
         kernel(caller)(1.0)
+
+
+def last_of(x, n):
+    """A number that a loop gives, of the type of x: a literal before."""
+    last = 0.0
+    for _ in range(n):
+        last = x
+    return last
+
+
+def sum_of(items, x):
+    """A loop that must be written out: the items have several types."""
+    total = x
+    for k in range(9):
+        total = total + items[k]
+    return total
+
+
+@shared
+def negated(x):
+    return -x if x > 0 else x
+
+
+@shared
+def opposite(x):
+    return x if x <= 0 else -x
+
+
+@pytest.mark.parametrize(
+    ("loop", "branches", "found"),
+    [
+        (lambda x, n: last_of(x, n), negated, 0.0),
+        (lambda x, n: sum_of(((x,) * 9 + ((),)), x), opposite, 4.5),
+    ],
+)
+def test_what_is_known_of_loops_is_found_again(loop, branches, found):
+    """A function that is seen to branch has all that were walked through forgotten."""
+
+    def caller(x, n):
+        return loop(x, n) + branches(x)
+
+    assert kernel(caller)(np.float32(0.5), 3) == found
+
+
+def last_pair(pair, n):
+    last = (0.0, 0.0)
+    for _ in range(n):
+        last = (pair.first, pair.second)
+    return last
+
+
+def test_loops_over_tuples_keep_their_precision():
+    """Of single numbers, what a loop begins with is single; doubles beside them change nothing."""
+
+    def alone(single, n):
+        a, b = last_pair(single, n)
+        return a * b + a * a
+
+    def beside(single, double, n):
+        found = alone(single, n)
+        return found + 0 * len(last_pair(double, n))
+
+    pairs = Pair(np.float32(1 / 3), np.float32(0.7)), Pair(1 / 3, 0.7)
+    assert kernel(beside)(*pairs, 2) == kernel(alone)(pairs[0], 2)

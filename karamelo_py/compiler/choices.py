@@ -44,8 +44,8 @@ def name_of(thing: Any) -> str:
     return f"{thing.__module__}:{thing.__qualname__}"
 
 
-# What was asked of a point function, or code of a function that was run.
-Part: TypeAlias = "tuple[Callable, tuple] | Choice | python.CodeType"
+# What was asked of a point function, code of a function that was run, or a class that it names.
+Part: TypeAlias = "tuple[Callable, tuple] | Choice | python.CodeType | type"
 _noted: list[set[Part]] = []  # of the functions that are made, innermost last
 
 
@@ -94,6 +94,7 @@ def contents(parts: Iterable[Part]) -> tuple[frozenset[Choice], frozenset[python
     choices = {
         part if isinstance(part, Choice) else Choice(name_of(part[0]), (*map(class_name, part[1]),))
         for part in {*parts} - codes
+        if not isinstance(part, type)
     }
     return frozenset(choices), frozenset(c for c in codes if c.co_filename not in WHOLE)
 

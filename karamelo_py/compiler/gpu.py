@@ -26,8 +26,7 @@ from karamelo_py.compiler.choices import INTERPRETED, Unknown, contents, parts_n
 from karamelo_py.compiler.code import I32, I64
 from karamelo_py.compiler.compile import implements
 from karamelo_py.compiler.fingerprint import fingerprint
-from karamelo_py.compiler.held import HeldTuple, item_of
-from karamelo_py.compiler.loops import ENTRY, NAME, compilation, written
+from karamelo_py.compiler.loops import ENTRY, NAME, compilation, items_at, written
 from karamelo_py.compiler.trace import formula, in_one
 from karamelo_py.compiler.values import intrinsic
 
@@ -114,13 +113,6 @@ def aligned_record(array, i, count):
 # --- code -------------------------------------------------------------------------------------
 
 
-def _items(builder: Any, kinds: tuple, place: Any) -> list:
-    held = HeldTuple(kinds[1:])
-    place = builder.inttoptr(place, held.register_type())
-    full = (k for k, kind in enumerate(kinds[1:]) if not code.is_empty(kind))
-    return [item_of(builder, held, place, k) for k in full]
-
-
 def _entry(module: ir.Module) -> tuple[ir.Function, ir.IRBuilder]:
     kind = ir.FunctionType(ir.VoidType(), [I64] * 2)
     entry = ir.Function(module, kind, NAME + ENTRY)
@@ -130,7 +122,7 @@ def _entry(module: ir.Module) -> tuple[ir.Function, ir.IRBuilder]:
 def _as_loop(module: ir.Module, main: ir.Function, kinds: tuple, result: Any) -> None:
     """Write what does the work of all threads, one after another."""
     entry, builder = _entry(module)
-    items = _items(builder, kinds, entry.args[0])
+    items = items_at(builder, kinds[1:], entry.args[0])
     with code.counted(builder, entry.args[1]) as i:
         builder.call(main, [i, *items])
     builder.ret_void()
@@ -147,7 +139,7 @@ def _as_threads(module: ir.Module, main: ir.Function, kinds: tuple, result: Any)
 
     i = builder.add(builder.mul(special("ctaid.x"), special("ntid.x")), special("tid.x"))
     with builder.if_then(builder.icmp_signed("<", i, entry.args[1])):
-        builder.call(main, [i, *_items(builder, kinds, entry.args[0])])
+        builder.call(main, [i, *items_at(builder, kinds[1:], entry.args[0])])
     builder.ret_void()
     main.linkage = "internal"
     main.attributes.discard("noinline")

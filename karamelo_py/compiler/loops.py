@@ -144,14 +144,19 @@ def _compiled(function: Callable, kinds: tuple, result: types.Type | None) -> tu
     return unit._replace(choices=found), codes
 
 
+def items_at(builder: ir.IRBuilder, kinds: tuple, address: Any) -> list:
+    """Write what reads arguments of these types from memory."""
+    held = HeldTuple(kinds)
+    place = builder.inttoptr(address, held.register_type())
+    full = (k for k, kind in enumerate(kinds) if not code.is_empty(kind))
+    return [item_of(builder, held, place, k) for k in full]
+
+
 def _write_entry(module: ir.Module, main: ir.Function, kinds: tuple, result: types.Type) -> None:
     """Write what calls a function with arguments in memory, and puts there what it gives."""
-    held = HeldTuple(kinds)
     entry = ir.Function(module, ir.FunctionType(ir.VoidType(), [code.I64] * 2), NAME + ENTRY)
     builder = ir.IRBuilder(entry.append_basic_block("entry"))
-    place = builder.inttoptr(entry.args[0], held.register_type())
-    full = (k for k, kind in enumerate(kinds) if not code.is_empty(kind))
-    given = builder.call(main, [item_of(builder, held, place, k) for k in full])
+    given = builder.call(main, items_at(builder, kinds, entry.args[0]))
     if not code.is_empty(result):
         room = builder.inttoptr(entry.args[1], code.memory_type(result).as_pointer())
         code.put(builder, result, given, room, 1)
@@ -191,8 +196,10 @@ class Kernel:
         plan, entry, size, read = self._planned(written, arguments)
         _memory, address = written.in_memory(plan)
         result = bytearray(size)
-        entry(address, ctypes.addressof(ctypes.c_char.from_buffer(result)))
-        raise_noted()
+        try:
+            entry(address, ctypes.addressof(ctypes.c_char.from_buffer(result)))
+        finally:  # also where Ctrl-C comes at the end of what has failed
+            raise_noted()
         return read(result)
 
     def compile(self, *arguments: Any) -> None:
@@ -249,7 +256,7 @@ def noinline(function: Callable) -> Callable:
 # --- functions that kernels call by their address, and do not contain -----------------------------
 
 _uncompiled: list[Callable] = []
-_addresses: dict[Callable, int] = {}
+_addresses: dict[tuple[Callable, types.Type], int] = {}
 _keep_alive: list = []
 
 
@@ -259,13 +266,14 @@ def address_of(function: Callable, signature: types.Type) -> int:
     Whoever calls by address does not contain the function: it need not be compiled anew for
     another one, and the function is compiled once for all its callers.
     """
-    if function not in _addresses:
+    key = function, signature
+    if key not in _addresses:
         if choices.INTERPRETED:
-            _addresses[function] = address_of_python(function, signature)
+            _addresses[key] = address_of_python(function, signature)
         else:
             unit = Kernel(function).unit(signature.args, signature.return_type)
-            _addresses[function] = load(unit)[0]
-    return _addresses[function]
+            _addresses[key] = load(unit)[0]
+    return _addresses[key]
 
 
 def address_of_python(function: Callable, signature: types.Type) -> int:

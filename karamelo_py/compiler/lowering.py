@@ -15,7 +15,7 @@ from karamelo_py.compiler.held import HeldTuple, item_of
 MOST_OPERATIONS = 10_000  # of one formula; beyond, a loop is better left to the compiler
 
 
-class FunctionType(types.Type):
+class FunctionType(types.Opaque):
     """Stand for a function, or a class, that is known."""
 
     def __init__(self, function: Callable):

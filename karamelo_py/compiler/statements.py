@@ -21,10 +21,12 @@ import types as python
 from collections.abc import Callable, Iterable
 from typing import Any
 
+import numpy as np
 from numba import types
 
+from karamelo_py.compiler import values
 from karamelo_py.compiler.choices import codes_in
-from karamelo_py.compiler.flow import Counter, Edge, Flow, Grows, Range, is_value
+from karamelo_py.compiler.flow import Edge, Flow, Grows, Range, is_value
 from karamelo_py.compiler.values import LONG, DataDependentBranch, Untraceable, emit
 
 
@@ -93,14 +95,15 @@ def source_of(function: Callable) -> ast.FunctionDef:
 class AstFunction:
     """Compile a function from its text, statement by statement, where it is called.
 
-    The function has the globals that it is to see; `flow` makes what writes the code of a call.
+    The function has the globals that it is to see.
     """
 
-    def __init__(self, function: Callable, flow: Callable[[], Flow]):
-        self.function, self.flow = function, flow
+    def __init__(self, function: Callable):
+        self.function = function
         self.definition = source_of(function)
-        self.unrolled: set[ast.For] = set()  # loops that must be
-        self.grown: dict[tuple, dict] = {}  # types of literals that loops begin with, by place
+        # Of loops, by all that decides on their code: types of literals that one begins with, by
+        # place; None of one that must be written out.
+        self.loops: dict[tuple, dict | None] = {}
         self.signature = inspect.signature(function)
         self.__code__ = function.__code__
         free = function.__code__.co_freevars
@@ -110,7 +113,20 @@ class AstFunction:
     def __call__(self, *arguments: Any, **keywords: Any) -> Any:
         bound = self.signature.bind(*arguments, **keywords)
         bound.apply_defaults()
-        return AstCompiler(self, self.flow(), dict(bound.arguments)).result()
+        return AstCompiler(self, dict(bound.arguments)).result()
+
+
+def _shape(thing: Any) -> Any:
+    """Give types in the place of values, and all else as it is."""
+    if isinstance(thing, values.Value | values.HeldValue):
+        return thing._kind._code
+    if isinstance(thing, dict):
+        return dict, *map(_shape, thing.items())
+    if isinstance(thing, tuple | list | set):
+        return type(thing), *map(_shape, thing)
+    if isinstance(thing, int | float | np.generic):  # 0, 0.0, -0.0 and False are equal
+        return type(thing), repr(thing)
+    return getattr(thing, "definition", thing) if isinstance(thing, python.FunctionType) else thing
 
 
 _BINARY = {
@@ -136,13 +152,18 @@ _WORDS = {
 class AstCompiler:
     """Compile one call of a function."""
 
-    def __init__(self, walked: AstFunction, flow: Flow, names: dict[str, Any]):
-        self.walked, self.flow, self.names = walked, flow, names
+    def __init__(self, walked: AstFunction, names: dict[str, Any]):
+        self.walked, self.names = walked, names
         self.function, self.free = walked.function, walked.free
         self.goes = True  # whether anything is done after the statement before
         self.returns: list[Edge] = []
         self.breaks: list[Edge] = []
         self.continues: list[Edge] = []
+
+    @property
+    def flow(self) -> Flow:
+        """What writes now: types may be found before there is code."""
+        return Flow(values.now())
 
     def result(self) -> Any:
         """Compile the body; return what the function returns."""
@@ -306,14 +327,10 @@ class AstCompiler:
 
     def either(self, condition: Any, then: Callable, otherwise: Callable) -> Any:
         """Compile the choice of one of two expressions."""
-
-        def of(do: Callable) -> Callable:
-            def put() -> None:
-                self.names["?"] = do()
-
-            return put
-
-        self.branch(condition, of(then), of(otherwise))
+        result = ast.Name("?")
+        self.branch(
+            condition, lambda: self.give(result, then()), lambda: self.give(result, otherwise())
+        )
         if "?" not in self.names:
             raise Untraceable("an expression gives things of two kinds")
         return self.names.pop("?")
@@ -343,6 +360,7 @@ class AstCompiler:
             finally:
                 self.names = outer
 
+        call.definition = node  # type: ignore[attr-defined]
         return call
 
     def comprehended(self, node: ast.expr, item: Callable[[], Any]) -> list:
@@ -422,8 +440,9 @@ class AstCompiler:
             given = defaults | dict(zip(names, arguments, strict=False)) | keywords
             if len(arguments) > len(names) or given.keys() != set(names):
                 raise TypeError(f"{node.name} takes {len(names)} arguments")
-            return AstCompiler(inner, self.flow, given).result()
+            return AstCompiler(inner, given).result()
 
+        call.definition = node  # type: ignore[attr-defined]
         self.names[node.name] = call
 
     def Raise(self, node: ast.Raise) -> None:
@@ -495,28 +514,37 @@ class AstCompiler:
         if isinstance(through, range) and self.is_rolled(node, through):
             through = Range((through.start, through.stop, through.step))
         if is_value(through):
-            array, through = through, Range((through.shape[0],))
-            self.roll(node, self.flow.counted(through.bounds), lambda k: array[k])
+            self.roll(node, (through.shape[0],), lambda k: through[k])
         elif isinstance(through, Range):
-            self.roll(node, self.flow.counted(through.bounds), lambda k: k)
+            self.roll(node, through.bounds, lambda k: k)
         else:
             self.unroll(node, through)
 
     def is_rolled(self, node: ast.For, through: range) -> bool:
         """Tell whether a loop over a known range stays a loop: a long one, if it can be."""
-        if len(through) <= LONG or node in self.walked.unrolled:
+        if len(through) <= LONG:
             return False
-        if not self.flow.builder:
-            go_back = self.state()
+        loops, key = self.walked.loops, (node, _shape((self.names, self.free)))
+        if key not in loops:
             bounds = through.start, through.stop, through.step
             try:
-                self.roll(node, self.flow.counted(bounds), lambda k: k)
+                self.without_code(lambda: self.roll(node, bounds, lambda k: k))
             except DataDependentBranch:
                 raise
             except (Exception, Untraceable):
-                self.walked.unrolled.add(node)
+                loops[key] = None
+        return loops[key] is not None
+
+    def without_code(self, do: Callable[[], None]) -> None:
+        """Do something for its types alone, and go back to here."""
+        go_back, here = self.state(), values.now()
+        typed = type(here)(here.seen)
+        typed.read = dict(here.read)
+        try:
+            with values.writing(typed):
+                do()
+        finally:
             go_back()
-        return node not in self.walked.unrolled
 
     def state(self) -> Callable[[], None]:
         """Make what goes back to here, where something is to be tried."""
@@ -549,28 +577,32 @@ class AstCompiler:
         self.roll(node, None)
 
     def roll(
-        self, node: ast.For | ast.While, counter: Counter | None, item: Callable | None = None
+        self, node: ast.For | ast.While, bounds: tuple | None, item: Callable | None = None
     ) -> None:
         """Compile a loop that ends when the run says so; `item` is what a count stands for.
 
         Types are found first: literals that it begins with become numbers of these types.
         """
-        kinds = tuple(sorted((n, v._kind._code) for n, v in self.names.items() if is_value(v)))
-        grown = self.walked.grown.setdefault((node, kinds), {})
+        loops, key = self.walked.loops, (node, _shape((self.names, self.free)))
+        if self.flow.builder and key not in loops:
+            self.without_code(lambda: self.roll(node, bounds, item))
+        grown = loops.get(key) or {}
         go_back = self.state()
         while True:
             try:
-                self.rolled(node, counter, item, grown)
+                self.rolled(node, bounds, item, grown)
+                loops[key] = grown
                 return
             except Grows as number:
                 if self.flow.builder:
                     raise
-                grown |= number.grown
+                grown = grown | number.grown
                 go_back()
 
     def rolled(
-        self, node: ast.For | ast.While, counter: Counter | None, item: Callable | None, grown: dict
+        self, node: ast.For | ast.While, bounds: tuple | None, item: Callable | None, grown: dict
     ) -> None:
+        counter = None if bounds is None else self.flow.counted(bounds)
         outer = self.breaks, self.continues
         self.breaks, self.continues = [], []
         if counter:

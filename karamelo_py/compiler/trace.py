@@ -27,7 +27,6 @@ from numba import types
 from karamelo_py.compiler import values
 from karamelo_py.compiler.arithmetic import OPERATIONS
 from karamelo_py.compiler.choices import choosers, codes_in, note, parts_noted, tag_class
-from karamelo_py.compiler.flow import Flow
 from karamelo_py.compiler.lowering import Lowering, name_of, numbers_of
 from karamelo_py.compiler.statements import AstFunction, place_in_text
 
@@ -139,12 +138,14 @@ def _seen(thing: Any) -> Any:
     if not isinstance(thing, Hashable):
         raise values.Untraceable(f"a {type(thing).__name__} is nothing that kernels know")
     if thing not in _copies:
-        _copies[thing] = _copy(thing)
-    made = _copies[thing]
-    if isinstance(made, AstFunction) or type(getattr(made, "__globals__", None)) is values.Globals:
-        note([made.__code__])
-    if isinstance(made, type):
-        values.now().classes.add(made)
+        with parts_noted() as parts:  # with those in closures
+            made = _copy(thing)
+            own = type(getattr(made, "__globals__", None)) is values.Globals
+            if own or isinstance(made, AstFunction | type):
+                note([getattr(made, "__code__", made)])
+        _copies[thing] = made, parts
+    made, parts = _copies[thing]
+    note(parts)
     return made
 
 
@@ -189,7 +190,7 @@ def _copied(function: Callable) -> Callable:
     if code not in values.branching:
         return made
     vars(made).update(vars(function))
-    return AstFunction(made, lambda: Flow(values.now()))
+    return AstFunction(made)
 
 
 # --- methods, which nothing follows ---------------------------------------------------------------
@@ -286,7 +287,9 @@ def _written(dispatch: Callable, kinds: tuple) -> _Formula | None:
             found = run(*(lowering.wrapped(kind, None) for kind in kinds))
             result = types.unliteral(lowering.kind_of(found))
         codes = {part for part in parts if isinstance(part, python.CodeType)}
-        _refuse_methods(codes, lowering.classes)
+        classes = {part for part in parts if isinstance(part, type)}
+        parts -= classes
+        _refuse_methods(codes, lowering.classes | classes)
         if hasattr(dispatch, "tags"):
             parts.add((dispatch, tuple(map(tag_class, kinds[: dispatch.tags]))))
         return _Formula(run, result, frozenset(parts), _is_plain(found), dispatch.__qualname__)
@@ -301,6 +304,7 @@ def formula(dispatch: Callable, kinds: tuple) -> _Formula | None:
     key = dispatch, numbers_of(kinds), _called
     if len(_formulas) > MOST_FORMULAS and not values.at_work():
         forget()
+    known = bool(values.branching) and not values.at_work()
     while key not in _formulas:
         if key in _begun:
             raise CannotCompile("it calls itself", dispatch)
@@ -310,6 +314,12 @@ def formula(dispatch: Callable, kinds: tuple) -> _Formula | None:
         except values.DataDependentBranch:
             # Once more, and through the text of the function that asks.
             _copies.clear()
+        except CannotCompile:
+            # Perhaps it only asks elsewhere what a run knows: as if nothing had been compiled.
+            if not known:
+                raise
+            known = False
+            forget()
         finally:
             _begun.remove(key)
     found = _formulas[key]
@@ -324,6 +334,7 @@ def forget() -> None:
     if not values.at_work():
         _copies.clear()
         _modules.clear()
+        values.branching.clear()
 
 
 def _number_types(kinds: Iterable[types.Type]) -> Iterator[type]:
