@@ -219,6 +219,22 @@ def test_thermal_pressure():
     assert jacobian(law, kin, free) == pytest.approx(1 + 2 / 160)
 
 
+@pytest.mark.parametrize("alpha", [0.0, 2e-5])
+def test_energy_of_a_warm_body_is_the_integral_of_its_pressure(alpha):
+    """W' = -p at a temperature, with heat by Gamma, by alpha, or both (central differences).
+
+    Without that of Gamma a body that begins warm seemed to gain energy as it expanded.
+    """
+    heat = PlasticWork(0.9, CV, 0.0, alpha, TR, 1356.0)
+    law, kin = EosStrength(COPPER, Viscous(0.0, 0.0), temperature=heat), Line()
+    for j in (0.8, 1.0, 1.02):
+        ways = [closed_to(law, kin, initial_state(law, kin, 1.0), j + e) for e in (-1e-5, 0, 1e-5)]
+        at = [with_temperature(law, kin, state, 800.0) for state in ways]
+        W = [energy_density(law, kin, state) for state in at]
+        p = pressure_of(law, kin, at[1])
+        assert (W[2] - W[0]) / 2e-5 == pytest.approx(-p, rel=1e-6)
+
+
 def test_tension_of_a_liquid():
     """tension cuts Tait's curve: pressure stays, energy grows with the volume."""
     whole, torn = Tait(1e-3, 2.0, 7.0), Tait(1e-3, 2.0, 7.0, 0.5)

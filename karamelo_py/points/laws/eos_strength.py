@@ -325,6 +325,18 @@ def intact_pressure(law, j, m):
     return further_pressure(law.further, m.further, p)
 
 
+def volume_energy(law, j, m):
+    """Energy of the change of volume of the intact material, at its temperature."""
+    elastic = strengths.elastic_ratio(law.strength, m.strength, j)
+    energy = eos.compression_energy(law.eos, elastic, m.energy)
+    energy -= eos.stored_heat(law.eos, sum(m.loss))
+    warm = sum(thermal_pressure(law.temperature, m.heat))
+    if len(m.heat):  # what the equation of state itself adds for it
+        warm += eos.pressure(law.eos, elastic, m.energy, m.heat)
+        warm -= eos.pressure(law.eos, elastic, m.energy, ())
+    return energy + warm * (1 - j)
+
+
 def full_pressure(law, j, m):
     """The pressure in the stress: damage takes of tension, not of compression."""
     p = intact_pressure(law, j, m)
@@ -388,7 +400,7 @@ def released(law, kin, j, s, m, broken):
         return 0
     shear = j * strengths.shear_energy(law.strength, kin, s)
     tension = intact_pressure(law, j, m) < 0
-    energy = shear + where(tension, eos.compression_energy(law.eos, j, m.energy), 0)
+    energy = shear + where(tension, volume_energy(law, j, m), 0)
     return (integrity(law.damage, m.damage) - integrity(law.damage, broken)) * energy
 
 
@@ -440,10 +452,7 @@ def _wave_speed_squared_eos_strength(law, kin, state):
 def _energy_density_eos_strength(law, kin, state):
     """Return the energy that unloading at this temperature frees: plastic work is not stored."""
     J, s, m = state
-    elastic = strengths.elastic_ratio(law.strength, m.strength, J)
-    volume = eos.compression_energy(law.eos, elastic, m.energy)
-    volume -= eos.stored_heat(law.eos, sum(m.loss))
-    volume += sum(thermal_pressure(law.temperature, m.heat)) * (1 - J)
+    volume = volume_energy(law, J, m)
     tension = intact_pressure(law, J, m) < 0
     share = borne_share(law, m.damage)
     volume = where(tension, share * volume, volume)
