@@ -26,6 +26,7 @@ LAM, G = lame_parameters(E, NU)
 K = LAM + 2 / 3 * G
 SPACE = Space()
 LINEAR = LinearElastic(1e-3, LAM, G)
+RATE = EosStrength(LinearPressure(1e-3, K), Elastic(G))
 HENCKY = Hencky(1e-3, LAM, G)
 ELASTIC = EosStrength(LinearPressure(1e-3, K), Elastic(G), strain=Logarithmic())
 FLOWING = EosStrength(LinearPressure(1e-3, K), Plastic(G, 5.0), strain=Logarithmic())
@@ -65,14 +66,29 @@ def test_a_step_by_a_constant_gradient_is_what_small_ones_add_up_to(kin):
     assert np.allclose(sym(increment), exact, atol=1e-8)
 
 
+@pytest.mark.parametrize("law", [LINEAR, RATE], ids=["linear", "eos-strength"])
+@pytest.mark.parametrize("kin", [PlaneStrain(), SPACE], ids=["plane", "space"])
+def test_simple_shear_in_load_steps(law, kin):
+    """Stress by Jaumann's rate: G sin(gamma), G (1 - cos(gamma)) (Dienes 1979); of order 2.
+
+    What a step adds has turned by half of its angle, or 20 steps are wrong by a tenth of G.
+    """
+    gamma, errors = 4.0, []
+    for steps in (20, 40):
+        s = sheared(law, kin, gamma, steps, far=True)
+        exact = G * np.sin(gamma), G * (1 - np.cos(gamma)), -G * (1 - np.cos(gamma))
+        errors.append(np.abs([s[0, 1], s[0, 0], s[1, 1]] - np.array(exact)).max() / G)
+    assert errors[0] < 4e-3 and errors[1] < 0.26 * errors[0]
+
+
 # --- logarithmic strain ---------------------------------------------------------------------------
 
 
-def sheared(law, kin, gamma, steps):
+def sheared(law, kin, gamma, steps, *, far=False):
     """Stress (3, 3) after simple shear in equal steps, which are exact for F."""
     state = initial_state(law, kin, 1.0)
     for _ in range(steps):
-        state = after(law, kin, state, [[0, gamma / steps, 0], [0, 0, 0], [0, 0, 0]], far=False)
+        state = after(law, kin, state, [[0, gamma / steps, 0], [0, 0, 0], [0, 0, 0]], far=far)
     return stress(law, kin, state)
 
 

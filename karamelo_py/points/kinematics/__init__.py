@@ -315,6 +315,10 @@ class Tensor(Matrix):
         """Give what strain and turn of this increment, dt grad v, are taken from."""
         return self
 
+    def strain_at_end(self):
+        """Find the strain that adds to a stress which has turned with this small increment."""
+        return sym(self)
+
     def after(self, dl):
         """(I + dl) F, as F + dl F: small increments keep their digits."""
         a, b = dl.at(), self.at()
@@ -431,6 +435,10 @@ class LargeIncrement(namedtuple("LargeIncrement", "dl logarithm")):
     def generator(self):
         """Give what strain and turn are taken from."""
         return self.logarithm
+
+    def strain_at_end(self):
+        """Find the strain by the axes at the end: with what it adds, it turns by half the angle."""
+        return sym(self).turned(self._replace(logarithm=0.5 * self.logarithm))
 
 
 algebra(LargeIncrement)

@@ -308,7 +308,8 @@ def _advance_eos_strength(law, kin, state, dl, dt):
 def carried_along(law, kin, s, dl):
     """Carry the deviatoric stress along with an increment; and find the strain that adds to it."""
     if isinstance(law.strain, Absent):
-        return s.turned(dl), sym(dl)
+        # What is only viscous keeps nothing that could turn: its stress is by the present rate.
+        return s.turned(dl), dl.strain_at_end() if hasattr(law.strength, "G") else sym(dl)
     # The part of the old strain that turns is in the difference.
     e = symmetric_tensor(kin, strengths.shear_strain(law.strength, kin, s))
     return s, elastic_trial(law.strain, e, dl) - e

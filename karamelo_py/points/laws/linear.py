@@ -98,7 +98,7 @@ laws.jacobian.on(LinearElastic)(lambda law, kin, state: state.J)
 
 @laws.advance.on(LinearElastic)
 def _advance_linear_elastic(law, kin, state, dl, dt):
-    eps = sym(dl)
+    eps = dl.strain_at_end() if law.turns else sym(dl)
     sigma = state.sigma.turned(dl) if law.turns else state.sigma
     increment = 2 * law.G * eps + law.lam * tr(eps) * I
     return State(state.J * det(I + dl), sigma + increment)
