@@ -144,8 +144,8 @@ known_failure(
     Moment,
     "affine noise",
     when=_inside_out,
-    reason=f"{WITH} grows in a body that drifts, at any step and with every scheme: turned inside "
-    "out after a few dozen steps",
+    reason=f"{WITH} gains energy where points cross cells, at any step and with every scheme, until "
+    "the run stops (a disk that drifts turns inside out after a few dozen steps)",
     cure=SMOOTH,
 )
 known_failure(
