@@ -133,7 +133,8 @@ class Tiles:
         clock = s.control.clock[0]
         most, steps = (DIRECT_DRIFT, DIRECT_STEPS) if self.direct else (DRIFT, STEPS)
         limit = min(max(LEAST_DRIFT[self.dimension], steps * clock.pace), most)
-        clock.drift_limit = limit if s.frame.moves else np.inf
+        # Points that are taken out leave an infinite drift, in the total frame too.
+        clock.drift_limit = limit if s.frame.moves else np.finfo(float).max
         clock.drift = clock.pace = 0.0
         occupied = [self._sort_block(s, block) for block in s.blocks]
         self.occupied = len(set().union(*(tiles.tolist() for tiles in occupied)))
