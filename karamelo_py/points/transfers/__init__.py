@@ -144,7 +144,7 @@ known_failure(
     Moment,
     "affine noise",
     when=_inside_out,
-    reason=f"{WITH} gains energy where points cross cells, at any step and with every scheme, until "
+    reason=f"{WITH} gains energy where points cross cells, at any step, with every scheme, until "
     "the run stops (a disk that drifts turns inside out after a few dozen steps)",
     cure=SMOOTH,
 )
