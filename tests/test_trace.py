@@ -11,7 +11,7 @@ from listening import listening
 from numba import config, typeof, types
 
 from karamelo_py.compiler import choices
-from karamelo_py.compiler.compile import fma, point_function, real, shared, where
+from karamelo_py.compiler.compile import fma, implements, point_function, real, shared, where
 from karamelo_py.compiler.held import hold
 from karamelo_py.compiler.loops import address_of, kernel, written
 from karamelo_py.compiler.lowering import Lowering
@@ -424,6 +424,13 @@ def test_another_implementation_is_seen():
     assert compiled_for(caller, Square(1.0), 2.0)[0] == 2
     late.on(Square)(lambda tag, x: 3 * x)
     assert compiled_for(caller, Square(1.0), 2.0)[0] == 6
+
+    def plain(x):
+        return x
+
+    for found in (2, 6):
+        assert compiled_for(lambda x: plain(x), 2.0)[0] == found
+        implements(plain)(lambda x: 3 * x)
 
 
 def test_choices_of_tags_without_numbers_are_followed(tmp_path, monkeypatch):

@@ -49,6 +49,7 @@ def implements(function: Callable, *numbers: type, by_type: bool = False) -> Cal
             known.insert(0, made)
         elif not numbers:
             known.append(lambda *_: made)
+        forget()
         return made
 
     return register
