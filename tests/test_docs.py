@@ -304,11 +304,12 @@ def test_the_form_writes_the_lines_of_the_table(tmp_path):
     answers = [[word for word, _ in one["answers"]] for one in CHOICES["questions"]]
     given = f"const given = {json.dumps([*product(*answers)])};"
     script = """
+      lines.id = "codecell0";  // as the button that copies calls it
       const found = given.map((words) => {
         words.forEach((word, k) => form.elements[`question-${k}`].forEach((one) => {
           if (one.value === word) one.click();
         }));
-        return document.getElementById("choose-lines").textContent.trim();
+        return lines.textContent.trim();
       });
       document.body.textContent = "FOUND " + JSON.stringify(found) + " END";
     """
