@@ -76,3 +76,51 @@ def test_plastic_work_heats(run_interpreted):
     log_of = run_interpreted(text, "-var", "refine", "0.25", "-var", "ppc", "1").log
     assert log_of["T"][-1] - 298 == pytest.approx(log_of["exact"][-1] - 298, rel=5e-3)
     assert max(log_of["worst_Tmax"]) == pytest.approx(log_of["T"][-1], rel=1e-3)
+
+
+BAR = """
+    axial = "NULL"
+    method(ulmpm, FLIP, linear, 1, thermo-mechanical)
+    scheme(quasi-static)
+    dimension(2, 0, 3, 0, 4, 1)
+    axisymmetric(true)
+    region(b, block, 0, 2, 0, 2)
+    material(m, linear, 1, 1, 0.3, 2, 1e-3, 1e-5)
+    solid(b, region, b, 2, m, 1, 20)
+    region(low, block, -INF, INF, -INF, 0)
+    region(top, block, -INF, INF, 2, INF)
+    group(low, nodes, region, low, all)
+    group(top, nodes, region, top, all)
+    fix(low, velocity_nodes, low, NULL, 0)
+    fix(top, velocity_nodes, top, NULL, pull)
+    HEAT
+    compute(s, average_stress, all)
+    compute(T, average_temperature, all)
+    log_modify(custom, step, s_11, s_22, s_33, T, parts)
+    run(1)
+    """
+
+
+def test_a_bar_between_walls_is_warmed_in_one_step(run_interpreted):
+    """-E alpha dT along the bar and nothing across it, in the step that warms it."""
+    heat = "fix(warm, temperature_particles, all, 120)"
+    log_of = run_interpreted(BAR.replace("pull", "0").replace("HEAT", heat)).log
+    assert log_of["T"][-1] == pytest.approx(120, rel=1e-12)
+    assert log_of["s_22"][-1] == pytest.approx(-1e-5 * 100, rel=1e-9)
+    assert abs(log_of["s_11"][-1]) < 1e-12 and abs(log_of["s_33"][-1]) < 1e-12
+
+
+def test_a_step_in_parts_warms_once(run_interpreted):
+    """A part without equilibrium takes its heat back: the rise is that of the faces, which grow."""
+    heat = """region(end, block, 0, INF, 0, 0.4)
+    group(end, particles, region, end, solid, b)
+    fix(warm, heat_flux_particles, end, 6)"""
+    text, rises = BAR.replace("HEAT", heat).replace("parts)", "parts, warm_s)"), []
+    for pull, parts in (0, 1), (1.5, 3):
+        log_of = run_interpreted(text.replace("pull", str(pull)), folder=str(pull)).log
+        assert log_of["parts"][-1] == parts
+        rises.append(log_of["T"][-1] - 20)
+        if not pull:
+            mass, cp = 2 * 2**2 / 2, 2
+            assert rises[0] == pytest.approx(log_of["warm_s"][-1] / (mass * cp), rel=1e-12)
+    assert rises[0] < rises[1] < 1.4 * rises[0]

@@ -15,11 +15,11 @@ from karamelo_py.run.implicit.solvers import direct
 
 
 def conduct(equations: Equations, hooks: Any, dt: float) -> None:
-    """Let heat flow for a step of `dt`, after the points have been strained and warmed by that.
+    """Let heat flow for a step of `dt`, before the points are strained by that.
 
     With capacities C and conductances K of the nodes, C (T' - T) / dt = q - K T'. Conduction is
-    linear: one solution is exact. The split into an adiabatic step and conduction is of first order
-    in the step (Armero & Simo 1992).
+    linear: one solution is exact. The split into conduction and an adiabatic step is of first order
+    in the step (Armero & Simo 1992). In this order a load step ends in equilibrium.
 
     Raises
     ------

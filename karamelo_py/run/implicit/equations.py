@@ -318,13 +318,9 @@ class Equations:
             self.whole = (self.K.tocsr() + self.averaged.stiffness()).tobsr((d, d))
 
     def conduction(self) -> sp.csr_matrix:
-        """Assemble the heat that flows out of nodes (m, m) by their temperatures.
-
-        The state of points is that after their strain; where they see nodes has not changed.
-        """
+        """Assemble the heat that flows out of nodes (m, m) by their temperatures."""
         data = np.zeros(len(self.pairs[1]))
         for block, (seen, _) in zip(self.blocks, self.parts, strict=True):
-            seen.gradients[:] = self._seen(block)[0].gradients
             conductance = field(block.points.fields, Conductance)
             loops.add_conductance(self.s.kin, seen, conductance, self.layout, data)
         m = len(self.nodes)

@@ -193,30 +193,28 @@ class LoadSteps:
         s, control = simulation.setup, simulation.setup.control
         time = float(control.values[TIME])
         totals = control.totals.copy()
+        heated = isinstance(s.heat, Conducting)
+        cold = simulation.snapshot() if heated else None
         control.values[DT] = control.clock[0].kick = control.clock[0].last_dt = dt
         try:
-            before = self._forces(hooks).copy() if self.dynamic else None
+            before = self._forces(hooks).copy() if self.dynamic or heated else None
             own = simulation.hooks
             loads = own.loads.copy() if self.dynamic and isinstance(own, Hooks) else None
             control.values[TIME] = time + dt
+            if heated:
+                self._conduct(hooks, dt)
             after = self._forces(hooks)
             if loads is not None:
                 # Their work is that of the mean of both, as Newmark's velocities are.
                 own.loads[:] = 0.5 * (loads + own.loads)
-            found = self._equilibrium(hooks, dt, before, after)
+            found = self._equilibrium(hooks, dt, before if self.dynamic else None, after)
             self._tell_of_long_way(found)
             self._publish(found, hooks, dt)
             if not take_rows(self.scheme.close, s, simulation.mode, hooks):
                 raise PointsWrong
-            if isinstance(s.heat, Conducting):
-                try:
-                    conduct(found.equations, hooks, dt)
-                except Singular:
-                    raise self._error(
-                        "temperatures have no solution: something conducts no finite heat",
-                        "look at conductivities and heat capacities",
-                    ) from None
         except Failed:
+            if cold is not None:
+                simulation.restore(cold)
             control.totals[:] = totals
             raise
         finally:
@@ -224,6 +222,17 @@ class LoadSteps:
         found.inertia.end(found.u)
         finish(control)
         return found.iterations, found.residual
+
+    def _conduct(self, hooks: Any, dt: float) -> None:
+        """Let heat flow, before the equilibrium: that of the temperatures of the end."""
+        s, mode = self.simulation.setup, self.simulation.mode
+        try:
+            conduct(Equations(s, mode, self.known, False), hooks, dt)
+        except Singular:
+            raise self._error(
+                "temperatures have no solution: something conducts no finite heat",
+                "look at conductivities and heat capacities",
+            ) from None
 
     def _forces(self, hooks: Any) -> np.ndarray:
         """Sum mass, momentum and forces at the nodes; return the forces (nodes, d) there."""
