@@ -10,7 +10,7 @@ import numpy as np
 
 from karamelo_py.output.files import picture_format
 from karamelo_py.output.plots import PlottedCurve, draw
-from karamelo_py.script.errors import ScriptError, nearest_few
+from karamelo_py.script.errors import ScriptError, unknown
 from karamelo_py.script.terms import number_of
 
 DESCRIPTION = """\
@@ -101,12 +101,7 @@ def run(options: argparse.Namespace) -> int:
         options.x = "Step" if "Time" not in known and "Step" in known else "Time"
     for name in (options.x, *options.columns, *options.right):
         if name not in known:
-            close = " or ".join(f"'{column}'" for column in nearest_few(name, known))
-            raise ScriptError(
-                f"{options.log} has no column '{name}'",
-                expected="one of " + " ".join(known),
-                hint=f"did you mean {close}?" if close else None,
-            )
+            raise unknown(f"{options.log} has no column '{name}'", name, known)
     curves, scale = [], "log" if options.log_scale else "linear"
     for side, names in (("left", options.columns), ("right", options.right)):
         for name in names:

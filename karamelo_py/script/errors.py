@@ -155,7 +155,7 @@ def one_of(name: str, names: Iterable[str], family: str = "") -> str:
     names = list(dict.fromkeys(names))
     close = ", ".join(nearest_few(name, names))
     if len(names) <= 12 or not (close or family):
-        return "one of " + ", ".join(names)
+        return "one of " + ", ".join(names) if names else "one that there is (none so far)"
     if not family:
         return f"one of {close}, ..."
     listed = f"karamelo-py styles {family} lists all {len(names)}"

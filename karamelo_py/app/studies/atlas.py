@@ -21,7 +21,7 @@ from karamelo_py.app.studies.case import PROGRAM, environment
 from karamelo_py.app.studies.variables import names
 from karamelo_py.output.console import duration
 from karamelo_py.output.files import read_json, write_whole
-from karamelo_py.script.errors import ScriptError, meant, plural
+from karamelo_py.script.errors import ScriptError, plural, unknown
 
 DESCRIPTION = """\
 Makes the pictures and tables of an atlas again: a file (TOML) that lists them with the commands of
@@ -126,11 +126,7 @@ def run(options: Any) -> int:
     known = [*groups, *(entry.name for entry in entries)]
     for name in asked:
         if name not in known:
-            raise ScriptError(
-                f"-only {name}: no such entry",
-                expected="one of " + ", ".join(sorted(groups)) + " (-list shows all)",
-                hint=meant(name, known),
-            )
+            raise unknown(f"-only {name}: no such entry (-list shows all)", name, known)
     chosen = [e for e in entries if not asked or e.name in asked or e.group in asked]
     if options.list:
         for entry in chosen:

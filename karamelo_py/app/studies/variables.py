@@ -16,7 +16,7 @@ from karamelo_py.app.studies.case import Launch
 from karamelo_py.language import registry
 from karamelo_py.output.quantity import KEYWORDS
 from karamelo_py.output.units import Units
-from karamelo_py.script.errors import ScriptError, meant, plural
+from karamelo_py.script.errors import ScriptError, meant, plural, unknown
 from karamelo_py.script.evaluation import evaluate
 from karamelo_py.script.functions import CONSTANTS
 from karamelo_py.script.parser import parse, parse_text, read_script
@@ -187,11 +187,7 @@ class ScriptFiles:
         for name in names:
             if name not in read and self.all_known:
                 what = "sets it and never reads it" if name in assigned else "has no such variable"
-                raise ScriptError(
-                    f"-var {name}: {self.path} {what}",
-                    expected="one of " + ", ".join(sorted(assigned & read)),
-                    hint=meant(name, sorted((assigned & read) - {name})),
-                )
+                raise unknown(f"-var {name}: {self.path} {what}", name, sorted(assigned & read))
 
     def logged(self) -> list[str] | None:
         """List headings of the log columns that it names; None if that is not known beforehand."""

@@ -33,7 +33,7 @@ from karamelo_py.points.laws.temperatures import (
     thermal_pressure,
 )
 from karamelo_py.points.laws.viscosity import damped, viscous_pressure, viscous_speed
-from karamelo_py.script.errors import ScriptError, nearest
+from karamelo_py.script.errors import ScriptError, unknown
 
 # --- the parts, as a script names them --------------------------------------------------------
 
@@ -72,13 +72,8 @@ class Option:
         known = {ID: part for named in optional.values() for ID, part in named.items()}
         if word in known:
             return known[word]
-        close = nearest(word, known) if word else None
-        raise ScriptError(
-            f"unknown {' or '.join(optional)} '{argument.text}'",
-            place=argument.place,
-            expected=f"one of {', '.join(known)}" if known else "none is defined yet",
-            hint=f"did you mean '{close}'?" if close else None,
-        )
+        said = f"unknown {' or '.join(optional)} '{argument.text}'"
+        raise unknown(said, word or "", known, place=argument.place)
 
 
 # --- the style ----------------------------------------------------------------------------------

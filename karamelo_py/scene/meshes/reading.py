@@ -14,7 +14,7 @@ import meshio
 import numpy as np
 
 from karamelo_py.language.kinds import InputFile
-from karamelo_py.script.errors import FAILURES, ScriptError, meant
+from karamelo_py.script.errors import FAILURES, ScriptError, unknown
 
 GEOMETRIES = (".geo", ".geo_unrolled")
 
@@ -174,12 +174,8 @@ def _members(mesh: meshio.Mesh, group: str | int) -> list[np.ndarray]:
         return masks
     names = [name for name in (*mesh.cell_sets, *mesh.field_data) if not name.startswith("gmsh:")]
     known = list(dict.fromkeys(names)) or sorted({str(n) for tag in tags for n in np.unique(tag)})
-    raise ScriptError(
-        f"the mesh has no physical group '{group}' with elements",
-        argument="group",
-        expected="one of " + ", ".join(known) if known else "no group: the mesh has none",
-        hint=meant(str(group), known),
-    )
+    message = f"the mesh has no physical group '{group}' with elements"
+    raise unknown(message, str(group), known, argument="group")
 
 
 # ---- commands in a geometry of Gmsh that do more than describe a shape -------------------------
