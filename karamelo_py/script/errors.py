@@ -167,10 +167,13 @@ def plural(count: float, noun: str) -> str:
     return f"{count:g} {noun}" if count == 1 else f"{count:.0f} {noun}s"
 
 
-def unknown(message: str, name: str, known: Iterable[str], **where: Any) -> ScriptError:
-    """Make the error for a `name` that is none of the `known`; `where` it stands."""
+def unknown(
+    message: str, name: str, known: Iterable[str], hint: str | None = None, **where: Any
+) -> ScriptError:
+    """Make the error for a `name` that is none of the `known`, `where` it stands."""
     known = list(known)
-    return ScriptError(message, expected=one_of(name, known), hint=meant(name, known), **where)
+    hint = meant(name, known) or hint
+    return ScriptError(message, expected=one_of(name, known), hint=hint, **where)
 
 
 def nearest_few(name: str, names: Iterable[str]) -> list[str]:

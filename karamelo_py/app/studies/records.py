@@ -21,7 +21,7 @@ from karamelo_py.app.studies.case import COLUMNS, CaseOutcome
 from karamelo_py.app.studies.variables import NamesOfCase, ScriptFiles
 from karamelo_py.output.files import write_whole
 from karamelo_py.output.quantity import KEYWORDS
-from karamelo_py.script.errors import ScriptError, meant, nearest
+from karamelo_py.script.errors import ScriptError, nearest, unknown
 from karamelo_py.script.evaluation import evaluate
 from karamelo_py.script.functions import CONSTANTS
 from karamelo_py.script.parser import parse_text
@@ -50,8 +50,8 @@ class Reduction:
         if reduction not in known:
             close = nearest(reduction, known)
             hint = f"did you mean '{close}:{self.column}'?" if close else None
-            unknown = f"-record {word}: unknown word '{reduction}'"
-            raise ScriptError(unknown, expected=_WORDS, hint=hint)
+            said = f"-record {word}: unknown word '{reduction}'"
+            raise ScriptError(said, expected=_WORDS, hint=hint)
         if not column or (reduction == "when") == (self.level is None):
             incomplete = f"-record {word}: '{reduction}:{column}' is not complete"
             raise ScriptError(incomplete, expected=_WORDS)
@@ -139,13 +139,9 @@ def recorded(
         for column in item.columns(variables):
             if headings is None or column in headings:
                 continue
-            known = list(dict.fromkeys(headings))
-            raise ScriptError(
-                f"{option} {item.text}: {script.path} does not log '{column}'",
-                expected="one of " + ", ".join(known),
-                hint=meant(column, known)
-                or f"log_modify(custom, step, dt, time, {column}) in the script",
-            )
+            said = f"{option} {item.text}: {script.path} does not log '{column}'"
+            hint = f"log_modify(custom, step, dt, time, {column}) in the script"
+            raise unknown(said, column, headings, hint)
     return found
 
 

@@ -14,7 +14,7 @@ from karamelo_py.scene.group import ALL, ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Compute
 from karamelo_py.scene.tables import read_table
-from karamelo_py.script.errors import ScriptError, nearest, unknown
+from karamelo_py.script.errors import ScriptError, unknown
 from karamelo_py.script.expressions import Expression
 
 VECTORS = {"displacement": "u", "velocity": "v"}
@@ -310,14 +310,9 @@ class Reference(Compared, Compute):
         known = [*hub.fields.particle_names(), "ux", "uy", "uz"]
         for name in (self.along, self.column):
             if name not in known:
-                close = nearest(name, known)
-                raise ScriptError(
-                    f"points have no column '{name}'",
-                    place=column.place,
-                    expected=f"in {file} the coordinate first, then columns named as those of a "
-                    f"dump: {' '.join(known)}",
-                    hint=f"name it '{close}' in the file" if close else None,
-                )
+                hint = f"in {file} the coordinate first, then columns named as those of a dump"
+                message = f"points have no column '{name}'"
+                raise unknown(message, name, known, hint, place=column.place)
         refuse_absent(hub, (self.column,))
 
     def refresh(self) -> None:
