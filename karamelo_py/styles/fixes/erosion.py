@@ -19,8 +19,8 @@ class Erosion(Fix):
     Parameters
     ----------
     condition
-        A formula of columns of dump particle (damage, volume, x, ep, T, ...), time and published
-        values; points go where it is not 0.
+        A formula of columns of dump particle (damage, volume, x, ep, T, ...), names of groups and
+        solids, time and published values; points go where it is not 0.
     every
         Steps between two looks.
 
