@@ -35,13 +35,14 @@ def found(run_script, name: str, full: bool) -> list[Row]:
 # Scenes that share compiled loops with each other or with other tests.
 SHARED = {
     "two_disks": "disks", "axis_aligned": "neo-hookean", "vibrating_bar": "bar",
-    "incline": "contact", "hertz": "contact", "slump": "soil",
+    "hertz": "contact", "slump": "soil",
     "dam_break": "water", "dam_ritter": "water",
 }  # fmt: skip
-# Of these a sibling shows the same in less: a rough footing in test_implicit_tools.py, a cylinder
-# and a vertical cut in test_implicit.py, slump, and taylor_bar_axisymmetric.
-SHOWN = {"footing", "static_footing", "lame", "static_slope"}
-SHOWN |= {"collapse", "taylor_bar", "taylor_bar_227"}
+# Of these a sibling shows the same in less: a cylinder and a vertical cut in test_implicit.py,
+# slump, taylor_bar_axisymmetric, friction in test_contact_grid.py, disks that turn in
+# test_conservation.py.
+SHOWN = {"footing", "static_footing", "lame", "static_slope", "collapse", "incline"}
+SHOWN |= {"taylor_bar", "taylor_bar_227", "tensile_bar", "disk_impact", "spinning_disk"}
 SMALL = [
     pytest.param(name, marks=pytest.mark.xdist_group(SHARED.get(name, name)))
     for name in scenes()

@@ -1,11 +1,12 @@
 """method ulmpm/contacts: solids with velocity fields of their own that touch on the grid."""
 
+from itertools import product
 from textwrap import dedent
 
 import numpy as np
 import pytest
 from scenes import SCHEMES, block
-from selection import few
+from selection import few, parameters
 from states import final_state, same_bits
 
 H = 0.1
@@ -31,8 +32,11 @@ def bars(gap: float, *lines: str, method: str = "ulmpm/contacts", scheme: str = 
     ])  # fmt: skip
 
 
-@pytest.mark.parametrize("d", [1, 2, 3])
-@pytest.mark.parametrize("scheme", SCHEMES)
+SOLE = [(1, "musl"), (2, "usl"), (2, "usf"), (3, "usavg")]
+OTHERS = [way for way in product((1, 2, 3), SCHEMES) if way not in SOLE]
+
+
+@pytest.mark.parametrize(("d", "scheme"), parameters(SOLE, OTHERS))
 def test_one_solid_is_as_in_ulmpm(state_interpreted, d, scheme):
     lines = (
         "fix(v, initial_velocity_particles, all, " + ", ".join(["sin(40*x0)"] * d) + ")",
@@ -55,7 +59,7 @@ def test_blocks_separate_freely(run_interpreted, scheme):
     assert abs(stuck.va_x[-1]) < 0.09
 
 
-@pytest.mark.parametrize("scheme", few(SCHEMES, "musl", "usl"))
+@pytest.mark.parametrize("scheme", few(SCHEMES, "musl"))
 def test_collision(run_interpreted, scheme):
     """Equal bars exchange their velocities; momentum is kept, forces are equal and opposite.
 
@@ -123,7 +127,7 @@ def test_three_solids_at_a_node_keep_momentum(run_interpreted):
     assert np.abs(log.cb_x).max() > 0.001
 
 
-@pytest.mark.parametrize(("scheme", "order"), [("musl", "cab"), ("usf", "bca")])
+@pytest.mark.parametrize(("scheme", "order"), parameters([("usf", "bca")], [("musl", "cab")]))
 def test_three_solids_in_any_order(run_interpreted, scheme, order):
     """Pairs that meet at a node take their impulses at once: the first of them has no advantage."""
     log = run_interpreted(three("abc", scheme)).log
@@ -159,7 +163,7 @@ def test_two_bodies_on_a_third(run_interpreted):
     assert log.b_x[-1] == pytest.approx(-0.25, abs=1e-4)
 
 
-@pytest.mark.parametrize("scheme", few(SCHEMES, "musl", "usavg"))
+@pytest.mark.parametrize("scheme", few(SCHEMES, "usavg"))
 def test_a_scene_that_grows_between_runs(state_interpreted, scheme):
     """What touched in the last step is known when the arrays are made anew: the same bits."""
     far = "region(far, block, 1.8, 1.9)\nsolid(far, region, far, 2, m, 0.1, 0)"
@@ -325,8 +329,8 @@ def test_a_base_held_at_the_corners_of_its_cells_is_rigid(run_interpreted):
 
 def test_no_friction_across_a_gap(run_interpreted):
     """Half a cell above the base both have mass at its nodes; the block slides on freely."""
-    log = run_interpreted(glide(H / 2, 0, 15)).log
-    assert log.v_x == pytest.approx(np.ones(16), rel=1e-12)
+    log = run_interpreted(glide(H / 2, 0, 8)).log
+    assert log.v_x == pytest.approx(np.ones(9), rel=1e-12)
     assert (log.rub_x == 0).all()
 
 

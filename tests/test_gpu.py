@@ -13,7 +13,10 @@ from karamelo_py.output.console import Console
 from karamelo_py.run.gpu import StepsOnCard
 from karamelo_py.scene.hub import Hub
 
-pytestmark = pytest.mark.skipif(bool(config.DISABLE_JIT), reason="threads of a GPU are compiled")
+pytestmark = [
+    pytest.mark.skipif(bool(config.DISABLE_JIT), reason="threads of a GPU are compiled"),
+    pytest.mark.xdist_group("gpu"),
+]
 
 DISKS = """
 precision({precision})
@@ -93,15 +96,25 @@ fix(push, velocity_particles, top, 0.1*cos(40*time) + 1e-4*base_y, NULL)
 """
 
 
+@pytest.fixture(scope="module")
+def own_cache(tmp_path_factory):
+    """A folder for kernels, empty at first."""
+    return str(tmp_path_factory.mktemp("cache"))
+
+
 @pytest.mark.parametrize("method", few(("ulmpm", "tlmpm"), "ulmpm"))
-def test_fixes(method):
+def test_fixes(monkeypatch, own_cache, method):
     """Walls with friction in common nodes, formulas, forces on points; the balance of energy.
 
-    Reactions are sums without rounding: they differ by what their terms do.
+    Reactions are sums without rounding: they differ by what their terms do. The code of threads is
+    made where nothing else was compiled before, as where the processor's kernels are on disk:
+    formulas of two fixes have one signature, and only the second asks for the larger of two.
     """
     script = WATER.replace("ulmpm", method)
     (hub, one), (other_hub, other) = begun(script), begun(script)
     hooks = one.hooks, one.python.functions
+    forget()
+    monkeypatch.setenv("KARAMELO_PY_CACHE", own_cache)
     steps = StepsOnCard(Emulator(), one.setup, hub.update.scheme, type(one.visits), *hooks)
     steps.send()
     assert steps.advance(43) == other.advance(43) == 0
@@ -120,23 +133,9 @@ def test_fixes(method):
         assert clocks[0][name] == pytest.approx(clocks[1][name], rel=1e-9, abs=1e-12), name
 
 
-def test_kernels_of_the_processor_on_disk(monkeypatch, tmp_path):
-    """What asks for the larger of two numbers is found where nothing else was compiled before.
-
-    Formulas of two fixes have one signature; the first has no condition, the second has one.
-    """
-    hub, one = begun(WATER)
-    forget()
-    monkeypatch.setenv("KARAMELO_PY_CACHE", str(tmp_path))
-    hooks = one.hooks, one.python.functions
-    steps = StepsOnCard(Emulator(), one.setup, hub.update.scheme, type(one.visits), *hooks)
-    steps.send()
-    assert steps.advance(1) == 0
-
-
 def test_order_in_memory_changes_nothing():
     """Points are summed in the order of their ids, wherever they lie."""
-    script = DISKS.format(method="ulmpm, FLIP, linear, 1", scheme="musl", precision="double")
+    script = DISKS.format(method="ulmpm, MLS, quadratic-spline", scheme="usl", precision="single")
     found = []
     for shuffled in (False, True):
         hub, simulation = begun(script)
@@ -156,8 +155,9 @@ def test_order_in_memory_changes_nothing():
         assert (here == there).all()
 
 
-def test_code_is_kept(monkeypatch):
+def test_code_is_kept(monkeypatch, own_cache):
     """The second run of a kind of scene compiles nothing."""
+    monkeypatch.setenv("KARAMELO_PY_CACHE", own_cache)
 
     def made_again(self, function, *_):
         raise AssertionError(f"{function.__qualname__} is compiled again")

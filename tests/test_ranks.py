@@ -12,7 +12,7 @@ import pytest
 from combinations import MESHED, scene, write_mesh
 from going_on import CURVE, SCENES, same_files, with_files
 from scenes import SCHEMES, block
-from selection import few
+from selection import few, parameters
 from states import same_bits
 from test_contact_points import bodies
 from test_heat import HOT, slab
@@ -41,13 +41,22 @@ def shared(state_interpreted, tmp_path, script: str, ranks: int = 2) -> bool:
     return same_bits(whole, parts)
 
 
-@pytest.mark.parametrize("scheme, transfer", [*zip(SCHEMES, cycle(("FLIP", "APIC")), strict=False)])
+WAYS = [*zip(SCHEMES, cycle(("FLIP", "APIC")), strict=False)]
+
+
+# The others are in a way below.
+@pytest.mark.parametrize("scheme, transfer", parameters([WAYS[0], WAYS[3]], WAYS[1:3]))
 def test_schemes(state_interpreted, tmp_path, scheme, transfer):
     script = block(2, *MOVING, "run(13)", scheme=scheme, transfer=transfer, size=(0.3, 0.2))
     assert shared(state_interpreted, tmp_path, with_files(script, "restart(5, r.*.h5)\n"))
 
 
-@pytest.mark.parametrize("name", few(SCENES, *(name for name in SCENES if name != "bench")))
+# Of these a sibling shows the same: in the other frame, by a formula, at an edge, in space.
+SHOWN = {f"{part} in the total frame" for part in ("loads", "flow", "heat")}
+SHOWN |= {"rigid by a formula", "rate of plastic strain", "reflected", "bench"}
+
+
+@pytest.mark.parametrize("name", few(SCENES, *(name for name in SCENES if name not in SHOWN)))
 def test_every_part(state_interpreted, tmp_path, name):
     """Contact, heat, damage, edges, tools, computes that look back."""
     (tmp_path / "curve.csv").write_text(CURVE, encoding="utf-8")
@@ -94,9 +103,9 @@ def test_nodes_in_pieces(state_interpreted, tmp_path, method):
 def test_dumps_in_pieces(state_interpreted, tmp_path):
     """16 ids after another, with points that are not there any more: the bytes of all at once."""
     script = block(
-        2, "boundary(delete)", *DUMPS, MOVING[0].replace("0.9", "12"), *MOVING[1:], "run(34)",
+        2, "boundary(delete)", *DUMPS, MOVING[0].replace("0.9", "12"), *MOVING[1:], "run(16)",
         ppc=3, size=(0.2, 0.2),
-    )  # fmt: skip
+    ).replace("dimension(2, 0, 1.2", "dimension(2, 0, 0.8")  # fmt: skip
     assert shared(state_interpreted, tmp_path, script)
     with h5py.File(tmp_path / "parts" / "h.h5") as file:
         assert np.isnan(file["x"][-1]).any() and len(file["id"]) > 32
@@ -113,7 +122,7 @@ def test_what_is_asked_between_two_runs(state_interpreted, tmp_path):
     assert shared(state_interpreted, tmp_path, script)
 
 
-@pytest.mark.parametrize("dimension", few((1, 2, 3), 1, 2))
+@pytest.mark.parametrize("dimension", few((1, 2, 3), 2))
 def test_pictures(state_interpreted, tmp_path, dimension):
     """From far to near, with the light of all points; 16 of them after others."""
     script = block(
@@ -209,7 +218,11 @@ FAILING = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("says", FAILING)
+# What is told of a step that has become too large is in test_failures.py, too.
+LARGE = "the stable limit, which has fallen to", "less than a millionth of the first"
+
+
+@pytest.mark.parametrize("says", few(FAILING, *(says for says in FAILING if says not in LARGE)))
 def test_what_went_wrong(state_interpreted, tmp_path, says):
     """Each process looks at its own points: message, log and last good state are those of one."""
     script = FAILING[says] + "\n"
@@ -378,8 +391,8 @@ def test_touching_bodies_on_their_way(state_interpreted, tmp_path, scheme):
 method(ulmpm/contacts, FLIP, linear, 1)
 scheme({scheme})
 dimension(2, 0, 2, 0, 2, 0.1)
-region(a, block, 0.3, 0.6, 0.2, 0.5)
-region(b, block, 0.6, 0.9, 0.2, 0.5)
+region(a, block, 0.3, 0.5, 0.2, 0.4)
+region(b, block, 0.5, 0.7, 0.2, 0.4)
 material(m, neo-hookean, 1, 100, 0)
 solid(a, region, a, 2, m, 0.1, 0)
 solid(b, region, b, 2, m, 0.1, 0)
@@ -457,7 +470,7 @@ def test_points_that_touch(state_interpreted, tmp_path, beside):
     """The pairs lie on several processes; also where all points are at one already."""
     contact = "contact/minimize_penetration, a, b, 0.2"
     lines = "log_modify(custom, step, c_x, c_y)", "set_output(1)", "set_dt(0.002)", "run(9)"
-    script = bodies(-0.01, contact, *beside, *lines, d=2, n=3)
+    script = bodies(-0.01, contact, *beside, *lines, d=2, n=2)
     assert shared(state_interpreted, tmp_path, with_files(script), ranks=3)
     assert np.loadtxt(tmp_path / "parts" / "log.mpm", skiprows=1)[:, 1].min() < 0
 

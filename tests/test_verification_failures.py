@@ -67,7 +67,7 @@ def test_linear_basis_has_false_forces_that_jump_where_points_cross(run):
     assert np.abs(np.diff(forces, axis=0)).max() == pytest.approx(1 / 2, rel=1e-9)
 
 
-@pytest.mark.parametrize("basis", ["ugimp", "cpgimp"])
+@pytest.mark.parametrize("basis", few(("ugimp", "cpgimp"), "ugimp"))
 def test_boxes_that_tile_the_bar_have_no_false_forces(run, basis):
     assert np.abs(crossing_forces(run, basis=basis)).max() < 1e-9
 
@@ -295,7 +295,7 @@ def test_what_a_light_node_is_depends_on_the_points_near_it(state_interpreted):
         group(ball, particles, region, ball, all)
         fix(v, initial_velocity_particles, ball, 0.2 + 0.03*(x0 - 2), 0.1)
         set_dt(0.2)
-        run(14)
+        run(7)
     """)
         )
     n = len(states[0]["x"]) // 2
@@ -354,7 +354,7 @@ SHAKEN = [
 
 
 # Its limit differs between one point per cell and more.
-BY_TURNS = [(method, 2 - k % 2) for k, method in enumerate(SHAKEN)]
+BY_TURNS = [(method, 2 if method == SHAKEN[2] else 1) for method in SHAKEN]
 OTHERS = [way for way in product(SHAKEN, (1, 2, 3)) if way not in BY_TURNS]
 
 
@@ -389,7 +389,7 @@ def test_what_cannot_go_well_is_stopped(run, what):
 
 
 def test_pic_loses_angular_momentum_and_apic_keeps_it(run):
-    lost, kept = (run("angular_momentum", cure=cure, turns=0.15).log.L_z for cure in (0, 1))
+    lost, kept = (run("angular_momentum", cure=cure, turns=0.1).log.L_z for cure in (0, 1))
     assert lost[-1] < 0.1 * lost[0]
     assert kept == pytest.approx(np.full(len(kept), kept[0]), rel=1e-9)
 
@@ -519,8 +519,11 @@ def test_hoop_strain_is_the_radial_one_up_to_the_axis(run_interpreted, basis):
 @pytest.mark.parametrize(
     ("basis", "scheme"),
     parameters(
-        [*(("linear", scheme) for scheme in SCHEMES), ("quadratic-spline", "musl")],
-        [("quadratic-spline", scheme) for scheme in SCHEMES[1:]],
+        [("linear", "musl"), ("linear", "usl")],
+        [
+            *(("linear", scheme) for scheme in SCHEMES[2:]),
+            *(("quadratic-spline", scheme) for scheme in SCHEMES),
+        ],
     ),
 )
 def test_a_ball_on_the_axis_stays_whole(run_interpreted, scheme, basis):
@@ -587,7 +590,7 @@ def test_the_jaumann_rate_swings_in_shear(run):
     log = run("jaumann").log
     assert log.stress == pytest.approx(np.sin(log.strain), abs=0.03)
     assert log.stress.min() < -0.9
-    log = run("jaumann", cure=1).log
+    log = run("jaumann", cure=1, top=1).log
     assert log.stress == pytest.approx(log.strain, rel=0.01)
 
 
