@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from tensors import ALL_KINEMATICS, every_kinematics, flat
 
@@ -45,6 +45,7 @@ BASES = [Linear, QuadraticSpline, CubicSpline, BernsteinQuadratic, UGIMP, CPGIMP
 SMOOTH = [QuadraticSpline, CubicSpline, UGIMP, CPGIMPDet]
 every_basis = pytest.mark.parametrize("basis", BASES, ids=lambda basis: basis.__name__)
 sizes = st.sampled_from(SIZES)
+enough = settings(max_examples=15)  # each of 24 pairs of a basis and kinematics has as many
 # Half sizes of domains, in cells: of ppc = 1 and less.
 halves = st.tuples(*[st.one_of(st.just(0.5), st.floats(0.01, 0.5))] * 3)
 # Fractions of a side, with both walls among them; places of nodes and of middles come on top.
@@ -104,6 +105,7 @@ def centre_of(kin, size, x, half, basis):
 
 @every_basis
 @every_kinematics
+@enough
 @given(size=sizes, fraction=fractions, halfway=nodes_of_halves, half=halves)
 def test_reproduces_linear_functions(basis, kin, size, fraction, halfway, half):
     """sum N = 1, sum N X = x, sum grad N = 0, sum X grad N = I: exact but for round-off.
@@ -137,6 +139,7 @@ def test_reproduces_linear_functions(basis, kin, size, fraction, halfway, half):
 
 @every_basis
 @every_kinematics
+@enough
 @given(size=sizes, fraction=fractions, halfway=nodes_of_halves, half=halves)
 def test_affine_weights_carry_linear_velocities(basis, kin, size, fraction, halfway, half):
     """sum_I (N_I D^-1 (X_I - x)) (X_I - x)^T = I, and the weights add to no linear momentum.
@@ -157,6 +160,7 @@ def test_affine_weights_carry_linear_velocities(basis, kin, size, fraction, half
 
 @every_basis
 @every_kinematics
+@enough
 @given(size=sizes, fraction=st.tuples(*[st.floats(0.001, 0.999)] * 3))
 def test_gradients_are_derivatives_of_the_weights(basis, kin, size, fraction):
     """Central differences, whatever nodes the stencils on both sides hold."""

@@ -79,9 +79,10 @@ def test_every_basis_conserves_momentum(run_interpreted, basis, corner):
         "log_modify(custom, step, v_x, v_y)",
         "set_dt(0.001)",
         "run(4)",
+        size=(0.2, 0.1),
     )
     if corner == 0:
-        script = script.replace("block, 0.3, 0.6, 0.3, 0.5", "block, 0, 0.3, 0.1, 0.3")
+        script = script.replace("block, 0.3, 0.5, 0.3, 0.4", "block, 0, 0.2, 0.1, 0.2")
         script = script.replace("0.3+sin(40*x0)", "0.9+0.1*sin(40*x0)")  # away from the wall
     log = run_interpreted(with_basis(script, "FLIP", basis)).log
     assert log.v_x == pytest.approx(np.full(5, log.v_x[0]), rel=2e-10)
@@ -109,7 +110,7 @@ def spinning(transfer, steps=40, stress="", h="0.1"):
 STRESS = "fix(s, initial_stress, all, 5*cos(9*x0), 3, 0, 0, 0, 2*sin(50*x0*y0))"
 
 
-@pytest.mark.parametrize("stress", ["", STRESS], ids=["unstressed", "stressed"])
+@pytest.mark.parametrize("stress", few(("", STRESS), STRESS), ids=["unstressed", "stressed"])
 def test_apic_conserves_angular_momentum(run_interpreted, stress):
     """To round-off (ten digits are logged), stressed or not (Jiang, Schroeder & Teran 2017)."""
     log = run_interpreted(spinning("APIC", 8, stress=stress)).log
@@ -126,8 +127,8 @@ def test_apic_conserves_angular_momentum(run_interpreted, stress):
 @pytest.mark.parametrize("basis", few(ANGULAR, *ANGULAR[:-2]))
 def test_apic_conserves_angular_momentum_with_every_basis(run_interpreted, basis):
     """To round-off (ten digits are logged): the affine weights of the basis are right."""
-    log = run_interpreted(with_basis(spinning("APIC", 5), "APIC", basis)).log
-    assert log.L_z == pytest.approx(np.full(6, log.L_z[0]), rel=1e-9)
+    log = run_interpreted(with_basis(spinning("APIC", 2), "APIC", basis)).log
+    assert log.L_z == pytest.approx(np.full(3, log.L_z[0]), rel=1e-9)
 
 
 def with_energy(text):
@@ -169,14 +170,14 @@ def test_formulas_of_the_present_place_have_a_gradient_where_points_have_moved(r
     """
     error = {}
     for name in ("x", "x0"):
-        text = spinning("APIC", 4).replace("set_dt(0.005)", "set_dt(0.2)")
+        text = spinning("APIC", 2).replace("set_dt(0.005)", "set_dt(0.2)")
         text += f"""fix(again, initial_velocity_particles, all, 0, {name})
         dump(p, all, particle, 1, p.*.LAMMPS, x, x0, vy)
         set_dt(1e-9)
         run(1)
         """
         result = run_interpreted(text.replace("100, 0.3", "1e-12, 0.3"), folder=name)
-        points = result.dump("p.5.LAMMPS")
+        points = result.dump("p.3.LAMMPS")
         error[name] = np.abs(points.vy - getattr(points, name)).max()
     assert error["x"] < 1e-7
     assert error["x0"] > 1e-3
@@ -197,7 +198,8 @@ def test_xpic_of_the_first_order_is_pic(state_interpreted, scheme):
 
 
 @pytest.mark.parametrize(
-    ("order", "loss"), [(1, 4.08e-2), (2, 2.77e-3), (3, 6.56e-4), (5, 1.91e-4), (10, 4.0e-5)]
+    ("order", "loss"),
+    parameters([(1, 4.08e-2), (2, 2.77e-3), (3, 6.56e-4)], [(5, 1.91e-4), (10, 4.0e-5)]),
 )
 def test_what_xpic_takes_of_the_angular_momentum_in_a_step(run_interpreted, order, loss):
     """docs/method-measurements.md: a disk with four cells in the radius, linear functions.
@@ -262,7 +264,7 @@ def test_mls_conserves_angular_momentum(run_interpreted):
 
 @pytest.mark.parametrize(
     "method, scheme",
-    [("ulmpm", "musl"), ("ulmpm", "usf"), ("ulmpm", "usavg"), ("tlmpm", "usl")],
+    parameters([("ulmpm", "usf"), ("tlmpm", "usl")], [("ulmpm", "musl"), ("ulmpm", "usavg")]),
 )
 def test_averaged_volumes_do_the_work_that_is_stored(run_interpreted, method, scheme):
     """The forces of F-bar are those of the averaged strain: kinetic and stored energy exchange.

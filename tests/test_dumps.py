@@ -2,6 +2,7 @@
 
 import gzip
 import shutil
+from itertools import product
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from fakes import FakeHub
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from selection import parameters
 
 from karamelo_py.kernels import text
 from karamelo_py.output import files
@@ -230,9 +232,12 @@ def test_an_error_of_a_dump_in_a_run_is_its_own(plane):
     assert "p.0.dump" in caught.value.message
 
 
-@pytest.mark.parametrize(
-    ("ending", "field"), [("png", None), ("png", "seq"), ("pdf", "seq"), ("svg", None)]
-)
+DRAWN = [(1, "png", None), (2, "png", None), (3, "png", "seq"), (2, "pdf", "seq"), (3, "svg", None)]
+OTHERS = product((1, 2, 3), [("png", None), ("png", "seq"), ("pdf", "seq"), ("svg", None)])
+OTHERS = [(d, *of) for d, of in OTHERS if (d, *of) not in DRAWN]
+
+
+@pytest.mark.parametrize(("hub", "ending", "field"), parameters(DRAWN, OTHERS), indirect=["hub"])
 def test_pyplot_draws(hub, field, ending):
     hub.dumps["d"] = PyPlot(hub, 2, f"p.*.{ending}", 300, 2, field)
     hub.run(3)
@@ -289,8 +294,12 @@ def test_pictures_of_a_run_do_not_jump(hub):
         np.testing.assert_allclose(places(), before, atol=1e-9)
 
 
-@pytest.mark.parametrize("size", [(300, 450), (200, 500), (800, 250)])
-@pytest.mark.parametrize("title", [None, "a ball that falls upon a plate of lead"])
+TITLE = "a ball that falls upon a plate of lead"
+TITLED = [((300, 450), None), ((200, 500), TITLE), ((800, 250), TITLE)]
+UNTITLED = [((300, 450), TITLE), ((200, 500), None), ((800, 250), None)]
+
+
+@pytest.mark.parametrize(("size", "title"), parameters(TITLED, UNTITLED))
 def test_a_title_lies_within_the_picture_and_colours_beside_the_axes(plane, size, title):
     dump = PyPlot(plane, 1, "p.png", *size, "seq", title=title)
     plane.update.time = 0.300056

@@ -21,12 +21,12 @@ region(line, block, 1, 2)
 material(rubber, linear, 2, 100, 0)
 solid(body, region, line, 2, rubber, 1/N, 0)
 fix(v, initial_velocity_particles, all, speed)
-set_dt(0.01)
+set_dt(0.02)
 compute(c, center_of_mass, all)
 place = c_x - 1.5 + begin
-set_output(10)
+set_output(5)
 log_modify(custom, step, time, c_x, place)
-run(40)
+run(20)
 """
 TIMES = np.linspace(0, 0.4, 21)
 

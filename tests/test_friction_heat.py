@@ -32,7 +32,7 @@ BLOCK = f"""
 """
 BASE = f"""region(base, block, 0, 8, 0, 1)
     material(rock, {{rock}})
-    solid(base, region, base, 2, rock, 0.5{{T}})
+    solid(base, region, base, 1, rock, 0.5{{T}})
     fix(rub, contact/friction, block, base, {MU})"""
 WALL = f"""region(low, block, INF, INF, INF, 1.1)
     group(low, nodes, region, low, all)
@@ -49,14 +49,15 @@ WALL = f"""region(low, block, INF, INF, INF, 1.1)
 @pytest.mark.parametrize(
     ("factor", "rel"), [pytest.param(0.1, 0.012, marks=pytest.mark.full), (0.8, 0.05)]
 )
-def test_heat_is_the_work_of_friction(run_script, method, ground, factor, rel):
+def test_heat_is_the_work_of_friction(run_script, run_interpreted, method, ground, factor, rel):
     """A block slides: m cp (T - T0) is what its energy lacks (exact), and mu m g s (Coulomb).
 
     With any step: taken with the speed that internal forces lead the surface to, the heat is 20 %
     and more too large at 0.8 of the stable step. What differs from the first there is what the
     bouncing block gains. It is dropped on the ground with its weight: the second holds on average.
     """
-    result = run_script(BLOCK.format(method=method, ground=ground, factor=factor))
+    run = run_script if factor < 0.5 else run_interpreted
+    result = run(BLOCK.format(method=method, ground=ground, factor=factor))
     log = result.log
     heat = 500 * (log.T - 300)
     assert heat[-1] == pytest.approx(log.E[0] - log.E[-1], rel=rel)

@@ -10,6 +10,7 @@ import pytest
 from going_on import SCENES, SERIAL, goes_on, with_files
 from numba import config
 from scenes import block
+from selection import few
 from test_gpu import DISKS, begun
 from test_ranks import FAILING, HALVED
 
@@ -94,8 +95,10 @@ def test_in_pieces(run_interpreted):
 
 
 @pytest.mark.parametrize(
-    "scene", ["flow in the total frame", "deleted", "points that go", "wall that rubs"]
-)
+    "scene",
+    few(["flow in the total frame", "deleted", "points that go", "wall that rubs"],
+        "deleted", "wall that rubs"),
+)  # fmt: skip
 def test_goes_on_from_a_file(run_interpreted, scene):
     """Also with a file of the other: what a card does not know of, such as tiles, is made anew."""
     script = with_files((SCENES | SERIAL)[scene])

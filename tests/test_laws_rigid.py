@@ -60,9 +60,9 @@ def test_its_velocity_may_be_a_formula(run_script):
     assert last.x[tool] - last.x0[tool] == pytest.approx(np.full(16, 0.1 * 9), rel=1e-2)
 
 
-def test_gravity_does_not_move_it(run_interpreted):
+def test_gravity_does_not_move_it(run_script):
     text = scene().replace("run_time(3)", "run_time(1)")
-    result = run_interpreted(text + "fix(g, body_force, all, 1, 0)\nrun(5)\n")
+    result = run_script(text + "fix(g, body_force, all, 1, 0)\nrun(5)\n")
     assert result.log.va_x[-1] == 0.5
 
 

@@ -247,11 +247,11 @@ def test_a_scene_is_made_in_twice_its_memory(tmp_path, monkeypatch, capsys):
 def test_what_check_says_of_the_memory_of_the_process(tmp_path, monkeypatch, capsys):
     """Without dumps and without compiling; allocators keep a few percent for themselves."""
     monkeypatch.chdir(tmp_path)
-    text = (INPUTS / "in.two_disks").read_text(encoding="utf-8").replace("run_time(3.5)", "run(20)")
+    text = (INPUTS / "in.two_disks").read_text(encoding="utf-8").replace("run_time(3.5)", "run(3)")
     path = tmp_path / "in.disks"
     path.write_text(re.sub(r"(?m)^(dump|plot|save_plot)\(.*$", "", text), encoding="utf-8")
     # What this process compiled before may lie in another cache than that of its children.
-    peak_of(path, "run", compiled=True, threads=1, N=100)
+    peak_of(path, "run", compiled=True, threads=1, N=20)
     said = peak_of(path, compiled=True, threads=1, find=r"(\d+) MiB with the program", N=700)
     assert said == pytest.approx(peak_of(path, "run", compiled=True, threads=1, N=700), rel=0.15)
 

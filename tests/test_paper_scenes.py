@@ -70,6 +70,7 @@ def test_plate_penetration(run_interpreted):
     assert 0.2 * PRESSURE < log.p.max() < 1.5 * PRESSURE
 
 
+@pytest.mark.full
 def test_elastic_gate(run_script):
     """Water begins to push its gate open, and not faster than its weight allows."""
     # The sum by hand: 598 Pa and 775 Pa on 79 mm, E I = 12.4 N m.

@@ -191,7 +191,7 @@ run(100)
 """
 
 
-@pytest.mark.parametrize("compiled", [False, True])
+@pytest.mark.parametrize("compiled", few((False, True), True))
 def test_a_strength_shows_its_own_number(site, tmp_path, compiled):
     recovery = 4e3
     (tmp_path / "in.pull").write_text(PULL.replace("{recovery}", str(recovery)))

@@ -14,6 +14,7 @@ import psutil
 import pytest
 from conftest import INPUTS
 from scenes import block
+from selection import few
 
 from karamelo_py import Simulation
 from karamelo_py.app.cli import main
@@ -153,7 +154,10 @@ def test_scenes_of_few_points_do_not_ask(tmp_path, monkeypatch):
     assert main(["in.script"]) == 0
 
 
-@pytest.mark.parametrize("script", ["two_disks", "heat_slab", "tensile_bar", "hertz"])
+SCRIPTS = "two_disks", "heat_slab", "tensile_bar", "hertz"
+
+
+@pytest.mark.parametrize("script", few(SCRIPTS, "two_disks", "hertz"))
 def test_it_is_never_more_than_check_says_and_most_of_it(run_interpreted, monkeypatch, script):
     """Of what would run nothing is refused: check counts the arrays as they are."""
     hub = Hub(Console(quiet=True))

@@ -6,6 +6,7 @@ from math import sqrt
 import numpy as np
 import pytest
 from scenes import SCHEMES, block
+from selection import parameters
 
 from karamelo_py.kernels.arrays import TIME, TIMESTEP, new_control
 from karamelo_py.kernels.clock import choose_dt, finish
@@ -110,7 +111,7 @@ def test_the_programs_own_step(run_interpreted, scheme, transfer, ppc, still, sh
 
 @pytest.mark.parametrize(
     "transfer, still, share",
-    [("FLIP", 0.9, 0.4), ("FLIP quadratic", 1.125, 0.9), ("APIC", 0.9, 0.9)],
+    parameters([("FLIP", 0.9, 0.4), ("FLIP quadratic", 1.125, 0.9)], [("APIC", 0.9, 0.9)]),
 )
 def test_the_step_of_rest_ends_with_a_quarter_of_a_cell(run_interpreted, transfer, still, share):
     """Also where a second run begins on the way, and where the scene is made anew for it."""

@@ -8,6 +8,7 @@ from math import inf
 
 import numpy as np
 import pytest
+from selection import few, parameters
 
 from karamelo_py.kernels.hooks import POINT_STAGES
 from karamelo_py.language.interpreter import Interpreter
@@ -72,7 +73,11 @@ def passing(method="ulmpm, FLIP, linear, 1", scheme="musl", law="linear, 2, 100,
     return PASSING.format(method=method, scheme=scheme, law=law, **words)
 
 
-@pytest.mark.parametrize("kind", [*KINDS, "space"])
+# Where a point and its box end depends on the basis, and on what else is given to nodes.
+ALIKE = {"usl", "XPIC", "MLS", "averaged", "two laws", "total", "single"}
+
+
+@pytest.mark.parametrize("kind", few([*KINDS, "space"], *({*KINDS, "space"} - ALIKE)))
 def test_fast_points_give_to_their_boxes(state_interpreted, kind):
     """What would be given outside a box would be missing, or at a node of another.
 
@@ -119,11 +124,17 @@ def push(points):
 """
 
 
-@pytest.mark.parametrize("moment", POINT_STAGES)
-@pytest.mark.parametrize("method, scheme", [
+METHODS = [
     ("ulmpm, FLIP, linear, 1", "musl"), ("ulmpm, MLS, quadratic-spline", "usl"),
     ("ulmpm, APIC, cubic-spline", "usavg"), ("ulcpdi, FLIP, linear, 1, Q4", "usf"),
-])  # fmt: skip
+]  # fmt: skip
+LEAPS_OF = [(*way, moment) for way in METHODS for moment in POINT_STAGES]
+BY_TURNS = [(*METHODS[k % len(METHODS)], moment) for k, moment in enumerate(POINT_STAGES)]
+
+
+@pytest.mark.parametrize(
+    "method, scheme, moment", parameters(BY_TURNS, [way for way in LEAPS_OF if way not in BY_TURNS])
+)
 def test_points_that_python_moves_in_a_step_are_sorted(
     state_interpreted, tmp_path, method, scheme, moment
 ):

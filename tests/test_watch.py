@@ -140,7 +140,7 @@ def test_energy_that_is_no_number_ends_the_run(tmp_path, monkeypatch):
         hub.interpreter.run_text("run(30)\n", "in.more")
 
 
-@pytest.mark.parametrize("scheme", few(SCHEMES, "musl", "usl"))
+@pytest.mark.parametrize("scheme", few(SCHEMES, "musl"))
 def test_work_of_gravity_is_added_up(run_interpreted, scheme):
     """A body in free fall: its energy less the work of gravity stays, and nothing is told."""
     lines = ["fix(g, body_force, all, 0, -1)", "set_dt(0.002)", "set_output(100)", "run(130)"]
@@ -203,10 +203,10 @@ def test_a_step_above_the_limit_is_named(run_interpreted):
     assert list(result.folder.glob("last_good.*"))
 
 
-def test_half_the_step_in_trouble(run_interpreted):
+def test_half_the_step_in_trouble(run_script):
     """The same run ends well with on_trouble=halve, and says what it did."""
     lines = ["dt_factor(1.9)", "set_output(100)", "run(60, on_trouble=halve)"]
-    result = run_interpreted(block(2, TRAVEL, *lines, size=(0.3, 0.3)))
+    result = run_script(block(2, TRAVEL, *lines, size=(0.3, 0.3)))
     assert "with 1/2 of the step" in result.err + result.out
 
 
