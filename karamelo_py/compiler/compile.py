@@ -85,7 +85,8 @@ def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Calla
             return nearest[classes]
 
         def plain(*arguments: Any) -> Any:
-            classes = tuple([a.__class__ for a in arguments[:tags]])
+            first = arguments[0].__class__
+            classes = (first,) if tags == 1 else tuple([a.__class__ for a in arguments[:tags]])
             chosen = nearest[classes] if classes in nearest else find(classes)
             if chosen is None:
                 raise Undefined(stub.__name__, classes)
