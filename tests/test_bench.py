@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from selection import few
 
 from karamelo_py.app.bench import apart, command, measure
 from karamelo_py.app.bench.measure import WORKLOADS, Measured
@@ -36,7 +37,11 @@ SMALL = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", WORKLOADS)
+# At one size these are those of disks-20.
+SIZES = "disks-80", "disks-320"
+
+
+@pytest.mark.parametrize("name", few(WORKLOADS, *(name for name in WORKLOADS if name not in SIZES)))
 def test_scenes_run(name, run_interpreted):
     """At small sizes; a mistake in a script would show here."""
     size = SMALL[name.partition("-")[0]]

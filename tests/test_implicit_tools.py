@@ -187,6 +187,7 @@ def test_a_pressed_disk(run_script):
     assert errors[1] < 0.028 and np.log2(errors[0] / errors[1]) > 1.5
 
 
+@pytest.mark.full
 def test_a_rough_footing(run_script):
     """(2 + pi) c, for a rough base as for a smooth one (Chen 1975)."""
     log_of = run_script(INPUTS / "in.static_rough_footing", "-var", "steps", "12").log

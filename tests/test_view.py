@@ -13,6 +13,7 @@ from fakes import FakeHub
 from hubs import SmallHub
 from PIL import Image
 from scenes import block
+from selection import parameters
 
 from karamelo_py import Simulation
 from karamelo_py.app import view
@@ -61,7 +62,11 @@ def test_dumps_are_read_back(hub, name):
             np.testing.assert_allclose([snapshot.lo[:d], snapshot.hi[:d]], [[-0.5] * d, [0.5] * d])
 
 
-@pytest.mark.parametrize("file", ["p.h5", "p.pvd", "p.dump"])
+SHOWN = [(1, "p.dump"), (2, "p.h5"), (3, "p.pvd")]
+OTHERS = [of for of in product((1, 2, 3), ("p.h5", "p.pvd", "p.dump")) if of not in SHOWN]
+
+
+@pytest.mark.parametrize(("hub", "file"), parameters(SHOWN, OTHERS), indirect=["hub"])
 def test_view_draws_pictures_and_movies(hub, capsys, file):
     for name, style in FORMS.items():
         hub.dumps[name] = style(hub, 5, name, "vx")
@@ -287,29 +292,26 @@ LOOKS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", LOOKS)
-def test_words_of_pictures_are_the_same_everywhere(run_interpreted, capsys, monkeypatch, name):
+def test_words_of_pictures_are_the_same_everywhere(run_interpreted, capsys, monkeypatch):
     """dump pyplot and view draw the same picture with a word, and another one without it."""
-    words, options = LOOKS[name]
     text = block(
-        2, "fix(v, initial_velocity_particles, all, 30*x^3, 0)",
+        2, "fix(v, initial_velocity_particles, all, 30*x^3, 0)", "set_dt(1e-3)", "run(2)",
         "dump(d, all, particle, 10, p.dump, x, y, type, seq)",
-        "dump(a, all, pyplot, 10, plain.*.png, 300, 300, seq)",
-        f"dump(b, all, pyplot, 10, own.*.png, 300, 300, {'seq, ' * ('=' in words)}{words})",
-        "set_dt(1e-3)", "run(2)",
+        "dump(plain, all, pyplot, 10, plain.png, 300, 300, seq)",
+        *(f"dump({name}, all, pyplot, 10, {name}.png, 300, 300, {'seq, ' * ('=' in words)}{words})"
+          for name, (words, _) in LOOKS.items()),
+        "run(0)",
     )  # fmt: skip
-    folder = run_interpreted(text).folder
-    own, plain = (folder / f"{one}.2.png" for one in ("own", "plain"))
-    assert own.read_bytes() != plain.read_bytes()
-    monkeypatch.chdir(folder)
-    given = [word for key, value in options.items() for word in (f"--{key}", value)]
-    own = call(
-        capsys, "view", "p.dump", "-c", "seq", "--size", "300", "300", *given, "-o", "v.*.png"
-    )
-    assert own[0] == 0, own[2]
-    call(capsys, "view", "p.dump", "-c", "seq", "--size", "300", "300", "-o", "w.*.png")
-    assert Image.open("v.2.png").size == Image.open(folder / "own.2.png").size
-    assert Path("v.2.png").read_bytes() != Path("w.2.png").read_bytes()
+    monkeypatch.chdir(run_interpreted(text).folder)
+    view = "view", "p.dump", "-c", "seq", "--size", "300", "300"
+    assert call(capsys, *view, "-o", "v_plain.png")[0] == 0
+    for name, (_, options) in LOOKS.items():
+        assert Path(f"{name}.png").read_bytes() != Path("plain.png").read_bytes(), name
+        given = [word for key, value in options.items() for word in (f"--{key}", value)]
+        status, _, err = call(capsys, *view, *given, "-o", f"v_{name}.png")
+        assert status == 0, err
+        assert Image.open(f"v_{name}.png").size == Image.open(f"{name}.png").size, name
+        assert Path(f"v_{name}.png").read_bytes() != Path("v_plain.png").read_bytes(), name
 
 
 @pytest.fixture

@@ -94,8 +94,12 @@ class Message(NamedTuple):
 
     def matches(self, said: str) -> bool:
         """Tell whether a message of a run is one of this kind."""
-        parts = map(re.escape, self.text.split(HOLE))
-        return re.fullmatch("(.*: )?" + ".*".join(parts), said, re.S) is not None
+        return _pattern(self.text).fullmatch(said) is not None
+
+
+@cache
+def _pattern(text: str) -> re.Pattern:
+    return re.compile("(.*: )?" + ".*".join(map(re.escape, text.split(HOLE))), re.S)
 
 
 class _Reader:
