@@ -316,9 +316,7 @@ def _run(options: argparse.Namespace) -> int:
         with leaving_at_once():  # before they know of each other
             import_module("karamelo_py.scene.hub")
         return launch.together(
-            options.ranks,
-            lambda comm: _carry_out(options, script, comm),
-            debugging=options.debug,
+            options.ranks, lambda comm: _carry_out(options, script, comm), debugging=options.debug
         )
     if (options.ranks or 1) > 1 and not options.checking and not options.gpu:
         if options.live:

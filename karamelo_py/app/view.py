@@ -22,14 +22,7 @@ from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.language.signature import Argument, Parameter
 from karamelo_py.output.console import Console
 from karamelo_py.output.fields import ColumnFormula, unknown_column
-from karamelo_py.output.files import (
-    Frames,
-    movie_format,
-    picture_format,
-    savefig,
-    unwarned,
-    whole,
-)
+from karamelo_py.output.files import Frames, movie_format, picture_format, savefig, unwarned, whole
 from karamelo_py.output.point_table import members, named_sets
 from karamelo_py.output.quantity import Caption
 from karamelo_py.output.snapshots import Snapshot, read

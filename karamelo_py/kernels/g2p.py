@@ -7,14 +7,7 @@ through.
 from math import inf, sqrt
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import (
-    Weighted,
-    all_lanes,
-    fma,
-    point_function,
-    real,
-    where,
-)
+from karamelo_py.compiler.compile import Weighted, all_lanes, fma, point_function, real, where
 from karamelo_py.compiler.fields import field, forget, increase, load_vector, store, store_from
 from karamelo_py.compiler.gpu import aligned_record
 from karamelo_py.compiler.loops import many_threads
@@ -200,10 +193,7 @@ def add_gradient(w, stencil, k, grad_v):
 
 @gathered.on(Strain)
 def _gathered_strain(task, w, stencil, k, total):
-    return (
-        add_gradient(w, stencil, k, total[0]),
-        visit.gathered_ratio(w, stencil, k, total[1]),
-    )
+    return (add_gradient(w, stencil, k, total[0]), visit.gathered_ratio(w, stencil, k, total[1]))
 
 
 gathered.on(TrialStrain)(lambda task, w, stencil, k, total: add_gradient(w, stencil, k, total))

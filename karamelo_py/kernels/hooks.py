@@ -222,12 +222,7 @@ def _writer(item: Any) -> Callable:
 
 
 def vector_hook(
-    function: Callable,
-    *,
-    reads: tuple,
-    writes: tuple,
-    publishes: bool = False,
-    nodes: bool = False,
+    function: Callable, *, reads: tuple, writes: tuple, publishes: bool = False, nodes: bool = False
 ) -> CompiledHook:
     """Make a compiled hook on points that sees vectors, declared fields, and the state of the law.
 

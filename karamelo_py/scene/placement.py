@@ -308,7 +308,5 @@ def _cut_off(
     half = np.ones((len(x0), 1))
     half[row, 0] = pieces.share[held] ** (1 / d)
     return placed._replace(
-        volume=placed.volume * share[:, 0],
-        half_size=size / 2 * half,
-        missed=pieces.missed(size),
+        volume=placed.volume * share[:, 0], half_size=size / 2 * half, missed=pieces.missed(size)
     )

@@ -342,9 +342,7 @@ class PointsView(View):
             self._rows.put(_declared(VelocityBefore, "point"), np.full_like(value, np.nan))
 
     velocity = Shown(
-        lambda view: view._rows.take(lambda points: points.v),
-        _write_velocity,
-        "(n, d) velocities.",
+        lambda view: view._rows.take(lambda points: points.v), _write_velocity, "(n, d) velocities."
     )
     mass = Shown(
         lambda view: view._rows.take(lambda points: points.mass), doc="(n,) masses; read only."

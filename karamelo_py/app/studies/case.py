@@ -170,10 +170,7 @@ class Launch:
         words = [str(self.script.resolve()), *options_of(case), "--threads", str(self.threads)]
         (folder / "log.mpm").unlink(missing_ok=True)
         begun = time.perf_counter()
-        with (
-            (folder / "out.txt").open("wb") as out,
-            (folder / "err.txt").open("wb") as err,
-        ):
+        with (folder / "out.txt").open("wb") as out, (folder / "err.txt").open("wb") as err:
             pid = self.warm.start(kind_of(case.values()), words, folder, out, err)
             process: Any = SimpleNamespace(pid=pid, returncode=None)
             if process.pid is None:

@@ -246,11 +246,7 @@ def beside_wall(grid, t):
     weights = (1 - t + 1 / 6 * tt * t, t * (1 - 1 / 3 * tt), 1 / 6 * tt * t)
     slopes = ((0.5 * tt - 1) * grid.inv_h, (1 - tt) * grid.inv_h, 0.5 * tt * grid.inv_h)
     k = grid.inv_h / (1 - t + 1 / 3 * tt)
-    affine = (
-        -k * weights[0],
-        k * (1 - 1 / 3 * tt) * (1 - t),
-        k * (1 / 6) * tt * (2 - t),
-    )
+    affine = (-k * weights[0], k * (1 - 1 / 3 * tt) * (1 - t), k * (1 / 6) * tt * (2 - t))
     return weights, slopes, affine
 
 

@@ -203,9 +203,7 @@ def plastic_flow(law, q, p, pc):
         far = on_surface * (y / c + apart) > q * apart
         near_top = on_surface > 0.5 * law.M * abs(apart)
         w = where(
-            near_top,
-            q / where(near_top, on_surface, 1) - 1,
-            y / (c * where(near_top, 1, apart)),
+            near_top, q / where(near_top, on_surface, 1) - 1, y / (c * where(near_top, 1, apart))
         )
         low, high = where(far, low, y), where(far, y, high)
         y = 0.5 * (low + high)

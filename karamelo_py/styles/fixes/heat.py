@@ -23,8 +23,7 @@ class HeatFix(Fix):
         super().__init__(hub, group)
         if not hub.update.thermal:
             raise ScriptError(
-                "the method is mechanical: no heat flows",
-                expected="method(..., thermo-mechanical)",
+                "the method is mechanical: no heat flows", expected="method(..., thermo-mechanical)"
             )
         self.formulas = formulas
 

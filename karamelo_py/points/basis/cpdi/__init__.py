@@ -15,14 +15,7 @@ stored corners that move with the grid derive from `CarriedDomain`, and give `up
 from math import inf
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import (
-    Weighted,
-    beside,
-    index,
-    point_function,
-    real,
-    where,
-)
+from karamelo_py.compiler.compile import Weighted, beside, index, point_function, real, where
 from karamelo_py.compiler.tuples import flat, nested_as
 from karamelo_py.language.rules import known_failure
 from karamelo_py.points import basis as bases
