@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from karamelo_py.language.replay import spelled
-from karamelo_py.language.unknown import check_name, listed
-from karamelo_py.script.errors import ScriptError, meant
+from karamelo_py.language.unknown import check_name
+from karamelo_py.script.errors import ScriptError, unknown
 from karamelo_py.script.expressions import Value
 from karamelo_py.script.parser import parse, parse_text, read_script
 from karamelo_py.script.syntax import Assignment, CommandCall, Statement
@@ -100,11 +100,8 @@ class Presets(dict[str, str]):
         told = self and self._collect(statements, self._script.folder, words, assigned, [])
         for name in self if told else ():
             if name not in words:
-                raise ScriptError(
-                    f"-var {name}: the script has no variable '{name}'",
-                    expected=f"one of those that it assigns ({listed(assigned)})",
-                    hint=meant(name, assigned),
-                )
+                said = f"-var {name}: the script has no variable '{name}'"
+                raise unknown(said, name, assigned)
 
     def _collect(
         self, statements: list[Statement], folder: Path, words: set, assigned: dict, seen: list

@@ -6,7 +6,7 @@ from typing import Any
 
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
-from karamelo_py.script.errors import ScriptError, meant, table
+from karamelo_py.script.errors import ScriptError, meant, table, unknown
 from karamelo_py.script.expressions import POINT_SEEDS
 from karamelo_py.script.syntax import Raw, Source
 
@@ -35,11 +35,7 @@ class Quantity:
         if self.is_word:
             return
         if formula is None and name not in self.names(hub):
-            raise ScriptError(
-                f"unknown quantity '{name}'",
-                expected="step, dt, time, a variable, or a value of a fix or compute",
-                hint=meant(name, self.names(hub)),
-            )
+            raise unknown(f"unknown quantity '{name}'", name, self.names(hub))
         source = self._source()
         per_point = PER_POINT & getattr(source, "names", frozenset())
         if per_point:
