@@ -168,7 +168,7 @@ def test_the_atlas_of_the_pages_names_scripts_and_commands_that_exist():
                     values = choices(options.var, {n for g in zipped(options) for n in g})
                     ScriptFiles(script).check(values)
                     assert cases(values, zipped(options), options.where)
-                    recorded(options.record, ScriptFiles(script), values)
+                    recorded(",".join(options.record), ScriptFiles(script), values)
 
 
 def test_curves_of_a_sweep(folder, capsys):

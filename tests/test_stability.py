@@ -116,7 +116,8 @@ def test_an_interrupted_map_is_drawn_and_goes_on(folder, monkeypatch, capsys):
     assert list(pandas.read_csv(folder / "map.csv")["class"]) == ["stable", "failed"]
 
 
-def test_steps_beyond_those_that_conduction_bears_have_failed(folder):
+def test_steps_beyond_those_that_conduction_bears_have_failed(folder, capsys):
+    """Nobody adds up the work of heat: what came to its end is not said to be stable."""
     text = SCRIPT.replace("linear, 1)", "linear, 1, thermo-mechanical)", 1)
     text = text.replace("100, 0)", "100, 0, 1, 1)").replace(
         "set_dt(factor*0.1)", "dt_factor(factor)"
@@ -125,6 +126,8 @@ def test_steps_beyond_those_that_conduction_bears_have_failed(folder):
     words = ["-var", "factor=0.5,30", "-var", "push=0", "-o", "map.svg"]
     assert main(["stability", "in.bar", *words]) == 0
     assert list(pandas.read_csv(folder / "map.csv")["class"]) == ["stable", "failed"]
+    out = capsys.readouterr().out
+    assert "whatever they gained" in out and "first step that a run survived is 0.5 times" in out
 
 
 def test_what_limits_the_step_stands_in_the_map(folder):

@@ -84,7 +84,7 @@ def test_a_sweep_is_a_table_that_pandas_reads(folder, capsys):
 
 @pytest.mark.usefixtures("starts_are_cheap")
 def test_a_run_that_breaks_off_has_no_values(folder):
-    words = ["-var", "speed=3,300", "-record", "v_x,max:c_x"]
+    words = ["-var", "speed=3,300", "-record", "v_x", "-record", "max:c_x"]
     assert main(["sweep", "in.flight", *words]) == 0
     good, bad = records.read(folder / "sweep.csv")
     assert good["v_x"] == "3" and bad["status"] == "failed" and "moves by 6 cells" in bad["reason"]

@@ -53,7 +53,9 @@ def add_options(parser: ArgumentParser) -> None:
         "rows by -by, columns by the other variables",
     )  # fmt: skip
     parser.add_argument("-cost", metavar="COLUMN", help="column of the cost (seconds)")
-    parser.add_argument("-by", default="", metavar="A,B", help="variables with a line per value")
+    parser.add_argument(
+        "-by", action="append", default=[], metavar="A,B", help="variables with a line per value"
+    )
     kinds = parser.add_mutually_exclusive_group()
     kinds.add_argument("-x", metavar="NAME", help="draw errors over this variable, not over cost")
     kinds.add_argument("-heat", metavar="A,B", help="draw errors over two variables, as colours")
@@ -80,7 +82,7 @@ def run(options: Any) -> int:
     if len(options.tables) > 1:
         raise ScriptError(f"{len(options.tables)} tables", expected="one, or several with -versus")
     table = read(options.tables[0], options.where)
-    by = names(options.by)
+    by = names(",".join(options.by))
     if options.keeps:
         return keeps(options, table, by or table.variables)
     if options.curve:

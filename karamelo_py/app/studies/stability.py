@@ -266,7 +266,7 @@ class Map:
             # A domain that is too small tells nothing of the step.
             left = LEFT.search(row["reason"]) and FROM_NOWHERE not in complaint
             found |= {"class": "left" if left else "failed", "why": in_short(row)}
-        elif not (self.energy or changes or unwatched) and row["steps"] < FEWEST:
+        elif not (self.energy or changes) and row["steps"] < FEWEST:
             found |= {"class": "short", "why": f"{row['steps']:.0f} steps"}
         elif grows:
             found |= {"class": "growing", "why": grows}
@@ -344,14 +344,16 @@ class Map:
             print(f"    {reason}: {plural(times, 'run')}")
         if unwatched := Counter(filter(None, (row["unwatched"] for row in self.found.values()))):
             (why, times), *_ = unwatched.most_common()
-            print(f"energy is {why} ({plural(times, 'run')}); -energy COLUMN judges by the log")
+            print(f"energy is {why} ({plural(times, 'run')}): stable are those that came to their")
+            print("end, whatever they gained on the way; -energy COLUMN judges by the log")
         if count["short"]:
             print(f"runs of fewer than {FEWEST} steps do not show whether energy grows: run longer")
         margins = self.margins()
         if margins:
             low, high = min(margins), max(margins)
             ends = f"{low:.3g}" if high - low < 1e-3 else f"{low:.3g} to {high:.3g}"
-            print(f"the largest stable first step is {ends} times the program's stable step")
+            borne = "first step that a run survived" if unwatched else "stable first step"
+            print(f"the largest {borne} is {ends} times the program's stable step")
 
     def draw(self, path: Path, title: str, words: tuple[str, str]) -> None:
         """Draw the map, with `words` along its axes."""

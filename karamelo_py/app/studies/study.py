@@ -338,7 +338,7 @@ def add_options(parser: ArgumentParser) -> None:
     variables.add_family(parser)
     variables.add_combinations(parser)
     parser.add_argument(
-        "-record", default="", metavar="COLUMNS",
+        "-record", action="append", default=[], metavar="COLUMNS",
         help="log columns, separated by commas: err (the last value), max:err, min:err, mean:err, "
         "first:err, the time when:err:0.1, or a formula: off=abs(max:u/3.28 - 1)",
     )  # fmt: skip
@@ -356,7 +356,7 @@ def run(options: Any) -> int:
     repeat = options.repeat if options.time else 1
     values, script, launch, jobs = variables.family(options, timed=options.time, repeat=repeat)
     combinations = variables.cases(values, variables.zipped(options), options.where)
-    items = recorded(options.record, script, values)
+    items = recorded(",".join(options.record), script, values)
     study = Study(launch, out, list(values), items, jobs, options.again, str(options.script))
     study.page = live_page(options, study)
     if study.folder.exists() and not study.folder.is_dir():

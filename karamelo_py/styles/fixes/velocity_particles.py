@@ -59,6 +59,9 @@ class VelocityParticles(VelocityOfPoints):
     point in one direction, the last one decides. It also overrides initial velocities and held
     nodes. A run warns of this before its first step.
 
+    Take two cells of points or more: the rest of a solid can slip past a grip of one cell. So it
+    did in ulmpm where a slab was squeezed by a fifth (linear, quadratic-spline, cubic-spline).
+
     See Also
     --------
     velocity_nodes, initial_velocity_particles
