@@ -17,6 +17,7 @@ from numba import config
 from karamelo_py.compiler import cache, choices, fingerprint
 from karamelo_py.compiler.compile import point_function
 from karamelo_py.compiler.loops import kernel
+from karamelo_py.compiler.lowering import FunctionType
 from karamelo_py.compiler.threads import Threaded, shared_out
 from karamelo_py.kernels.step import step
 from karamelo_py.output.console import Console
@@ -390,6 +391,12 @@ def test_a_class_that_cannot_be_named_is_not_kept(tmp_path, monkeypatch):
     with pytest.warns(RuntimeWarning, match=r"compiled in every run: .*Local cannot be followed"):
         assert fresh()(Local()) == 43
     assert not (tmp_path / "kernels").exists()
+
+
+def test_a_function_that_a_kernel_is_given_is_not_described():
+    """Its number would be another one in each run: kernels would be kept and never found."""
+    with pytest.raises(choices.Unknown):
+        fingerprint.describe(FunctionType(answer))
 
 
 def test_what_threads_do_is_followed(tmp_path, monkeypatch):

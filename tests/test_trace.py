@@ -15,7 +15,7 @@ from karamelo_py.compiler.compile import fma, implements, point_function, real, 
 from karamelo_py.compiler.held import hold
 from karamelo_py.compiler.loops import address_of, kernel, written
 from karamelo_py.compiler.lowering import Lowering
-from karamelo_py.compiler.trace import CannotCompile, forget
+from karamelo_py.compiler.trace import CannotCompile, forget, in_one
 from karamelo_py.language.faults import cause_of, place_in
 
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
@@ -365,29 +365,38 @@ def test_a_failure_leaves_nothing_behind():
     assert kernel(lambda x: spelled(x, True))(2.0) == 2.0
 
 
+class Clock:
+    """What lets Ctrl-C come at a moment; a signature, of which Python code makes hashes, too."""
+
+    left = 0
+
+    def __hash__(self):
+        self.tick()
+        return 1
+
+    def tick(self):
+        self.left -= 1
+        if self.left == 0:
+            raise KeyboardInterrupt
+
+
 def test_an_interrupt_leaves_nothing_behind(monkeypatch):
-    """Ctrl-C at any of the operations of a function, each a moment later than the one before."""
+    """Ctrl-C at any operation of a function, and whenever formulas are looked for or kept."""
 
     def caller(tag, x):
         return value_of(tag, x) + third_power(x)
 
-    left, call = [0], Lowering.call
-
-    def interrupted(*arguments):
-        left[0] -= 1
-        if left[0] == 0:
-            raise KeyboardInterrupt
-        return call(*arguments)
-
-    monkeypatch.setattr(Lowering, "call", interrupted)
-    texts = {str(written(caller, KINDS)[0])}
-    for moment in range(1, 30, 4):
-        forget()
-        left[0] = moment
-        with contextlib.suppress(KeyboardInterrupt):
-            written(caller, KINDS)
-        left[0] = 0
-        texts.add(str(written(caller, KINDS)[0]))
+    clock, call = Clock(), Lowering.call
+    monkeypatch.setattr(Lowering, "call", lambda *given: clock.tick() or call(*given))
+    with in_one({clock: caller}):
+        texts = {str(written(caller, KINDS)[0])}
+        for moment in range(1, -clock.left):
+            forget()
+            clock.left = moment
+            with contextlib.suppress(KeyboardInterrupt):
+                written(caller, KINDS)
+            clock.left = 0
+            texts.add(str(written(caller, KINDS)[0]))
     assert len(texts) == 1
 
 

@@ -58,11 +58,12 @@ def note(parts: Iterable[Part]) -> None:
 @contextmanager
 def parts_noted() -> Iterator[set[Part]]:
     """Collect what is noted meanwhile."""
+    before = len(_noted)
     _noted.append(set())
     try:
         yield _noted[-1]
     finally:
-        _noted.pop()
+        del _noted[before:]
 
 
 def tag_class(numba_type: Any) -> Any:

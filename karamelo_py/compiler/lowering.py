@@ -30,6 +30,7 @@ class Lowering:
     """
 
     dispatch: Callable  # what calls functions that are chosen by type
+    key: tuple | None = None  # of the formula whose types are asked for
 
     def __init__(self, seen: Callable, builder: ir.IRBuilder | None = None):
         self.seen, self.builder = seen, builder

@@ -237,7 +237,6 @@ class _Formula(NamedTuple):
 
 _formulas: dict[tuple, _Formula | None] = {}
 MOST_FORMULAS = 4000  # that are kept: some 12 kB each, 800 for a scene with contact
-_begun: set[tuple] = set()  # of what is written now
 _own: set[Callable] = set()  # functions that are not written into what calls them
 _called: tuple | None = None  # where a module has all that it calls: see `in_one`
 
@@ -273,11 +272,12 @@ def _is_plain(thing: Any) -> bool:
     return thing is None or isinstance(thing, values.Value | values.HeldValue)
 
 
-def _written(dispatch: Callable, kinds: tuple) -> _Formula | None:
+def _written(key: tuple, dispatch: Callable, kinds: tuple) -> _Formula | None:
     """Find by a run what :func:`formula` gives."""
     chosen = dispatch
     try:
         lowering = Lowering(_seen)
+        lowering.key = key
         with values.writing(lowering), parts_noted() as parts:
             chosen = _chosen(dispatch, kinds)
             if chosen is None:
@@ -306,11 +306,10 @@ def formula(dispatch: Callable, kinds: tuple) -> _Formula | None:
         forget()
     known = bool(values.branching) and not values.at_work()
     while key not in _formulas:
-        if key in _begun:
+        if values.is_begun(key):
             raise CannotCompile("it calls itself", dispatch)
-        _begun.add(key)
         try:
-            _formulas[key] = _written(dispatch, kinds)
+            _formulas[key] = _written(key, dispatch, kinds)
         except values.DataDependentBranch:
             # Once more, and through the text of the function that asks.
             _copies.clear()
@@ -320,8 +319,6 @@ def formula(dispatch: Callable, kinds: tuple) -> _Formula | None:
                 raise
             known = False
             forget()
-        finally:
-            _begun.remove(key)
     found = _formulas[key]
     if found is not None:
         note(found.parts)

@@ -104,16 +104,22 @@ def now() -> Any:
 @contextmanager
 def writing(lowering: Any) -> Iterator[None]:
     """Let operations become code of `lowering` meanwhile."""
+    before = len(_lowerings)
     _lowerings.append(lowering)
     try:
         yield
     finally:
-        _lowerings.pop()
+        del _lowerings[before:]  # Ctrl-C may have come just before an inner one was taken off
 
 
 def at_work() -> bool:
     """Tell whether functions are run for a kernel now."""
     return bool(_lowerings)
+
+
+def is_begun(key: tuple) -> bool:
+    """Tell whether the types of a formula are asked for now."""
+    return any(lowering.key == key for lowering in _lowerings)
 
 
 def _real_kind(thing: Any) -> Any:
