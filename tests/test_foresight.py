@@ -176,6 +176,9 @@ AVERAGED = {"more": "anti_volumetric_locking(true)"}
         ("pressure of grains", SOIL | {"law": "grains"}, True),
         ("pressure of grains", SOIL | SMOOTH | {"law": "grains"}, False),
         ("locking", SOIL, True),
+        # A dry slope of 40 degrees stands with boxes at a friction of 30, and slides with splines.
+        ("locking", SOIL | {"method": "ulmpm, FLIP, ugimp, 1"}, True),
+        ("locking", SOIL | {"method": "ulcpdi, FLIP, linear, 1, R4"}, True),
         ("locking", SOIL | SMOOTH, False),
         ("locking", SOIL | AVERAGED, False),
         ("locking", SOIL | {"more": "scheme(newmark)"}, True),

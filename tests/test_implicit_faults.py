@@ -341,7 +341,9 @@ PLASTIC = """eos(e, linear, 1, 1000)
     material(m, eos-strength, e, y)"""
 
 
-@pytest.mark.parametrize(("basis", "told"), [("linear", True), ("quadratic-spline", False)])
+@pytest.mark.parametrize(
+    ("basis", "told"), [("linear", True), ("ugimp", True), ("quadratic-spline", False)]
+)
 def test_plastic_flow_that_locks_is_told(run_interpreted, basis, told):
     text = patch().replace("material(m, linear, 1, 1000, 0.25)", PLASTIC)
     said = run_interpreted(text, "-var", "basis", basis, command="check").err

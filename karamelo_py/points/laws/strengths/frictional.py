@@ -89,18 +89,14 @@ def frictional(strength: type) -> None:
     known_failure(
         strength,
         "locking",
-        when=_locks,
+        when=lambda strength, scene: scene.locks and {"place": scene.method.place},
         reason="plastic flow of soil gives its cells a volume, and {scene.basis_name} functions "
-        "without averaged volumes cannot follow: limit loads are a tenth to a quarter too high, "
-        "and may go on rising",
-        cure="anti_volumetric_locking(true), and method tlmpm where soil with friction keeps its "
-        "neighbours, as below a footing: points that cross cells take a tenth of such loads",
+        "without averaged volumes cannot follow: limit loads are a tenth to a third too high, "
+        "and slopes stand that should slide",
+        cure="quadratic-spline; or anti_volumetric_locking(true) in soil with cohesion, and method "
+        "tlmpm where soil with friction keeps its neighbours, as below a footing: points that "
+        "cross cells take a tenth of such loads",
     )
-
-
-def _locks(strength, scene):
-    locks = scene.linear and scene.d > 1 and not scene.hub.update.anti_locking
-    return {"place": scene.method.place} if locks else None
 
 
 def peak_and_residual(surface_of, cohesion, phi, psi, to_cohesion, to_phi, over):
