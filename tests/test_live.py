@@ -464,10 +464,12 @@ def test_pages_in_a_browser(simulation, browser):
     assert shown.evaluate("document.getElementById('chart').data[0].name") == "growing"
     shown.get_by_label("N = 20: waiting").click()
     shown.get_by_text("last line of the log: Step 6,").wait_for()
-    study.follow([row, {**row, "N": "20", "status": "done"}], [], [], of=2)
+    going = [({"N": "30"}, simulation.hub.folder, 1.0)]
+    study.follow([row, {**row, "N": "20", "status": "done"}], [], going, of=3)
     shown.get_by_label("N = 20: done").wait_for()
     shown.get_by_role("button", name="Stop the study").click()
     assert study.stopped.wait(20)
+    study._end()
+    shown.get_by_label("N = 30: not run").wait_for()
     assert not wrong
     page.close()
-    study.server.close()
