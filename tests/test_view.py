@@ -372,7 +372,7 @@ def test_view_knows_groups_solids_and_values_by_name(run_interpreted, monkeypatc
     text = block(2, SETS, FAST, own, "dump(p, all, particle, 9, p.*.dump, vx)", "run(2)")
     monkeypatch.chdir(run_interpreted(text).folder)
     view = ["view", "p.2.dump", "-o", "v.png", "--size", "100", "100"]
-    for word, count in CHOSEN.items():
+    for word, count in [*CHOSEN.items()][::3]:
         name, _, value = word.partition("=")
         option = [f"--{name}", value.strip('"')] if name in ("only", "title") else ["-c", word]
         status, _, err = call(capsys, *view, *option, "--script", "in.script")
