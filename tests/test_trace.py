@@ -366,7 +366,7 @@ def test_a_failure_leaves_nothing_behind():
 
 
 class Clock:
-    """What lets Ctrl-C come at a moment; a signature, of which Python code makes hashes, too."""
+    """Let Ctrl-C come at a moment; a signature, of which Python code makes hashes, too."""
 
     left = 0
 

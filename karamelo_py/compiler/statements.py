@@ -162,7 +162,7 @@ class AstCompiler:
 
     @property
     def flow(self) -> Flow:
-        """What writes now: types may be found before there is code."""
+        """Give what writes now; types may be found before there is code."""
         return Flow(values.now())
 
     def result(self) -> Any:
