@@ -152,6 +152,22 @@ def test_a_reflected_drop(run_interpreted, d):
     assert "reflections" in result.out
 
 
+def test_a_body_pressed_to_a_reflecting_edge_gains_energy(run_interpreted):
+    """A block of rubber falls on the edge: the warning names what feeds it, and the remedy."""
+    said = run_interpreted("""
+        method(ulmpm, FLIP, linear, 1)
+        dimension(2, 0, 0.12, 0, 0.12, 0.02)
+        boundary(reflect)
+        region(block, block, 0.04, 0.08, 0.02, 0.06)
+        material(rubber, neo-hookean, 1000, 1e6, 0.3)
+        solid(block, region, block, 2, rubber, 0.02, 0)
+        fix(v, initial_velocity_particles, all, 0, -8)
+        run(60)
+    """).err
+    assert "energy comes from nowhere" in said
+    assert "the edge of the domain puts back" in said and "fix velocity_nodes" in said
+
+
 # What acts on points splits a step into its stages, also when it acts on no point.
 STAGES = (
     "region(nowhere, block, 1.1, 1.15, 1.1, 1.15)",

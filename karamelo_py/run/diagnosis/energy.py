@@ -70,6 +70,9 @@ def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
             f"the step is {share:.3g} times the stable one",
             "leave set_dt and dt_factor out, or make them smaller",
         )
+    if update.boundary == "reflect" and simulation.bounces:
+        pressed = "points that the edge of the domain puts back, while their neighbours press on"
+        return pressed, "nodes held by fix velocity_nodes along walls in place of boundary(reflect)"
     courant, _ = timestep.own_step_of_waves(hub, still=False)
     # Of waves in bodies that nothing has deformed: later they may be softer.
     fastest = timestep.fastest_wave(simulation)
