@@ -107,7 +107,11 @@ FAILURES = {
         (
             {"law": "metal", "method": "ulmpm, FLIP, linear, 1", "v": "-1, 0"},
             {"law": "metal", "method": "ulmpm, TPIC, quadratic-spline", "v": "-1, 0"},
-        )
+        ),
+        (  # the pressure of a flyer of 1 km/s is 0.61 of the exact one, and 0.999
+            {"law": "metal", "method": "ulmpm, FLIP, linear, 0.99", "v": "-0.2, 0"},
+            {"law": "metal", "method": "ulmpm, FLIP, quadratic-spline, 0.99", "v": "-0.2, 0"},
+        ),
     ],
 }
 
