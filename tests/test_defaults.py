@@ -1,7 +1,6 @@
 """What the defaults do: each case is right, or is told (docs/defaults.md)."""
 
 import pytest
-from selection import few
 
 from comparisons import defaults
 from comparisons.defaults.__main__ import PAGE
@@ -29,7 +28,8 @@ def test_errors_of_the_page_are_shares_of_the_exact_numbers():
         assert shown == pytest.approx(case.error(float(default)), abs=6e-4)
 
 
-@pytest.mark.parametrize("name", few(("faces", "punch"), "faces"))
+@pytest.mark.full
+@pytest.mark.parametrize("name", ("faces", "punch"))
 def test_faces_that_end_beside_each_other(tmp_path, name):
     """Bodies touch as long as a wave runs to the end of the rod and back (St Venant 1867).
 

@@ -11,7 +11,7 @@ log_modify(custom, step, dt, time, Ek, Es{more})
 set_output(2)
 dump(points, all, particle, 5, d.*.LAMMPS, x, vx, s11{T})
 dump(nodes, all, grid, 5, g.*.LAMMPS, mass, vx)
-run(10)
+run(6)
 """
 # A short bar is drawn out.
 BAR = """

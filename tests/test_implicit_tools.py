@@ -168,6 +168,7 @@ def test_a_ball_is_pressed_in(run_script, scheme):
         assert np.allclose(log_of["hold_x"], -log_of["pull_x"], rtol=1e-8)
 
 
+@pytest.mark.full
 def test_a_pressed_disk(run_script):
     """Force and stress below the contact after Hertz (Johnson 1985); errors fall with the cells."""
     # Friction that is none: compiled with that of test_splines_rub.

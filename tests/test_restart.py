@@ -178,7 +178,7 @@ def test_outputs_go_on_in_their_files(run_interpreted):
     fly = "fix(v, initial_velocity_particles, all, sin(9*x0), 0)"
     lines = ["compute(E, energy_balance, all)", "log_modify(custom, step, time, E)", "run(5)",
              "E0 = value(E_total)", "run_time(0.03*E0/E0)", "write_restart(w.h5)",
-             "fix(g, body_force, all, E0, 0)", "run_while(time < 0.12)"]  # fmt: skip
+             "fix(g, body_force, all, E0, 0)", "run_while(time < 0.07)"]  # fmt: skip
     script = with_files(block(2, fly, OUTPUTS, *lines, size=(0.2, 0.1)))
     whole = goes_on(run_interpreted, script, files=2)
     again = whole.with_name("between")

@@ -102,7 +102,9 @@ class PointsById:
                 continue
             for k in range(count):
                 add_all(limbs, k, np.ascontiguousarray(terms[k], float))
-        return np.array([rounded(total) for total in self.comm.allreduce(limbs)])
+        totals = self.comm.allreduce(limbs)
+        there = totals.any(axis=1)  # of the thousands of a quantile few
+        return np.array([rounded(t) if one else 0.0 for t, one in zip(totals, there, strict=True)])
 
     def summed(self, terms: np.ndarray) -> np.ndarray:
         """Sums of terms (n,) or (n, k) of what is at hand over all, rounded once."""

@@ -61,7 +61,8 @@ class Server:
         self.token = secrets.token_urlsafe(16)
         self._http = _Quiet(("127.0.0.1", 0), _handler(self))
         self.address = f"http://127.0.0.1:{self._http.server_address[1]}/{self.token}/"
-        threading.Thread(target=self._http.serve_forever, daemon=True).start()
+        # It ends as soon as it has looked whether it should.
+        threading.Thread(target=self._http.serve_forever, args=(0.05,), daemon=True).start()
 
     def changed(self) -> None:
         """Let all pages know that there are news."""
