@@ -51,6 +51,7 @@ def test_cold_spray(run_script):
     assert 0.7 * 0.9 < heat / log.spent[-1] < 0.9
 
 
+@pytest.mark.full
 def test_machining(run_script):
     """The tool pushes the piece back, by no more than Merchant's force of what has hardened."""
     log = tiny(run_script, "machining", refine=1 / 20, T=1e-6).log
