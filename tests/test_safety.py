@@ -228,3 +228,26 @@ def test_ctrl_c_while_the_program_starts(tmp_path, after):
 def test_the_word_of_the_error():
     """ScriptError and SimulationError are one family, so that either can be caught."""
     assert issubclass(SimulationError, ScriptError)
+
+
+@pytest.mark.parametrize(("law", "told"), [("linear", True), ("neo-hookean", False)])
+def test_a_law_that_resists_is_named_where_there_is_another(run_interpreted, law, told):
+    """A bar of 1 whose nodes are brought together by 1.5 (det F < 0): whatever the law."""
+    said = run_interpreted(
+        f"""
+        method(tlmpm, FLIP, linear, 1)
+        dimension(1, 0, 1, 1)
+        region(b, block, 0, 1)
+        material(m, {law}, 1e-6, 1, 0.3)
+        solid(b, region, b, 2, m, 1)
+        region(ends, block, -INF, INF)
+        group(ends, nodes, region, ends, all)
+        fix(press, velocity_nodes, ends, -1.5*x0)
+        fix(start, initial_velocity_particles, all, -1.5*x0)
+        set_dt(0.05)
+        run(20)
+        """,
+        status=1,
+    ).err
+    assert "is turned inside out (det F <= 0)" in said
+    assert ("neo-hookean" in said) == told

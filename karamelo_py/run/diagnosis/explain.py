@@ -10,6 +10,7 @@ from karamelo_py.kernels.step import ABOVE_LIMIT, GAINED, HEATED, SHRUNK
 from karamelo_py.output.node_columns import places_of
 from karamelo_py.output.point_table import PointTable
 from karamelo_py.points.basis import carried, extent
+from karamelo_py.points.laws import by_rates
 from karamelo_py.run.diagnosis import energy
 from karamelo_py.run.timestep import own_step_instead, step_by_script
 from karamelo_py.scene.group import NodeGroup
@@ -185,9 +186,11 @@ def _wrong_point(hub: Hub, simulation: Any) -> tuple:
             f"finer points, so that the corners of a domain move more alike{instead}, or method "
             f"tlcpdi, whose domains keep their shape; or {smaller}",
         )
+    law = solid_with(hub, number).material.law
+    other = ", or a law that resists the compression (neo-hookean)" if by_rates(law) else ""
     return (
         f"{name} at {_place(old)} is turned inside out (det F <= 0)",
-        f"{smaller}, or a finer grid, or a law that resists the compression (neo-hookean)",
+        f"{smaller}, or a finer grid{other}",
     )
 
 
