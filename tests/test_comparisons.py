@@ -34,15 +34,16 @@ def found(run_script, name: str, full: bool) -> list[Row]:
 
 # Scenes that share compiled loops with each other or with other tests.
 SHARED = {
-    "two_disks": "disks", "axis_aligned": "neo-hookean", "vibrating_bar": "bar",
+    "two_disks": "disks", "axis_aligned": "neo-hookean",
     "hertz": "contact", "slump": "soil",
     "dam_break": "water", "dam_ritter": "water",
 }  # fmt: skip
 # Of these a sibling shows the same in less: a cylinder and a vertical cut in test_implicit.py,
 # slump, taylor_bar_axisymmetric, friction in test_contact_grid.py, disks that turn in
-# test_conservation.py.
+# test_conservation.py, a bar that vibrates in test_bar.py.
 SHOWN = {"footing", "static_footing", "lame", "static_slope", "collapse", "incline"}
 SHOWN |= {"taylor_bar", "taylor_bar_227", "tensile_bar", "disk_impact", "spinning_disk"}
+SHOWN |= {"vibrating_bar"}
 SMALL = [
     pytest.param(name, marks=pytest.mark.xdist_group(SHARED.get(name, name)))
     for name in scenes()

@@ -57,7 +57,8 @@ def state(simulation):
     [
         pytest.param("ulmpm, FLIP, linear, 0.99", "musl", "double", marks=pytest.mark.full),
         ("ulmpm, MLS, quadratic-spline", "usl", "single"),
-        ("tlmpm, FLIP, linear, 0.99", "usf", "double"),
+        # As in test_gpu_runs.py, interpreted.
+        pytest.param("tlmpm, FLIP, linear, 0.99", "usf", "double", marks=pytest.mark.full),
     ],
 )
 def test_same_as_processor(method, scheme, precision):
