@@ -278,3 +278,11 @@ def test_a_body_that_begins_behind_a_plane_is_told(run_interpreted, style, norma
     touching = block(2, fix.replace("0.4", "0.3"), "set_dt(1e-9)", "run(1)")
     if normal > 0:
         assert "behind" not in run_interpreted(touching).err
+
+
+def test_a_body_that_begins_in_a_ball_is_told(run_interpreted):
+    """A ball that reaches the middle of the block's 0.3 x 0.2, or one beside it."""
+    for x, told in (("0.3", True), ("-0.3", False)):
+        fix = f"fix(F, indent/minimize_penetration, all, sphere, 0.15, {x}, 0.4, 0, 0, 0, 0, 0)"
+        err = run_interpreted(block(2, fix, "run(0)"), folder=x, command="check").err
+        assert ("points in the ball of fix 'F': " in err) == told

@@ -445,6 +445,15 @@ class BallTool(ToolFix):
         return self.now(self.R) - np.linalg.norm(self.from_place(points, self.centre), axis=1)
 
 
+known_failure(
+    BallTool,
+    "points in the ball of fix '{part.id}'",
+    when=_begin_behind,
+    reason="{which} points of its group begin there, up to {depth:.3g} deep, and are thrown out",
+    cure="another place of the ball or the body",
+)
+
+
 class Indent(BallTool):
     """Push points out of a ball (in the plane a disk) with a force that grows as depth squared.
 
