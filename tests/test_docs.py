@@ -542,6 +542,25 @@ def test_words_of_other_programs_lead_to_a_page(asked, page):
     assert set(asked.lower().split()) <= set(WORDS[page].lower().split())
 
 
+def _scene_of_the_front_page():
+    return re.search(
+        r"```karamelo\n(.*?)```", (ROOT / "docs" / "index.md").read_text("utf-8"), re.S
+    )[1]
+
+
+def test_the_scene_of_the_front_page_is_sound(run_interpreted):
+    """The check of it warns of nothing."""
+    assert "warning" not in run_interpreted(_scene_of_the_front_page(), command="check").err
+
+
+@pytest.mark.full
+def test_the_scene_of_the_front_page(run_script):
+    """The ball bounces in its box and is whole: no warning, and no energy from nowhere."""
+    result = run_script(_scene_of_the_front_page())
+    assert "warning" not in result.err and (result.folder / "ball.gif").exists()
+    assert -15 < float(re.search(r"^ +energy +(\S+) %", result.out, re.M)[1]) < 0
+
+
 def test_claims_of_the_front_page():
     """Their numbers are those of the pages that they link to."""
     front = (ROOT / "docs" / "index.md").read_text("utf-8")
