@@ -145,9 +145,10 @@ def _width(character: str) -> int:
 
 
 def meant(name: str, names: Iterable[str]) -> str | None:
-    """Write ``did you mean '...'?`` with the one of `names` most like `name`; None without any."""
-    close = nearest(name, names)
-    return f"did you mean '{close}'?" if close else None
+    """Write ``did you mean '...'?`` with those of `names` most like `name`; None without any."""
+    like = [(n, difflib.SequenceMatcher(None, n, name).ratio()) for n in nearest_few(name, names)]
+    close = [f"'{n}'" for n, ratio in like if ratio == like[0][1]]
+    return f"did you mean {' or '.join(close)}?" if close else None
 
 
 def one_of(name: str, names: Iterable[str], family: str = "") -> str:
