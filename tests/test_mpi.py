@@ -302,6 +302,20 @@ def test_a_signal_amid_the_first_picture(tmp_path, words):
 @pytest.mark.full
 @needs_mpi
 @pytest.mark.parametrize("rank", [0, 1])
+def test_a_process_is_stopped(tmp_path, rank):
+    """All wait; a signal continues it, and the run ends with the last state of all."""
+    process = running(tmp_path)
+    os.kill(_pids(process.pid)[rank], signal.SIGSTOP)
+    time.sleep(0.5)
+    process.send_signal(signal.SIGINT)
+    _out, err = process.communicate(timeout=120)
+    assert process.returncode == 128 + signal.SIGINT, err
+    assert err.count("interrupted: the log and the dumps are complete") == 1
+
+
+@pytest.mark.full
+@needs_mpi
+@pytest.mark.parametrize("rank", [0, 1])
 def test_a_process_is_killed(tmp_path, rank):
     process = running(tmp_path)
     os.kill(_pids(process.pid)[rank], signal.SIGKILL)

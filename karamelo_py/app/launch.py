@@ -163,6 +163,9 @@ class Launcher:
     def _pass_on(self, number: int, _: Any) -> None:
         self.signals.append(number)
         first = next((link for link, one in self.links.items() if one.get("rank") == 0), None)
+        for one in filter(None, self.links.values()):  # the others would wait for a stopped one
+            with suppress(ProcessLookupError):
+                os.kill(one["pid"], signal.SIGCONT)
         if first is not None and 0 not in self.reports and len(self.signals) < AT_ONCE:
             with suppress(OSError):
                 first.sendall(bytes([number]))
