@@ -273,6 +273,18 @@ def test_each_of_several_workloads_has_a_process(tmp_path, capfd, monkeypatch):
     assert "h = 1/N" in err and "Traceback" not in err
 
 
+@pytest.mark.xdist_group("disks")
+def test_the_process_of_a_workload_ends_with_bench():
+    """Also where that is killed, and can tell nobody."""
+    part = apart.Measurement("disks-320", 1, {}, 600.0, 1e9, False)
+    with subprocess.Popen(
+        [*apart.COMMAND, json.dumps(part)],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    ) as process:  # fmt: skip
+        assert process.communicate() == (b"", b"")
+    assert process.returncode == 0
+
+
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="there are no such signals here")
 def test_a_process_that_somebody_ends(capfd, monkeypatch):
     monkeypatch.setattr(measure, "bandwidth", lambda threads, size=1: 2e10)
@@ -284,21 +296,24 @@ def test_a_process_that_somebody_ends(capfd, monkeypatch):
 
 
 def test_an_interrupt_ends_the_process_of_a_workload(capfd, monkeypatch):
-    """Ctrl-C comes to the one process that waits, which ends the other."""
+    """Ctrl-C comes to the one process that waits, and the other ends with it."""
     begun = []
 
     class Interrupted(subprocess.Popen):
-        def communicate(self, *arguments, **options):
+        def wait(self, timeout=None):
+            if self in begun:
+                return super().wait(timeout)
             begun.append(self)
             raise KeyboardInterrupt
 
     monkeypatch.setattr(measure, "bandwidth", lambda threads, size=1: 2e10)
-    monkeypatch.setattr(apart, "COMMAND", (sys.executable, "-c", "import time; time.sleep(600)"))
+    ends = "import os; os.read(0, 1); os._exit(7)"
+    monkeypatch.setattr(apart, "COMMAND", (sys.executable, "-c", ends))
     monkeypatch.setattr(subprocess, "Popen", Interrupted)
     monkeypatch.setattr(command, "commit", lambda: None)  # of which another process tells
     assert main([*TWO, "10"]) == 130
     assert capfd.readouterr().err == "error: interrupted\n"
-    assert len(begun) == 1 and begun[0].returncode not in (0, None)
+    assert len(begun) == 1 and begun[0].wait(60) == 7
 
 
 # --- several processes ----------------------------------------------------------------------------

@@ -2,15 +2,18 @@
 
 What workloads before it leave in memory has no part in the speed of one then. This module is the
 program of such a process, too: ``python -m karamelo_py.app.bench.apart``. It takes a `Measurement`
-in JSON as its argument, and writes what it finds to a file.
+in JSON as its argument, writes what it finds to a file, and ends with the process that has started
+it, which closes its input then.
 """
 
 import json
+import os
 import re
 import signal
 import subprocess
 import sys
 import tempfile
+import threading
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -78,9 +81,11 @@ def _found_apart(part: Measurement) -> tuple[int, dict[str, Any]]:
         if part.ranks > 1:
             status = launch(part.ranks, words, module=MODULE)
         else:
-            # A session of its own: Ctrl-C comes to this process alone, which ends the other.
-            done = subprocess.run([*COMMAND, *words], start_new_session=True, check=False)
-            status = done.returncode
+            # A session of its own: Ctrl-C comes to this process alone, with which the other ends.
+            with subprocess.Popen(
+                [*COMMAND, *words], stdin=subprocess.PIPE, start_new_session=True
+            ) as process:
+                status = process.wait()
         return status, read_json(file)
 
 
@@ -167,6 +172,7 @@ def main() -> int:
     keep_to_oneself()
     if part.ranks > 1:
         return together(part.ranks, lambda comm: _measure(part, comm))
+    threading.Thread(target=_end_with_the_other, daemon=True).start()
     status, text = outcome_of(lambda: _measure(part), debugging=part.debug)
     if text:
         print(text, file=sys.stderr, flush=True)
@@ -185,6 +191,12 @@ def _measure(part: Measurement, comm: MpiComm | None = None) -> int:
     if comm is None or comm.leads:
         Path(part.file).write_text(json.dumps(found), encoding="utf-8")
     return 0
+
+
+def _end_with_the_other() -> None:
+    """End where nobody waits for what is found any more: the input is closed then."""
+    os.read(0, 1)
+    os._exit(0)
 
 
 if __name__ == "__main__":
