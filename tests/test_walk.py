@@ -7,6 +7,7 @@ import pytest
 from listening import listening
 from numba import config
 
+from karamelo_py.compiler import statements
 from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.held import hold
 from karamelo_py.compiler.loops import kernel, noinline
@@ -376,6 +377,67 @@ def test_what_is_known_of_loops_is_found_again(loop, branches, found):
         return loop(x, n) + branches(x)
 
     assert kernel(caller)(np.float32(0.5), 3) == found
+
+
+def last_given(f, n):
+    last = 0.0
+    for _ in range(n):
+        last = f()
+    return last
+
+
+def by_lambda(x, n):
+    if n > 100:
+        return x
+    return last_given(lambda: x, n)
+
+
+def by_functions(x, n):
+    """One calls the other, which calls itself."""
+    if n > 100:
+        return x
+
+    def known(k=2):
+        return x if k == 0 else known(k - 1)
+
+    def given():
+        return known()
+
+    return last_given(given, n)
+
+
+def by_default(x, n):
+    if n > 100:
+        return x
+
+    def known(y=x):
+        return y
+
+    return last_given(known, n)
+
+
+KINDS = np.float32, np.float64
+
+
+@pytest.mark.parametrize("last", [by_lambda, by_functions, by_default])
+@pytest.mark.parametrize("kinds", [KINDS, KINDS[::-1]])
+def test_loops_keep_the_types_of_what_functions_close_over(last, kinds):
+    def caller(a, b, n):
+        return last(a, n), last(b, n)
+
+    numbers = [kind(0.1) for kind in kinds]
+    assert kernel(caller)(*numbers, 3) == tuple(numbers)
+
+
+def test_a_loop_of_other_types_than_were_found_is_refused(monkeypatch):
+    """With an error that says so, whatever was forgotten in what loops are kept by."""
+    monkeypatch.setattr(statements, "_shape", lambda thing: 0)
+
+    def caller(a, b, n):
+        return by_lambda(a, n), by_lambda(b, n)
+
+    with pytest.raises(CannotCompile, match="becomes one of another type"):
+        kernel(caller)(np.float32(0.1), 0.1, 3)
 
 
 def last_pair(pair, n):

@@ -85,6 +85,7 @@ class Grows(Untraceable):
     """
 
     def __init__(self, grown: dict[tuple, Any]):
+        super().__init__(f"a number becomes one of another type{IN_A_LOOP}")
         self.grown = grown
 
 

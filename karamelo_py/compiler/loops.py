@@ -26,7 +26,7 @@ from karamelo_py.compiler.failing import noting, raise_noted
 from karamelo_py.compiler.held import HeldTuple, hold, item_of
 from karamelo_py.compiler.lowering import function_type
 from karamelo_py.compiler.trace import alone, formula, write_into
-from karamelo_py.compiler.values import builtin, in_kernels, intrinsic
+from karamelo_py.compiler.values import Untraceable, builtin, in_kernels, intrinsic
 
 _CALL = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64)  # free of the interpreter lock
 NAME, ENTRY = "$kernel", ".entry"  # what functions of a module are called until it has a name
@@ -122,7 +122,10 @@ def written(
     main.attributes.add("noinline")
     main.attributes.add("nounwind")
     lowering = write_into(ir.IRBuilder(main.append_basic_block("entry")))
-    lowering.give_back(found.run, kinds, main.args, result)
+    try:
+        lowering.give_back(found.run, kinds, main.args, result)
+    except Untraceable as why:
+        raise trace.CannotCompile(str(why), function) from why
     (entry or _write_entry)(module, main, kinds, result)
     module.raises = hasattr(main, "raises")
     return module, result

@@ -116,17 +116,20 @@ class AstFunction:
         return AstCompiler(self, dict(bound.arguments)).result()
 
 
-def _shape(thing: Any) -> Any:
-    """Give types in the place of values, and all else as it is."""
+def _shape(thing: Any, *within: Callable) -> Any:
+    """Give types in the place of values, and all else as it is; `within` functions that know it."""
     if isinstance(thing, values.Value | values.HeldValue):
         return thing._kind._code
     if isinstance(thing, dict):
-        return dict, *map(_shape, thing.items())
+        thing = tuple(thing.items())
     if isinstance(thing, tuple | list | set):
-        return type(thing), *map(_shape, thing)
+        return type(thing), *(_shape(item, *within) for item in thing)
     if isinstance(thing, int | float | np.generic):  # 0, 0.0, -0.0 and False are equal
         return type(thing), repr(thing)
-    return getattr(thing, "definition", thing) if isinstance(thing, python.FunctionType) else thing
+    if not isinstance(thing, python.FunctionType) or not hasattr(thing, "closes_over"):
+        return thing
+    known = [] if thing in within else thing.closes_over()
+    return thing.definition, _shape(known, thing, *within)
 
 
 _BINARY = {
@@ -360,7 +363,17 @@ class AstCompiler:
             finally:
                 self.names = outer
 
-        call.definition = node  # type: ignore[attr-defined]
+        return self.closing(call, node)
+
+    def closing(self, call: Callable, node: ast.Lambda | ast.FunctionDef, **more: Any) -> Callable:
+        """Mark a function with what it is written as, and what its names stand for when called."""
+        read = {n.id for n in ast.walk(node) if isinstance(n, ast.Name)}
+
+        def closes_over() -> list:
+            known = self.free | self.names
+            return [more, *((name, known[name]) for name in sorted(read & known.keys()))]
+
+        call.definition, call.closes_over = node, closes_over  # type: ignore[attr-defined]
         return call
 
     def comprehended(self, node: ast.expr, item: Callable[[], Any]) -> list:
@@ -442,8 +455,7 @@ class AstCompiler:
                 raise TypeError(f"{node.name} takes {len(names)} arguments")
             return AstCompiler(inner, given).result()
 
-        call.definition = node  # type: ignore[attr-defined]
-        self.names[node.name] = call
+        self.names[node.name] = self.closing(call, node, **defaults)
 
     def Raise(self, node: ast.Raise) -> None:
         what, arguments = node.exc, []
