@@ -17,7 +17,7 @@ from karamelo_py.run.lower.memory import PAGE, bytes_in, nodes_in_use
 from karamelo_py.run.tiles import ROUNDING, SHARES
 from karamelo_py.scene.hub import Hub
 
-# Two bodies that pass each other, at 0.7 of a cell a step and more: sorted at every other one.
+# Two bodies that pass each other, at 0.7 of a cell per step and more: sorted at every other one.
 PASSING = """
 method({method})
 scheme({scheme})

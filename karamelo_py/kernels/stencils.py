@@ -22,8 +22,8 @@ from karamelo_py.points.kinematics import from_columns, zero_vector
 
 # --- what is affine around a point: mass, momentum, force of MLS ------------------------------
 #
-# In lanes such a quantity is brought into the order of the nodes' records once a point, not once a
-# node: half of the work of a scatter, in space two thirds.
+# In lanes such a quantity is brought into the order of the nodes' records once per point, not once
+# per node: half of the work of a scatter, in space two thirds.
 
 
 @point_function(otherwise=True)

@@ -191,7 +191,7 @@ def _print_solved(one: measure.Solved) -> None:
     print(f"  {'unknowns':<34} {one.unknowns:8d}")
     print(f"  {'seconds per load step':<34} {one.points / one.best:8.3f} (median "
           f"{one.points / one.median:.3f})")  # fmt: skip
-    print(f"  {'corrections a load step':<34} {one.corrections:8.1f}")
+    print(f"  {'corrections per load step':<34} {one.corrections:8.1f}")
     for stage, share in one.stages.items():
         print(f"    {stage:<38} {100 * share:6.1f} %")
 

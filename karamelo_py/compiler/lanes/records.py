@@ -248,7 +248,7 @@ def accumulate_affine(array, nodes, first, weights, value, slopes):
 def _accumulate_affine(array, nodes, first, weights, value, slopes):
     """The records of the points, each with one vector; the weights are read one by one.
 
-    So the records are made once a point, not at each node.
+    So the records are made once per point, not at each node.
     """
     lanes = weights[0]
 

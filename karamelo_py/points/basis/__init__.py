@@ -56,7 +56,7 @@ from karamelo_py.compiler.compile import point_function
 
 @point_function()
 def locate(basis, kin, grid, place):
-    """The stencil of a point: whatever the functions below need, computed once a point."""
+    """The stencil of a point: whatever the functions below need, computed once per point."""
 
 
 @point_function()

@@ -16,7 +16,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
 from karamelo_py.script.errors import Place, ScriptError
 
-# Moments of fixes that implicit steps have; those of plug-ins may be called more often per step.
+# Moments of fixes in implicit steps; those of plug-ins may be called more than once per step.
 _MOMENTS = "initial_integrate", "post_particles_to_grid", "post_update_grid_state"
 _OF_HEAT = "post_heat_to_grid", "supply_heat", "post_update_grid_heat"
 _OF_PLUGINS = _MOMENTS[1:]
