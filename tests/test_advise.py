@@ -89,6 +89,15 @@ def test_errors_that_stop_falling_are_no_promise(folder, capsys):
     assert "with 0.03; finer values of N or other choices may do" in out
 
 
+def test_a_target_met_by_chance_alone_is_no_contradiction(folder, capsys):
+    """Order 8 to the finest run: more than cubic splines have."""
+    advise("-var", "slope=8", "-var", "price=5", N="10,12,20", status=1)
+    out = capsys.readouterr().out
+    assert "no variant is expected to reach err <= 0.02, unless by chance\n" in out
+    assert re.search(r"reaches it only by chance: .*N = 20 \(err 0.00391", out)
+    assert "nearest" not in out
+
+
 def test_a_variable_that_coarsens_is_turned_round(folder, capsys):
     """With the cell size as variable small values are fine."""
     (folder / "in.law").write_text(SCRIPT.replace("N = 10", "h = 0.1\nN = 1/h"), encoding="utf-8")

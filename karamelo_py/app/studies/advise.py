@@ -484,19 +484,20 @@ def sureness(adviser: Adviser, best: Candidate) -> str:
 
 def _nothing(adviser: Adviser) -> int:
     """Say that no variant meets the target, and what comes nearest."""
-    print(f"\nno variant is expected to reach {adviser.accuracy} <= {adviser.target:g}")
+    lucky = adviser.lucky()
+    luck = ", unless by chance" * (lucky is not None)
+    print(f"\nno variant is expected to reach {adviser.accuracy} <= {adviser.target:g}{luck}")
     found = [
         (abs(error), adviser.label(choice, k))
         for choice in adviser.choices
         for k, error in enumerate(errors(choice.rows, adviser.accuracy)) if np.isfinite(error)
     ]  # fmt: skip
-    if found:
+    if lucky is not None:
+        print(f"reaches it only by chance: {by_luck(adviser, lucky)}")
+    elif found:
         error, label = min(found, key=lambda item: item[0])
         others = f"finer values of {adviser.name} or other choices may do"
         print(f"nearest: {label} with {error:.3g}; {others}")
-    lucky = adviser.lucky()
-    if lucky is not None:
-        print(f"not sure, for it may meet the target by chance: {by_luck(adviser, lucky)}")
     hope = adviser.hopeful()
     if hope is not None:
         print(

@@ -48,6 +48,7 @@ BORNE = ("stable", "damped")  # classes of steps that are borne
 UNTOLD = ("left", "short")  # of steps that nothing is known of
 LABELS = {"left": "left the domain", "short": "too short to tell"}
 FEWEST = watch.FEW * watch.LOOK + 1  # steps in which the program looks often enough at energies
+SURE = 3 * watch.LOOKS * watch.LOOK  # steps, from which on slow growth is told
 FIRST = 0.1  # of the rows of a log: energies are means over so many
 FEW = 9  # values of a variable that stand at the axis one by one
 COLOURS = {
@@ -322,15 +323,15 @@ class Map:
         low, *_, high = edges(self.x)
         return exp(at) if at <= log(high) and exp(at) >= low else None
 
-    def margins(self) -> list[float]:
-        """Divide the largest stable step by the program's, in each row that has an edge."""
+    def margins(self) -> list[tuple[float, int]]:
+        """Divide the largest stable step by the program's, in each row with an edge; its steps."""
         found, classes = [], self.classes
         for j in range(self.shape[1]):
             column = [classes[i, j] for i in range(self.shape[0])]
             edge = next((i for i, kind in enumerate(column) if kind not in BORNE), None)
             row = self.found.get((edge - 1, j)) if edge and column[edge] not in UNTOLD else None
             if row and row.get("dt") and row.get("stable_dt"):
-                found.append(row["dt"] / row["stable_dt"])
+                found.append((row["dt"] / row["stable_dt"], int(row["steps"])))
         return found
 
     def tell(self) -> None:
@@ -350,10 +351,12 @@ class Map:
             print(f"runs of fewer than {FEWEST} steps do not show whether energy grows: run longer")
         margins = self.margins()
         if margins:
-            low, high = min(margins), max(margins)
+            ratios, steps = zip(*margins, strict=True)
+            low, high, few = min(ratios), max(ratios), min(steps)
             ends = f"{low:.3g}" if high - low < 1e-3 else f"{low:.3g} to {high:.3g}"
             borne = "first step that a run survived" if unwatched else "stable first step"
-            print(f"the largest {borne} is {ends} times the program's stable step")
+            held = f", for {few} steps: longer runs may show slow growth" if few < SURE else ""
+            print(f"the largest {borne} is {ends} times the program's stable step{held}")
 
     def draw(self, path: Path, title: str, words: tuple[str, str]) -> None:
         """Draw the map, with `words` along its axes."""
