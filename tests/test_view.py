@@ -180,6 +180,8 @@ def test_points_that_move_stay_in_view(tmp_path, monkeypatch):
         (["p.dump", "--only", "not tool"], "--script FILE the groups, solids and variables"),
         (["p.dump", "-c", "tool"], "--script FILE the groups"),
         (["p.dump", "--title", "load {load} N"], "a log beside the dumps (log.mpm, log.csv)"),
+        (["p.dump", "--title", "v_{max}"], "($v_{max}$), or {{max}} for braces"),
+        (["p.dump", "--title", "{1/0}"], "error: {1/0} in --title: division by zero"),
         ([], "FILE"),
     ],
 )
@@ -346,7 +348,7 @@ SETS = """
 CHOSEN = {
     "only=not part": 16, "only=not second": 24, "only=part && x < 0.35": 2,
     "part": 28, "second + 2*part": 28, "only=vx > twice/3": 24,
-    'title="v {twice/2} of {1+1} $a_{2}$"': 28,
+    'title="v {twice/2} of {{{1+1}}} $a_{2}$"': 28,
 }  # fmt: skip
 FAST = "fix(f, initial_velocity_particles, all, 0.1*(x < 0.7), 0)"
 
@@ -360,7 +362,7 @@ def test_groups_and_solids_are_left_out_by_name(shown):
         if "twice" not in word or name == "title":
             sim.show(**keyword)
             assert shown[-1][0] == count, word
-    assert shown[-1][1] == "v 0 of 2 $a_{2}$: step 0, time 0"
+    assert shown[-1][1] == "v 0 of {2} $a_{2}$: step 0, time 0"
     with pytest.raises(ScriptError, match="unknown name 'partt'") as caught:
         sim.show(only="not partt")
     assert caught.value.hint == "did you mean 'part'?"
@@ -378,7 +380,7 @@ def test_view_knows_groups_solids_and_values_by_name(run_interpreted, monkeypatc
         status, _, err = call(capsys, *view, *option, "--script", "in.script")
         assert (status, err) == (0, "") and shown[-1][0] == count, word
     v = 0.1 * 24 / 28
-    assert shown[-1][1].startswith(f"v {v:.6g} of 2 $a_{{2}}$: step 2")
+    assert shown[-1][1].startswith(f"v {v:.6g} of {{2}} $a_{{2}}$: step 2")
     # Without a script the log knows its columns.
     only = ["--only", "vx > twice/3"]
     assert call(capsys, *view, *only)[0] == 0 and shown[-1][0] == 24

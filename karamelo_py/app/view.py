@@ -2,7 +2,6 @@
 
 import argparse
 import glob
-import re
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -153,8 +152,7 @@ def _telling_of_names(options: argparse.Namespace) -> Iterator[None]:
     try:
         yield
     except ScriptError as error:
-        known = re.match("did you mean|log_modify", error.hint or "")
-        if re.search("unknown name|has no column", error.message) and not known:
+        if error.unknown and not (error.hint or "").startswith("did you mean"):
             error.hint = "a log beside the dumps (log.mpm, log.csv) knows the values of its columns"
             if options.script is None:
                 error.hint += ", and --script FILE the groups, solids and variables of the run"
@@ -268,7 +266,7 @@ def _look(first: Snapshot, options: argparse.Namespace, scene: Hub) -> dict[str,
             argument = Argument(Raw(Source(given, f"--{option}"), 0, len(given)), scene.interpreter)
             look[word.name] = signature.convert(hub, word, argument)
     if look["title"] is not None:
-        look["title"] = Caption(scene, look["title"])
+        look["title"] = Caption(scene, look["title"], "--title")
     return look
 
 

@@ -109,12 +109,12 @@ class Argument:
         try:
             return script.evaluate(parse_expression(self._raw), self._raw)
         except ScriptError as error:
-            if unknown := re.fullmatch(r"unknown name '(\w+)'", error.message):
+            if name := error.unknown:
                 numbers = self.numbers()
                 others = ", ".join(numbers) or "none so far"
-                few = one_of(unknown[1], seeds)
+                few = one_of(name, seeds)
                 known = f"{few}, or a number that the script has set ({others})"
-                hint = meant(unknown[1], [*seeds, *numbers]) or f"set it first: {unknown[1]} = ..."
+                hint = meant(name, [*seeds, *numbers]) or f"set it first: {name} = ..."
                 error.expected, error.hint = known, hint
             raise
 

@@ -273,7 +273,7 @@ class Interpreter:
             self.variables[name] = self.evaluate(statement.node, statement.right)
         except ScriptError as error:
             word = statement.right.code.strip()
-            if error.message.startswith("unknown name") and re.fullmatch(r"\w+([-/.]\w+)+", word):
+            if error.unknown and re.fullmatch(r"\w+([-/.]\w+)+", word):
                 error.hint = f'a text stands in quotes: "{word}"'
             raise
         self.presets.follow(statement)

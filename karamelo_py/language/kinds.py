@@ -189,15 +189,14 @@ def _to_number(hub: Any, argument: Argument) -> float:
 
 def _suggest_numbers(argument: Argument, error: ScriptError) -> None:
     """Suggest for an unknown name no other that changes in a run, which is no number here."""
-    name = re.fullmatch(r"unknown name '(\w+)'", error.message)
     close = re.fullmatch(r"did you mean '(\w+)'\?", error.hint or "")
-    if not (name and close) or close[1] in CONSTANTS or "value" in argument.text:
+    if not (error.unknown and close) or close[1] in CONSTANTS or "value" in argument.text:
         return
     numbers = argument.numbers()
     if close[1] not in numbers:
         known = ", ".join(numbers) or "none so far"
         error.expected = f"a number, or a variable that is one ({known})"
-        error.hint = meant(name[1], numbers) or f"set it first: {name[1]} = ..."
+        error.hint = meant(error.unknown, numbers) or f"set it first: {error.unknown} = ..."
 
 
 def _to_integer(hub: Any, argument: Argument) -> int:

@@ -96,6 +96,7 @@ def unknown_name(script: Any, name: str, place: Any) -> ScriptError:
     return ScriptError(
         f"unknown name '{name}'",
         place=place,
+        unknown=name,
         expected=f"a variable that is set ({listed(script.variables)}), a value of a fix or a "
         f"compute ({listed(published)}), or x, y, z, x0, y0, z0, time, timestep, dt, PI",
         hint=_meant_by(script, name, [*script.variables, *published, *SEEDS, *CONSTANTS]),

@@ -235,7 +235,7 @@ def check_columns(columns: Sequence[str], known: Sequence[str], *, first: int) -
 def unknown_column(message: str, name: str, known: Iterable[str], **where: Any) -> ScriptError:
     """Make the error for a column that is none of the `known`; `where` it stands."""
     known = list(known)
-    error = unknown(message, name, known, **where)
+    error = unknown(message, name, known, unknown=name, **where)
     others = table()["columns"].items()
     quantity = next((columns for columns, words in others if name.lower() in words), "")
     if there := [column for column in quantity.split() if column in known]:

@@ -55,7 +55,7 @@ class Quantity:
         except ScriptError as error:
             if error.place is None:
                 error.place = argument.place
-            if error.message == f"unknown name '{text}'":
+            if error.unknown == text:
                 error.expected = "one of " + ", ".join(dict.fromkeys(cls.names(hub)))
                 if not (error.hint or "").startswith("did you mean"):
                     energy = table()["energies"].get(text)
@@ -113,11 +113,14 @@ class Quantity:
 
 
 class Caption:
-    """A text in which ``{name}`` or ``{formula}`` is the number it has when the text is shown."""
+    """A text in which ``{name}`` or ``{formula}`` is the number it has when the text is shown.
 
-    PIECE = re.compile(r"\$[^$]*\$|{([^{}]+)}")  # in dollars: mathematics of Matplotlib
+    Two braces, ``{{`` or ``}}``, are one. Errors name the `option` that has the text.
+    """
 
-    def __init__(self, hub: Scene, text: str):
+    PIECE = re.compile(r"\$[^$]*\$|{{|}}|{([^{}]+)}")  # in dollars: mathematics of Matplotlib
+
+    def __init__(self, hub: Scene, text: str, option: str = "title"):
         self.text, self.quantities = text, {}
         for piece in filter(None, self.PIECE.findall(text)):
             argument = Argument(Raw(Source(piece, "title"), 0, len(piece)), hub.interpreter)
@@ -125,6 +128,11 @@ class Caption:
                 self.quantities[piece] = Quantity.from_script(hub, argument)
             except ScriptError as error:
                 error.place, error.argument = None, "title"
+                error.message = f"{{{piece}}} in {option}: {error.message}"
+                error.expected = (
+                    f"{error.expected or 'a formula'}, or mathematics in dollars ($v_{{max}}$), "
+                    f"or {{{{{piece}}}}} for braces"
+                )
                 raise
 
     @property
@@ -135,7 +143,9 @@ class Caption:
 
     def __str__(self) -> str:
         def shown(found: re.Match) -> str:
-            return f"{self.quantities[found[1]].read():.6g}" if found[1] else found[0]
+            if found[1]:
+                return f"{self.quantities[found[1]].read():.6g}"
+            return found[0][0] if found[0] in ("{{", "}}") else found[0]
 
         return self.PIECE.sub(shown, self.text)
 

@@ -79,6 +79,8 @@ class ScriptError(Exception):
     others: "list[ScriptError]" = field(default_factory=list)
     # Where the text of a script is wrong: the statements in which it is not.
     statements: list = field(default_factory=list)
+    # The name in a formula, or the column, that nothing answers to.
+    unknown: str | None = None
     # Whether the statement it belongs to is known: nothing outside of it may add to it.
     complete: bool = False
 

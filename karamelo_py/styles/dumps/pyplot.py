@@ -67,7 +67,8 @@ class PyPlot(Dump):
         false: without axes and numbers.
     title
         What is written above, in front of step and time. A name or formula in braces becomes the
-        number it has then, as in "force {press_y} N".
+        number it has then, as in "force {press_y} N". Two braces are one, and dollars enclose
+        mathematics, as in "$v_{max}$".
     label
         What is written beside the colours, such as "stress (MPa)"; the column when left out.
     only
