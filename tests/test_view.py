@@ -373,24 +373,29 @@ def test_view_knows_groups_solids_and_values_by_name(run_interpreted, monkeypatc
     own = 'dump(d, all, movie, 9, d.gif, 1, 1, 2*part, only=not second, title="{v} m/s")'
     text = block(2, SETS, FAST, own, "dump(p, all, particle, 9, p.*.dump, vx)", "run(2)")
     monkeypatch.chdir(run_interpreted(text).folder)
-    view = ["view", "p.2.dump", "-o", "v.png", "--size", "100", "100"]
+    words = ["view", "p.2.dump", "-o", "v.png", "--size", "100", "100"]
     for word, count in [*CHOSEN.items()][::3]:
         name, _, value = word.partition("=")
         option = [f"--{name}", value.strip('"')] if name in ("only", "title") else ["-c", word]
-        status, _, err = call(capsys, *view, *option, "--script", "in.script")
+        status, _, err = call(capsys, *words, *option, "--script", "in.script")
         assert (status, err) == (0, "") and shown[-1][0] == count, word
     v = 0.1 * 24 / 28
     assert shown[-1][1].startswith(f"v {v:.6g} of {{2}} $a_{{2}}$: step 2")
+    # The log is read where it is needed.
+    with monkeypatch.context() as without:
+        without.setattr(view, "read_rows", None)
+        known = ["--only", "not part && sqrt(vx^2) >= 0 and time < PI", "--title", "twice {time}"]
+        assert call(capsys, *words, *known, "--script", "in.script")[::2] == (0, "")
     # Without a script the log knows its columns.
     only = ["--only", "vx > twice/3"]
-    assert call(capsys, *view, *only)[0] == 0 and shown[-1][0] == 24
+    assert call(capsys, *words, *only)[0] == 0 and shown[-1][0] == 24
     Path("log.mpm").write_text("Step Time twice\n0 0 0\n")
-    assert "twice at step 2 is a value that dumps do not hold" in call(capsys, *view, *only)[2]
+    assert "twice at step 2 is a value that dumps do not hold" in call(capsys, *words, *only)[2]
     Path("log.mpm").unlink()
-    err = call(capsys, *view, *only, "--script", "in.script")[2]
+    err = call(capsys, *words, *only, "--script", "in.script")[2]
     assert "log_modify(custom, step, time, v) in the script" in err
     Path("in.small").write_text(block(2))
-    err = call(capsys, *view, "--script", "in.small")[2]
+    err = call(capsys, *words, "--script", "in.small")[2]
     assert "the script has 24 points, the dump 28" in err
 
 

@@ -2,6 +2,7 @@
 
 import argparse
 import glob
+import re
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -23,13 +24,15 @@ from karamelo_py.output.console import Console
 from karamelo_py.output.fields import ColumnFormula, unknown_column
 from karamelo_py.output.files import Frames, movie_format, picture_format, savefig, unwarned, whole
 from karamelo_py.output.point_table import members, named_sets
-from karamelo_py.output.quantity import Caption
+from karamelo_py.output.quantity import KEYWORDS, Caption
 from karamelo_py.output.snapshots import Snapshot, read
 from karamelo_py.output.units import labelled
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
 from karamelo_py.script.errors import ScriptError, plural, render_message
 from karamelo_py.script.expressions import GLOBAL_SEEDS
+from karamelo_py.script.functions import CONSTANTS, FUNCTIONS
+from karamelo_py.script.grammar import SPELLINGS
 from karamelo_py.script.parser import parse
 from karamelo_py.script.syntax import Raw, Source
 from karamelo_py.styles.dumps.pyplot import LEAST_PIXELS, MOST_PIXELS, look_of, tools_of
@@ -100,7 +103,6 @@ def run(options: argparse.Namespace) -> int:
     # Named by number, 1000 comes after 999.
     files = sorted(_matching(options.files), key=lambda path: (_number(path), path.name))
     drawn, scene = 0, _scene(options)
-    log = _log_beside(files, scene)
     if not movie and "*" not in options.output.name and len(list(islice(_all_in(files), 2))) > 1:
         raise ScriptError(
             f"{options.output} is one picture, and these are dumps of several moments",
@@ -112,6 +114,8 @@ def run(options: argparse.Namespace) -> int:
         for snapshot in _all_in(files):
             if picture is None:
                 with _telling_of_names(options):
+                    needs = _needs_log(snapshot, options, scene)
+                    log = _log_beside(files[0], scene) if needs else {}
                     look = _look(snapshot, options, scene)
                     chosen = partial(_chosen, look, scene, log)
                     picture = _picture(snapshot, files, options, look, scene, chosen)
@@ -174,15 +178,24 @@ def _scene(options: argparse.Namespace) -> Hub:
     return hub
 
 
-def _log_beside(files: list[Path], scene: Hub) -> dict[int, dict[str, float]]:
-    """Read the log beside the dumps, by step: formulas know the names of its columns."""
+def _needs_log(first: Snapshot, options: argparse.Namespace, scene: Hub) -> bool:
+    """Tell if a formula or title has a name that a dump lacks, or a tool may have one."""
+    formulas = [options.column, options.only, *Caption.PIECE.findall(options.title or "")]
+    asked = set(re.findall(r"[^\W\d]\w*", " ".join(filter(None, formulas))))
+    known = {*first.columns, *named_sets(scene), "time", "timestep", "step"}
+    known.update(FUNCTIONS, CONSTANTS, SPELLINGS)
+    return bool(asked - known or (options.script and options.outlines))
+
+
+def _log_beside(file: Path, scene: Hub) -> dict[int, dict[str, float]]:
+    """Read the log beside a dump, by step: formulas know the names of its columns."""
     rows = []
-    for name in ("log.mpm", "log.csv") if files else ():
+    for name in ("log.mpm", "log.csv"):
         with suppress(ScriptError):
-            rows += [row for row in read_rows(files[0].parent / name) if "Step" in row]
+            rows += [row for row in read_rows(file.parent / name) if "Step" in row]
     for name in filter(str.isidentifier, dict.fromkeys(name for row in rows for name in row)):
         scene.interpreter.variables.pop(name, None)  # of a formula the log has the value
-        if name not in scene.values:
+        if name not in scene.values and name not in KEYWORDS.values():
             scene.values.publish(name)
     return {int(row["Step"]): row for row in rows}
 
