@@ -366,6 +366,10 @@ def test_groups_and_solids_are_left_out_by_name(shown):
     with pytest.raises(ScriptError, match="unknown name 'partt'") as caught:
         sim.show(only="not partt")
     assert caught.value.hint == "did you mean 'part'?"
+    for name, what in (("second", "a variable or another value"), ("x", "a column")):
+        sim = Simulation(block(2, SETS.replace("(second", f"({name}"), "second = 2"))
+        with pytest.raises(ScriptError, match=f"'{name}' is a group or solid here, and {what}"):
+            sim.show(only=f"not {name}")
 
 
 def test_view_knows_groups_solids_and_values_by_name(run_interpreted, monkeypatch, capsys, shown):

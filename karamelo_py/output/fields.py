@@ -81,8 +81,8 @@ class Fields(PointTable):
         return list(dict.fromkeys([*point_table.COLUMNS, *own]))
 
     def shown_names(self) -> list[str]:
-        """Names that `particle` knows, with groups of points and solids: 1 for theirs, else 0."""
-        return list(dict.fromkeys([*self.particle_names(), *point_table.named_sets(self.hub)]))
+        """Names that `particle` knows, then groups of points and solids: 1 for theirs, else 0."""
+        return [*self.particle_names(), *point_table.named_sets(self.hub)]
 
     def node_names(self) -> list[str]:
         """Names that `node` knows."""
@@ -182,8 +182,16 @@ class ColumnFormula:
 
     def __init__(self, hub: Scene, argument: Argument):
         columns = hub.fields.particle_names()
-        sets = [name for name in hub.fields.shown_names() if not argument.knows(name)]
-        known = list(dict.fromkeys([*columns, *sets]))
+        sets = hub.fields.shown_names()[len(columns) :]
+        of_both = [name for name in sets if name in columns or argument.knows(name)]
+        if clash := set(of_both).intersection(re.findall(r"[^\W\d]\w*", argument.text)):
+            other = "a column" if min(clash) in columns else "a variable or another value"
+            raise ScriptError(
+                f"'{min(clash)}' is a group or solid here, and {other}",
+                place=argument.place,
+                expected="another name for the group or solid",
+            )
+        known = [*columns, *(name for name in sets if name not in of_both)]
         self.hub, self.text = hub, argument.text
         self.formula = Expression(argument.value_with(known))
         self.columns = sorted(self.formula.names & set(known))
