@@ -19,7 +19,7 @@ from karamelo_py.points.grid import Bounces
 from karamelo_py.points.laws import can, dissipated_energy, energy_density
 from karamelo_py.points.laws.eos import initial_energy, taken_heat
 from karamelo_py.points.laws.further import has_rate
-from karamelo_py.script.errors import ScriptError, table, unknown
+from karamelo_py.script.errors import ScriptError, one_of, table, unknown
 from karamelo_py.script.expressions import Expression
 
 PIECE = 1 << 17  # points that are looked at together
@@ -244,6 +244,7 @@ def unknown_column(message: str, name: str, known: Iterable[str], **where: Any) 
     """Make the error for a column that is none of the `known`; `where` it stands."""
     known = list(known)
     error = unknown(message, name, known, unknown=name, **where)
+    error.expected = one_of(name, known, page="docs/reference/columns.md")
     others = table()["columns"].items()
     quantity = next((columns for columns, words in others if name.lower() in words), "")
     if there := [column for column in quantity.split() if column in known]:

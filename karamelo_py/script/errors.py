@@ -153,14 +153,14 @@ def meant(name: str, names: Iterable[str]) -> str | None:
     return f"did you mean {' or '.join(close)}?" if close else None
 
 
-def one_of(name: str, names: Iterable[str], family: str = "") -> str:
-    """Write ``one of a, b, c``; of many the ones most like `name`, and what lists the family."""
+def one_of(name: str, names: Iterable[str], family: str = "", page: str = "") -> str:
+    """Write ``one of a, b, c``; of many those most like `name`, their number and what lists all."""
     names = list(dict.fromkeys(names))
     close = ", ".join(nearest_few(name, names))
     if len(names) <= 12 or not (close or family):
         return "one of " + ", ".join(names) if names else "one that there is (none so far)"
     if not family:
-        return f"one of {close}, ..."
+        return f"one of {close}, ... ({len(names)} in all{page and f': see {page}'})"
     listed = f"karamelo-py styles {family} lists all {len(names)}"
     return f"one of {close}, ... ({listed})" if close else listed
 
