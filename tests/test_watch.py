@@ -400,7 +400,7 @@ def test_the_end_of_a_run_tells_its_energy_at_one_time(run_interpreted):
     """
     done = run_interpreted(script)
     assert 0.25 < max(done.log.E_drift) < 0.35
-    (told,) = re.findall(r"energy +([+-][\d.]+) % of the largest since the start", done.out)
+    (told,) = re.findall(r"energy +([+-][\d.]+) % of the largest since the first step", done.out)
     assert abs(float(told)) < 1.5
 
 

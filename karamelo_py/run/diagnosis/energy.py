@@ -173,7 +173,7 @@ def taken_by(hub: Hub) -> list[str]:
 
 
 def share_lost(simulation: Any) -> float:
-    """Share of the largest energy so far that has gone since the start; negative: a gain."""
+    """Share of the largest energy so far that has gone since the first step; negative: a gain."""
     clock = simulation.control.clock[0]
     mean = (clock.balance + clock.last_balance + clock.last_but_one) / FEW
     return -growth(clock.first_balance, mean, max(clock.largest_energy, clock.energy_floor))
@@ -190,8 +190,8 @@ def words_of_loss(hub: Hub, simulation: Any, within: float) -> tuple[str, str] |
     cause, cure = cause_of_loss(hub)
     message = (
         f"step {simulation.step}, time {simulation.time:.6g}: energy is lost, {100 * lost:.2g} % "
-        f"of the largest so far since the start (kinetic + stored + dissipated - work). Known to "
-        f"do that here: {cause}"
+        f"of the largest so far since the first step (kinetic + stored + dissipated - work). Known "
+        f"to do that here: {cause}"
     )
     return message, cure
 
@@ -258,7 +258,7 @@ def change_of_energy(hub: Hub, simulation: Any) -> dict[str, str]:
         return {}
     # Since the first balance, not `first_few`, which `forget_growth` changes.
     share, takers, by = -100 * share_lost(simulation), taken_by(hub), ""
-    words = "of the largest since the start (kinetic + stored + dissipated - work)"
+    words = "of the largest since the first step (kinetic + stored + dissipated - work)"
     if takers and share < -1:
         often = takers[-1].startswith("transfer") and not hasattr(hub.update.transfer, "per_time")
         if hub.update.method.fields_per_solid or any(fix.impulsive for fix in hub.fixes.values()):
