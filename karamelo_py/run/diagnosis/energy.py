@@ -160,14 +160,18 @@ def words_of_growth(hub: Hub, simulation: Any) -> tuple[str, str] | None:
     return message, cure
 
 
+def blends(transfer: Any) -> bool:
+    """Check that points take a share of the velocities of nodes, and so lose what these lack."""
+    return getattr(transfer, "alpha", 0) < 1
+
+
 def taken_by(hub: Hub) -> list[str]:
     """Name what a script has chosen that takes energy without an account of it."""
     found, transfer, scheme = [], hub.update.transfer, hub.update.scheme
     if getattr(scheme, "damping", ""):
         found.append(f"scheme {registry.name_of('scheme', type(scheme))} with {scheme.damping}")
-    alpha = getattr(transfer, "alpha", None)
-    if alpha is None or alpha < 1:
-        share = "" if alpha is None else f" {alpha:g}"
+    if blends(transfer):
+        share = f" {transfer.alpha:g}" if hasattr(transfer, "alpha") else ""
         found.append(f"transfer {registry.name_of('transfer', type(transfer))}{share}")
     return found
 
@@ -201,17 +205,8 @@ def cause_of_loss(hub: Hub) -> tuple[str, str]:
     if getattr(update.scheme, "damps", False):
         name = registry.name_of("scheme", type(update.scheme))
         return f"scheme {name}, which damps what vibrates", "scheme(musl)"
-    if any(fix.impulsive for fix in hub.fixes.values()):
-        return (
-            "contact that undoes penetrations within a step: of such impulses the grid carries "
-            "only what it sees, the less the shorter the step",
-            "impenetrablesurface, indent or contact/hertz, whose forces grow with the depth",
-        )
-    if method.fields_per_solid:
-        return (
-            "collisions: nodes of a surface lose their velocity of approach",
-            "finer cells, of which collisions take less",
-        )
+    if found := collides(hub):
+        return found
     if method.frame.moves and getattr(method.basis, "gradient_jumps", False):
         return (
             f"points that cross cells, where the gradients of {method.basis_name} "
@@ -230,6 +225,22 @@ def cause_of_loss(hub: Hub) -> tuple[str, str]:
             "finer cells, TPIC or APIC, or method tlmpm for a solid",
         )
     return "waves that the cells do not resolve", "finer cells"
+
+
+def collides(hub: Hub) -> tuple[str, str] | None:
+    """Describe collisions that take energy, with their cure; None where nothing collides so."""
+    if any(fix.impulsive for fix in hub.fixes.values()):
+        return (
+            "contact that undoes penetrations within a step: of such impulses the grid carries "
+            "only what it sees, the less the shorter the step",
+            "impenetrablesurface, indent or contact/hertz, whose forces grow with the depth",
+        )
+    if hub.update.method.fields_per_solid:
+        return (
+            "collisions: nodes of a surface lose their velocity of approach",
+            "finer cells, of which collisions take less",
+        )
+    return None
 
 
 def grown_little(simulation: Any) -> bool:
@@ -260,9 +271,10 @@ def change_of_energy(hub: Hub, simulation: Any) -> dict[str, str]:
     share, takers, by = -100 * share_lost(simulation), taken_by(hub), ""
     words = "of the largest since the first step (kinetic + stored + dissipated - work)"
     if takers and share < -1:
-        often = takers[-1].startswith("transfer") and not hasattr(hub.update.transfer, "per_time")
-        if hub.update.method.fields_per_solid or any(fix.impulsive for fix in hub.fixes.values()):
-            takers.append("collisions")  # see `cause_of_loss`
+        transfer = hub.update.transfer
+        often = blends(transfer) and not getattr(transfer, "per_time", False)
+        if collides(hub):
+            takers.append("collisions")
         by = f"; {' and '.join(takers)} {'takes' if len(takers) == 1 else 'take'} some"
         by += ", the transfer more with shorter steps" * often
     return {"energy": f"{share:+.2f} % {words}{by}"}
