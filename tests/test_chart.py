@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from karamelo_py.app.cli import main
 from karamelo_py.app.studies import look, pictures
+from karamelo_py.app.studies.chart import in_html
 from karamelo_py.app.studies.curves import Family, Table, order
 from karamelo_py.output.plots import blank_figure, tick_texts, tidy
 
@@ -312,6 +313,12 @@ def test_numbers_of_an_axis_have_one_style(ticks, said):
     positive = [tick for tick in ticks if tick]
     look.log_axis(axes.xaxis, positive[0], positive[-1], positive)
     assert axes.xaxis.get_major_formatter().format_ticks(positive) == tick_texts(positive)
+
+
+def test_numbers_of_an_axis_on_a_page():
+    said = ["2·10<sup>-7</sup>", "10<sup>-3</sup>", "0", "-1.5·10<sup>5</sup>"]
+    assert tick_texts([2e-7, 1e-3, 0, -1.5e5], in_html) == said
+    assert tick_texts([5e-4, 20.0], in_html) == ["0.0005", "20"]
 
 
 def lucky_rows():

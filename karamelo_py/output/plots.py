@@ -128,17 +128,24 @@ def blank_figure(width: float, height: float) -> Any:
     return figure
 
 
-def tick_texts(numbers: Sequence[float]) -> list[str]:
+def in_mathtext(lead: str, exponent: int) -> str:
+    """Write a number times a power of ten for Matplotlib; no lead is 1."""
+    return rf"${lead}\cdot10^{{{exponent}}}$" if lead else f"$10^{{{exponent}}}$"
+
+
+def tick_texts(
+    numbers: Sequence[float], power: Callable[[str, int], str] = in_mathtext
+) -> list[str]:
     """Write the numbers of one axis in one style: 0.02, 500, or 10^-7, 3·10^-7."""
     plain = all(a == 0 or 1e-4 <= abs(a) < 1e5 for a in numbers)
-    return [f"{a:g}" if plain or a == 0 else _power(a) for a in numbers]
+    return [f"{a:g}" if plain or a == 0 else power(*_parts(a)) for a in numbers]
 
 
-def _power(a: float) -> str:
+def _parts(a: float) -> tuple[str, int]:
+    """Find what stands before the power of ten of a number, nothing for 1, and the exponent."""
     exponent = floor(log10(abs(a)) + 1e-9)
     lead = a / 10**exponent
-    tens = f"10^{{{exponent}}}"
-    return f"${tens}$" if abs(lead - 1) < 1e-9 else rf"${lead:g}\cdot{tens}$"
+    return "" if abs(lead - 1) < 1e-9 else f"{lead:g}", exponent
 
 
 def real_ticks(axis: Any) -> None:
@@ -151,7 +158,7 @@ def real_ticks(axis: Any) -> None:
             if largest == 0 or 1e-3 <= largest < 1e5:
                 return super().__call__(x, pos)
             whole = float(f"{x / largest:.12f}") * largest
-            return _power(whole) if whole else "0"
+            return in_mathtext(*_parts(whole)) if whole else "0"
 
     if type(axis.get_major_formatter()) is ScalarFormatter:
         whole = WholeNumbers(useOffset=False)

@@ -302,7 +302,7 @@ def write_page(family: Family, path: Path, words: tuple[str, str], title: str) -
         ticks = look.log_ticks(*(drawn.min(), drawn.max()) if len(drawn) else (1.0, 10.0))
         if 2 <= len(ticks) <= 14:
             figure.layout[axis].tickvals = ticks
-            figure.layout[axis].ticktext = [_in_html(text) for text in tick_texts(ticks)]
+            figure.layout[axis].ticktext = tick_texts(ticks, in_html)
     if family.words:
         figure.update_xaxes(tickvals=[*range(len(family.words))], ticktext=family.words)
     runs = [_about(row, family, family.table.path.parent, k) for k, row in enumerate(rows)]
@@ -324,10 +324,9 @@ def write_page(family: Family, path: Path, words: tuple[str, str], title: str) -
     write_whole(path, page)
 
 
-def _in_html(text: str) -> str:
-    """Write a number of an axis, a power of ten as Matplotlib has it, for a page."""
-    plain = text.strip("$").replace(r"\cdot", "·")
-    return plain.replace("^{", "<sup>").replace("}", "</sup>")
+def in_html(lead: str, exponent: int) -> str:
+    """Write a number times a power of ten for a page; no lead is 1."""
+    return f"{lead}·10<sup>{exponent}</sup>" if lead else f"10<sup>{exponent}</sup>"
 
 
 def _values(row: Mapping[str, str], family: Family) -> dict[str, str]:
