@@ -166,7 +166,7 @@ def command_lines(page):
 
 
 NAMES = {"check", "bench", "styles", "help", "-i SCRIPT", "help drag", "in.script", "script.mpm"}
-LATER = ("in.file", "SCRIPT", "in.script")  # scripts of the reader
+LATER = ("in.file", "SCRIPT", "in.script", "in.loss", "in.bars")  # scripts of the reader
 ENTRIES = [
     entry["name"] for entry in tomllib.loads((ROOT / "docs/atlas.toml").read_text("utf-8"))["entry"]
 ]
