@@ -36,7 +36,7 @@ def draw(name: str, how: dict) -> dict:
     """Run a scene with pictures of its own; what there is to tell of the run."""
     text = (INPUTS / f"in.{name}").read_text(encoding="utf-8")
     width, height = how.get("size", [640, 480])
-    drawn = f"film.png, {width}, {height}, {how['look']}"
+    drawn = f"film.png, {width}, {height}, fontsize=13, {how['look']}"  # read on a small card
     lines = [f"dump(own_picture, all, pyplot, 1000000000, {drawn})"]
     if "film" in how:
         small = f"{0.6 * width:.0f}, {0.6 * height:.0f}"

@@ -27,6 +27,46 @@ CARD = """````{{grid-item-card}} {title}
 {tags}
 ````"""
 
+# Titles of pages and cards, where the name of a scene does not say it to a reader.
+TITLES = {
+    "axis_aligned": "Pulsating square",
+    "axis_aligned_1d": "Pulsating bar",
+    "axis_aligned_3d": "Pulsating cube",
+    "billet": "Upset billet in space",
+    "billet_axisymmetric": "Upset billet, axisymmetric",
+    "cantilever_tets": "Cantilever of tetrahedra",
+    "cold_spray": "Cold spray in space",
+    "cold_spray_axisymmetric": "Cold spray, axisymmetric",
+    "collapse": "Heap of aluminium bars",
+    "column": "Column under its weight",
+    "cook": "Cook's membrane",
+    "dam_ritter": "Long dam break (Ritter)",
+    "element": "Laws of materials at a point",
+    "energy_disk": "Energy of a moving disk",
+    "heat_slab": "Heated slab",
+    "hertz": "Disk on a plane (Hertz)",
+    "incline": "Disk on an incline",
+    "lame": "Thick elastic cylinder (Lamé)",
+    "slow_bar": "Slowly vibrating bar",
+    "slump": "Slope failure",
+    "sod": "Shock tube (Sod)",
+    "static_billet": "Upset billet in load steps",
+    "static_block": "Block on a plane in load steps",
+    "static_collapse": "Soil under its weight in load steps",
+    "static_column": "Column under its weight in load steps",
+    "static_footing": "Footing in load steps",
+    "static_hertz": "Disk on a plane in load steps",
+    "static_rough_footing": "Rough footing in load steps",
+    "static_slope": "Slope failure in load steps",
+    "taylor_bar": "Taylor bar in space",
+    "taylor_bar_227": "Taylor bar at 227 m/s",
+    "taylor_bar_axisymmetric": "Taylor bar, axisymmetric",
+    "thick_cylinder": "Thick cylinder that flows",
+    "two_disks_2020": "Two disks in the language of 2020",
+    "two_disks_karamelo": "Two disks in Karamelo's language",
+    "vertical_bar": "Hanging cube",
+}
+
 
 def write_gallery(docs: Path, folder: Path) -> None:
     """Write a page for each scene, and the gallery of all, to `folder`, which is emptied before."""
@@ -50,18 +90,19 @@ def write_gallery(docs: Path, folder: Path) -> None:
         "Choose a card for the script, its pictures and its numbers. Times are those of one thread "
         "of a shared machine, with compilation, for the picture on the card. Numbers beside those "
         "of others are in [Comparison](../../comparison.md).",
-        "`````{grid} 1 2 3 3\n:gutter: 3\n\n" + "\n\n".join(cards) + "\n`````",
+        "`````{grid} 1 2 2 2\n:gutter: 3\n\n" + "\n\n".join(cards) + "\n`````",
         "## More scenes",
         "\n".join(["| script | what it is |", "|---|---|", *rest]),
-        TOC % "\n".join(scenes),
+        TOC % "\n".join(sorted(scenes, key=title_of)),
     ]
     (folder / "index.md").write_text("\n\n".join(parts) + "\n", encoding="utf-8")
 
 
 def _card(name: str, how: dict, told: dict) -> str:
     tags = " ".join(f"{{bdg-secondary-line}}`{tag}`" for tag in how["tags"])
-    title = name.replace("_", " ").capitalize()
-    return CARD.format(name=name, title=title, shows=how["shows"], size=_size(told), tags=tags)
+    return CARD.format(
+        name=name, title=title_of(name), shows=how["shows"], size=_size(told), tags=tags
+    )
 
 
 def _size(told: dict) -> str:
@@ -71,7 +112,7 @@ def _size(told: dict) -> str:
 
 def _page(name: str, title: str, text: str, told: dict | None, static: Path) -> str:
     """A scene: what it is, its bodies, how to run it, its chart, its script."""
-    parts = [f"# {name.replace('_', ' ').capitalize()}", title]
+    parts = [f"# {title_of(name)}", title]
     words = ""
     if told:
         words = "".join(f" -var {key} {value}" for key, value in told["var"].items())
@@ -89,6 +130,11 @@ def _page(name: str, title: str, text: str, told: dict | None, static: Path) -> 
     parts += [f"```text\n{text}\n```"] if text else []
     parts.append(f"```{{literalinclude}} ../../../inputs/in.{name}\n:language: karamelo\n```")
     return "\n\n".join(parts) + "\n"
+
+
+def title_of(name: str) -> str:
+    """Give the title of a scene for readers."""
+    return TITLES.get(name, name.replace("_", " ").capitalize())
 
 
 def head_of(text: str) -> tuple[str, str]:
