@@ -57,7 +57,7 @@ def of_change(kin):
 
 
 def vector_at(kin, records, i, first, like):
-    """The components of a record of a node from the `first` on, as a vector."""
+    """Return the components of a record of a node from the `first` on, as a vector."""
     return vector(kin, row(records, i, first, (*like,)))
 
 
@@ -86,7 +86,7 @@ class Points(NamedTuple):
 
 
 def known_to_laws(points):
-    """The points with what every scene has of them, and no more.
+    """Return the points with what every scene has of them, and no more.
 
     What asks laws alone is compiled once for each then, not for all methods that go with it.
     """
@@ -97,7 +97,7 @@ def known_to_laws(points):
 
 
 def arrays_of(points: Points) -> Iterator[tuple[str, np.ndarray]]:
-    """Every array of the points, with its name; the points come last in its shape."""
+    """Yield the arrays of the points with their names; points come last in the shapes."""
     for name, array in points._asdict().items():
         if name != "fields" and array is not None:
             yield name, array
@@ -106,7 +106,7 @@ def arrays_of(points: Points) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def made_of(points: Points, found: Iterable[np.ndarray]) -> Points:
-    """Points of the kind of `points` with such arrays as `arrays_of` has given."""
+    """Make points of the kind of `points` with such arrays as `arrays_of` has given."""
     arrays = iter(found)
     own: list[Any] = [None if array is None else next(arrays) for array in points[:-1]]
     return Points(*own, tuple(type(one)(next(arrays)) for one in points.fields))
@@ -350,7 +350,7 @@ class Control(NamedTuple):
 
 
 def new_control(values: np.ndarray, firsts: Sequence[int] = (), d: int = 0) -> Control:
-    """A control of these published values, its clock at zero, of solids in `d` dimensions."""
+    """Make a control of these published values, its clock at zero, of solids in `d` dimensions."""
     clock = np.zeros(1, CLOCK).view(np.recarray)
     clock[0].weight = clock[0].stride = 1.0
     more = (1 + d) * len(firsts)
@@ -389,7 +389,7 @@ def with_items_of(values, others):
 
 @noinline
 def first_from(ascending, begin, end, x):
-    """The first place of these whose number is not below `x`; NumPy's search compiles for 0.4 s."""
+    """Find the first number that is not below `x`; NumPy's search compiles for 0.4 s."""
     while begin < end:
         middle = (begin + end) // 2
         if ascending[middle] < x:

@@ -41,7 +41,7 @@ def kick(s: Setup) -> Number:
 
 
 def common_velocity(kin: Tag, clock: Any, like: Number) -> tuple:
-    """The velocity that speeds are measured from, in the number type of `like`."""
+    """Return the velocity that speeds are measured from, in the number type of `like`."""
     return vector(kin, [real(clock.common[0, k], like) for k in range(kin.dimension)])
 
 

@@ -185,7 +185,7 @@ def _normal(contact, kin, nodes, n):
 
 @noinline
 def _pair_of(contact, kin, nodes, records, n, m):
-    """The two bodies with nodes `n` and `m`; velocities are the first components of `records`."""
+    """Pair the bodies with nodes `n` and `m`; velocities are the first components of `records`."""
     per_n, per_m = 1.0 / nodes.sums[n, MASS], 1.0 / nodes.sums[m, MASS]
     # Opposite faces that end beside each other lean to opposite sides: the difference does not.
     of_n, scatter_n = _normal(contact, kin, nodes, n)
@@ -204,7 +204,7 @@ def _pair_of(contact, kin, nodes, records, n, m):
 
 
 def _left(pair, push):
-    """The relative velocity once the impulse `push` m grad N has been given."""
+    """Return the relative velocity once the impulse `push` m grad N has been given."""
     items = zip(pair.relative, pair.outward, pair.yielding, strict=True)
     return pair.relative._make([v - push * n * yielding for v, n, yielding in items])
 
@@ -307,7 +307,7 @@ def _meet(contact, nodes, n):
 
 @noinline
 def _node(contact, place, i):
-    """The node at a place of the `i`-th of the fields that meet there."""
+    """Return the node at a place of the `i`-th of the fields that meet there."""
     return place + contact.meeting[i] * contact.stride
 
 
@@ -345,7 +345,7 @@ def _share(contact, i, j):
 
 @noinline
 def _take(contact, control, a, i, n, k, impulse, per_mass, x):
-    """A node takes a component of an impulse; a fix that prescribes its velocity takes it over."""
+    """Give a node a component of an impulse; a fix that prescribes its velocity takes it over."""
     slot = contact.prescribed[n, k]
     if not _immovable(contact, n, k):
         contact.change[i, k] += impulse * per_mass

@@ -29,7 +29,7 @@ def export_state(kin, points, laws, out):
 
 @kernel
 def export(what, times_volume, kin, points, laws, out):
-    """One number ``out`` (n,) of each point, declared by laws that have it (`columns_of`).
+    """Fill ``out`` (n,) with a number of each point that laws declare (`columns_of`).
 
     ``times_volume`` multiplies it by the reference volume: energies from their densities.
     """
@@ -92,7 +92,7 @@ def export_to_nodes(basis, kin, grids, grid_of, where, values, unit, out):
 
 @kernel
 def export_velocity_moment(basis, kin, grids, grid_of, where, gradients, out):
-    """The moments ``out`` (d d, n) sum N v (X - x) of velocity fields with these gradients.
+    """Fill ``out`` (d d, n) with the moments sum N v (X - x) of velocities of these gradients.
 
     ``where`` (w, n) are the places that the weights belong to, on the grids ``grid_of`` (n,).
     """

@@ -179,7 +179,7 @@ def update_at(kin: arrays.Tag, nodes: arrays.Nodes, i: arrays.Index, like: array
 
 
 def add_gradient(w, stencil, k, grad_v):
-    """The velocity gradient with the part of the k-th node, where it is gathered at all."""
+    """Add the part of the k-th node to the velocity gradient, where it is gathered at all."""
     if not len(grad_v):
         return grad_v
     i, _, grad_N = straining_node(w, stencil, k)

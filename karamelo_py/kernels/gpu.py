@@ -326,11 +326,11 @@ class Stage:
 
     @property
     def numbers(self) -> int:
-        """The most numbers that a cell sums in a part."""
+        """Return the most numbers that a cell sums in a part."""
         return len(self.columns) * -(-self.support // self.parts)
 
     def nodes_of(self, part: int) -> tuple[int, int]:
-        """The nodes of a stencil that are summed in a part: from the first to before the second."""
+        """Return the nodes of a stencil that are summed in a part: from and to before."""
         count = self.support
         return count * part // self.parts, count * (part + 1) // self.parts
 
@@ -385,7 +385,7 @@ class Stage:
 
 
 def _grid_of(grids, n):
-    """The grid that node `n` belongs to."""
+    """Find the grid that node `n` belongs to."""
     g = 0
     for k in range(1, grids.first.size):
         if grids.first[k] <= n:
@@ -468,7 +468,7 @@ def list_point(i, fate, cells):
 
 
 def _point_and_corner(corners, count, listed):
-    """The point that is listed, of so many, and which of its corners."""
+    """Find the point that is listed, of so many, and which of its corners."""
     return (index(listed), 0) if corners == 1 else (index(listed % count), listed // count)
 
 

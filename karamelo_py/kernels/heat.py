@@ -279,12 +279,12 @@ def _at_heated_points_hooks(hooks, s):
 
 
 def _of_heat(s):
-    """The setup with the nodes of heat."""
+    """Return the setup with the nodes of heat."""
     return arrays.with_items_of(s, s.heat)
 
 
 def at_its_nodes(s):
-    """The same for tasks at nodes, which have one component."""
+    """Return the same for tasks at nodes, which have one component."""
     return _of_heat(s)._replace(kin=Line())
 
 

@@ -85,7 +85,7 @@ class CompiledHook(NamedTuple):
 
     @property
     def signature(self) -> Any:
-        """The Numba type of its function."""
+        """Return the Numba type of its function."""
         return FUNCTIONS[self.where]
 
 

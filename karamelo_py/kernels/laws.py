@@ -13,7 +13,7 @@ from karamelo_py.points.laws.parameters import Numbers
 
 
 def law_in(law: Any, real: type) -> Any:
-    """The law with its numbers in the type `real`."""
+    """Return the law with its numbers in the type `real`."""
     return type(law)(*(_in(p, real) for p in law))
 
 
@@ -24,7 +24,7 @@ def _in(value: Any, real: type) -> Any:
 
 
 def law_table(laws: Sequence[Any], real: type) -> Any:
-    """The NamedTuple of `laws` of one kind with an array (m,) for each number, m their count.
+    """Gather `laws` of one kind in a NamedTuple with an array (m,) for each number, m their count.
 
     Rows of numbers become arrays (m, longest).
     """
@@ -41,7 +41,7 @@ def _table(column: Sequence, real: type) -> Any:
 
 
 def law_on(law: Any, h: float, T0: float | None) -> Any:
-    """The law with what it has to know of a solid: cell size `h`, initial temperature `T0`.
+    """Tell the law what it has to know of a solid: cell size `h`, initial temperature `T0`.
 
     Laws and parts that need them have fields ``cell_size`` and ``initial_temperature``.
     """
@@ -59,5 +59,5 @@ def law_on(law: Any, h: float, T0: float | None) -> Any:
 
 
 def elastic_law(law: Any) -> Any:
-    """The law that makes the stress, of one that adds a temperature to it."""
+    """Return the law that makes the stress, of one that adds a temperature to it."""
     return getattr(law, "elastic", law)

@@ -112,7 +112,7 @@ def in_company(w, stencil, p, moment):
 
 
 def _own_share(lost, w, stencil, mass):
-    """The share of a point of this mass in what its nodes have, by its weights."""
+    """Return the share of a point of this mass in what its nodes have, by its weights."""
     share = mass - mass
     for i, weight, _ in nodes_of(w, stencil):
         share += weight * weight * mass / max(lost[i, 2], real(1e-36, mass))
@@ -147,7 +147,7 @@ def reflect(reflected, w, stencil, p, term, k):
 
 
 def gathered_term(w, stencil, term):
-    """The present term of XPIC's series at a point."""
+    """Gather the present term of XPIC's series at a point."""
     for i, weight, _ in nodes_of(w, stencil):
         term = term + weight * term_at(w, i, term)
     return term
@@ -162,12 +162,12 @@ def _spread(w, stencil, term):
 
 
 def term_at(w, i, like):
-    """The present term of XPIC's series at a node."""
+    """Return the present term of XPIC's series at a node."""
     return vector_at(w.kin, fields.field(w.nodes.fields, Series), i, 0, like)
 
 
 def _before(w, i, like):
-    """The velocity of a node before the update."""
+    """Return the velocity of a node before the update."""
     v = vector_at(w.kin, w.nodes.update, i, 0, like)
     return v - vector_at(w.kin, w.nodes.update, i, of_change(w.kin), like)
 

@@ -90,7 +90,7 @@ def at_node(task: Tag, kin: Tag, nodes: Nodes, n: Index, dt: Number) -> None:
 
 
 def per_mass(nodes: Nodes, n: Index, like: Number) -> Number:
-    """One over the mass of a node, 0 where it has none."""
+    """Return one over the mass of a node, 0 where it has none."""
     mass = nodes.sums[n, arrays.MASS]
     return real(1, like) / mass if mass > 0 else real(0, like)
 
@@ -141,7 +141,7 @@ def _at_node_sums_to_velocity(task, kin, nodes, n, dt):
 
 
 def unlimited(seen, n, mass, light):
-    """The share of its change of velocity that a node shows: all where it is not light."""
+    """Return the share of its change of velocity that a node shows: all where it is not light."""
     if seen is None:
         return real(1, mass)
     square = mass * mass

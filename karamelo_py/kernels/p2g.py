@@ -156,7 +156,7 @@ class RigidSums(SummedField):
 
     @staticmethod
     def shape(kin):
-        """The components of the sums of a node."""
+        """Return the components of the sums of a node."""
         return arrays.SUMS_WIDTH[kin.dimension]
 
 
@@ -186,7 +186,7 @@ def _is_apart(w):
 
 
 def _mass(w, p):
-    """The mass that a point gives to the sums of all solids."""
+    """Return the mass that a point gives to the sums of all solids."""
     mass = of_present(p, w.points.mass[p])
     return mass - mass if _is_apart(w) else mass
 
@@ -319,7 +319,7 @@ def adds(quantity: NamedTuple) -> bool:
 
 
 def columns_of(quantities: tuple, kin: NamedTuple) -> list[tuple[Any, int, int]]:
-    """The columns that take all the quantities; those that follow each other are one entry."""
+    """List the columns that take all the quantities; those that follow each other are one entry."""
     found: dict[tuple[Any, int], int] = {}  # the first column of each array that ends there
     for quantity in quantities:
         for array, first, end in quantity.fills(kin):

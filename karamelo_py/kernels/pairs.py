@@ -160,7 +160,7 @@ def _lay_cells(d, bodies, cells, reach):
 
 @noinline
 def _find_cells(d, bodies, cells, width):
-    """The cell of every point, and those of the second body sorted by it, stably."""
+    """Find the cell of every point, and sort those of the second body by it, stably."""
     n, m = bodies.first2, bodies.mass.size
     used = cells.count[0] * cells.count[1] * cells.count[2]
     cells.start[: used + 1] = 0
@@ -187,7 +187,7 @@ def _find_cells(d, bodies, cells, width):
 
 @noinline
 def _touch(law, kin, bodies, reach, dt, kick, i, j, total):
-    """The force between two points, if they touch; whether they do."""
+    """Add the force between two points, if they touch; tell whether they do."""
     x, f = bodies.x, bodies.force
     none = zero_vector(kin, 0.0)
     dx = vector_at(kin, x, j, 0, none) - vector_at(kin, x, i, 0, none)

@@ -35,7 +35,7 @@ class RigidBodies(NamedTuple):
 
 @noinline
 def _impose(kin, nodes, rigid, dt, kept, control, n):
-    """A node that sees rigid points takes their velocity; the force of that stands in `rigid`.
+    """Give a node that sees rigid points their velocity; the force of that stands in `rigid`.
 
     Its work on the others is that of one that prescribes velocities.
 
@@ -62,7 +62,7 @@ def _impose(kin, nodes, rigid, dt, kept, control, n):
 
 
 def _impose_on_strain(kin, nodes, rigid, n):
-    """The same of the velocity that deforms the points."""
+    """Do the same with the velocity that deforms the points."""
     if rigid[n, MASS] > 0:
         for k in range(kin.dimension):
             nodes.velocity[n, k] = rigid[n, of_momentum(kin) + k] / rigid[n, MASS]

@@ -48,7 +48,7 @@ class SortedOrder(NamedTuple):
 
 
 def cell_of(grid: Grid, direction: int, at: Number) -> int:
-    """The cell of a point that lies so many cells from the corner of the grid.
+    """Find the cell of a point that lies so many cells from the corner of the grid.
 
     Clamped, since a hook may have put a point anywhere: the next sweep finds it.
     """
@@ -56,7 +56,7 @@ def cell_of(grid: Grid, direction: int, at: Number) -> int:
 
 
 def _seen(grid, around, g, direction, at):
-    """The first and last nodes of grid `g` that a point at `at` cells may see along a direction."""
+    """Find the first and last node of grid `g` that a point at `at` cells may see that way."""
     first = cell_of(grid, direction, at - around.reach)
     last = cell_of(grid, direction, at + around.reach)
     top = around.top[g, direction]

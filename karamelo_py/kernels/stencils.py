@@ -45,7 +45,7 @@ def _affine(w, stencil, value, growths):
 
 
 def _momentum(w, stencil, mass, v, moment):
-    """The momentum at the first node, and its growth; () where nobody knows."""
+    """Return the momentum at the first node, and its growth; () where nobody knows."""
     momentum = mass * v
     if not len(moment):
         return () if transfers.nodal_momentum.defined(type(w.transfer)) else (momentum, ())
@@ -188,13 +188,13 @@ def all_by_corners(parts, w):
 
 
 def _seeing(basis, w):
-    """The work with something in the place of the basis."""
+    """Return the work with something in the place of the basis."""
     items = zip(w._fields, w, strict=True)
     return type(w)(*[basis if name == "basis" else item for name, item in items])
 
 
 def in_block(w):
-    """The work of points that see blocks of nodes."""
+    """Return the work of points that see blocks of nodes."""
     return _seeing(InBlock(w.basis), w)
 
 
@@ -204,7 +204,7 @@ def shows_corners(tasks, w):
 
 
 def gather_corners(tasks, w, stencil, totals):
-    """The totals of the tasks over all corners."""
+    """Add up the totals of the tasks over all corners."""
     at = _seeing(AtCorners(w.basis), w)
     for c in range(support(at.basis, w.kin)):
         totals = g2p.gathered_all(tasks, at, stencil, c, totals)

@@ -33,7 +33,7 @@ class Staged(NamedTuple):
 
 
 def rows_of(scheme: Any, visits: Any) -> list[Any]:
-    """The rows of a step of `scheme`."""
+    """List the rows of a step of `scheme`."""
     return table.fused(scheme.rows) if visits is Fused else table.staged(scheme.rows)
 
 
@@ -45,7 +45,7 @@ def first_rows(scheme: Any, visits: Any) -> list[Any]:
 
 
 def _take(row, s, mode, hooks, more):
-    """One row of the table; whether all points went well."""
+    """Take one row of the table; tell whether all points went well."""
     if isinstance(row, table.AtPoints):
         at_points(hooks, row.stage, row.then, s)
     elif isinstance(row, table.AtNodes):
@@ -75,7 +75,7 @@ def _take(row, s, mode, hooks, more):
 
 
 def _visit(row, s, mode, more):
-    """A visit of the points; whether all went well."""
+    """Visit the points; tell whether all went well."""
     whole = clocks.last_step_size(s) if row.of_last_step else clocks.step_size(s)
     dt = whole if row.share == 1 else real(row.share, whole) * whole
     scatters = more if row.only_if_more else row.scatters
@@ -96,7 +96,7 @@ _begin_rows: Any = functools.cache(first_rows)
 
 
 def step(scheme: Tag, visits: Tag, mode: Tag, s: Setup, hooks: Tag, more: bool) -> bool:
-    """One step of `scheme`. With `more`, a fused step leaves the next step's sums on the nodes.
+    """Take a step of `scheme`. With `more`, a fused one leaves the next one's sums on the nodes.
 
     Returns whether all points went well.
     """
@@ -197,7 +197,7 @@ def _fastest(frame, kin, points, laws, control):
 
 
 def measure(s: Setup) -> None:
-    """The rate of the present state, for the first dt."""
+    """Measure the rate of the present state, for the first dt."""
     s.control.clock[0].rate = 0.0
     for block in s.blocks:
         _fastest(s.frame, s.kin, block.points, block.laws, s.control)

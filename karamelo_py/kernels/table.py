@@ -152,7 +152,7 @@ def each_point(function: Any, law: type) -> EachPoint:
 
 
 def _tasks(gathers: list[Gather]) -> tuple:
-    """The tasks of one visit; what strains is told of what comes before it.
+    """List the tasks of one visit; what strains is told of what comes before it.
 
     Strain behind a move knows what that gathered. By the velocity of the last step, points are
     strained where that has led them.
@@ -171,7 +171,7 @@ def _kinds(tags: Any) -> Any:
 
 
 def fused(rows: Iterable[Any]) -> list[Any]:
-    """The rows of a step with as few visits as they allow; the sums are on the nodes before it."""
+    """List the rows of a step with as few visits as they allow; sums are on the nodes before."""
     kept = [row for row in rows if not isinstance(row, AtPoints | Check)]
     first = next(k for k, row in enumerate(kept) if isinstance(row, Scatter))
     next_sums = kept.pop(first)
@@ -201,16 +201,16 @@ def fused(rows: Iterable[Any]) -> list[Any]:
 
 
 def staged(rows: Iterable[Any]) -> list[Any]:
-    """The rows of a step one by one, as parts of the visits of the fused step where they can be."""
+    """List the rows of a step one by one, where they can be as parts of visits of the fused."""
     rows = list(rows)
     return one_by_one(rows, [row.visit for row in fused(rows) if isinstance(row, Sweep)])
 
 
 def one_by_one(rows: Iterable[Any], loops: Iterable[Visit] = ()) -> list[Any]:
-    """The rows of a part of a step, each a visit of its own, or a part of one of `loops`."""
+    """List the rows of a part of a step, each a visit of its own, or a part of one of `loops`."""
 
     def loop_of(own: Visit) -> Visit:
-        """The one of `loops` with such tasks, or such quantities; else the visit itself."""
+        """Find the one of `loops` with such tasks, or such quantities; else the visit itself."""
         part = slice(0, 1) if own.tasks else slice(1, 3)
         return next((visit for visit in loops if _kinds(visit[part]) == _kinds(own[part])), own)
 
@@ -239,7 +239,7 @@ def says(row: Any, setup: Any) -> str | None:
 
 
 def plain(rows: Iterable[Any], s: Setup) -> Iterator[Any]:
-    """The rows of a scene, with all that it adds: averaged volumes belong to visits that strain."""
+    """List the rows of a scene with all it adds: averaged volumes belong to visits that strain."""
     for row in rows:
         if isinstance(row, SceneTask):
             yield from plain(row.rows(s), s)
@@ -267,7 +267,7 @@ def _clear_radial(s, n):
 
 
 def _axis_of(grids, g):
-    """The range of the nodes on the axis of a grid."""
+    """Return the range of the nodes on the axis of a grid."""
     first = grids.first[g]
     return first, first + (
         grids.step_x[g] if abs(grids.x0[g]) <= grids.slack[g] * grids.h[g] else 0

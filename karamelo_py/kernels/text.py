@@ -49,7 +49,7 @@ BYTEWISE = config.DISABLE_JIT or sys.byteorder != "little"  # type: ignore[attr-
 
 
 def rows(columns: Sequence[np.ndarray]) -> Iterator[bytes]:
-    """The rows of a table as text, block by block.
+    """Yield the rows of a table as text, block by block.
 
     Integers are written as integers, the rest with nine significant digits.
     """
@@ -174,7 +174,7 @@ def _put_number(text, at, x, bits):
 
 
 def _decimal(x, binary):
-    """The nine digits of x > 0 as an integer, 0 if in doubt, and the power of ten of the first.
+    """Find nine digits of x > 0 as an integer, 0 if in doubt, and the power of ten of the first.
 
     `binary` is the power of two of x.
     """
@@ -194,7 +194,7 @@ def _decimal(x, binary):
 
 
 def _eight(n):
-    """The eight digits of n < 10^8 as the bytes of their text: halves, quarters, eighths."""
+    """Return the eight digits of n < 10^8 as the bytes of their text: halves, quarters, eighths."""
     four = n * 109951163 >> 40  # n // 10^4
     word = four | (n - 10_000 * four) << 32
     two = (word * 5243 >> 19) & 0x7F0000007F  # // 100

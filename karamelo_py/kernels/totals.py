@@ -130,7 +130,7 @@ def carry(total):
 
 @kernel
 def rounded(total):
-    """The value of a total (LIMBS,), which is left in digits."""
+    """Return the value of a total (LIMBS,), which is left in digits."""
     if total[LOST] > 0:
         return np.nan
     carry(total)
@@ -184,7 +184,7 @@ def counts(ranks, n):
 
 @point_function(otherwise=True)
 def number_of_all(ranks, control, number):
-    """The sum of a number over all processes."""
+    """Sum a number over all processes."""
     return number
 
 
@@ -204,7 +204,7 @@ def take_over(ranks, due):
 
 
 def publish(control, slot, count):
-    """The published values from `slot` on become those of their totals."""
+    """Set the published values from `slot` on to those of their totals."""
     collect(control.ranks, control, slot, count)
     for k in range(count):
         control.values[slot + k] = control.answer[k]

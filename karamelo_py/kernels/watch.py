@@ -51,7 +51,7 @@ BORNE = 4.0
 
 
 def solid_of(firsts, number):
-    """The solid that a point of this id belongs to."""
+    """Find the solid that a point of this id belongs to."""
     return first_from(firsts, 0, firsts.size, number + 1) - 1
 
 
@@ -188,7 +188,7 @@ def take_drift(s):
 
 
 def _sum_before(s, mode, step):
-    """The energies of a step whose next is looked at."""
+    """Sum the energies of a step whose next is looked at."""
     sum_energies(s, mode)
     note_before(s.control.clock[0], step)
 
