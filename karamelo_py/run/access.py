@@ -65,7 +65,7 @@ class PointsById:
         return rounded(self.comm.allreduce(limbs)[0])
 
     def rows_of(self, group: Any) -> Iterator[tuple[Block, np.ndarray]]:
-        """The points of a group that are at hand, so many at a time: a block, and rows of it."""
+        """Yield the points of a group at hand, so many at a time: a block, and rows of it."""
         for block in self.setup.blocks:
             ids = block.points.id
             for first in range(0, len(ids), PIECE):
@@ -126,7 +126,7 @@ class PointsById:
         return self.comm.allgather(say(self.simulation, *arguments))
 
     def largest(self, of: Callable[[PointTable], np.ndarray]) -> tuple[float, int]:
-        """The largest number that a function says of all points, and the first point with it."""
+        """Find the largest number that a function says of points, and the first with it."""
 
         def own() -> tuple[float, int]:
             found = -inf, 0
@@ -167,7 +167,7 @@ class PointsById:
 
 
 def _ranges(count: int) -> Iterator[tuple[int, int]]:
-    """The numbers of pieces of so many, from and to before, one after another."""
+    """Yield the numbers of pieces of so many, from and to before, one after another."""
     return ((first, min(first + PIECE, count)) for first in range(0, count, PIECE))
 
 
@@ -178,7 +178,7 @@ class NodesByNumber:
         self.points, self.simulation = points, points.simulation
 
     def pieces(self, names: Iterable[str], *, to_first: bool = False) -> Iterator[NodeRows]:
-        """All nodes, so many at a time, with the sums over points of these names; see `pieces`."""
+        """Yield all nodes, so many at a time, with these sums over points; see `pieces`."""
         simulation, hub, comm = self.simulation, self.points.hub, self.points.comm
         simulation.show_on_nodes()
         s = simulation.setup
@@ -212,14 +212,14 @@ class NodesByNumber:
         return own
 
     def counted(self) -> np.ndarray:
-        """The numbers of the nodes in use, of each at one process."""
+        """Give the numbers of the nodes in use, of each at one process."""
         simulation = self.simulation
         if simulation.subdomain is not None:
             return simulation.subdomain.counted()
         return numbers(simulation.setup.spans)
 
     def with_mass(self) -> np.ndarray:
-        """The numbers of those of them that have mass."""
+        """Give the numbers of those of them that have mass."""
         nodes = self.counted()
         return nodes[self.simulation.setup.nodes.sums[nodes, MASS] > 0]
 

@@ -138,7 +138,7 @@ def yields(law: Any) -> bool:
 
 
 def _bodies(s: Any) -> list[tuple[BodyMotion, Any]]:
-    """The solids that may vibrate, and how they move."""
+    """List the solids that may vibrate, and how they move."""
     solids = list(s.hub.solids.values())
     bodies = [(one, solids[one.number].material.law) for one in s.motions if s.waves > 0]
     return [(one, law) for one, law in bodies if rings(law)]

@@ -65,7 +65,7 @@ def ranges_of_shares(rows: np.ndarray, owner: np.ndarray, count: int) -> np.ndar
 
 
 def extents(starts: np.ndarray, begin: np.ndarray, end: np.ndarray) -> tuple[np.ndarray, ...]:
-    """The least and largest of the rows from each start to the next."""
+    """Find the least and largest of the rows from each start to the next."""
     if not len(starts):
         return begin, end
     return np.minimum.reduceat(begin, starts), np.maximum.reduceat(end, starts)
@@ -87,12 +87,12 @@ def without(spans: np.ndarray, others: np.ndarray) -> np.ndarray:
 
 
 def numbers(spans: np.ndarray) -> np.ndarray:
-    """The numbers of the nodes in spans, of which the first row is the count."""
+    """List the numbers of the nodes in spans, of which the first row is the count."""
     return between(*used(spans)[1:].T)
 
 
 def between(begin: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """All whole numbers from each begin to before its end."""
+    """List all whole numbers from each begin to before its end."""
     of, left = ragged(end - begin)
     return begin[of] + left
 
@@ -129,13 +129,13 @@ def buffers_of(s: Setup) -> list[Buffers]:
 
 
 def chosen_of(nodes: Nodes, what: int) -> list[np.ndarray]:
-    """The arrays that points give to, of the kinds that `what` names (kernels.p2g.arrays_given)."""
+    """List the arrays that points give to, of the kinds in `what` (kernels.p2g.arrays_given)."""
     sums, velocity, *rest = summed(nodes)
     return [sums] * (what & 1) + [velocity] * (what >> 1 & 1) + rest * (what >> 2 & 1)
 
 
 def summed(nodes: Nodes) -> list[np.ndarray]:
-    """The arrays that points give to."""
+    """List the arrays that points give to."""
     own = [one.array for one in nodes.fields if getattr(type(one), "summed", False)]
     return [nodes.sums, nodes.velocity, *own]
 

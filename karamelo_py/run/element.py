@@ -183,13 +183,13 @@ class Point:
     def _solve(
         self, motion: Loading, dt: float, a: float, b: float, rate: np.ndarray
     ) -> np.ndarray:
-        """One increment: Newton's iteration for the strains whose stress is prescribed."""
+        """Solve one increment: Newton's iteration for the strains whose stress is prescribed."""
         prescribed, target = motion.prescribed, motion.begin + b * (motion.end - motion.begin)
         increment = (b - a) * motion.strain
         rigid = self._turned((b - a) * motion.turn, dt)
 
         def after(unknown: np.ndarray) -> tuple[tuple, np.ndarray] | None:
-            """The state and its stress; None where there is none."""
+            """Return the state and its stress; None where there is none."""
             increment[prescribed] = unknown
             dl = self._strained(increment, motion.shear) + rigid
             try:
@@ -248,7 +248,7 @@ class Point:
         increment: np.ndarray,
         target: np.ndarray,
     ) -> np.ndarray:
-        """The strains at which `misfit` vanishes, by its exact tangent."""
+        """Find the strains at which `misfit` vanishes, by its exact tangent."""
         if not len(guess):
             return guess
         volume = laws.specific_volume(self.law) * laws.jacobian(self.law, self.kin, self.state)

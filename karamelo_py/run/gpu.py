@@ -41,7 +41,7 @@ _NONE = arrays.NoHooks()
 
 
 def arrays_in(thing: Any) -> Iterator[np.ndarray]:
-    """Every array in nested tuples."""
+    """Yield the arrays in nested tuples."""
     if isinstance(thing, np.ndarray):
         yield thing
     elif isinstance(thing, tuple):
@@ -59,7 +59,7 @@ def there(s: arrays.Setup) -> arrays.Setup:
 
 
 def as_rows(image: np.ndarray) -> np.ndarray:
-    """The numbers of points, (..., n), as whole numbers (rows, n) of as many bytes."""
+    """See the numbers of points, (..., n), as whole numbers (rows, n) of as many bytes."""
     rows = int(np.prod(image.shape[:-1], dtype=int))
     step = image.strides[-2] if image.ndim > 1 else 0
     whole = {4: np.int32, 8: np.int64}[image.itemsize]
@@ -216,7 +216,7 @@ class StepsOnCard:
         return found
 
     def _plain(self, rows: Iterable) -> Iterator[Any]:
-        """The rows of the scene, those that are repeated one after another."""
+        """Yield the rows of the scene, those that are repeated one after another."""
         for row in table.plain(rows, self.s):
             if isinstance(row, table.Repeated):
                 for k in range(row.count(self.s)):
@@ -317,7 +317,7 @@ class StepsOnCard:
         return 1 + max((operand for op, operand in self._globals()), default=0)
 
     def _globals(self) -> Iterator[tuple[int, int]]:
-        """The instructions of formulas that ask for published values."""
+        """Yield the instructions of formulas that ask for published values."""
         return ((op, int(slot)) for op, slot in self.hooks.code if op % UNIFORM == GLOBAL)
 
     def _members(self, h: int) -> int:
@@ -381,7 +381,7 @@ class StepsOnCard:
     # --- totals, and the watch over energy
 
     def _slots(self) -> tuple[int, int]:
-        """The first of the rows of totals that hooks publish, and where they end."""
+        """Return the first of the rows of totals that hooks publish, and where they end."""
         slots = [int(row.slot) for row in self._table() if row.slot >= 0]
         return (min(slots), max(slots) + 3) if slots else (0, 0)
 

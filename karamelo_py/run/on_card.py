@@ -57,7 +57,7 @@ class SimulationOnCard(Simulation):
 
     @property
     def setup(self) -> Setup:
-        """The arrays, as the last step has left them."""
+        """Return the arrays, as the last step has left them."""
         self._fetch()
         return self._setup
 
@@ -67,7 +67,7 @@ class SimulationOnCard(Simulation):
 
     @property
     def nodes(self) -> NodesByNumber:
-        """The nodes, as the last step has left them: there may be many, and few ask for them."""
+        """Return the nodes, as the last step has left them: they may be many, and few ask."""
         if self._nodes_ahead:
             self._fetch()
             self._nodes_ahead = False

@@ -111,7 +111,7 @@ class SceneArrays:
 
     @property
     def now(self) -> int:
-        """The number of the present of the two position arrays."""
+        """Return the number of the present of the two position arrays."""
         return int(self.control.clock[0].now)
 
     @property
@@ -128,7 +128,7 @@ class SceneArrays:
         return int(self.control.values[TIMESTEP])
 
     def state(self) -> State:
-        """All that a new lowering takes over."""
+        """Return all that a new lowering takes over."""
         if self.subdomain is not None:
             self.subdomain.share_memory()
         laws, all_points = {}, self.points.rows()
@@ -210,7 +210,7 @@ class SceneArrays:
         return int(self.points.total("bounces"))
 
     def clear_forces(self) -> None:
-        """Points bear no force of fixes, until these say so anew."""
+        """Clear the forces of fixes on points, until these say so anew."""
         for block in self.setup.blocks:
             force = field(block.points.fields, Force)
             if force is not None:

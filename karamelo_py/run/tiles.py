@@ -154,7 +154,7 @@ class Tiles:
         return beyond if far < cells else cells  # also where it is not a number
 
     def _where(self, s: kernel_arrays.Setup, points: kernel_arrays.Points) -> np.ndarray:
-        """The places (w, n) that weights belong to."""
+        """Return the places (w, n) that weights belong to."""
         return points.x[s.control.clock[0].now] if points.home is None else points.home
 
     def tiles_of(self, s: kernel_arrays.Setup, points: kernel_arrays.Points) -> np.ndarray:
@@ -276,7 +276,7 @@ class Tiles:
         return grid_boxes.joined_spans(own), ranges, firsts, parts
 
     def _beside(self, tile: np.ndarray, grid: np.ndarray) -> np.ndarray:
-        """The first of the tiles of nodes (n,) that are of one share with each.
+        """Find the first of the tiles of nodes (n,) that are of one share with each.
 
         To go through memory with gaps of some thousand bytes takes twice as long. So, one thread
         has one share, and long tiles are of one share with those in the same rows of nodes.
@@ -289,7 +289,7 @@ class Tiles:
         return tile - (tile - first) % along
 
     def _shares(self, s: kernel_arrays.Setup) -> np.ndarray:
-        """The share of the points of its block that each own tile is in."""
+        """Find the share of the points of its block that each own tile is in."""
         found = []
         for block in s.blocks:
             tiles, shares, _ = block.tiling.count

@@ -41,7 +41,7 @@ def sparse(hub: Hub) -> bool:
 
 
 def keeping_share(hub: Hub) -> float:
-    """The largest share of the stable step with which a drifting body keeps its energy.
+    """Return the largest share of the stable step with which a drifting body keeps its energy.
 
     Where points go from cell to cell, and keep their own velocities (FLIP and its kin), jumps of
     the gradients feed energy to a body, about as the third power of the step. The numbers are those
@@ -90,7 +90,7 @@ def _flows(law: Any) -> bool:
 
 
 def lone_point(hub: Hub) -> float:
-    """The stable step over h/c of a point that has its nodes for itself and keeps a moment.
+    """Return the stable step over h/c of a point that has its nodes for itself and keeps a moment.
 
     The velocity gradient L that it keeps answers to its pressure by dL/dt = -p / (rho D): an
     oscillator of the frequency c sqrt(d / D), stable up to dt = 2 sqrt(D / d) / c; sums of
@@ -152,7 +152,7 @@ def common_velocity(simulation: Any, weight: float) -> np.ndarray:
 
 
 def courant_number(hub: Hub, *, longer: bool) -> float:
-    """The stable step over h/c; `longer` is that of points which stay where they are."""
+    """Return the stable step over h/c; `longer` is that of points which stay where they are."""
     scheme, method = hub.update.scheme, hub.update.method
     two, one = getattr(scheme, "courant", (1.0, 1.0))  # a plug-in may have nothing to say of it
     if min(two, one) < 1:
@@ -170,7 +170,7 @@ def courant_number(hub: Hub, *, longer: bool) -> float:
 
 
 def own_step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
-    """The stable step over h/c, and the share of it that the program takes of itself.
+    """Return the stable step over h/c, and the share of it that the program takes of itself.
 
     `still`: while no point has gone as far as `STILL`. The stable step is that of scheme, basis and
     points per cell.
@@ -186,7 +186,7 @@ def own_step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
 
 
 def step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
-    """The same with the share of the script, which is one of the same step at rest as after."""
+    """Return the same with the share of the script: that of the same step at rest as after."""
     update = hub.update
     if update.dt_factor is None and update.fixed_dt is None:
         return own_step_of_waves(hub, still=still)
@@ -194,7 +194,7 @@ def step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
 
 
 def own_step(hub: Hub, simulation: Any, *, still: bool = False) -> float:
-    """The step that the program would take of itself now: at rest, or had points moved."""
+    """Return the step that the program would take of itself now: at rest, or had points moved."""
     clock = simulation.control.clock[0]
     courant, share = own_step_of_waves(hub, still=still)
     weight = own_weight_of_drift(hub)
@@ -206,7 +206,7 @@ def own_step(hub: Hub, simulation: Any, *, still: bool = False) -> float:
 
 
 def _borne(hub: Hub, simulation: Any) -> float:
-    """The largest step that points bear where they are."""
+    """Find the largest step that points bear where they are."""
     clock = simulation.control.clock[0]
     return own_step_of_waves(hub, still=clock.path <= STILL)[0] * clock.spacing / clock.rate
 
@@ -229,7 +229,7 @@ def what_follows(hub: Hub, simulation: Any, step: float) -> str:
 
 
 def words_of_own_step(hub: Hub, simulation: Any) -> str:
-    """The step that the program would take of itself now, and how long; empty where it does."""
+    """Tell the step that the program would take of itself and how long; empty where it does."""
     if hub.update.dt_factor is None and hub.update.fixed_dt is None:
         return ""
     still = simulation.control.clock[0].path <= STILL
@@ -239,7 +239,7 @@ def words_of_own_step(hub: Hub, simulation: Any) -> str:
 
 
 def stable_step(hub: Hub, simulation: Any, limit: float) -> float:
-    """The stable step where a script asks for one: `limit`, or what the program's own is of."""
+    """Return the stable step where a script asks for one: `limit`, or that of the program's own."""
     return max(limit, own_step(hub, simulation) / USUAL)
 
 
@@ -281,7 +281,7 @@ def words_of_share(hub: Hub) -> str:
 
 
 def ruling_limit(simulation: Any) -> str:
-    """The name of what limits the step now.
+    """Return the name of what limits the step now.
 
     ``set_dt`` and ``end`` (of the run) are no limits of stability; ``conduction`` is that of heat,
     ``viscosity`` that of waves which viscosity slows down, ``speed`` that of points which move

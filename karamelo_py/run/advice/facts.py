@@ -78,7 +78,7 @@ class SceneFacts:
 
     @cached_property
     def text(self) -> str:
-        """The text of the script, without comments."""
+        """Return the text of the script, without comments."""
         return script_text(self.hub)
 
     @property
@@ -102,14 +102,14 @@ class SceneFacts:
 
     @cached_property
     def turn(self) -> float:
-        """The angle by which the solid that turns most would turn in this run, if none held it."""
+        """Find the angle by which the solid that turns most would turn if none held it."""
         if self.d == 1 or self.hub.domain.axisymmetric:
             return 0.0
         return max((one.spin for one in self.motions), default=0.0) * self.duration
 
     @property
     def share(self) -> float:
-        """The step over the stable one."""
+        """Return the step over the stable one."""
         return self.simulation.dt / self.simulation.limit
 
     @property
@@ -131,18 +131,18 @@ class SceneFacts:
 
     @cached_property
     def waves(self) -> float:
-        """The speed of waves."""
+        """Return the speed of waves."""
         clock = self.simulation.control.clock[0]
         return float(clock.rate) - self.simulation.fastest(clock.common[0])
 
     @cached_property
     def fastest(self) -> float:
-        """The largest component of a velocity."""
+        """Find the largest component of a velocity."""
         return self.simulation.fastest()
 
     @property
     def speed(self) -> float:
-        """The same over the speed of waves."""
+        """Return the same over the speed of waves."""
         return self.fastest / self.waves if self.waves > 0 else 0.0
 
     @cached_property
@@ -180,14 +180,14 @@ class SceneFacts:
 
     @cached_property
     def sag(self) -> float:
-        """The strain of a solid under its own weight, g L / c^2."""
+        """Estimate the strain of a solid under its own weight, g L / c^2."""
         sizes = [one.high - one.low for one in self.motions]
         found = (np.abs(g) * np.max(sizes, axis=0) / self.waves**2 for g in self.weights)
         return max((float(one.max()) for one in found), default=0.0)
 
     @cached_property
     def bending(self) -> float:
-        """The strain of the slenderest solid if it bends: under its weight, or by what it moves.
+        """Estimate the strain of the slenderest solid if its weight or its motion bends it.
 
         A cantilever of the length L and the height H bears 3 g L^2 / (H c^2) at its clamp; the
         kinetic energy of a beam becomes that of strains up to sqrt(3) v / c.
@@ -217,7 +217,7 @@ class SceneFacts:
 
     @cached_property
     def pressure_ratio(self) -> float:
-        """The largest pressure over the smallest, of all points; 1 where there is tension."""
+        """Return the largest pressure over the smallest of all; 1 where there is tension."""
         points = self.simulation.points
         low = -points.largest(lambda some: some.particle("s11"))[0]
         high = points.largest(lambda some: -some.particle("s11"))[0]
@@ -225,12 +225,12 @@ class SceneFacts:
 
     @property
     def strain(self) -> float:
-        """The strain that impacts and weights cause."""
+        """Estimate the strain that impacts and weights cause."""
         return max(self.impact if len(self.hub.solids) > 1 else 0.0, self.sag)
 
     @cached_property
     def shear_stress(self) -> float:
-        """The largest equivalent stress of a point."""
+        """Find the largest equivalent stress of a point."""
         return self.simulation.points.largest(lambda points: points.particle("seq"))[0]
 
 

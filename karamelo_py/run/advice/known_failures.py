@@ -111,7 +111,7 @@ class Step(NamedTuple):
 
 
 def step_of(hub: Hub, halves: bool, span: tuple[float, float] = (inf, inf)) -> Step:
-    """The step that a run asks for here, which goes back and halves it in trouble or not."""
+    """Return the step that a run asks for here, which goes back and halves it in trouble or not."""
     update = hub.update
     method, scheme, transfer = update.method, update.scheme, update.transfer
     scene = (

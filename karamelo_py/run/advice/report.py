@@ -119,7 +119,7 @@ def _size(count: float) -> str:
 
 
 def materials(hub: Hub, block: Any) -> list[Material]:
-    """The materials of the points of this block: those in use whose laws are of its kind."""
+    """List the materials of the points of a block: those in use whose laws are of its kind."""
     used = dict.fromkeys(solid.material for solid in hub.solids.values())
     kind = without_rate(law_kind(block.laws))
     return [material for material in used if law_kind(material.law) == kind]
@@ -138,7 +138,7 @@ def _say_of_equations(say: Callable, simulation: Simulation, nodes: int) -> None
 
 
 def stages(hub: Hub, simulation: Simulation) -> list[str]:
-    """The stages of a step with the fixes that act in them."""
+    """List the stages of a step with the fixes that act in them."""
     acting: dict[str, list[str]] = {}
     for fix in hub.fixes.values():
         for name in fix.hooks():

@@ -92,7 +92,7 @@ def _acting(hub: Hub) -> list[Any]:
 
 
 def _given(fix: Any) -> tuple:
-    """Its formulas by direction; of fixes without, that they may do anything."""
+    """Give its formulas by direction; of fixes without, that they may do anything."""
     return tuple(fix.formulas) or (np.nan,) * 3
 
 

@@ -150,7 +150,7 @@ class InFile:
 
 @contextmanager
 def opened(path: Path, group: str = "state") -> Iterator[dict[str, InFile]]:
-    """The arrays in a file to go on from, by name; they are read when they are looked at."""
+    """Open a file to go on from: its arrays by name; they are read when they are looked at."""
     import h5py
 
     found: dict[str, InFile] = {}

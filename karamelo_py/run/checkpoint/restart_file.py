@@ -145,7 +145,7 @@ def refuse_altered(path: Path, *, large: bool, rank: int = 0, size: int = 1) -> 
 
 
 def _checksum(data: Any, file: BinaryIO) -> int:
-    """The checksum of the bytes of an array, in one piece of the file unless somebody packed it."""
+    """Find the checksum of an array, one piece of the file unless somebody packed it."""
     begin, found, left = data.id.get_offset(), 0, data.id.get_storage_size()
     if begin is None:
         return zlib.crc32(np.ascontiguousarray(data[()]))

@@ -118,7 +118,7 @@ def _shrunk(hub: Hub, simulation: Any) -> tuple[str, str]:
 
 
 def _first_wrong(simulation: Any) -> tuple | None:
-    """The first point that went wrong: number, positions before and after, velocity, grid."""
+    """Find the first point that went wrong: number, positions before and after, velocity, grid."""
     wrong = []
     for block in simulation.setup.blocks:
         tiling = block.tiling
@@ -242,7 +242,7 @@ def _smaller_step(hub: Hub, simulation: Any) -> str:
 
 
 def _first_bad(simulation: Any) -> tuple | None:
-    """The first such fix by numbers, at hand: (fix, formula, place), value, position."""
+    """Find the first such fix by numbers, at hand: (fix, formula, place), value, position."""
     hub, values = simulation.hub, simulation.hub.values
     for which, fix in enumerate(hub.fixes.values()):
         over = simulation.step > 0 and fix in simulation.begun
@@ -268,7 +268,7 @@ def _first_bad(simulation: Any) -> tuple | None:
 
 
 def formulas_of(value: Any) -> Iterator[Expression]:
-    """The formulas among the attributes of a fix, and in tuples and lists of these."""
+    """List the formulas among the attributes of a fix, and in tuples and lists of these."""
     if isinstance(value, Expression):
         yield value
     elif isinstance(value, (tuple, list)):
@@ -292,7 +292,7 @@ def _places(simulation: Any, group: Any, formula: Expression) -> Iterator[tuple]
 
 
 def no_number(hub: Hub, simulation: Any, message: str, hint: str) -> Trouble:
-    """The trouble with what is NaN, and the first fix whose formula gives NaN or infinity."""
+    """Tell the trouble with what is NaN, and the first fix whose formula gives NaN or infinity."""
     found = [one for one in simulation.points.seen(_first_bad) if one is not None]
     if not found:
         return Trouble(message, hint)

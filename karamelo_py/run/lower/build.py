@@ -63,7 +63,7 @@ class State(NamedTuple):
 
 
 def check_scene(hub: Hub) -> None:
-    """A scene without domain, method or solids cannot run: say what is missing."""
+    """Say what is missing in a scene: without domain, method or solids it cannot run."""
     missing = (
         (hub.domain, "no domain is defined", "dimension(2, xmin, xmax, ymin, ymax, h)"),
         (hub.update.method, "no method is defined", "method(ulmpm, FLIP, linear, 0.99)"),
@@ -124,7 +124,7 @@ def thread_count(hub: Hub, points: int) -> int:
 
 
 def stable_conduction(hub: Hub) -> float:
-    """The stable step of conduction in undeformed bodies, of the worst.
+    """Find the stable step of conduction in undeformed bodies, of the worst.
 
     h^2 / (4 d) times capacity over conductivity: half of the bound of lumped finite elements, since
     points stand anywhere in a cell.
@@ -272,7 +272,7 @@ def resume_nodes(nodes: arrays.Nodes, grids: NamedTuple, previous: State) -> Non
 
 
 def part_of(solid: Solid, first: int, end: int) -> Solid:
-    """A solid like this one, with its points whose ids are from `first` to before `end`."""
+    """Make a solid like this one, with its points whose ids are from `first` to before `end`."""
     begin, end = (min(max(i - solid.first_id, 0), solid.count) for i in (first, end))
     other = copy.copy(solid)
     for name, value in vars(solid).items():
@@ -284,14 +284,14 @@ def part_of(solid: Solid, first: int, end: int) -> Solid:
 
 
 def point_kinds(hub: Hub) -> tuple[type, ...]:
-    """The declared fields of the points, as far as no array of nodes has to be made for that."""
+    """List the declared fields of points, as far as no array of nodes has to be made for that."""
     return fields.declared(owners_of_fields(hub), "point_fields")
 
 
 def lower_points(
     hub: Scene, solids: list, kin: NamedTuple, kinds: tuple[type, ...], real: type
 ) -> tuple[arrays.Points, NamedTuple]:
-    """The points of solids whose laws are of one kind, and these laws."""
+    """Lower the points of solids whose laws are of one kind, and these laws."""
     method = hub.update.method
     known = [law_on(s.material.law, s.h, s.T0) for s in solids]
     if hub.fields.rate_is_asked_for():
@@ -341,7 +341,7 @@ def lower_points(
 
 
 def resumed(block: arrays.Block, previous: State) -> arrays.Block:
-    """The block with what its points had before, as far as they were there."""
+    """Return the block with what its points had before, as far as they were there."""
     points = block.points
     old = points.id < previous.count
     ids = points.id[old]

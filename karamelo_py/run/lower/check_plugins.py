@@ -65,7 +65,7 @@ def _samples(setup: Any, fix: Any, hook: Any) -> Iterator[tuple]:
 
 
 def _one_node(setup: Any) -> Any:
-    """A node of mass 1 with what the nodes of a setup have."""
+    """Make a node of mass 1 with what the nodes of a setup have."""
     fields = tuple(type(one)(one.array[:1].copy()) for one in setup.nodes.fields)
     arrays = (np.ones_like(a[:1]) for a in setup.nodes[:3])
     return type(setup.nodes)(*arrays, fields)

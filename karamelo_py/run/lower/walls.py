@@ -14,7 +14,7 @@ from karamelo_py.scene.modify import Fix
 
 
 def fixes_of_walls(hub: Hub) -> list[Fix]:
-    """The fixes whose nodes make walls, where the basis asks for them."""
+    """List the fixes whose nodes make walls, where the basis asks for them."""
     method = hub.update.method
     if method is None or not walled.defined(type(method.basis)):
         return []
@@ -28,7 +28,7 @@ def key_of_walls(hub: Hub) -> tuple:
 
 
 def with_walls(hub: Hub, lattices: list[Lattice], basis: NamedTuple) -> NamedTuple:
-    """The basis with the walls inside the grids, where there are some that it asks for."""
+    """Give the basis the walls inside the grids, where there are some that it asks for."""
     fixes = fixes_of_walls(hub)
     found = []
     for axis in sorted({axis for fix in fixes for axis in fix.held_directions}):

@@ -395,7 +395,7 @@ def occupied(tiling: Tiling) -> tuple[np.ndarray, np.ndarray]:
 
 
 def sized(points: Points, count: int, *, anew: bool = False) -> Points:
-    """Points of the kind of `points`, so many: these, where they are as many, if not `anew`."""
+    """Give points of this kind, so many: `points`, where they are as many, if not `anew`."""
     if points.mass.size == count and not anew:
         return points
     shapes = [((*a.shape[:-1], count), a.dtype) for _, a in arrays_of(points)]
@@ -404,7 +404,7 @@ def sized(points: Points, count: int, *, anew: bool = False) -> Points:
 
 
 def joined(points: Points, parts: list[list[np.ndarray]]) -> Points:
-    """Points of the kind of `points` from the arrays that `arrays_of` has given, in parts."""
+    """Join points of the kind of `points` from the arrays that `arrays_of` has given, in parts."""
     made = sized(points, sum(part[0].shape[-1] for part in parts), anew=True)
     for (_, array), same in zip(arrays_of(made), zip(*parts, strict=True), strict=True):
         np.concatenate(same, axis=-1, out=array)
