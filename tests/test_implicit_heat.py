@@ -111,7 +111,11 @@ def test_a_bar_between_walls_is_warmed_in_one_step(run_interpreted):
 
 
 def test_a_step_in_parts_warms_once(run_interpreted):
-    """A part without equilibrium takes its heat back: the rise is that of the faces, which grow."""
+    """A part without equilibrium takes its heat back: the rise is that of the faces, which grow.
+
+    Sides of cubes of the points' volumes grow at most by the root of the stretch, as the bar gets
+    thinner; parts of 1 and 1/2 of the step that kept their heat would add as much again, and half.
+    """
     heat = """region(end, block, 0, INF, 0, 0.4)
     group(end, particles, region, end, solid, b)
     fix(warm, heat_flux_particles, end, 6)"""
@@ -123,4 +127,4 @@ def test_a_step_in_parts_warms_once(run_interpreted):
         if not pull:
             mass, cp = 2 * 2**2 / 2, 2
             assert rises[0] == pytest.approx(log_of["warm_s"][-1] / (mass * cp), rel=1e-12)
-    assert rises[0] < rises[1] < 1.4 * rises[0]
+    assert rises[0] < rises[1] < (1 + 1.5 / 2) ** 0.5 * rises[0]
