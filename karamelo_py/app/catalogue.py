@@ -196,8 +196,7 @@ def _arguments(word: str) -> dict[str, Parameter]:
                 for parameter in help_.parameters:
                     if word == parameter.name or word in parameter.kind.words:
                         found[help_.name] = parameter
-    own = {owner: p for owner, p in found.items() if p.name == word}
-    return own or found
+    return {owner: p for owner, p in found.items() if p.name == word} or found
 
 
 def _explain_argument(word: str, found: dict[str, Parameter]) -> None:

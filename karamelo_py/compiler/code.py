@@ -151,8 +151,7 @@ def scalar_of(kind: types.Type) -> types.Type:
 
 def splat(builder: Any, value: Any, lanes: Lanes) -> Any:
     """Put the same number into all lanes."""
-    vector = register_type(lanes)
-    none = ir.Constant(vector, ir.Undefined)
+    none = ir.Constant(register_type(lanes), ir.Undefined)
     one = builder.insert_element(none, value, I32(0))
     return shuffle(builder, one, none, [0] * lanes.width)
 

@@ -374,8 +374,7 @@ def _lanes_changed(thing: Any, change: Callable) -> Any:
     """Give tuples, or a number, with something else for each number in lanes in them."""
 
     def changed(item: Any) -> Any:
-        lanes = isinstance(item, Value) and isinstance(item._kind, Lanes)
-        return change(item) if lanes else item
+        return change(item) if isinstance(item, Value) and isinstance(item._kind, Lanes) else item
 
     return mapped(changed, thing)
 
@@ -424,8 +423,7 @@ def lane_by_lane(lowering: Any, function: Callable, unrolled: bool, arguments: t
             lanes = Lanes(scalar, width)
             made = Value(lanes, _room(builder, lanes))
             if builder:
-                number = lowering.lowered(thing, scalar)
-                code.put(builder, scalar, number, _place(builder, made, k))
+                code.put(builder, scalar, lowering.lowered(thing, scalar), _place(builder, made, k))
             return made
 
         read, lowering.read = lowering.read, dict(lowering.read)

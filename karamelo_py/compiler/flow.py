@@ -301,8 +301,7 @@ class Flow:
             return Value(types.boolean, builder and compare(sign, counter._value, stop._value))
 
         def after(counter: Value) -> Value:
-            added = builder and builder.add(counter._value, step._value, flags=("nsw",))
-            return Value(kind, added)
+            return Value(kind, builder and builder.add(counter._value, step._value, flags=("nsw",)))
 
         return Counter(start, goes_on, after)
 

@@ -97,8 +97,7 @@ def aligned_record(array, i, count):
     together = max(1, min(16 // size, count.literal_value))
 
     def codegen(builder, table, i, _):
-        number = code.register_type(array.dtype)
-        kind = ir.VectorType(number, together)
+        kind = ir.VectorType(code.register_type(array.dtype), together)
         place = code.item_pointer(builder, array, table, (i, I64(0)))
         place = builder.bitcast(place, kind.as_pointer())
         numbers = []
@@ -114,8 +113,7 @@ def aligned_record(array, i, count):
 
 
 def _entry(module: ir.Module) -> tuple[ir.Function, ir.IRBuilder]:
-    kind = ir.FunctionType(ir.VoidType(), [I64] * 2)
-    entry = ir.Function(module, kind, NAME + ENTRY)
+    entry = ir.Function(module, ir.FunctionType(ir.VoidType(), [I64] * 2), NAME + ENTRY)
     return entry, ir.IRBuilder(entry.append_basic_block("entry"))
 
 
@@ -574,8 +572,7 @@ class Images:
     def new(self, shape: tuple[int, ...], dtype: Any) -> np.ndarray:
         """Give an array that is on the card alone."""
         size = max(int(np.prod(shape)) * np.dtype(dtype).itemsize, 1)
-        memory = (ctypes.c_char * size).from_address(self._room(size))
-        return np.ndarray(shape, dtype, memory)
+        return np.ndarray(shape, dtype, (ctypes.c_char * size).from_address(self._room(size)))
 
     def send(self, arrays: Iterable[np.ndarray]) -> None:
         """Copy what arrays hold to their images."""

@@ -274,8 +274,7 @@ def address_of(function: Callable, signature: types.Type) -> int:
         if choices.INTERPRETED:
             _addresses[key] = address_of_python(function, signature)
         else:
-            unit = Kernel(function).unit(signature.args, signature.return_type)
-            _addresses[key] = load(unit)[0]
+            _addresses[key] = load(Kernel(function).unit(signature.args, signature.return_type))[0]
     return _addresses[key]
 
 

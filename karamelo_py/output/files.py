@@ -103,8 +103,7 @@ def savefig(figure: Any, path: Path) -> None:
     ending = picture_format(path)
     # Without date and with a fixed salt for ids in the SVG, equal pictures are equal files.
     undated = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(ending)
-    salt = {"svg.hashsalt": "karamelo-py"}
-    with matplotlib.rc_context(salt), unwarned(), whole(path) as file:
+    with matplotlib.rc_context({"svg.hashsalt": "karamelo-py"}), unwarned(), whole(path) as file:
         figure.savefig(file, format=ending, metadata=undated)
 
 

@@ -181,8 +181,7 @@ def _sections(
     for height in heights:
         cut_off = height in cuts
         inset = 0.0 if cut_off else inset_of.get(height, 0.0)
-        section = partial(_section, depth, axis, height + inset)
-        for flat in zeros(section, lo, hi, SECTION):
+        for flat in zeros(partial(_section, depth, axis, height + inset), lo, hi, SECTION):
             line = np.insert(flat, axis, height + inset, axis=1)
             if inset:  # do other faces meet that at the end?
                 part = inset / 2 * np.eye(3)[axis]
@@ -258,8 +257,7 @@ class Front:
 
     def hides(self, x: np.ndarray, height: np.ndarray, around: int = 0) -> np.ndarray:
         """Tell of places seen at x (n, 2), in this height, if all cells `around` are in front."""
-        front = -_largest(-self.height, around)[self._cells(x)]
-        return front > height + 3 * self.cell
+        return -_largest(-self.height, around)[self._cells(x)] > height + 3 * self.cell
 
 
 def split(line: np.ndarray, hidden: np.ndarray) -> Iterator[tuple[np.ndarray, bool]]:

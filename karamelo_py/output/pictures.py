@@ -208,8 +208,7 @@ class Picture:
                 columns = snapshot.columns
                 x = np.column_stack([columns[name] for name in "xyz"])
             kinds = columns["type"]
-            bodies = [x[kinds == kind] for kind in np.unique(kinds)]
-            self._outline(bodies, tools, side)
+            self._outline([x[kinds == kind] for kind in np.unique(kinds)], tools, side)
 
     def _outline(self, bodies: list[np.ndarray], tools: Sequence[Tool], side: float) -> None:
         """Set the lines around points (n, 3) of bodies, and around tools."""

@@ -27,8 +27,7 @@ class Snapshot(NamedTuple):
 
 def read(path: Path, first: int = 0) -> Iterator[Snapshot]:
     """Read the snapshots in a file, in their order from the `first`; an error if it is no dump."""
-    readers = {".h5": _hdf5, ".hdf5": _hdf5, ".vtu": _vtu, ".pvd": _pvd}
-    reader = readers.get(path.suffix, _lammps)
+    reader = {".h5": _hdf5, ".hdf5": _hdf5, ".vtu": _vtu, ".pvd": _pvd}.get(path.suffix, _lammps)
     try:
         yield from reader(path, first)
     # meshio ends the program over a file that it cannot read.

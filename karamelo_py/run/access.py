@@ -227,8 +227,7 @@ class NodesByNumber:
         """(4,) the mass of the nodes of a group, and this times x, y and z; rounded once."""
         self.simulation.show_on_nodes()
         hub = self.points.hub
-        members = hub.groups[group.id].members
-        nodes = np.intersect1d(self.with_mass(), members, assume_unique=True)
+        nodes = np.intersect1d(self.with_mass(), hub.groups[group.id].members, assume_unique=True)
         mass = self.simulation.setup.nodes.sums[nodes, MASS].astype(float)
         places = np.column_stack([np.ones(len(nodes)), places_of(hub, nodes)])
         return self.points.summed(mass[:, None] * places)

@@ -209,8 +209,7 @@ def turn_of(s: Any) -> Noise | None:
 def held(s: Any, one: BodyMotion) -> np.ndarray:
     """(d,) Find the directions in which fixes hold nodes at a body: it goes nowhere."""
     found, lattices = np.zeros(s.d, np.bool_), s.hub.lattices
-    solid = list(s.hub.solids.values())[one.number]
-    lattice = lattices[s.method.lattice_of(s.hub, solid)]
+    lattice = lattices[s.method.lattice_of(s.hub, list(s.hub.solids.values())[one.number])]
     for fix in s.hub.fixes.values():
         if not fix.prescribes_velocity:
             continue
@@ -218,8 +217,7 @@ def held(s: Any, one: BodyMotion) -> np.ndarray:
         own = (nodes >= lattice.first) & (nodes < lattice.first + lattice.node_count)
         x = lattice.positions(nodes[own])[:, : s.d]
         near = ((x >= one.low - lattice.h) & (x <= one.high + lattice.h)).all(axis=1)
-        given = [formula is not None for formula in fix.formulas[: s.d]]
-        found |= near.any() & np.array(given)
+        found |= near.any() & np.array([formula is not None for formula in fix.formulas[: s.d]])
     return found
 
 

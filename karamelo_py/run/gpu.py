@@ -63,8 +63,7 @@ def as_rows(image: np.ndarray) -> np.ndarray:
     rows = int(np.prod(image.shape[:-1], dtype=int))
     step = image.strides[-2] if image.ndim > 1 else 0
     whole = {4: np.int32, 8: np.int64}[image.itemsize]
-    strides = (step, image.itemsize)
-    return as_strided(image.view(whole), (rows, image.shape[-1]), strides)
+    return as_strided(image.view(whole), (rows, image.shape[-1]), (step, image.itemsize))
 
 
 def _no_formula(*_):
@@ -132,8 +131,7 @@ class StepsOnCard:
 
     def _totals(self) -> None:
         """Give room to copies of the totals, and to counts of members."""
-        sums = self.s.control.totals
-        self.copies = np.zeros((self.card.copies, *sums.shape), np.int64)
+        self.copies = np.zeros((self.card.copies, *self.s.control.totals.shape), np.int64)
         self.heavy = np.zeros(max(len(self.functions), 1), np.int64)
         self.images.of((self.copies, self.heavy))
         self.images.send([self.copies, self.heavy])
@@ -302,8 +300,7 @@ class StepsOnCard:
 
     def _called(self, h: int) -> dict:
         """Map what is called by its address to the functions of a hook."""
-        signatures = (NODE_FUNCTION, POINT_FUNCTION, HEAT_FUNCTION)
-        own = dict.fromkeys(signatures, self.functions[h])
+        own = dict.fromkeys((NODE_FUNCTION, POINT_FUNCTION, HEAT_FUNCTION), self.functions[h])
         return {**own, EVALUATE: evaluate_in_table if self._has_formulas(h) else _no_formula}
 
     def _has_formulas(self, h: int) -> bool:
@@ -362,8 +359,7 @@ class StepsOnCard:
             for h in own:
                 called = self._called(h)
                 if self._table()[h].address != arrays.WHOLE:
-                    what_of = heated if heats else moving_points
-                    act = fixes.on_point(what_of, then, self._values(h))
+                    act = fixes.on_point(heated if heats else moving_points, then, self._values(h))
                     yield self._of_points(act, block, hooks, h, copies, called=called)
                 else:
                     (tag,) = (one for one in hooks.whole if one.row == h)

@@ -238,8 +238,7 @@ class SceneArrays:
         self.sort_if_due()
         s = self.setup
         dt = step_size(s)
-        visit = Visit((), SUMS.quantities, SUMS.weights)
-        sweep(s, self.mode, visit, dt, False, True, False)
+        sweep(s, self.mode, Visit((), SUMS.quantities, SUMS.weights), dt, False, True, False)
         all_well(s)
         sweep_nodes(self.mode, SumsToVelocity(), s.kin, s.nodes, s.ranges, dt)
         if isinstance(s.heat, Conducting):

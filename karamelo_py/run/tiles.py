@@ -203,8 +203,7 @@ class Tiles:
         tiling.number[:count] = occupied
         tiling.range[:count] = np.stack([begins[occupied], ends[occupied]], axis=1)
         tiling.share[:] = shares_of(tiling.range[:count], shares, len(tiling.share))
-        grid = np.searchsorted(self.first, occupied, side="right") - 1
-        tiling.grid[:count] = grid
+        tiling.grid[:count] = np.searchsorted(self.first, occupied, side="right") - 1
         tiling.box[:count] = np.concatenate(found.boxes[:, occupied], axis=1)
         if self._most_in_box:
             sorting.find_rows(mode, parts, s.kin, s.grids, around, x, tiling, parts)

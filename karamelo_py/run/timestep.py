@@ -260,8 +260,7 @@ def words_of_share(hub: Hub) -> str:
     """Say what share of the stable step is taken, and what it means."""
     asked, keeping = hub.update.dt_factor, keeping_share(hub)
     if hub.update.fixed_dt is not None:
-        limit = stable_step(hub, hub.simulation, hub.simulation.limit)
-        share = hub.update.fixed_dt / limit
+        share = hub.update.fixed_dt / stable_step(hub, hub.simulation, hub.simulation.limit)
         words = f"{share:.3g} of the stable step"
     elif asked is None:
         clock = hub.simulation.control.clock[0]

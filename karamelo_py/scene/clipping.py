@@ -206,8 +206,7 @@ def _plane(mean: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray
     for way in range(1, 1 << len(m)):
         rows = np.flatnonzero(ways == way)
         if len(rows):
-            axes = [k for k in range(len(m)) if way >> k & 1]
-            here = np.ix_(np.array(axes), rows)
+            here = np.ix_(np.array([k for k in range(len(m)) if way >> k & 1]), rows)
             share[rows], middle[here] = _simplices(mean[rows], m[here])
     return share, np.where(slopes > 0, 1 - middle, middle)
 

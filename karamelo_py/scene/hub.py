@@ -163,8 +163,7 @@ class Update:
 
     def transfer_tag(self, real: type) -> Any:
         """The transfer with its numbers in the precision of the run."""
-        numbers = (real(x) if isinstance(x, float) else x for x in self.transfer)
-        return type(self.transfer)(*numbers)
+        return type(self.transfer)(*(real(x) if isinstance(x, float) else x for x in self.transfer))
 
 
 def _with_numbers(name: str, tag: NamedTuple) -> str:

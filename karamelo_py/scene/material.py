@@ -32,10 +32,9 @@ class Material(MaterialPart):
     @property
     def words(self) -> str:
         """ID, style, and the styles of its parts: ``steel (eos-strength: linear, plastic)``."""
-        named = zip(self.law._fields, self.law, strict=True)
         styles = [
             registry.name_of(kind, type(part))
-            for kind, part in named
+            for kind, part in zip(self.law._fields, self.law, strict=True)
             if isinstance(part, tuple) and part and registry.names(kind)
         ]
         parts = ", ".join(styles)

@@ -60,8 +60,7 @@ class Filled:
 
     def candidates(self, begin: int, end: int) -> np.ndarray:
         """All places (m, d) in the cells with numbers from `begin` to before `end`."""
-        index = positions(*self._cells, begin, end)
-        centre = self._corner + (index + 0.5) * self._h
+        centre = self._corner + (positions(*self._cells, begin, end) + 0.5) * self._h
         return (centre[:, None, :] + self._places).reshape(-1, len(self._corner))
 
     def keep(self, kept: np.ndarray) -> None:
@@ -77,8 +76,7 @@ class Filled:
         """
         cell, place = self._cell_and_place(number)
         index = cell * self._ppc + self._subs[place] + step
-        counts = np.array(self._counts)
-        none = ((index < 0) | (index >= counts * self._ppc)).any(axis=1)
+        none = ((index < 0) | (index >= np.array(self._counts) * self._ppc)).any(axis=1)
         cell, place = np.divmod(np.where(none[:, None], 0, index), self._ppc)
         number = np.ravel_multi_index(tuple(cell.T), self._counts) * len(self._places)
         return np.where(none, -1, number + self._number[tuple(place.T)])

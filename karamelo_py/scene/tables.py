@@ -62,5 +62,4 @@ def read_table(path: Path) -> dict[str, np.ndarray]:
                 argument="file",
             )
         table.append(values)
-    columns = np.array(table, float).reshape(-1, len(names)).T
-    return dict(zip(names, columns, strict=True))
+    return dict(zip(names, np.array(table, float).reshape(-1, len(names)).T, strict=True))

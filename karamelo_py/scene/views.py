@@ -513,8 +513,7 @@ class PieceView(PointsView):
         super().__init__(simulation, np.concatenate(ids), then)
         own = pairwise(np.cumsum([0, *map(len, ids)]).tolist())
         found = [Part(*part, slice(*places)) for part, places in zip(parts, own, strict=True)]
-        present = np.ones(len(self.ids), np.bool_)
-        self._found = Rows(simulation.setup, found, self._numbers, present)
+        self._found = Rows(simulation.setup, found, self._numbers, np.ones(len(self.ids), np.bool_))
         self._in_steps = in_steps
 
     def total(self, terms: Any) -> np.ndarray:

@@ -53,8 +53,7 @@ def literal(word: str, start: int) -> float:
     """Read a number, which stands at `start`."""
     value = float(word)
     if math.isinf(value):
-        message = f"the number {word} is too large"
-        raise Mistake(message, start, start + len(word), "below 1.8e308")
+        raise Mistake(f"the number {word} is too large", start, start + len(word), "below 1.8e308")
     return value
 
 

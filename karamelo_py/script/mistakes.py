@@ -127,8 +127,7 @@ class _Stop(NamedTuple):
     def after_call(self) -> bool:
         """Tell if all before is one call."""
         types = [getattr(part, "type", "") for part in self.stack]
-        call = types[:2] == ["NAME", "LPAR"] and types[-1] == "RPAR"
-        return call and types.count("LPAR") == 1
+        return types[:2] == ["NAME", "LPAR"] and types[-1] == "RPAR" and types.count("LPAR") == 1
 
     def mistake(self, message: str, expected: str = _VALUE, hint: str | None = None) -> Mistake:
         """Make a mistake that marks what stands here."""
@@ -211,8 +210,7 @@ def _equals(at: _Stop) -> Mistake:
     first, rest = tokens[0], at.code[at.end :].strip()
     if len(tokens) == 2 and before.type in _OPERATORS and first.type == "NAME":
         hint = f"{first} = {first} {before} {rest}"
-        message = f"'{before}=' is not known here"
-        return Mistake(message, before.start_pos, at.end, expected, hint)
+        return Mistake(f"'{before}=' is not known here", before.start_pos, at.end, expected, hint)
     if first.type == "NAME" and len(tokens) > 1 and tokens[1] == "(" and before == ")":
         hint = f"a formula needs no arguments: {first} = {rest}"
         place = first.start_pos, before.end_pos

@@ -149,8 +149,7 @@ def alike(one: Term, other: Term) -> bool:
         operands = [kinds[id(t)] for t in term.operands]
         if term.operation in ("+", "*"):
             operands.sort()
-        key = (term.operation, term.value, *operands)
-        kinds[id(term)] = known.setdefault(key, len(known))
+        kinds[id(term)] = known.setdefault((term.operation, term.value, *operands), len(known))
     return kinds[id(one)] == kinds[id(other)]
 
 
@@ -159,8 +158,7 @@ def alike(one: Term, other: Term) -> bool:
 
 def number_text(value: float) -> str:
     """Write a number as a script says it, exactly."""
-    text = repr(float(value))
-    return text.removesuffix(".0")
+    return repr(float(value)).removesuffix(".0")
 
 
 def number_of(text: str) -> float | None:

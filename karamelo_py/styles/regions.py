@@ -70,8 +70,7 @@ class BlockRegion(Primitive):
 
     def __init__(self, hub: Hub, *bounds: Argument):
         given, exterior = region.split_exterior(bounds)
-        values = self.forms.read(hub, given, require_domain(hub).dimension)
-        ends = tuple(values.values())
+        ends = tuple(self.forms.read(hub, given, require_domain(hub).dimension).values())
         self.slabs = [(k // 2, *ends[k : k + 2]) for k in range(0, len(ends), 2)]
         for axis, *slab in self.slabs:
             region.check_order(*slab, _NAMES, 2 * axis)
@@ -157,8 +156,7 @@ class Sphere(Primitive):
 
     def __init__(self, hub: Hub, *shape: Argument):
         given, exterior = region.split_exterior(shape)
-        values = self.forms.read(hub, given, require_domain(hub).dimension)
-        *centre, self.radius = values.values()
+        *centre, self.radius = self.forms.read(hub, given, require_domain(hub).dimension).values()
         region.check_radius(self.radius, argument=len(centre))
         self.across, self.centre = range(len(centre)), np.array(centre)
         lo, hi = self.centre - self.radius, self.centre + self.radius

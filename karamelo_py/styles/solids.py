@@ -86,8 +86,7 @@ class RegionSolid(Solid):
         super().__init__(hub, material, h, T0, GlueToSolid)
         self.region = region
         self.ppc = ppc
-        basis = hub.update.method.basis
-        corners = {"corners", "half_edges"} & {*getattr(basis, "shape", ())}
+        corners = {"corners", "half_edges"} & {*getattr(hub.update.method.basis, "shape", ())}
         # Contact feels the steps of whole boxes.
         if points is None and hub.update.method.fields_per_solid:
             points = None if corners or region.unknown or region.aligned else "cut"
@@ -122,8 +121,7 @@ class RegionSolid(Solid):
         return f"region '{self.region.id}'"
 
     def why_empty(self) -> str:
-        used = slice(0, self.domain.dimension)
-        if (self.region.box_lo > self.region.box_hi)[used].any():
+        if (self.region.box_lo > self.region.box_hi)[slice(0, self.domain.dimension)].any():
             return f"{self.described()} is empty"
         return f"no point lies in {self.described()}"
 

@@ -104,8 +104,7 @@ def run(options: Namespace) -> int:
                 return measured
             _print(name, measured, published=not presets)
             one = measured.record()
-        title = WORKLOADS[name].title
-        found["workloads"][name] = {"title": title, "variables": presets, **one}
+        found["workloads"][name] = {"title": WORKLOADS[name].title, "variables": presets, **one}
         if out:
             write_whole(out, json.dumps(found, indent=1) + "\n")
     return _ended(found, earlier, out)

@@ -103,8 +103,7 @@ class FolderPage:
             self._dimension = 3 if "z" in directions else 1 + len(directions)
             known = [name for name in ("seq", "type") if name in columns]
             self._column = [*known, *self._columns][0]
-        count = len(columns["x"])
-        self._states.append((path, place, snapshot.step, float(snapshot.time), count))
+        self._states.append((path, place, snapshot.step, float(snapshot.time), len(columns["x"])))
 
     def _news(self, seen: int) -> tuple[int, dict]:
         log = self._log

@@ -75,8 +75,7 @@ class KeptFrames:
             size = sum(each.numbers.nbytes for each in self._kept.values())
             stay = sum(not k % self._every for k in self._kept)
             self._every *= 2 if stay > COUNT or size > BYTES else 1
-            first = self._new[0][0]
-            for number in [k for k in self._kept if k % self._every and k < first]:
+            for number in [k for k in self._kept if k % self._every and k < self._new[0][0]]:
                 del self._kept[number]
 
     def replace_last(self, take: Callable[[], Frame]) -> None:

@@ -440,8 +440,7 @@ def tell(adviser: Adviser) -> None:
         if np.isfinite(signed[-1]):
             xs = adviser.xs[:count]
             error, fit = shown(float(signed[-1])), str(order(xs, np.abs(signed)).towards(xs))
-        fine = adviser.values[count - 1]
-        table.add_row(choice.label, str(count), fine, error, fit, where, cost)
+        table.add_row(choice.label, str(count), adviser.values[count - 1], error, fit, where, cost)
     terminal().print(table)
 
 

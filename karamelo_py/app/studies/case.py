@@ -186,8 +186,7 @@ class Launch:
         if overdue:
             return CaseOutcome("too long", f"given up after {self.limit:g} s", facts, folder)
         if process.returncode < 0:
-            reason = f"ended by signal {-process.returncode}"
-            return CaseOutcome("killed", reason, facts, folder)
+            return CaseOutcome("killed", f"ended by signal {-process.returncode}", facts, folder)
         outcome = CaseOutcome("done", "", facts, folder)
         if process.returncode:
             outcome.status, outcome.reason = "failed", reason_in(outcome.complaint)

@@ -135,8 +135,7 @@ class Table(NamedTuple):
     def label(self, name: str) -> str:
         """Give the title of an axis: of a column of the table, or of the logs with its unit."""
         path = Path(self.made.get("script", ""))
-        unit = ScriptFiles(path).unit(name) if path.is_file() else ""
-        return labelled(look.label(name), unit)
+        return labelled(look.label(name), ScriptFiles(path).unit(name) if path.is_file() else "")
 
 
 @dataclass

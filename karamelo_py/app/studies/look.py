@@ -148,8 +148,7 @@ def log_axis(axis: Any, low: float, high: float, values: Sequence[float] | None 
     low, high = low / pad, high * pad
     (axes.set_xlim if axis.axis_name == "x" else axes.set_ylim)(low, high)
     distinct = sorted(set(values or ()))
-    few = 0 < len(distinct) <= 9
-    ticks = _thinned(distinct, low, high) if few else log_ticks(low, high)
+    ticks = _thinned(distinct, low, high) if 0 < len(distinct) <= 9 else log_ticks(low, high)
     axis.set_major_locator(FixedLocator(ticks))
     axis.set_minor_locator(NullLocator())
     axis.set_major_formatter(FixedFormatter(tick_texts(ticks)))

@@ -134,8 +134,7 @@ _fma = arithmetic.of_library("llvm.fma")  # a b + c of vectors, with one roundin
 @intrinsic
 def _prefetch_records(array, nodes):
     def codegen(builder, table, at):
-        stride = code.ArrayParts(builder, array, table).strides[0]
-        ahead = builder.mul(stride, I64(AHEAD))
+        ahead = builder.mul(code.ArrayParts(builder, array, table).strides[0], I64(AHEAD))
         for k in range(nodes.width):
             ask(builder, at_lane(builder, array, table, nodes, at, k, I64(0)), ahead)
 
@@ -318,8 +317,7 @@ def _kept_in_memory(builder: Any, vectors: list) -> Callable:
     A number from memory gets into all lanes as it is loaded; out of a register that takes as long
     as a shuffle.
     """
-    kind = ir.ArrayType(vectors[0].type, len(vectors))
-    room = code.room(builder, kind)
+    room = code.room(builder, ir.ArrayType(vectors[0].type, len(vectors)))
     room.align = 64
     for k, vector in enumerate(vectors):
         builder.store(vector, code.at(builder, room, 0, k))

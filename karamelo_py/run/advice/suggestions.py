@@ -36,8 +36,7 @@ def suggestions(hub: Hub, simulation: Any) -> list[Advice]:
 
 
 def _of_parts(hub: Hub, simulation: Any) -> Words:
-    said = SceneFacts(hub, simulation, inf).advice("suggestion")
-    return ((one.reason, one.cure) for one in said)
+    return ((one.reason, one.cure) for one in SceneFacts(hub, simulation, inf).advice("suggestion"))
 
 
 def _unread(hub: Hub, simulation: Any) -> Words:
@@ -297,8 +296,7 @@ def _precision(hub: Hub, simulation: Any) -> Words:
     ):
         return
     x = max(float(np.abs(solid.x0).max()) for solid in hub.solids.values() if solid.count)
-    moved = simulation.fastest() * simulation.dt
-    if moved > RESOLVED * np.spacing(np.float32(x)):
+    if simulation.fastest() * simulation.dt > RESOLVED * np.spacing(np.float32(x)):
         yield (
             "double precision: points in single precision take 0.6 of the memory; errors of scenes "
             "with an exact solution change by less than a twentieth or 2e-4",

@@ -351,8 +351,7 @@ def check_numbers(simulation: Any, found: Mapping[str, Any]) -> None:
 
 def remembered_at(simulation: Any, spans: np.ndarray) -> list[np.ndarray]:
     """Return what contact remembers at the nodes of these spans (k, 2)."""
-    method = simulation.hub.update.method
-    return method.remembered(simulation.setup.contact, spans)
+    return simulation.hub.update.method.remembered(simulation.setup.contact, spans)
 
 
 def _checked(found: Mapping[str, Any], name: str, like: np.ndarray, *, read: bool = True) -> Any:

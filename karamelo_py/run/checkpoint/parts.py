@@ -92,8 +92,7 @@ def _all_parts(hub: Hub) -> Iterator[tuple[Key, Any]]:
     yield ("method", "", ""), hub.update.method
     for catalogue in hub.catalogues:
         for ID, part in catalogue.items():
-            kind = getattr(part, "style", "") or type(part).__name__
-            yield (catalogue.kind, ID, kind), part
+            yield (catalogue.kind, ID, getattr(part, "style", "") or type(part).__name__), part
     for curve in hub.output.plots.values():
         yield ("curve", curve.id, ""), curve
     for item in hub.output.last:

@@ -267,8 +267,7 @@ class Restart:
         with reading(), h5py.File(self.path, "r", locking=False) as root:
             there = root.get(name, ())
             arrays = [there[str(k)][()] for k in range(len(there))]
-        kept = {tuple(key): state for *key, state in self.content[name]}
-        return PartStates(kept, arrays, values)
+        return PartStates({tuple(key): state for *key, state in self.content[name]}, arrays, values)
 
 
 def _latest(path: Path, out: Path | None) -> Path:

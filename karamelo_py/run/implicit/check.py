@@ -132,8 +132,7 @@ def _bears_shear(law: Any, kin: Any) -> bool:
     """Tell whether a law resists a shear that takes any time; in one dimension all do."""
     places = kin.Tensor.places
     rest = kin.Tensor._make([0.0] * len(places))
-    state = initial_state(law, kin, 1.0)
-    _, C = on_numbers(stress_and_tangent)(law, kin, state, rest, LONG)
+    _, C = on_numbers(stress_and_tangent)(law, kin, initial_state(law, kin, 1.0), rest, LONG)
     if kin.dimension == 1:
         return True
     shear = places.index((0, 1))

@@ -45,8 +45,7 @@ def conduct(equations: Equations, hooks: Any, dt: float) -> None:
     balance = flow + stored * (own - mapped)
     A = (K + sp.diags(stored)).tocsr()
     if np.any(free):
-        right = (balance - K @ change)[free]
-        change[free] = direct(A[free][:, free], right)
+        change[free] = direct(A[free][:, free], (balance - K @ change)[free])
     new = mapped + change
     # What the nodes would have without those that hold them, who publish the heat that it takes.
     without = new - np.where(given, np.divide(

@@ -350,8 +350,7 @@ class Equations:
                 own_of = np.bincount(on, points.mass[points.material == k], of_grids.shape[1])
                 of_grids += own_of * float(specific_volume(law)) * np.array([[float(one)], [1.0]])
         per = np.where(of_grids[1] > 0, of_grids[1], 1.0)
-        mean = total / volume if volume else 0.0
-        return Moduli(mean, of_grids[0] / per, of_laws)
+        return Moduli(total / volume if volume else 0.0, of_grids[0] / per, of_laws)
 
     def ghost(self, moduli: "Moduli") -> sp.csr_matrix:
         """Make the matrix (m, m) that penalises jumps of the gradient at the border of bodies.
@@ -384,8 +383,7 @@ class Equations:
         the differences hold their nodes at the border all the same.
         """
         d, places = self.d, self.places
-        shape = (int(self.grid.max()) + 1, *(places.max(0) + 2))
-        touched = np.zeros(shape, bool)
+        touched = np.zeros((int(self.grid.max()) + 1, *(places.max(0) + 2)), bool)
         soft = self.deforming
         touched[self.grid[soft], *places[soft].T] = True
         corners = [tuple(slice(c, c - 1 or None) for c in at) for at in np.ndindex(*(2,) * d)]

@@ -95,8 +95,7 @@ class Motion:
         """Average values (d, n) of the points of each block at the nodes (m, d), by mass."""
         equations = self.equations
         total = np.zeros((len(equations.nodes), equations.d))
-        blocks = zip(equations.blocks, equations.parts, values, strict=True)
-        for block, (seen, _), own in blocks:
+        for block, (seen, _), own in zip(equations.blocks, equations.parts, values, strict=True):
             scatter(seen, block.points.mass, own, total)
         return total * self.inverse
 
@@ -109,8 +108,7 @@ class Motion:
         """Add inertia to what forces leave (m, d), after displacements (m, d)."""
         a = self.acceleration(u)
         # Who holds a node does it with the force of the end of the step.
-        weighted = np.where(self.given, a, self._demand(a))
-        return forces - self.mass * weighted
+        return forces - self.mass * np.where(self.given, a, self._demand(a))
 
     def _demand(self, a: np.ndarray) -> np.ndarray:
         """Find the forces per mass (m, d) that accelerations at the end ask for there."""

@@ -261,8 +261,7 @@ class LoadSteps:
         simulation = self.simulation
         s = simulation.setup
         with counted(self.seconds, "layout"):
-            stabilised = self.scheme.stabilisation > 0
-            equations = Equations(s, simulation.mode, self.known, stabilised)
+            equations = Equations(s, simulation.mode, self.known, self.scheme.stabilisation > 0)
         nodes = equations.nodes
         external = after[nodes] + equations.present_forces()
         self._check_numbers(external, "a node gets a force that is not a number")

@@ -135,8 +135,7 @@ class Newton:
             if interrupted(iteration, residual):
                 raise Broken
             if iteration < scheme.iterations:
-                change = self._correction(balance, jump, residual)
-                u += change
+                u += self._correction(balance, jump, residual)
                 jump = np.zeros_like(jump)
                 self._respond(u)
         raise Failed(f"after {scheme.iterations} corrections {residual:.1e} of the forces are left")

@@ -67,8 +67,7 @@ def _samples(setup: Any, fix: Any, hook: Any) -> Iterator[tuple]:
 def _one_node(setup: Any) -> Any:
     """Make a node of mass 1 with what the nodes of a setup have."""
     fields = tuple(type(one)(one.array[:1].copy()) for one in setup.nodes.fields)
-    arrays = (np.ones_like(a[:1]) for a in setup.nodes[:3])
-    return type(setup.nodes)(*arrays, fields)
+    return type(setup.nodes)(*(np.ones_like(a[:1]) for a in setup.nodes[:3]), fields)
 
 
 def _try_hook(setup: Any, fix: Any, moment: str, hook: Any) -> None:
@@ -144,8 +143,7 @@ def _numbers(part: PartInUse, what: str, found: Iterable, one: Any) -> None:
 
 def _try_law(hub: Hub, setup: Any, solid: Any) -> None:
     material, kinds = solid.material, laws.law_kind(solid.material.law)
-    usual = PartInUse(f"material {material.style}", kinds[0], material.place)
-    part = _part_of(hub, kinds) or usual
+    part = _part_of(hub, kinds) or PartInUse(f"material {material.style}", kinds[0], material.place)
     kin, one = setup.kin, _one(setup)
     law = law_in(law_on(solid.material.law, solid.h, solid.T0), type(one))
     size = len(kin.Symmetric.places)

@@ -30,8 +30,7 @@ def lower_hooks(
 ) -> arrays.Hooks | arrays.NoHooks:
     """Make the tables of the compiled hooks of fixes, in their order; by one thread, or several."""
     dimension = hub.domain.dimension
-    count = sum(s.count for s in hub.solids.values())
-    builder = _Builder(hub, count)
+    builder = _Builder(hub, sum(s.count for s in hub.solids.values()))
     for fix, name, hook in compiled_hooks(fixes):
         builder.add(fix, name, hook)
     if not builder.rows:
@@ -216,8 +215,7 @@ def _agree(simulation: Any, fix: Any) -> None:
 
 def _on_nodes(hooks: PythonHooks, s: Setup, stage: int, target: int) -> None:
     for fix, hook in hooks.by_stage[stage]:
-        before = target == ON_VELOCITY
-        view = NodesView(hooks.simulation, s, fix.group, stage, before_update=before)
+        view = NodesView(hooks.simulation, s, fix.group, stage, before_update=target == ON_VELOCITY)
         _call(hooks.simulation, fix, hook, view)
 
 

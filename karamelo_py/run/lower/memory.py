@@ -39,8 +39,7 @@ def memory_of(simulation: Any, s: arrays.Setup, boxes: int) -> MemoryTaken:
     moved = sum(of["x moved"] * n for of, n in zip(of_point, counts, strict=True))
     nodes = sum(bytes_in(used(s.spans)[1:], array) for _, array in node_fields(simulation.setup))
     hooks = sum(getattr(simulation.hooks, name, np.empty(0)).nbytes for name in ("x0", "members"))
-    whole = known(simulation.hub) + hooks
-    return MemoryTaken(points + nodes + boxes, points - moved, whole)
+    return MemoryTaken(points + nodes + boxes, points - moved, known(simulation.hub) + hooks)
 
 
 def known(hub: Hub) -> int:

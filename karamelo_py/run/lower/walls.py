@@ -23,8 +23,7 @@ def fixes_of_walls(hub: Hub) -> list[Fix]:
 
 def key_of_walls(hub: Hub) -> tuple:
     """Return what walls depend on, besides the grids."""
-    fixes = fixes_of_walls(hub)
-    return tuple((fix.group, fix.group.parts, fix.held_directions) for fix in fixes)
+    return tuple((fix.group, fix.group.parts, fix.held_directions) for fix in fixes_of_walls(hub))
 
 
 def with_walls(hub: Hub, lattices: list[Lattice], basis: NamedTuple) -> NamedTuple:

@@ -119,8 +119,7 @@ class SharedTiles(Tiles):
     def share_out(self, work: np.ndarray) -> None:
         """Cut the tiles into parts of nearly as much work each."""
         if not self.direct:
-            rows = ROWS if self.long else 1
-            self.owner = bisected(self._places, work, self.comm.size, rows)
+            self.owner = bisected(self._places, work, self.comm.size, ROWS if self.long else 1)
 
     def balance(self, work: np.ndarray) -> bool:
         """Cut the tiles anew where that is worth it; `work` (tiles,) is of the own points."""
@@ -169,10 +168,9 @@ class SharedTiles(Tiles):
         come = list(self.comm.exchange({rank: parts(rank) for rank in others}).values())
         if not come:
             return s
-        found = zip(s.blocks, own, *come, strict=True)
         blocks = tuple(
             block._replace(points=self._with(k, block.points, np.flatnonzero(to == me), parts))
-            for k, (block, to, *parts) in enumerate(found)
+            for k, (block, to, *parts) in enumerate(zip(s.blocks, own, *come, strict=True))
         )
         return s._replace(blocks=blocks)
 
@@ -399,8 +397,7 @@ def sized(points: Points, count: int, *, anew: bool = False) -> Points:
     if points.mass.size == count and not anew:
         return points
     shapes = [((*a.shape[:-1], count), a.dtype) for _, a in arrays_of(points)]
-    empty = [rows_of_points(*shape) for shape in shapes]
-    return made_of(points, empty)
+    return made_of(points, [rows_of_points(*shape) for shape in shapes])
 
 
 def joined(points: Points, parts: list[list[np.ndarray]]) -> Points:

@@ -125,8 +125,7 @@ def _part(s: Setup, own: np.ndarray) -> Setup:
 
 def report_lines(simulation: Simulation, ranks: int) -> list[str]:
     """Say in lines what so many processes would have, and pass on."""
-    shares = plan(simulation, ranks)
-    columns = np.array(shares)
+    columns = np.array(plan(simulation, ranks))
     mean = columns[:, 0].mean()
     lines = [f"shared out among {ranks} processes{'':<6}least     largest"]
     columns[:, -2:] >>= 20

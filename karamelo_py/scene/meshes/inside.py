@@ -183,8 +183,7 @@ class Skin:
                 height = np.einsum("ni,ni->n", x[rows] - self.faces[items, 0], self.normal[items])
                 near = np.abs(height) < distance[rows]
                 rows, items = rows[near], items[near]
-            found = _distance(x[rows], self.faces[items])
-            distance[rows] = np.minimum(distance[rows], found)
+            distance[rows] = np.minimum(distance[rows], _distance(x[rows], self.faces[items]))
         return distance
 
 
@@ -259,8 +258,7 @@ class Surface:
     def encloses(self, x: np.ndarray) -> np.ndarray:
         """Test which positions (n, 3) lie inside or on the surface: (n,) bool."""
         odd = np.zeros(len(x), bool)
-        flat = np.ascontiguousarray(x[:, :2])
-        for rows, items in self.bins.candidates(flat):
+        for rows, items in self.bins.candidates(np.ascontiguousarray(x[:, :2])):
             odd[rows] ^= self._crossed(x[rows], items)
         return odd | self.skin.contain(x)
 

@@ -41,8 +41,7 @@ class PointField:
     def __init__(self, name: str, columns: tuple[str, ...]):
         self.name = name
         self.columns = columns
-        shear = name in TENSORS
-        self.weights = [2.0 if shear and k >= 3 else 1.0 for k in range(len(columns))]
+        self.weights = [2.0 if name in TENSORS and k >= 3 else 1.0 for k in range(len(columns))]
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> "PointField":

@@ -225,8 +225,7 @@ class PyPlot(Dump):
         """Take what a picture needs of all points, some of them after others."""
         label, domain, update = self._label(), self.hub.domain, self.hub.update
         names = dict.fromkeys(["id", "type", "x", "y", "z", "volume", label])
-        tables = self.hub.fields.pieces(to_first=True)
-        pieces = [self._chosen(table, names) for table in tables]
+        pieces = [self._chosen(table, names) for table in self.hub.fields.pieces(to_first=True)]
         columns = dict(zip(names, map(np.concatenate, zip(*pieces, strict=True)), strict=True))
         return Snapshot(update.step, update.time, columns, domain.lo, domain.hi)
 

@@ -168,8 +168,7 @@ class EdgeFix(PointForces):
         found = {}
         for solid in self.hub.solids.values():
             if getattr(solid, "cut", False):
-                own = members[_of(solid, members)]
-                found[solid.id] = solid, faces_cut(solid, self.region, own)
+                found[solid.id] = solid, faces_cut(solid, self.region, members[_of(solid, members)])
         return found
 
     def _find(self, ids: np.ndarray) -> Faces:

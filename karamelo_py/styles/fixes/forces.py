@@ -224,8 +224,7 @@ class LocalDamping(Fix):
     def defined(self) -> None:
         """Warn where rest would not be that without damping."""
         alpha = self.formulas[0]
-        lasts = alpha.is_constant and alpha.constant > 0
-        if lasts and self.hub.update.method.fields_per_solid:
+        if alpha.is_constant and alpha.constant > 0 and self.hub.update.method.fields_per_solid:
             self.hub.warn(
                 "bodies that touch come to rest anywhere near their balance while damping acts",
                 hint="an alpha that goes to 0: 0.8*max(1 - time/T, 0)",

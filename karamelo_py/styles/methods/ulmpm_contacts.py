@@ -139,8 +139,7 @@ class ULMPMContacts(Method):
         h = hub.domain.h
         first: dict[int, Solid] = {}
         copies: list[tuple[int, int]] = []
-        solids = hub.solids.values()
-        for solid, field in zip(solids, fields(hub), strict=True):
+        for solid, field in zip(hub.solids.values(), fields(hub), strict=True):
             if first.setdefault(field, solid) is not solid:
                 both = (slots_of_loads(hub, one) for one in (first[field], solid))
                 copies += zip(*both, strict=True)
@@ -177,8 +176,7 @@ class ULMPMContacts(Method):
         for (a, b), fix in self._rubbing(hub):
             contact.friction[a, b] = contact.friction[b, a] = fix.friction
             contact.pair[a, b] = hub.values.slot(f"{fix.id}_x")
-        pairs = contact.pair[contact.pair >= 0]
-        published = [*contact.slot, *contact.torque, *pairs]
+        published = [*contact.slot, *contact.torque, *contact.pair[contact.pair >= 0]]
         contact.forces[: 1 + len(published)] = [len(published), *published]
         fixes = [fix for fix in hub.fixes.values() if fix.prescribes_velocity]
         slots = [hub.values.slot(f"{fix.id}_x") for fix in fixes]
