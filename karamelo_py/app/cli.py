@@ -194,10 +194,9 @@ def _surplus(arguments: list[str], words: list[str], parser: CommandLine) -> Scr
         hint = f"-var {option[1:]} {value[0]} sets a variable"
     elif not option and VARIABLE[0] in arguments and "-jobs" in parser.options():
         hint = f"-var NAME={words[0]}, in one word"
-    usage = USAGE if command == "run" else parser.plain_usage()
     return ScriptError(
         f"there is no option {option}" if option else f"one word too many: {words[0]}",
-        expected=usage,
+        expected=USAGE if command == "run" else parser.plain_usage(),
         hint=hint,
     )
 

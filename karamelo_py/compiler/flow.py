@@ -282,8 +282,7 @@ class Flow:
     def counted(self, bounds: tuple) -> Counter:
         """Count the turns of a loop over a range."""
         lowering, builder = self.lowering, self.builder
-        kinds = tuple(types.unliteral(lowering.kind_of(bound)) for bound in bounds)
-        kind = _counter(kinds)
+        kind = _counter(tuple(types.unliteral(lowering.kind_of(bound)) for bound in bounds))
         start, stop, step = {1: (0, *bounds, 1), 2: (*bounds, 1)}.get(len(bounds), bounds)
         known = step if isinstance(step, int) else None
         if known == 0:

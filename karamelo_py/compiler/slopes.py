@@ -264,13 +264,9 @@ def _pow(x, y):
     return _raised(x, y, math.pow(value_of(x), value_of(y)))
 
 
-def stepwise(*functions: Callable) -> None:
-    """Let functions whose slopes vanish, or whose results are no real numbers, know slopes."""
-    for one in functions:
-        implements(one, Dual)(lambda x, do=one: do(x.value))
-
-
-stepwise(math.floor, math.ceil, math.trunc, math.isnan, math.isinf, math.isfinite)
+# Their slopes vanish, or their results are no real numbers.
+for _one in (math.floor, math.ceil, math.trunc, math.isnan, math.isinf, math.isfinite):
+    implements(_one, Dual)(lambda x, do=_one: do(x.value))
 
 
 class NoSlope(TypeError):

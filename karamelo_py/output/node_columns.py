@@ -168,10 +168,9 @@ LOADS = "post_particles_to_grid"
 
 
 def _volume(simulation: Any, block: Any) -> np.ndarray:
-    s = simulation.setup
     points = known_to_laws(block.points)
     rows = np.zeros((len(points.id), EXPORTED))
-    export_state(s.kin, points, block.laws, rows)
+    export_state(simulation.setup.kin, points, block.laws, rows)
     return volumes_before(simulation.hub, points.id) * rows[:, JACOBIAN]
 
 

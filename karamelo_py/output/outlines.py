@@ -206,8 +206,7 @@ def edges(faces: np.ndarray) -> np.ndarray:
     first, second = order[:-1][shared], order[1:][shared]
     cosine = np.abs((normal[first // 3] * normal[second // 3]).sum(axis=1))
     sharp = first[cosine < SHARP]
-    ends = faces[sharp // 3, sharp % 3], faces[sharp // 3, (sharp + 1) % 3]
-    found = [np.stack(ends, axis=1)]
+    found = [np.stack((faces[sharp // 3, sharp % 3], faces[sharp // 3, (sharp + 1) % 3]), axis=1)]
     bends = (cosine >= SHARP) & (cosine < FLAT)
     smooth = faces[np.unique(np.concatenate([first[bends], second[bends]]) // 3)]
     for axis in range(3) if len(smooth) else ():

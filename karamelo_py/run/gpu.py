@@ -370,9 +370,8 @@ class StepsOnCard:
 
     def _work_of_loads(self) -> Iterator[KernelLaunch]:
         if len(self._table()) and self.hooks.loads.size:
-            called = self._called(0)
             rest = (self.s, self.hooks, self.copies)
-            yield self._launch(fixes.work_of_loads, self.nodes, *rest, called=called)
+            yield self._launch(fixes.work_of_loads, self.nodes, *rest, called=self._called(0))
 
     # --- totals, and the watch over energy
 

@@ -177,7 +177,7 @@ class SimulationOnCard(Simulation):
             status = super()._advance_to(self.step + 1)
             if status != DONE or self.step >= target:
                 return status
-        if self._ends(target):
+        if self.step >= target or self.time >= self.control.clock[0].end_time:
             return DONE
         steps = self.launches()
         if not self._sent:
@@ -189,9 +189,6 @@ class SimulationOnCard(Simulation):
         if status == STOPPED:
             self._report(steps.wrong)
         return status
-
-    def _ends(self, target: int) -> bool:
-        return self.step >= target or self.time >= self.control.clock[0].end_time
 
     def _report(self, number: int) -> None:
         """Let the reports of tiles show the point that went wrong, where others look for it."""

@@ -140,7 +140,6 @@ class SceneArrays:
             laws[without_rate(law_kind(block.laws))] = rows
         found = (type(one) for block in self.setup.blocks for one in block.points.fields)
         kept = [kind for kind in dict.fromkeys(found) if fields.is_kept(kind)]
-        nodes = self.setup.nodes.fields
         return State(
             self.count,
             self.present,
@@ -149,7 +148,7 @@ class SceneArrays:
             laws,
             {kind: all_points.declared(kind).T for kind in kept},
             self.setup.grids,
-            {type(one): one.array for one in nodes if fields.is_kept(type(one))},
+            {type(one): one.array for one in self.setup.nodes.fields if fields.is_kept(type(one))},
             self.setup.contact,
             float(self.control.clock[0].last_dt),
             float(self.control.clock[0].path),

@@ -222,8 +222,7 @@ class Tiles:
         spans, *found = self._rows_to_clear(s) if self.direct else self._parts_to_sum(s)
         s.buffers.count[:] = len(found[1]) - 1, self.direct
         spans = np.concatenate([[[len(spans), 0]], spans])
-        rooms = s.spans, s.ranges, *s.buffers[2:4]
-        for room, rows in zip(rooms, (spans, *found), strict=True):
+        for room, rows in zip((s.spans, s.ranges, *s.buffers[2:4]), (spans, *found), strict=True):
             grid_boxes.grow(room, len(rows))
             room[: len(rows)] = rows
 

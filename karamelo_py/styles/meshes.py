@@ -38,8 +38,7 @@ class Enclosed(Region):
 
     @property
     def aligned(self) -> bool:
-        across = np.ptp(self.faces(), axis=1).min(axis=1)
-        return bool((across <= self.domain.tolerance).all())
+        return bool((np.ptp(self.faces(), axis=1).min(axis=1) <= self.domain.tolerance).all())
 
     def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
         distance = self.skin.distance(x[:, : self.dimension], reach)

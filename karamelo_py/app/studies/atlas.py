@@ -122,8 +122,7 @@ def run(options: Any) -> int:
     """Do what the command line says; returns the exit status."""
     entries, inputs = read(options.atlas)
     asked = names(options.only)
-    groups = {entry.group for entry in entries}
-    known = [*groups, *(entry.name for entry in entries)]
+    known = [*{entry.group for entry in entries}, *(entry.name for entry in entries)]
     for name in asked:
         if name not in known:
             raise unknown(f"-only {name}: no such entry (-list shows all)", name, known)

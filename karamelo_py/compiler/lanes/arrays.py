@@ -215,7 +215,6 @@ def _load_points(array, at):
 @intrinsic
 def _store_points(array, at, value):
     lanes = Lanes(array.dtype, lanes_of(at))
-    typed = value if isinstance(value, Lanes) else lanes
 
     def codegen(builder, table, place, number):
         pointer, p = _points_at(builder, array, table, at, place)
@@ -230,7 +229,7 @@ def _store_points(array, at, value):
 
         _all_or_masked(builder, pointer, p, lanes, whole, partly)
 
-    return types.void(array, at, typed), codegen
+    return types.void(array, at, value if isinstance(value, Lanes) else lanes), codegen
 
 
 def ask(builder: Any, pointer: Any, ahead: Any) -> None:

@@ -288,9 +288,8 @@ def _both_sides(solid: Any, sides: Callable[[np.ndarray], np.ndarray]) -> bool:
 
 def _precision(hub: Hub, simulation: Any) -> Words:
     """Large scenes whose steps are long enough for single precision."""
-    count = sum(solid.count for solid in hub.solids.values())
     if (
-        count < LARGE
+        sum(solid.count for solid in hub.solids.values()) < LARGE
         or hub.settings.precision != "double"
         or getattr(simulation, "implicit", False)
     ):

@@ -41,9 +41,8 @@ class AveragedVolumes:
         return sums
 
     def _grow(self) -> None:
-        kin = self.equations.s.kin
         for points, laws, _, response, averages in self._parts():
-            loops.grow(self.mode, PARTS, kin, points, laws, response, averages)
+            loops.grow(self.mode, PARTS, self.equations.s.kin, points, laws, response, averages)
         self.volume = self._sums("volume")
         self.volume[self.volume == 0] = 1.0
 
@@ -59,9 +58,8 @@ class AveragedVolumes:
 
     def keep_stress(self) -> None:
         """Find the stresses of the present state."""
-        kin = self.equations.s.kin
         for points, laws, _, response, averages in self._parts():
-            loops.keep_averaged_stress(kin, points, laws, response, averages)
+            loops.keep_averaged_stress(self.equations.s.kin, points, laws, response, averages)
         self._grow()
         self._bring_mean()
 

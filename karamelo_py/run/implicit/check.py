@@ -140,10 +140,9 @@ def _bears_shear(law: Any, kin: Any) -> bool:
 
 
 def _only_prescribes(fix: Fix) -> bool:
-    bounds = any(getattr(formula, "bound", "") for formula in fix.formulas)
     return (
         (fix.prescribes_velocity or fix.first_step_only)
-        and not bounds
+        and not any(getattr(formula, "bound", "") for formula in fix.formulas)
         and fix.wall_friction is None
     )
 

@@ -128,7 +128,6 @@ class Equations:
     def _seen(self, block: Any) -> tuple[loops.Seen, loops.Response]:
         s = self.s
         seen, response = loops.nothing_seen(s, block)
-        now = int(s.control.clock[0].now)
         loops.see(
             self.mode,
             loops.PARTS,
@@ -138,7 +137,7 @@ class Equations:
             s.grids,
             block.points,
             block.laws,
-            now,
+            int(s.control.clock[0].now),
             seen,
         )
         return seen, response

@@ -277,10 +277,8 @@ class LoadSteps:
         if before is None:
             inertia: Rest | Motion = Rest(equations)
         else:
-            held = given, velocities
-            inertia = Motion(equations, self.scheme, dt, before[nodes], *held, contact)
-        tools = tools_of(equations, simulation)
-        pushing = [*([] if contact is None else [contact]), *tools]
+            inertia = Motion(equations, self.scheme, dt, before[nodes], given, velocities, contact)
+        pushing = [*([] if contact is None else [contact]), *tools_of(equations, simulation)]
         more = self.seconds, self.held
         newton = Newton(self.scheme, equations, ~given, inertia, pushing, external, dt, *more)
         newton.scale(self.moduli, self.scheme.stabilisation)
@@ -288,9 +286,8 @@ class LoadSteps:
             jump = np.where(given, velocities * dt, 0.0)
             u, iterations, residual = newton.solve(jump, self._interrupted)
         except Loose as reason:
-            chosen = np.arange(len(nodes)) == reason.node
             where = ", ".join(f"{x:.4g}" for x in equations.positions[reason.node])
-            solid = self._solid_at(equations, chosen)
+            solid = self._solid_at(equations, np.arange(len(nodes)) == reason.node)
             raise Failed(f"{reason}: nothing holds solid '{solid}' near ({where})") from None
         except Wrong as reason:
             raise Failed(f"{reason} (solid '{self._solid_of(reason.point)}')") from None
@@ -307,19 +304,17 @@ class LoadSteps:
         self.unknowns = int(np.count_nonzero(~given))
         self.corrections += iterations
         reaction = newton.reaction(u)
-        found = equations, inertia, pushing, u, fixed, reaction, iterations, residual
-        return Equilibrium(*found)
+        return Equilibrium(equations, inertia, pushing, u, fixed, reaction, iterations, residual)
 
     def _prescribed(self, equations: Equations, hooks: Any) -> tuple[np.ndarray, np.ndarray]:
         """Find which components of the nodes are held, and the velocities that they get."""
         simulation, s = self.simulation, equations.s
-        hold = self.scheme.hold
         given, velocities, changed = prescribed(
             s,
             s.nodes.update,
             equations.nodes,
             equations.d,
-            lambda: take_rows(hold, s, simulation.mode, hooks),
+            lambda: take_rows(self.scheme.hold, s, simulation.mode, hooks),
         )
         now = s.nodes.update[equations.nodes, : equations.d]
         self._check_numbers(now, "a node gets a velocity that is not a number")

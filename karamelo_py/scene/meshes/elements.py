@@ -141,9 +141,8 @@ def _accepted(dimension: int) -> str:
 
 def _check_plane(positions: np.ndarray, dimension: int) -> None:
     """Refuse nodes that lie beside the x axis in 1D or the plane z = 0 in 2D."""
-    size = np.ptp(positions, axis=0).max()
     beside = np.abs(positions[:, dimension:]).max() if dimension < 3 else 0.0
-    if beside > _PLANE * size:
+    if beside > _PLANE * np.ptp(positions, axis=0).max():
         raise ScriptError(
             f"the mesh does not lie {'on the x axis' if dimension == 1 else 'in the plane z = 0'}: "
             f"a node is {beside:g} away from it",

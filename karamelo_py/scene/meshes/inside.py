@@ -189,8 +189,7 @@ class Skin:
 
 def outer_faces(corners: np.ndarray) -> np.ndarray:
     """Faces (m, d, d) that belong to one only of simplices with `corners` (n, d + 1, d)."""
-    d = corners.shape[2]
-    faces = np.concatenate([np.delete(corners, k, axis=1) for k in range(d + 1)])
+    faces = np.concatenate([np.delete(corners, k, axis=1) for k in range(corners.shape[2] + 1)])
     order = np.lexsort(np.moveaxis(faces, 2, 0)[::-1], axis=1)
     same = np.take_along_axis(faces, order[:, :, None], axis=1)
     _, first, count = np.unique(

@@ -17,8 +17,7 @@ class Energy(Compute):
     measured = ""
 
     def refresh(self) -> None:
-        energy = self.hub.fields.energy(self.measured, self.group)
-        self.publish_all(*[energy] * len(self.published))
+        self.publish_all(*[self.hub.fields.energy(self.measured, self.group)] * len(self.published))
 
 
 class KineticEnergy(Energy):

@@ -104,9 +104,8 @@ class ULMPMContacts(Method):
 
     def lattices(self, hub: Hub) -> list[Lattice]:
         domain = hub.domain
-        count = max(fields(hub), default=0) + 1
         box = domain.dimension, domain.lo, domain.hi, domain.h
-        return numbered([self._lattice(*box) for _ in range(count)])
+        return numbered([self._lattice(*box) for _ in range(max(fields(hub), default=0) + 1)])
 
     def lattice_of(self, hub: Hub, solid: Solid) -> int:
         return fields(hub)[solid.index]
