@@ -42,17 +42,17 @@ MASS = 0  # of Nodes.sums
 
 
 def of_momentum(kin):
-    """First component of the momentum in `Nodes.sums`."""
+    """Return the first component of the momentum in `Nodes.sums`."""
     return 1
 
 
 def of_force(kin):
-    """First component of the force in `Nodes.sums`."""
+    """Return the first component of the force in `Nodes.sums`."""
     return 2 if kin.dimension == 1 else 4
 
 
 def of_change(kin):
-    """First component of v* - v in `Nodes.update`; that of v* is 0."""
+    """Return the first component of v* - v in `Nodes.update`; that of v* is 0."""
     return 4 if kin.dimension == 3 else kin.dimension
 
 

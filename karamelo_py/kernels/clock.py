@@ -16,12 +16,12 @@ from karamelo_py.points.kinematics import vector
 
 
 def step_size(s: Setup) -> Number:
-    """dt of the present step, in the precision of the run: how long points move."""
+    """Return dt of the present step, in the precision of the run: how long points move."""
     return real(s.control.values[DT], s.nodes.sums[0, MASS])
 
 
 def last_step_size(s: Setup) -> Number:
-    """dt of the step before, which the velocity at the start of this one belongs to.
+    """Return dt of the step before, which the velocity at the start of this one belongs to.
 
     Before the first step there was none: the state at the start has its strain already. It takes
     next to nothing, since rates of strain are asked for.
@@ -57,7 +57,7 @@ STRIDE = 0.65
 
 @kernel
 def choose_dt(control: Control) -> None:
-    """dt of the next step, from the rate of the fastest point or as fixed; shortened at the end.
+    """Choose dt of the next step, by the rate of the fastest point or as fixed; less at the end.
 
     The last two steps are shortened alike. Where velocities are mapped or prescribed, a step takes
     impulses that do not vanish with its length: in a last step that is a small part of the others,

@@ -273,7 +273,7 @@ def _excess_of(contact, kin, nodes, pair, where):
 
 @noinline
 def _friction_of(pair, friction, push, slide, share):
-    """Impulse along the surface over the speed of sliding, and whether it stops all sliding."""
+    """Find the impulse along the surface over the speed of sliding, and whether that stops all."""
     compliance = dot(slide, slide, pair.yielding)
     if not compliance > 0:
         return 0.0, False
@@ -367,7 +367,7 @@ def _before(kin, nodes, n, per_mass):
 
 @noinline
 def _touch_pair(contact, kin, nodes, control, i, j, place, share, where):
-    """`share` of the impulse between the `i`-th and the `j`-th of the fields that meet."""
+    """Give `share` of the impulse between the `i`-th and the `j`-th of the fields that meet."""
     a, b = contact.meeting[i], contact.meeting[j]
     n, m = _node(contact, place, i), _node(contact, place, j)
     pair = _pair_of(contact, kin, nodes, nodes.update, n, m)
@@ -447,7 +447,7 @@ def touch_node(contact, kin, grids, nodes, control, n):
 
 @noinline
 def _keep_rigid(contact, kin, nodes, control, n):
-    """Rigid bodies have their velocity, whatever acts on the nodes; it does no work."""
+    """Keep the velocity of rigid bodies, whatever acts on the nodes; it does no work."""
     if contact.rigid[n // contact.stride] and nodes.sums[n, MASS] > 0:
         for k in range(kin.dimension):
             v = nodes.sums[n, of_momentum(kin) + k] / nodes.sums[n, MASS]

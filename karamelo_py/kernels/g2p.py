@@ -145,7 +145,7 @@ def _records_of_strain(task, nodes):
 
 @point_function()
 def gathered(task: arrays.Tag, w: Work, stencil: tuple, k: int, total: tuple) -> tuple:
-    """`total` with the part of the k-th node of the stencil."""
+    """Add the part of the k-th node of the stencil to `total`."""
 
 
 @gathered.on(Move)
@@ -166,7 +166,7 @@ def moves_corners(basis: arrays.Tag, kin: arrays.Tag) -> bool:
 
 
 def update_at(kin: arrays.Tag, nodes: arrays.Nodes, i: arrays.Index, like: arrays.Number) -> tuple:
-    """v* and v* - v of a node: one record in the plane, two in space."""
+    """Return v* and v* - v of a node: one record in the plane, two in space."""
     if many_threads() and not isinstance(i, Weighted):  # records that lie side by side
         both = aligned_record(nodes.update, i, 2 * arrays.of_change(kin))
         first, d = arrays.of_change(kin), kin.dimension
@@ -223,7 +223,7 @@ def updated(task, w, stencil, p, dt, total, totals, fastest):
 
 @updated.on(Strain)
 def _updated_strain(task, w, stencil, p, dt, total, totals, fastest):
-    """State of the law and shape of the domain after a step; growth in cells, and rate."""
+    """Return state of the law and shape of the domain after a step; growth in cells, and rate."""
     gradient, ratio = total
     if not len(gradient):  # the point keeps it
         gradient = totals[0][2]
@@ -271,7 +271,7 @@ def _updated_trial_strain(task, w, stencil, p, dt, total, totals, fastest):
 
 
 def increment(dt, grad_v):
-    """dl = dt grad v, as numbers: F + dl is a sum of two of them."""
+    """Return dl = dt grad v, as numbers: F + dl is a sum of two of them."""
     return grad_v._make(dt * grad_v)
 
 
@@ -289,14 +289,14 @@ def _updated_series_term(task, w, stencil, p, dt, total, totals, fastest):
 
 
 def further_reach(basis, kin, grid, before, after):
-    """By how many cells the domain of a point reaches further than before."""
+    """Find by how many cells the domain of a point reaches further than before."""
     further = extent(basis, kin, grid, after) - extent(basis, kin, grid, before)
     return max(further, 0)
 
 
 @updated.on(Move)
 def _updated_move(task, w, stencil, p, dt, total, totals, fastest):
-    """New velocity, position and carried corners; how far that is in cells."""
+    """Return the new velocity, position and carried corners; how far that is in cells."""
     law, state = visit.law_and_state(w, p)
     v_pic, dv, moment, *corners = total
     old = load_vector(w.kin, w.points.v, p)

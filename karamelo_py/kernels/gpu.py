@@ -399,7 +399,7 @@ def _steps_to(s, grid, k):
 
 
 def _with_cell(s, cells, grid, n, k, begin, end, found):
-    """`found` with what a cell gives to node `n`, which its points see as their k-th node."""
+    """Add to `found` what a cell gives to node `n`, which its points see as their k-th node."""
     c = n - _steps_to(s, grid, k)
     box = cells.box[index(max(c, 0))]
     there = (box >= 0) & (c >= 0)

@@ -118,7 +118,7 @@ class Warming(NamedTuple):
 
 
 def at_least_round_off(weight):
-    """`weight`, and next to nothing where it is nothing.
+    """Return `weight`, and next to nothing where it is nothing.
 
     A point that stands on a node has no weight at the next, but a gradient: that node needs the
     temperature that the point has there, and what flows to it has to come back.

@@ -80,7 +80,7 @@ class CompiledHook(NamedTuple):
 
     @property
     def on_nodes(self) -> bool:
-        """True where it acts on nodes."""
+        """Tell whether it acts on nodes."""
         return self.where in ("nodes", WHOLE_NODES)
 
     @property

@@ -141,7 +141,7 @@ def gradient_at(kin, seen, p, k):
 
 @by_threads
 def strain(kin, seen, u, response, part):
-    """H of each point, from displacements (m, d)."""
+    """Find H of each point, from displacements (m, d)."""
     seen, response = at_hand(seen), at_hand(response)
     count = seen.nodes.shape[0]
     most = 0.0
@@ -167,13 +167,13 @@ def strained_point(kin, points, laws, response, p):
 
 
 def nominal_stress(law, kin, state, H, dt):
-    """P by the places before the step, per reference volume."""
+    """Return P by the places before the step, per reference volume."""
     after = advance(law, kin, state, large(H) if by_rates(law) else H, dt)
     return kirchhoff_stress(law, kin, after).nominal(I + H)
 
 
 def stress_and_tangent(law, kin, state, H, dt):
-    """P and dP/dH."""
+    """Return P and dP/dH."""
     P = nominal_stress(law, kin, state, seeded(H), dt)
     return P._make([x.value for x in P]), tuple([slopes_of(x, len(H)) for x in P])
 
@@ -184,7 +184,7 @@ if config.DISABLE_JIT:  # type: ignore[attr-defined]
 
 @by_threads
 def respond(kin, points, laws, dt, response, part):
-    """Stress of each point after its increment."""
+    """Find the stress of each point after its increment."""
     points, laws, response = at_hand(points), at_hand(laws), at_hand(response)
     lanes = lanes_with((), laws, points.mass)
     end = points_of(points.mass.size, part + 1)
@@ -196,7 +196,7 @@ def respond(kin, points, laws, dt, response, part):
 
 @by_threads
 def respond_to_changes(kin, points, laws, dt, response, first, end, tangent, part):
-    """V0 dP/dH (t t, c) of c points from the `first` on, a row of P after another."""
+    """Find V0 dP/dH (t t, c) of c points from the `first` on, a row of P after another."""
     points, laws, response = at_hand(points), at_hand(laws), at_hand(response)
     lanes = lanes_with((), laws, points.mass)
     count = end - first
@@ -211,7 +211,7 @@ def respond_to_changes(kin, points, laws, dt, response, first, end, tangent, par
 
 @kernel
 def keep_stress(kin, points, laws, stress):
-    """V0 P of the present state: no place has changed yet."""
+    """Keep V0 P of the present state: no place has changed yet."""
     points, laws = at_hand(points), at_hand(laws)
     for p in range(points.mass.size):
         law, state = state_at(kin, points, laws, p)
@@ -289,7 +289,7 @@ def along(kin, row):
 
 
 def by_gradient(kin, h, C):
-    """df/dH (d t) of a node with gradient h, from dP/dH (t t)."""
+    """Return df/dH (d t) of a node with gradient h, from dP/dH (t t)."""
     d, places = kin.dimension, kin.Tensor.places
     t = len(places)
     return tuple(

@@ -59,13 +59,13 @@ def nothing_averaged(kin: Any, block: Block) -> Averages:
 
 
 def cofactors(A):
-    """J A^-T, the derivatives of J."""
+    """Return J A^-T, the derivatives of J."""
     return det(A) * inv(A).transposed()
 
 
 @by_threads
 def grow(kin, points, laws, response, averages, part):
-    """Volume of each point before and after its increment, and its derivatives."""
+    """Find the volume of each point before and after its increment, and its derivatives."""
     points, laws = at_hand(points), at_hand(laws)
     response, averages = at_hand(response), at_hand(averages)
     for p in range(points_of(points.mass.size, part), points_of(points.mass.size, part + 1)):
@@ -77,7 +77,7 @@ def grow(kin, points, laws, response, averages, part):
 
 
 def averaged_stress(law, kin, state, H, ratio, dt):
-    """P and q per reference volume, after the increment H and a ratio of volumes."""
+    """Return P and q per reference volume, after the increment H and a ratio of volumes."""
     A = I + H
     dl = scaled_increment(Updated(), kin, H, (), ratio / det(A))
     tau = kirchhoff_stress(law, kin, advance(law, kin, state, dl, dt))
@@ -91,7 +91,7 @@ if config.DISABLE_JIT:  # type: ignore[attr-defined]
 
 @by_threads
 def respond_averaged(kin, points, laws, dt, response, averages, part):
-    """P and q of each point, and their derivatives."""
+    """Find P and q of each point, and their derivatives."""
     points, laws = at_hand(points), at_hand(laws)
     response, averages = at_hand(response), at_hand(averages)
     lanes = lanes_with((), laws, points.mass)
@@ -115,7 +115,7 @@ def respond_averaged(kin, points, laws, dt, response, averages, part):
 
 @kernel
 def keep_averaged_stress(kin, points, laws, response, averages):
-    """P and q of the present state: no place has changed yet."""
+    """Keep P and q of the present state: no place has changed yet."""
     points, laws = at_hand(points), at_hand(laws)
     for p in range(points.mass.size):
         law, state = state_at(kin, points, laws, p)

@@ -53,7 +53,7 @@ def warm_node(rubbed, n, heat):
 
 
 def warm_by_friction(rubbed, w, stencil, p, like):
-    """Point `p` takes the heat of friction at its nodes by its weights: none is lost."""
+    """Give point `p` the heat of friction at its nodes by its weights: none is lost."""
     if rubbed is not None:
         law, state = law_and_state(w, p)
         heat = like - like
@@ -154,7 +154,7 @@ def gathered_term(w, stencil, term):
 
 
 def _spread(w, stencil, term):
-    """sum_i N_i |w_i - term|^2 of the present term w of XPIC's series."""
+    """Sum N_i |w_i - term|^2 of the present term w of XPIC's series."""
     spread = term[0] - term[0]
     for i, weight, _ in nodes_of(w, stencil):
         spread += weight * (term_at(w, i, term) - term).squared()
@@ -184,7 +184,7 @@ def _moment_before(w, stencil, v, moment):
 
 
 def _gone(lost, w, stencil, v, moment):
-    """Kinetic energy per mass that a point has lost at the nodes and on the way back."""
+    """Find the kinetic energy per mass that a point lost at the nodes and on the way back."""
     gone = v[0] - v[0]
     there, here = transfers.lost_shares(w.transfer, gone)
     one = real(1, gone)

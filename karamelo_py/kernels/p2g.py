@@ -216,7 +216,7 @@ def _scattered_mass_momentum(quantity, w, stencil, k, load):
 
 
 def _mean_stress(kin, law, state, volume):
-    """Volume times mean stress, and volume, of a point of reference `volume`."""
+    """Return volume times mean stress, and volume, of a point of reference `volume`."""
     tau = laws.kirchhoff_stress(law, kin, state).mean_of_stretching()
     return volume * tau, volume * laws.jacobian(law, kin, state)
 

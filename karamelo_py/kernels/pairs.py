@@ -42,7 +42,7 @@ class Cells(NamedTuple):
 
 
 def cells_for(points: int) -> Cells:
-    """Scratch for the search among so many points."""
+    """Make scratch for the search among so many points."""
     return Cells(
         start=np.zeros(2 * points + 65, np.int64), cell=np.zeros(points, np.int64),
         order=np.zeros(points, np.int64), corner=np.zeros(3), length=np.zeros(3),
@@ -96,7 +96,7 @@ def pick(kin, x, points, begin1, end1, begin2, end2, low, high, rows):
 
 @kernel
 def collect(kin, x, points, laws, rows, found):
-    """Number, mass, radius, position and velocity of points of a block (n, 3 + 2 d)."""
+    """Collect number, mass, radius, position and velocity of points of a block (n, 3 + 2 d)."""
     points, laws, d = at_hand(points), at_hand(laws), kin.dimension
     for i in range(rows.size):
         p = rows[i]
@@ -109,7 +109,7 @@ def collect(kin, x, points, laws, rows, found):
 
 @noinline
 def _range(x, begin, end, k):
-    """Least and largest coordinate k of some points."""
+    """Find the least and largest coordinate k of some points."""
     lo, hi = inf, -inf
     for i in range(begin, end):
         lo = min(lo, x[i, k])
@@ -127,7 +127,7 @@ def _largest(values, begin, end):
 
 @noinline
 def _lay_cells(d, bodies, cells, reach):
-    """Cells over all places where the bodies may touch; returns their width, 0 if there are none.
+    """Lay cells over all places where the bodies may touch; return their width, 0 without any.
 
     They are as wide as two points that touch can be apart, or wider where there is no room.
     """

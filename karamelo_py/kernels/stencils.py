@@ -28,7 +28,7 @@ from karamelo_py.points.kinematics import from_columns, zero_vector
 
 @point_function(otherwise=True)
 def affine_part(quantity, w, stencil, load):
-    """(array, first component, value at the first node, growths from node to node) of a quantity.
+    """Return (array, first component, value at the first node, growth per node) of a quantity.
 
     One growth for each direction, or none where all nodes see the same. () for what is not affine.
     """
@@ -91,7 +91,7 @@ def _beside(a, b):
 
 
 def joined(lanes, kin, parts):
-    """Momentum and force as one part, where both grow and a register takes both."""
+    """Join momentum and force as one part, where both grow and a register takes both."""
     if isinstance(lanes, OneByOne) or len(parts) != 2 or of_force(kin) != 4:
         return parts
     array, first, a, to_a = parts[0]

@@ -110,7 +110,7 @@ def _step(scheme, visits, mode, s, hooks, more):
 
 
 def begin(scheme: Tag, visits: Tag, mode: Tag, s: Setup) -> bool:
-    """Before the first of several steps; returns whether all points are on the grid."""
+    """Prepare the first of several steps; tell whether all points are on the grid."""
     return _take_all(_begin_rows(type(scheme), type(visits)), s, mode, NoHooks(), True)
 
 
@@ -176,7 +176,7 @@ _by_team = by_team(_led)
 
 @kernel
 def advance(scheme: Tag, visits: Tag, mode: Tag, s: Setup, hooks: Tag, count: int) -> int:
-    """`run_steps`, by a team of threads where there are some."""
+    """Call `run_steps`, by a team of threads where there are some."""
     return _by_team(mode, scheme, visits, s, hooks, count)
 
 

@@ -121,7 +121,7 @@ def hand_over(own, totals, row):
 
 @kernel
 def carry(total):
-    """Digits from 0 to 2^32 - 1, the last one signed."""
+    """Carry digits over to 0 to 2^32 - 1, the last one signed."""
     for k in range(LOST - 1):
         carry = total[k] >> 32
         total[k] -= carry << 32
@@ -190,12 +190,12 @@ def number_of_all(ranks, control, number):
 
 @point_function(otherwise=True)
 def agree_on_reports(ranks, control):
-    """Largest move and rate of all processes, and whether a point of any went wrong."""
+    """Find the largest move and rate of all processes, and whether a point of any went wrong."""
 
 
 @point_function(otherwise=True)
 def agree_on_heat(ranks, control):
-    """Lowest and highest temperatures of all processes."""
+    """Find the lowest and highest temperatures of all processes."""
 
 
 @point_function(otherwise=True)

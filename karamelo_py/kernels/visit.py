@@ -193,7 +193,7 @@ def no_ratio(w, like):
 
 
 def gathered_ratio(w, stencil, k, total):
-    """`total` with the ratio of volumes at the k-th node, where it is averaged."""
+    """Add the ratio of volumes at the k-th node to `total`, where it is averaged."""
     if not len(total):
         return total
     i, weight, _ = node_of(w, stencil, k)
@@ -202,7 +202,7 @@ def gathered_ratio(w, stencil, k, total):
 
 
 def averaged(w, p, dl, ratio):
-    """`dl` with the change of volume that the surroundings have on average, where there is one."""
+    """Give `dl` the change of volume that the surroundings have on average, where there is one."""
     if not len(ratio):
         return dl
     # The ratio of volumes of the increment is replaced by its average over the points nearby,

@@ -67,7 +67,7 @@ def rub(kin, nodes, programs, held, n, mu, dt, kept, control, slot):
 
 @noinline
 def stick(kin, nodes, programs, n):
-    """Nor does the velocity that deforms slide, where friction stopped the node.
+    """Stop the velocity that deforms, too, where friction stopped the node.
 
     Where it is mapped apart from v*, stress would else do work on a slip that there is not.
     """

@@ -67,7 +67,7 @@ def energies_of(kin, points, laws, p):
 
 @shared_out
 def _look_at_shares(kin, points, laws, tiling, firsts, k):
-    """Energies, mass and momentum of the points of each tile of the k-th share, for its report."""
+    """Sum energies, mass and momentum of points of each tile of the k-th share, for its report."""
     points, laws, tiling = at_hand(points), at_hand(laws), at_hand(tiling)
     lanes = lanes_with((), laws, points.mass)
     for place in range(tiling.share[k], tiling.share[k + 1]):
@@ -106,7 +106,7 @@ def _take_work(work, control):
 
 
 def sum_energies(s, mode):
-    """Energies of points, kinetic and stored plus dissipated, and the work into the clock.
+    """Sum energies of points, kinetic and stored plus dissipated, and the work into the clock.
 
     Rigid bodies have none: they move as they are told, and do work on others.
     """
@@ -132,7 +132,7 @@ def take_energies(s):
 
 @kernel
 def _add_momenta(d, ids, masses, v, tiling, control):
-    """Mass and momentum of each solid, 1 + d, to the totals behind those of published values."""
+    """Add mass and momentum of each solid, 1 + d, to totals behind those of published values."""
     firsts, sums = control.firsts, control.answer
     for t in range(tiling.count[0]):
         solid = int(tiling.report[t, OF_SOLID])
@@ -162,7 +162,7 @@ def _add_momentum(control, solid, d):
 
 
 def _sum_drift(s):
-    """Kinetic energy of the centres of mass of the solids, into the clock; after `sum_energies`."""
+    """Sum kinetic energies of centres of mass of solids into the clock, after `sum_energies`."""
     control, d = s.control, s.kin.dimension
     own = control.values.size
     control.totals[own:] = 0
@@ -211,7 +211,7 @@ def keeps(first, later, unit, within=WITHIN):
 
 
 def unit_of(clock):
-    """Unit of the growth of energy: the most that there was, of a drift no more than so."""
+    """Return the unit of the growth of energy: the most there was, of a drift no more than so."""
     return max(clock.largest_own, DRIFTING * clock.largest_energy, clock.energy_floor)
 
 
@@ -279,7 +279,7 @@ def _range_of_heat(kin, points, laws, control):
 
 
 def measure_heat(s):
-    """Lowest and highest temperature of all points, into the clock."""
+    """Find the lowest and highest temperature of all points, for the clock."""
     clock = s.control.clock[0]
     clock.T_low, clock.T_high, clock.own_heat = inf, -inf, 0.0
     for block in s.blocks:
@@ -300,7 +300,7 @@ def look_at_heat(s):
 
 
 def begin_to_look(s, mode, level, anew):
-    """Before a run: the stored energy of the present state, where a look is due after a step.
+    """Note the stored energy before a run, where a look is due after a step.
 
     `level` is the share of the later stored energy, and of the earlier kinetic one, in the balance.
     With `anew` the balance starts from here.
