@@ -86,7 +86,7 @@ class PointsById:
         return PointTable(self.hub, Rows(self.setup, parts, ids, np.ones(len(ids), np.bool_)))
 
     def added_up(self, part: Any, name: str, *arguments: Any) -> np.ndarray:
-        """Sums over the points of a part's group of what its method `name` says; no rounding.
+        """Sum, over the points of a part's group, what its method `name` says; no rounding.
 
         Called with tables of some of the points, and the `arguments`, it returns rows of terms
         (k, n), or the number of sums, to which of them (n,) a term goes, and terms.
@@ -107,7 +107,7 @@ class PointsById:
         return np.array([rounded(t) if one else 0.0 for t, one in zip(totals, there, strict=True)])
 
     def summed(self, terms: np.ndarray) -> np.ndarray:
-        """Sums of terms (n,) or (n, k) of what is at hand over all, rounded once."""
+        """Sum terms (n,) or (n, k) of what is at hand over all, rounded once."""
         columns = terms.reshape(len(terms), int(np.prod(terms.shape[1:]))).T
         limbs = np.zeros((len(columns), LIMBS), np.int64)
         for k, column in enumerate(columns):
@@ -202,7 +202,7 @@ class NodesByNumber:
             yield NodeRows(first, end, s.kin, arrays, own, weights)
 
     def _sums_between(self, first: int, end: int, sums: dict, gather: Callable) -> dict:
-        """Sums over the points of all processes at the nodes from `first` to before `end`."""
+        """Sum over the points of all processes at the nodes from `first` to before `end`."""
         nodes = numbers(self.simulation.setup.spans)
         used = nodes[slice(*np.searchsorted(nodes, (first, end)))]
         own = {name: np.zeros((end - first, 2)) for name in sums}
@@ -224,7 +224,7 @@ class NodesByNumber:
         return nodes[self.simulation.setup.nodes.sums[nodes, MASS] > 0]
 
     def mass_of(self, group: Any) -> np.ndarray:
-        """(4,) the mass of the nodes of a group, and this times x, y and z; rounded once."""
+        """Sum the mass of the nodes of a group, and this times x, y and z (4,); rounded once."""
         self.simulation.show_on_nodes()
         hub = self.points.hub
         nodes = np.intersect1d(self.with_mass(), hub.groups[group.id].members, assume_unique=True)

@@ -34,16 +34,16 @@ class BodyMotion(NamedTuple):
 
     @property
     def size(self) -> float:
-        """Half of the longest side of the box around it."""
+        """Return half of the longest side of the box around it."""
         return float((self.high - self.low).max()) / 2
 
     def drift(self, axisymmetric: bool) -> np.ndarray:
-        """(d,) Velocity of the body as a whole: along the radius it has none."""
+        """Find the velocity (d,) of the body as a whole: along the radius it has none."""
         return np.array([0.0, self.velocity[1]]) if axisymmetric else self.velocity
 
     @property
     def turning(self) -> np.ndarray:
-        """(3,) Angular velocity, I^-1 L; a body without extent across an axis has none about it."""
+        """Find the angular velocity (3,), I^-1 L: none about an axis without extent across it."""
         spread, shear = np.zeros((2, 3, 3))
         d = len(self.centre)
         spread[:d, :d], shear[:d, :d] = self.spread, self.shear
@@ -57,7 +57,7 @@ class BodyMotion(NamedTuple):
 
     @property
     def reach(self) -> float:
-        """Largest distance, from the axis that it turns about, of an ellipsoid in its box."""
+        """Find the largest distance of an ellipsoid in its box from its axis of rotation."""
         w, half = self.turning, np.zeros(3)
         half[: len(self.centre)] = (self.high - self.low) / 2
         across = np.dot(w, w) * np.eye(3) - np.outer(w, w)
@@ -65,7 +65,7 @@ class BodyMotion(NamedTuple):
 
     @property
     def rate(self) -> float:
-        """Largest stretching of the gradient that is nearest to the velocities of all points."""
+        """Find the largest stretching of the gradient nearest to the velocities of all points."""
         gradient = np.linalg.lstsq(self.spread, self.shear, rcond=None)[0]
         return float(np.abs(np.linalg.eigvalsh(gradient + gradient.T)).max()) / 2
 
@@ -97,7 +97,7 @@ def motions(simulation: Any) -> list[BodyMotion]:
 
 
 def _pieces(simulation: Any, d: int) -> Iterator[tuple[int, np.ndarray, np.ndarray, np.ndarray]]:
-    """Number of a solid, masses (n,), places and velocities (d, n) of some of its points."""
+    """Yield the number of a solid, masses (n,), places and velocities (d, n) of some points."""
     firsts = [solid.first_id for solid in simulation.hub.solids.values()]
     for block, rows in simulation.points.rows_of(None):
         points = block.points
@@ -207,7 +207,7 @@ def turn_of(s: Any) -> Noise | None:
 
 
 def held(s: Any, one: BodyMotion) -> np.ndarray:
-    """(d,) Find the directions in which fixes hold nodes at a body: it goes nowhere."""
+    """Find the directions (d,) in which fixes hold nodes at a body: it goes nowhere."""
     found, lattices = np.zeros(s.d, np.bool_), s.hub.lattices
     lattice = lattices[s.method.lattice_of(s.hub, list(s.hub.solids.values())[one.number])]
     for fix in s.hub.fixes.values():
@@ -222,7 +222,7 @@ def held(s: Any, one: BodyMotion) -> np.ndarray:
 
 
 def _free_time(s: Any, one: BodyMotion) -> float:
-    """Time of flight of a body until it meets another, or the edge of the domain."""
+    """Find the time of flight of a body until it meets another, or the edge of the domain."""
     d, domain = s.d, s.hub.domain
     ways = zip(one.velocity, one.low, one.high, domain.lo[:d], domain.hi[:d], strict=True)
     first = min(
@@ -236,7 +236,7 @@ def _free_time(s: Any, one: BodyMotion) -> float:
 
 
 def _meeting(one: BodyMotion, other: BodyMotion) -> float:
-    """Time at which the boxes around two bodies meet; infinite if they never do."""
+    """Find the time at which the boxes around two bodies meet; infinite if they never do."""
     begin, end = 0.0, inf
     for v, gap, over in zip(
         one.velocity - other.velocity, other.low - one.high, other.high - one.low, strict=True

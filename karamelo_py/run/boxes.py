@@ -41,7 +41,7 @@ def rows_of(boxes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def joined_spans(boxes: np.ndarray) -> np.ndarray:
-    """(k, 2) the rows of boxes of nodes (see `Buffers`), joined where they meet."""
+    """Join the rows (k, 2) of boxes of nodes (see `Buffers`) where they meet."""
     begin, end = rows_of(boxes)
     order = np.argsort(begin, kind="stable")
     begin, end = begin[order], np.maximum.accumulate(end[order])
@@ -77,7 +77,7 @@ def used(spans: np.ndarray) -> np.ndarray:
 
 
 def without(spans: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """(k, 2) what of spans is in none of the others; neither of them overlap."""
+    """Find what of spans (k, 2) is in none of the others; neither of them overlap."""
     edges = np.concatenate([spans.T.ravel(), others.T.ravel()])
     steps = np.repeat([1, -1, 2, -2], [len(spans)] * 2 + [len(others)] * 2)
     order = np.argsort(edges, kind="stable")
@@ -98,7 +98,7 @@ def between(begin: np.ndarray, end: np.ndarray) -> np.ndarray:
 
 
 def ragged(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """For each of so many items of each of k lists: its list, and its number in that."""
+    """Find, for each of so many items of each of k lists, its list and its number in that."""
     of = np.repeat(np.arange(len(counts)), counts)
     return of, np.arange(len(of)) - (np.cumsum(counts) - counts)[of]
 
@@ -109,7 +109,7 @@ def numbered(shapes: np.ndarray) -> np.ndarray:
 
 
 def steps_of(shapes: np.ndarray) -> np.ndarray:
-    """Steps (k, d) from a number to that of the neighbour in boxes of these shapes (k, d)."""
+    """Find steps (k, d) from a number to that of the neighbour in boxes of these shapes (k, d)."""
     after = np.concatenate([shapes[:, 1:], np.ones((len(shapes), 1), np.int64)], axis=1)
     return np.cumprod(after[:, ::-1], axis=1)[:, ::-1]
 
@@ -120,7 +120,7 @@ def unique(numbers: np.ndarray) -> np.ndarray:
 
 
 def no_nodes() -> dict[str, np.ndarray]:
-    """Room for the nodes in use of a setup, where none are yet."""
+    """Make room for the nodes in use of a setup, where none are yet."""
     return {name: np.zeros((1, 2), np.int64) for name in ("spans", "ranges")}
 
 
@@ -141,7 +141,7 @@ def summed(nodes: Nodes) -> list[np.ndarray]:
 
 
 def room_of(rows: int, like: np.ndarray) -> np.ndarray:
-    """So many rows as the array has, zero; with none it can grow."""
+    """Make so many rows like those of the array, zero; with none it can grow."""
     width, kind = like.shape[1], like.dtype
     return records(rows, width, kind) if rows else np.zeros((0, width), kind)
 

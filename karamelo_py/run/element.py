@@ -66,7 +66,7 @@ class LoadPath(Named):
             )
 
     def strain_at_end(self, strain: np.ndarray, free: Sequence[str]) -> np.ndarray:
-        """(6,) strain at the end, from that at the start and the components that are `free`."""
+        """Find the strain (6,) at the end, from that at the start and the `free` components."""
         end = strain.copy()
         for name, value in self.strain.items():
             end[COMPONENTS.index(name)] = value
@@ -116,7 +116,7 @@ class Loading(NamedTuple):
 
 
 def stress_after(law, kin, state, dl, dt):
-    """Cauchy stress after an increment."""
+    """Return the Cauchy stress after an increment."""
     return laws.cauchy_stress(law, kin, laws.advance(law, kin, state, dl, dt))
 
 
@@ -233,7 +233,7 @@ class Point:
     def _slopes(
         self, state: tuple, dl: np.ndarray, dt: float, ways: Sequence[np.ndarray]
     ) -> np.ndarray:
-        """Derivatives (6, w) of the stress after an increment `dl`, by w changes of it (3, 3)."""
+        """Find derivatives (6, w) of the stress after an increment `dl` by w changes (3, 3)."""
         places = GRADIENT[type(self.kin)]
         numbers = [Dual(float(dl[at]), tuple([float(way[at]) for way in ways])) for at in places]
         found = on_numbers(stress_after)(self.law, self.kin, state, tensor(self.kin, numbers), dt)

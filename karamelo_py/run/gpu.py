@@ -308,7 +308,7 @@ class StepsOnCard:
         return any(program.begin < program.end for program in self.hooks.programs[h])
 
     def _values(self, h: int) -> int:
-        """Published values that a thread needs for itself: those of formulas a step earlier."""
+        """Count published values that a thread needs for itself: of formulas a step earlier."""
         if not (self._table()[h].uses_before and self._has_formulas(h)):
             return 0
         return 1 + max((operand for op, operand in self._globals()), default=0)
@@ -453,7 +453,7 @@ class StepsOnCard:
 
     @property
     def wrong(self) -> int:
-        """Number of the first of the points that went wrong."""
+        """Return the number of the first of the points that went wrong."""
         return int(gpu.BEHIND - self.fate[gpu.WRONG])
 
     def advance(self, count: int) -> int:

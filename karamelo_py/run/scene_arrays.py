@@ -124,7 +124,7 @@ class SceneArrays:
 
     @property
     def step(self) -> int:
-        """Number of steps taken in the whole script."""
+        """Return the number of steps taken in the whole script."""
         return int(self.control.values[TIMESTEP])
 
     def state(self) -> State:
@@ -155,7 +155,7 @@ class SceneArrays:
         )
 
     def leaving(self) -> np.ndarray:
-        """Ids (0-based, ascending) of the points whose new places lie beyond the edge."""
+        """List the ids (0-based, ascending) of points whose new places lie beyond the edge."""
         s, then = self.setup, 1 - self.now
         edges = ((s.grids.x0, s.grids.lx), (s.grids.y0, s.grids.ly), (s.grids.z0, s.grids.lz))
         found = []

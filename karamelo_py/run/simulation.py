@@ -83,7 +83,7 @@ class Simulation(SceneArrays):
         self._watch_energy(begun_before)
 
     def go_on(self, end_time: float, halvings: int) -> None:
-        """In place of `begin`: go on, to this end, with a state that was put into the arrays."""
+        """Go on, to this end, with a state that was put into the arrays, in place of `begin`."""
         clock = self.control.clock[0]
         self._make_ready()
         other_end, clock.end_time = clock.end_time != end_time, end_time
@@ -96,7 +96,7 @@ class Simulation(SceneArrays):
             clock.over_limit = over_limit
 
     def halve_step(self, times: int) -> None:
-        """From here on in this run the step is that of its start, halved so many `times`."""
+        """Halve the step of the start so many `times`, from here on in this run."""
         self._ask_for_steps(times)
         choose_dt(self.control)
         self._watch_limit()
@@ -166,7 +166,7 @@ class Simulation(SceneArrays):
 
     @property
     def limit(self) -> float:
-        """Stable step of the present state."""
+        """Return the stable step of the present state."""
         return float(self.control.clock[0].limit)
 
     @property
@@ -230,7 +230,7 @@ class Simulation(SceneArrays):
         return int(self.comm.allreduce(np.array([own]))[0])
 
     def energy(self) -> float:
-        """Kinetic, stored and dissipated energy less the work; NaN where nobody watches it."""
+        """Sum kinetic, stored and dissipated energy less the work; NaN where nobody watches it."""
         clock = self.control.clock
         if self._outside_tiles() or not clock[0].watch_energy:
             return np.nan

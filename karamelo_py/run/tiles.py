@@ -103,7 +103,7 @@ class Tiles:
         )
 
     def empty_buffers(self, nodes: kernel_arrays.Nodes, blocks: int) -> kernel_arrays.Buffers:
-        """Buffers for what points of so many blocks give to `nodes`."""
+        """Make buffers for what points of so many blocks give to `nodes`."""
         most = blocks * self._most_rows
         rows = int(most) if most <= AT_ONCE * len(nodes.sums) else 0
         given = tuple(one for one in nodes.fields if getattr(type(one), "summed", False))
@@ -158,7 +158,7 @@ class Tiles:
         return points.x[s.control.clock[0].now] if points.home is None else points.home
 
     def tiles_of(self, s: kernel_arrays.Setup, points: kernel_arrays.Points) -> np.ndarray:
-        """(n,) the tile of each point."""
+        """Find the tile (n,) of each point."""
         x, ends = self._where(s, points), np.empty((self.threads, self.count), np.int64)
         tile = np.empty(x.shape[1], np.int64)
         kin, of = planar(s.kin), points.grid
@@ -227,7 +227,7 @@ class Tiles:
             room[: len(rows)] = rows
 
     def _rows_to_clear(self, s: kernel_arrays.Setup) -> tuple[np.ndarray, ...]:
-        """As `_parts_to_sum` where points are few: one share, a part for each span."""
+        """Do as `_parts_to_sum` where points are few: one share, a part for each span."""
         boxes = Tiles._boxes(self, s)
         steps = self._steps[boxes.grid]
         self._tell_buffers(s, 0, 0, self._first_node[boxes.grid], steps)
@@ -395,7 +395,7 @@ def _evenly(parts: np.ndarray, beside: np.ndarray) -> np.ndarray:
 
 
 def in_use(tiling: kernel_arrays.Tiling) -> list[tuple[str, int]]:
-    """Names of the arrays of a tiling that a sort changes, and how many rows are in use."""
+    """Name the arrays of a tiling that a sort changes, and tell how many rows are in use."""
     tiles = tiling.count[0]
     whole = [(name, len(getattr(tiling, name))) for name in ("count", "share")]
     return [*whole, *((name, tiles) for name in ("range", "grid", "number", "box", "rows"))]
@@ -413,6 +413,6 @@ def shares_of(ranges: np.ndarray, shares: int, size: int) -> np.ndarray:
 
 
 def one_after_another(ranges: np.ndarray) -> np.ndarray:
-    """Ranges (k, 2) as long as these, each from the end of the one before."""
+    """Return ranges (k, 2) as long as these, each from the end of the one before."""
     ends = np.cumsum(ranges[:, 1] - ranges[:, 0])
     return np.stack([np.append(0, ends)[:-1], ends], axis=1)

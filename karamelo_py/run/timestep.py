@@ -127,7 +127,7 @@ def bears_drift(hub: Hub) -> bool:
 
 
 def own_weight_of_drift(hub: Hub) -> float:
-    """Weight of the common velocity of all in the step that the program takes of itself.
+    """Return the weight of the common velocity in the step that the program takes of itself.
 
     1 as in the rule of the language, h/(c + |v|). What drifts by boxes (ugimp, cpgimp), two and
     more per cell, gains the more the faster it is: by edges of shaken bars and blocks at 0.05 to
@@ -142,7 +142,7 @@ def own_weight_of_drift(hub: Hub) -> float:
 
 
 def common_velocity(simulation: Any, weight: float) -> np.ndarray:
-    """(3,) The velocity that speeds are measured from so that the common drift has this weight."""
+    """Return the velocity (3,) to measure speeds from so that the common drift has this weight."""
     bodies = motions(simulation) if weight != 1 else []
     common = np.zeros(3)
     if bodies:
@@ -335,7 +335,7 @@ class LimitsTold:
 
 
 def fastest_wave(simulation: Any) -> float:
-    """Fastest wave in the undeformed materials, without viscosity."""
+    """Find the fastest wave in the undeformed materials, without viscosity."""
     return max(elastic_speed(simulation, solid)[0] for solid in simulation.hub.solids.values())
 
 

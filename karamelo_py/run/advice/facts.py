@@ -92,12 +92,12 @@ class SceneFacts:
 
     @cached_property
     def drift(self) -> Noise | None:
-        """Noise of a drift through the grid, at most."""
+        """Estimate the noise of a drift through the grid, at most."""
         return drift_of(self)
 
     @cached_property
     def rotation(self) -> Noise | None:
-        """Noise of a turn through the grid, at most."""
+        """Estimate the noise of a turn through the grid, at most."""
         return turn_of(self)
 
     @cached_property
@@ -125,7 +125,7 @@ class SceneFacts:
 
     @cached_property
     def free_turns(self) -> float:
-        """Turns of the solid that turns most and is held nowhere."""
+        """Return the turns of the solid that turns most and is held nowhere."""
         free = [one.spin for one in self.motions if self.turn > TURN and not held(self, one).any()]
         return max(free, default=0.0) * self.duration / (2 * pi)
 
@@ -147,7 +147,7 @@ class SceneFacts:
 
     @cached_property
     def impact(self) -> float:
-        """Half of the largest difference of velocities over the speed of waves."""
+        """Return half of the largest difference of velocities over the speed of waves."""
         if not (self.motions and self.waves > 0):
             return 0.0
         fast = np.max([one.fast for one in self.motions], axis=0)
@@ -156,7 +156,7 @@ class SceneFacts:
 
     @cached_property
     def vibration(self) -> Vibration:
-        """Vibration of the solid that swings most."""
+        """Estimate the vibration of the solid that swings most."""
         most = Vibration(0.0, 0.0)
         for one in self.motions if self.waves > 0 else ():
             strain = one.rate * one.size / (2 * self.waves)
@@ -166,7 +166,7 @@ class SceneFacts:
 
     @cached_property
     def weights(self) -> list[np.ndarray]:
-        """Mean accelerations (d,) that fixes give the solids."""
+        """Find the mean accelerations (d,) that fixes give the solids."""
         found = []
         for fix in self.hub.fixes.values():
             if fix.accelerates and self.waves > 0 and self.motions:
@@ -204,14 +204,14 @@ class SceneFacts:
 
     @property
     def falls(self) -> float:
-        """Duration of the run in times sqrt(L/g), in which a solid falls by its own size."""
+        """Return the duration of the run over sqrt(L/g), in which a solid falls by its size."""
         sizes = [np.maximum(one.high - one.low, 1e-300) for one in self.motions]
         found = (np.abs(g) / np.max(sizes, axis=0) for g in self.weights)
         return self.duration * max((sqrt(one.max()) for one in found), default=0.0)
 
     @property
     def passes(self) -> float:
-        """Ways of points past each other, at their present velocities, in sizes of their solid."""
+        """Measure ways of points past each other, at present velocities, in sizes of solids."""
         found = [(one.fast - one.slow).max() / (4 * one.size) for one in self.motions if one.size]
         return self.duration * float(max(found, default=0.0))
 

@@ -277,7 +277,7 @@ def _duration_of_later(hub: Hub, simulation: Simulation) -> float:
 
 
 def _gone(hub: Hub, simulation: Simulation) -> float:
-    """Time that the solids have moved: since the last fix has come."""
+    """Return the time that the solids have moved: since the last fix has come."""
     fixes, update = list(hub.fixes.values()), hub.update
     known, since = update.moving
     if any(all(fix is not other for other in known) for fix in fixes):

@@ -58,7 +58,7 @@ def _unread(hub: Hub, simulation: Any) -> Words:
 
 
 def _unused(hub: Hub, simulation: Any) -> Words:
-    """Groups whose names stand nowhere but where they are made."""
+    """Find groups whose names stand nowhere but where they are made."""
     text = script_text(hub)
     if re.search(r"\binclude\s*\(", text):
         return  # who knows what stands there
@@ -125,7 +125,7 @@ def _alike(hub: Hub, fix: Any, key: Callable[[np.ndarray], np.ndarray]) -> bool:
 
 
 def _flat(hub: Hub, simulation: Any) -> Words:
-    """Solids that are the same all along a direction in which nothing moves."""
+    """Find solids that are the same all along a direction in which nothing moves."""
     domain = hub.domain
     d = domain.dimension
     if d == 1 or domain.axisymmetric or len(hub.lattices) > 1:
@@ -203,7 +203,7 @@ def _faces_held(hub: Hub, k: int, low: float, high: float) -> bool:
 
 
 def _round(hub: Hub, simulation: Any) -> Words:
-    """Cylinders about one axis, along which all acts."""
+    """Find cylinders about one axis, along which all acts."""
     if hub.domain.dimension != 3:
         return
     regions = [getattr(solid, "region", None) for solid in hub.solids.values()]
@@ -239,7 +239,7 @@ def _round(hub: Hub, simulation: Any) -> Words:
 
 
 def _mirrored(hub: Hub, simulation: Any) -> Words:
-    """Scenes that are the same on both sides of a plane across an axis."""
+    """Find scenes that are the same on both sides of a plane across an axis."""
     domain, solids = hub.domain, [solid for solid in hub.solids.values() if solid.count]
     if len(hub.lattices) > 1 or not _acting(hub):
         return
@@ -287,7 +287,7 @@ def _both_sides(solid: Any, sides: Callable[[np.ndarray], np.ndarray]) -> bool:
 
 
 def _precision(hub: Hub, simulation: Any) -> Words:
-    """Large scenes whose steps are long enough for single precision."""
+    """Find large scenes whose steps are long enough for single precision."""
     if (
         sum(solid.count for solid in hub.solids.values()) < LARGE
         or hub.settings.precision != "double"
@@ -304,7 +304,7 @@ def _precision(hub: Hub, simulation: Any) -> Words:
 
 
 def _output(hub: Hub, simulation: Any) -> Words:
-    """Output that takes longer than the steps, by rough times of one core."""
+    """Find output that takes longer than the steps, by rough times of one core."""
     span = getattr(simulation.control.clock[0], "end_time", inf) - hub.update.time
     steps = span / simulation.dt
     if not np.isfinite(steps):

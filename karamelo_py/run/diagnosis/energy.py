@@ -132,7 +132,7 @@ def _step_of(hub: Hub, simulation: Any, share: float) -> str:
 
 
 def swelling(points: PointTable) -> np.ndarray:
-    """(n,) volumes over those before the first step."""
+    """Return the volumes (n,) over those before the first step."""
     return points.particle("volume") / points.reference_volume
 
 
@@ -257,7 +257,7 @@ def grown_little(simulation: Any) -> bool:
 
 
 def growth_since(simulation: Any, before: float) -> float:
-    """Growth of the energy now since one that it had `before`; NaN where nobody watches it."""
+    """Find the growth of energy since one that it had `before`; NaN where nobody watches it."""
     unit = max(abs(before), float(simulation.control.clock[0].energy_floor), 1e-300)
     return growth(before, simulation.energy(), unit)
 

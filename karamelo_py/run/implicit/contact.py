@@ -144,7 +144,7 @@ class Contact:
 
     @property
     def on_second(self) -> np.ndarray:
-        """Forces (c, d) on the second body of each pair."""
+        """Return the forces (c, d) on the second body of each pair."""
         return self.push[:, None] * self.normal + self.drag
 
     def forces(self) -> np.ndarray:

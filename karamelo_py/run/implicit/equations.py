@@ -269,14 +269,14 @@ class Equations:
 
     @cached_property
     def positions(self) -> np.ndarray:
-        """Positions (m, d) of the nodes."""
+        """Return the positions (m, d) of the nodes."""
         grids, g = self.s.grids, self.grid
         origin = np.stack([grids.x0[g], grids.y0[g], grids.z0[g]], 1)[:, : self.d]
         return origin + grids.spacing[g][:, None] * self.places
 
     @cached_property
     def rigid_motions(self) -> np.ndarray:
-        """Rigid motions (m, d, k) of the nodes."""
+        """Return the rigid motions (m, d, k) of the nodes."""
         return rigid_motions(self.positions, isinstance(self.s.kin, Axisymmetric))
 
     def for_all_components(self, matrix: sp.csr_matrix) -> sp.bsr_matrix:

@@ -252,7 +252,7 @@ def warms_by_friction(hub: Hub) -> bool:
 
 
 def lower_nodes(kinds: Iterable[type], kin: NamedTuple, count: int, real: type) -> arrays.Nodes:
-    """Fields of `count` nodes, zero."""
+    """Make fields of `count` nodes, zero."""
     d = kin.dimension
     return arrays.Nodes(
         sums=fields.records(count, arrays.SUMS_WIDTH[d], real),

@@ -96,7 +96,7 @@ def point_fields(block: Any) -> list[tuple[str, str, int]]:
 
 
 def bytes_per_point(simulation: Any) -> int:
-    """Bytes of all fields of a point, the mean over the points of all kinds."""
+    """Sum the bytes of all fields of a point, the mean over the points of all kinds."""
     blocks = simulation.setup.blocks
     own = np.array([len(block.points.id) for block in blocks])
     counts = simulation.comm.allreduce(own).tolist()

@@ -51,7 +51,7 @@ def with_walls(hub: Hub, lattices: list[Lattice], basis: NamedTuple) -> NamedTup
 
 
 def _walls(lattice: Lattice, nodes: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
-    """Walls that held nodes make: a direction, and the cells (n, d) whose lower faces they are.
+    """Yield the walls that held nodes make: a direction, and cells (n, d) with these lower faces.
 
     A face of a cell is a wall if its nodes are held, but not within a block of held nodes, where
     the next faces on both sides are held, too. At the ends of the grid there are walls anyway.

@@ -416,7 +416,7 @@ def _needs(place: np.ndarray, begin: np.ndarray, end: np.ndarray) -> Needs:
 
 
 def _rows(lo: np.ndarray, hi: np.ndarray, first: np.ndarray, steps: np.ndarray) -> np.ndarray:
-    """Rows of the buffers of all nodes from `lo` to `hi` (k, d), box after box."""
+    """List rows of the buffers of all nodes from `lo` to `hi` (k, d), box after box."""
     shape = hi - lo + 1
     box, left = ragged(np.prod(shape, axis=1))
     inner = steps_of(shape)[box]
