@@ -36,7 +36,7 @@ def affine_part(quantity, w, stencil, load):
 
 
 def _affine(w, stencil, value, growths):
-    """Value at the first node, and growth a node, of `value` at the point and growths a length."""
+    """Return the value at the first node and growth per node: of one at the point, per length."""
     arm = reach(w.basis, w.kin, w.grid, stencil, 0)
     for growth, way in zip(growths, arm, strict=True):
         value = value + way * growth
