@@ -31,8 +31,6 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
 from karamelo_py.script.errors import ScriptError, plural, render_message
 from karamelo_py.script.expressions import GLOBAL_SEEDS
-from karamelo_py.script.functions import CONSTANTS, FUNCTIONS
-from karamelo_py.script.grammar import SPELLINGS
 from karamelo_py.script.parser import parse
 from karamelo_py.script.syntax import Raw, Source
 from karamelo_py.styles.dumps.pyplot import LEAST_PIXELS, MOST_PIXELS, look_of, tools_of
@@ -95,10 +93,7 @@ def run(options: argparse.Namespace) -> int:
     if options.live:
         return _live(options.files)
     movie = options.output.suffix.lower() in (".gif", ".mp4")
-    if movie:
-        movie_format(options.output)
-    else:
-        picture_format(options.output)
+    (movie_format if movie else picture_format)(options.output)
     frames = Frames(options.fps)
     # Named by number, 1000 comes after 999.
     files = sorted(_matching(options.files), key=lambda path: (_number(path), path.name))
@@ -114,8 +109,7 @@ def run(options: argparse.Namespace) -> int:
         for snapshot in _all_in(files):
             if picture is None:
                 with _telling_of_names(options):
-                    needs = _needs_log(snapshot, options, scene)
-                    log = _log_beside(files[0], scene) if needs else {}
+                    log = _log_beside(files[0], snapshot, options, scene)
                     look = _look(snapshot, options, scene)
                     chosen = partial(_chosen, look, scene, log)
                     picture = _picture(snapshot, files, options, look, scene, chosen)
@@ -178,17 +172,15 @@ def _scene(options: argparse.Namespace) -> Hub:
     return hub
 
 
-def _needs_log(first: Snapshot, options: argparse.Namespace, scene: Hub) -> bool:
-    """Tell if a formula or title has a name that a dump lacks, or a tool may have one."""
+def _log_beside(
+    file: Path, first: Snapshot, options: argparse.Namespace, scene: Hub
+) -> dict[int, dict[str, float]]:
+    """Read the log beside a dump, by step, where a formula, the title or a tool may need it."""
     formulas = [options.column, options.only, *Caption.PIECE.findall(options.title or "")]
-    asked = set(re.findall(r"[^\W\d]\w*", " ".join(filter(None, formulas))))
-    known = {*first.columns, *named_sets(scene), "time", "timestep", "step"}
-    known.update(FUNCTIONS, CONSTANTS, SPELLINGS)
-    return bool(asked - known or (options.script and options.outlines))
-
-
-def _log_beside(file: Path, scene: Hub) -> dict[int, dict[str, float]]:
-    """Read the log beside a dump, by step: formulas know the names of its columns."""
+    asked = re.findall(r"[^\W\d]\w*\b(?! *\()", " ".join(filter(None, formulas)))  # no functions
+    known = {*first.columns, *named_sets(scene), "time", "timestep", "step", "and", "or", "not"}
+    if known.issuperset(asked) and not (options.script and options.outlines):
+        return {}
     rows = []
     for name in ("log.mpm", "log.csv"):
         with suppress(ScriptError):
@@ -221,9 +213,8 @@ def _live(folders: list[Path]) -> int:
     from karamelo_py.app.live.folder import FolderPage
 
     if len(folders) > 1:
-        raise ScriptError(
-            f"--live shows one folder, not {len(folders)}", expected="view --live FOLDER"
-        )
+        what = f"--live shows one folder, not {len(folders)}"
+        raise ScriptError(what, expected="view --live FOLDER")
     page = FolderPage(folders[0])
     print(f"live: {page.server.address} (Ctrl-C ends it)", flush=True)
     with suppress(KeyboardInterrupt):
@@ -236,9 +227,8 @@ def _matching(names: Iterable[Path]) -> set[Path]:
     """Find the files of these names; a pattern stands for all files that match it."""
     found: set[Path] = set()
     for name in names:
-        there = [name]
-        if not name.exists() and glob.has_magic(str(name)):
-            there = [Path(file) for file in glob.glob(str(name))]
+        is_pattern = glob.has_magic(str(name)) and not name.exists()
+        there = [Path(file) for file in glob.glob(str(name))] if is_pattern else [name]
         if not there:
             raise ScriptError(f"no file matches {name}", expected="dumps of an earlier run")
         found.update(there)
@@ -273,9 +263,8 @@ def _look(first: Snapshot, options: argparse.Namespace, scene: Hub) -> dict[str,
                 continue
             (call,) = parse(f"view({given})", f"--{option}")
             if len(call.arguments) != 1:
-                raise ScriptError(
-                    f"--{option} takes one value, not '{given}'", expected=word.kind.text
-                )
+                what = f"--{option} takes one value, not '{given}'"
+                raise ScriptError(what, expected=word.kind.text)
             argument = Argument(Raw(Source(given, f"--{option}"), 0, len(given)), scene.interpreter)
             look[word.name] = signature.convert(hub, word, argument)
     if look["title"] is not None:
@@ -383,8 +372,7 @@ def _all(
 
     corners, ends, there, left = [], [], 0, 0
     file_of: dict[int, Path] = {}
-    of_files = ((path, snapshot) for path in files for snapshot in read(path))
-    for path, snapshot in of_files:
+    for path, snapshot in ((file, one) for file in files for one in read(file)):
         if file_of.setdefault(snapshot.step, path) != path:
             raise ScriptError(
                 f"{file_of[snapshot.step]} and {path} both have step {snapshot.step}: one picture "

@@ -185,12 +185,8 @@ class ColumnFormula:
         sets = hub.fields.shown_names()[len(columns) :]
         of_both = [name for name in sets if name in columns or argument.knows(name)]
         if clash := set(of_both).intersection(re.findall(r"[^\W\d]\w*", argument.text)):
-            other = "a column" if min(clash) in columns else "a variable or another value"
-            raise ScriptError(
-                f"'{min(clash)}' is a group or solid here, and {other}",
-                place=argument.place,
-                expected="another name for the group or solid",
-            )
+            what = f"'{min(clash)}' is a group or solid, and a column or another value, too"
+            raise ScriptError(what, place=argument.place, hint="rename the group or solid")
         known = [*columns, *(name for name in sets if name not in of_both)]
         self.hub, self.text = hub, argument.text
         self.formula = Expression(argument.value_with(known))

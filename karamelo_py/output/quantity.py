@@ -6,7 +6,7 @@ from typing import Any
 
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
-from karamelo_py.script.errors import ScriptError, meant, table, unknown
+from karamelo_py.script.errors import ScriptError, meant, unknown
 from karamelo_py.script.expressions import POINT_SEEDS
 from karamelo_py.script.syntax import Raw, Source
 
@@ -57,9 +57,8 @@ class Quantity:
                 error.place = argument.place
             if error.unknown == text:
                 error.expected = "one of " + ", ".join(dict.fromkeys(cls.names(hub)))
-                if not (error.hint or "").startswith("did you mean"):
-                    energy = table()["energies"].get(text)
-                    error.hint = energy or meant(text, KEYWORDS) or error.hint
+                if error.hint.startswith("set it first"):
+                    error.hint = meant(text, KEYWORDS) or error.hint
                 if text in hub.fields.particle_names():
                     error.hint = (
                         f"{text} differs from point to point: dump(...) writes it, and "
@@ -113,10 +112,7 @@ class Quantity:
 
 
 class Caption:
-    """A text in which ``{name}`` or ``{formula}`` is the number it has when the text is shown.
-
-    Two braces, ``{{`` or ``}}``, are one. Errors name the `option` that has the text.
-    """
+    """A text in which ``{name}`` or ``{formula}`` is the number it has then, and ``{{`` a brace."""
 
     PIECE = re.compile(r"\$[^$]*\$|{{|}}|{([^{}]+)}")  # in dollars: mathematics of Matplotlib
 
@@ -129,10 +125,8 @@ class Caption:
             except ScriptError as error:
                 error.place, error.argument = None, "title"
                 error.message = f"{{{piece}}} in {option}: {error.message}"
-                error.expected = (
-                    f"{error.expected or 'a formula'}, or mathematics in dollars ($v_{{max}}$), "
-                    f"or {{{{{piece}}}}} for braces"
-                )
+                ways = f"or mathematics in dollars ($v_{{max}}$), or {{{{{piece}}}}} for braces"
+                error.expected = f"{error.expected or 'a formula'}, {ways}"
                 raise
 
     @property

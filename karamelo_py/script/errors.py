@@ -159,9 +159,8 @@ def one_of(name: str, names: Iterable[str], family: str = "", page: str = "") ->
     close = ", ".join(nearest_few(name, names))
     if len(names) <= 12 or not (close or family):
         return "one of " + ", ".join(names) if names else "one that there is (none so far)"
-    if not family:
-        return f"one of {close}, ... ({len(names)} in all{page and f': see {page}'})"
-    listed = f"karamelo-py styles {family} lists all {len(names)}"
+    listed = f"{len(names)} in all{page and f': see {page}'}"
+    listed = f"karamelo-py styles {family} lists all {len(names)}" if family else listed
     return f"one of {close}, ... ({listed})" if close else listed
 
 

@@ -172,7 +172,8 @@ def main() -> int:
     keep_to_oneself()
     if part.ranks > 1:
         return together(part.ranks, lambda comm: _measure(part, comm))
-    threading.Thread(target=_end_with_the_other, daemon=True).start()
+    # The input is closed where nobody waits for what is found any more.
+    threading.Thread(target=lambda: (os.read(0, 1), os._exit(0)), daemon=True).start()
     status, text = outcome_of(lambda: _measure(part), debugging=part.debug)
     if text:
         print(text, file=sys.stderr, flush=True)
@@ -191,12 +192,6 @@ def _measure(part: Measurement, comm: MpiComm | None = None) -> int:
     if comm is None or comm.leads:
         Path(part.file).write_text(json.dumps(found), encoding="utf-8")
     return 0
-
-
-def _end_with_the_other() -> None:
-    """End where nobody waits for what is found any more: the input is closed then."""
-    os.read(0, 1)
-    os._exit(0)
 
 
 if __name__ == "__main__":
