@@ -303,8 +303,9 @@ def _advance_eos_strength(law, kin, state, dl, dt):
 def carried_along(law, kin, s, dl):
     """Carry the deviatoric stress along with an increment; and find the strain that adds to it."""
     if isinstance(law.strain, Absent):
-        # What is only viscous keeps nothing that could turn: its stress is by the present rate.
-        return s.turned(dl), dl.strain_at_end() if hasattr(law.strength, "G") else sym(dl)
+        # What flows is in balance with the strain at the end of the step, which has not turned.
+        elastic = getattr(law.strength, "rebounds", False)
+        return s.turned(dl), dl.strain_at_end() if elastic else sym(dl)
     # The part of the old strain that turns is in the difference.
     e = symmetric_tensor(kin, strengths.shear_strain(law.strength, kin, s))
     return s, elastic_trial(law.strain, e, dl) - e
