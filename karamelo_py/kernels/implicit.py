@@ -303,7 +303,7 @@ def by_gradient(kin, h, C):
 
 
 def by_displacement(kin, D, g):
-    """df/du (d d) by the displacement of a node with gradient g, from df/dH (d t) of another."""
+    """Return df/du (d d) by the move of a node with gradient g, from df/dH (d t) of another."""
     d, places = kin.dimension, kin.Tensor.places
     t = len(places)
     return tuple(

@@ -86,7 +86,7 @@ def _affine_part_internal_force(quantity, w, stencil, load):
 
 
 def _beside(a, b):
-    """`b` behind `a` and zeros, from the fifth component on."""
+    """Put `b` behind `a` and zeros, from the fifth component on."""
     return (*a, *((a[0] - a[0],) * (4 - len(a))), *b)
 
 
@@ -145,7 +145,7 @@ def _gathered_at_once_move(task, w, stencil, total):
 
 
 def _tails(weights, vectors):
-    """Sums of weights times vectors: of the last one, of the last two, ... of all."""
+    """Sum weights times vectors: of the last one, of the last two, ... of all."""
     last = len(weights) - 1
     sums = (weights[last] * vectors[last],)
     for k in range(last - 1, -1, -1):

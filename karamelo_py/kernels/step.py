@@ -38,7 +38,7 @@ def rows_of(scheme: Any, visits: Any) -> list[Any]:
 
 
 def first_rows(scheme: Any, visits: Any) -> list[Any]:
-    """Fused steps expect the sums on the nodes: the scatter of the last visit, alone."""
+    """List the row that fused steps expect before them: the scatter of the last visit, alone."""
     if visits is not Fused:
         return []
     return [rows_of(scheme, Fused)[-1]._replace(gathers=False, only_if_more=False, moves=False)]

@@ -334,7 +334,7 @@ def at_nodes_with(kind: type, task: Tag) -> Any:
 
 
 def light_node(s):
-    """Nodal mass below which USL limits the gradient: d (c dt / h)^2 of a point that the node sees.
+    """Return the mass below which USL limits gradients: d (c dt / h)^2 of a point that a node sees.
 
     Less than one: a share below m / m_p would be less than what comes back to the node through the
     points' velocities, and the strain of the node would run ahead of its stress.

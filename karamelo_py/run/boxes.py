@@ -33,7 +33,7 @@ class Reached(NamedTuple):
 
 
 def rows_of(boxes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """First nodes of the rows of boxes of nodes (see `Buffers`), and those behind their last."""
+    """List first nodes of the rows of boxes of nodes (see `Buffers`), and those behind the last."""
     row, left = ragged(boxes[:, 2] * boxes[:, 3])
     own = boxes[row]
     begin = own[:, 0] + left // own[:, 3] * own[:, 5] + left % own[:, 3] * own[:, 6]
@@ -53,7 +53,7 @@ def joined_spans(boxes: np.ndarray) -> np.ndarray:
 
 
 def ranges_of_shares(rows: np.ndarray, owner: np.ndarray, count: int) -> np.ndarray:
-    """`Setup.ranges`: rows (k, 2) of `count` owners, joined where one ends at another."""
+    """Make `Setup.ranges`: rows (k, 2) of `count` owners, joined where one ends at another."""
     order = np.lexsort((rows[:, 0], owner))
     rows, owner = rows[order], owner[order]
     apart = (rows[1:, 0] != rows[:-1, 1]) | (owner[1:] != owner[:-1])
@@ -104,7 +104,7 @@ def ragged(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def numbered(shapes: np.ndarray) -> np.ndarray:
-    """(k + 1,) where numbers of what is in boxes of these shapes (k, d) begin, and the end."""
+    """Find where numbers of what is in boxes of shapes (k, d) begin, and the end: (k + 1,)."""
     return np.concatenate([[0], np.cumsum(np.prod(shapes, axis=1))])
 
 

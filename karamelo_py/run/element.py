@@ -281,7 +281,7 @@ class Point:
         raise Unreachable("the law does not reach the prescribed stress")
 
     def _strained(self, increment: np.ndarray, shear: Sequence[int]) -> np.ndarray:
-        """(3, 3) dt grad v of a strain increment: pure, or simple in components of `shear`."""
+        """Return dt grad v (3, 3) of a strain increment, pure, or simple in those of `shear`."""
         full = np.diag(increment[:3])
         for k, (i, j) in SHEARS.items():
             simple = k in shear
@@ -290,7 +290,7 @@ class Point:
         return full
 
     def _turned(self, angle: float, dt: float) -> np.ndarray:
-        """(3, 3) dt grad v of a turn about z, in the form that the law takes for rigid.
+        """Return dt grad v (3, 3) of a turn about z, in the form that the law takes for rigid.
 
         To first order that is a skew tensor. To second order a law takes its strain from the
         symmetric part, its volume from det F, or all from F, and the three disagree.

@@ -175,7 +175,7 @@ class Simulation(SceneArrays):
 
     @property
     def limit_moving(self) -> float:
-        """Stable step of points that go from cell to cell: steps of a script are its shares."""
+        """Return the stable step of points that cross cells: steps of a script are its shares."""
         clock = self.control.clock[0]
         waves = clock.courant_moving * clock.spacing / clock.rate if clock.rate > 0 else np.inf
         return float(min(waves, clock.heat_limit))

@@ -239,7 +239,7 @@ class Tiles:
         return spans, ranges, [0, len(spans)], parts
 
     def _parts_to_sum(self, s: kernel_arrays.Setup) -> tuple[np.ndarray, ...]:
-        """Spans and ranges of the nodes in tiles that boxes reach; first of each share, and parts.
+        """Find spans and ranges of nodes in tiles that boxes reach; first of each share, and parts.
 
         Nodes are in the order of the shares of points that have most of them: what a thread has
         given to is in its caches, and to get it from those of another takes longer than to sum it.
@@ -356,7 +356,7 @@ class Tiles:
         """Take note of the tiles of nodes in use, and of the nodes from `begin` to `end` there."""
 
     def _parts(self, grid, begin, end, first, steps) -> np.ndarray:
-        """`Buffers.parts` of nodes (k, d) from `begin` to `end` of the grids.
+        """Make `Buffers.parts` of nodes (k, d) from `begin` to `end` of the grids.
 
         In boxes they have the numbers `first` + sum of `steps` (k, d) times places.
         """
@@ -381,7 +381,7 @@ def _empty(s: kernel_arrays.Setup, spans: np.ndarray) -> None:
 
 
 def _evenly(parts: np.ndarray, beside: np.ndarray) -> np.ndarray:
-    """(n,) of which share each of n tiles of nodes is, from 0 to SHARES - 1: they do not decrease.
+    """Find which share each of n tiles of nodes is: ascending (n,), from 0 to SHARES - 1.
 
     `parts` (n, 10) are those of all nodes of a tile in use (see `Buffers`). A share gets the tiles
     whose middle, counted in nodes, lies in its equal part of all nodes. Neighbours with the same
@@ -402,7 +402,7 @@ def in_use(tiling: kernel_arrays.Tiling) -> list[tuple[str, int]]:
 
 
 def shares_of(ranges: np.ndarray, shares: int, size: int) -> np.ndarray:
-    """(size,) where shares of tiles with these points (T, 2) begin, nearly equal, and the end."""
+    """Find where shares of tiles with these points (T, 2) begin, nearly equal, and end: (size,)."""
     out = np.zeros(size, np.int64)
     out[shares] = len(ranges)
     if shares > 1:

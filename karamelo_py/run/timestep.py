@@ -340,7 +340,7 @@ def fastest_wave(simulation: Any) -> float:
 
 
 def elastic_speed(simulation: Any, solid: Any) -> tuple[float, bool]:
-    """Of an undeformed solid: its fastest wave without viscosity, and whether it is viscous."""
+    """Find the fastest wave of an undeformed solid without viscosity, and whether it is viscous."""
     law, viscous = law_on(solid.material.law, solid.h, solid.T0), False
     if not isinstance(getattr(law, "viscosity", Absent()), Absent):
         law, viscous = law._replace(viscosity=Absent()), True

@@ -269,7 +269,7 @@ def refuse_endless_speeds(hub: Hub, simulation: Simulation) -> None:
 
 
 def _duration_of_later(hub: Hub, simulation: Simulation) -> float:
-    """Duration of the runs behind the next one that have the same scene, as far as is known."""
+    """Sum the duration of the runs behind the next one that have the same scene, if known."""
     present = step_of(hub, False).scene
     later = [step for step in hub.later[len(hub.runs) :] if step.scene == present]
     spans = [min(s.span[0], s.span[1] * (s.fixed_dt or simulation.dt)) for s in later]

@@ -172,7 +172,7 @@ def opened(path: Path, group: str = "state") -> Iterator[dict[str, InFile]]:
 
 @contextmanager
 def reading() -> Iterator[None]:
-    """Within this, what HDF5 cannot read is a damaged file; only what reads belongs there."""
+    """Take for a damaged file what HDF5 cannot read within this; only what reads belongs there."""
     try:
         yield
     except OSError as error:
@@ -473,7 +473,7 @@ def own_share(simulation: Any, state: Mapping) -> dict[str, np.ndarray]:
 
 
 def _chosen(array: Any, points: np.ndarray) -> np.ndarray:
-    """Some points (ascending) of an array in a file, of which so many are read at a time."""
+    """Read some points (ascending) of an array in a file, of which so many are read at a time."""
     found = rows_of_points((*array.shape[:-1], len(points)), array.dtype)
     for begin in range(0, array.shape[-1], PIECE):
         own = slice(*np.searchsorted(points, (begin, begin + PIECE)))

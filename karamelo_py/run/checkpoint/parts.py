@@ -263,7 +263,7 @@ class RollbackPoint:
 
     @contextmanager
     def remembered(self) -> Iterator[None]:
-        """Within this, parts remember what they did there."""
+        """Let parts remember, within this, what they did there."""
         now = PartStates.of(self.hub)
         self.parts.give(self.hub)
         try:

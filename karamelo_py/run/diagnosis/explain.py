@@ -277,7 +277,7 @@ def formulas_of(value: Any) -> Iterator[Expression]:
 
 
 def _places(simulation: Any, group: Any, formula: Expression) -> Iterator[tuple]:
-    """Numbers of places at hand at which a fix evaluates a formula; now (n, d), and at first."""
+    """List places at hand at which a fix evaluates a formula: numbers; now (n, d), and at first."""
     if not formula.names.intersection(POINT_SEEDS):
         yield np.zeros(1, np.int64), np.empty((1, 0)), None
     elif isinstance(group, NodeGroup):

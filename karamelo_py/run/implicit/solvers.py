@@ -160,7 +160,7 @@ def solve(
 
 
 def rigid_motions(positions: np.ndarray, axisymmetric: bool) -> np.ndarray:
-    """Rigid motions (m, d, k) of nodes at `positions` (m, d); around an axis, along it alone."""
+    """List rigid motions (m, d, k) of nodes at `positions` (m, d); around an axis, along it."""
     m, d = positions.shape
     x = positions - positions.mean(0)
     motions = [np.broadcast_to(np.eye(d)[i], (m, d)) for i in range(d)]

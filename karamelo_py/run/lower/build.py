@@ -107,7 +107,7 @@ def check_scene(hub: Hub) -> None:
 
 
 def thread_count(hub: Hub, points: int) -> int:
-    """Threads to use: as asked by --threads, else all cores for scenes that are worth it."""
+    """Count threads to use: as asked by --threads, else all cores for scenes that are worth it."""
     from numba import config
 
     available = int(config.NUMBA_NUM_THREADS)

@@ -76,7 +76,7 @@ class Needs(NamedTuple):
     hi: np.ndarray  # (k, d)
 
     def among(self, place: np.ndarray, begin: np.ndarray, end: np.ndarray) -> tuple:
-        """Of nodes (m, d) at places (m,): which have some of these; the first and last such."""
+        """Find which of nodes (m, d) at places (m,) have some of these; the first and last such."""
         at = np.minimum(np.searchsorted(self.place, place), len(self.place) - 1)
         low, high = np.maximum(begin, self.lo[at]), np.minimum(end, self.hi[at])
         which = np.flatnonzero((self.place[at] == place) & (low <= high).all(axis=1))
@@ -135,7 +135,7 @@ class SharedTiles(Tiles):
         return self.owner is not before
 
     def loads(self, blocks: Sequence[Block]) -> np.ndarray:
-        """(blocks + 1, tiles) points of each sorted block, and nodes that all may reach."""
+        """Count points of each sorted block, and nodes that all may reach: (blocks + 1, tiles)."""
         found = np.zeros((len(blocks) + 1, self.count), np.int64)
         for row, block in zip(found, blocks, strict=False):
             tiles, points = occupied(block.tiling)
@@ -144,7 +144,7 @@ class SharedTiles(Tiles):
         return found
 
     def partners(self, going: np.ndarray) -> list[int]:
-        """Others that this process has something for, or that have for it; how much, by rank."""
+        """List others that this process has something for, or they for it; how much, by rank."""
         going[self.comm.rank] = 0
         return np.flatnonzero(going + self.comm.alltoall(going)).tolist()
 
@@ -373,7 +373,7 @@ class SharedTiles(Tiles):
 
 
 def work_of(loads: np.ndarray, costs: np.ndarray) -> np.ndarray:
-    """(tiles,) cost of points and nodes in whole numbers, from so many (k, tiles) of each kind."""
+    """Sum the cost (tiles,) of points and nodes in whole numbers, of so many (k, tiles) each."""
     return np.rint(FINE * (costs @ loads)).astype(np.int64)
 
 
