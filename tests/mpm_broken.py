@@ -208,6 +208,23 @@ class Misspelt(Group):
     def position_of(self): ...
 
 
+class Blurred(Group):
+    published = ()
+
+    def initial_integrate(self, points): ...
+
+    def post_update_grid(self, nodes): ...
+
+
+def turned(v, values, dt):
+    return type(v)(-v[0])
+
+
+class Turning(Group):
+    published = ()
+    initial_integrate = vector_hook(turned, reads=("velocity",), writes=("velocity",))
+
+
 class Silent(Group):
     published = ("x",)
     initial_integrate = point_hook(at_point, publishes=False)
@@ -410,6 +427,36 @@ class Endless(Forgetful): ...
 
 
 class Uncountable(Forgetful): ...
+
+
+class Lone(Forgetful): ...
+
+
+class Misnaming(Forgetful): ...
+
+
+class Renaming(Forgetful): ...
+
+
+class Constant(NamedTuple):
+    """A strength that remembers a number, and forgets to update it."""
+
+    G: float
+
+
+for kind in (Lone, Misnaming, Renaming, Constant):
+    remembers(kind, ep=0.0, R=0.0)
+    shear_response.on(kind)(radial_return)
+flow_stress.on(Lone)(lambda strength, *others: strength.G)
+flow_stress.on(Misnaming)(lambda strength, memory, *others: (memory.R1, strength.G))
+updated_memory.on(Renaming)(lambda strength, memory, *others: memory._replace(R1=0.0))
+
+
+class Misshapen(Forgetful): ...  # remembers nothing of its own
+
+
+shear_response.on(Misshapen)(lambda strength, kin, s, *others: (s, ()))
+flow_stress.on(Constant)(lambda strength, memory, *others: (strength.G + memory.R, strength.G))
 
 
 for kind, number in ((Endless, inf), (Uncountable, nan)):

@@ -26,11 +26,11 @@ pytestmark = pytest.mark.xdist_group("faults")
 FAMILIES = {
     "fix": "spring light misplaced swapped cold hot many few undirected viewless idle misspelt "
     "silent stop ids weigh bare formless oneword clashing nodal first again doubled lost leaving "
-    "silenced orphan wholly heavily fixing homeless late slim lawless dark "
+    "blurred turning silenced orphan wholly heavily fixing homeless late slim lawless dark "
     "nodeless early elsewhere unnamed partly slightly",
     "compute": "gauge mute",
     "material": "motionless growing raising short uncompiled hiding double",
-    "strength": "forgetful endless uncountable",
+    "strength": "forgetful endless uncountable lone misnaming renaming constant misshapen",
     "basis": "pathless tuple vague heavy slanted narrow precise",
     "transfer": "lazy absent",
     "scheme": "rowless wrong grounded",
@@ -164,6 +164,7 @@ def test_a_column_belongs_to_one_field(hub):
         ("idle)", "meant initial_integrate, or begins"),
         ("misspelt, all)", "post_gird_to_point, which is no hook and is never called"),
         ("misspelt, all)", "meant post_grid_to_point, or begins the name with _"),
+        ("blurred, all)", "meant post_update_grid_state, or begins"),
         ("silent, all)", "says in `published` that it publishes, and none of its hooks does: s_x"),
     ],
 )
@@ -263,13 +264,14 @@ def scene(**lines):
         ),
         (
             {"material": "material(m, short, 1)"}, 4, "material short",
-            "cauchy_stress has to return a tuple of 3, not 2",
+            "cauchy_stress has to return a symmetric tensor of 3, not a tuple of 2",
         ),
         (
             {
                 "material": "eos(e, linear, 3, 100)\nstrength(s, forgetful, 50)\n"
                 "material(m, eos-strength, e, s)"
-            }, 5, "strength forgetful", "what a point remembers is",
+            }, 5, "strength forgetful",
+            "updated_memory has to return a tuple of 2, not a Less of 1 (mpm_bro",
         ),
         (
             {"method": "method(ulmpm, FLIP, pathless, 1)"}, 1, "basis pathless",
@@ -318,6 +320,33 @@ def test_a_run_names_the_part(run_interpreted, lines, line, part, message):
     assert f"in.script:{line}:1: error: {part} (of mpm-broken 0.1): " in text
     assert message in text
     assert "internal error" not in text
+
+
+@pytest.mark.parametrize(
+    ("style", "message"),
+    [
+        ("lone", "flow_stress has to return a tuple of 2, not a float (mpm_broken.py:"),
+        ("misnaming", "AttributeError: 'MisnamingMemory' object has no attribute 'R1' (mpm_brok"),
+        ("renaming", "ValueError: Got unexpected field names: ['R1'] (mpm_broken.py:"),
+        ("constant", "R would never change: it has no updated_memory"),
+        ("misshapen", "ValueError: not enough values to unpack (expected 3, got 2), in 's, memory"),
+    ],
+)
+def test_a_material_names_the_part(hub, style, message):
+    with pytest.raises(ScriptError) as caught:
+        run(hub, f"eos(e, linear, 3, 9)\nstrength(s, {style}, 5)\nmaterial(m, eos-strength, e, s)")
+    assert caught.value.render().startswith(
+        f"in.wrong:2:1: error: strength {style} (of mpm-broken 0.1): {message}"
+    )
+
+
+def test_a_hook_makes_a_vector(run_interpreted):
+    """Of the class of one that it is given."""
+    folder = run_interpreted(scene(fix="fix(s, turning, all)")).folder
+    vx = [np.loadtxt(folder / f"d.{step}.LAMMPS", skiprows=11)[:, -1] for step in (0, 1, 2)]
+    assert (vx[0] == 1).all()
+    assert (vx[1] < 0).all()
+    assert (vx[2] > 0).all()
 
 
 def test_a_compute_that_publishes_nothing_is_told(run_interpreted):

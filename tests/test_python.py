@@ -261,6 +261,7 @@ def test_a_function_of_a_module(run_interpreted, tmp_path):
     [
         ("ropes.pul", "did you mean 'ropes.pull'?"),
         ("rops.pull", "the module rops cannot be imported"),
+        ("rops.pull", "/run, nor installed"),
         ("pull", "'pull' names no module"),
         ("ropes.py, pull", "hint: a function f of the file ropes.py is ropes.f"),
         ("rops.py, pull", "hint: a function f of the file rops.py is rops.f"),

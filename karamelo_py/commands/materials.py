@@ -12,9 +12,10 @@ from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
 from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.points.laws.doubts import doubts
 from karamelo_py.run.element import COMPONENTS, NORMAL, LoadPath, Point, Response, Unreachable
+from karamelo_py.run.lower.check_plugins import try_law
 from karamelo_py.scene.hub import Catalogue, Hub
 from karamelo_py.scene.material import Material, MaterialPart
-from karamelo_py.scene.plugins import check_columns
+from karamelo_py.scene.plugins import attributed, check_columns
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.parser import parse_text
 
@@ -44,8 +45,10 @@ def material(hub: Hub, ID: str, style: StyleOf("material"), *arguments: Argument
         arguments = (Argument(parse_text(style)[0], hub.interpreter), *arguments)
         style = "eos-strength"
     define(hub, hub.materials, ID, style, arguments)
-    for what, hint in doubts(hub.materials[ID].law):
-        hub.warn(f"material '{ID}': {what}", hint=hint)
+    try_law(hub, hub.materials[ID])
+    with attributed(hub):
+        for what, hint in doubts(hub.materials[ID].law):
+            hub.warn(f"material '{ID}': {what}", hint=hint)
 
 
 def _part(kind: str, summary: str, example: str, others: str) -> Callable:
@@ -291,7 +294,8 @@ def element(
     hub.rehearse()
     what = f"element {ID}: {material.words}, {kinematics}"
     try:
-        _follow(point, paths, response)
+        with attributed(hub):
+            _follow(point, paths, response)
     finally:
         for name, value in response.last().items():
             hub.values.set(f"{ID}_{name}", value)

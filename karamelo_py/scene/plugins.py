@@ -4,6 +4,7 @@ Built-in parts go through the same checks as those of plug-ins.
 """
 
 import inspect
+import linecache
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -70,7 +71,8 @@ def check_fix(hub: Scene, fix: Fix) -> None:
         if other or not (callable(own) or isinstance(own, CompiledHook)):
             continue
         least = 0.0 if method.startswith(HOOKS_BEGIN) else ALIKE
-        for close in get_close_matches(method, STAGES, 1, least):
+        stages = [stage for stage in STAGES if "heat" in method or "heat" not in stage]
+        for close in get_close_matches(method, stages, 1, least):
             hub.warn(
                 f"{name} has a method {method}, which is no hook and is never called by a step",
                 hint=f"its author meant {close}, or begins the name with _",
@@ -328,6 +330,8 @@ def attributed(hub: Scene, usual: PartInUse | None = None) -> Iterator[None]:
         if not found:
             raise
         part, place = found[0]
+        if not (place or isinstance(error, Undefined)):  # told by the line that asked for it
+            place = f", in '{linecache.getline(*next(places_of(error))).strip()}'"
         what = f"{faults.cause_of(error)}{place}"
         raise faults.fault(part.name, what, part.place, faults.TRACEBACK) from error
 

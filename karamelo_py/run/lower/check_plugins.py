@@ -15,12 +15,12 @@ from karamelo_py.kernels.hook_loop import WholeNodes, WholePoints
 from karamelo_py.kernels.hooks import CompiledHook, results
 from karamelo_py.kernels.laws import law_in, law_on
 from karamelo_py.kernels.visit import place_at, state_at
-from karamelo_py.language.faults import as_script_error, fault
+from karamelo_py.language.faults import as_script_error, fault, place_of
 from karamelo_py.points import laws
 from karamelo_py.points.basis import entry, locate, support
 from karamelo_py.points.basis.product import Along, along
-from karamelo_py.points.kinematics import planar, tensor, vector
-from karamelo_py.points.laws.strengths.hardening import flow_stress, precompute
+from karamelo_py.points.kinematics import KINEMATICS, planar, tensor, vector
+from karamelo_py.points.laws.strengths import hardening, shear_response
 from karamelo_py.points.transfers import updated_velocity
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.plugins import PartInUse, attributed, foreign_parts, is_foreign
@@ -35,8 +35,8 @@ NUMBERS = (laws.jacobian, laws.wave_speed_squared, laws.energy_density)
 def try_parts(hub: Hub, setup: Any) -> None:
     """Try the laws, the basis and the transfer of a scene that plug-ins brought."""
     for solid in hub.solids.values():
-        if any(is_foreign(kind) for kind in laws.law_kind(solid.material.law)):
-            _try_law(hub, setup, solid)
+        law = law_on(solid.material.law, solid.h, solid.T0)
+        try_law(hub, solid.material, setup.kin, law, _one(setup))
     if is_foreign(type(setup.basis)):
         _try_basis(hub, setup)
     if is_foreign(type(setup.transfer)):
@@ -121,10 +121,12 @@ def _trial(hub: Hub, part: PartInUse) -> Iterator[None]:
                 raise
 
 
-def _expect(part: PartInUse, function: Any, given: Any, count: int) -> None:
-    got = len(given) if isinstance(given, tuple) else type(given).__name__
-    if got != count:
-        what = f"{function.__name__} has to return a tuple of {count}, not {got}"
+def _expect(part: PartInUse, function: Any, given: Any, count: int, kind: type = tuple) -> None:
+    if not (isinstance(given, kind) and len(given) == count):
+        at = place_of(function.find((part.kind,))) if function.defined(part.kind) else ""
+        wanted = "tuple" if kind is tuple else "symmetric tensor"
+        got = type(given).__name__ + (f" of {len(given)}" if isinstance(given, tuple) else "")
+        what = f"{function.__name__} has to return a {wanted} of {count}, not a {got}{at}"
         raise fault(part.name, what, part.place)
 
 
@@ -141,46 +143,52 @@ def _numbers(part: PartInUse, what: str, found: Iterable, one: Any) -> None:
             raise fault(part.name, doubles, part.place)
 
 
-def _try_law(hub: Hub, setup: Any, solid: Any) -> None:
-    material, kinds = solid.material, laws.law_kind(solid.material.law)
+def try_law(hub: Hub, material: Any, kin: Any = None, law: Any = None, one: Any = 1.0) -> None:
+    """Try a law of a plug-in, `law` as a solid has it or in a cell of 1 at room temperature."""
+    kinds = laws.law_kind(material.law)
+    if not any(map(is_foreign, kinds)):
+        return
     part = _part_of(hub, kinds) or PartInUse(f"material {material.style}", kinds[0], material.place)
-    kin, one = setup.kin, _one(setup)
-    law = law_in(law_on(solid.material.law, solid.h, solid.T0), type(one))
-    size = len(kin.Symmetric.places)
+    law = law_in(law or law_on(material.law, 1.0, 293.0), type(one))
+    kin = kin or KINEMATICS[hub.domain.dimension if hub.domain else 3]()
     for strain in STRAINS:
         dl = (type(one)(strain),) * kin.tensor_size
         with _trial(hub, part):
             state = laws.initial_state(law, kin, one)
+            _try_flow_stress(part, law, state, one * strain)
             after = laws.advance(law, kin, state, tensor(kin, dl), one)
             if len(flat(after)) != len(flat(state)):
                 what = f"what a point remembers is {len(flat(state))} numbers at first and "
                 what += f"{len(flat(after))} after a step: their number must not change"
                 raise fault(part.name, what, part.place)
             _numbers(part, f"what a point remembers after a strain of {strain:g}", flat(after), one)
-            _try_flow_stress(part, law, state, one * strain)
-            for function in TENSORS:
+            for function in (*TENSORS, *NUMBERS):
                 found = function(law, kin, after)
-                _expect(part, function, found, size)
-                if not isinstance(found, kin.Symmetric):
-                    what = f"{function.__name__} has to return a symmetric tensor, not a tuple"
-                    raise fault(part.name, what, part.place)
-                _numbers(part, f"{function.__name__} after a strain of {strain:g}", found, one)
-            for function in NUMBERS:
+                if function in TENSORS:
+                    _expect(part, function, found, len(kin.Symmetric.places), kin.Symmetric)
                 name = f"{function.__name__} after a strain of {strain:g}"
-                _numbers(part, name, (function(law, kin, after),), one)
+                _numbers(part, name, flat((found,)), one)
             laws.specific_volume(law)
+            for of in laws.columns_of(law).values():
+                laws.shown(of, law, kin, after)
 
 
 def _try_flow_stress(part: PartInUse, law: Any, state: Any, strain: Any) -> None:
     """Try what a strength of a plug-in yields at, after so much plastic strain."""
-    strength = getattr(law, "strength", None)
-    if not (is_foreign(type(strength)) and flow_stress.defined(type(strength))):
+    strength, kind = getattr(law, "strength", None), type(getattr(law, "strength", None))
+    if not (is_foreign(kind) and hardening.flow_stress.defined(kind)):
         return
-    memory, heat = state.m.strength, state.m.heat
-    known = precompute(strength, memory, heat)
-    found = flow_stress(strength, memory, known, strain, heat, strain / strain if strain else 1)
-    _expect(part, flow_stress, found, 2)
+    memory, heat, dt = state.m.strength, state.m.heat, strain / strain if strain else 1
+    known = hardening.precompute(strength, memory, heat)
+    found = hardening.flow_stress(strength, memory, known, strain, heat, dt)
+    _expect(part, hardening.flow_stress, found, 2)
     _numbers(part, f"flow_stress, or its slope, at a plastic strain of {strain:g}", found, strain)
+    if shear_response.find((kind,)) is hardening.radial_return:
+        after = hardening.updated_memory(strength, memory, strain, dt)
+        _expect(part, hardening.updated_memory, after, len(memory))
+        if memory[1:] and not hardening.updated_memory.defined(kind):
+            what = f"{', '.join(memory._fields[1:])} would never change: it has no updated_memory"
+            raise fault(part.name, what, part.place)
 
 
 def _try_basis(hub: Hub, setup: Any) -> None:

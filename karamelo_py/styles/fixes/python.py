@@ -62,7 +62,8 @@ class PythonFunction:
             raise ScriptError(
                 f"the module {module} cannot be imported: {cause_of(error)}",
                 place=argument.place,
-                hint=no_file,
+                hint=no_file
+                or (None if beside.is_file() else f"{module}.py is not in {folder}, nor installed"),
             ) from error
         finally:
             sys.path.pop(0)

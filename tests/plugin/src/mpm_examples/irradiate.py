@@ -39,6 +39,7 @@ class Irradiate(Fix):
     """
 
     published = ()
+    conserves = True
     point_fields = (Dose,)
 
     def __init__(

@@ -23,6 +23,7 @@ class PeakSpeed(Fix):
     """
 
     published = ()
+    conserves = True  # it only measures: the energy of the scene stays watched
     node_fields = (Peak,)
 
     def __init__(self, hub, group: NodeGroup):
