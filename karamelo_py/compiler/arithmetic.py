@@ -311,10 +311,6 @@ def _to(kind: types.Type) -> Callable:
     return _unary(lambda a: kind, _as_it_is)
 
 
-def _whole_of(kind: types.Type) -> types.Type:
-    return kind if isinstance(kind, types.Integer) else types.int64
-
-
 def _real_of(kind: types.Type) -> types.Type | None:
     """Give the type of real numbers that those of a type become; whole ones in lanes do not."""
     if isinstance(kind, Lanes):
@@ -473,7 +469,7 @@ OPERATIONS: dict[Any, Callable] = {
     abs: _unary(_sized, _size),
     bool: _to(types.boolean),
     float: _unary(_real_of, _as_it_is),
-    int: _unary(_whole_of, _as_it_is),
+    int: _unary(lambda a: a if isinstance(a, types.Integer) else types.int64, _as_it_is),
     max: _extreme(">"),
     min: _extreme("<"),
     round: lambda *kinds: _rounding("llvm.rint")(*kinds) if len(kinds) == 1 else None,

@@ -56,7 +56,6 @@ class Simulation(SceneArrays):
 
     def begin(self, end_time: float) -> None:
         """Start of a run: choose the first dt; the run ends at `end_time` at the latest."""
-        update = self.hub.update
         clock = self.control.clock[0]
         self._ask_for_steps(0)
         clock.end_time = end_time
@@ -77,7 +76,7 @@ class Simulation(SceneArrays):
                 hint="set_dt(...), or a velocity from fix initial_velocity_particles",
             )
         # A body at rest that has no waves has no first limit to compare with.
-        if clock.first_limit == 0 and np.isfinite(self.limit) and not update.fixed_dt:
+        if clock.first_limit == 0 and np.isfinite(self.limit) and not self.hub.update.fixed_dt:
             clock.first_limit = self.limit
         self._watch_limit()
         self._watch_energy(begun_before)

@@ -19,12 +19,6 @@ _WRITTEN = (
 )
 
 
-def scripts_in(folder: Path) -> list[str]:
-    """List names of the files in a folder that may be scripts."""
-    files = folder.iterdir() if folder.is_dir() else ()
-    return sorted(file.name for file in files if file.suffix not in _WRITTEN and file.is_file())
-
-
 def read_script(path: Path) -> str:
     """Read the text of a script file."""
     try:
@@ -35,7 +29,9 @@ def read_script(path: Path) -> str:
         data = path.read_bytes()
     except FileNotFoundError:
         parent = path.parent
-        close = difflib.get_close_matches(path.name, scripts_in(parent), n=1, cutoff=0.75)
+        files = parent.iterdir() if parent.is_dir() else ()
+        scripts = sorted(f.name for f in files if f.suffix not in _WRITTEN and f.is_file())
+        close = difflib.get_close_matches(path.name, scripts, n=1, cutoff=0.75)
         where = "" if parent.is_dir() else f": the folder {parent} does not exist"
         raise ScriptError(
             f"there is no file {path}{where}",

@@ -203,8 +203,7 @@ def _try_functions(part: PartInUse, setup: Any, points: Any, p: int) -> None:
     """Try the functions of a basis at a point: they add up to 1 everywhere, their slopes to 0."""
     basis, kin, one = setup.basis, setup.kin, _one(setup)
     grid = record(setup.grids, points.grid[p])
-    where = points.x[0] if points.home is None else points.home
-    at = place_at(basis, kin, where, p)
+    at = place_at(basis, kin, points.x[0] if points.home is None else points.home, p)
     line = along(basis, kin, grid, at, 0) if along.defined(type(basis)) else None
     if line is not None:
         if not set(Along._fields) <= set(getattr(line, "_fields", ())):

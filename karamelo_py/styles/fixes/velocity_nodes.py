@@ -261,11 +261,10 @@ class Reaction(Compute):
         super().__init__(hub, group)
 
     def refresh(self) -> None:
-        values = self.hub.values
         total = np.zeros(3)
         for fix in self.hub.fixes.values():
             if isinstance(fix, VelocityNodes) and self._contains(fix):
-                total += [values.get(f"{fix.id}_{axis}") for axis in "xyz"]
+                total += [self.hub.values.get(f"{fix.id}_{axis}") for axis in "xyz"]
         self.publish_components(total)
 
     def _contains(self, fix) -> bool:
