@@ -65,6 +65,12 @@ def test_error_is_the_default(run_interpreted, d):
     assert "leaves the domain" in said and "boundary(delete)" in said
 
 
+def test_walls_of_grids_that_go_with_solids(run_interpreted):
+    script = block(2, "boundary(reflect)", "run(1)").replace("ulmpm", "tlmpm")
+    err = run_interpreted(script, status=1).err
+    assert "has no meaning here" in err and "hint: fix(ID, contact/surface, all, region)" in err
+
+
 @pytest.mark.parametrize(("last", "loose"), [(0.9, True), (0.6, False)])
 def test_a_point_come_loose_from_its_solid_is_told(run_interpreted, last, loose):
     """Two points, 0.4 or 0.1 apart in cells of 0.1, fly over the edge at x = 1.2."""

@@ -33,6 +33,8 @@ def test_what_the_two_disks_need(check):
     assert re.search(r"boxes of tiles 0 MiB", out)  # few points give straight to the nodes
     # c = sqrt((lambda + 2 G) / rho) = sqrt(1000 * 0.7 / (1.3 * 0.4) / 1000), v = 0.1, h = 0.05
     assert re.search(r"first dt\s+0\.001 \(stable limit 0\.0396\d*\)", out)
+    # run_time(3.5); 1e-7 s for a step of each point
+    assert re.search(r"\nsteps +about 3500, 0\.1 s or more\n", out)
     for field, numbers, size in [("x", 2, 16), ("v", 2, 16), ("mass", 1, 8), ("state", 5, 40)]:
         assert re.search(rf"^  {field}\s+{numbers}\s+{size}$", out, re.MULTILINE)
     for words in (

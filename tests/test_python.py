@@ -314,8 +314,11 @@ def test_errors_carry_message_and_place(tmp_path, capsys):
         Simulation(tmp_path / "in.wrnog")
     with pytest.raises(AttributeError, match="did you mean 'solid'"):
         sim.solidd()
+    with pytest.raises(AttributeError, match=r"no command .gravity.; fix.ID, body_force, all"):
+        sim.gravity(3)
     for name, says in (
         ("s1", "did you mean 's1"),
+        ("vonmises", "did you mean seq"),
         ("nonsense", "there is no 'nonsense'; there are"),
     ):
         with pytest.raises(KeyError, match=says) as missing:

@@ -104,6 +104,7 @@ NAMES = [
     ("a = INF", 5, "INF is not a number"),
     ("a = NULL + 1", 5, "NULL is not a number"),
     ("a = cubic-spline", 5, 'quotes: "cubic-spline"'),
+    ("h = L/20", 5, "hint: set it first: L = ..."),
 ]
 
 VALUES = [
@@ -219,7 +220,13 @@ COMMANDS = [
     ("region(r, circle, 0, 0, 1)", 11, "the style cylinder"),
     ("fix(v, initial_velocity_particles, s, 1, 0)", 36, "'s' is a solid"),
     ("solid(s2, region, n, 1, m, 0.1)", 19, "'n' is a group"),
-    ("fix(v, velocity_nodes, b, 1, 0)", 24, "group(b, particles, region, b, all) makes"),
+    ("fix(v, velocity_nodes, b, 1, 0)", 24, "hint: group(b, nodes, region, b, all) makes"),
+    ("method(FLIP, linear, 0.99)", 22, "hint: FLIP is a transfer; a method comes first: "),
+    ("method(mpm, FLIP, linear, 1)", 8, "hint: ulmpm, or tlmpm"),
+    ("material(m2, linear, 1000; 1000, 0.3)", 22, "hint: is a comma missing in '1000; 1000'?"),
+    ("material(m2, linear, 1000, 1,000,000, 0.3)", 34, "hint: commas separate arguments: a mill"),
+    ("dump(d, all, movie, 5, d.gif, seq)", 1, "hint: the size stands behind the file: dump(ID"),
+    ("E = 1e5\nlog_modify(custom, step, Ek)", 26, "hint: compute(Ek, kinetic_energy, all)"),
     ("material(c, johnson_cook, 1, 2)", 13, "'johnson_cook' is a style of strength"),
     ("fix(t, max_position, all)", 8, "is a style of compute"),
     ("delete_fix(g)", 12, "expected: no fix is defined yet"),

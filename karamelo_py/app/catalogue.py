@@ -123,11 +123,12 @@ def _plural(family: str) -> str:
 
 
 def _unknown(what: str, name: str, known: Iterable[str]) -> ScriptError:
-    known = sorted(known)
+    known, called = sorted(known), table()["columns"].items()
+    said = (f"the column {c} of dumps and pictures" for c, w in called if name.lower() in w)
     return ScriptError(
         f"unknown {what} '{name}'",
         expected="one of " + ", ".join(known) if what == "family" else HELP_USAGE,
-        hint=meant(name, known) or "karamelo-py styles lists them all",
+        hint=next(said, None) or meant(name, known) or "karamelo-py styles lists them all",
     )
 
 

@@ -100,11 +100,11 @@ def _dispatch(arguments: list[str]) -> int:
     if first not in (*COMMANDS, "-h", "--help", "--version"):
         close = nearest(first, COMMANDS)
         alone = len(arguments) == 1 and "." in first
-        if close and not alone and not Path(first).exists():
+        if (close or first in OPTIONS) and not alone and not Path(first).exists():
             raise ScriptError(
                 f"there is no file {first} and no such subcommand",
                 expected="a script, or one of " + ", ".join(COMMANDS),
-                hint=f"did you mean 'karamelo-py {close}'?",
+                hint=f"did you mean 'karamelo-py {close or 'SCRIPT --' + first}'?",
             )
         arguments = ["run", *arguments]
     if first == "help" and len(arguments) == 2 and arguments[1] in COMMANDS[1:]:

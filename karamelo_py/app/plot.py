@@ -91,7 +91,7 @@ def run(options: argparse.Namespace) -> int:
             expected="the name of a log, and then the columns",
             hint=f"karamelo-py plot log.mpm {options.log}",
         )
-    rows = read_rows(options.log)
+    rows = read_rows(options.log / "log.mpm" if options.log.is_dir() else options.log)
     known = list(dict.fromkeys(name for row in rows for name in row))
     if not options.columns and not options.right:
         print(" ".join(known))

@@ -23,12 +23,13 @@ from karamelo_py.app.options import make_folder, threads_option
 from karamelo_py.language import registry, signature
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
+from karamelo_py.output.fields import unknown_column
 from karamelo_py.run.lower.card import take_card, use_card
 from karamelo_py.run.mpi.comm import launched
 from karamelo_py.run.runner import Interrupted
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.views import set_columns
-from karamelo_py.script.errors import NoItem, Pause, Quit, ScriptError, nearest, nearest_few
+from karamelo_py.script.errors import NoItem, Pause, Quit, ScriptError, instead, nearest
 from karamelo_py.script.expressions import Expression, shown
 from karamelo_py.script.parser import parse, parse_text
 
@@ -73,8 +74,8 @@ class Columns(Mapping):
     def __getitem__(self, name: str) -> np.ndarray:
         names = self._names()
         if name not in names:
-            close = nearest_few(str(name), names)
-            hint = f"did you mean {' or '.join(map(repr, close))}? " if close else ""
+            close = unknown_column("", str(name), names).hint
+            hint = f"{close} " if close else ""
             raise NoItem(f"there is no '{name}'; {hint}there are {', '.join(names) or 'none'}")
         with _as_simulation_error():
             found = self._column(name)
@@ -348,7 +349,8 @@ class Simulation:
     def __getattr__(self, name: str) -> Callable[..., Any]:
         if name.startswith("_") or not registry.knows("command", name):
             close = nearest(name, [*registry.names("command"), *dir(type(self))])
-            hint = f"; did you mean '{close}'?" if close else ""
+            other = instead("command", name) or instead("fix", name)
+            hint = f"; did you mean '{close}'?" if close else f"; {other}" if other else ""
             raise AttributeError(f"there is no command '{name}'{hint}")
 
         def call(*arguments: Any, **named: Any) -> None:

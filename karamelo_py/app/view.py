@@ -229,8 +229,10 @@ def _matching(names: Iterable[Path]) -> set[Path]:
     for name in names:
         is_pattern = glob.has_magic(str(name)) and not name.exists()
         there = [Path(file) for file in glob.glob(str(name))] if is_pattern else [name]
-        if not there:
-            raise ScriptError(f"no file matches {name}", expected="dumps of an earlier run")
+        if not there or name.is_dir():
+            hint = f"view '{name}/*.dump', or view --live {name}" if there else None
+            said, expected = f"no file matches {name}", "dumps of an earlier run"
+            raise ScriptError(said, expected=expected, hint=hint)
         found.update(there)
     return found
 

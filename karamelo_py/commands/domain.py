@@ -416,12 +416,10 @@ def group(
     if kind == "nodes" and not solids and own_grids(hub):
         members.awaits_solids = True  # the run tells when none came
     else:
-        none_yet = kind == "particles" and not hub.solids
+        none_yet = "no solid is made yet: groups of particles come after the solids"
         hub.warn(
             f"group '{ID}': region '{region.id}' holds no {kind}; {NOTHING_THERE}",
-            hint="no solid is made yet: groups of particles come after the solids"
-            if none_yet
-            else None,
+            hint=none_yet if kind == "particles" and not hub.solids else None,
         )
 
 

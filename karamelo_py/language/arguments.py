@@ -17,7 +17,7 @@ NULL = "NULL"
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 _NAME = re.compile(r"[^\W\d]\w*")
 _QUOTED = re.compile(r'"([^"]*)"')
-_GAP = re.compile(r'[\w)"]\s+["\w.]')  # two words with nothing but blanks between them
+_GAP = re.compile(r'[\w)"]\s+["\w.]|\w;')  # two words with no more than a blank or ; between them
 _KEYWORD = re.compile(r"([^\W\d]\w*)\s*=(?!=)")
 
 

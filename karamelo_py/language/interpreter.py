@@ -272,8 +272,8 @@ class Interpreter:
         try:
             self.variables[name] = self.evaluate(statement.node, statement.right)
         except ScriptError as error:
-            word = statement.right.code.strip()
-            if error.unknown and re.fullmatch(r"\w+([-/.]\w+)+", word):
+            word, letters = statement.right.code.strip(), r"[^\W\d]\w*"  # no L/20
+            if error.unknown and re.fullmatch(rf"{letters}([-/.]\w+)*[-/.]{letters}", word):
                 error.hint = f'a text stands in quotes: "{word}"'
             raise
         self.presets.follow(statement)

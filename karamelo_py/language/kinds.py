@@ -112,14 +112,11 @@ class OutputFile:
             ) from None
         if not path.parent.is_dir():
             folder, expected = Path(name).parent, "a file in a folder that exists"
-            message = f"the folder {folder} does not exist"
-            raise ScriptError(
-                message, place=argument.place, expected=expected, hint=f"mkdir {folder}"
-            )
+            message, hint = f"the folder {folder} does not exist", f"mkdir {folder}"
+            raise ScriptError(message, place=argument.place, expected=expected, hint=hint)
         if path.is_dir() or name.endswith(("/", "\\")):
-            raise ScriptError(
-                f"{name} is a folder", place=argument.place, expected="the name of a file"
-            )
+            message, expected = f"{name} is a folder", "the name of a file"
+            raise ScriptError(message, place=argument.place, expected=expected)
         return Path(name)
 
 

@@ -144,14 +144,11 @@ def call(target: Callable, hub: Any, arguments: Sequence[Argument], name: str) -
             what = f"{error.filename}: " if error.filename else ""
             raise ScriptError(f"{what}{error.strerror or error}") from error
         except OverflowError as error:
-            raise ScriptError(
-                "a number is too large for what is done with it",
-                expected="numbers in proportion to each other",
-            ) from error
+            message = "a number is too large for what is done with it"
+            raise ScriptError(message, expected="numbers in proportion to each other") from error
         except MemoryError as error:
-            raise ScriptError(
-                "there is not enough memory for this", hint="use larger cells or fewer points"
-            ) from error
+            message = "there is not enough memory for this"
+            raise ScriptError(message, hint="use larger cells or fewer points") from error
     except ScriptError as error:
         for wrong in () if error.complete else (error, *error.others):
             wrong.place = wrong.place or _guilty(wrong, arguments, bound)
@@ -273,13 +270,9 @@ def _unknown_keyword(
         hint = f"leave out '{word} ='; == compares"
     if any(p.name == word for p in expected):
         hint = f"arguments are given by position: leave out '{word} ='"
-    known = ", ".join(f"{name}=..." for name in by_name)
-    return ScriptError(
-        f"there is no argument to be given as '{word} = ...'",
-        place=argument.place,
-        expected=known or "arguments in their order, without names",
-        hint=hint,
-    )
+    known = ", ".join(f"{n}=..." for n in by_name) or "arguments in their order, without names"
+    message = f"there is no argument to be given as '{word} = ...'"
+    return ScriptError(message, place=argument.place, expected=known, hint=hint)
 
 
 def convert(hub: Any, parameter: Parameter, argument: Argument, number: int | None = None) -> Any:
@@ -318,6 +311,10 @@ def _swapped(
         if other != wrong and not fits(other, there) and fits(wrong, there) and fits(other, given):
             right = f"{wrong.name} {there.text}, {other.name} {given.text}"
             return f"swap {given.text} and {there.text}: {right}"
+    family, after = [p.kind.family for p in (*single, *single)][:2]
+    word = bound[single[0].name][0].text
+    if family and registry.knows(after or "", word):
+        return f"{word} is a {after}; a {family} comes first: {', '.join(registry.names(family))}"
     return None
 
 
@@ -328,12 +325,10 @@ def _misfit(
     family, text, hint = parameter.kind.family, parameter.kind.text, unfit.hint
     if family and NUMBER.fullmatch(argument.text):
         text, hint = f"one of {', '.join(registry.names(family))}", None
-    return ScriptError(
-        f"{which} must be {text}, not {unfit.got}",
-        place=unfit.place or argument.place,
-        expected=text,
-        hint=hint,
-    )
+    if re.fullmatch(r"0\d\d", argument.text):  # of 1,000
+        hint = "commas separate arguments: a million is 1e6 or 1000000"
+    message, place = f"{which} must be {text}, not {unfit.got}", unfit.place or argument.place
+    return ScriptError(message, place=place, expected=text, hint=hint)
 
 
 def _guilty(

@@ -32,11 +32,9 @@ def unknown_statement(script: Any, name: str) -> ScriptError:
     """Make the error for a statement that is no more than a name nobody knows."""
     meaning = "quit" if name.lower() in ("exit", "stop", "end") else name
     known = ["quit", *registry.names("command"), *script.variables]
-    return ScriptError(
-        f"'{name}' is neither a command nor a variable",
-        expected="name = expression, or command(arguments)",
-        hint=instead("command", name) or meant(meaning, known),
-    )
+    message = f"'{name}' is neither a command nor a variable"
+    hint = instead("command", name) or meant(meaning, known)
+    return ScriptError(message, expected="name = expression, or command(arguments)", hint=hint)
 
 
 def unknown_call(script: Any, name: str, place: Any, statement: bool) -> ScriptError:
@@ -45,10 +43,8 @@ def unknown_call(script: Any, name: str, place: Any, statement: bool) -> ScriptE
     what = "command" if statement else "function"
     other = in_own_words(script, name) or instead("command", name) if statement else None
     if script.knows(name) and not other:
-        message, expected = (
-            f"'{name}' is not a {what} but a variable",
-            "an operator between the name and the parenthesis",
-        )
+        message = f"'{name}' is not a {what} but a variable"
+        expected = "an operator between the name and the parenthesis"
         return ScriptError(message, place=place, expected=expected, hint=f"{name}*(...)")
     shown = commands if statement else sorted(FUNCTIONS)
     known = commands if statement else [*FUNCTIONS, *commands]
@@ -62,22 +58,16 @@ def unknown_call(script: Any, name: str, place: Any, statement: bool) -> ScriptE
 
 def no_value(name: str, place: Any) -> ScriptError:
     """Make the error for a command that gives no value in an expression."""
-    return ScriptError(
-        f"{name}(...) gives no value",
-        place=place,
-        expected="a function, or a command that gives a value, such as value(...)",
-        hint=f"{name}(...) stands on a line of its own",
-    )
+    message, hint = f"{name}(...) gives no value", f"{name}(...) stands on a line of its own"
+    expected = "a function, or a command that gives a value, such as value(...)"
+    return ScriptError(message, place=place, expected=expected, hint=hint)
 
 
 def unknown_name(script: Any, name: str, place: Any) -> ScriptError:
     """Make the error for a name in an expression."""
     kind = "command" if registry.knows("command", name) else "function"
     if name in WORDS:
-        expected = (
-            "a number or a formula; NULL, INF and EDGE are words that stand alone, "
-            "where a command knows them"
-        )
+        expected = "a number or formula; NULL, INF and EDGE stand alone, where a command knows them"
         return ScriptError(f"{name} is not a number", place=place, expected=expected)
     if kind == "command" or name in FUNCTIONS:
         expected = f"{name}(...)" if kind == "command" else usage(name)
@@ -122,7 +112,8 @@ def _meant_by(script: Any, name: str, known: list[str]) -> str:
         if item.published
     }
     close = "time" if name == "t" else nearest(name, known)
-    if close := close or by_style.get(nearest(name, by_style) or ""):
+    close = close or by_style.get(nearest(name, by_style) or "")
+    if close and not (name in energies and close in script.variables):  # Ek is no modulus E
         return f"did you mean '{close}'?"
     if re.match("leq|geq", name):
         return f"{name[:3]} stands in front of a bound in fix velocity_nodes only"

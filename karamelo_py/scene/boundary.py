@@ -22,7 +22,7 @@ def check(hub: Scene) -> None:
             f"boundary({update.boundary}) has no meaning here: the grids of {name} belong to "
             "the solids and go with them, so that no point can leave one",
             place=update.boundary_place,
-            hint="leave boundary out, or method(ulmpm, ...)",
+            hint="fix(ID, contact/surface, all, region) makes walls here; or method(ulmpm, ...)",
         )
     carries = carried(update.method.basis, update.method.kinematics(hub)) > 0
     if update.boundary == "reflect" and carries:

@@ -54,7 +54,12 @@ class AnyGroup(Named):
         """Find the group that `argument` names; ``all`` is everything, or all points."""
         if ALL in (argument.text, argument.word()):
             return (ParticleGroup if cls is AnyGroup else cls)(hub, everything=True)
-        group = super().from_script(hub, argument)
+        try:
+            group = super().from_script(hub, argument)
+        except ScriptError as error:
+            asked = f", {cls.kind or 'particles|nodes'},"
+            error.hint = error.hint and error.hint.replace(", particles,", asked)
+            raise
         if not isinstance(group, cls):
             raise ScriptError(
                 f"group '{group.id}' is a group of {group.kind}",

@@ -42,7 +42,7 @@ def add_options(parser: ArgumentParser) -> None:
         "tables", type=Path, nargs="+", metavar="table",
         help="what karamelo-py sweep has written; several with -versus",
     )  # fmt: skip
-    wanted = parser.add_mutually_exclusive_group(required=True)
+    wanted = parser.add_mutually_exclusive_group()
     wanted.add_argument("-accuracy", metavar="COLUMN", help="column of the error")
     wanted.add_argument(
         "-curve", metavar="COLUMN", help="draw a log column of each run over -x (Time)"
@@ -77,6 +77,9 @@ def run(options: Any) -> int:
     options.cost = options.cost or "seconds"
     if options.axes and (options.keeps or not (options.o or options.curve)):
         raise ScriptError("-axes", expected="-curve, or -accuracy with -o")
+    if not (options.accuracy or options.curve or options.keeps):
+        hint = f"karamelo-py chart {options.tables[0]} -accuracy error -o chart.png"
+        raise ScriptError("no column is named", expected="-accuracy, -curve or -keeps", hint=hint)
     if options.versus:
         return side_by_side(options)
     if len(options.tables) > 1:

@@ -334,4 +334,5 @@ def _warn_about_groups(hub: Hub, simulation: Simulation) -> None:
     for group in hub.groups.values():
         if isinstance(group, NodeGroup) and group.awaits_solids and not len(group):
             group.awaits_solids = False
-            hub.warn(f"group '{group.id}' holds no nodes; {NOTHING_THERE}", place=group.place)
+            hint = "nodes belong to the solids here: fix contact/surface makes walls beside them"
+            hub.warn(f"group '{group.id}' holds no nodes; {NOTHING_THERE}", group.place, hint)
