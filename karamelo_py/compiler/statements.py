@@ -126,10 +126,9 @@ def _shape(thing: Any, *within: Callable) -> Any:
         return type(thing), *(_shape(item, *within) for item in thing)
     if isinstance(thing, int | float | np.generic):  # 0, 0.0, -0.0 and False are equal
         return type(thing), repr(thing)
-    if not isinstance(thing, python.FunctionType) or not hasattr(thing, "closes_over"):
-        return thing
-    known = [] if thing in within else thing.closes_over()
-    return thing.definition, _shape(known, thing, *within)
+    if isinstance(thing, python.FunctionType) and hasattr(thing, "closes_over"):
+        return thing not in within and _shape(thing.closes_over(), thing, *within)
+    return thing
 
 
 _BINARY = {
@@ -365,15 +364,11 @@ class AstCompiler:
 
         return self.closing(call, node)
 
-    def closing(self, call: Callable, node: ast.Lambda | ast.FunctionDef, **more: Any) -> Callable:
-        """Mark a function with what it is written as, and what its names stand for when called."""
+    def closing(self, call: Any, node: ast.Lambda | ast.FunctionDef, **more: Any) -> Callable:
+        """Mark a function with its text and what its names stand for, which decide on its code."""
         read = {n.id for n in ast.walk(node) if isinstance(n, ast.Name)}
-
-        def closes_over() -> list:
-            known = self.free | self.names
-            return [more, *((name, known[name]) for name in sorted(read & known.keys()))]
-
-        call.definition, call.closes_over = node, closes_over  # type: ignore[attr-defined]
+        known = lambda: {n: x for n, x in (self.free | self.names).items() if n in read}  # noqa: E731
+        call.closes_over = lambda: (node, more, known())
         return call
 
     def comprehended(self, node: ast.expr, item: Callable[[], Any]) -> list:

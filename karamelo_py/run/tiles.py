@@ -172,21 +172,19 @@ class Tiles:
         reach = self._reach(s, block, x)
         # Some parts for each thread: tiles are not of like size, and others may need a core. Of few
         # points, or fewer than tiles, one thread has sorted all before several have met.
-        parts, mode = (
-            min(4 * self.threads, x.shape[1] // PART, 4 * x.shape[1] // self.count),
-            self.mode,
-        )
+        n, mode = x.shape[1], self.mode
+        parts = min(4 * self.threads, n // PART, 4 * n // self.count)
         if self.threads == 1 or parts < 2:
             parts, mode = 1, Serial()
-        scratch = np.empty((4, x.shape[1]), np.int64)
         found = sorting.SortedOrder(
-            lanes_for(8 * x.itemsize).width,
-            np.empty((parts, self.count), np.int64),
-            np.empty(parts + 1, np.int64),
-            np.empty((2, self.count, self.dimension), np.int64),
-            np.empty((parts, 2, self.size.prod()), np.int32),
-            *scratch[:2],
-            scratch[2:],
+            width=lanes_for(8 * x.itemsize).width,
+            ends=np.empty((parts, self.count), np.int64),
+            share=np.empty(parts + 1, np.int64),
+            boxes=np.empty((2, self.count, self.dimension), np.int64),
+            bins=np.empty((parts, 2, self.size.prod()), np.int32),
+            order=np.empty(n, np.int64),
+            tile=np.empty(n, np.int64),
+            room=np.empty((2, n), np.int64),
         )
         top, least = self._nodes - 1, self.least_nodes - 1
         offset = float(first_node(s.basis, s.grids.h[0]))

@@ -16,8 +16,6 @@ point_fields
 inverts_spread
     whether it divides by D = sum_I N_I (X_I - x)(X_I - x)^T, which some bases let vanish.
 
-Where `alpha` is the share that is kept in a stable step, not in each, `per_time` is True.
-
 What else is not defined for a class is that of PIC: nothing is kept, v alone is mapped.
 """
 

@@ -78,7 +78,7 @@ class FLIPPerTime(NamedTuple):
 
     inverts_spread = False
     in_lanes = True
-    per_time = True
+    per_time = True  # alpha is the share of a stable step, not of each; others may leave it out
 
 
 @in_step.on(FLIPPerTime)

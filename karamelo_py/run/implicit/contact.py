@@ -4,8 +4,8 @@ Where two bodies meet at a node, the displacement u of the first as the second s
 gap g between them along their common normal N, and not more. What goes further meets a stiff
 spring: the pressing force is p = max(0, k (N u - g)). Along the surface the bodies stick by another
 one, as long as it bears less than friction, |k s| <= mu p for the slip s of the step; then they
-slide, and the force is mu p against the slip (Coulomb; the return mapping of Wriggers 2006,
-"Computational Contact Mechanics", chapter 10). Both derivatives are exact. Normals and gaps are
+slide, and the force is mu p against the slip (Coulomb; Wriggers 2006, "Computational Contact
+Mechanics", chapter 10). Both derivatives are exact. Normals and gaps are
 those of the beginning of the step.
 """
 
@@ -115,32 +115,37 @@ class Contact:
         nothing but the last step tells.
         """
         k, N = self.stiffness, self.normal
-        glued = np.isinf(self.mu)
-        mu = np.where(glued, 0.0, self.mu)
         x = self.jump @ u
         across = (N * x).sum(1)
         push = k * (across - self.gap)
-        self.pressed = pressed = self.close if supposed else push >= 0
-        self.push = push = np.where(pressed, push, 0.0)
-        slip = x - across[:, None] * N
+        self.pressed = self.close if supposed else push >= 0
+        self.push = np.where(self.pressed, push, 0.0)
+        self.slip = x - across[:, None] * N
+        NN = N[:, :, None] * N[:, None, :]
+        self.tangent = np.where(self.pressed, k, 0.0)[:, None, None] * NN
+        self._rub(np.eye(self.d) - NN, supposed)
+
+    def _rub(self, along: np.ndarray, supposed: bool) -> None:
+        """Find the drag, and what it adds to the derivatives, by the return map of friction.
+
+        Pairs are tried as sticking; those beyond Coulomb's cone slide on it (Simo & Laursen 1992,
+        "An augmented Lagrangian treatment of contact problems involving friction").
+        """
+        k, N, slip, C = self.stiffness, self.normal, self.slip, self.tangent
+        glued = np.isinf(self.mu)
+        mu = np.where(glued, 0.0, self.mu)
         size = np.linalg.norm(slip, axis=1)
-        bound = mu * np.maximum(push, 0.0)
-        rubs = pressed & (self.mu > 0)
+        bound = mu * np.maximum(self.push, 0.0)
+        rubs = self.pressed & (self.mu > 0)
         self.sticks = sticks = rubs & (glued | (k * size <= bound) | supposed)
         slides = rubs & ~sticks
-        way = slip / np.where(size > 0, size, 1.0)[:, None]
+        size = np.where(size > 0, size, 1.0)
+        way = slip / size[:, None]
         bound = np.where(slides, bound, 0.0)
         self.drag = np.where(sticks[:, None], k[:, None] * slip, bound[:, None] * way)
-        self.slip = slip
-        NN = N[:, :, None] * N[:, None, :]
-        along = np.eye(self.d) - NN
-        C = np.where(pressed, k, 0.0)[:, None, None] * NN
         C += np.where(sticks, k, 0.0)[:, None, None] * along
-        turn = bound / np.where(size > 0, size, 1.0)
-        C += turn[:, None, None] * (along - way[:, :, None] * way[:, None, :])
-        rise = np.where(slides, mu * k, 0.0)
-        C += rise[:, None, None] * way[:, :, None] * N[:, None, :]
-        self.tangent = C
+        C += (bound / size)[:, None, None] * (along - way[:, :, None] * way[:, None, :])
+        C += np.where(slides, mu * k, 0.0)[:, None, None] * way[:, :, None] * N[:, None, :]
 
     @property
     def on_second(self) -> np.ndarray:

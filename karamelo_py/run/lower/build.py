@@ -67,12 +67,9 @@ def check_scene(hub: Hub) -> None:
     missing = (
         (hub.domain, "no domain is defined", "dimension(2, xmin, xmax, ymin, ymax, h)"),
         (hub.update.method, "no method is defined", "method(ulmpm, FLIP, linear, 0.99)"),
-        (
-            hub.solids or None,
-            "there is no solid to move",
-            "solid(ID, region, regionID, points per cell, material, h, T0)",
-        ),
-    )
+        (hub.solids or None, "there is no solid to move",
+         "solid(ID, region, regionID, points per cell, material, h, T0)"),
+    )  # fmt: skip
     for part, message, command in missing:
         if part is None:
             raise ScriptError(message, hint=f"put {command} before run")
@@ -113,8 +110,7 @@ def thread_count(hub: Hub, points: int) -> int:
     available = int(config.NUMBA_NUM_THREADS)
     if hub.settings.threads is not None:
         if hub.settings.threads > available:
-            asked = hub.settings.threads
-            said = f"--threads {asked}: only {available} threads can be had here"
+            said = f"--threads {hub.settings.threads}: only {available} threads can be had here"
             hub.console.warn(render_message("warning", said))
         return max(1, min(hub.settings.threads, available))
     usable = min(available, os.cpu_count() or 1)
@@ -143,12 +139,9 @@ def stable_conduction(hub: Hub) -> float:
 
 
 def lower(
-    hub: Hub,
-    previous: State | None = None,
-    *,
-    ids: tuple[int, int] | None = None,
+    hub: Hub, previous: State | None = None, *, ids: tuple[int, int] | None = None,
     comm: SerialComm | None = None,
-) -> tuple[arrays.Setup, Tiles]:
+) -> tuple[arrays.Setup, Tiles]:  # fmt: skip
     """Make the arrays of a run from the scene, taking over the state of points that exist.
 
     With `ids`, from and to before, only with those points; tiles are those of a process of `comm`.
@@ -161,12 +154,11 @@ def lower(
     transfer = hub.update.transfer_tag(real)
     basis = type(method.basis)(*(real(x) for x in method.basis))
     basis = with_walls(hub, lattices, basis)
-    count = sum(solid.count for solid in hub.solids.values())
+    cut = lattices, basis, sum(solid.count for solid in hub.solids.values()), sparse(hub)
     if comm.size == 1:
-        tiles = Tiles(lattices, basis, count, sparse(hub))
+        tiles = Tiles(*cut)
     else:
-        one_place = method.fields_per_solid
-        tiles = SharedTiles(comm, lattices, basis, count, sparse(hub), one_place=one_place)
+        tiles = SharedTiles(comm, *cut, one_place=method.fields_per_solid)
     contact = method.contact_between(hub, lattices)
     if previous is not None:
         method.resume(contact, previous.contact)
@@ -183,50 +175,42 @@ def lower(
     if hub.update.boundary == "reflect":
         grids = ReflectingGrid(*grids)
     count = sum(lattice.node_count for lattice in lattices)
-    averaging = method.averaging(hub)
     heat = Insulated()
     if hub.update.thermal:
-        at_nodes = lower_nodes((NodalMean,), Line(), count, real)
-        heat = Conducting(at_nodes, tiles.empty_buffers(at_nodes, len(hub.solids)))
-    owners = owners_of_fields(hub, contact)
-    kinds = [
-        kind
-        for kind in fields.declared(owners, "node_fields")
-        if getattr(kind, "needed", lambda basis: True)(basis)
-    ]
-    if returns_loss(hub):
-        kinds.append(EnergyLoss)
-    if warms_by_friction(hub):
-        kinds.append(FrictionalHeat)
-    at_nodes = lower_nodes(kinds, kin, count, real)
+        means = lower_nodes((NodalMean,), Line(), count, real)
+        heat = Conducting(means, tiles.empty_buffers(means, len(hub.solids)))
+    nodes = lower_nodes(node_kinds(hub, basis, contact), kin, count, real)
     if previous is not None:
-        resume_nodes(at_nodes, grids, previous)
-    # One block for each kind of law, in the order in which the solids use them.
+        resume_nodes(nodes, grids, previous)
+    kinds = fields.declared(owners_of_fields(hub, contact), "point_fields")
+    blocks = (
+        arrays.Block(*lower_points(hub, solids, kin, kinds, real), tiles.empty_tiling())
+        for solids in solids_alike(hub, ids)
+    )
+    setup = arrays.Setup(
+        frame=method.frame, kin=kin, basis=basis, transfer=transfer,
+        averaging=method.averaging(hub), contact=contact, heat=heat, grids=grids, nodes=nodes,
+        buffers=tiles.empty_buffers(nodes, len(hub.solids)),
+        blocks=tuple(resumed(one, previous) if previous else one for one in blocks),
+        **no_nodes(), control=control,
+    )  # fmt: skip
+    return setup, tiles
+
+
+def node_kinds(hub: Hub, basis: NamedTuple, contact: NamedTuple) -> list[type]:
+    """List the fields that nodes have beside sums, update and velocity."""
+    declared = fields.declared(owners_of_fields(hub, contact), "node_fields")
+    kinds = [kind for kind in declared if getattr(kind, "needed", lambda basis: True)(basis)]
+    return kinds + [EnergyLoss] * returns_loss(hub) + [FrictionalHeat] * warms_by_friction(hub)
+
+
+def solids_alike(hub: Hub, ids: tuple[int, int] | None) -> Iterable[list[Solid]]:
+    """Group solids by their kind of law, in order of use; of `ids` only, from and to before."""
     alike: dict[tuple, list] = {}
     for solid in hub.solids.values():
         part = solid if ids is None else part_of(solid, *ids)
         alike.setdefault(laws.law_kind(solid.material.law), []).append(part)
-    of_points = fields.declared(owners, "point_fields")
-    blocks = (
-        arrays.Block(*lower_points(hub, solids, kin, of_points, real), tiles.empty_tiling())
-        for solids in alike.values()
-    )
-    setup = arrays.Setup(
-        frame=method.frame,
-        kin=kin,
-        basis=basis,
-        transfer=transfer,
-        averaging=averaging,
-        contact=contact,
-        heat=heat,
-        grids=grids,
-        nodes=at_nodes,
-        buffers=tiles.empty_buffers(at_nodes, len(hub.solids)),
-        blocks=tuple(blocks if previous is None else (resumed(one, previous) for one in blocks)),
-        **no_nodes(),
-        control=control,
-    )
-    return setup, tiles
+    return alike.values()
 
 
 def returns_loss(hub: Hub) -> bool:
@@ -327,16 +311,14 @@ def lower_points(
     elastic = elastic_law(used)
     own = [kind for kind in kinds if getattr(kind, "needed", lambda law: True)(elastic)]
     points = arrays.Points(
-        x=x,
-        home=None if method.frame.moves else places,
+        x=x, home=None if method.frame.moves else places,
         v=joined((np.zeros((kin.dimension, 1)) for _ in solids), real),
-        mass=joined((s.mass for s in solids), real),
-        state=joined(states, real),
+        mass=joined((s.mass for s in solids), real), state=joined(states, real),
         material=joined((laws_of_solids.index(law) for law in known), np.int32),
         grid=joined((method.lattice_of(hub, s) for s in solids), np.int32),
         id=joined((np.arange(s.first_id, s.first_id + s.count) for s in solids), np.int64),
         fields=tuple(fields.at_points(kind, kin, count, real) for kind in own),
-    )
+    )  # fmt: skip
     return points, used
 
 
