@@ -197,6 +197,7 @@ class LoadSteps:
         cold = simulation.snapshot() if heated else None
         control.values[DT] = control.clock[0].kick = control.clock[0].last_dt = dt
         try:
+            # Heat flows by these masses, and changes the stress that is summed after it.
             before = self._forces(hooks).copy() if self.dynamic or heated else None
             own = simulation.hooks
             loads = own.loads.copy() if self.dynamic and isinstance(own, Hooks) else None
