@@ -1,0 +1,1 @@
+"""Walls and rigid tools that push points."""

@@ -1,0 +1,176 @@
+"""Bases of walls and rigid tools, which push points: planes, balls, their force."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.kernels.laws import elastic_law
+from karamelo_py.language.rules import known_failure
+from karamelo_py.output.point_table import PointTable
+from karamelo_py.scene.group import ParticleGroup
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.solid import Solid
+from karamelo_py.scene.views import PointsView
+from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.expressions import Expression
+from karamelo_py.styles.fixes.forces import PointForces
+from karamelo_py.styles.fixes.formulas import per_direction
+
+
+class ToolFix(PointForces):
+    """Base of fixes that push points, which they take for small cubes (in the plane squares)."""
+
+    follows_points = True
+    needs_stiffness = False  # whether the force goes with the shear modulus of the point
+
+    def __init__(self, hub: Hub, group: ParticleGroup):
+        super().__init__(hub, group)
+        soft = (s for s in hub.solids.values() if not _shear_modulus(s) and group.touches(s))
+        if self.needs_stiffness and (solid := next(soft, None)):
+            raise ScriptError(
+                f"material '{solid.material.id}' of solid '{solid.id}' has no shear modulus, "
+                "with which the force would go",
+                argument="group",
+                expected="a group of points of elastic materials",
+            )
+
+    def behind(self, points: PointTable) -> tuple[int, float]:
+        """Count points that are in the tool now, and find how deep the deepest is."""
+        depth = self.depth_of(points)
+        return int(np.sum(depth > self.hub.domain.tolerance)), float(depth.max(initial=0.0))
+
+    def now(self, *formulas: Expression) -> np.ndarray:
+        """The present numbers (n,) of formulas of time."""
+        return np.array([formula.evaluate(self.hub.values) for formula in formulas])
+
+    def of_time(self, name: str, formulas: Sequence[Expression]) -> tuple[Expression, ...]:
+        """Check that there is a formula of time for each direction."""
+        found = per_direction(self.hub, name, formulas, all_given=True)
+        self.now(*found)
+        return found
+
+    def from_place(
+        self, points: PointsView | PointTable, place: Sequence[Expression]
+    ) -> np.ndarray:
+        """Vectors (n, d) from a place to the points."""
+        return points.position.astype(float) - self.now(*place)
+
+    def side(self, points: PointsView) -> np.ndarray:
+        """Edges (n,) of the cubes that points are taken for."""
+        return (points.column("volume") / self._radius(points)) ** (1 / self.hub.domain.dimension)
+
+    def face(self, points: PointsView) -> np.ndarray:
+        """Areas (n,) of a face of these cubes, per radian around an axis."""
+        return self.side(points) ** (self.hub.domain.dimension - 1) * self._radius(points)
+
+    def _radius(self, points: PointsView) -> np.ndarray | float:
+        return points.position[:, 0].astype(float) if self.hub.domain.axisymmetric else 1.0
+
+    def stiffness(self, points: PointsView) -> np.ndarray:
+        """Shear moduli (n,) less what damage has taken of them."""
+        moduli = np.array([_shear_modulus(solid) for solid in self.hub.solids.values()])
+        return moduli[points.column("type").astype(int) - 1] * (1 - points.column("damage"))
+
+
+def _shear_modulus(solid: Solid) -> float:
+    """The shear modulus of a solid, 0 where it has none."""
+    law: Any = elastic_law(solid.material.law)
+    return float(getattr(law, "G", None) or getattr(getattr(law, "strength", None), "G", None) or 0)
+
+
+def unit(vector: np.ndarray) -> np.ndarray:
+    """A vector (d,) of length 1; one without a direction is refused."""
+    length = np.linalg.norm(vector)
+    if not (np.isfinite(length) and length > 0):
+        raise ScriptError("the normal has no direction", expected="a vector that is not 0")
+    return vector / length
+
+
+def penalty(
+    points: PointsView, depth: np.ndarray, normal: np.ndarray, velocity: Any, mu: float
+) -> np.ndarray:
+    """Forces (n, d) that undo penetrations of `depth` (n,) along `normal` within one step.
+
+    m p / dt^2, for a point that nothing else holds. Friction by a tool of this `velocity` is mu
+    times that, along the slip, and at most what stops it within the step (de Vaucorbeil & Nguyen
+    2021).
+    """
+    mass = points.mass.astype(float)
+    push = (mass * np.maximum(depth, 0) / (points.dt * points.kick))[:, None] * normal
+    slip = velocity - points.velocity.astype(float)
+    slip = slip - (slip * normal).sum(axis=1, keepdims=True) * normal
+    speed = np.linalg.norm(slip, axis=1)
+    rub = np.minimum(mu * np.linalg.norm(push, axis=1), mass * speed / points.kick)
+    return push + slip * np.divide(rub, speed, out=np.zeros_like(speed), where=speed > 0)[:, None]
+
+
+def begin_behind(plane: Any, scene: Any) -> Any:
+    """Count the points that are behind a surface before the first step, for words."""
+    if scene.simulation.step > 0:
+        return False
+    counts, depths = zip(*scene.hub.fields.each(plane, "behind"), strict=True)
+    count = sum(counts)
+    which = "all" if count == len(plane.group) else f"{count} of {len(plane.group)}"
+    return {"which": which, "depth": max(depths)} if count else False
+
+
+class PlaneTool(ToolFix):
+    """Base of walls: a plane that may move, with points on the side of its normal."""
+
+    def lay(self, place: Sequence[Expression], normal: Sequence[Expression]) -> None:
+        """Check the formulas of a place in the plane, and of its normal."""
+        self.origin = self.of_time("", place)
+        self.towards = self.of_time("n", normal)
+        if not self.hub.rehearsing:  # which does not know all numbers
+            unit(self.now(*self.towards))
+
+    def depth(self, points: PointsView | PointTable) -> tuple[np.ndarray, np.ndarray]:
+        """Measure how far (n,) points are behind the plane now, and find its normal (d,)."""
+        normal = unit(self.now(*self.towards))
+        return -(self.from_place(points, self.origin) @ normal), normal
+
+    def depth_of(self, points: PointTable) -> np.ndarray:
+        """Depth (n,) of points behind the plane now."""
+        return self.depth(points)[0]
+
+
+known_failure(
+    PlaneTool,
+    "points behind the plane of fix '{part.id}'",
+    when=begin_behind,
+    reason="{which} points of its group begin there, up to {depth:.3g} deep, and are thrown out",
+    cure="the other direction of the normal, which shows where points may be, or another place of "
+    "the plane or the body",
+)
+
+
+class BallTool(ToolFix):
+    """Base of balls (in the plane disks), of a `centre` and a radius `R`.
+
+    Parameters
+    ----------
+    kind
+        The word ``sphere``.
+    R
+        Radius of the ball: a number or a formula of time.
+    x, y, z
+        Its centre: numbers or formulas of time; z is 0 in the plane.
+    """
+
+    published = ("x", "y", "z", "s")
+    R: Expression
+    centre: tuple[Expression, ...]
+
+    def depth_of(self, points: PointTable) -> np.ndarray:
+        """Depth (n,) of points in the ball now."""
+        return self.now(self.R) - np.linalg.norm(self.from_place(points, self.centre), axis=1)
+
+
+known_failure(
+    BallTool,
+    "points in the ball of fix '{part.id}'",
+    when=begin_behind,
+    reason="{which} points of its group begin there, up to {depth:.3g} deep, and are thrown out",
+    cure="another place of the ball or the body",
+)

@@ -1,0 +1,62 @@
+"""Contact of a solid with a plane, as stiff as the step allows."""
+
+from typing import Annotated
+
+import numpy as np
+
+from karamelo_py.language.signature import NonNegative
+from karamelo_py.scene.group import ParticleGroup
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.solid import Solid
+from karamelo_py.scene.views import PointsView
+from karamelo_py.script.expressions import Expression
+from karamelo_py.styles.fixes.formulas import judge_friction
+from karamelo_py.styles.fixes.tools.base import PlaneTool, penalty
+
+
+class ContactMinimizePenetrationPlane(PlaneTool):
+    """Let a solid touch a fixed plane, as stiffly as the step allows, with friction.
+
+    Parameters
+    ----------
+    solid
+        ID of the solid.
+    x, y, z
+        A point of the plane: numbers or formulas of time; z is 0 in the plane.
+    nx, ny, nz
+        Its normal, of any length, towards the side where the solid is.
+    mu
+        Coefficient of friction (Coulomb).
+
+    Example
+    -------
+    fix(floor, contact/minimize_penetration/plane, s1, 0, 0.1, 0, 0, 1, 0, 0.2)
+
+    Notes
+    -----
+    Points are balls with the radius rp of half the side of a cube of their present volume. Where
+    one reaches p = rp - n.(x - xq) > 0 into the plane it gets the force m p / dt^2. This takes a
+    free point out within one step. Friction is mu times that, against the slip, and at most stops
+    it (de Vaucorbeil & Nguyen 2021). A moving plane does not drag.
+
+    Publishes the force on the solid as ID_x, ID_y, ID_z.
+
+    See Also
+    --------
+    impenetrablesurface, contact/minimize_penetration, indent/minimize_penetration
+    """
+
+    impulsive = True
+
+    def __init__(
+        self, hub: Hub, solid: Solid, x: Expression, y: Expression, z: Expression,
+        nx: Expression, ny: Expression, nz: Expression, mu: Annotated[float, NonNegative],
+    ):  # fmt: skip
+        super().__init__(hub, ParticleGroup.of(hub, solid))
+        self.mu = mu
+        judge_friction(hub, mu)
+        self.lay((x, y, z), (nx, ny, nz))
+
+    def forces(self, points: PointsView) -> np.ndarray:
+        depth, normal = self.depth(points)
+        return penalty(points, self.side(points) / 2 + depth, normal, 0.0, self.mu)

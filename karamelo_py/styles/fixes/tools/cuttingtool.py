@@ -1,0 +1,84 @@
+"""The tip of a cutting tool in the plane."""
+
+from typing import Annotated
+
+import numpy as np
+
+from karamelo_py.language.signature import NonNegative
+from karamelo_py.output.point_table import PointTable
+from karamelo_py.scene.group import ParticleGroup
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.views import PointsView
+from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.expressions import Expression
+from karamelo_py.styles.fixes.tools.base import ToolFix
+
+
+class CuttingTool(ToolFix):
+    """Push points out of the tip of a rigid tool, in the plane.
+
+    Parameters
+    ----------
+    K
+        Stiffness of the tool in shear moduli of the point: a number or a formula of time.
+    x_tip, y_tip, z_tip
+        The tip: numbers or formulas of time; z is 0.
+    vx, vy, vz
+        Its velocity, which scripts of Karamelo give; there is no friction that would need it.
+    xA, yA, xB, yB
+        A point on each of the two faces that meet in the tip: numbers or formulas of time.
+
+    Example
+    -------
+    fix(tool, cuttingtool, all, 1, 1 - time, 0.5, 0, -1, 0, 0, 1.1 - time, 0.9, 1.4 - time, 0.55)
+
+    Notes
+    -----
+    The tool lies between the two faces. A point in it, at the depth p from the nearer face, gets
+    the force K G (1 - D) p out of that face (de Vaucorbeil & Nguyen 2021). G is the shear modulus
+    and D the damage. Publishes the force on the points as ID_x, ID_y, ID_z.
+
+    See Also
+    --------
+    impenetrablesurface, meldtool
+    """
+
+    needs_stiffness = True
+
+    def __init__(
+        self, hub: Hub, group: ParticleGroup, K: Annotated[Expression, NonNegative],
+        x_tip: Expression, y_tip: Expression, z_tip: Expression,
+        vx: Expression, vy: Expression, vz: Expression,
+        xA: Expression, yA: Expression, xB: Expression, yB: Expression,
+    ):  # fmt: skip
+        super().__init__(hub, group)
+        if hub.domain.dimension != 2:
+            raise ScriptError("the tool is one in the plane", expected="a domain in 2D")
+        self.K = K
+        self.tip = self.of_time("", (x_tip, y_tip, z_tip))
+        self.ends = (xA, yA), (xB, yB)
+        if not hub.rehearsing:  # which does not know all numbers
+            self._faces()
+
+    def _faces(self) -> tuple[np.ndarray, np.ndarray]:
+        """Unit normals (2, 2) out of the tool, of the faces to A and to B, and the tip."""
+        tip = self.now(*self.tip)
+        a, b = (self.now(*end) - tip for end in self.ends)
+        turn = a[0] * b[1] - a[1] * b[0]
+        if not abs(turn) > 0:
+            raise ScriptError("tip, A and B lie in one line", expected="two faces with an angle")
+        # Turned away from the other face.
+        normals = np.array([[a[1], -a[0]], [-b[1], b[0]]]) * np.sign(turn)
+        return normals / np.linalg.norm(normals, axis=1, keepdims=True), tip
+
+    def depth_of(self, points: PointTable) -> np.ndarray:
+        """Depth (n,) of points in the tool now, below the nearer face."""
+        normals, tip = self._faces()
+        return ((tip - points.position.astype(float)) @ normals.T).min(axis=1)
+
+    def forces(self, points: PointsView) -> np.ndarray:
+        normals, tip = self._faces()
+        depths = (tip - points.position.astype(float)) @ normals.T
+        nearer = depths.argmin(axis=1)
+        depth = np.maximum(depths.min(axis=1), 0)
+        return (self.now(self.K) * self.stiffness(points) * depth)[:, None] * normals[nearer]

@@ -1,0 +1,56 @@
+"""A plane that pushes points back with a force of their shear modulus."""
+
+from typing import Annotated
+
+import numpy as np
+
+from karamelo_py.language.signature import NonNegative
+from karamelo_py.scene.group import ParticleGroup
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.views import PointsView
+from karamelo_py.script.expressions import Expression
+from karamelo_py.styles.fixes.tools.base import PlaneTool
+
+
+class ImpenetrableSurface(PlaneTool):
+    """Push points back that come behind a plane, with a force that grows with the depth.
+
+    Parameters
+    ----------
+    K
+        Stiffness of the wall in shear moduli of the point: a number or a formula of time.
+    xs, ys, zs
+        A point of the plane: numbers or formulas of time; z is 0 in the plane.
+    nx, ny, nz
+        Its normal, of any length, towards the side where points may be.
+
+    Example
+    -------
+    fix(wall, impenetrablesurface, all, 1, 0, 0.1, 0, 0, 1, 0)
+
+    Notes
+    -----
+    A point at the depth p = n.(xs - x) > 0 gets the force K G (1 - D) p V^(1/d) along the normal. G
+    is the shear modulus, D the damage, V the present volume and d the number of dimensions.
+    Publishes the force on the points as ID_x, ID_y, ID_z.
+
+    See Also
+    --------
+    contact/minimize_penetration/plane, cuttingtool
+    """
+
+    needs_stiffness = True
+
+    def __init__(
+        self, hub: Hub, group: ParticleGroup, K: Annotated[Expression, NonNegative],
+        xs: Expression, ys: Expression, zs: Expression,
+        nx: Expression, ny: Expression, nz: Expression,
+    ):  # fmt: skip
+        super().__init__(hub, group)
+        self.K = K
+        self.lay((xs, ys, zs), (nx, ny, nz))
+
+    def forces(self, points: PointsView) -> np.ndarray:
+        depth, normal = self.depth(points)
+        push = self.now(self.K) * self.stiffness(points) * np.maximum(depth, 0) * self.side(points)
+        return push[:, None] * normal

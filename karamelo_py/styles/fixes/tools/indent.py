@@ -1,0 +1,77 @@
+"""A ball that pushes points with a force of depth squared."""
+
+from typing import Annotated, Literal
+
+import numpy as np
+
+from karamelo_py.language.signature import Argument, NonNegative
+from karamelo_py.language.unknown import words_of
+from karamelo_py.scene.group import ParticleGroup
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.views import PointsView
+from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.expressions import Expression
+from karamelo_py.styles.fixes.tools.base import BallTool
+
+
+class Radius(Expression):
+    """For signatures: a radius above 0, which Karamelo had behind the centre in 2020."""
+
+    script_kind = "a number or a formula above 0"
+
+    @classmethod
+    def from_script(cls, hub: Hub, argument: Argument) -> Expression:
+        radius = super().from_script(hub, argument)
+        if radius.is_constant and not radius.constant > 0:
+            ID, style, group, kind, K, *centre, R = words_of(argument.statement)
+            line = ", ".join([ID, style, group, kind, K, R, *centre])
+            raise ScriptError(
+                f"the radius is {radius.constant:g}",
+                place=argument.place,
+                expected="a number above 0",
+                hint=f"with the radius in front of the centre: fix({line})",
+            )
+        return radius
+
+
+class Indent(BallTool):
+    """Push points out of a ball (in the plane a disk) with a force that grows as depth squared.
+
+    Parameters
+    ----------
+    K
+        Acceleration per depth squared: a number or a formula of time.
+
+    Example
+    -------
+    fix(ball, indent, all, sphere, 1e4, 0.2, 0.5, 1.2 - 0.1*time, 0)
+
+    Notes
+    -----
+    A point at the distance r < R from the centre gets the force m K (R - r)^2 away from it.
+    ``fix indent`` of LAMMPS does the same, but not per mass. Publishes the force on the points as
+    ID_x, ID_y, ID_z and the number of pushed points as ID_s.
+
+    See Also
+    --------
+    indent/minimize_penetration, impenetrablesurface
+    """
+
+    def __init__(
+        self, hub: Hub, group: ParticleGroup, kind: Literal["sphere"],
+        K: Annotated[Expression, NonNegative], R: Radius,
+        x: Expression, y: Expression, z: Expression,
+    ):  # fmt: skip
+        super().__init__(hub, group)
+        self.K, self.R = K, R
+        self.centre = self.of_time("", (x, y, z))
+
+    def forces(self, points: PointsView) -> np.ndarray:
+        K, R = self.now(self.K, self.R)
+        away = self.from_place(points, self.centre)
+        r = np.linalg.norm(away, axis=1)
+        depth = np.maximum(R - r, 0)
+        self.publish("s", points.total(depth > 0))
+        push = points.mass.astype(float) * K * depth**2
+        size = np.divide(push, r, out=np.zeros_like(r), where=r > 0)
+        return size[:, None] * away

@@ -1,0 +1,64 @@
+"""A rigid ball, as stiff as the step allows."""
+
+from typing import Annotated, Literal
+
+import numpy as np
+
+from karamelo_py.language.signature import NonNegative
+from karamelo_py.scene.group import ParticleGroup
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.views import PointsView
+from karamelo_py.script.expressions import Expression
+from karamelo_py.styles.fixes.formulas import judge_friction
+from karamelo_py.styles.fixes.tools.base import BallTool, penalty
+
+
+class IndentMinimizePenetration(BallTool):
+    """Press a rigid ball (in the plane a disk) into points, as stiffly as the step allows.
+
+    Parameters
+    ----------
+    vx, vy, vz
+        Its velocity, which friction needs: the centre does not follow from it.
+    mu
+        Coefficient of friction (Coulomb).
+
+    Example
+    -------
+    fix(ball, indent/minimize_penetration, all, sphere, 0.2, 0.5, 1.2 - time, 0, 0, -1, 0, 0.1)
+
+    Notes
+    -----
+    Points are balls, too, with the radius rp of half the side of a cube of their present volume.
+    One at the distance r from the centre overlaps by p = R + rp - r. With p > 0 it gets the force m
+    p / dt^2. This takes a free point out within one step. Friction is mu times that, against the
+    slip, and at most stops it (de Vaucorbeil & Nguyen 2021).
+
+    Publishes the force on the points as ID_x, ID_y, ID_z and the area of contact as ID_s. Each
+    touching point counts as one face of its cube.
+
+    See Also
+    --------
+    indent, contact/minimize_penetration/plane, contact/minimize_penetration
+    """
+
+    impulsive = True
+
+    def __init__(
+        self, hub: Hub, group: ParticleGroup, kind: Literal["sphere"],
+        R: Annotated[Expression, NonNegative], x: Expression, y: Expression, z: Expression,
+        vx: Expression, vy: Expression, vz: Expression, mu: Annotated[float, NonNegative],
+    ):  # fmt: skip
+        super().__init__(hub, group)
+        self.R, self.mu = R, mu
+        judge_friction(hub, mu)
+        self.centre = self.of_time("", (x, y, z))
+        self.velocity = self.of_time("v", (vx, vy, vz))
+
+    def forces(self, points: PointsView) -> np.ndarray:
+        away = self.from_place(points, self.centre)
+        r = np.linalg.norm(away, axis=1, keepdims=True)
+        normal = np.divide(away, r, out=np.zeros_like(away), where=r > 0)
+        depth = self.now(self.R) + self.side(points) / 2 - r[:, 0]
+        self.publish("s", points.total(self.face(points) * (depth > 0)))
+        return penalty(points, depth, normal, self.now(*self.velocity), self.mu)

@@ -1,0 +1,98 @@
+"""The tool of additive friction stir deposition."""
+
+from typing import Annotated, Any, Literal
+
+import numpy as np
+
+from karamelo_py.language.signature import NonNegative
+from karamelo_py.output.point_table import PointTable
+from karamelo_py.scene.group import ParticleGroup
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.views import PointsView
+from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.expressions import Expression
+from karamelo_py.styles.fixes.tools.base import ToolFix
+
+
+class MeldTool(ToolFix):
+    """Push points out of the tool of additive friction stir deposition, in space.
+
+    Parameters
+    ----------
+    K
+        Stiffness of the tool in shear moduli of the point, times a length: a number or a formula of
+        time, as are all that follow.
+    axis
+        The word x, y or z: the direction of the axis.
+    half_width
+        Half the width of the square channel along the axis.
+    c1, c2
+        The axis in the other two directions, in the order x, y, z.
+    theta
+        Angle by which the tool has turned, from the first of these directions to the second.
+    lo, hi
+        Ends of the tool along the axis; points are pushed out at the lower one.
+    Rmax
+        Radius of the tool.
+
+    Example
+    -------
+    fix(tool, meldtool, all, 1, y, 0.1, 0.5, 0.5, 10*time, 0.6, 1, 0.3)
+
+    Notes
+    -----
+    The tool is a cylinder without its channel. A point in it gets the force K G (1 - D) times the
+    shortest way out: into the channel, out of the cylinder, or below its end. G is the shear
+    modulus and D the damage. Publishes the force on the points as ID_x, ID_y, ID_z.
+
+    See Also
+    --------
+    cuttingtool, impenetrablesurface
+    """
+
+    needs_stiffness = True
+
+    def __init__(
+        self, hub: Hub, group: ParticleGroup, K: Annotated[Expression, NonNegative],
+        axis: Literal["x", "y", "z"], half_width: Annotated[Expression, NonNegative],
+        c1: Expression, c2: Expression, theta: Expression, lo: Expression, hi: Expression,
+        Rmax: Annotated[Expression, NonNegative],
+    ):  # fmt: skip
+        super().__init__(hub, group)
+        if hub.domain.dimension != 3:
+            raise ScriptError("the tool is one in space", expected="a domain in 3D")
+        self.numbers = (K, half_width, c1, c2, theta, lo, hi, Rmax)
+        self.now(*self.numbers)  # refuses those of places
+        self.along = "xyz".index(axis)
+        self.across = [k for k in range(3) if k != self.along]
+
+    def _seen(self, points: Any, *at: float) -> tuple[np.ndarray, ...]:
+        """Heights (n,) of points above the end, and their places (n, 2): as they are and turned."""
+        c1, c2, theta, lo = at
+        x = points.position.astype(float)
+        q = x[:, self.across] - np.array([c1, c2])
+        turn = np.array([[np.cos(theta), np.sin(theta)], [-np.sin(theta), np.cos(theta)]])
+        return x[:, self.along] - lo, q, q @ turn.T, turn
+
+    def depth_of(self, points: PointTable) -> np.ndarray:
+        """Depth (n,) of points in the tool now."""
+        _, w, c1, c2, theta, lo, hi, Rmax = self.now(*self.numbers)
+        height, q, own, _ = self._seen(points, c1, c2, theta, lo)
+        ways = height, hi - lo - height, Rmax - np.linalg.norm(q, axis=1), abs(own).max(axis=1) - w
+        return np.min(ways, axis=0)
+
+    def forces(self, points: PointsView) -> np.ndarray:
+        K, w, c1, c2, theta, lo, hi, Rmax = self.now(*self.numbers)
+        height, q, own, turn = self._seen(points, c1, c2, theta, lo)
+        r = np.linalg.norm(q, axis=1)
+        inward = (np.clip(own, -w, w) - own) @ turn
+        outward = q * np.divide(Rmax - r, r, out=np.zeros_like(r), where=r > 0)[:, None]
+        # The ways out (n, 3): into the channel, radially, below; and how long they are.
+        ways = np.zeros((3, len(r), 3))
+        ways[0][:, self.across] = inward
+        ways[1][:, self.across] = outward
+        ways[2][:, self.along] = -height
+        shortest = np.linalg.norm(ways, axis=2).argmin(axis=0)
+        inside = (height >= 0) & (height <= hi - lo) & (r <= Rmax)
+        way = ways[shortest, np.arange(len(r))] * inside[:, None]
+        return (K * self.stiffness(points))[:, None] * way

@@ -1,0 +1,48 @@
+"""Loads on the surface of a body: a force per area on the outer points."""
+
+import numpy as np
+
+from karamelo_py.scene.group import ParticleGroup
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.views import PointsView
+from karamelo_py.script.expressions import Expression
+from karamelo_py.styles.fixes.formulas import per_direction, vector
+from karamelo_py.styles.fixes.tools.base import ToolFix
+
+
+class NeumannBcMech(ToolFix):
+    """Load the surface of a body with a force per area.
+
+    Parameters
+    ----------
+    group
+        Group of points: one layer of them along the surface.
+    traction
+        tx, ty, tz, as many as the domain has dimensions: force per area. Numbers or formulas of x,
+        y, z, x0, y0, z0, time and published values. NULL leaves a component alone.
+
+    Example
+    -------
+    fix(load, neumann_bc_mech, top, 0, -1e6*min(time/0.01, 1))
+
+    Notes
+    -----
+    A point has one face to the outside, the side of a cube of its present volume: V^(2/3) in space,
+    V^(1/2) in the plane, the whole section in one dimension. In axisymmetric scenes the face is at
+    the radius of the point. Points lie half a side inside the surface on which the real load acts.
+    Publishes the total force as ID_x, ID_y, ID_z.
+
+    See Also
+    --------
+    force_nodes, body_force, heat_flux_particles
+    """
+
+    syntax = "group, tx[, ty[, tz]]"
+
+    def __init__(self, hub: Hub, group: ParticleGroup, *traction: Expression | None):
+        super().__init__(hub, group)
+        self.traction = per_direction(hub, "t", traction)
+
+    def forces(self, points: PointsView) -> np.ndarray:
+        x, first = points.position.astype(float), lambda: points.reference_position
+        return self.face(points)[:, None] * vector(self.traction, self.hub, x, first)
