@@ -1,6 +1,5 @@
 """Commands about space and what fills it: dimension, boundary, region, solid, group."""
 
-import copy
 from collections.abc import Sequence
 from typing import Literal
 
@@ -406,8 +405,6 @@ def group(
                 argument="kind",
                 expected=f"{members.kind}, or another ID",
             )
-        if hub.rehearsing:  # The real group gets its members when the script comes here.
-            members = hub.groups[ID] = copy.copy(members)
     else:
         members = hub.groups.add(ID, KINDS[kind](hub))
     found = members.add(region, solids or None)

@@ -98,6 +98,7 @@ def carry_out(hub: Hub, **length: Any) -> None:
     runner = Runner(hub, **length)
     check_scene(hub)
     if hub.rehearsing:
+        hub.begun += 1
         if hub.settings.card:
             refuse(hub)
         span = runner.end_time - hub.update.time, inf if runner.steps is None else runner.steps
@@ -107,7 +108,7 @@ def carry_out(hub: Hub, **length: Any) -> None:
         return
     if hub.pausing:
         raise Pause
-    hub.begun = True
+    hub.begun += 1
     hub.rehearse()
     if hub.checking:
         report(hub, runner.end_time)

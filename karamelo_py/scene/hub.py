@@ -186,7 +186,7 @@ class Hub:
         # While the rest of a script is tried before the first step nothing runs or is written.
         self.rehearsing = False
         self.rehearsed = False
-        self.begun = False  # a run, in fact or in the rehearsal of what follows it
+        self.begun = 0  # runs, in fact or in the rehearsal of what follows
         self.answered = False  # the script has printed or written something, or said where it ends
         self.checking = False  # under ``karamelo-py check``: the first run only reports
         self.pausing = False  # a script stops in front of its runs: a program lets time go on
@@ -245,11 +245,14 @@ class Hub:
 
         The same list as long as they stay the same.
         """
-        domain, method = self.domain, self.update.method
-        key = (domain, domain.h, method, *self.solids.values())
+        key, method = self._key_of_lattices, self.update.method
         if self._lattices is None or self._lattices[0] != key:
-            self._lattices = key, method.lattices(self) if method else [domain.lattice]
+            self._lattices = key, method.lattices(self) if method else [self.domain.lattice]
         return self._lattices[1]
+
+    @property
+    def _key_of_lattices(self) -> tuple:
+        return self.domain, self.domain.h, self.update.method, *self.solids.values()
 
     def forget_simulation(self) -> None:
         """The points of a solid were replaced: arrays and grids are made anew when asked for."""
@@ -294,6 +297,7 @@ class Hub:
             other = self.rehearsal()
             other.in_runs = self.lasting()
             self.interpreter.rehearse(other)
+            self.later = other.later
             self._tell_of_late(other)
 
     def lasting(self) -> list[Any]:
@@ -320,7 +324,11 @@ class Hub:
                 )
 
     def rehearsal(self) -> Hub:
-        """A copy on which the rest of the script can be tried without consequences."""
+        """A copy on which the rest of the script can be tried without consequences.
+
+        Whatever a command may change is a copy. Fixes, computes, regions and materials are the same
+        objects: commands make new ones.
+        """
         other = copy.copy(self)
         other.rehearsing = True
         other.parts = Parts(other)
@@ -335,10 +343,27 @@ class Hub:
         other.values = copy.deepcopy(self.values)
         other.update = copy.copy(self.update)
         other.update.values = other.values
+        other.update.warned_of = list(self.update.warned_of)
         other.output = Output(other)
         other.output.files = dict(self.output.files)
         other.output.log.file = self.output.log.file
         other.output.plots.update(self.output.plots)
         other.output.plots.file = self.output.plots.file
         other.fields = Fields(other)
+        other.runs, other.later = list(self.runs), []
+        other._copy_bodies(self)
         return other
+
+    def _copy_bodies(self, real: Hub) -> None:
+        """Give a rehearsal a domain, solids and groups that it may change."""
+        self.domain = copy.copy(real.domain)
+        copies: dict[Any, Any] = {}
+        for ID, solid in real.solids.items():
+            mine = copies[solid] = self.solids[ID] = copy.copy(solid)
+            mine.domain, mine.glued_to = self.domain, copies.get(solid.glued_to)
+        for ID, group in real.groups.items():
+            mine = self.groups[ID] = copy.copy(group)
+            mine.hub = self
+        if real._lattices is not None:
+            # The same grids, as long as these stay as they are: groups of nodes know their members.
+            self._lattices = self._key_of_lattices, real._lattices[1]

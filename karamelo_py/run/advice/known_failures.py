@@ -99,9 +99,11 @@ def mixed_units(hub: Hub, simulation: Any) -> str:
 class Step(NamedTuple):
     """The step that a run has, where the script asks for it, and what its stable limit depends on.
 
-    `span` says how long the run is, in time or in steps; infinite where a condition ends it.
+    `run` is the number of the run. `span` says how long it is, in time or in steps; infinite where
+    a condition ends it.
     """
 
+    run: int
     place: Any
     fixed_dt: float | None
     dt_factor: float | None
@@ -115,10 +117,16 @@ def step_of(hub: Hub, halves: bool, span: tuple[float, float] = (inf, inf)) -> S
     update = hub.update
     method, scheme, transfer = update.method, update.scheme, update.transfer
     scene = (
-        *(hub.domain.h, *hub.solids.values(), method, update.thermal),
+        *((solid.id, solid.material, solid.h, solid.count) for solid in hub.solids.values()),
+        *(hub.domain.h, method, update.thermal),
         *(type(scheme), scheme, type(transfer), transfer),
     )
-    return Step(update.dt_place, update.fixed_dt, update.dt_factor, halves, scene, span)
+    return Step(hub.begun, update.dt_place, update.fixed_dt, update.dt_factor, halves, scene, span)
+
+
+def later_steps(hub: Hub) -> list[Step]:
+    """List the steps of the runs after the present one."""
+    return [step for step in hub.later if step.run > hub.begun]
 
 
 def warn_about_steps(
@@ -128,7 +136,7 @@ def warn_about_steps(
     present, limit = step_of(hub, halves), simulation.limit_moving
     of_heat = float(simulation.control.clock[0].heat_limit)
     stable = timestep.stable_step(hub, simulation, limit)
-    for step in (present, *hub.later[len(hub.runs) :]):
+    for step in (present, *later_steps(hub)):
         asked = step.fixed_dt or (step.dt_factor or 0) * limit
         if step.scene != present.scene or not asked > stable * (1 + 1e-12):
             continue
@@ -271,7 +279,7 @@ def refuse_endless_speeds(hub: Hub, simulation: Simulation) -> None:
 def _duration_of_later(hub: Hub, simulation: Simulation) -> float:
     """Sum the duration of the runs behind the next one that have the same scene, if known."""
     present = step_of(hub, False).scene
-    later = [step for step in hub.later[len(hub.runs) :] if step.scene == present]
+    later = [step for step in later_steps(hub) if step.scene == present]
     spans = [min(s.span[0], s.span[1] * (s.fixed_dt or simulation.dt)) for s in later]
     return fsum(span for span in spans if isfinite(span))
 
