@@ -132,7 +132,7 @@ def described(thing, seen):
 
 
 def rehearse(begin, before, rest):
-    """Let a script come to `begin`; describe the scene before and after its rehearsal of the rest."""
+    """Let a script come to `begin`; describe the scene before and after the rest is rehearsed."""
     hub = Hub(Console(quiet=True))
     Interpreter(hub)
     found = []
