@@ -5,7 +5,7 @@ from karamelo_py.compiler.fields import load, store
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.tuples import put_at, record, row
-from karamelo_py.kernels.visit import place_at, state_at
+from karamelo_py.kernels.visit import deformation_of, place_at, state_at
 from karamelo_py.points import laws as law_functions
 from karamelo_py.points.basis import entry, locate, reach, support
 from karamelo_py.points.kinematics import outer, planar, zero
@@ -109,3 +109,18 @@ def export_velocity_moment(basis, kin, grids, grid_of, where, gradients, out):
             arm = reach(basis, kin, grid, stencil, k)
             total = total + outer(weight * (gradient @ arm), arm)
         store(out, p, total)
+
+
+@kernel
+def move_moments(frame, kin, points, laws, moments):
+    """Turn moments (d d, n) of velocity about reference places into those about present places.
+
+    An arm becomes F times what it was before the first step, so that a moment M becomes M F^T.
+    """
+    points, laws = at_hand(points), at_hand(laws)
+    flat = planar(kin)
+    for p in range(points.mass.size):
+        law, state = state_at(kin, points, laws, p)
+        f = deformation_of(frame, kin, law, state, points, p).planar()
+        moment = load(moments, p, zero(flat, points.mass[p]))
+        store(moments, p, moment @ f.transposed())

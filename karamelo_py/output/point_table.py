@@ -178,14 +178,20 @@ class PointTable:
 
     @property
     def velocity_moment(self) -> np.ndarray | None:
-        """(n, d d) moment of velocity, sum N v (X - x), of transfers that keep it, or None."""
+        """(n, d d) moment of velocity, sum N v (X - x), of transfers that keep it, or None.
+
+        The arms X - x are those of the present places: in the total frame F times the reference's.
+        """
         rows = self._rows
-        kept = rows.declared(Moment)
-        if kept is None or not getattr(rows.s.transfer, "keeps_gradient", False):
-            return kept
-        parts = [part._replace(block=part.block._replace(points=part.points), rows=None)
-                 for part in rows.parts]  # fmt: skip
-        return rows._replace(parts=parts).take(partial(_velocity_moment, rows.s))
+        if (kept := rows.declared(Moment)) is None:
+            return None
+        have = [
+            part
+            for part in rows.parts
+            if fields.field(part.block.points.fields, Moment) is not None
+        ]
+        own = [(part.places, _velocity_moment(rows.s, part)) for part in have]
+        return rows._filled(np.zeros(kept.T.shape, kept.dtype), own)
 
     def declared(self, kind: type) -> np.ndarray | None:
         """Return a declared field (n, components), None where the scene does not have it."""
@@ -284,11 +290,15 @@ def shown_velocity(s: Setup, points: Points) -> np.ndarray:
     return np.where(np.isnan(before), points.v, points.v + ahead * (points.v - before))
 
 
-def _velocity_moment(s: Setup, points: Points) -> np.ndarray:
+def _velocity_moment(s: Setup, part: Part) -> np.ndarray:
+    points = part.points
     kept = fields.field(points.fields, Moment)
-    where = points.x[s.control.clock[0].now] if points.home is None else points.home
-    moment = np.zeros_like(kept)
-    export.export_velocity_moment(s.basis, s.kin, s.grids, points.grid, where, kept, moment)
+    moment = kept.copy()
+    if getattr(s.transfer, "keeps_gradient", False):
+        where = points.x[s.control.clock[0].now] if points.home is None else points.home
+        export.export_velocity_moment(s.basis, s.kin, s.grids, points.grid, where, kept, moment)
+    if not s.frame.moves:
+        export.move_moments(s.frame, s.kin, points, part.block.laws, moment)
     return moment
 
 
