@@ -11,7 +11,7 @@ import pytest
 from scenes import block
 
 from karamelo_py import Simulation, SimulationError
-from karamelo_py.scene.meshes.reading import refuse_commands
+from karamelo_py.scene.meshes.geometry import refuse_commands
 from karamelo_py.script.errors import ScriptError
 
 RUN = block(2, "fix(v, initial_velocity_particles, all, 0.1, 0)", "set_dt(0.001)", "run(2)")
@@ -98,6 +98,29 @@ ACTS = [
     'Printf("Include "); Printf("x"); name = "other.geo"; Include Str(name);',
     'General.OptionsFileName = "hacked"; General.SaveOptions = 1;',
     "Exit;",
+    # Fields, merged files and names made of texts act, too, and so do names that a file gives.
+    'Field[1] = ExternalProcess;\nField[1].CommandLine = "touch hacked";\nBackground Field = 1;',
+    "ExternalProcess = 1;\nField[1] = ExternalProcess;",
+    'Field[1] = Structured;\nField[1].FileName = "/etc/passwd";',
+    'MergeWithBoundingBox "other.pos";',
+    'Include "other.stl";',
+    'Merge "other.Stl";',
+    'Merge "other.py";',
+    'Merge "data.stl";',
+    'System = 1; System "touch hacked";',
+    'S2N["System"] "touch hacked";',
+    'StringToName["SystemCall"] "touch hacked";',
+    'future = 1; future "touch hacked";',
+    'Future "touch hacked";',
+    "x() = ListFromFile['/etc/passwd'];",
+    'x = GetValue("waits for an answer", 1);',
+    "Sleep 100000;",
+    'General[0].LogFileName = "hacked";',
+    # Passing over a condition Gmsh loses the letter after E, F, I, M and R, and ends at a NUL.
+    "E = 1; If(0) E\" EndIf SystemCall 'touch hacked'; \"; EndIf",
+    'E = 1; If(0) E"x"; // " EndIf SystemCall \'touch hacked\';\nEndIf',
+    'x1E = 1; If(0) x1E// EndIf SystemCall "touch hacked";\n ; EndIf',
+    '// \0 SystemCall "touch hacked";',
 ]
 
 
@@ -105,16 +128,19 @@ ACTS = [
 def test_a_geometry_that_acts(run_interpreted, tmp_path, line):
     folder = tmp_path / "run"
     folder.mkdir()
-    for name in ("other.geo", "other.txt", "other.pos", "other.msh"):
-        (folder / name).write_text('\n\nSystemCall "touch hacked";\n')
+    (folder / "data.stl").write_text("solid\nendsolid\n")
+    for name in ("geo", "txt", "pos", "msh", "stl", "Stl", "py"):
+        (folder / f"other.{name}").write_text('\n\nSystemCall "touch hacked";\n')
+    (folder / "data.stl.opt").write_text('\n\nSystemCall "touch hacked";\n')
     (folder / "box.geo").write_text(SQUARE + line + "\n")
     script = block(2).replace("region, box, 2,", "mesh, box.geo,")
     result = run_interpreted(script, status=1)
-    says = "would end this program" if line == "Exit;" else "run a program or write a file"
+    says = "would end this program" if line == "Exit;" else "run a program, or read or write a file"
     assert says in result.err
     assert "--trust-geometries" in result.err
-    read = re.fullmatch(r'(?:Include|Merge) "(other\.(?!txt)\w+)";', line)
-    assert (f"{read[1]}, line 3" if read else "box.geo, line") in result.err
+    read = re.fullmatch(r'(?:Include|Merge\w*) "((?:other\.(?!S|py)\w+|data.stl))";', line)
+    where = read and read[1].replace("data.stl", "data.stl.opt")
+    assert (f"{where}, line 3" if read else "box.geo, line") in result.err
     assert not list(folder.glob("hacked*"))
 
 
@@ -130,7 +156,14 @@ def test_options_beside_a_geometry(tmp_path):
 
 @pytest.mark.parametrize(
     "text",
-    ["// SystemCall\n", "/* Save\n Print */\n", 'Printf("SystemCall");\n', "SystemCalls = 1;\n",
+    ["// SystemCall\n", "/* EndIf Save\n Print */\n", 'Printf("SystemCall");\n',
+     "SystemCalls = 1;\n",
+     "n = 3; DefineConstant[ m = {2, Min 1, Name 'm'}, k ]; x() = {1e-3, n*m + k};\n",
+     "For i In {1:3}\n list~{i}[] += newp; EndFor // Return\n",
+     "Macro Hole p = newp; Return Call Hole;\n",
+     "Field[1] = Box; Field[1].VIn = 0.1; Background Field = 1;\n",
+     "Transfinite Curve{1} = 4 Using Progression 1.1; Recombine Surface{1};\n",
+     "Color Red{ Surface{1}; } General.RotationX = 30; Mesh.Algorithm = 6;\n",
      "General.Terminal = 1; // it's \"\n"],
 )  # fmt: skip
 def test_a_geometry_that_only_speaks(tmp_path, text):
@@ -223,6 +256,28 @@ def test_ctrl_c_while_the_program_starts(tmp_path, after):
     assert process.returncode == 130, err
     assert "Traceback" not in err
     assert "interrupted" in err
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no SIGTERM to one process")
+def test_a_signal_between_two_runs(tmp_path, starts_are_cheap):
+    """One that comes while the first run writes its last outputs: the second does not begin."""
+    (tmp_path / "in.a").write_text(
+        RUN.replace("run(2)", "plot(e, 1, time, dt)\nsave_plot(e.png)\nrun(2)\nrun(40)")
+    )
+    sent = (
+        "import os, signal, sys; from karamelo_py.app.cli import main; "
+        "from karamelo_py.output import plots; plot = plots.Plots.finish; "
+        "plots.Plots.finish = lambda s: (plot(s), os.kill(os.getpid(), signal.SIGTERM)); "
+        "sys.exit(main(['in.a']))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", sent], cwd=tmp_path, capture_output=True, text=True,
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+    )  # fmt: skip
+    assert done.returncode == 128 + signal.SIGTERM, done.stderr
+    assert "the log and the dumps are complete up to here" in done.stderr
+    assert done.stdout.count("Run interrupted") == 1
+    assert (tmp_path / "log.mpm").read_text().splitlines()[-1].split()[0] == "2"
 
 
 def test_the_word_of_the_error():

@@ -203,6 +203,7 @@ class Runner:
                         # Before the last state of this run is written, which a longer one has not.
                         hub.output.write_last()
                     hub.output.end()
+                self._agree(simulation)  # a signal may have come meanwhile: no further run begins
             except BaseException as error:
                 hub.console.end_run()
                 hub.output.abort()
