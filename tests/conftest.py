@@ -173,8 +173,9 @@ BROWSERS = "chromium", "chromium-browser", "google-chrome", "chrome"  # as comma
 
 
 @pytest.fixture
-def browser() -> Iterator[Any]:
+def browser(request) -> Iterator[Any]:
     """Chromium without a window: that of Playwright, or one that is installed."""
+    assert "in_a_browser" in request.node.name, "by this name .ci/run finds such tests"
     sync = pytest.importorskip("playwright.sync_api", reason="no Playwright to lead a browser")
     drawing = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"]  # WebGL without a card
     with sync.sync_playwright() as started:

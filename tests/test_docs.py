@@ -42,6 +42,20 @@ def blocks(path, language):
     return re.findall(rf"^```{language}\n(.*?)^```", path.read_text("utf-8"), re.S | re.M)
 
 
+def test_the_program_of_the_checks_runs_what_readme_says():
+    """Its first two commands, word for word, before anything else is installed."""
+    script = (ROOT / ".ci" / "run").read_text("utf-8")
+    told = subprocess.run(
+        ["bash", str(ROOT / ".ci" / "run"), "commands"], capture_output=True, text=True, check=True
+    )
+    commands = blocks(ROOT / "README.md", "sh")
+    assert told.stdout == "".join(commands[:2])
+    assert "pip install . " in commands[0] and commands[1].endswith("&& pytest\n")
+    stages = re.findall(r"^(?:if )?stage ([^;|\n]*[^;|\s])", script, re.M)
+    assert stages[:2] == ['typed "$install"', 'typed "$tests"']
+    assert not re.search(r"pip install", script[: script.index(stages[1])])
+
+
 SNIPPETS = [(page, block) for page in PAGES for block in blocks(page, "karamelo")]
 
 
@@ -290,7 +304,7 @@ def test_the_form_has_the_table_of_the_page(tmp_path):
     assert found == json.loads(json.dumps(CHOICES))
 
 
-def test_the_form_writes_the_lines_of_the_table(tmp_path, browser):
+def test_the_form_writes_the_lines_of_the_table_in_a_browser(tmp_path, browser):
     """All answers in Chromium, clicked one after another."""
     docs = ROOT / "docs"
     choose.write_choices(docs / "choose.md", tmp_path / "choose.js")

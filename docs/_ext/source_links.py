@@ -8,8 +8,6 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from docutils import nodes
-
 ROLE = re.compile(r"\{src\}`([\w/]+\.py):(\w+)`")
 PAGE = "reference/generated/source"
 
@@ -39,6 +37,8 @@ def write_page(docs: Path) -> None:
 
 def source_role(role, rawtext, text, lineno, inliner, options=None, content=()):
     """Link a function to its source."""
+    from docutils import nodes  # tests call named_in, and have no docutils
+
     file, _, name = text.partition(":")
     here = inliner.document.settings.env.docname
     target = "../" * here.count("/") + f"{PAGE}.html#{anchor(file, name)}"

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from docutils import nodes
-
 WORDS = {
     "getting-started": "install pip conda Windows quick start resume exit status cache read result",
     "tutorial": "Jupyter notebook Python API interface numpy pandas interactive script",
@@ -59,6 +57,8 @@ def add_words(app, doctree) -> None:
 
     The search takes what stands between commas as one word; those of the head of a page, too.
     """
+    from docutils import nodes  # tests read WORDS, and have no docutils
+
     name = app.env.docname
     words = WORDS.get(name, "")
     if name.startswith("howto/") or name in ASKED_OF:
