@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from conftest import interpreting
 from going_on import goes_on, same_files
-from plugged import PLUGIN, install
+from plugged import PLUGIN, install, offer
 from scenes import block
 from selection import few
 
@@ -287,6 +287,95 @@ def test_compiled_hooks_do_what_interpreted_ones_do(site, tmp_path, run_interpre
     found = read_log(tmp_path)[:4]
     assert found[2][-1] < 0.99 * found[2][0]
     np.testing.assert_array_equal(found, read_log(run_interpreted(scene).folder)[:4])
+
+
+# Hooks that publish more numbers than there are directions, under names that a test gives.
+MANY = """
+from karamelo_py.scene.group import NodeGroup, ParticleGroup
+from karamelo_py.scene.modify import Fix, vector_hook
+
+
+def of_point(mass, velocity, values, dt):
+    return velocity, (mass, 2 * mass, 3 * mass, 4 * mass)
+
+
+def of_node(mass, force, values, dt):
+    return force, (mass, 2 * mass, 3 * mass, 4 * mass)
+
+
+class OfPoints(Fix):
+    published = {names}
+    final_integrate = vector_hook(
+        of_point, reads=("mass", "velocity"), writes=("velocity",), publishes=True
+    )
+
+    def __init__(self, hub, group: ParticleGroup):
+        super().__init__(hub, group)
+
+
+class OfNodes(Fix):
+    published = {names}
+    post_particles_to_grid = vector_hook(
+        of_node, reads=("mass", "force"), writes=("force",), publishes=True, nodes=True
+    )
+
+    def __init__(self, hub, group: NodeGroup):
+        super().__init__(hub, group)
+
+
+class Others(OfNodes):
+    published = ("d", "c", "b", "a")
+"""
+PUBLISHING = """
+method(ulmpm, FLIP, linear, 0.99)
+dimension(2, 0, 1, 0, 1, 0.02)
+region(box, block, 0.2, 0.8, 0.2, 0.8)
+material(rubber, neo-hookean, 1000, 1000, 0.3)
+solid(body, region, box, 2, rubber, 0.02, 0)
+fix(p, many/points, all)
+fix(n, many/nodes, all)
+log_modify(custom, step, p_a, p_b, p_c, p_d, n_a, n_b, n_c, n_d)
+run(2)
+"""
+
+
+def many(folder, names):
+    """A folder of packages with the styles above."""
+    (folder / "many_totals.py").write_text(MANY.replace("{names}", repr(names)))
+    classes = {"many/points": "OfPoints", "many/nodes": "OfNodes", "many/others": "Others"}
+    styles = {style: f"many_totals:{name}" for style, name in classes.items()}
+    return offer(folder, "many-totals", "1", {"karamelo_py.fix": styles})
+
+
+@pytest.mark.parametrize(
+    "how, compiled", [((), False), (("--threads", "2"), True), (("--gpu",), False)]
+)
+def test_hooks_publish_any_number_of_totals(tmp_path, how, compiled):
+    """Once, twice, three and four times the mass, of 360 kg; in several threads and on a card."""
+    site = many(tmp_path, ("a", "b", "c", "d"))
+    (tmp_path / "in.many").write_text(PUBLISHING)
+    done = karamelo_py(site, tmp_path, "in.many", *how, compiled=compiled)
+    assert done.returncode == 0, done.stderr
+    expected = 360 * np.array([1, 2, 3, 4, 1, 2, 3, 4])
+    np.testing.assert_allclose(read_log(tmp_path)[1:, -1], expected, rtol=1e-8)
+
+
+def test_another_fix_of_the_same_name_publishes_in_its_own_order(tmp_path):
+    site = many(tmp_path, ("a", "b", "c", "d"))
+    lines = "fix(n, many/others, all)\nrun(1)"
+    (tmp_path / "in.many").write_text(PUBLISHING.replace("run(2)", f"run(1)\n{lines}"))
+    done = karamelo_py(site, tmp_path, "in.many")
+    assert done.returncode == 0, done.stderr
+    expected = 360 * np.array([4, 3, 2, 1])
+    np.testing.assert_allclose(read_log(tmp_path)[5:, -1], expected, rtol=1e-8)
+
+
+def test_totals_whose_names_do_not_lie_in_a_row_are_refused(tmp_path):
+    site = many(tmp_path, ("x", "a", "b", "c"))
+    (tmp_path / "in.many").write_text(PUBLISHING)
+    done = karamelo_py(site, tmp_path, "in.many")
+    assert done.returncode == 1
+    assert "published = ('x', 'a', 'b', 'c') has to be a part of x, y, z, s" in done.stderr
 
 
 # Dust that feels no stress is blown up by its charge.

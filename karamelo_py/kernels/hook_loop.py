@@ -172,8 +172,8 @@ def _act_on_parts(what, task, hooks, control, dt, h, share, k):
     # Of nodes that others have held before, their totals change, too.
     several = hooks.held.size > 0
     for other in range(0 if several else h, len(hooks.table) if several else h + 1):
-        slot = hooks.table[other].slot
-        for row in range(max(slot, 0), min(slot + 3, own.totals.shape[0]) if slot >= 0 else 0):
+        first, count = _published(hooks, other)
+        for row in range(first, first + count):
             totals.hand_over(own.totals, control.totals, row)
 
 

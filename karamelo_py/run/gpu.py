@@ -179,6 +179,7 @@ class StepsOnCard:
     def _launches(self, rows: list, ahead: list[KernelLaunch] | None = None) -> list[KernelLaunch]:
         """List the launches of rows of a step; `ahead` takes those that serve the next one."""
         found: list[KernelLaunch] = []
+        self._stages: set[int] = set()  # at which hooks have acted
         for row in self._plain(rows):
             if isinstance(row, table.Sweep):
                 found += self._visit(row, ahead)
@@ -327,6 +328,7 @@ class StepsOnCard:
         hooks, heavy, copies = self.hooks, self.heavy, self.copies
         s = at_its_nodes(self.s) if of_heat else self.s
         own = [h for h, row in enumerate(self._table()) if row.stage == stage]
+        yield from self._clear_again(stage, own)
         if own and target == arrays.ON_UPDATE and hooks.held.size:
             yield self._launch(fixes.clear_held, self.nodes, hooks.held)
         for h in own:
@@ -353,6 +355,7 @@ class StepsOnCard:
         s, hooks, copies = self.s, self.hooks, self.copies
         own = [h for h, row in enumerate(self._table()) if row.stage == stage]
         heats = stage == arrays.SUPPLY_HEAT
+        yield from self._clear_again(stage, own)
         for block in s.blocks:
             if stage == arrays.INITIAL_INTEGRATE and getattr(hooks, "whole", ()):
                 yield self._of_points(fixes.clear_force, block)
@@ -375,10 +378,23 @@ class StepsOnCard:
 
     # --- totals, and the watch over energy
 
+    def _rows_of(self, h: int) -> tuple[int, int]:
+        """Return the first of the rows of totals that a hook publishes, and where they end."""
+        row = self._table()[h]
+        return int(row.slot), int(row.slot) + max(3, int(row.totals))
+
     def _slots(self) -> tuple[int, int]:
         """Return the first of the rows of totals that hooks publish, and where they end."""
-        slots = [int(row.slot) for row in self._table() if row.slot >= 0]
-        return (min(slots), max(slots) + 3) if slots else (0, 0)
+        rows = [self._rows_of(h) for h, row in enumerate(self._table()) if row.slot >= 0]
+        return (min(rows)[0], max(end for _, end in rows)) if rows else (0, 0)
+
+    def _clear_again(self, stage: int, own: list[int]) -> Iterator[KernelLaunch]:
+        """Clear the totals of hooks whose stage comes again in a step: the last time counts."""
+        if stage in self._stages:
+            for h in own:
+                if self._table()[h].slot >= 0:
+                    yield from self._clear(*self._rows_of(h))
+        self._stages.add(stage)
 
     def _clear(self, first: int, end: int) -> list[KernelLaunch]:
         """Clear rows of the totals."""
@@ -405,11 +421,11 @@ class StepsOnCard:
 
     def _publish_at_once(self, h: int) -> list[KernelLaunch]:
         """Publish the totals of a hook behind it, where formulas of others may read them."""
-        slot, slots = int(self._table()[h].slot), range(*self._slots())
-        if slot < 0 or all(read not in slots for _, read in self._globals()):
+        slots = range(*self._slots())
+        if self._table()[h].slot < 0 or all(read not in slots for _, read in self._globals()):
             return []
         publish = self._launch(fixes.publish_hook, 1, self.s, self.hooks, h)
-        return [*self._collect(slot, slot + 3), publish]
+        return [*self._collect(*self._rows_of(h)), publish]
 
     def _looks(self) -> tuple[list[KernelLaunch], list[KernelLaunch]]:
         """List the launches of a look at the energy: before, and a step later."""

@@ -36,6 +36,7 @@ from karamelo_py.points.kinematics import KINEMATICS
 from karamelo_py.points.transfers import updated_velocity
 from karamelo_py.scene.modify import Fix
 from karamelo_py.script.errors import FAILURES
+from karamelo_py.script.values import in_a_row
 
 # Attributes that the class of a part must have.
 SAID = {
@@ -129,6 +130,11 @@ def _wrong_hooks(fix: Fix) -> Iterator[str]:
             )
         if whole:
             yield from _wrong_items(fix, moment, hook)
+            if hook.publishes and not in_a_row(fix.published):
+                yield (
+                    f"{moment} publishes several numbers, and published = {fix.published} has to "
+                    "be a part of x, y, z, s, '' in that order, or names that are none of these"
+                )
             continue
         gives = len(hook.signature.return_type)
         with faults.as_script_error(f"fix {fix.style}", moment, function, fix.place):

@@ -11,6 +11,12 @@ TIME, TIMESTEP, DT = 0, 1, 2
 SUFFIXES = ("x", "y", "z", "s", "")
 
 
+def in_a_row(suffixes: Sequence[str]) -> bool:
+    """Tell whether published values with these suffixes lie one after another, in this order."""
+    known = [SUFFIXES.index(suffix) for suffix in suffixes if suffix in SUFFIXES]
+    return not known or known == list(range(known[0], known[0] + len(suffixes)))
+
+
 class Values:
     """Numbers with names, in one array that kernels read and write.
 
@@ -39,18 +45,21 @@ class Values:
         """Publish the values of a fix or compute: ``ID_x`` for "x" and so on, ``ID`` for "".
 
         ``ID_x``, ``ID_y``, ``ID_z``, ``ID_s`` lie in consecutive slots, whether or not all of them
-        have a name; other suffixes get slots of their own. Names that the ID had before and
-        `suffixes` leaves out are forgotten.
+        have a name; so do other suffixes. Names that the ID had before and `suffixes` leaves out
+        are forgotten.
         """
         if ID not in self._first:
             self._first[ID] = self._reserve(len(SUFFIXES))
-        ordered = [s for s in SUFFIXES if s in suffixes]
-        ordered += [s for s in suffixes if s not in SUFFIXES]
+        first, own = self._first[ID], [s for s in suffixes if s not in SUFFIXES]
+        begin = self._slots.get(f"{ID}_{own[0]}", -1) if own else 0
+        if any(self._slots.get(f"{ID}_{s}") != begin + k for k, s in enumerate(own)):
+            begin = self._reserve(len(own))
+        places = {s: first + k for k, s in enumerate(SUFFIXES) if s in suffixes}
+        places |= {s: begin + k for k, s in enumerate(own)}
         slots = {}
-        for suffix in ordered:
+        for suffix, place in places.items():
             name = f"{ID}_{suffix}" if suffix else ID
-            if suffix in SUFFIXES:
-                self._slots[name] = self._first[ID] + SUFFIXES.index(suffix)
+            self._slots[name] = place
             slots[name] = self.publish(name)
         for name, slot in self._of.get(ID, {}).items():
             if name not in slots and self._slots.get(name) == slot:
