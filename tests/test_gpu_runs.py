@@ -17,6 +17,7 @@ from test_ranks import FAILING, HALVED
 from karamelo_py import Simulation, SimulationError
 from karamelo_py.compiler import gpu
 from karamelo_py.kernels.arrays import Nodes, NoHooks
+from karamelo_py.language import registry
 from karamelo_py.run.gpu import arrays_in, there
 from karamelo_py.run.on_card import SimulationOnCard
 from karamelo_py.run.on_card import alike as same_hooks
@@ -170,6 +171,61 @@ def test_fixes_of_the_first_step(run_interpreted):
     there = run_interpreted(script, "--gpu", folder="there")
     alike(here, there)
     assert abs(there.log.Ek[1] - run_interpreted(squares("run(5)")).log.Ek[1]) > 1e-3
+
+
+# Whatever fixes with compiled hooks publish. Bodies reach new nodes of the walls in each step, and
+# some nodes are held by two fixes.
+PUBLISHING = """
+region(low, block, INF, 0.15, INF, INF)
+region(floor, block, INF, INF, INF, 0.15)
+region(roof, block, INF, INF, 0.25, INF)
+group(low, nodes, region, low, all)
+group(floor, nodes, region, floor, all)
+group(roof, nodes, region, roof, all)
+fix(weight, body_force, all, 0.3, -0.2*time)
+fix(push, force_nodes, roof, 0.01*x, 0.02)
+fix(calm, local_damping, all, 0.1)
+fix(side, velocity_nodes, low, 0.1, NULL)
+fix(rough, velocity_nodes, floor, NULL, geq0, mu=0.3)
+fix(lead, velocity_nodes, roof, -0.1, 0.2*time)
+fix(grip, velocity_particles, a, 0.02*time, NULL)
+inner = internal_force(low, x)
+outer = external_force(low, x)
+rate = internal_force(b, y)
+log_modify(custom, step, weight_x, weight_y, push_x, push_y, calm_x, calm_y, side_x, rough_x, rough_y, lead_x, lead_y, grip_x, inner, outer, rate{more})
+set_output(1)
+run(3)
+run(2)
+"""  # noqa: E501
+HEATED = """
+fix(hot, temperature_nodes, floor, 400)
+fix(laser, heat_flux_particles, b, 5)
+fix(air, convection_particles, a, 2, 293)
+"""
+
+
+EXPLICIT = [
+    scheme
+    for scheme in registry.names("scheme")
+    if not getattr(registry.find("scheme", scheme), "implicit", False)
+]
+
+
+@pytest.mark.parametrize("scheme", EXPLICIT)
+@pytest.mark.parametrize("heat", few([False, True], True))
+def test_all_published_values_are_those_of_the_processor(run_interpreted, scheme, heat):
+    more = ", hot_s, laser_s, air_s" if heat else ""
+    lines = PUBLISHING.replace("{more}", more).replace("log_modify", HEATED * heat + "log_modify")
+    script = squares(lines, scheme=scheme)
+    if heat:
+        script = script.replace("0.99", "0.99, thermo-mechanical")
+        script = script.replace("neo-hookean, 1000, 1000, 0.3", "linear, 1000, 1000, 0.3, 10, 1")
+    one = run_interpreted(script, folder="here").log
+    other = run_interpreted(script, "--gpu", folder="there").log
+    assert len(one.weight_x) == 6
+    for name, column in one.items():
+        assert np.abs(column).max() > 0, name
+        np.testing.assert_allclose(other[name], column, rtol=1e-8, atol=1e-12, err_msg=name)
 
 
 # --- what a GPU refuses ---------------------------------------------------------------------------
