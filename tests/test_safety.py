@@ -266,8 +266,8 @@ def test_a_signal_between_two_runs(tmp_path, starts_are_cheap):
     )
     sent = (
         "import os, signal, sys; from karamelo_py.app.cli import main; "
-        "from karamelo_py.output import plots; plot = plots.Plots.finish; "
-        "plots.Plots.finish = lambda s: (plot(s), os.kill(os.getpid(), signal.SIGTERM)); "
+        "from karamelo_py.output.schedule import Output; end = Output.end; "
+        "Output.end = lambda s: (end(s), os.kill(os.getpid(), signal.SIGTERM)); "
         "sys.exit(main(['in.a']))"
     )
     done = subprocess.run(
