@@ -1,8 +1,12 @@
 """Kernels on disk: compiled again when what is in them has changed, and never in the way."""
 
 import errno
+import hashlib
 import io
 import os
+import pickle
+import shutil
+import stat
 import subprocess
 import sys
 import warnings
@@ -14,7 +18,7 @@ import numpy as np
 import pytest
 from numba import config
 
-from karamelo_py.compiler import cache, choices, fingerprint
+from karamelo_py.compiler import cache, choices, fingerprint, machine
 from karamelo_py.compiler.compile import point_function
 from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.lowering import FunctionType
@@ -357,6 +361,70 @@ def test_a_full_disk_or_a_forbidden_folder(tmp_path, monkeypatch, call):
         assert fresh()(Tag()) == 42
     names = [path.name for path in (tmp_path / "kernels").iterdir()]
     assert all(name.endswith(".kernel") for name in names)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no owners and modes")
+@pytest.mark.parametrize("whose", ["folder of another", "file of another", "file for all", "link"])
+def test_what_another_user_may_have_written_is_not_read(tmp_path, monkeypatch, whose):
+    """A pickle can run any program: one that others may have put there is not opened."""
+
+    class Harm:
+        def __reduce__(self):
+            return open, (str(tmp_path / "harm"), "w")
+
+    monkeypatch.setenv("KARAMELO_PY_CACHE", str(tmp_path))
+    assert fresh()(Tag()) == 42
+    (path,) = (tmp_path / "kernels").iterdir()
+    content = pickle.dumps(Harm())
+    planted = path.with_name("planted") if whose == "link" else path
+    planted.write_bytes(hashlib.sha256(content).digest() + content)
+    if whose == "link":
+        path.unlink()
+        path.symlink_to(planted)
+    elif whose == "file for all":
+        path.chmod(0o666)
+    elif os.geteuid() == 0:
+        os.chown(path if whose == "file of another" else path.parent, 12345, -1)
+    else:
+        monkeypatch.setattr(os, "geteuid", lambda: 12345)
+    told = []
+    with cache.telling(told.append):
+        assert fresh()(Tag()) == 42
+    assert not (tmp_path / "harm").exists()
+    assert len(told) == 1 and f"cannot be kept in {tmp_path / 'kernels'}" in told[0]
+    word = {"link": "symbolic links", "file for all": "other users may write there"}
+    assert word.get(whose, "it belongs to another user") in told[0]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no owners and modes")
+def test_the_folder_is_closed_to_others(tmp_path, monkeypatch):
+    """A usual umask of 002 opens it to a group."""
+    monkeypatch.setenv("KARAMELO_PY_CACHE", str(tmp_path))
+    (tmp_path / "kernels").mkdir()
+    (tmp_path / "kernels").chmod(0o777)
+    told = []
+    with cache.telling(told.append):
+        assert fresh()(Tag()) == 42
+        assert fresh()(Tag()) == 42
+    assert told == []
+    assert stat.S_IMODE((tmp_path / "kernels").stat().st_mode) == 0o755
+
+
+def test_a_folder_that_is_gone_when_a_loop_is_compiled(tmp_path, monkeypatch):
+    """While it compiles, the folder turns into a file: told, and the loop runs."""
+    monkeypatch.setenv("KARAMELO_PY_CACHE", str(tmp_path / "cache"))
+    compiled = machine.compile_text
+
+    def meanwhile(text):
+        shutil.rmtree(tmp_path / "cache")
+        (tmp_path / "cache").write_text("")
+        return compiled(text)
+
+    monkeypatch.setattr(machine, "compile_text", meanwhile)
+    told = []
+    with cache.telling(told.append):
+        assert fresh()(Tag()) == 42
+    assert len(told) == 1 and "cannot be kept in" in told[0]
 
 
 def test_room_and_other_files(tmp_path, monkeypatch):

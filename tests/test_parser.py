@@ -274,7 +274,9 @@ def test_long_scripts_are_read_in_proportion_to_their_length():
     assert few > 100 and many < 4.2 * few
 
 
-@pytest.mark.parametrize("state", ["none", "kept", "damaged", "cut off", "a folder", "no folder"])
+@pytest.mark.parametrize(
+    "state", ["none", "kept", "damaged", "cut off", "one bit", "a folder", "no folder"]
+)
 def test_a_parser_on_disk_is_read_and_never_a_reason_to_stop(tmp_path, monkeypatch, state):
     """It makes the same of a script, and of a mistake; a file that is no use is written anew."""
 
@@ -300,6 +302,11 @@ def test_a_parser_on_disk_is_read_and_never_a_reason_to_stop(tmp_path, monkeypat
             file.write_bytes(b"damaged")
         elif state == "cut off":
             file.write_bytes(content[: len(content) // 2])
+        elif state == "one bit":
+            middle = len(content) // 2
+            file.write_bytes(
+                content[:middle] + bytes([content[middle] ^ 1]) + content[middle + 1 :]
+            )
         elif state == "a folder":
             file.unlink()
             file.mkdir()

@@ -2,16 +2,19 @@
 
 One file holds one kernel for one list of argument types. Its name says which, and ends in the
 fingerprint of all that the code depends on (:mod:`~karamelo_py.compiler.fingerprint`); a checksum
-tells whether it is whole. Whatever is wrong with a file or the folder, the kernel is compiled as if
+tells whether it is whole. What is read becomes code: only files that this user or the administrator
+alone may write are read. Whatever is wrong with a file or the folder, the kernel is compiled as if
 it were not there, and the user told once.
 """
 
 import contextlib
+import errno
 import hashlib
 import os
 import pickle
 import platform
 import re
+import stat
 import tempfile
 import warnings
 from collections.abc import Callable, Iterator
@@ -31,6 +34,10 @@ VARIANTS = 4  # of a kernel for the same types: as many states of the sources ar
 ROOM = 400e6  # bytes; of what takes more, the files that were used least recently are forgotten
 
 _ENDING, _LOCK = ".kernel", ".lock"
+_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
+_AS_IT_IS = (  # no link, no waiting for a pipe
+    getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+)
 _OURS = re.compile(r"[\w.]+-[0-9a-f]{24}-[0-9a-f]{24}\.kernel")
 
 
@@ -38,6 +45,41 @@ def folder() -> Path:
     """Give the folder where kernels are kept."""
     home = os.environ.get("KARAMELO_PY_CACHE") or platformdirs.user_cache_dir("karamelo-py")
     return Path(home) / "kernels"
+
+
+def _refuse_of_others(about: os.stat_result) -> None:
+    """Refuse what another user may have written."""
+    if hasattr(os, "geteuid"):
+        if about.st_uid not in (0, os.geteuid()):
+            raise PermissionError(errno.EACCES, "it belongs to another user")
+        if about.st_mode & _BY_OTHERS:
+            raise PermissionError(errno.EACCES, "other users may write there")
+
+
+def _guard(place: Path) -> None:
+    """Refuse a folder in which others may put files; one of this user's is closed to them."""
+    for one in (place, place.parent):
+        about = one.stat()
+        if about.st_mode & stat.S_ISVTX:  # others may not take away what is there
+            continue
+        if hasattr(os, "geteuid") and about.st_uid == os.geteuid() and about.st_mode & _BY_OTHERS:
+            one.chmod(stat.S_IMODE(about.st_mode) & ~_BY_OTHERS)
+            about = one.stat()
+        _refuse_of_others(about)
+
+
+def read(path: Path) -> bytes:
+    """Read a file that only this user or the administrator can have written.
+
+    Raises OSError where it is another's, and ValueError where it is not what was written.
+    """
+    with open(os.open(path, os.O_RDONLY | _AS_IT_IS), "rb") as file:
+        _guard(path.parent)
+        _refuse_of_others(os.fstat(file.fileno()))
+        data = file.read()
+    if hashlib.sha256(data[32:]).digest() != data[:32]:
+        raise ValueError("not what was written")
+    return data[32:]
 
 
 def _warn(text: str) -> None:
@@ -103,10 +145,7 @@ class KernelFiles:
         """Read the kernel in a file; one that is not whole is told of, and taken away."""
         for path in self._files(key):
             try:
-                data = path.read_bytes()
-                if hashlib.sha256(data[32:]).digest() != data[:32]:
-                    raise ValueError("not what was written")
-                choices, code = pickle.loads(data[32:])
+                choices, code = pickle.loads(read(path))
                 stamp = fingerprint(self._roots, kinds, frozenset(choices))
                 if stamp[:24] != path.stem.rpartition("-")[2]:
                     continue
@@ -134,7 +173,7 @@ class KernelFiles:
             stamp = fingerprint(self._roots, kinds, unit.choices, codes)
             content = pickle.dumps((tuple(sorted(unit.choices)), pickle.dumps(unit)))
             path = folder() / f"{key}-{stamp[:24]}{_ENDING}"
-            write(path, hashlib.sha256(content).digest() + content)
+            write(path, content)
             self._forget(key)
         except Unknown as what:
             self._tell_of_unknown(what)
@@ -191,12 +230,13 @@ _SETTING = repr((_VERSIONS, [Path(file).read_bytes() for file in WHOLE]))  # of 
 
 
 def write(path: Path, content: bytes) -> None:
-    """Write a file, whole or not at all."""
+    """Write a file that `read` takes, whole or not at all."""
     path.parent.mkdir(parents=True, exist_ok=True)
+    _guard(path.parent)
     handle, name = tempfile.mkstemp(dir=path.parent, prefix="new-")
     try:
         with open(handle, "wb") as file:
-            file.write(content)
+            file.write(hashlib.sha256(content).digest() + content)
         os.replace(name, path)
     except BaseException:
         Path(name).unlink(missing_ok=True)

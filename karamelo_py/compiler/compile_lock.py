@@ -49,7 +49,12 @@ def _take(path: Path, held: contextlib.ExitStack) -> None:
             return
     held.callback(fcntl.flock, file, fcntl.LOCK_UN)  # for a process that was forked meanwhile, too
     # Who waits has this very file open, and finds the kernel when it has the lock.
-    held.callback(path.unlink, missing_ok=True)
+    held.callback(_take_away, path)
+
+
+def _take_away(path: Path) -> None:
+    with contextlib.suppress(OSError):  # the folder may be gone
+        path.unlink()
 
 
 def _locked(file: int, patience: float) -> bool:

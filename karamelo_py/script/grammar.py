@@ -1,8 +1,10 @@
 """The grammars script.lark and expression.lark, their parsers, and the trees that they make."""
 
 import functools
+import hashlib
+import marshal
 import math
-import platform
+import sys
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -29,24 +31,30 @@ def refused() -> type[Exception]:
 def parser_of(start: str) -> Any:
     """Make the parser of statements, or that of expressions, which knows no other tokens.
 
-    Lark needs 0.06 s for each, and 0.01 s to read one that it has kept; what it cannot read or
-    write there is no matter.
+    Lark needs 0.06 s for each, and 0.01 s to take one from its tables, which are kept on disk; what
+    cannot be read or written there is no matter.
     """
     import lark
+    from lark.grammar import Rule
+    from lark.lexer import TerminalDef
 
-    folder = cache.folder().with_name("parsers")
-    with suppress(OSError):
-        folder.mkdir(parents=True, exist_ok=True)
-    versions = f"{lark.__version__}-{platform.python_version()}"
-    return lark.Lark(
-        Path(__file__).with_name(f"{start}.lark").read_text(encoding="utf-8"),
-        parser="lalr",
-        start=start,
+    text = Path(__file__).with_name(f"{start}.lark").read_text(encoding="utf-8")
+    # The numbers and texts of the tables, as bytes that make no objects of other kinds.
+    stamp = hashlib.sha256(f"{lark.__version__} {sys.version} {text}".encode()).hexdigest()[:24]
+    path = cache.folder().with_name("parsers") / f"{start}-{stamp}.tables"
+    with suppress(OSError, ValueError, EOFError, TypeError):
+        return lark.Lark._load_from_dict(
+            *marshal.loads(cache.read(path)), transformer=_TreeBuilder()
+        )
+    made = lark.Lark(
+        text, parser="lalr", start=start, keep_all_tokens=True, maybe_placeholders=False,
         transformer=_TreeBuilder(),
-        keep_all_tokens=True,
-        maybe_placeholders=False,
-        cache=str(folder / f"{start}-{versions}.parser"),
-    )
+    )  # fmt: skip
+    data, memo = made.memo_serialize([TerminalDef, Rule])
+    data["options"].pop("transformer")
+    with suppress(OSError, ValueError):
+        cache.write(path, marshal.dumps((data, memo)))
+    return made
 
 
 def literal(word: str, start: int) -> float:
