@@ -9,7 +9,7 @@ from hubs import SmallHub
 from meshed import cube_surface, enclosed_volume, sphere_surface, write
 from test_scene_script import message
 
-from karamelo_py.scene.meshes.inside import Surface
+from karamelo_py.scene.meshes.inside import skin_of
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.meshes import STL
 
@@ -50,14 +50,14 @@ def test_a_sphere(stl):
 def test_rays_through_edges_and_vertices_count_once():
     """Positions straight below vertices, edges and the poles, off the surface itself."""
     points, triangles = sphere_surface(1.0, 16, 8)
-    surface = Surface(points, triangles, 1e-9)
+    surface = skin_of(points, triangles, 1e-9)
     edges = (points[triangles] + points[np.roll(triangles, 1, axis=1)]).reshape(-1, 3) / 2
     above = np.concatenate([points, edges])
     for height in (-2.0, -0.01, 0.0, 0.013, 2.0):
         x = above.copy()
         x[:, 2] = height
         radius = np.linalg.norm(x, axis=1)
-        inside = surface.encloses(x)
+        inside = surface.contains(x)
         assert inside[radius < 0.9].all()
         assert not inside[radius > 1 + 1e-9].any()
 
@@ -73,8 +73,8 @@ def test_neither_the_order_of_vertices_nor_a_rotation_changes_what_is_inside():
     local[5000:6000] = np.sign(local[5000:6000])  # vertices
     want = (np.abs(local) <= 1).all(axis=1)
     for faces in (triangles, flipped):
-        straight = Surface(points, faces, 1e-9).encloses(local)
-        turned = Surface(points @ rotation, faces, 1e-9).encloses(local @ rotation)
+        straight = skin_of(points, faces, 1e-9).contains(local)
+        turned = skin_of(points @ rotation, faces, 1e-9).contains(local @ rotation)
         np.testing.assert_array_equal(straight, want)
         np.testing.assert_array_equal(turned, want)
 
@@ -82,18 +82,18 @@ def test_neither_the_order_of_vertices_nor_a_rotation_changes_what_is_inside():
 def test_a_part_inside_is_a_cavity():
     outer, faces = cube_surface(0, 1)
     inner, _ = cube_surface(0.25, 0.75)
-    surface = Surface(np.concatenate([outer, inner]), np.concatenate([faces, faces + 8]), 1e-9)
+    surface = skin_of(np.concatenate([outer, inner]), np.concatenate([faces, faces + 8]), 1e-9)
     x = np.array([[0.1, 0.1, 0.1], [0.5, 0.5, 0.5], [0.5, 0.5, 0.1], [0.5, 0.5, 1.1]])
-    np.testing.assert_array_equal(surface.encloses(x), [True, False, True, False])
+    np.testing.assert_array_equal(surface.contains(x), [True, False, True, False])
 
 
 def test_vertices_with_few_digits_are_joined():
     points, triangles = cube_surface()
     apart = points[triangles].reshape(-1, 3)
     apart += np.random.default_rng(4).uniform(-1e-8, 1e-8, apart.shape)
-    surface = Surface(apart, np.arange(len(apart)).reshape(-1, 3), 1e-6)
+    surface = skin_of(apart, np.arange(len(apart)).reshape(-1, 3), 1e-6)
     np.testing.assert_array_equal(
-        surface.encloses(np.array([[0.5, 0.5, 0.5], [0.3, 0.3, -0.1]])), [True, False]
+        surface.contains(np.array([[0.5, 0.5, 0.5], [0.3, 0.3, -0.1]])), [True, False]
     )
 
 
@@ -123,3 +123,82 @@ def test_what_is_no_surface(tmp_path, monkeypatch):
         from karamelo_py.language.interpreter import Interpreter
 
         Interpreter(SmallHub(3)).run_text("region(r, stl, bdy.stl)")
+
+
+def boxes(*ends):
+    """Points and triangles of cubes from `lo` to `hi` along each axis."""
+    made = [cube_surface(*end) for end in ends]
+    points = np.concatenate([points for points, _ in made])
+    faces = np.concatenate([triangles + 8 * k for k, (_, triangles) in enumerate(made)])
+    return points, faces
+
+
+def test_shells_that_overlap_are_one_body(stl):
+    """Two cubes of 0.6, shifted by 0.3: 2 x 0.216 - 0.027, at each of three ways to fill it."""
+    hub = SmallHub(3, -0.1, 1.1, 0.1)
+    region = STL(hub, stl(*boxes((0, 0.6), (0.3, 0.9))))
+    x = np.array([[0.45, 0.45, 0.45], [0.2, 0.2, 0.2], [0.8, 0.8, 0.8], [0.2, 0.2, 0.8]])
+    np.testing.assert_array_equal(region.contains(x), [True, True, True, False])
+    # In the middle of both the surface is 0.15 away in space, though faces are as near.
+    assert region.distance(x, 1.0) == pytest.approx([0.15, 0.2, 0.1, -0.1 * math.sqrt(2)])
+    for k, points in enumerate((None, "gauss", "cut")):
+        volume = hub.solid(f"s{k}", region, points=points).volume0.sum()
+        assert volume == pytest.approx(0.405, rel=1e-6 if points != "gauss" else 1e-2)
+
+
+def test_shells_that_meet_in_a_face_leave_no_gap_and_no_wall():
+    points, triangles = boxes((0, 1), (0, 1))
+    points[8:, 0] = 2 - points[8:, 0]
+    skin = skin_of(points, triangles, 1e-9)
+    x = np.array([[0.5, 0.5, 0.5], [1.0, 0.5, 0.5], [1.5, 0.5, 0.5], [2.1, 0.5, 0.5]])
+    np.testing.assert_array_equal(skin.contains(x), [True, True, True, False])
+    assert skin.depth(x[1:2], 1.0) == pytest.approx(0.5)
+    assert skin.volume == pytest.approx(2)
+
+
+def test_every_shell_in_another_changes_what_is_inside():
+    """A ball in a cavity in a body, however their triangles are turned; one that is twice there."""
+    points, triangles = boxes((0, 1), (0.2, 0.8), (0.4, 0.6))
+    x = np.array([[0.1, 0.5, 0.5], [0.3, 0.5, 0.5], [0.5, 0.5, 0.5]])
+    for turned in (slice(0), slice(12), slice(12, 24), slice(0, None, 5)):
+        faces = triangles.copy()
+        faces[turned] = faces[turned][:, ::-1]
+        skin = skin_of(points, faces, 1e-9)
+        np.testing.assert_array_equal(skin.contains(x), [True, False, True])
+        assert skin.volume == pytest.approx(1 - 0.6**3 + 0.2**3)
+    skin = skin_of(points, np.concatenate([triangles[:12], triangles[:12]]), 1e-9)
+    assert skin.contains(x).all() and skin.volume == pytest.approx(1)
+
+
+def test_a_part_between_two_prongs_is_no_cavity():
+    """All corners of the bar lie in the prongs, and its middle in the gap between them."""
+    points, triangles = boxes((0, 1), (0, 1), (0, 1))
+    points[:8] *= [0.4, 1, 1]
+    points[8:16] *= [0.4, 1, 1]
+    points[8:16, 0] += 0.6
+    points[16:] = points[16:] * [0.6, 0.2, 0.2] + [0.2, 0.4, 0.4]
+    base = cube_surface(0, 1)[0] * [1, 1, 0.2] + [0, 0, -0.1]
+    points = np.concatenate([points, base])
+    triangles = np.concatenate([triangles, cube_surface(0, 1)[1] + 24])
+    skin = skin_of(points, triangles, 1e-9)
+    x = np.array([[0.3, 0.5, 0.5], [0.5, 0.5, 0.5], [0.5, 0.5, 0.8], [0.5, 0.5, 0.05]])
+    np.testing.assert_array_equal(skin.contains(x), [True, True, False, True])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_distances_are_those_of_the_nearest_triangle(seed):
+    """Against all triangles one by one, by SciPy's bounded least squares over a face."""
+    optimize = pytest.importorskip("scipy.optimize")
+    points, triangles = sphere_surface(1.0, 6, 4)
+    rng = np.random.default_rng(seed)
+    points = points * rng.uniform(0.6, 1.4, (len(points), 1))
+    x = rng.uniform(-1.5, 1.5, (4, 3))
+    found = skin_of(points, triangles, 1e-9).depth(x, 10.0)
+    for place, depth in zip(x, found, strict=True):
+        least = math.inf
+        for a, b, c in points[triangles]:
+            for origin, *ways in ((a, b - a, c - a), (a, b - a), (b, c - b), (c, a - c)):
+                fit = optimize.lsq_linear(np.array(ways).T, place - origin, (0, 1))
+                if fit.x.sum() <= 1:  # of a face, within it
+                    least = min(least, math.sqrt(2 * fit.cost))
+        assert abs(depth) == pytest.approx(least, rel=1e-6)

@@ -92,7 +92,7 @@ def join(region: Region, boxes: Any, pieces: Pieces) -> Pieces:
         at = pieces.middle[row]
         other = np.flatnonzero(~known & (number >= 0))
         at[other] = boxes.middles(number[other])
-        large[other] = region.depth(at[other], 1.0) > 0
+        large[other] = region.depth(at[other], region.domain.tolerance) > 0
         for k in range(d):
             large &= (at[:, k] > region.lo[k]) & (at[:, k] < region.hi[k])
         at -= middle

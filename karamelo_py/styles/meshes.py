@@ -1,6 +1,5 @@
 """Region styles mesh and stl, solid style mesh: what Gmsh and others make."""
 
-from functools import cached_property
 from typing import Annotated, Literal
 
 import numpy as np
@@ -10,7 +9,7 @@ from karamelo_py.scene.domain import RELATIVE_TOLERANCE, require_domain
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
 from karamelo_py.scene.meshes.elements import bulge_of, elements_of, measured
-from karamelo_py.scene.meshes.inside import Simplices, Skin, Surface, outer_faces, split
+from karamelo_py.scene.meshes.inside import Skin, flat_faces, outer_faces, skin_of
 from karamelo_py.scene.meshes.reading import MeshFile, read
 from karamelo_py.scene.placement import Placement
 from karamelo_py.scene.region import EXTERIOR, Region
@@ -30,19 +29,19 @@ def _tell_of_curved_edges(hub: Hub, file: MeshFile, bulge: float) -> None:
 
 
 class Enclosed(Region):
-    """Base of regions within a surface of `faces`."""
+    """Base of regions within a `skin`."""
 
-    @cached_property
-    def skin(self) -> Skin:
-        return Skin(self.faces())
+    skin: Skin
 
     @property
     def aligned(self) -> bool:
-        return bool((np.ptp(self.faces(), axis=1).min(axis=1) <= self.domain.tolerance).all())
+        return bool((np.ptp(self.skin.faces, axis=1).min(axis=1) <= self.domain.tolerance).all())
+
+    def contains(self, x: np.ndarray) -> np.ndarray:
+        return self.skin.contains(x)
 
     def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
-        distance = self.skin.distance(x[:, : self.dimension], reach)
-        return np.where(self.contains(x), distance, -distance)
+        return self.skin.depth(x, reach)
 
 
 class MeshRegion(Enclosed):
@@ -89,16 +88,13 @@ class MeshRegion(Enclosed):
         mesh = read(file, dimension, hub.settings.trusts)
         parts = elements_of(mesh, dimension, group, lower=group is not None)
         _tell_of_curved_edges(hub, file, bulge_of(mesh, group))
-        corners = np.concatenate([split(elements) for elements in parts])
-        lo, hi = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+        flat = parts[0].shape.dimension < dimension
+        faces = flat_faces(parts) if flat else outer_faces(parts)
+        lo, hi = faces.min(axis=(0, 1)), faces.max(axis=(0, 1))
         super().__init__(hub, lo, hi, exterior=exterior == EXTERIOR)
         # Meshes are written with fewer digits than numbers have.
         tolerance = max(self.tolerance, RELATIVE_TOLERANCE * float((hi - lo).max()))
-        self.corners = corners
-        self.simplices = Simplices(corners, tolerance)
-
-    def contains(self, x: np.ndarray) -> np.ndarray:
-        return self.simplices.contain(np.asarray(x)[:, : self.dimension])
+        self.skin = Skin([faces], tolerance, odd=dimension == 1, open=flat)
 
     @property
     def aligned(self) -> bool:
@@ -106,15 +102,7 @@ class MeshRegion(Enclosed):
 
     @property
     def flat(self) -> bool:
-        return self.simplices.flat
-
-    def faces(self) -> np.ndarray:
-        return outer_faces(self.corners)
-
-    def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
-        if self.flat:
-            return np.full(len(x), -reach)  # nothing lies in a surface or a line
-        return super().distance(x, reach)
+        return self.skin.open
 
 
 # Binary STL files, and most programs that write the others, have single precision.
@@ -138,9 +126,8 @@ class STL(Enclosed):
 
     Notes
     -----
-    The surface must be closed: every edge belongs to two triangles. A part inside of another one is
-    a cavity. A position is inside if a ray from it along z crosses the surface an odd number of
-    times. Edges and vertices on the ray do not matter.
+    The surface must be closed: every edge belongs to two triangles. A shell that lies in another
+    one is a cavity, whichever side its triangles show. Shells that overlap are one body.
 
     See Also
     --------
@@ -165,13 +152,7 @@ class STL(Enclosed):
         lo, hi = used.min(axis=0), used.max(axis=0)
         super().__init__(hub, lo, hi, exterior=exterior == EXTERIOR)
         tolerance = max(self.tolerance, 2 * _SINGLE * float(np.abs(used).max()))
-        self.surface = Surface(points, triangles.astype(np.int64), tolerance)
-
-    def contains(self, x: np.ndarray) -> np.ndarray:
-        return self.surface.encloses(np.asarray(x)[:, :3])
-
-    def faces(self) -> np.ndarray:
-        return self.surface.corners
+        self.skin = skin_of(points, triangles.astype(np.int64), tolerance)
 
 
 class MeshSolid(Solid):

@@ -1,153 +1,111 @@
-"""Positions in simplices, and inside or near surfaces: found by boxes in a coarse grid."""
-
-import math
-from collections.abc import Iterator
+"""Skins of bodies: shells of triangles from files, and the outer faces of a mesh."""
 
 import numpy as np
 
+from karamelo_py.kernels.surfaces import Surface, depths, distances, surface_of
 from karamelo_py.scene.meshes.elements import MeshElements, measured
 from karamelo_py.script.errors import ScriptError
 
-# Boxes are filed in so many cells on average at most; larger ones make the cells larger.
-_MOST = 32
-# Faces of a hexahedron, seen from outside counter-clockwise.
-_FACES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
+# Faces of elements by their corners; seen from outside counter-clockwise, in 2D on the left.
+FACES = {
+    "line": ((0,), (1,)),
+    "triangle": ((0, 1), (1, 2), (2, 0)),
+    "quad": ((0, 1), (1, 2), (2, 3), (3, 0)),
+    "tetra": ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)),
+    "hexahedron": (
+        (0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)
+    ),
+}  # fmt: skip
 # Vertices this close (of the size of the surface) are the same one, written with few digits.
 _WELD = 1e-6
+_SAMPLES = 4000  # places on a shell that tell whether it lies in another one
+_SETS = 8  # of shells of which none overlap, at most
 
 
-class Bins:
-    """Boxes with corners (m, d), filed so that the few that may hold a position are found."""
+class Skin:
+    """Surface of a body: sets of `faces` (m, d, d), each of which is closed.
 
-    def __init__(self, lo: np.ndarray, hi: np.ndarray):
-        count, d = lo.shape
-        self.lo, self.hi = lo.min(axis=0), hi.max(axis=0)
-        extent = np.maximum(self.hi - self.lo, np.finfo(float).tiny)
-        # As many cells as boxes, more or less.
-        size = max((extent.prod() / count) ** (1 / d), extent.max() / count)
-        while True:
-            self.size = size
-            self.cells = np.maximum(1, np.ceil(extent / size)).astype(np.int64)
-            first, last = self._index(lo), self._index(hi)
-            spans = last - first + 1
-            filed = spans.prod(axis=1)
-            if filed.sum() <= _MOST * count:
-                break
-            size *= 1.5
-        self.first, self.items = self._file(first, spans, filed)
-
-    def _index(self, x: np.ndarray) -> np.ndarray:
-        return np.clip(((x - self.lo) / self.size).astype(np.int64), 0, self.cells - 1)
-
-    def _number(self, index: np.ndarray) -> np.ndarray:
-        return np.ravel_multi_index(tuple(index.T), tuple(self.cells))
-
-    def _file(self, first, spans, filed) -> tuple[np.ndarray, np.ndarray]:
-        """Boxes in the order of cells, and where those of each cell begin."""
-        box = np.repeat(np.arange(len(filed)), filed)
-        place = np.arange(len(box)) - np.repeat(np.cumsum(filed) - filed, filed)
-        index = np.empty((len(box), spans.shape[1]), np.int64)
-        for axis in range(spans.shape[1] - 1, -1, -1):
-            place, along = np.divmod(place, spans[box, axis])
-            index[:, axis] = first[box, axis] + along
-        number = self._number(index)
-        order = np.argsort(number, kind="stable")
-        begin = np.searchsorted(number[order], np.arange(int(self.cells.prod()) + 1))
-        return begin, box[order]
-
-    def candidates(
-        self, x: np.ndarray, done: np.ndarray | None = None
-    ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Pairs of positions and boxes that may hold them: rows of `x` (k,) and boxes (k,).
-
-        Each batch names a position once. Positions that `done` (n,) marks meanwhile are left out.
-        """
-        rows = np.flatnonzero(((x >= self.lo) & (x <= self.hi)).all(axis=1))
-        cell = self._number(self._index(x[rows]))
-        place, end = self.first[cell], self.first[cell + 1]
-        while True:
-            kept = place < end
-            if done is not None:
-                kept &= ~done[rows]
-            rows, place, end = rows[kept], place[kept], end[kept]
-            if not len(rows):
-                return
-            yield rows, self.items[place]
-            place = place + 1
-
-
-class Simplices:
-    """Simplices with `corners` (m, k + 1, d), d >= k; their faces belong to them.
-
-    A position may lie by the `tolerance` beyond a face, or beside a simplex with k < d.
+    A position is in the body if one of the sets encloses it, or within the `tolerance` of a face.
+    Faces of an `open` skin enclose nothing.
     """
 
-    def __init__(self, corners: np.ndarray, tolerance: float):
-        edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
-        gram = np.swapaxes(edges, 1, 2) @ edges
-        size = np.ptp(corners, axis=1).max(axis=1)
-        k = edges.shape[2]
-        solid = np.linalg.det(gram) > (1e-12 * size**k) ** 2
-        corners, edges, gram = corners[solid], edges[solid], gram[solid]
-        self.tolerance = tolerance
-        self.origin = corners[:, 0]
-        self.edges = edges
-        # Of the barycentric coordinates; the first one is 1 minus the others.
-        self.inverse = (
-            np.linalg.inv(edges)
-            if edges.shape[1] == k
-            else np.linalg.solve(gram, np.swapaxes(edges, 1, 2))
-        )
-        slopes = np.linalg.norm(self.inverse, axis=2)
-        first = np.linalg.norm(self.inverse.sum(axis=1), axis=1)
-        # A distance from a face, in barycentric coordinates.
-        self.slack = -tolerance * np.column_stack([first, slopes])
-        self.flat = k < corners.shape[2]
-        self.bins = Bins(corners.min(axis=1) - tolerance, corners.max(axis=1) + tolerance)
+    def __init__(
+        self, sets: list[np.ndarray], tolerance: float, *, odd: bool = False, open: bool = False
+    ):
+        self.tolerance, self.open = tolerance, open
+        self.surfaces: list[Surface] = [surface_of(faces, tolerance, odd=odd) for faces in sets]
+        # (length, area) of what it encloses; not known where sets may overlap
+        self.volume = None if open or odd or len(sets) > 1 else float(abs(_volumes(sets[0]).sum()))
 
-    def contain(self, x: np.ndarray) -> np.ndarray:
-        """Test which positions (n, d) lie in one of the simplices: (n,) bool."""
-        inside = np.zeros(len(x), bool)
-        for rows, items in self.bins.candidates(x, done=inside):
-            local = x[rows] - self.origin[items]
-            coordinates = np.einsum("nij,nj->ni", self.inverse[items], local)
-            slack = self.slack[items]
-            within = (coordinates >= slack[:, 1:]).all(axis=1)
-            within &= 1 - coordinates.sum(axis=1) >= slack[:, 0]
-            if self.flat:
-                beside = local - np.einsum("nij,nj->ni", self.edges[items], coordinates)
-                within &= np.einsum("ni,ni->n", beside, beside) <= self.tolerance**2
-            inside[rows[within]] = True
-        return inside
+    @property
+    def faces(self) -> np.ndarray:
+        """(m, d, d) corners of all faces."""
+        return np.concatenate([surface.faces for surface in self.surfaces])
+
+    def depth(self, x: np.ndarray, reach: float) -> np.ndarray:
+        """Return how deep positions (n, >= d) lie in the body, below 0 outside, `reach` at most."""
+        if self.open:
+            return -np.minimum.reduce([distances(surface, x, reach) for surface in self.surfaces])
+        return np.maximum.reduce([depths(surface, x, reach) for surface in self.surfaces])
+
+    def contains(self, x: np.ndarray) -> np.ndarray:
+        """Test which positions (n, >= d) belong to the body, its faces included: (n,) bool."""
+        return self.depth(np.asarray(x), 2 * self.tolerance) >= -self.tolerance
 
 
-def split(elements: MeshElements) -> np.ndarray:
-    """The simplices (m, k + 1, d) that the elements are made of.
+def _volumes(faces: np.ndarray) -> np.ndarray:
+    """Volumes (m,) below faces (m, d, d), whose sum is what they enclose."""
+    d = faces.shape[2]
+    if d == 1:
+        return faces[:, 0, 0] * np.where(np.arange(len(faces)) % 2, 1, -1)
+    local = faces - faces.mean(axis=(0, 1))
+    return np.linalg.det(local) / (1, 2, 6)[d - 1]
 
-    A hexahedron becomes 12 tetrahedra about its middle. Faces that are not plane are split along
-    the diagonal from their lowest node number, so that neighbours agree and leave no gap.
+
+# --- meshes -----------------------------------------------------------------------------------
+
+
+def outer_faces(parts: list[MeshElements]) -> np.ndarray:
+    """Faces (m, d, d) that belong to one only of the elements; of solid ones seen from outside.
+
+    Faces with four corners are split along the diagonal from the lowest node number, so that
+    neighbours agree and leave no gap. In 1D they come in pairs, the lower one first.
     """
-    shape = elements.shape.name
-    corners = elements.corners
-    if shape == "hexahedron":
-        elements = measured(elements)[0]
-        middle = elements.corners.mean(axis=1, keepdims=True)
-        parts = [
-            np.concatenate([np.broadcast_to(middle, (len(middle), 1, 3)), triangle], axis=1)
-            for face in _FACES
-            for triangle in _halves(elements.numbers[:, face], elements.corners[:, face])
-        ]
-        return np.concatenate(parts)
-    if shape == "quad" and corners.shape[2] == 2:
-        # Of the diagonals, one that stays inside.
-        corners = measured(elements)[0].corners
-        sides = np.roll(corners, -1, axis=1) - corners
-        turn = np.roll(sides, 1, axis=1)
-        reflex = turn[..., 0] * sides[..., 1] - turn[..., 1] * sides[..., 0]
-        return np.concatenate(_halves(reflex, corners))
-    if shape == "quad":
-        return np.concatenate(_halves(elements.numbers, corners))
-    return corners
+    found: list[np.ndarray] = []
+    for part in parts:
+        solid, _, _ = measured(part)
+        local = FACES[solid.shape.name]
+        for size in dict.fromkeys(map(len, local)):
+            some = [list(face) for face in local if len(face) == size]
+            numbers = np.concatenate([solid.numbers[:, face] for face in some])
+            once = _once(np.sort(numbers, axis=1))
+            corners = np.concatenate([solid.corners[:, face] for face in some])[once]
+            found += _halves(numbers[once], corners) if size == 4 else [corners]
+    faces = np.concatenate(found)
+    if faces.shape[2] == 1:
+        return np.sort(faces, axis=0)[_once(np.sort(faces[:, :, 0], axis=0))]
+    order = np.lexsort(np.moveaxis(faces, 2, 0)[::-1], axis=1)
+    same = np.take_along_axis(faces, order[:, :, None], axis=1)
+    return faces[_once(same.reshape(len(same), -1))]
+
+
+def flat_faces(parts: list[MeshElements]) -> np.ndarray:
+    """Elements of lower dimension as simplices (m, d, d), a line in 3D as a triangle."""
+    found: list[np.ndarray] = []
+    for part in parts:
+        corners, d = part.corners, part.corners.shape[2]
+        whole = _halves(part.numbers, corners) if corners.shape[1] == 4 else [corners]
+        found += [np.concatenate([c, c[:, -1:]], axis=1) if c.shape[1] < d else c for c in whole]
+    return np.concatenate(found)
+
+
+def _once(rows: np.ndarray) -> np.ndarray:
+    """Numbers of the rows (n, k) that are there an odd number of times, ascending."""
+    order = np.lexsort(rows.T[::-1])
+    ordered = rows[order]
+    begin = np.flatnonzero(np.r_[True, (ordered[1:] != ordered[:-1]).any(axis=1)])
+    odd = np.diff(np.r_[begin, len(rows)]) % 2 == 1
+    return np.sort(order[begin[odd]])
 
 
 def _halves(rank: np.ndarray, corners: np.ndarray) -> list[np.ndarray]:
@@ -157,125 +115,49 @@ def _halves(rank: np.ndarray, corners: np.ndarray) -> list[np.ndarray]:
     return [turned[:, [0, 1, 2]], turned[:, [0, 2, 3]]]
 
 
-class Skin:
-    """Surface of a body in d dimensions: simplices of d - 1 dimensions, `faces` (m, d, d)."""
-
-    def __init__(self, faces: np.ndarray):
-        self.faces = faces
-        self.lo, self.hi = faces.min(axis=1), faces.max(axis=1)
-        if faces.shape[2] == 3:
-            normal = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
-            size = np.linalg.norm(normal, axis=1, keepdims=True)
-            self.normal = normal / np.maximum(size, np.finfo(float).tiny)
-        self._bins: dict[int, Bins] = {}
-
-    def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
-        """Distance of positions (n, d) from the nearest face, `reach` at most: (n,)."""
-        distance, d = np.full(len(x), reach), x.shape[1]
-        widen = math.ceil(math.log2(reach))  # so that few tables are made
-        if widen not in self._bins:
-            self._bins[widen] = Bins(self.lo - 2.0**widen, self.hi + 2.0**widen)
-        for rows, items in self._bins[widen].candidates(x):
-            known = distance[rows][:, None]
-            near = ((x[rows] > self.lo[items] - known) & (x[rows] < self.hi[items] + known)).all(1)
-            rows, items = rows[near], items[near]
-            if d == 3:
-                height = np.einsum("ni,ni->n", x[rows] - self.faces[items, 0], self.normal[items])
-                near = np.abs(height) < distance[rows]
-                rows, items = rows[near], items[near]
-            distance[rows] = np.minimum(distance[rows], _distance(x[rows], self.faces[items]))
-        return distance
+# --- shells from files ------------------------------------------------------------------------
 
 
-def outer_faces(corners: np.ndarray) -> np.ndarray:
-    """Faces (m, d, d) that belong to one only of simplices with `corners` (n, d + 1, d)."""
-    faces = np.concatenate([np.delete(corners, k, axis=1) for k in range(corners.shape[2] + 1)])
-    order = np.lexsort(np.moveaxis(faces, 2, 0)[::-1], axis=1)
-    same = np.take_along_axis(faces, order[:, :, None], axis=1)
-    _, first, count = np.unique(
-        same.reshape(len(same), -1), axis=0, return_index=True, return_counts=True
-    )
-    return faces[first[count == 1]]
+def skin_of(points: np.ndarray, triangles: np.ndarray, tolerance: float) -> Skin:
+    """Make the skin of a body of closed shells: `points` (n, 3), `triangles` (m, 3) of them.
 
-
-def _distance(x: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Of positions (n, d) from a face each, (n, d, d)."""
-    if faces.shape[1] == 1:
-        return np.abs(x - faces[:, 0])[:, 0]
-    ways = [(k, (k + 1) % faces.shape[1]) for k in range(faces.shape[1])]
-    distance = np.min([_from_line(x, faces[:, i], faces[:, j]) for i, j in ways], axis=0)
-    if faces.shape[1] == 2:
-        return distance
-    normal = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
-    size = np.linalg.norm(normal, axis=1)
-    above = size > 0
-    for i, j in ways:
-        side = np.cross(faces[:, j] - faces[:, i], x - faces[:, i])
-        above &= np.einsum("ni,ni->n", side, normal) >= 0
-    height = np.abs(np.einsum("ni,ni->n", x - faces[:, 0], normal))
-    distance[above] = height[above] / size[above]
-    return distance
-
-
-def _from_line(x: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    way, local = end - start, x - start
-    square = np.maximum(np.einsum("ni,ni->n", way, way), np.finfo(float).tiny)
-    along = np.clip(np.einsum("ni,ni->n", way, local) / square, 0, 1)
-    return np.linalg.norm(local - along[:, None] * way, axis=1)
-
-
-class Surface:
-    """A closed surface of triangles, perhaps in several parts; it belongs to what it encloses.
-
-    A position is inside if a ray from it upwards (along z) crosses the surface an odd number of
-    times. Seen from above, a triangle holds a position if a ray in the plane crosses its outline
-    an odd number of times. Triangles that share an edge find the same crossings, bit for bit,
-    since the edge is taken in the order of the vertex numbers; and whether an edge is reached at
-    all is a comparison without rounding. A position above an edge or a vertex is therefore
-    counted once, and no direction needs a second try. (Crossing number: Shimrat 1962,
-    Algorithm 112.) An edge that belongs to one triangle only is an error.
-
-    `points` (n, 3) are vertices, `triangles` (m, 3) their numbers; within the `tolerance` a
-    position lies on the surface.
+    A shell that lies in another one is a cavity, whichever side its triangles show. Shells that
+    overlap are one body. An edge that belongs to an odd number of triangles is an error.
     """
-
-    def __init__(self, points: np.ndarray, triangles: np.ndarray, tolerance: float):
-        triangles = _closed(points, triangles)
-        self.corners = corners = points[triangles]
-        self.skin = Simplices(corners, tolerance)
-        # Edges by number, lower first; each as (start, end), seen from above.
-        ends = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2), axis=2)
-        self.start, self.end = points[ends[..., 0], :2], points[ends[..., 1], :2]
-        a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
-        self.normal = np.cross(b - a, c - a)
-        self.origin = a
-        self.bottom, self.top = corners[..., 2].min(axis=1), corners[..., 2].max(axis=1)
-        flat = corners[..., :2]
-        # Wider by the tolerance: a crossing may be found an ulp beside the triangle.
-        self.bins = Bins(flat.min(axis=1) - tolerance, flat.max(axis=1) + tolerance)
-
-    def encloses(self, x: np.ndarray) -> np.ndarray:
-        """Test which positions (n, 3) lie inside or on the surface: (n,) bool."""
-        odd = np.zeros(len(x), bool)
-        for rows, items in self.bins.candidates(np.ascontiguousarray(x[:, :2])):
-            odd[rows] ^= self._crossed(x[rows], items)
-        return odd | self.skin.contain(x)
-
-    def _crossed(self, x: np.ndarray, items: np.ndarray) -> np.ndarray:
-        """Test if the ray upwards from each position crosses the triangle beside it: (k,) bool."""
-        start, end = self.start[items], self.end[items]
-        y = x[:, None, 1]
-        reached = (start[..., 1] > y) != (end[..., 1] > y)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            part = (y - start[..., 1]) / (end[..., 1] - start[..., 1])
-            at = start[..., 0] + part * (end[..., 0] - start[..., 0])
-            crossed = (reached & (x[:, None, 0] < at)).sum(axis=1) % 2 == 1
-            normal, local = self.normal[items], x - self.origin[items]
-            rise = -(normal[:, 0] * local[:, 0] + normal[:, 1] * local[:, 1]) / normal[:, 2]
-            height = self.origin[items, 2] + rise
-        # A triangle on edge has any height between its ends: there the position is beside it.
-        height = np.clip(np.nan_to_num(height), self.bottom[items], self.top[items])
-        return crossed & (height > x[:, 2])
+    triangles = _closed(points, triangles)
+    for sided in (True, False):  # as the file has them; else turned so that neighbours agree
+        some = _single(triangles, sided=sided)
+        some = some if sided else _turned(some)
+        edge, way = _edges(some)
+        if not np.bincount(edge, way).any():
+            break
+    else:
+        return Skin([points[triangles]], tolerance, odd=True)
+    faces, shell = points[some], _shells(edge, sided=sided)
+    volume = np.bincount(shell, _volumes(faces))
+    negative = volume[shell] < 0
+    faces[negative] = faces[negative][:, ::-1]
+    if len(volume) == 1:
+        return Skin([faces], tolerance)
+    order = np.argsort(shell, kind="stable")
+    ends = np.searchsorted(shell[order], np.arange(1, len(volume)))
+    shells = np.split(faces[order], ends)
+    lo, hi = (np.array([end(s, axis=(0, 1)) for s in shells]) for end in (np.min, np.max))
+    within = _within(shells, lo, hi, tolerance)
+    depth = within.sum(axis=1)
+    shells = [s[:, ::-1] if n % 2 else s for s, n in zip(shells, depth, strict=True)]
+    # What a shell is in, it goes with; outermost ones go apart where their boxes overlap.
+    sets: list[list[int]] = []
+    for outer in np.flatnonzero(depth == 0):
+        own = [outer, *np.flatnonzero(within[:, outer])]
+        for one in sets:
+            apart = (lo[outer] >= hi[one] - tolerance) | (hi[outer] <= lo[one] + tolerance)
+            if apart.any(axis=1).all() or (len(sets) == _SETS and one is sets[-1]):
+                one += own
+                break
+        else:
+            sets.append(own)
+    return Skin([np.concatenate([shells[k] for k in one]) for one in sets], tolerance)
 
 
 def _closed(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
@@ -283,17 +165,18 @@ def _closed(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     size = np.ptp(points, axis=0).max()
     for spacing in (0.0, _WELD * size):
         same = points if spacing == 0 else np.rint(points / spacing)
-        _, first, number = np.unique(same, axis=0, return_index=True, return_inverse=True)
-        welded = first[number.ravel()][triangles]
-        edges = np.sort(
-            np.concatenate([welded[:, [0, 1]], welded[:, [1, 2]], welded[:, [2, 0]]]), axis=1
-        )
-        edges = edges[edges[:, 0] != edges[:, 1]]
-        unique, count = np.unique(edges, axis=0, return_counts=True)
-        open_edges = unique[count % 2 == 1]
+        order = np.lexsort(same.T)
+        new = np.r_[True, (same[order[1:]] != same[order[:-1]]).any(axis=1)]
+        first = np.empty(len(points), np.int64)
+        first[order] = order[np.flatnonzero(new)][np.cumsum(new) - 1]
+        welded = first[triangles]
+        welded = welded[(welded != np.roll(welded, 1, axis=1)).all(axis=1)]
+        low, high, _ = _ends(welded)
+        edge, count = np.unique(low * len(points) + high, return_counts=True)
+        open_edges = edge[count % 2 == 1]
         if not len(open_edges):
             return welded
-    where = ", ".join(f"{c:g}" for c in points[open_edges[0]].mean(axis=0))
+    where = ", ".join(f"{c:g}" for c in points[[*divmod(open_edges[0], len(points))]].mean(axis=0))
     raise ScriptError(
         f"the surface is not closed: {len(open_edges)} "
         f"edge{'s belong' if len(open_edges) > 1 else ' belongs'} to one triangle only, "
@@ -302,3 +185,98 @@ def _closed(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
         expected="a surface without holes, of which every edge joins two triangles",
         hint="repair it, for example in MeshLab, Blender or Gmsh",
     )
+
+
+def _ends(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Edges (3 m,) of triangles: lower and higher number, and 1 or -1 by their direction."""
+    a, b = triangles.T.ravel(), np.roll(triangles, -1, axis=1).T.ravel()
+    return np.minimum(a, b), np.maximum(a, b), np.where(a < b, 1, -1)
+
+
+def _edges(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Number the edges (3 m,) of triangles, alike where they are; 1 or -1 by their direction."""
+    low, high, way = _ends(triangles)
+    return np.unique(low * (triangles.max() + 1) + high, return_inverse=True)[1].ravel(), way
+
+
+def _single(triangles: np.ndarray, *, sided: bool) -> np.ndarray:
+    """Leave one of triangles that coincide, and none where two shells meet in them."""
+    same = np.sort(triangles, axis=1)
+    order = np.lexsort(same.T)
+    begin = np.flatnonzero(np.r_[True, (np.diff(same[order], axis=0) != 0).any(axis=1)])
+    if len(begin) == len(triangles):
+        return triangles
+    side = -np.sign(triangles - np.roll(triangles, 1, axis=1)).prod(axis=1)
+    count = np.add.reduceat(side[order], begin)
+    left = order[begin[count != 0 if sided else count % 2 != 0]]
+    return triangles[left] if len(left) else triangles
+
+
+def _turned(triangles: np.ndarray) -> np.ndarray:
+    """Turn triangles so that two at an edge go through it in opposite directions."""
+    edge, way = _edges(triangles)
+    m = len(triangles)
+    order = np.argsort(edge, kind="stable")
+    begin = np.flatnonzero(np.r_[True, np.diff(edge[order]) > 0])
+    pairs = begin[np.diff(np.r_[begin, len(order)]) == 2]
+    ends = np.stack([order[pairs], order[pairs + 1]], axis=1)
+    turned = (way[ends[:, 0]] == way[ends[:, 1]]).tolist()
+    beside: list[list[tuple[int, bool]]] = [[] for _ in range(m)]
+    for (a, b), other in zip((ends % m).tolist(), turned, strict=True):
+        beside[a].append((b, other))
+        beside[b].append((a, other))
+    sides: list[bool | None] = [None] * m
+    for first in range(m):
+        stack = [first] if sides[first] is None else []
+        sides[first] = bool(sides[first])
+        while stack:
+            one = stack.pop()
+            for other, differs in beside[one]:
+                if sides[other] is None:
+                    sides[other] = sides[one] != differs
+                    stack.append(other)
+    return np.where(np.array(sides, bool)[:, None], triangles[:, ::-1], triangles)
+
+
+def _shells(edge: np.ndarray, *, sided: bool) -> np.ndarray:
+    """Numbers (m,) of the shells that triangles belong to, which have edges (3 m,) in common.
+
+    Where triangles of a file have no sides, edges of two of them alone.
+    """
+    edges = np.ascontiguousarray(edge.reshape(3, -1).T)
+    if not sided:
+        several = np.bincount(edge)[edges] > 2
+        edges = np.where(several, edge.max() + 1 + np.arange(edge.size).reshape(-1, 3), edges)
+    label = np.arange(edges.max() + 1)
+    while True:
+        least = label[edges].min(axis=1)
+        new = label.copy()
+        np.minimum.at(new, edges.ravel(), np.repeat(least, 3))
+        new = new[new]
+        if (new == label).all():
+            return np.unique(least, return_inverse=True)[1].ravel()
+        label = new
+
+
+def _within(
+    shells: list[np.ndarray], lo: np.ndarray, hi: np.ndarray, tolerance: float
+) -> np.ndarray:
+    """Tell of each shell whether it lies wholly in each other one: (n, n) bool."""
+    n = len(shells)
+    within = np.zeros((n, n), bool)
+    for k in range(n):
+        inner = np.flatnonzero(((lo >= lo[k]) & (hi <= hi[k])).all(axis=1))
+        inner = inner[inner != k]
+        if not len(inner):
+            continue
+        outer = surface_of(shells[k], tolerance)
+        for other in inner:
+            within[other, k] = (depths(outer, _sample(shells[other]), 2 * tolerance) > 0).all()
+    return within & ~within.T
+
+
+def _sample(faces: np.ndarray) -> np.ndarray:
+    """Places (n, 3) on triangles: corners, and along edges."""
+    some = faces[:: max(1, 21 * len(faces) // _SAMPLES)]
+    part = np.linspace(0, 1, 8)[:-1, None, None, None]
+    return ((1 - part) * some + part * np.roll(some, -1, axis=1)).reshape(-1, 3)

@@ -1,0 +1,272 @@
+"""Faces in trees of boxes: the distance of a position from the nearest, and if they enclose it.
+
+Faces are simplices: points in 1D, segments in 2D, triangles in 3D. They are the leaves of a binary
+tree of boxes. Node k has the children 2k and 2k + 1, so that a walk through the tree needs no
+stack. A position is enclosed if the faces wind around it: each face that a ray along the last axis
+crosses counts 1 or -1, by its side. Faces that have an edge in common find the same crossings, bit
+for bit, and whether an edge is reached at all is a comparison without rounding: no position is
+counted twice or left out. (Winding number: Sunday 2001; triangles: Ericson 2005, section 5.1.5.)
+"""
+
+from math import sqrt
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from karamelo_py.compiler.compile import point_function
+from karamelo_py.compiler.held import at_hand
+from karamelo_py.compiler.loops import noinline
+from karamelo_py.compiler.threads import Serial, by_threads
+from karamelo_py.points.kinematics import KINEMATICS
+
+LEAF = 4  # faces
+CHUNK = 1024  # positions that a thread takes at a time
+TINY = float(np.finfo(float).tiny)
+
+
+class Surface(NamedTuple):
+    """Faces in a tree of boxes, whose nodes are counted from 1."""
+
+    low: np.ndarray  # (2 l, d) corners of the boxes; the last l nodes are leaves
+    high: np.ndarray
+    faces: np.ndarray  # (m, d, d): face, corner, direction
+    odd: bool  # only an odd number of crossings encloses: the faces know no sides
+
+
+def surface_of(faces: np.ndarray, margin: float, *, odd: bool = False) -> Surface:
+    """Put `faces` (m, d, d) into a tree, whose boxes are wider by `margin`."""
+    count, _, d = faces.shape
+    middle = faces.mean(axis=1)
+    extent = np.maximum(np.ptp(middle, axis=0).max(initial=0), TINY)
+    index = ((middle - middle.min(axis=0, initial=np.inf)) * (1023 / extent)).astype(np.int64)
+    code = np.zeros(count, np.int64)  # along a curve that stays near (Morton 1966)
+    for bit in range(10):
+        for k in range(d):
+            code |= (index[:, k] >> bit & 1) << (d * bit + k)
+    faces = np.ascontiguousarray(faces[np.argsort(code, kind="stable")], float)
+    leaves = 1 << max(0, (-(-count // LEAF) - 1).bit_length())
+    low, high = np.full((2 * leaves, d), np.inf), np.full((2 * leaves, d), -np.inf)
+    begin = np.arange(0, count, LEAF)
+    used = slice(leaves, leaves + len(begin))
+    low[used] = np.minimum.reduceat(faces.min(axis=1), begin) - margin
+    high[used] = np.maximum.reduceat(faces.max(axis=1), begin) + margin
+    while leaves > 1:
+        below, leaves = slice(leaves, 2 * leaves), leaves // 2
+        low[leaves : 2 * leaves] = low[below].reshape(-1, 2, d).min(axis=1)
+        high[leaves : 2 * leaves] = high[below].reshape(-1, 2, d).max(axis=1)
+    return Surface(low, high, faces, odd)
+
+
+@noinline
+def _behind(k):
+    """Return the node that a walk comes to behind node `k` and all below it, 0 behind the last."""
+    k += 1
+    while k & 1 == 0:
+        k >>= 1
+    return k if k > 1 else 0
+
+
+def _corner(kin, surface, i, k):
+    return kin.Vector._make([surface.faces[i, k, c] for c in range(kin.dimension)])
+
+
+def _from_line(a, b, x):
+    """Square of the distance of `x` from a segment."""
+    way, local = b - a, x - a
+    along = min(max(_dot(way, local) / max(way.squared(), TINY), 0.0), 1.0)
+    return (local - along * way).squared()
+
+
+def _dot(a, b):
+    found = a[0] * b[0]
+    for k in range(1, len(a)):
+        found = found + a[k] * b[k]
+    return found
+
+
+def _cross(a, b):
+    return a._make(
+        (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+    )
+
+
+@point_function()
+def _squared(kin, surface, i, x):
+    """Square of the distance of `x` from face `i`."""
+
+
+@_squared.on(KINEMATICS[1])
+def _from_point(kin, surface, i, x):
+    return (x - _corner(kin, surface, i, 0)).squared()
+
+
+@_squared.on(KINEMATICS[2])
+def _from_segment(kin, surface, i, x):
+    return _from_line(_corner(kin, surface, i, 0), _corner(kin, surface, i, 1), x)
+
+
+@_squared.on(KINEMATICS[3])
+def _from_triangle(kin, surface, i, x):
+    a, b, c = (_corner(kin, surface, i, k) for k in range(3))
+    normal = _cross(b - a, c - a)
+    size = normal.squared()
+    above = size > TINY
+    above = above and _dot(_cross(b - a, x - a), normal) >= 0
+    above = above and _dot(_cross(c - b, x - b), normal) >= 0
+    above = above and _dot(_cross(a - c, x - c), normal) >= 0
+    if above:
+        height = _dot(x - a, normal)
+        return height * height / size
+    return min(min(_from_line(a, b, x), _from_line(b, c, x)), _from_line(c, a, x))
+
+
+@noinline
+def _from_box(kin, surface, k, x):
+    """Square of the distance of `x` from the box of node `k`."""
+    found = 0.0
+    for c in range(kin.dimension):
+        away = max(max(surface.low[k, c] - x[c], x[c] - surface.high[k, c]), 0.0)
+        found += away * away
+    return found
+
+
+def _nearer(kin, surface, k, x, best):
+    first = LEAF * (k - surface.low.shape[0] // 2)
+    for i in range(first, min(first + LEAF, surface.faces.shape[0])):
+        best = min(best, _squared(kin, surface, i, x))
+    return best
+
+
+@noinline
+def distance(kin, surface, x, reach):
+    """Return the distance of `x` from the nearest face, `reach` at most."""
+    leaves = surface.low.shape[0] // 2
+    best = reach * reach
+    k = 1
+    while k < leaves:  # to a face that is near, so that the walk enters few boxes
+        here, there = _from_box(kin, surface, 2 * k, x), _from_box(kin, surface, 2 * k + 1, x)
+        if min(here, there) >= best:
+            break
+        k = 2 * k if here <= there else 2 * k + 1
+    if k >= leaves:
+        best = _nearer(kin, surface, k, x, best)
+    k = 1
+    while k > 0:
+        near = _from_box(kin, surface, k, x) < best
+        if near and k < leaves:
+            k = 2 * k
+        else:
+            if near:
+                best = _nearer(kin, surface, k, x, best)
+            k = _behind(k)
+    return sqrt(best)
+
+
+@noinline
+def _crossed(ax, ay, bx, by, x, y):
+    """Tell if a ray from (x, y) along x crosses an edge from a to b: 1 if that rises, -1, or 0."""
+    if (ay > y) == (by > y):
+        return 0
+    if ay < by:  # both faces at an edge take it the same way
+        return 1 if x < ax + (y - ay) / (by - ay) * (bx - ax) else 0
+    return -1 if x < bx + (y - by) / (ay - by) * (ax - bx) else 0
+
+
+@point_function()
+def _crossing(kin, surface, i, x):
+    """Tell if a ray from `x` along the last axis crosses face `i`: 1 or -1, by its side, or 0."""
+
+
+@_crossing.on(KINEMATICS[1])
+def _crossing_point(kin, surface, i, x):
+    return 1 if surface.faces[i, 0, 0] > x[0] else 0
+
+
+@_crossing.on(KINEMATICS[2])
+def _crossing_segment(kin, surface, i, x):
+    a, b = _corner(kin, surface, i, 0), _corner(kin, surface, i, 1)
+    return _crossed(a[1], a[0], b[1], b[0], x[1], x[0])
+
+
+@_crossing.on(KINEMATICS[3])
+def _crossing_triangle(kin, surface, i, x):
+    a, b, c = (_corner(kin, surface, i, k) for k in range(3))
+    found = _crossed(a[0], a[1], b[0], b[1], x[0], x[1])
+    found += _crossed(b[0], b[1], c[0], c[1], x[0], x[1])
+    found += _crossed(c[0], c[1], a[0], a[1], x[0], x[1])
+    if found == 0:
+        return 0
+    normal = _cross(b - a, c - a)
+    low, high = min(min(a[2], b[2]), c[2]), max(max(a[2], b[2]), c[2])
+    # A triangle on edge has any height between its ends: there the position is beside it.
+    height = low
+    if normal[2] != 0:
+        fall = normal[0] * (x[0] - a[0]) + normal[1] * (x[1] - a[1])
+        height = min(max(a[2] - fall / normal[2], low), high)
+    return found if height > x[2] else 0
+
+
+@noinline
+def encloses(kin, surface, x):
+    """Tell whether the faces enclose `x`."""
+    leaves, count = surface.low.shape[0] // 2, surface.faces.shape[0]
+    last = kin.dimension - 1
+    found = 0
+    k = 1
+    while k > 0:
+        near = x[last] <= surface.high[k, last]
+        for c in range(last):
+            near = near and surface.low[k, c] <= x[c] and x[c] <= surface.high[k, c]
+        if near and k < leaves:
+            k = 2 * k
+        else:
+            if near:
+                first = LEAF * (k - leaves)
+                for i in range(first, min(first + LEAF, count)):
+                    found += _crossing(kin, surface, i, x)
+            k = _behind(k)
+    return found & 1 != 0 if surface.odd else found != 0
+
+
+def _place(kin, x, p):
+    return kin.Vector._make([x[p, c] for c in range(kin.dimension)])
+
+
+def _depths_of_some(kin, surface, x, reach, depth, n):
+    surface = at_hand(surface)
+    for p in range(n * CHUNK, min((n + 1) * CHUNK, x.shape[0])):
+        place = _place(kin, x, p)
+        found = distance(kin, surface, place, reach)
+        depth[p] = found if encloses(kin, surface, place) else -found
+
+
+_depths = by_threads(_depths_of_some)
+
+
+def depths(surface: Surface, x: np.ndarray, reach: float) -> np.ndarray:
+    """Return how deep positions (n, d) lie in what a surface encloses: (n,).
+
+    Below 0 outside; `reach` at most.
+    """
+    return _of(_depths, surface, x, float(reach))
+
+
+def _distances_of_some(kin, surface, x, reach, found, n):
+    surface = at_hand(surface)
+    for p in range(n * CHUNK, min((n + 1) * CHUNK, x.shape[0])):
+        found[p] = distance(kin, surface, _place(kin, x, p), reach)
+
+
+_distances = by_threads(_distances_of_some)
+
+
+def distances(surface: Surface, x: np.ndarray, reach: float) -> np.ndarray:
+    """Return the distances of positions (n, d) from the nearest face, `reach` at most: (n,)."""
+    return _of(_distances, surface, x, float(reach))
+
+
+def _of(kernel: Any, surface: Surface, x: np.ndarray, *more: Any) -> np.ndarray:
+    d = surface.low.shape[1]
+    places, found = np.ascontiguousarray(x[:, :d], float), np.empty(len(x))
+    kernel(Serial(), -(-len(x) // CHUNK), KINEMATICS[d](), surface, places, *more, found)
+    return found
