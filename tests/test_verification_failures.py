@@ -119,17 +119,11 @@ def test_flip_keeps_a_sawtooth_pic_and_xpic_take_it_away(run):
     assert modes[2] > 0.996
 
 
-@pytest.mark.parametrize(
-    ("size", "flip", "xpic", "apic"),
-    # In a shorter bar the front of the wave, which takes some cells, is a larger part.
-    parameters([({"L": 10}, 0.2, 0.08, 0.15)], [({}, 0.15, 0.025, 0.1)]),
-)
-def test_flip_rings_behind_a_wave(run, size, flip, xpic, apic):
-    """Behind the wave the bar is at rest: FLIP leaves a fifth of the velocity, XPIC a fiftieth."""
-    assert run("flip_noise", **size).log.noise[-1] > flip
-    assert run("flip_noise", **size, cure=1).log.noise[-1] < xpic
-    way = {"transfer": "APIC", "order": "mechanical"}
-    assert run("flip_noise", **size, **way).log.noise[-1] < apic
+def test_flip_rings_behind_a_wave(run):
+    """Where two bars have met they are at rest: FLIP leaves a fifth of the velocity there."""
+    assert run("flip_noise").log.noise[-1] > 0.15
+    assert run("flip_noise", cure=1).log.noise[-1] < 0.1
+    assert run("flip_noise", transfer="XPIC", order=5).log.noise[-1] < 0.1
 
 
 @pytest.mark.full
@@ -170,7 +164,7 @@ def gaps(result):
 
 
 # A shorter and softer one takes a quarter of the steps, which are as many per passage of a wave.
-@pytest.mark.parametrize("size", few(({"L": 3, "T": 3, "E": 25}, {}), {"L": 3, "T": 3, "E": 25}))
+@pytest.mark.parametrize("size", few(({"T": 4, "E": 25}, {}), {"T": 4, "E": 25}))
 def test_a_stretched_bar_breaks_without_reason(run, size):
     """To three times its length: the force breaks off, and the points gather to lumps.
 

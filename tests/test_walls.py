@@ -88,3 +88,61 @@ def test_mistakes(run_interpreted):
     assert "held in all directions cannot rub" in run_interpreted(held, status=1).err
     negative = scene().replace("mu=0.3", "mu=-1")
     assert "a number or a formula of at least 0" in run_interpreted(negative, status=1).err
+
+
+COUETTE = """
+method(KIND, FLIP, linear, 1)
+scheme(SCHEME)
+dimension(2, 0, 0.2, -0.2, 1.2, 0.2)
+region(gap, block, INF, INF, 0, 1)
+eos(liquid, linear, 1, 50)
+strength(liquid, fluid, 1)
+material(liquid, eos-strength, liquid, liquid)
+solid(liquid, region, gap, 2, liquid, 0.2)
+region(low, block, INF, INF, -0.2, 0)
+region(high, block, INF, INF, 1, 1.2)
+fix(flat, velocity_nodes, all, NULL, 0)
+WALLS
+group(gap, particles, region, gap, solid, liquid)
+compute(err, error, gap, vx, 1e-5*y, L2, relative)
+log_modify(custom, time, low, high, err)
+set_output(time(0.1))
+run_time(1)
+"""
+HELD = """
+group(low, nodes, region, low, all)
+group(high, nodes, region, high, all)
+fix(low, velocity_nodes, low, 0, NULL)
+fix(high, velocity_nodes, high, 1e-5, NULL)
+low = low_x
+high = high_x
+"""
+PLATES = """
+material(iron, rigid, 1)
+solid(low, region, low, 2, iron, 0.2)
+solid(high, region, high, 2, iron, 0.2)
+group(high, particles, region, high, solid, high)
+fix(pull, velocity_particles, high, 1e-5, 0)
+low = ContactForce_low_x
+high = ContactForce_high_x
+"""
+
+
+@pytest.mark.parametrize(
+    "kind, walls, scheme",
+    parameters(
+        [("ulmpm", HELD, "musl"), ("ulmpm", PLATES, "usf")],
+        [("ulmpm", HELD, "usl"), ("tlmpm", HELD, "usavg"), ("ulmpm", PLATES, "usavg")],
+    ),
+)
+def test_points_of_flip_learn_the_speed_of_a_wall(run_interpreted, kind, walls, scheme):
+    """Couette flow (Batchelor 1967, 4.2): v = U y / H, the force is mu U / H.
+
+    A wall gives the points beside it a change of velocity, too: else 0.39 of their velocity is
+    wrong with five cells. What is left falls as h^1.5: only two cells are wrong, by a share of h.
+    """
+    script = COUETTE.replace("KIND", kind).replace("SCHEME", scheme).replace("WALLS", walls)
+    log = run_interpreted(script).log
+    assert log.err[-1] < 0.1
+    assert abs(log.low[-1]) == pytest.approx(0.2 * 1e-5, rel=2e-3)
+    assert log.high[-1] == pytest.approx(-log.low[-1], rel=2e-3)

@@ -435,7 +435,7 @@ def _change_nodes(what, hooks, control, dt, h, count, share):
 @noinline
 def _rub_at_nodes(what, hooks, control, dt, h, count):
     """Rub the chosen nodes along their wall."""
-    target, kin, nodes, kept = what.target, what.kin, what.nodes, what.kept
+    target, kin, nodes = what.target, what.kin, what.nodes
     programs = hooks.programs[h]
     if target == arrays.ON_VELOCITY:
         # Else v* is that of the step before.
@@ -447,7 +447,7 @@ def _rub_at_nodes(what, hooks, control, dt, h, count):
     slot = hooks.table[h].slot
     for q in range(count):
         n, mu = hooks.chosen[q], hooks.scratch[VALUE, q]
-        rub(kin, nodes, programs, hooks.held, n, mu, dt, kept, control, slot)
+        rub(kin, nodes, programs, hooks.held, n, mu, dt, control, slot)
 
 
 @noinline

@@ -34,13 +34,13 @@ class RigidBodies(NamedTuple):
 
 
 @noinline
-def _impose(kin, nodes, rigid, dt, kept, control, n):
+def _impose(kin, nodes, rigid, dt, control, n):
     """Give a node that sees rigid points their velocity; the force of that stands in `rigid`.
 
     Its work on the others is that of one that prescribes velocities.
 
-    As with a body of infinite mass, v* - v is nothing: points that keep their velocity take none
-    from there. `kept` is the share that they keep.
+    The change v* - v of the node has that force, too: else points that keep their own velocity
+    (FLIP) never learn the speed of the body that they touch.
     """
     d = kin.dimension
     if not rigid[n, MASS] > 0:
@@ -52,11 +52,10 @@ def _impose(kin, nodes, rigid, dt, kept, control, n):
         velocity = rigid[n, of_momentum(kin) + k] / rigid[n, MASS]
         impulse = 0.0
         if mass > 0:
-            before = nodes.sums[n, of_momentum(kin) + k] / mass
-            impulse = velocity - nodes.update[n, k] + kept * (before - velocity)
+            impulse = velocity - nodes.update[n, k]
         rigid[n, of_force(kin) + k] = -mass * impulse / dt
         nodes.update[n, k] = velocity
-        nodes.update[n, of_change(kin) + k] = 0
+        nodes.update[n, of_change(kin) + k] += impulse
         if counts(control.ranks, n):
             add_to(control.totals, WORK, float(mass * impulse * velocity))
 
@@ -89,8 +88,7 @@ def _add_forces(s, block, p):
 
 
 def _impose_node(s, n):
-    clock = s.control.clock[0]
-    _impose(s.kin, s.nodes, field(s.nodes.fields, RigidSums), kick(s), clock.kept, s.control, n)
+    _impose(s.kin, s.nodes, field(s.nodes.fields, RigidSums), kick(s), s.control, n)
 
 
 @kernel

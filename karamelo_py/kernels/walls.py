@@ -23,12 +23,12 @@ def _is_free(held, programs, n, c):
 
 
 @noinline
-def rub(kin, nodes, programs, held, n, mu, dt, kept, control, slot):
+def rub(kin, nodes, programs, held, n, mu, dt, control, slot):
     """Give node `n` the friction of its wall; add the force to the totals from `slot` on.
 
-    `programs` are those of the hook that has held the node: what it changed v and v* by, of which
-    points that keep the share `kept` of their velocity take both, is the impulse across the wall.
-    Where several fixes hold the node (`held`), each rubs for the directions in which it decides.
+    `programs` are those of the hook that has held the node: what it changed v* by is the impulse
+    across the wall. Where several fixes hold the node (`held`), each rubs for the directions in
+    which it decides.
     """
     d = kin.dimension
     mass = nodes.sums[n, MASS]
@@ -42,9 +42,7 @@ def rub(kin, nodes, programs, held, n, mu, dt, kept, control, slot):
             continue
         v = nodes.sums[n, of_momentum(kin) + c] / mass
         free = v + dt * nodes.sums[n, of_force(kin) + c] / mass
-        now = star - nodes.update[n, of_change(kin) + c]
-        impulse = star - free + kept * (v - now)
-        across += impulse * impulse
+        across += (star - free) * (star - free)
     if not along > 0:
         return
     speed = sqrt(along)

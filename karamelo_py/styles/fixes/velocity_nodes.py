@@ -15,8 +15,8 @@ from karamelo_py.styles.fixes.formulas import AXES, judge_friction, per_directio
 
 
 def prescribe(mass, v, v_star, force, value, before, dt, share):
-    """v* is the value now, v the value one step earlier; the total is the reaction."""
-    return before, value, force, mass * (value - v_star) / dt
+    """v* is the value now; the total is the reaction."""
+    return v, value, force, mass * (value - v_star) / dt
 
 
 def prescribe_mapped(mass, v, v_star, force, value, before, dt, share):
