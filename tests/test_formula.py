@@ -178,6 +178,21 @@ def test_the_program_follows_the_published_values(hub):
         assert rising.evaluate(hub.values) == 2 * time
 
 
+def test_a_power_does_not_depend_on_those_of_other_points():
+    """Blocks have other points in them with another number of threads."""
+    code = np.array([[POINT, 0], [POINT, 1], [OPERATIONS["^"], 0]], np.int64)
+    program, stack = Program(code, np.zeros(1)), np.zeros((ROWS, BLOCK))
+    points, out = np.zeros((6, BLOCK)), np.zeros(BLOCK)
+    points[0] = np.random.default_rng(0).uniform(0.5, 2, BLOCK)
+    for power in (2, 3, 2.5):
+        points[1] = power
+        evaluate(program, np.zeros(4), points, BLOCK, out, stack)
+        alone = out.copy()
+        points[1, -3:] = 2, 3, 0.5
+        evaluate(program, np.zeros(4), points, BLOCK, out, stack)
+        np.testing.assert_array_equal(out[:-3], alone[:-3])
+
+
 def test_only_the_count_asked_for_is_written():
     program = Program(np.array([[CONSTANT + UNIFORM, 0]]), np.array([3.0]))
     out = np.zeros(BLOCK)

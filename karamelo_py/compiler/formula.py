@@ -89,7 +89,10 @@ def _binary(op, n, a, b):
 
 
 def _powers(n, a, b):
-    """Powers; small whole ones are the common case, and pow costs ten multiplications."""
+    """Raise the first `n` numbers of `a` to powers, in loops without a choice where all are alike.
+
+    Each result is that of `_power`, whatever the powers of the other numbers.
+    """
     power = b[0]
     same = True
     for i in range(n):

@@ -52,6 +52,13 @@ def _max(a, b):
     return b if b > a else a
 
 
+def _power(a, b):
+    """Powers; small whole ones are the common case, and pow costs ten multiplications."""
+    if b == 2.0:
+        return a * a
+    return a * (a * a) if b == 3.0 else math.pow(a, b)
+
+
 def _truth(compare: Callable) -> Callable:
     """A comparison that gives 1.0 or 0.0."""
 
@@ -83,7 +90,7 @@ BINARY = {
     "-": operator.sub,
     "*": operator.mul,
     "/": operator.truediv,
-    "^": math.pow,
+    "^": _power,
     "%": operator.mod,  # the sign of the divisor, as in Python
     **{sign: _truth(compare) for sign, compare in {
         "<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge,
