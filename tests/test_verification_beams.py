@@ -85,7 +85,7 @@ def test_geometry_of_the_beam_gives_tetrahedra_of_its_volume():
     """4 x 1 x 1, exactly: its faces are flat."""
     pytest.importorskip("gmsh", exc_type=(ImportError, OSError))
     mesh = read(INPUTS / "cantilever.geo", 3)
-    corners = mesh.points[mesh.cells_dict["tetra"]]
+    corners = mesh.points[np.concatenate([c.nodes for c in mesh.cells if c.type == "tetra"])]
     edges = corners[:, 1:] - corners[:, :1]
     volumes = np.linalg.det(edges) / 6
     assert 400 < len(volumes) < 1500

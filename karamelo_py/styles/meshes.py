@@ -8,7 +8,8 @@ from karamelo_py.language.signature import Positive
 from karamelo_py.scene.domain import RELATIVE_TOLERANCE, require_domain
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
-from karamelo_py.scene.meshes.elements import bulge_of, elements_of, measured
+from karamelo_py.scene.meshes.data import Mesh
+from karamelo_py.scene.meshes.elements import elements_of, measured
 from karamelo_py.scene.meshes.inside import Skin, flat_faces, outer_faces, skin_of
 from karamelo_py.scene.meshes.reading import MeshFile, read
 from karamelo_py.scene.placement import Placement
@@ -50,10 +51,11 @@ class MeshRegion(Enclosed):
     Parameters
     ----------
     file
-        Name of a mesh file in a format that meshio reads, such as Gmsh's .msh, or of a .geo file,
-        which Gmsh meshes.
+        Name of a mesh file: Gmsh (.msh), Abaqus or CalculiX (.inp), MED, Nastran, VTK and whatever
+        meshio reads; or of a geometry (.geo, .step, .brep), which Gmsh meshes.
     group
-        Name or number of a physical group (a set of elements in other formats). Left out: the
+        Name or number of a physical group (a set of elements, an instance or a surface in other
+        formats). Left out: the
         whole mesh. A group of lower dimension, such as a boundary, holds the positions that lie
         on it, which is useful for groups of nodes.
     exterior
@@ -66,9 +68,10 @@ class MeshRegion(Enclosed):
 
     Notes
     -----
-    Elements are lines in 1D, triangles and quadrilaterals in 2D, tetrahedra and hexahedra in 3D.
-    Elements of higher order count by their corners. Faces belong to elements. Faces of hexahedra
-    that are not plane count as two triangles. In 2D the mesh lies in the plane z = 0.
+    Elements are lines in 1D, triangles and quadrilaterals in 2D, tetrahedra, hexahedra, wedges and
+    pyramids in 3D. Elements of higher order count by their corners. Faces belong to elements. Faces
+    with four corners that are not plane count as two triangles. In 2D the mesh lies in the plane
+    z = 0.
 
     See Also
     --------
@@ -84,10 +87,11 @@ class MeshRegion(Enclosed):
     ):
         if group == EXTERIOR and exterior is None:
             group, exterior = None, EXTERIOR
-        dimension = require_domain(hub).dimension
-        mesh = read(file, dimension, hub.settings.trusts)
+        domain = require_domain(hub)
+        dimension = domain.dimension
+        mesh = read(file, dimension, hub.settings.trusts, domain.h / 2)
         parts = elements_of(mesh, dimension, group, lower=group is not None)
-        _tell_of_curved_edges(hub, file, bulge_of(mesh, group))
+        _tell_of_curved_edges(hub, file, max(part.bulge for part in parts))
         flat = parts[0].shape.dimension < dimension
         faces = flat_faces(parts) if flat else outer_faces(parts)
         lo, hi = faces.min(axis=(0, 1)), faces.max(axis=(0, 1))
@@ -142,7 +146,9 @@ class STL(Enclosed):
                 hint="in 2D, region(ID, mesh, file) takes a mesh of triangles or quadrilaterals",
             )
         mesh = read(file, 2, hub.settings.trusts)
-        triangles = mesh.get_cells_type("triangle")
+        triangles = np.concatenate(
+            [np.empty((0, 3), int), *(c.nodes for c in mesh.cells if c.type == "triangle")]
+        )
         if not len(triangles):
             raise ScriptError(
                 f"{file.name} has no triangles", argument="file", expected="a surface of triangles"
@@ -164,10 +170,12 @@ class MeshSolid(Solid):
     Parameters
     ----------
     file
-        Name of a mesh file in a format that meshio reads, such as Gmsh's .msh, or of a .geo file,
-        which Gmsh meshes. It is looked for in the current folder, then beside the script.
+        Name of a mesh file: Gmsh (.msh), Abaqus or CalculiX (.inp), MED, Nastran, VTK and whatever
+        meshio reads; or of a geometry (.geo, .step, .brep), which Gmsh meshes. It is looked
+        for in the current folder, then next to the script.
     group
-        Name or number of a physical group, whose elements are taken. Left out: the whole mesh.
+        Name or number of a physical group (a set of elements, a part or an instance in other
+        formats), whose elements are taken. Left out: the whole mesh.
 
     Example
     -------
@@ -175,10 +183,11 @@ class MeshSolid(Solid):
 
     Notes
     -----
-    Elements are lines in 1D, triangles and quadrilaterals in 2D, tetrahedra and hexahedra in 3D;
-    those of lower dimension are left out. Elements of higher order count by their corners, with
-    straight edges. The cpdi methods take elements of one shape. In 2D the mesh lies in the plane
-    z = 0. Elements whose centroid lies outside the domain are left out, with a warning.
+    Elements are lines in 1D, triangles and quadrilaterals in 2D, tetrahedra, hexahedra, wedges and
+    pyramids in 3D; those of lower dimension are left out. Elements of higher order have the volume
+    within their curved edges. The cpdi methods take elements of one shape, by their corners. In 2D
+    the mesh lies in the plane z = 0. Elements whose centroid lies outside the domain are left out,
+    with a warning.
 
     See Also
     --------
@@ -202,9 +211,9 @@ class MeshSolid(Solid):
         domain = require_domain(hub)
         super().__init__(hub, material, h, T0, GlueToSolid)
         self.file = file
-        mesh = read(file, domain.dimension, hub.settings.trusts)
+        mesh = read(file, domain.dimension, hub.settings.trusts, h / 2)
         parts = elements_of(mesh, domain.dimension, group)
-        _tell_of_curved_edges(hub, file, bulge_of(mesh, group))
+        self._tell_of_left_out(hub, mesh)
         found = [measured(part) for part in parts]
         inside = [domain.contains(centroid) for _, _, centroid in found]
         corners = [part.corners[kept] for (part, _, _), kept in zip(found, inside, strict=True)]
@@ -228,6 +237,13 @@ class MeshSolid(Solid):
                 corners=None if mixed else corners[0],
             ),
         )
+
+    def _tell_of_left_out(self, hub: Hub, mesh: Mesh) -> None:
+        highest = max(cells.dimension for cells in mesh.cells)
+        shells = {c.label: len(c.nodes) for c in mesh.cells if c.label and c.dimension < highest}
+        counts = ", ".join(f"{n} {kind}" for kind, n in (mesh.left_out | shells).items())
+        if counts:
+            hub.warn(f"elements of {self.file.name} that no solid has are left out: {counts}")
 
     def described(self) -> str:
         return f"mesh '{self.file.name}'"

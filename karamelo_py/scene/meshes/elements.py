@@ -1,70 +1,84 @@
-"""Elements by their corners: which are known, their volumes and centroids, their orientation."""
+"""Elements: which are known, their exact volumes and centroids, their orientation."""
 
 import itertools
 import math
+from functools import lru_cache
 from typing import NamedTuple
 
-import meshio
 import numpy as np
 
-from karamelo_py.scene.meshes.reading import chosen_cells
+from karamelo_py.scene.meshes.data import Cells, Mesh
 from karamelo_py.script.errors import ScriptError
 
 # A shape of this part of size^dimension is flat: its volume is rounding.
 _FLAT = 1e-12
-# Nodes this far (of the mesh's size) beside the plane of a 2D mesh still lie in it.
+# Nodes this far (of the mesh's size) off the plane of a 2D mesh still lie in it.
 _PLANE = 1e-9
+_CHUNK = 4096  # elements of many nodes that are integrated at once
 
 
 class Shape(NamedTuple):
-    """A shape of elements; nodes are in the order of meshio, which is that of VTK."""
+    """A family of elements; nodes are in the order of meshio, which is that of VTK."""
 
-    name: str  # the cell type in meshio
+    name: str
     words: str  # in plural
     dimension: int
-    # The order of the nodes that turns a negative orientation into a positive one.
+    # The order of the corners that turns a negative orientation into a positive one.
     mirrored: tuple[int, ...]
-    # (c, d) signs of the natural coordinates of nodes; none for simplices, whose map is linear.
-    natural: tuple[tuple[int, ...], ...] = ()
+    corners: tuple[tuple[float, ...], ...]  # natural coordinates
+    simplex: bool = False  # natural coordinates from 0, with a sum up to 1; else from -1 to 1
 
 
 _SQUARE = ((-1, -1), (1, -1), (1, 1), (-1, 1))
 _CUBE = tuple((*xy, z) for z in (-1, 1) for xy in _SQUARE)
+_TRIANGLE = ((0, 0), (1, 0), (0, 1))
+_WEDGE = tuple((*xy, z) for z in (-1, 1) for xy in _TRIANGLE)
+_PYRAMID = (*((*xy, 0) for xy in _SQUARE), (0, 0, 1))
+_TETRAHEDRON = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))
 SHAPES = {
     shape.name: shape
     for shape in (
-        Shape("line", "lines with 2 nodes", 1, (1, 0)),
-        Shape("triangle", "triangles with 3 nodes", 2, (0, 2, 1)),
-        Shape("quad", "quadrilaterals with 4 nodes", 2, (0, 3, 2, 1), _SQUARE),
-        Shape("tetra", "tetrahedra with 4 nodes", 3, (0, 2, 1, 3)),
-        Shape("hexahedron", "hexahedra with 8 nodes", 3, (0, 3, 2, 1, 4, 7, 6, 5), _CUBE),
+        Shape("line", "lines", 1, (1, 0), ((-1,), (1,))),
+        Shape("triangle", "triangles", 2, (0, 2, 1), _TRIANGLE, True),
+        Shape("quad", "quadrilaterals", 2, (0, 3, 2, 1), _SQUARE),
+        Shape("tetra", "tetrahedra", 3, (0, 2, 1, 3), _TETRAHEDRON, True),
+        Shape("hexahedron", "hexahedra", 3, (0, 3, 2, 1, 4, 7, 6, 5), _CUBE),
+        Shape("wedge", "wedges", 3, (0, 2, 1, 3, 5, 4), _WEDGE),
+        Shape("pyramid", "pyramids", 3, (0, 3, 2, 1, 4), _PYRAMID),
     )
 }
 
-
-# Corners at the ends of edges, in whose middles elements of second order have their next nodes.
-_EDGES = {
-    "line3": ((0, 1),),
-    **dict.fromkeys(("triangle6", "triangle7"), ((0, 1), (1, 2), (2, 0))),
-    **dict.fromkeys(("quad8", "quad9"), ((0, 1), (1, 2), (2, 3), (3, 0))),
-    "tetra10": ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)),
-    **dict.fromkeys(
-        ("hexahedron20", "hexahedron24", "hexahedron27"),
-        (*((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6)),
-         *((6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))),
+# Pairs of corners in whose middle elements of second order have their next nodes, then faces.
+_MIDDLES: dict[str, tuple[tuple[int, ...], ...]] = {
+    "line": ((0, 1),),
+    "triangle": ((0, 1), (1, 2), (2, 0)),
+    "quad": ((0, 1), (1, 2), (2, 3), (3, 0), (0, 1, 2, 3)),
+    "tetra": ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)),
+    "hexahedron": (
+        *((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6)),
+        *((6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)),
+        *((0, 3, 7, 4), (1, 2, 6, 5), (0, 1, 5, 4), (2, 3, 7, 6), (0, 1, 2, 3), (4, 5, 6, 7)),
+        tuple(range(8)),
     ),
-}  # fmt: skip
+    "wedge": (
+        *((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)),
+        *((0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
+    ),
+}
 
 
 class MeshElements(NamedTuple):
     """Elements of one shape."""
 
     shape: Shape
-    numbers: np.ndarray  # (n, c) of their nodes
+    numbers: np.ndarray  # (n, c) of their corners
     corners: np.ndarray  # (n, c, d) positions of these
+    nodes: np.ndarray | None = None  # (n, k, d) of all nodes, where they have more than corners
+    reference: tuple[tuple[float, ...], ...] = ()  # natural coordinates of these
+    bulge: float = 0.0  # how far such nodes lie off the place that corners give, over the size
 
     def mirrored(self, which: np.ndarray) -> "MeshElements":
-        """With the orientation of `which` (n,) of them reversed."""
+        """With the orientation of `which` (n,) of them reversed; by their corners."""
         order = list(self.shape.mirrored)
         numbers, corners = self.numbers.copy(), self.corners.copy()
         numbers[which], corners[which] = numbers[which][:, order], corners[which][:, order]
@@ -72,61 +86,112 @@ class MeshElements(NamedTuple):
 
 
 def elements_of(
-    mesh: meshio.Mesh, dimension: int, group: str | int | None = None, *, lower: bool = False
+    mesh: Mesh, dimension: int, group: str | int | None = None, *, lower: bool = False
 ) -> list[MeshElements]:
-    """The elements of `dimension` in a mesh or its physical `group`, one item for each shape.
+    """The elements of `dimension` in a mesh or its named `group`, one item for each type.
 
     With `lower`, a group of lower dimension, such as a boundary, will do. None, elements of other
-    types, and a mesh out of the plane z = 0 in 2D, beside the x axis in 1D are errors.
+    types, and a mesh out of the plane z = 0 in 2D, off the x axis in 1D are errors.
     """
-    cells = chosen_cells(mesh, group)
+    chosen = mesh.chosen(group)
     of = f"group '{group}'" if group is not None else "the mesh"
-    highest = max(d for _, d, _ in cells)
+    highest = max(cells.dimension for cells in chosen)
     if highest > dimension or (highest < dimension and not lower) or highest < 1:
-        types = ", ".join(dict.fromkeys(name for name, _, _ in cells))
+        strange = [cells.type for cells in chosen if cells.dimension < 0]
+        types = ", ".join(dict.fromkeys(strange or [cells.type for cells in chosen]))
         raise ScriptError(
             f"{of} does not fit {dimension}D: it has elements of type {types}",
             argument="file" if group is None else "group",
             expected=_accepted(dimension),
         )
-    wanted = [_by_corners(name, nodes) for name, d, nodes in cells if d == highest]
-    for name, _ in wanted:
-        if name not in SHAPES:
+    wanted = [_in_order(cells) for cells in chosen if cells.dimension in (-1, highest)]
+    for cells in wanted:
+        if cells.family not in SHAPES:
             raise ScriptError(
-                f"{of} has elements of type {name}",
+                f"{of} has elements of type {cells.label or cells.family}",
                 argument="file",
                 expected=_accepted(highest),
-                hint="in Gmsh, Mesh.ElementOrder = 1",
             )
-    positions = np.zeros((len(mesh.points), 3))
-    positions[:, : mesh.points.shape[1]] = mesh.points
-    used = np.unique(np.concatenate([nodes.ravel() for _, nodes in wanted]))
-    _check_plane(positions[used], dimension)
-    positions = np.ascontiguousarray(positions[:, :dimension])
+    used = np.unique(np.concatenate([cells.nodes.ravel() for cells in wanted]))
+    _check_plane(mesh.points[used], dimension)
+    positions = np.ascontiguousarray(mesh.points[:, :dimension])
+    kinds: dict[tuple[str, tuple], list[np.ndarray]] = {}
+    for cells in wanted:
+        kinds.setdefault((cells.family, _reference(cells)), []).append(cells.nodes)
     found = []
-    for name in dict.fromkeys(name for name, _ in wanted):
-        numbers = _once(np.concatenate([nodes for other, nodes in wanted if other == name]))
-        found.append(MeshElements(SHAPES[name], numbers, positions[numbers]))
+    for (name, reference), parts in kinds.items():
+        shape, numbers = SHAPES[name], _once(np.concatenate(parts))
+        corners = len(shape.corners)
+        found.append(MeshElements(shape, numbers[:, :corners], positions[numbers[:, :corners]]))
+        if len(reference) > corners:
+            nodes = positions[numbers[:, : len(reference)]]
+            bulge = _bulge(shape, nodes, reference)
+            found[-1] = found[-1]._replace(nodes=nodes, reference=reference, bulge=bulge)
     return found
 
 
-def bulge_of(mesh: meshio.Mesh, group: str | int | None = None) -> float:
-    """Find how far nodes in the middle of edges lie beside these, over their length, at most."""
-    found = 0.0
-    for name, _, nodes in chosen_cells(mesh, group):
-        corners = _by_corners(name, nodes)[1].shape[1]
-        for k, (a, b) in enumerate(_EDGES.get(name, ())):
-            a, b, middle = (mesh.points[nodes[:, i]] for i in (a, b, corners + k))
-            length = np.linalg.norm(b - a, axis=1)
-            beside = np.linalg.norm(middle - (a + b) / 2, axis=1)
-            found = max(found, float((beside / np.maximum(length, np.finfo(float).tiny)).max()))
-    return found
+def _in_order(cells: Cells) -> Cells:
+    """Pixels and voxels, whose nodes go row by row, and prisms with six sides, by halves."""
+    order = {
+        "pixel": ("quad", [[0, 1, 3, 2]]),
+        "voxel": ("hexahedron", [[0, 1, 3, 2, 4, 5, 7, 6]]),
+        "hexa_prism": ("hexahedron", [[0, 1, 2, 3, 6, 7, 8, 9], [0, 3, 4, 5, 6, 9, 10, 11]]),
+    }
+    if cells.type not in order:
+        return cells
+    name, parts = order[cells.type]
+    return Cells(name, np.concatenate([cells.nodes[:, part] for part in parts]))
 
 
-def _by_corners(name: str, nodes: np.ndarray) -> tuple[str, np.ndarray]:
-    """Reduce elements to their corners, which come first: type and nodes (n, c)."""
-    shape = SHAPES.get(name.rstrip("0123456789"))
-    return (shape.name, nodes[:, : len(shape.mirrored)]) if shape else (name, nodes)
+def _reference(cells: Cells) -> tuple[tuple[float, ...], ...]:
+    """Natural coordinates of the nodes that count: of corners alone where no more are known."""
+    shape, count = SHAPES[cells.family], cells.nodes.shape[1]
+    if cells.reference is not None:
+        given = tuple(map(tuple, cells.reference.tolist()))
+    else:
+        corners = np.array(shape.corners, float)
+        middles = [corners[list(of)].mean(axis=0) for of in _MIDDLES.get(shape.name, ())]
+        given = tuple(map(tuple, np.concatenate([corners, *(m[None] for m in middles)]).tolist()))
+        if count > len(given):
+            given = given[: len(corners)]
+    while len(given) > len(shape.corners):
+        given = given[: min(count, len(given))]
+        if _exponents(shape.name, len(given)) is not None:
+            return given
+        given = given[: len(given) - 1]  # the node in the middle moves no boundary
+    return given[: len(shape.corners)]
+
+
+@lru_cache
+def _exponents(name: str, count: int) -> tuple[tuple[int, ...], ...] | None:
+    """Monomials (count, d) that functions of so many nodes are made of; None where not known."""
+    d = SHAPES[name].dimension
+    for p in range(1, 11):
+        every = tuple(itertools.product(range(p + 1), repeat=d))
+        if SHAPES[name].simplex:
+            spaces = [[e for e in every if sum(e) <= p]]
+        elif name == "wedge":
+            flat = [e for e in every if e[0] + e[1] <= p]
+            linear = [e for e in flat if e[2] < 2 or e[0] + e[1] < 2]
+            spaces = [flat, linear] if p == 2 else [flat]
+        elif name == "pyramid":
+            return None
+        else:  # complete, or with nodes on the edges alone (Arnold & Awanou 2011)
+            spaces = [list(every)]
+            if p > 1 and d > 1:
+                spaces.append([e for e in every if sum(k for k in e if k > 1) <= p])
+        for space in spaces:
+            if len(space) == count:
+                return tuple(space)
+    return None
+
+
+def _bulge(shape: Shape, nodes: np.ndarray, reference: tuple) -> float:
+    functions, _ = _functions(shape.name, shape.corners, np.array(reference))
+    straight = np.einsum("qc,nci->nqi", functions, nodes[:, : len(shape.corners)])
+    size = np.ptp(nodes, axis=1).max(axis=1)
+    off = np.linalg.norm(nodes - straight, axis=2).max(axis=1)
+    return float((off / np.maximum(size, np.finfo(float).tiny)).max())
 
 
 def _once(numbers: np.ndarray) -> np.ndarray:
@@ -140,7 +205,7 @@ def _accepted(dimension: int) -> str:
 
 
 def _check_plane(positions: np.ndarray, dimension: int) -> None:
-    """Refuse nodes that lie beside the x axis in 1D or the plane z = 0 in 2D."""
+    """Refuse nodes that lie off the x axis in 1D or the plane z = 0 in 2D."""
     beside = np.abs(positions[:, dimension:]).max() if dimension < 3 else 0.0
     if beside > _PLANE * np.ptp(positions, axis=0).max():
         raise ScriptError(
@@ -154,47 +219,100 @@ def _check_plane(positions: np.ndarray, dimension: int) -> None:
 def measured(elements: MeshElements) -> tuple[MeshElements, np.ndarray, np.ndarray]:
     """The elements with positive orientation, their volumes (n,) and their centroids (n, d).
 
-    Volume and centroid are those of the region that the map of the element covers, faces that are
-    not plane included: integrals of det J and x det J by 2 Gauss points per direction, which is
-    exact, since both are polynomials of degree 3 at most in each natural coordinate. An element
-    that is flat or twisted is an error.
+    Volume and centroid belong to the region that the map of the element covers, with curved edges
+    and warped faces: integrals of det J and x det J by Gauss's rule of the degree that makes them
+    exact. An element that is flat or twisted is an error.
     """
-    shape, corners = elements.shape, elements.corners
-    # About the first node, so that a mesh far from the origin loses no digits.
-    local = corners - corners[:, :1]
-    if shape.natural:
-        weights, x = _by_quadrature(shape, local)
-    else:
-        edges = local[:, 1:]
-        weights = np.linalg.det(edges)[:, None] / math.factorial(shape.dimension)
-        x = local.mean(axis=1)[:, None]
-    volume = weights.sum(axis=1)
-    size = np.ptp(corners, axis=1).max(axis=1)
-    flat = np.abs(volume) <= _FLAT * size**shape.dimension
-    twisted = ~flat & (weights * np.sign(volume)[:, None] <= 0).any(axis=1)
+    shape = elements.shape
+    nodes = elements.corners if elements.nodes is None else elements.nodes
+    reference = elements.reference or shape.corners
+    volume = np.empty(len(nodes))
+    centroid = np.empty((len(nodes), shape.dimension))
+    twisted = np.zeros(len(nodes), bool)
+    for first in range(0, len(nodes), _CHUNK):
+        part = slice(first, first + _CHUNK)
+        # About the first node, so that a mesh far from the origin loses no digits.
+        local = nodes[part] - nodes[part, :1]
+        weights, x = _integrated(shape, reference, local)
+        volume[part] = weights.sum(axis=1)
+        twisted[part] = (weights * np.sign(volume[part])[:, None] <= 0).any(axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):  # refused below
+            moment = (weights[:, :, None] * x).sum(axis=1) / volume[part, None]
+        centroid[part] = nodes[part, 0] + moment
+    flat = np.abs(volume) <= _FLAT * np.ptp(nodes, axis=1).max(axis=1) ** shape.dimension
     for bad, what in ((flat, "has no volume"), (twisted, "is twisted: it overlaps itself")):
         if bad.any():
             number = int(np.argmax(bad))
-            where = ", ".join(f"{c:g}" for c in corners[number].mean(axis=0))
+            where = ", ".join(f"{c:g}" for c in nodes[number].mean(axis=0))
             raise ScriptError(
-                f"element {number + 1} of the {len(volume)} {shape.words} {what}; "
-                f"it lies at ({where})",
+                f"element {number + 1} of the {len(volume)} {shape.words} with "
+                f"{nodes.shape[1]} nodes {what}; it lies at ({where})",
                 argument="file",
                 expected="elements with a volume, their nodes in the order of the format",
             )
-    centroid = corners[:, 0] + (weights[:, :, None] * x).sum(axis=1) / volume[:, None]
     return elements.mirrored(volume < 0), np.abs(volume), centroid
 
 
-def _by_quadrature(shape: Shape, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """det J (n, q) and position (n, q, d) at the 2^d Gauss points, all of weight 1."""
-    natural = np.array(shape.natural, float)
-    gauss = np.array(list(itertools.product((-1, 1), repeat=shape.dimension))) / math.sqrt(3)
-    factors = (1 + natural[None] * gauss[:, None]) / 2  # (q, c, d)
-    functions = factors.prod(axis=2)
-    slopes = np.empty_like(factors)
-    for axis in range(shape.dimension):
-        others = np.delete(factors, axis, axis=2).prod(axis=2)
-        slopes[:, :, axis] = others * natural[:, axis] / 2
-    jacobian = np.einsum("nci,qcj->nqij", corners, slopes)
-    return np.linalg.det(jacobian), np.einsum("qc,nci->nqi", functions, corners)
+def _integrated(shape: Shape, reference: tuple, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Weighted det J (n, q) and position (n, q, d) at the points of Gauss's rule."""
+    if shape.simplex and len(reference) == len(shape.corners):
+        edges = nodes[:, 1:] - nodes[:, :1]
+        weights = np.linalg.det(edges)[:, None] / math.factorial(shape.dimension)
+        return weights, nodes.mean(axis=1)[:, None]
+    rule, functions, slopes = _quadrature(shape.name, reference)
+    jacobian = np.einsum("nci,qcj->nqij", nodes, slopes)
+    return np.linalg.det(jacobian) * rule, np.einsum("qc,nci->nqi", functions, nodes)
+
+
+@lru_cache
+def _quadrature(name: str, reference: tuple) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Weights (q,) of a rule, and functions (q, c) and their slopes (q, c, d) at its points."""
+    shape = SHAPES[name]
+    exponents = _exponents(name, len(reference))
+    order = max(map(max, exponents)) if exponents else 1  # a pyramid is a cube with five corners
+    d = shape.dimension
+    at, weight = np.polynomial.legendre.leggauss(-(-(d + 1) * order // 2))
+    points = np.array(list(itertools.product(at, repeat=d)))
+    weights = np.prod(list(itertools.product(weight, repeat=d)), axis=1)
+    # A square collapsed to a triangle, a cube to a tetrahedron (Duffy 1982).
+    room = np.ones(len(points))
+    for axis in range({"triangle": 2, "tetra": 3, "wedge": 2}.get(name, 0)):
+        weights = weights / 2 * room
+        points[:, axis] = (points[:, axis] + 1) / 2 * room
+        room = room - points[:, axis]
+    return weights, *_functions(name, reference, points)
+
+
+@lru_cache
+def _coefficients(name: str, reference: tuple) -> tuple[np.ndarray, np.ndarray]:
+    exponents = np.array(_exponents(name, len(reference)))
+    nodes = np.array(reference, float)
+    table = np.prod(nodes[:, None, :] ** exponents[None], axis=2)  # 0^0 is 1
+    return exponents, np.linalg.inv(table)
+
+
+def _functions(name: str, reference: tuple, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Functions (q, c) of the nodes at `reference`, and their slopes (q, c, d), at `points`."""
+    if name == "pyramid":
+        return _of_pyramids(points)
+    exponents, inverse = _coefficients(name, reference)
+    powers = points[:, None, :] ** exponents[None]
+    functions = np.prod(powers, axis=2) @ inverse
+    slopes = []
+    for axis in range(points.shape[1]):
+        of = powers.copy()
+        lower = np.maximum(exponents[:, axis] - 1, 0)
+        of[:, :, axis] = exponents[:, axis] * points[:, None, axis] ** lower
+        slopes.append(np.prod(of, axis=2) @ inverse)
+    return functions, np.stack(slopes, axis=2)
+
+
+def _of_pyramids(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """As `_functions`, of a cube whose four upper corners are one."""
+    cube = SHAPES["hexahedron"].corners
+    functions, slopes = _functions("hexahedron", cube, points)
+    upper = [of[:, 4:].sum(axis=1, keepdims=True) for of in (functions, slopes)]
+    return (
+        np.concatenate([functions[:, :4], upper[0]], axis=1),
+        np.concatenate([slopes[:, :4], upper[1]], axis=1),
+    )

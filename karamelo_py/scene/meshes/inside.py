@@ -3,19 +3,10 @@
 import numpy as np
 
 from karamelo_py.kernels.surfaces import Surface, depths, distances, surface_of
+from karamelo_py.scene.meshes.data import FACES
 from karamelo_py.scene.meshes.elements import MeshElements, measured
 from karamelo_py.script.errors import ScriptError
 
-# Faces of elements by their corners; seen from outside counter-clockwise, in 2D on the left.
-FACES = {
-    "line": ((0,), (1,)),
-    "triangle": ((0, 1), (1, 2), (2, 0)),
-    "quad": ((0, 1), (1, 2), (2, 3), (3, 0)),
-    "tetra": ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)),
-    "hexahedron": (
-        (0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)
-    ),
-}  # fmt: skip
 # Vertices this close (of the size of the surface) are the same one, written with few digits.
 _WELD = 1e-6
 _SAMPLES = 4000  # places on a shell that tell whether it lies in another one

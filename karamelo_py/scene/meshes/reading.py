@@ -1,9 +1,14 @@
-"""Meshes from files: read by meshio, and made by Gmsh where the file is a geometry."""
+"""The one door for meshes from files: which reader takes a file, and what it must return.
+
+Gmsh reads its own files, MED and UNV, and meshes geometries; decks of Abaqus have a reader here;
+meshio reads the rest, and Gmsh's files where Gmsh's library cannot be loaded.
+"""
 
 import contextlib
 import io
-import tempfile
+import re
 import warnings
+from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
 
@@ -11,22 +16,38 @@ import meshio
 import numpy as np
 
 from karamelo_py.language.kinds import InputFile
+from karamelo_py.scene.meshes.abaqus import read_deck
+from karamelo_py.scene.meshes.by_gmsh import NoGmsh, mesh_geometry, read_by_gmsh
+from karamelo_py.scene.meshes.data import Cells, Mesh
 from karamelo_py.scene.meshes.geometry import refuse_commands
-from karamelo_py.script.errors import FAILURES, ScriptError, unknown
+from karamelo_py.script.errors import FAILURES, ScriptError
 
 GEOMETRIES = (".geo", ".geo_unrolled")
-
-_LIBRARIES = "libglu1-mesa libxrender1 libxcursor1 libxft2 libxinerama1"
+CAD = (".step", ".stp", ".iges", ".igs", ".brep")
+_BY_GMSH = (".msh", ".msh2", ".msh4", ".med", ".unv", ".bdf", ".nas")
+# What Gmsh's own files begin with; other text it would take for its language of geometries.
+_OF_GMSH = (b"$MeshFormat", b"$NOD", b"$Comments", b"$PhysicalNames")
+_BY_ENDING = (".unv", ".bdf", ".nas")  # of which Gmsh asks no more
+_MED = b"\x89HDF"
+# Files of other programs under an ending that meshes have: how they begin, and what to do.
+_FOREIGN = (
+    (re.compile(rb"\s*MFEM"), "a mesh of MFEM", "in MFEM, write it as .vtu or .msh"),
+    (re.compile(rb"\s*(#[^\n]*\n\s*)*MESH\s", re.I), "a mesh of GiD", "export it as .inp or .msh"),
+    (re.compile(rb"\s*Begin\s+(ModelPart|Properties|Nodes)"), "a model of Kratos",
+     "export it as .vtu or .msh"),
+    (re.compile(rb"\s*(\$[^\n]*\n)*\*KEYWORD", re.I), "a deck of LS-DYNA",
+     "in LS-PrePost, export it as .inp (Abaqus)"),
+)  # fmt: skip
 
 
 class MeshFile(InputFile):
     """For signatures: a file that `read` can read, by its ending."""
 
-    endings = {*meshio.extension_to_filetypes, *GEOMETRIES} - {".svg"}  # only written
+    endings = {*meshio.extension_to_filetypes, *GEOMETRIES, *CAD, *_BY_GMSH} - {".svg"}
 
 
-def read(path: Path, dimension: int, trusted: bool = False) -> meshio.Mesh:
-    """The mesh in a file; a geometry of Gmsh is meshed up to `dimension`.
+def read(path: Path, dimension: int, trusted: bool = False, size: float | None = None) -> Mesh:
+    """The mesh in a file; a geometry is meshed up to `dimension`, a CAD file by edges of `size`.
 
     A `trusted` geometry may run commands of the system and write files.
     """
@@ -38,55 +59,156 @@ def read(path: Path, dimension: int, trusted: bool = False) -> meshio.Mesh:
     if path.suffix.lower() in GEOMETRIES:
         refuse_commands(path, trusted=trusted)
     # Regions and solids often come from the same file.
-    return _read(path.resolve(), dimension, (status.st_mtime_ns, status.st_size))
+    cad = path.suffix.lower() in CAD
+    return _read(
+        path.resolve(), dimension, size if cad else None, (status.st_mtime_ns, status.st_size)
+    )
 
 
 @lru_cache(maxsize=2)
-def _read(path: Path, dimension: int, _state: tuple[int, int]) -> meshio.Mesh:
-    if path.suffix.lower() not in GEOMETRIES:
-        return _by_meshio(path)
-    with tempfile.TemporaryDirectory() as folder:
-        made = Path(folder) / "made.msh"
-        _mesh_geometry(path, dimension, made)
-        return _by_meshio(made, path.name)
-
-
-def _by_meshio(path: Path, name: str | None = None) -> meshio.Mesh:
-    said = io.StringIO()
-    try:
-        # It prints what it has to say, and ends the process where no format fits.
-        with (
-            contextlib.redirect_stdout(said),
-            contextlib.redirect_stderr(said),
-            warnings.catch_warnings(),
-        ):
-            warnings.simplefilter("ignore")
-            mesh = meshio.read(path)
-    except FAILURES as error:
-        unknown = "Could not deduce" in str(error)
-        reason = "its ending tells no format" if unknown else _reason(error)
+def _read(path: Path, dimension: int, size: float | None, _state: tuple[int, int]) -> Mesh:
+    if path.suffix.lower() in (*GEOMETRIES, *CAD):
+        _refuse_what_is_no_cad(path)
+        mesh = mesh_geometry(path, dimension, size)
+    else:
+        mesh = _by_content(path)
+    if not len(mesh.points) or not sum(len(cells.nodes) for cells in mesh.cells):
         raise ScriptError(
-            f"the file {name or path.name} cannot be read as a mesh: {reason}",
-            argument="file",
-            expected="a mesh in a format that meshio reads (.msh, .vtu, .inp, .med, .stl, ...), "
-            "or a .geo file, which Gmsh meshes",
-            hint="mesh a CAD file beforehand: gmsh -3 part.step -o part.msh"
-            if path.suffix.lower() in (".step", ".stp", ".iges", ".igs", ".brep")
-            else None,
-        ) from None
-    points = np.asarray(mesh.points, float)
-    if not len(points) or not sum(len(block.data) for block in mesh.cells):
-        raise ScriptError(
-            f"the mesh {name or path.name} is empty",
+            f"the mesh {path.name} is empty",
             argument="file",
             expected="a mesh with elements",
         )
-    if not np.isfinite(points).all():
+    if not np.isfinite(mesh.points).all():
         raise ScriptError(
-            f"the mesh {name or path.name} has a node whose position is not a number",
+            f"the mesh {path.name} has a node whose position is not a number",
             argument="file",
         )
     return mesh
+
+
+def _refuse_what_is_no_cad(path: Path) -> None:
+    """Refuse a file that is not what its ending says: the library of CAD would print on its own."""
+    with path.open("rb") as file:
+        begin = file.read(1024)
+    right = {
+        "st": begin.lstrip().startswith(b"ISO-10303-21"),
+        "ig": begin[72:73] == b"S",
+        "br": b"CASCADE" in begin or begin.lstrip().startswith(b"DBRep"),
+    }
+    if not right.get(path.suffix[1:3].lower(), True):
+        raise _unreadable(path, "its content does not fit its ending")
+
+
+def _by_content(path: Path) -> Mesh:
+    """Let the reader take the file that its first bytes name, else the one of its ending."""
+    with path.open("rb") as file:
+        begin = file.read(4096)
+    ending = path.suffix.lower()
+    for pattern, what, remedy in _FOREIGN:
+        if pattern.match(begin):
+            raise _unreadable(path, f"it is {what}", hint=remedy)
+    if begin.lstrip().startswith(b"*") and ending in (".inp", ".msh"):
+        return read_deck(path)
+    if ending == ".inp" and re.match(rb"\s*(#[^\n]*\n\s*)*\d+ +\d+ +\d+ +\d+ +\d+\s", begin):
+        return _by_meshio(path, "avsucd")
+    if ending in (".bdf", ".nas"):
+        _refuse_systems(path)
+    why = None
+    if ending in _BY_GMSH and (begin.startswith((*_OF_GMSH, _MED)) or ending in _BY_ENDING):
+        try:
+            return read_by_gmsh(path)
+        except NoGmsh as error:
+            why = f"Gmsh cannot be loaded ({error}), and meshio: "
+        except ValueError as error:
+            raise _unreadable(path, str(error)) from None
+    return _by_meshio(path, why=why)
+
+
+def _refuse_systems(path: Path) -> None:
+    """Refuse nodes of Nastran in a coordinate system of their own, which no reader here turns."""
+    with path.open(errors="replace") as file:
+        for number, line in enumerate(file, 1):
+            if line[:4].upper() == "GRID":
+                wide = 16 if line[:5].endswith("*") else 8
+                field = line.split(",")[2] if "," in line else line[8 + wide : 8 + 2 * wide]
+                if field.strip(" 0\n"):
+                    raise _unreadable(
+                        path,
+                        f"line {number}: GRID in the coordinate system {field.strip()} (CP)",
+                        "write the nodes in the basic system",
+                    )
+
+
+def _unreadable(path: Path, reason: str, hint: str | None = None) -> ScriptError:
+    return ScriptError(
+        f"the file {path.name} cannot be read as a mesh: {reason}",
+        argument="file",
+        expected="a mesh of Gmsh (.msh, .med, .unv), of Abaqus (.inp) or in a format that meshio "
+        "reads (.vtu, .stl, ...), or a geometry, which Gmsh meshes (.geo, .step, .brep)",
+        hint=hint,
+    )
+
+
+def _by_meshio(path: Path, file_format: str | None = None, why: str | None = None) -> Mesh:
+    # Pixels and voxels of VTK, which meshio knows by half.
+    for number, name, count, dimension in ((8, "pixel", 4, 2), (11, "voxel", 8, 3)):
+        meshio._common.num_nodes_per_cell.setdefault(name, count)
+        meshio._mesh.topological_dimension.setdefault(name, dimension)
+        meshio._vtk_common.vtk_to_meshio_type.setdefault(number, name)
+    try:
+        # It prints what it has to say, and ends the process where no format fits.
+        with (
+            contextlib.redirect_stdout(io.StringIO()),
+            contextlib.redirect_stderr(io.StringIO()),
+            warnings.catch_warnings(),
+        ):
+            warnings.simplefilter("ignore")
+            mesh = meshio.read(path, file_format)
+    except FAILURES as error:
+        unknown = "Could not deduce" in str(error)
+        reason = "its ending tells no format" if unknown else _reason(error)
+        raise _unreadable(path, (why or "") + reason) from None
+    points = np.zeros((len(mesh.points), 3))
+    points[:, : mesh.points.shape[1]] = mesh.points
+    cells = [Cells(block.type, np.asarray(block.data)) for block in mesh.cells]
+    return Mesh(points, cells, dict(_sets_of(mesh)), {}, {})
+
+
+def _sets_of(mesh: meshio.Mesh) -> Iterator[tuple[str, list[np.ndarray]]]:
+    """Named sets of elements, and numbers that elements have, as ``name`` and ``name:number``."""
+    for name, held in mesh.cell_sets.items():
+        if not name.startswith("gmsh:"):
+            yield (
+                name,
+                [
+                    np.isin(np.arange(len(block.data)), () if of is None else of)
+                    for block, of in zip(mesh.cells, held, strict=True)
+                ],
+            )
+    tags = {
+        name: [np.asarray(array) for array in arrays]
+        for name, arrays in mesh.cell_data.items()
+        if all(np.ndim(a) == 1 and np.issubdtype(np.asarray(a).dtype, np.integer) for a in arrays)
+        and name != "gmsh:geometrical"
+    }
+    for name, arrays in tags.items():
+        for number in np.unique(np.concatenate(arrays)):
+            masks = [array == number for array in arrays]
+            yield f"{name}:{number}", masks
+            if len(tags) == 1 or name == "gmsh:physical":
+                yield str(number), masks
+            for group in getattr(mesh, "cell_tags", {}).get(int(number), ()):  # of MED
+                yield group, masks
+    for name, (number, dimension) in mesh.field_data.items():
+        arrays = tags.get("gmsh:physical", [])
+        if arrays:
+            yield (
+                name,
+                [
+                    (array == number) & (block.dim == dimension)
+                    for block, array in zip(mesh.cells, arrays, strict=True)
+                ],
+            )
 
 
 def _reason(error: BaseException) -> str:
@@ -94,83 +216,3 @@ def _reason(error: BaseException) -> str:
     if isinstance(error, SystemExit) or not str(error).strip():
         return "its content does not fit its ending"
     return f"{' '.join(str(error).split())} ({type(error).__name__})"
-
-
-def _mesh_geometry(path: Path, dimension: int, target: Path) -> None:
-    """Let Gmsh mesh the geometry in `path`; the mesh is written to `target`."""
-    try:
-        import gmsh
-    except (ImportError, OSError) as error:
-        raise ScriptError(
-            f"Gmsh, which meshes {path.name}, cannot be loaded: {error}",
-            argument="file",
-            expected="its libraries installed: on Debian and Ubuntu, apt install " + _LIBRARIES,
-            hint=f"or mesh it elsewhere: gmsh -{dimension} {path.name} -o {path.stem}.msh",
-        ) from None
-    # Whoever uses Gmsh in the same process keeps it, with the models that are open.
-    mine = not gmsh.isInitialized()
-    if mine:
-        gmsh.initialize([], readConfigFiles=False, run=False, interruptible=False)
-    try:
-        gmsh.option.setNumber("General.Terminal", 0)
-        gmsh.open(str(path))
-        gmsh.model.mesh.generate(dimension)
-        if not len(gmsh.model.mesh.getNodes()[0]):
-            raise ScriptError(f"{path.name} has nothing to mesh", argument="file")
-        # Where there are physical groups, Gmsh writes what is in them and no more.
-        groups = {d for d, _ in gmsh.model.getPhysicalGroups()}
-        if groups and min(groups) > dimension:
-            raise ScriptError(
-                f"{path.name} does not fit {dimension}D: its physical groups have "
-                f"{min(groups)} dimensions",
-                argument="file",
-                expected=f"a physical group of {dimension} dimensions, or none",
-            )
-        gmsh.write(str(target))
-        if not mine:
-            gmsh.model.remove()
-    except ScriptError:
-        raise
-    except Exception as error:  # Gmsh has one class for all that it complains about.
-        reason = " ".join(str(error).split()).replace(str(path), path.name)
-        raise ScriptError(
-            f"Gmsh cannot mesh {path.name}: {reason}",
-            argument="file",
-            hint=f"gmsh -{dimension} {path.name} says more",
-        ) from None
-    finally:
-        if mine:
-            gmsh.finalize()
-
-
-def chosen_cells(mesh: meshio.Mesh, group: str | int | None) -> list[tuple[str, int, np.ndarray]]:
-    """The cells of a physical group (or set of cells), or all: types, dimensions, nodes (n, c)."""
-    if group is None:
-        masks = [np.ones(len(block.data), bool) for block in mesh.cells]
-    else:
-        masks = _members(mesh, group)
-    return [
-        (block.type, block.dim, np.asarray(block.data)[mask])
-        for block, mask in zip(mesh.cells, masks, strict=True)
-        if mask.any()
-    ]
-
-
-def _members(mesh: meshio.Mesh, group: str | int) -> list[np.ndarray]:
-    tags = mesh.cell_data.get("gmsh:physical", [])
-    if group in mesh.cell_sets:
-        sets = zip(mesh.cells, mesh.cell_sets[group], strict=True)
-        return [np.isin(np.arange(len(b.data)), () if of is None else of) for b, of in sets]
-    number, dimension = group, None
-    if isinstance(group, str):
-        number, dimension = mesh.field_data.get(group, (None, None))
-    masks = [
-        np.asarray(tag) == number if dimension in (None, block.dim) else np.zeros(len(tag), bool)
-        for block, tag in zip(mesh.cells, tags, strict=bool(len(tags)))
-    ]
-    if number is not None and any(mask.any() for mask in masks):
-        return masks
-    names = [name for name in (*mesh.cell_sets, *mesh.field_data) if not name.startswith("gmsh:")]
-    known = list(dict.fromkeys(names)) or sorted({str(n) for tag in tags for n in np.unique(tag)})
-    message = f"the mesh has no physical group '{group}' with elements"
-    raise unknown(message, str(group), known, argument="group")

@@ -1,0 +1,520 @@
+"""Read the mesh in an input deck of Abaqus or CalculiX.
+
+Parts, instances with shift and rotation, sets, surfaces, generated nodes and elements. What moves
+or copies nodes in a way that is not known here is refused by its keyword (Abaqus Keywords
+Reference; CalculiX CrunchiX manual).
+"""
+
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from karamelo_py.scene.meshes.data import FACE_TYPES, Cells, Mesh
+from karamelo_py.script.errors import ScriptError
+
+_MOST = 2**31  # bytes of a deck and of what it includes
+_REFUSED = ("NCOPY", "ELCOPY", "NMAP")
+# Corners of faces S1, S2, ... (Abaqus Analysis User's Guide, "Two- and three-dimensional solid
+# element library"), from 0.
+_FACES = {
+    "triangle": ((0, 1), (1, 2), (2, 0)),
+    "quad": ((0, 1), (1, 2), (2, 3), (3, 0)),
+    "tetra": ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
+    "wedge": ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0)),
+    "hexahedron": (
+        *((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1)),
+        *((1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)),
+    ),
+    "pyramid": ((0, 1, 2, 3), (0, 4, 1), (1, 4, 2), (2, 4, 3), (3, 4, 0)),
+}
+_FAMILIES = {
+    **{("solid", c): "tetra" for c in (4, 10)},
+    **{("solid", c): "pyramid" for c in (5, 13)},
+    **{("solid", c): "wedge" for c in (6, 15, 18)},
+    **{("solid", c): "hexahedron" for c in (8, 20, 27)},
+    **{("flat", c): "triangle" for c in (3, 6)},
+    **{("flat", c): "quad" for c in (4, 8, 9)},
+    **{("line", c): "line" for c in (2, 3)},
+}
+_CORNERS = {
+    **{"line": 2, "triangle": 3, "quad": 4},
+    **{"tetra": 4, "pyramid": 5, "wedge": 6, "hexahedron": 8},
+}
+_TYPES = (
+    ("solid", re.compile(r"(?:C|DC|AC|EC|PC|Q|F|DCC)?3D(\d+)\D?.*|SC([68])R\w*")),
+    ("flat", re.compile(r"(?:CPS|CPE|CPEG|CAX|CGAX|DC2D|AC2D|DCAX|ACAX|EC2D)(\d+)\D?.*")),
+    ("flat", re.compile(r"(?:S|M3D|STRI|DS|SFM3D|R3D|R2D)([346789])\d*R?\w*")),
+    ("line", re.compile(r"(?:T2D|T3D|DC1D|AC1D)([23])\w*")),
+)
+
+
+class _Keyword(NamedTuple):
+    name: str
+    options: dict[str, str]
+    lines: list[str]
+    number: int  # line in its file
+    file: Path
+
+
+class _Elements(NamedTuple):
+    type: str  # of Abaqus
+    numbers: np.ndarray  # (n,)
+    nodes: np.ndarray  # (n, c) numbers of nodes in the deck
+
+
+class _Part:
+    """Nodes, elements and sets of a part, of the assembly, or of a deck without parts."""
+
+    def __init__(self) -> None:
+        self.numbers: list[np.ndarray] = []
+        self.places: list[np.ndarray] = []
+        self.elements: list[_Elements] = []
+        self.skipped: list[tuple[str, int]] = []
+        # Per name what was said: numbers, or names of sets.
+        self.nodes: dict[str, list[np.ndarray | str]] = {}
+        self.groups: dict[str, list[np.ndarray | str]] = {}
+        self.surfaces: dict[str, list[tuple[str, str]]] = {}
+        self.system: Callable[[np.ndarray], np.ndarray] = lambda x: x
+
+    def table(self) -> tuple[np.ndarray, np.ndarray]:
+        """Numbers (n,) of the nodes in ascending order, and positions: the last ones given."""
+        if not self.numbers:
+            return np.empty(0, np.int64), np.empty((0, 3))
+        numbers, places = np.concatenate(self.numbers), np.concatenate(self.places)
+        unique, last = np.unique(numbers[::-1], return_index=True)
+        return unique, places[::-1][last]
+
+
+class _Instance(NamedTuple):
+    name: str
+    part: _Part
+    move: Callable[[np.ndarray], np.ndarray]
+
+
+def _wrong(keyword: _Keyword, what: str, expected: str | None = None) -> ScriptError:
+    return ScriptError(
+        f"{keyword.file.name}, line {keyword.number}: *{keyword.name} {what}",
+        argument="file",
+        expected=expected,
+    )
+
+
+def _keywords(path: Path, above: tuple[Path, ...] = ()) -> Iterator[_Keyword]:
+    """The keywords of a deck with their lines of data, those of included files in their place."""
+    lines = path.read_text("utf-8", errors="replace").splitlines()
+    starts = [
+        k for k, line in enumerate(lines) if line.startswith("*") and not line.startswith("**")
+    ]
+    for at, end in zip(starts, [*starts[1:], len(lines)], strict=True):
+        head, first = lines[at].rstrip(), at + 1
+        while head.endswith(",") and first < end:
+            head, first = head + lines[first].strip(), first + 1
+        data = [line for line in lines[first:end] if line.strip() and not line.startswith("**")]
+        name, *words = re.findall(r'(?:[^,"]|"[^"]*")+', head[1:]) or [""]
+        options = {}
+        for word in words:
+            key, _, value = word.partition("=")
+            options[key.strip().upper().replace(" ", "")] = value.strip().strip('"')
+        keyword = _Keyword(" ".join(name.upper().split()), options, data, at + 1, path)
+        yield keyword
+        if keyword.name == "INCLUDE" and "INPUT" in options:
+            yield from _keywords(_included(keyword, options["INPUT"], above + (path,)))
+        elif "INPUT" in options and keyword.name in ("NODE", "ELEMENT", "NSET", "ELSET"):
+            raise _wrong(keyword, "with INPUT is not read", "the lines in the deck, or *INCLUDE")
+
+
+def _included(keyword: _Keyword, name: str, above: tuple[Path, ...]) -> Path:
+    path = keyword.file.parent / name
+    if path in above or not path.is_file() or path.stat().st_size > _MOST:
+        raise _wrong(keyword, f"of '{name}', which cannot be read", "a file next to the deck")
+    return path
+
+
+def _table(keyword: _Keyword, least: int, most: int) -> np.ndarray:
+    """Numbers (n, most) of the lines; what is left out at the end or between commas is 0."""
+    try:
+        rows = [line.rstrip().rstrip(",").split(",")[:most] for line in keyword.lines]
+        if any(len(row) < least for row in rows):
+            raise ValueError
+        filled = [[x if x.strip() else "0" for x in row] + ["0"] * (most - len(row))
+                  for row in rows]  # fmt: skip
+        return np.array(filled, float).reshape(-1, most)
+    except ValueError:
+        raise _wrong(keyword, "has a line that is not numbers and commas") from None
+
+
+def _flat(keyword: _Keyword) -> np.ndarray:
+    """All whole numbers of the lines (n,), however they go on from line to line."""
+    try:
+        words = ",".join(keyword.lines).replace(" ", "").split(",")
+        return np.array([word for word in words if word], np.int64)
+    except ValueError:
+        raise _wrong(keyword, "has a line that is not whole numbers and commas") from None
+
+
+def _cylindrical(x: np.ndarray) -> np.ndarray:
+    angle = np.radians(x[:, 1])
+    return np.stack([x[:, 0] * np.cos(angle), x[:, 0] * np.sin(angle), x[:, 2]], axis=1)
+
+
+def _spherical(x: np.ndarray) -> np.ndarray:
+    """Radius, longitude and latitude in degrees."""
+    turn, rise = np.radians(x[:, 1]), np.radians(x[:, 2])
+    flat = x[:, 0] * np.cos(rise)
+    return np.stack([flat * np.cos(turn), flat * np.sin(turn), x[:, 0] * np.sin(rise)], axis=1)
+
+
+def _system(keyword: _Keyword) -> Callable[[np.ndarray], np.ndarray]:
+    """From local coordinates: origin, a point on the local x axis, one in the local x-y plane."""
+    if not keyword.lines:
+        return lambda x: x
+    given = _table(keyword, 3, 6)
+    origin, along = given[0, :3], given[0, 3:]
+    if len(given) == 1:  # a point of the x axis parallel to the global x-y plane
+        way = along - origin
+        beside = np.array([-way[1], way[0], 0.0]) if way[:2].any() else np.array([0.0, 1, 0])
+    else:
+        way, beside = along - origin, given[1, :3] - origin
+    if not way.any():
+        return lambda x: x + origin
+    e1 = way / np.linalg.norm(way)
+    e3 = np.cross(e1, beside)
+    e3 /= np.linalg.norm(e3)
+    axes = np.stack([e1, np.cross(e3, e1), e3])
+    return lambda x: origin + x @ axes
+
+
+def _motion(keyword: _Keyword) -> Callable[[np.ndarray], np.ndarray]:
+    """Of an instance: a shift, then a rotation about an axis through two points, in degrees."""
+    rows = [_table(keyword._replace(lines=[line]), 1, 7)[0] for line in keyword.lines[:2]]
+    shift = rows[0][:3] if rows else np.zeros(3)
+    if len(rows) < 2:
+        return lambda x: x + shift
+    start, end, angle = rows[1][:3], rows[1][3:6], np.radians(rows[1][6])
+    k = (end - start) / np.linalg.norm(end - start)
+    cross = np.array([[0, -k[2], k[1]], [k[2], 0, -k[0]], [-k[1], k[0], 0]])
+    rotation = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    return lambda x: start + (x + shift - start) @ rotation.T
+
+
+def _kind(name: str) -> tuple[str, int] | None:
+    """The family of a type of elements in Abaqus and its number of nodes."""
+    for kind, pattern in _TYPES:
+        match = pattern.fullmatch(name)
+        if match:
+            count = int(next(filter(None, match.groups())))
+            return (_FAMILIES[kind, count], count) if (kind, count) in _FAMILIES else None
+    return None
+
+
+class _Deck:
+    def __init__(self, path: Path):
+        self.path = path
+        self.parts: dict[str, _Part] = {}
+        self.instances: list[_Instance] = []
+        self.whole = self.scope = _Part()  # the assembly, or a deck without parts
+        self.assembly: list[tuple[dict, str, str, list]] = []
+        for keyword in _keywords(path):
+            reads: Any = getattr(self, f"_{keyword.name.lower().replace(' ', '_')}", None)
+            if keyword.name in _REFUSED:
+                raise _wrong(keyword, "is not read", "the nodes and elements written out")
+            if keyword.name in ("STEP",):
+                break
+            if reads:
+                reads(keyword)
+
+    # ---- the keywords that are read, one method each ----------------------------------------
+
+    def _part(self, keyword: _Keyword) -> None:
+        self.scope = self.parts.setdefault(keyword.options.get("NAME", "").upper(), _Part())
+
+    def _end_part(self, _: _Keyword) -> None:
+        self.scope = self.whole
+
+    def _instance(self, keyword: _Keyword) -> None:
+        name = keyword.options.get("PART", "").upper()
+        if name not in self.parts:
+            raise _wrong(keyword, f"of the part '{name}', which is not defined above")
+        part = self.parts[name]
+        self.instances.append(
+            _Instance(keyword.options.get("NAME", "").upper(), part, _motion(keyword))
+        )
+        self.scope = part
+
+    def _end_instance(self, _: _Keyword) -> None:
+        self.scope = self.whole
+
+    def _system(self, keyword: _Keyword) -> None:
+        self.scope.system = _system(keyword)
+
+    def _node(self, keyword: _Keyword) -> None:
+        table = _table(keyword, 1, 4)
+        kind = (keyword.options.get("SYSTEM") or "R")[0].upper()
+        known = {"R": lambda x: x, "C": _cylindrical, "S": _spherical}
+        if kind not in known:
+            raise _wrong(keyword, f"has the system '{kind}'", "R, C or S")
+        numbers = table[:, 0].astype(np.int64)
+        self._add_nodes(numbers, self.scope.system(known[kind](table[:, 1:])))
+        self._into(self.scope.nodes, keyword.options.get("NSET"), numbers)
+
+    def _add_nodes(self, numbers: np.ndarray, places: np.ndarray) -> None:
+        self.scope.numbers.append(numbers)
+        self.scope.places.append(places)
+
+    def _into(self, sets: dict, name: str | None, what: np.ndarray | str) -> None:
+        if name:
+            sets.setdefault(name.upper(), []).append(what)
+
+    def _ngen(self, keyword: _Keyword) -> None:
+        if keyword.options.get("LINE", "").upper()[:1] in ("C", "P"):
+            raise _wrong(keyword, "along a curve is not read", "the nodes written out")
+        for first, last, step in _table(keyword, 2, 3).astype(np.int64):
+            numbers = np.arange(first, last + 1, step or 1)
+            ends = self._places(keyword, np.array([first, last]))
+            part = (numbers - first) / max(last - first, 1)
+            self._add_nodes(numbers, ends[0] + part[:, None] * (ends[1] - ends[0]))
+            self._into(self.scope.nodes, keyword.options.get("NSET"), numbers)
+
+    def _nfill(self, keyword: _Keyword) -> None:
+        if {"BIAS", "SINGULAR"} & keyword.options.keys():
+            raise _wrong(keyword, "with BIAS or SINGULAR is not read", "the nodes written out")
+        for line in keyword.lines:
+            low, high, count, step = (word.strip() for word in (line + ",,,").split(",")[:4])
+            a = self._numbers(keyword, self.scope.nodes, low)
+            b = self._numbers(keyword, self.scope.nodes, high)
+            start, end = self._places(keyword, a), self._places(keyword, b)
+            for k in range(1, int(count or 1)):
+                numbers = a + k * int(step or 1)
+                self._add_nodes(numbers, start + k / int(count) * (end - start))
+                self._into(self.scope.nodes, keyword.options.get("NSET"), numbers)
+
+    def _places(self, keyword: _Keyword, numbers: np.ndarray) -> np.ndarray:
+        known, places = self.scope.table()
+        at = np.searchsorted(known, numbers)
+        if not len(known) or (known[np.minimum(at, len(known) - 1)] != numbers).any():
+            raise _wrong(keyword, "names a node that is not defined above")
+        return places[at]
+
+    def _element(self, keyword: _Keyword) -> None:
+        name = keyword.options.get("TYPE", "").upper()
+        kind = _kind(name)
+        if kind is None:
+            self.scope.skipped.append((name or "without a type", len(keyword.lines)))
+            return
+        flat, count = _flat(keyword), kind[1] + 1
+        if len(flat) % count:
+            raise _wrong(keyword, f"has lines that are not {count} whole numbers for a {name}")
+        table = flat.reshape(-1, count)
+        self.scope.elements.append(_Elements(name, table[:, 0], table[:, 1:]))
+        self._into(self.scope.groups, keyword.options.get("ELSET"), table[:, 0])
+
+    def _elgen(self, keyword: _Keyword) -> None:
+        for row in _table(keyword, 2, 10).astype(np.int64):
+            found = [e for e in self.scope.elements if row[0] in e.numbers]
+            if not found:
+                raise _wrong(keyword, f"of element {row[0]}, which is not defined above")
+            type_, numbers, nodes = found[-1]
+            numbers, nodes = numbers[numbers == row[0]], nodes[numbers == row[0]]
+            for count, by_nodes, by_number in row[1:].reshape(3, 3):
+                steps = np.arange(max(count, 1))[:, None]
+                numbers = (numbers + steps * (by_number or 1)).ravel()
+                nodes = (nodes[None] + steps[:, :, None] * (by_nodes or 1)).reshape(
+                    -1, nodes.shape[1]
+                )
+            self.scope.elements.append(_Elements(type_, numbers[1:], nodes[1:]))
+            self._into(self.scope.groups, keyword.options.get("ELSET"), numbers)
+
+    def _nset(self, keyword: _Keyword) -> None:
+        self._set(keyword, self.scope.nodes, "NSET")
+
+    def _elset(self, keyword: _Keyword) -> None:
+        self._set(keyword, self.scope.groups, "ELSET")
+
+    def _set(self, keyword: _Keyword, sets: dict, option: str) -> None:
+        name = keyword.options.get(option, "")
+        items: list[np.ndarray | str] = []
+        if "GENERATE" in keyword.options:
+            for first, last, step in _table(keyword, 2, 3).astype(np.int64):
+                items.append(np.arange(first, last + 1, step or 1))
+        else:
+            words = [w.strip().strip('"') for w in ",".join(keyword.lines).split(",")]
+            items = [w.upper() for w in words if w and not w.lstrip("-").isdigit()]
+            items.append(np.array([int(w) for w in words if w.lstrip("-").isdigit()], np.int64))
+        instance = keyword.options.get("INSTANCE", "").upper()
+        if instance:  # said in the assembly, of the numbers of a part
+            self.assembly.append((sets, name.upper(), instance, items))
+            return
+        for item in items:
+            self._into(sets, name, item)
+
+    def _surface(self, keyword: _Keyword) -> None:
+        name = keyword.options.get("NAME", "").upper()
+        if keyword.options.get("TYPE", "ELEMENT").upper() == "NODE":
+            for line in keyword.lines:
+                self._into(self.scope.nodes, name, line.split(",")[0].strip().upper())
+            return
+        for line in keyword.lines:
+            of, face = (word.strip().upper() for word in (line + ",").split(",")[:2])
+            self.scope.surfaces.setdefault(name, []).append((of, face))
+
+    # ---- sets by numbers ---------------------------------------------------------------------
+
+    def _numbers(self, keyword: _Keyword | None, sets: dict, name: str) -> np.ndarray:
+        """The numbers (n,) in a set, or the one that is its name."""
+        if name.lstrip("-").isdigit():
+            return np.array([int(name)])
+        return np.unique(np.concatenate([np.empty(0, np.int64), *self._resolved(sets, name, ())]))
+
+    def _resolved(self, sets: dict, name: str, above: tuple[str, ...]) -> Iterator[np.ndarray]:
+        for item in sets.get(name.upper(), ()):
+            if not isinstance(item, str):
+                yield item
+            elif item not in above:
+                yield from self._resolved(sets, item, (*above, name))
+
+    # ---- the mesh ----------------------------------------------------------------------------
+
+    def mesh(self) -> Mesh:
+        """All bodies in one: their nodes and elements are numbered one after the other."""
+        bodies = self.instances or [
+            _Instance(name, part, lambda x: x) for name, part in self.parts.items()
+        ]
+        if self.whole.numbers or not bodies:
+            bodies = [*bodies, _Instance("", self.whole, lambda x: x)]
+        found = _Found()
+        for body in bodies:
+            self._add(found, body)
+        for sets, name, instance, items in self.assembly:
+            known = found.nodes if sets is self.whole.nodes else found.groups
+            table = (found.node_numbers if sets is self.whole.nodes else found.numbers)[instance]
+            for item in items:
+                said = known.get(f"{instance}.{item}", []) if isinstance(item, str) else [
+                    _looked_up(table, item)
+                ]  # fmt: skip
+                known.setdefault(name, []).extend(said)
+        if self.instances:  # sets of the assembly that are made of INSTANCE.SET and each other
+            for sets, known in ((self.whole.nodes, found.nodes), (self.whole.groups, found.groups)):
+                for name, items in sets.items():
+                    for item in items:
+                        if isinstance(item, str):
+                            known.setdefault(name, []).extend(known.get(item, []))
+            self._add_surfaces(found, _Instance("", self.whole, lambda x: x))
+        return found.mesh()
+
+    def _add(self, found: "_Found", body: _Instance) -> None:
+        numbers, places = body.part.table()
+        table = numbers, np.arange(len(numbers)) + sum(map(len, found.points))
+        found.points.append(body.move(places))
+        found.node_numbers[body.name] = table
+        for kind, count in body.part.skipped:
+            found.skipped[kind] = found.skipped.get(kind, 0) + count
+        made = [np.empty((2, 0), np.int64)]
+        for elements in body.part.elements:
+            nodes = _looked_up(table, elements.nodes.ravel(), keep=True)
+            nodes = nodes.reshape(elements.nodes.shape)
+            if (nodes < 0).any():
+                row, column = np.argwhere(nodes < 0)[0]
+                raise ScriptError(
+                    f"{self.path.name}: element {elements.numbers[row]} has the node "
+                    f"{elements.nodes[row, column]}, which is not defined",
+                    argument="file",
+                )
+            made.append(np.stack([elements.numbers, found.count + np.arange(len(nodes))]))
+            found.add(elements.type, nodes)
+        numbers = np.concatenate(made, axis=1)
+        numbers = numbers[:, np.argsort(numbers[0], kind="stable")]
+        found.numbers[body.name] = numbers[0], numbers[1]
+        found.groups.setdefault(body.name, []).append(numbers[1])
+        for sets, known, numbered in (
+            (body.part.nodes, found.nodes, table),
+            (body.part.groups, found.groups, found.numbers[body.name]),
+        ):
+            for name in sets:
+                at = _looked_up(numbered, self._numbers(None, sets, name))
+                for key in {name, f"{body.name}.{name}"} if body.name else {name}:
+                    known.setdefault(key, []).append(at)
+        self._add_surfaces(found, body)
+
+    def _add_surfaces(self, found: "_Found", body: _Instance) -> None:
+        for name, items in body.part.surfaces.items():
+            for of, face in items:
+                if of.isdigit():
+                    held = [_looked_up(found.numbers[body.name], np.array([int(of)]))]
+                else:
+                    held = found.groups.get(f"{body.name}.{of}", found.groups.get(of, []))
+                if re.fullmatch(r"S[1-6]", face) and held:
+                    key = int(face[1]) - 1, np.concatenate(held)
+                    for known in {name, f"{body.name}.{name}"} if body.name else {name}:
+                        found.surfaces.setdefault(known, []).append(key)
+
+
+def _looked_up(table: tuple[np.ndarray, np.ndarray], of: np.ndarray, keep: bool = False):
+    """What stands for the numbers `of` (n,) in a table; unknown ones are left out, or -1."""
+    numbers, stands = table
+    if not len(numbers):
+        return np.full(len(of), -1) if keep else np.empty(0, np.int64)
+    at = np.minimum(np.searchsorted(numbers, of), len(numbers) - 1)
+    known = numbers[at] == of
+    return np.where(known, stands[at], -1) if keep else stands[at[known]]
+
+
+class _Found:
+    """What all bodies have together: elements are numbered from 0 as they come."""
+
+    def __init__(self) -> None:
+        self.points: list[np.ndarray] = []
+        self.count = 0
+        self.blocks: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}  # per type in Abaqus
+        self.nodes: dict[str, list[np.ndarray]] = {}
+        self.groups: dict[str, list[np.ndarray]] = {}
+        self.surfaces: dict[str, list[tuple[int, np.ndarray]]] = {}
+        self.skipped: dict[str, int] = {}
+        # Per body: numbers in the deck in ascending order, and here.
+        self.node_numbers: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+        self.numbers: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+
+    def add(self, kind: str, nodes: np.ndarray) -> None:
+        numbers = self.count + np.arange(len(nodes))
+        self.blocks.setdefault(kind, []).append((numbers, nodes))
+        self.count += len(nodes)
+
+    def mesh(self) -> Mesh:
+        cells, numbers = [], []
+        for label, parts in self.blocks.items():
+            family, count = _kind(label) or ("", 0)
+            name = family if count == _CORNERS[family] else f"{family}{count}"
+            numbers.append(np.concatenate([n for n, _ in parts]))
+            cells.append(Cells(name, np.concatenate([nodes for _, nodes in parts]), label=label))
+        faces: dict[str, list[Cells]] = {}
+        for name, items in self.surfaces.items():
+            for side, held in items:
+                for block, of in zip(cells, numbers, strict=True):
+                    corners = _FACES.get(block.family, ())
+                    nodes = block.nodes[np.isin(of, held)]
+                    if side < len(corners) and len(nodes):
+                        kind = FACE_TYPES[len(corners[side])]
+                        faces.setdefault(name, []).append(Cells(kind, nodes[:, corners[side]]))
+        every = [*cells, *(cell for parts in faces.values() for cell in parts)]
+        none = [np.zeros(len(cell.nodes), bool) for cell in every]
+        sets = {}
+        for name, held in self.groups.items():
+            if name:
+                of_set = np.concatenate([np.empty(0, np.int64), *held])
+                sets[name] = [np.isin(of, of_set) for of in numbers] + none[len(cells) :]
+        for name, parts in faces.items():
+            mine = {id(cell) for cell in parts}
+            sets[name] = [mask | (id(c) in mine) for mask, c in zip(none, every, strict=True)]
+        points = np.concatenate(self.points)
+        node_sets = {}
+        for name, held in self.nodes.items():
+            node_sets[name] = np.zeros(len(points), bool)
+            node_sets[name][np.concatenate(held)] = True
+        return Mesh(points, every, sets, node_sets, self.skipped)
+
+
+def read_deck(path: Path) -> Mesh:
+    """The mesh in a deck; a line that cannot be read is an error that names it."""
+    return _Deck(path).mesh()

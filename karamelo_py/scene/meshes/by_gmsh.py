@@ -1,0 +1,162 @@
+"""Read or make a mesh by Gmsh: its own files of every version, MED, UNV, and geometries."""
+
+import contextlib
+import re
+import shutil
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.scene.meshes.data import Cells, Mesh
+from karamelo_py.script.errors import ScriptError
+
+_LIBRARIES = "libglu1-mesa libxrender1 libxcursor1 libxft2 libxinerama1"
+_FAMILIES = {"Line": "line", "Triangle": "triangle", "Quadrilateral": "quad", "Point": "vertex",
+             "Tetrahedron": "tetra", "Hexahedron": "hexahedron", "Prism": "wedge",
+             "Pyramid": "pyramid"}  # fmt: skip
+
+
+class NoGmsh(Exception):
+    """Gmsh or a library that it needs is not on this machine."""
+
+
+@contextlib.contextmanager
+def _model(path: Path) -> Iterator[Any]:
+    """Gmsh with the model in a file; models of the process that are open stay as they are."""
+    try:
+        import gmsh
+    except (ImportError, OSError) as error:
+        raise NoGmsh(str(error)) from None
+    mine = not gmsh.isInitialized()
+    if mine:
+        gmsh.initialize([], readConfigFiles=False, run=False, interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.open(str(path))
+        yield gmsh
+        if not mine:
+            gmsh.model.remove()
+    finally:
+        if mine:
+            gmsh.finalize()
+
+
+def _reason(error: BaseException, path: Path) -> str:
+    return " ".join(str(error).split()).replace(str(path), path.name)
+
+
+def mesh_geometry(path: Path, dimension: int, size: float | None = None) -> Mesh:
+    """Mesh the geometry in a file up to `dimension`, with edges up to `size` where it is given."""
+    try:
+        with _model(path) as gmsh:
+            if size:
+                gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+            gmsh.model.mesh.generate(dimension)
+            if not len(gmsh.model.mesh.getNodes()[0]):
+                raise ScriptError(f"{path.name} has nothing to mesh", argument="file")
+            # Where there are physical groups, the mesh is what is in them and no more.
+            groups = {d for d, _ in gmsh.model.getPhysicalGroups()}
+            if groups and min(groups) > dimension:
+                raise ScriptError(
+                    f"{path.name} does not fit {dimension}D: its physical groups have "
+                    f"{min(groups)} dimensions",
+                    argument="file",
+                    expected=f"a physical group of {dimension} dimensions, or none",
+                )
+            return _taken(gmsh, only_groups=bool(groups))
+    except ScriptError:
+        raise
+    except NoGmsh as error:
+        raise ScriptError(
+            f"Gmsh, which meshes {path.name}, cannot be loaded: {error}",
+            argument="file",
+            expected="its libraries installed: on Debian and Ubuntu, apt install " + _LIBRARIES,
+            hint=f"or mesh it elsewhere: gmsh -{dimension} {path.name} -o {path.stem}.msh",
+        ) from None
+    except Exception as error:  # Gmsh has one class for all that it complains about.
+        raise ScriptError(
+            f"Gmsh cannot mesh {path.name}: {_reason(error, path)}",
+            argument="file",
+            hint=f"gmsh -{dimension} {path.name} says more",
+        ) from None
+
+
+def read_by_gmsh(path: Path) -> Mesh:
+    """The mesh in a file that Gmsh knows; its own complaint is raised as a ValueError."""
+    # Gmsh reads a file of options next to a mesh by itself, and options may run programs.
+    with tempfile.TemporaryDirectory() as folder:
+        alone = Path(folder) / path.name
+        try:
+            alone.symlink_to(path)
+        except OSError:
+            shutil.copyfile(path, alone)
+        try:
+            with _model(alone) as gmsh:
+                return _taken(gmsh, of_file=_Header(path))
+        except NoGmsh:
+            raise
+        except Exception as error:
+            raise ValueError(_reason(error, alone)) from None
+
+
+class _Header:
+    """What a file of Gmsh says that Gmsh forgets.
+
+    These are names of groups that are empty, and, in versions 1 and 2, the group of each element:
+    Gmsh gives all elements of one geometrical entity to the groups of that entity.
+    """
+
+    def __init__(self, path: Path):
+        content = path.read_bytes()
+        names = re.search(rb"\$PhysicalNames(.*?)\$EndPhysicalNames", content[:1_000_000], re.S)
+        found = re.findall(r'(\d) +(\d+) +"([^"]*)"', names[1].decode("latin-1")) if names else []
+        self.names = {(int(dim), int(number)): name for dim, number, name in found}
+        self.groups: dict[int, int] | None = None  # of elements, by their numbers
+        version = re.match(rb"\$MeshFormat\s+([12])\S* +0", content)
+        section = re.search(rb"\$ELM\s+\d+(.*?)\$END|\$Elements\s+\d+(.*?)\$End", content, re.S)
+        if section and (section[1] or version):
+            at = 2 if section[1] else 3  # number, type, [count of tags,] group
+            rows = (line.split(None, at + 1) for line in (section[1] or section[2]).splitlines())
+            self.groups = {int(row[0]): int(row[at]) for row in rows if len(row) > at}
+
+
+def _taken(gmsh: Any, only_groups: bool = False, of_file: _Header | None = None) -> Mesh:
+    tags, points, _ = gmsh.model.mesh.getNodes()
+    order = np.argsort(tags)
+    known = tags[order]
+    if (known[1:] == known[:-1]).any():
+        raise ValueError("two nodes have one number, or one has the number 0")
+    names = dict(of_file.names) if of_file else {}
+    for dim, number in gmsh.model.getPhysicalGroups():
+        names.setdefault((dim, number), gmsh.model.getPhysicalName(dim, number).strip())
+    # Per type of elements: nodes and groups (n,) of each, the number -1 where it has none.
+    found: dict[int, list[tuple[np.ndarray, np.ndarray]]] = {}
+    for dim, tag in gmsh.model.getEntities():
+        numbers = gmsh.model.getPhysicalGroupsForEntity(dim, tag)
+        if only_groups and not len(numbers):
+            continue
+        for kind, own, nodes in zip(*gmsh.model.mesh.getElements(dim, tag), strict=True):
+            count = gmsh.model.mesh.getElementProperties(kind)[3]
+            if of_file and of_file.groups is not None:
+                groups = np.array([[of_file.groups.get(int(n), -1)] for n in own])
+            else:
+                groups = np.tile(np.append(numbers, -1).astype(int), (len(own), 1))
+            at = np.searchsorted(known, nodes).reshape(-1, count)
+            found.setdefault(int(kind), []).append((at, groups))
+    cells = []
+    sets: dict[str, list[np.ndarray]] = {}
+    for keys in sorted(names, key=lambda keys: keys[::-1]):
+        sets.update({key: [] for key in (names[keys], str(keys[1])) if key})
+    for kind, parts in found.items():
+        name, dim, _, count, reference, primary = gmsh.model.mesh.getElementProperties(kind)
+        family = _FAMILIES.get(name.split()[0], name.split()[0].lower())
+        natural = np.reshape(reference, (count, -1))[:, :dim] if dim else None
+        nodes = np.concatenate([nodes for nodes, _ in parts])
+        cells.append(Cells(family if count == primary else f"{family}{count}", nodes, natural))
+        for key, masks in sets.items():
+            of = [n for (d, n), name in names.items() if d == dim and key in (name, str(n))]
+            masks.append(np.concatenate([np.isin(groups, of).any(axis=1) for _, groups in parts]))
+    return Mesh(np.reshape(points, (-1, 3))[order], cells, sets, {}, {})

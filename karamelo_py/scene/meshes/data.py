@@ -1,0 +1,117 @@
+"""A mesh as every reader returns it: nodes, cells by type, named sets."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from karamelo_py.script.errors import unknown
+
+# Families of cell types, by the name that meshio gives them without their number of nodes.
+DIMENSIONS = {
+    "vertex": 0, "line": 1, "triangle": 2, "quad": 2, "polygon": 2, "pixel": 2,
+    "tetra": 3, "hexahedron": 3, "wedge": 3, "pyramid": 3, "voxel": 3, "hexa_prism": 3,
+}  # fmt: skip
+
+
+class Cells(NamedTuple):
+    """Cells of one type."""
+
+    type: str  # as meshio names it, such as tetra10
+    nodes: np.ndarray  # (n, c) their numbers, from 0; corners come first
+    # (c, d) natural coordinates of the nodes; None: in the order of VTK.
+    reference: np.ndarray | None = None
+    label: str = ""  # the name of the type in the file, where it has another one
+
+    @property
+    def family(self) -> str:
+        return self.type.rstrip("0123456789")
+
+    @property
+    def dimension(self) -> int:
+        return DIMENSIONS.get(self.family, -1)
+
+
+class Mesh(NamedTuple):
+    points: np.ndarray  # (N, 3)
+    cells: list[Cells]
+    sets: dict[str, list[np.ndarray]]  # per name a mask (n,) for each item of `cells`
+    node_sets: dict[str, np.ndarray]  # per name a mask (N,)
+    left_out: dict[str, int]  # elements that no solid has, such as springs: how many of each type
+
+    def chosen(self, group: str | int | None) -> list[Cells]:
+        """The cells of a named set, or all.
+
+        A set of nodes stands for the outer faces all of whose nodes it has. An unknown set and an
+        empty one are errors.
+        """
+        if group is None:
+            masks = [np.ones(len(cells.nodes), bool) for cells in self.cells]
+        else:
+            name = self._name_of(str(group))
+            if name not in self.sets:
+                return outer_faces_of(self, self.node_sets[name])
+            masks = self.sets[name]
+        return [
+            cells._replace(nodes=cells.nodes[mask])
+            for cells, mask in zip(self.cells, masks, strict=True)
+            if mask.any()
+        ]
+
+    def _name_of(self, group: str) -> str:
+        """Find a set, whatever the case of its letters if no other one differs by that alone."""
+        known = [*self.sets, *(name for name in self.node_sets if name not in self.sets)]
+        alike = [name for name in known if name.casefold() == group.casefold()]
+        name = group if group in known else alike[0] if len(alike) == 1 else None
+        message = f"the mesh has no physical group '{group}' with elements"
+        if name is None:
+            # Groups of Gmsh have a number as well; those with a name are named.
+            named = [name for name in known if not name.isdigit()] or known
+            raise unknown(message, group, named, argument="group")
+        held = self.sets.get(name) or [self.node_sets[name]]
+        if not any(mask.any() for mask in held):
+            raise unknown(
+                f"the physical group '{name}' of the mesh is empty",
+                group,
+                [n for n, masks in self.sets.items() if any(m.any() for m in masks)],
+                argument="group",
+            )
+        return name
+
+
+# Faces of elements by their corners; seen from outside counter-clockwise, in 2D on the left.
+FACES: dict[str, tuple[tuple[int, ...], ...]] = {
+    "line": ((0,), (1,)),
+    "triangle": ((0, 1), (1, 2), (2, 0)),
+    "quad": ((0, 1), (1, 2), (2, 3), (3, 0)),
+    "tetra": ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)),
+    "hexahedron": (
+        *((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4)),
+        *((1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
+    ),
+    "wedge": ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
+    "pyramid": ((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
+}
+FACE_TYPES = {1: "vertex", 2: "line", 3: "triangle", 4: "quad"}
+
+
+def outer_faces_of(mesh: Mesh, held: np.ndarray) -> list[Cells]:
+    """The faces with nodes in `held` (N,) alone that belong to one element only."""
+    highest = max((cells.dimension for cells in mesh.cells if cells.family in FACES), default=0)
+    faces: dict[int, list[np.ndarray]] = {}
+    for cells in mesh.cells:
+        if cells.dimension == highest:
+            for face in FACES[cells.family]:
+                nodes = cells.nodes[:, face]
+                faces.setdefault(len(face), []).append(nodes[held[nodes].all(axis=1)])
+    found = []
+    for corners, parts in faces.items():
+        nodes = np.concatenate(parts)
+        _, first, count = np.unique(
+            np.sort(nodes, axis=1), axis=0, return_index=True, return_counts=True
+        )
+        outer = nodes[first[count == 1]]
+        if len(outer):
+            found.append(Cells(FACE_TYPES[corners], outer))
+    if not found:  # single nodes: no face has them alone
+        found.append(Cells("vertex", np.flatnonzero(held)[:, None]))
+    return found

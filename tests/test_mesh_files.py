@@ -1,0 +1,279 @@
+"""Meshes as other programs write them: volumes that follow from the files by hand."""
+
+import math
+
+import meshio
+import numpy as np
+import pytest
+from hubs import SmallHub
+
+from karamelo_py.scene.meshes.elements import SHAPES, elements_of, measured
+from karamelo_py.scene.meshes.reading import read
+from karamelo_py.script.errors import ScriptError
+from karamelo_py.styles.meshes import MeshRegion, MeshSolid
+
+SQUARES = """\
+*NODE
+1, 0, 0, 0
+2, 1, 0, 0
+3, 2, 0, 0
+4, 0, 1, 0
+5, 1, 1, 0
+6, 2, 1, 0
+"""
+BOTH = "*ELEMENT, TYPE=CPS4, ELSET=A\n1, 1, 2, 5, 4\n*ELEMENT, TYPE=CPS4, ELSET=B\n2, 2, 3, 6, 5\n"
+CUBE = """\
+*NODE
+1, 0, 0, 0
+2, 1, 0, 0
+3, 1, 1, 0
+4, 0, 1, 0
+5, 0, 0, 1
+6, 1, 0, 1
+7, 1, 1, 1
+8, 0, 1, 1
+*ELEMENT, TYPE=C3D8, ELSET=CUBE
+1, 1, 2, 3, 4, 5, 6, 7, 8
+"""
+PART = "*Part, name=P\n" + CUBE + "*Elset, elset=E, generate\n1, 1, 1\n*End Part\n"
+
+
+def volume(path, dimension, group=None):
+    parts = elements_of(read(path, dimension), dimension, group)
+    return sum(measured(part)[1].sum() for part in parts)
+
+
+@pytest.mark.parametrize(
+    ("deck", "group", "area"),
+    [
+        (SQUARES + "*ELEMENT, TYPE=CPS4\n1, 1, 2, 5, 4\n** a comment\n2, 2, 3, 6, 5\n", None, 2),
+        (SQUARES + BOTH + "*ELSET, ELSET=BOTH\nA, B\n", "BOTH", 2),
+        (SQUARES + BOTH + "*ELSET, ELSET=T\n1\n*ELSET, ELSET=T\n2\n", "t", 2),
+        (SQUARES + BOTH + "*ELSET, ELSET=G, GENERATE\n1, 2\n", "G", 2),
+        (SQUARES.replace("0\n", "0,\n").lower() + BOTH.lower(), "a", 1),
+        (SQUARES + "*ELEMENT, TYPE=CPS4\n1, 1, 2,\n5, 4\n2, 2, 3, 6, 5\n", None, 2),
+        (
+            "*NODE\n1, 0, 0\n5, 4, 0\n11, 0, 1\n15, 4, 1\n*NGEN\n1, 5, 1\n11, 15, 1\n"
+            "*ELEMENT, TYPE=CPE4R\n1, 1, 2, 12, 11\n*ELGEN, ELSET=ROW\n1, 4, 1, 1\n",
+            "ROW", 4,
+        ),
+        (
+            "*NODE, NSET=LOW\n1, 0, 0\n2, 1, 0\n*NODE, NSET=HIGH\n31, 0, 3\n32, 1, 3\n*NFILL\n"
+            "LOW, HIGH, 3, 10\n*ELEMENT, TYPE=CPS4\n1, 11, 12, 22, 21\n",
+            None, 1,
+        ),
+        (  # a sector of 90 degrees between radii 1 and 2, by straight edges
+            "*NODE, SYSTEM=C\n1, 1, 0\n2, 2, 0\n3, 2, 90\n4, 1, 90\n"
+            "*ELEMENT, TYPE=CPS4\n1, 1, 2, 3, 4\n",
+            None, 1.5,
+        ),
+        ("*SYSTEM\n5, 0, 0, 5, 1, 0\n" + SQUARES + BOTH, None, 2),
+    ],
+)  # fmt: skip
+def test_decks_of_abaqus(deck, group, area, tmp_path):
+    (tmp_path / "a.inp").write_text(deck)
+    assert math.isclose(volume(tmp_path / "a.inp", 2, group), area, rel_tol=1e-14)
+
+
+def test_instances_of_a_part_are_shifted_and_rotated(tmp_path):
+    """Abaqus shifts, then rotates about the axis a-b: (0..1) + 2 turned by 90 degrees about z."""
+    (tmp_path / "a.inp").write_text(
+        PART + "*Assembly, name=A\n*Instance, name=P-1, part=P\n*End Instance\n"
+        "*Instance, name=P-2, part=P\n2, 0, 0\n0, 0, 0, 0, 0, 1, 90\n*End Instance\n"
+        "*Elset, elset=SECOND, instance=P-2\n1\n*Surface, type=ELEMENT, name=TOP\nP-1.E, S2\n"
+        "*Elset, elset=EVERY\nP-1.E, P-2.E\n*End Assembly\n"
+    )
+    hub = SmallHub(3, -2, 4, 0.25)
+    solid = MeshSolid(hub, tmp_path / "a.inp", hub.materials["steel"], 0.25)
+    np.testing.assert_allclose(solid.volume0, 1)
+    np.testing.assert_allclose(solid.x0, [[0.5, 0.5, 0.5], [-0.5, 2.5, 0.5]])
+    for group, count in (("E", 2), ("SECOND", 1), ("P-2", 1), ("p-1.e", 1), ("EVERY", 2)):
+        assert volume(tmp_path / "a.inp", 3, group) == pytest.approx(count, rel=1e-14), group
+    top = MeshRegion(hub, tmp_path / "a.inp", "TOP")
+    inside = top.inside(np.array([[0.5, 0.5, 1], [0.5, 0.5, 0.9], [-0.5, 2.5, 1]]))
+    np.testing.assert_array_equal(inside, [True, False, False])
+
+
+def test_parts_with_the_same_numbers_stay_apart(tmp_path):
+    second = PART.replace("name=P", "name=Q").replace(", 1, ", ", 3, ", 1)
+    (tmp_path / "a.inp").write_text(
+        PART + second + "*Assembly, name=A\n*Instance, name=P-1, part=P\n*End Instance\n"
+        "*Instance, name=Q-1, part=Q\n4, 0, 0\n*End Instance\n*End Assembly\n"
+    )
+    assert volume(tmp_path / "a.inp", 3, "P-1") == pytest.approx(1)
+    mesh = read(tmp_path / "a.inp", 3)
+    assert len(mesh.points) == 16
+
+
+def test_a_set_of_nodes_is_the_faces_that_it_has(tmp_path):
+    (tmp_path / "a.inp").write_text(CUBE + "*NSET, NSET=BASE\n1, 2, 3, 4\n")
+    region = MeshRegion(SmallHub(3, -1, 2, 0.25), tmp_path / "a.inp", "BASE")
+    inside = region.inside(np.array([[0.5, 0.5, 0], [0.5, 0.5, 1], [0.5, 0.5, 0.5]]))
+    np.testing.assert_array_equal(inside, [True, False, False])
+
+
+def test_included_decks_and_elements_that_no_solid_has(tmp_path):
+    (tmp_path / "cube.inp").write_text(CUBE)
+    (tmp_path / "a.inp").write_text(
+        "*INCLUDE, INPUT=cube.inp\n*ELEMENT, TYPE=SPRINGA, ELSET=S\n2, 1, 7\n3, 1, 8\n"
+        "*ELEMENT, TYPE=S4R\n4, 1, 2, 3, 4\n"
+    )
+    hub = SmallHub(3, -1, 2, 0.25)
+    solid = MeshSolid(hub, tmp_path / "a.inp", hub.materials["steel"], 0.25)
+    assert solid.count == 1
+    assert hub.warnings == [
+        "elements of a.inp that no solid has are left out: 2 SPRINGA, 1 S4R"
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "says"),
+    [
+        ("a.inp", SQUARES + "*ELEMENT, TYPE=CPS4\n1, 1, 2, 5, 9\n", "element 1 has the node 9"),
+        ("a.inp", SQUARES + "*ELEMENT, TYPE=CPS4\n1, 1, 2, 5\n", "line 8: *ELEMENT has lines"),
+        ("a.inp", "*NODE\n1, zero, 0\n", "a.inp, line 1: *NODE has a line that is not numbers"),
+        ("a.inp", "*NCOPY, CHANGE NUMBER=1\n", "line 1: *NCOPY"),
+        ("a.inp", "*INCLUDE, INPUT=none.inp\n", "*INCLUDE of 'none.inp', which cannot be read"),
+        ("a.inp", "*INCLUDE, INPUT=a.inp\n", "*INCLUDE of 'a.inp', which cannot be read"),
+        ("a.inp", "*Assembly\n*Instance, name=I, part=N\n", "of the part 'N', which is not"),
+        ("a.inp", "*HEADING\nnothing\n", "the mesh a.inp is empty"),
+        ("a.mesh", "MFEM mesh v1.0\n", "it is a mesh of MFEM"),
+        ("a.msh", "MESH dimension 2 ElemType Triangle Nnode 3\n", "it is a mesh of GiD"),
+        ("a.inp", "$ by LS-PrePost\n*KEYWORD\n*NODE\n", "it is a deck of LS-DYNA"),
+        ("a.bdf", "BEGIN BULK\nGRID,1,7,0.,0.,0.\n", "GRID in the coordinate system 7 (CP)"),
+    ],
+)  # fmt: skip
+def test_decks_that_are_refused_name_the_line(name, text, says, tmp_path):
+    (tmp_path / name).write_text(text)
+    with pytest.raises(ScriptError) as caught:
+        volume(tmp_path / name, 2)
+    assert says in str(caught.value)
+    assert caught.value.argument == "file"
+
+
+GMSH = """\
+$MeshFormat
+2.2 0 8
+$EndMeshFormat
+$PhysicalNames
+2
+2 5 "left"
+2 6 "none"
+$EndPhysicalNames
+$Nodes
+6
+1 0 0 0
+2 1 0 0
+3 2 0 0
+4 0 1 0
+5 1 1 0
+6 2 1 0
+$EndNodes
+$Elements
+2
+1 3 2 5 1 1 2 5 4
+2 3 3 0 1 7 2 3 6 5
+$EndElements
+"""
+
+
+def test_files_of_gmsh_as_gmsh_reads_them(tmp_path):
+    """Tags of differing number, elements without a group, a group without elements, version 1."""
+    pytest.importorskip("gmsh", exc_type=(ImportError, OSError))
+    (tmp_path / "a.msh").write_text(GMSH)
+    assert volume(tmp_path / "a.msh", 2) == 2
+    assert volume(tmp_path / "a.msh", 2, "left") == volume(tmp_path / "a.msh", 2, 5) == 1
+    with pytest.raises(ScriptError, match="group 'none' of the mesh is empty"):
+        volume(tmp_path / "a.msh", 2, "none")
+    (tmp_path / "b.msh").write_text(
+        "$NOD\n3\n1 0 0 0\n2 1 0 0\n3 0 1 0\n$ENDNOD\n$ELM\n1\n1 2 1 1 3 1 2 3\n$ENDELM\n"
+    )
+    assert volume(tmp_path / "b.msh", 2) == 0.5
+    zero = GMSH.replace("$Nodes\n6\n", "$Nodes\n7\n0 3 3 0\n")
+    (tmp_path / "c.msh").write_text(zero)
+    with pytest.raises(ScriptError, match="has the number 0"):
+        volume(tmp_path / "c.msh", 2)
+    (tmp_path / "a.msh.opt").write_text('SystemCall "touch ran";\n')
+    assert volume(tmp_path / "a.msh", 2) == 2
+    assert not (tmp_path / "ran").exists()
+
+
+@pytest.mark.parametrize("order", [1, 2, 3, 4])
+@pytest.mark.parametrize("hull", ["triangle", "quad", "tetra", "hexahedron", "wedge"])
+def test_curved_elements_of_every_order_have_their_exact_volume(hull, order, tmp_path):
+    """The shear (x + c y^p, y, z) has det = 1 and lies in the functions of order p: volume 1."""
+    gmsh = pytest.importorskip("gmsh", exc_type=(ImportError, OSError))
+    if hull == "wedge" and order > 2:
+        pytest.skip("Gmsh cannot read prisms of order 3 that it has written")
+    gmsh.initialize([], readConfigFiles=False, interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        d = SHAPES[hull].dimension
+        base = gmsh.model.occ.addRectangle(0, 0, 0, 1, 1)
+        if hull in ("quad", "hexahedron"):
+            gmsh.option.setNumber("Mesh.RecombineAll", 1)
+        gmsh.option.setNumber("Mesh.MeshSizeMin", 0.5)
+        gmsh.option.setNumber("Mesh.MeshSizeMax", 0.5)
+        if hull in ("hexahedron", "wedge"):
+            gmsh.model.occ.extrude([(2, base)], 0, 0, 1, [2], recombine=True)
+        elif hull == "tetra":
+            gmsh.model.occ.addBox(2, 0, 0, 1, 1, 1)
+            gmsh.model.occ.remove([(2, base)], recursive=True)
+        gmsh.model.occ.synchronize()
+        gmsh.model.mesh.generate(d)
+        gmsh.model.mesh.setOrder(order)
+        tags, places, _ = gmsh.model.mesh.getNodes()
+        for tag, x in zip(tags, places.reshape(-1, 3), strict=True):
+            gmsh.model.mesh.setNode(tag, [x[0] + 0.2 * x[1] ** order, x[1], x[2]], [])
+        gmsh.write(str(tmp_path / "a.msh"))
+    finally:
+        gmsh.finalize()
+    parts = elements_of(read(tmp_path / "a.msh", d), d)
+    volumes = [measured(part) for part in parts]
+    assert {part.shape.name for part in parts} == {hull}
+    assert sum(v.sum() for _, v, _ in volumes) == pytest.approx(1, rel=1e-12)
+    at = sum(v @ x for _, v, x in volumes)
+    shift = 2.0 if hull == "tetra" else 0.0
+    assert at[0] == pytest.approx(shift + 0.5 + 0.2 / (order + 1), rel=1e-12)
+    np.testing.assert_allclose(at[1:], 0.5, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("kind", "nodes", "right"),
+    [
+        ("wedge", [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1]], 1 / 2),
+        ("pyramid", [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.3, 0.6, 1]], 1 / 3),
+    ],
+)
+def test_wedges_and_pyramids(kind, nodes, right, tmp_path):
+    """A third or the whole of base times height; the centroid of a pyramid at 1/4 of it."""
+    path = tmp_path / "a.vtu"
+    meshio.write(path, meshio.Mesh(np.array(nodes, float), {kind: [range(len(nodes))]}))
+    assert volume(path, 3) == pytest.approx(right, rel=1e-14)
+    _, _, centroid = measured(elements_of(read(path, 3), 3)[0])
+    assert centroid[0, 2] == pytest.approx(1 / 4 if kind == "pyramid" else 1 / 2, rel=1e-14)
+    region = MeshRegion(SmallHub(3, -1, 2, 0.25), path)
+    x = np.random.default_rng(3).random((40_000, 3))
+    assert region.inside(x).mean() == pytest.approx(right, abs=0.01)  # 4 deviations of the count
+
+
+VTU = """<VTKFile type="UnstructuredGrid" version="0.1" byte_order="LittleEndian">
+<UnstructuredGrid><Piece NumberOfPoints="{n}" NumberOfCells="1">
+<Points><DataArray type="Float64" NumberOfComponents="3" format="ascii">{x}</DataArray></Points>
+<Cells><DataArray type="Int64" Name="connectivity" format="ascii">{nodes}</DataArray>
+<DataArray type="Int64" Name="offsets" format="ascii">{n}</DataArray>
+<DataArray type="UInt8" Name="types" format="ascii">{type}</DataArray></Cells>
+<CellData><DataArray type="Int64" Name="mat" format="ascii">3</DataArray></CellData>
+</Piece></UnstructuredGrid></VTKFile>
+"""
+
+
+@pytest.mark.parametrize(("type_", "d"), [(8, 2), (11, 3)])
+def test_pixels_voxels_and_numbers_of_elements(type_, d, tmp_path):
+    """Squares and cubes whose nodes go row by row, as ParaView makes of images."""
+    n = 2**d
+    x = " ".join(f"{i & 1} {i >> 1 & 1} {i >> 2}" for i in range(n))
+    text = VTU.format(n=n, x=x, nodes=" ".join(map(str, range(n))), type=type_)
+    (tmp_path / "a.vtu").write_text(text)
+    for group in (3, "mat:3"):
+        assert volume(tmp_path / "a.vtu", d, group) == pytest.approx(1, rel=1e-14)
