@@ -190,6 +190,7 @@ def test_files_of_gmsh_as_gmsh_reads_them(tmp_path):
     )
     assert volume(tmp_path / "b.msh", 2) == 0.5
     zero = GMSH.replace("$Nodes\n6\n", "$Nodes\n7\n0 3 3 0\n")
+    zero = zero.replace("7 2 3 6 5", "7 2 3 6 0")
     (tmp_path / "c.msh").write_text(zero)
     with pytest.raises(ScriptError, match="has the number 0"):
         volume(tmp_path / "c.msh", 2)
