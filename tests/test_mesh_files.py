@@ -67,6 +67,8 @@ def volume(path, dimension, group=None):
             "*ELEMENT, TYPE=CPS4\n1, 1, 2, 3, 4\n",
             None, 1.5,
         ),
+        # a line with more numbers than nodes, as C3D8I of CalculiX has
+        (SQUARES + "*ELEMENT, TYPE=CPE4I\n1, 1, 2, 5, 4, 7, 8,\n2, 2, 3, 6, 5, 9, 10\n", None, 2),
         ("*SYSTEM\n5, 0, 0, 5, 1, 0\n" + SQUARES + BOTH, None, 2),
     ],
 )  # fmt: skip
@@ -137,6 +139,7 @@ def test_included_decks_and_elements_that_no_solid_has(tmp_path):
         ("a.inp", "*INCLUDE, INPUT=a.inp\n", "*INCLUDE of 'a.inp', which cannot be read"),
         ("a.inp", "*Assembly\n*Instance, name=I, part=N\n", "of the part 'N', which is not"),
         ("a.inp", "*HEADING\nnothing\n", "the mesh a.inp is empty"),
+        ("a.inp", SQUARES + "*ELEMENT, TYPE=B31\n1, 1, 2\n", "a.inp is empty but for 1 B31"),
         ("a.mesh", "MFEM mesh v1.0\n", "it is a mesh of MFEM"),
         ("a.msh", "MESH dimension 2 ElemType Triangle Nnode 3\n", "it is a mesh of GiD"),
         ("a.inp", "$ by LS-PrePost\n*KEYWORD\n*NODE\n", "it is a deck of LS-DYNA"),

@@ -155,6 +155,26 @@ def _flat(keyword: _Keyword) -> np.ndarray:
         raise _wrong(keyword, "has a line that is not whole numbers and commas") from None
 
 
+def _rows(keyword: _Keyword, count: int) -> np.ndarray:
+    """The elements (n, count) of *ELEMENT: lines go on until they have `count` numbers.
+
+    More numbers on the last line, such as inner nodes of C3D8I, are passed over, as CalculiX does.
+    """
+    flat = _flat(keyword)
+    if len(flat) == count * len(keyword.lines):
+        return flat.reshape(-1, count)
+    rows, row = [], np.empty(0, np.int64)
+    for line in keyword.lines:
+        row = np.append(row, _flat(keyword._replace(lines=[line])))
+        if len(row) >= count:
+            rows.append(row[:count])
+            row = row[:0]
+    if len(row):
+        kind = keyword.options["TYPE"]
+        raise _wrong(keyword, f"has lines that are not {count} whole numbers for a {kind}")
+    return np.array(rows).reshape(-1, count)
+
+
 def _cylindrical(x: np.ndarray) -> np.ndarray:
     angle = np.radians(x[:, 1])
     return np.stack([x[:, 0] * np.cos(angle), x[:, 0] * np.sin(angle), x[:, 2]], axis=1)
@@ -304,10 +324,7 @@ class _Deck:
         if kind is None:
             self.scope.skipped.append((name or "without a type", len(keyword.lines)))
             return
-        flat, count = _flat(keyword), kind[1] + 1
-        if len(flat) % count:
-            raise _wrong(keyword, f"has lines that are not {count} whole numbers for a {name}")
-        table = flat.reshape(-1, count)
+        table = _rows(keyword, kind[1] + 1)
         self.scope.elements.append(_Elements(name, table[:, 0], table[:, 1:]))
         self._into(self.scope.groups, keyword.options.get("ELSET"), table[:, 0])
 
@@ -389,7 +406,8 @@ class _Deck:
             self._add(found, body)
         for sets, name, instance, items in self.assembly:
             known = found.nodes if sets is self.whole.nodes else found.groups
-            table = (found.node_numbers if sets is self.whole.nodes else found.numbers)[instance]
+            numbered = found.node_numbers if sets is self.whole.nodes else found.numbers
+            table = numbered.get(instance, numbered[bodies[-1].name])
             for item in items:
                 said = known.get(f"{instance}.{item}", []) if isinstance(item, str) else [
                     _looked_up(table, item)

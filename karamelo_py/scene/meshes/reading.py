@@ -73,10 +73,11 @@ def _read(path: Path, dimension: int, size: float | None, _state: tuple[int, int
     else:
         mesh = _by_content(path)
     if not len(mesh.points) or not sum(len(cells.nodes) for cells in mesh.cells):
+        counts = ", ".join(f"{n} {kind}" for kind, n in mesh.left_out.items())
         raise ScriptError(
-            f"the mesh {path.name} is empty",
+            f"the mesh {path.name} is empty" + (f" but for {counts}" if counts else ""),
             argument="file",
-            expected="a mesh with elements",
+            expected="a mesh with elements that have a volume",
         )
     if not np.isfinite(mesh.points).all():
         raise ScriptError(
@@ -107,7 +108,7 @@ def _by_content(path: Path) -> Mesh:
     for pattern, what, remedy in _FOREIGN:
         if pattern.match(begin):
             raise _unreadable(path, f"it is {what}", hint=remedy)
-    if begin.lstrip().startswith(b"*") and ending in (".inp", ".msh"):
+    if ending in (".inp", ".msh") and re.search(rb"^\*[A-Za-z]", begin, re.M):
         return read_deck(path)
     if ending == ".inp" and re.match(rb"\s*(#[^\n]*\n\s*)*\d+ +\d+ +\d+ +\d+ +\d+\s", begin):
         return _by_meshio(path, "avsucd")
