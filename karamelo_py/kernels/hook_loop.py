@@ -766,7 +766,7 @@ def moving_points(s, block, then):
     return MovingPoints(points.id, points.v, points.mass, x, y, corners_that_move(s), rigid)
 
 
-def _clear(kin, force, count):
+def clear_forces(kin, force, count):
     """Let points bear no force of fixes, until these say so anew."""
     if force is not None:
         for c in range(kin.dimension):
@@ -788,5 +788,5 @@ def at_points(hooks, stage, then, s):
 def _at_points_hooks(hooks, stage, then, s):
     if stage == arrays.INITIAL_INTEGRATE and len(hooks.whole):
         for block in s.blocks:
-            _clear(s.kin, field(block.points.fields, Force), block.points.mass.size)
+            clear_forces(s.kin, field(block.points.fields, Force), block.points.mass.size)
     point_hooks(stage, then, hooks, s, moving_points, lambda points: ())

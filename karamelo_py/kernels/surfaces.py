@@ -15,7 +15,7 @@ import numpy as np
 
 from karamelo_py.compiler.compile import point_function
 from karamelo_py.compiler.held import at_hand
-from karamelo_py.compiler.loops import noinline
+from karamelo_py.compiler.loops import kernel, noinline
 from karamelo_py.compiler.threads import Serial, by_threads
 from karamelo_py.points.kinematics import KINEMATICS
 
@@ -31,6 +31,15 @@ class Surface(NamedTuple):
     high: np.ndarray
     faces: np.ndarray  # (m, d, d): face, corner, direction
     odd: bool  # only an odd number of crossings encloses: the faces know no sides
+
+
+class Convex(NamedTuple):
+    """What lies below planes and in a ball, or in a cylinder, of a size that may be infinite."""
+
+    planes: np.ndarray  # (k, d + 1): normals into it, and their products with a place
+    across: np.ndarray  # (d,) 1 along the axes across which it is round, else 0
+    centre: np.ndarray  # (d,)
+    radius: float
 
 
 def surface_of(faces: np.ndarray, margin: float, *, odd: bool = False) -> Surface:
@@ -270,3 +279,45 @@ def _of(kernel: Any, surface: Surface, x: np.ndarray, *more: Any) -> np.ndarray:
     places, found = np.ascontiguousarray(x[:, :d], float), np.empty(len(x))
     kernel(Serial(), -(-len(x) // CHUNK), KINEMATICS[d](), surface, places, *more, found)
     return found
+
+
+@point_function()
+def reaches(shape, kin, x, reach):
+    """Tell whether `x` is in a shape, or nearer to it than `reach`."""
+
+
+@reaches.on(Surface)
+def _surface_reaches(shape, kin, x, reach):
+    if _from_box(kin, shape, 1, x) >= reach * reach:
+        return False
+    return distance(kin, shape, x, reach) < reach or encloses(kin, shape, x)
+
+
+@reaches.on(Convex)
+def _convex_reaches(shape, kin, x, reach):
+    for i in range(shape.planes.shape[0]):
+        depth = -shape.planes[i, kin.dimension]
+        for c in range(kin.dimension):
+            depth += shape.planes[i, c] * x[c]
+        if depth <= -reach:
+            return False
+    square = 0.0
+    for c in range(kin.dimension):
+        square += shape.across[c] * (x[c] - shape.centre[c]) ** 2
+    return sqrt(square) < shape.radius + reach
+
+
+@kernel
+def near_points(kin, shape, x, way, reach, rows):
+    """Find the points at `x` (w, n) that a shape reaches, `way` (d,) further on; how many.
+
+    Their numbers go to `rows` (n,).
+    """
+    shape = at_hand(shape)
+    count = 0
+    for p in range(x.shape[1]):
+        place = kin.Vector._make([float(x[c, p]) - way[c] for c in range(kin.dimension)])
+        if reaches(shape, kin, place, reach):
+            rows[count] = p
+            count += 1
+    return count

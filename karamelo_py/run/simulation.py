@@ -268,7 +268,7 @@ class Simulation(SceneArrays):
     def _advance(self, count: int) -> int:
         """Take compiled steps; row by row where Python acts between these; or load steps."""
         scheme, first = self.hub.update.scheme, self._first
-        hooks = first or (self.python if self.python.by_stage else self.hooks)
+        hooks = first or self._acting
         count = count if first is None else 1
         if self.implicit:
             status = self.load_steps.advance(hooks, count)
@@ -282,6 +282,11 @@ class Simulation(SceneArrays):
         self._first = None
         self.clear_forces()  # the steps to come may have no hook that does it
         return SORT  # there is more to do, unless that was all
+
+    @property
+    def _acting(self) -> Any:
+        """What acts in a step: compiled hooks, with calls of Python, or Python between its rows."""
+        return self._called or (self.python if self.python.by_stage else self.hooks)
 
     @property
     def begins(self) -> bool:
@@ -310,9 +315,10 @@ class Simulation(SceneArrays):
 
     def compile(self) -> None:
         """Have the loop over the steps compiled now: nobody waits for it amid a log."""
-        if config.DISABLE_JIT or self.python.by_stage or self.implicit:
+        hooks = self._acting
+        if config.DISABLE_JIT or isinstance(hooks, PythonHooks) or self.implicit:
             return
-        arguments = self.hub.update.scheme, self.visits, self.mode, self.setup, self.hooks, 1
+        arguments = self.hub.update.scheme, self.visits, self.mode, self.setup, hooks, 1
         self.comm.in_turn(lambda: advance.compile(*arguments))
 
     def _make_ready(self) -> None:
@@ -325,6 +331,7 @@ class Simulation(SceneArrays):
         new = [fix for fix in fixes if fix.first_step_only and fix not in self.begun]
         self.python = PythonHooks(self, lasting)
         self.hooks = self.python.compiled
+        self._called = None if self.implicit else self.python.called()
         staged = self.python.by_stage or any(
             name in POINT_STAGES for fix in lasting for name in fix.hooks()
         )

@@ -125,6 +125,13 @@ class Fix(Publisher):
     def defined(self) -> None:
         """Called when the fix has its ID and belongs to the scene."""
 
+    def near(self, x: np.ndarray) -> np.ndarray | None:
+        """Return the numbers of those points at `x` (w, n) that it may act on; None: all of them.
+
+        For fixes with ``point_by_point``: their hooks see no other points.
+        """
+        return None
+
     def hooks(self) -> dict[str, Any]:
         """The hooks this fix overrides: name to method or compiled hook."""
         found = {name: getattr(self, name) for name in STAGES if hasattr(self, name)}

@@ -107,6 +107,13 @@ class Region(Named):
             near[other, k] = high
         return np.where(inside, 1, -1) * near.min(axis=1) / math.sqrt(d)
 
+    def outline(self) -> Any:
+        """Return what kernels know the shape by (`kernels.surfaces.reaches`), None if they do not.
+
+        `exterior` plays no part here.
+        """
+        return None
+
     def depth(self, x: np.ndarray, reach: float) -> np.ndarray:
         """Return the depth of positions in the region, see `distance`: (n,)."""
         depth = self.distance(x, reach)

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from karamelo_py.kernels.surfaces import Convex
 from karamelo_py.language.by_dimension import Forms
 from karamelo_py.language.signature import Argument
 from karamelo_py.scene import region
@@ -20,6 +21,8 @@ class Primitive(region.Region):
 
     slabs: Sequence[tuple] = ()  # axis, lower and upper end of each
     across: Sequence[int] = ()  # the axes along which it is round, with a centre and a radius
+    centre: Sequence[float] = ()
+    radius: float
 
     @property
     def aligned(self) -> bool:
@@ -36,6 +39,21 @@ class Primitive(region.Region):
             np.minimum(depth, x[:, axis] - lo, out=depth)
             np.minimum(depth, hi - x[:, axis], out=depth)
         return depth
+
+    def outline(self) -> Convex:
+        d = self.dimension
+        planes = [plane for slab in self.slabs for plane in _between(d, *slab)]
+        across, centre = np.zeros((2, d))
+        across[list(self.across)] = 1
+        centre[list(self.across)] = self.centre
+        radius = float(self.radius) if len(self.across) else math.inf
+        return Convex(np.array(planes).reshape(-1, d + 1), across, centre, radius)
+
+
+def _between(d: int, axis: int, lo: float, hi: float) -> list[np.ndarray]:
+    """Return the planes (d + 1,) of a slab, see `Convex`; none where it is open."""
+    normal = np.eye(d)[axis]
+    return [np.append(n, at) for n, at in ((normal, lo), (-normal, -hi)) if math.isfinite(at)]
 
 
 class BlockRegion(Primitive):
@@ -218,6 +236,11 @@ class Plane(Primitive):
         for k, (middle, along) in enumerate(zip(self.middle, self.normal, strict=True)):
             depth += along * (x[:, k] - middle)
         return depth
+
+    def outline(self) -> Convex:
+        d = self.dimension
+        plane = np.append(self.normal, self.normal @ self.middle)
+        return Convex(plane[None], np.zeros(d), np.zeros(d), math.inf)
 
 
 class Union(region.Region):

@@ -5,10 +5,11 @@ from typing import Any
 
 import numpy as np
 
+from karamelo_py.compiler.choices import INTERPRETED
 from karamelo_py.compiler.formula import BLOCK, EVALUATE, ROWS, STACK, evaluate_in_table
-from karamelo_py.compiler.loops import address_of
+from karamelo_py.compiler.loops import address_of, address_of_python
 from karamelo_py.compiler.threads import Serial
-from karamelo_py.kernels import arrays
+from karamelo_py.kernels import arrays, called
 from karamelo_py.kernels.arrays import INITIAL_INTEGRATE, ON_VELOCITY, SUPPLY_HEAT, Setup
 from karamelo_py.kernels.heat import at_heat_nodes, at_heated_points
 from karamelo_py.kernels.hook_loop import add_work, at_nodes, at_points
@@ -174,6 +175,19 @@ class PythonHooks:
                 if not isinstance(hook, CompiledHook):
                     self.by_stage.setdefault(STAGES[name], []).append((fix, hook))
 
+    def called(self) -> called.CalledHooks | None:
+        """Give what compiled steps call them by, where none moves a point or acts elsewhere."""
+        acting = [fix for fix, _ in self.by_stage.get(INITIAL_INTEGRATE, ())]
+        elsewhere = len(self.by_stage) > 1 or not all(fix.point_by_point for fix in acting)
+        if INTERPRETED or not acting or elsewhere or self.simulation.subdomain is not None:
+            return None
+
+        def act(stage: int) -> int:
+            _on_points(self, self.simulation.setup, stage, 0)
+            return 1
+
+        return called.CalledHooks(self.compiled, address_of_python(act, called.CALL))
+
     def act(self, function: Callable, s: Setup, stage: int, *arguments: Any) -> None:
         """Call what acts from Python on a setup: the own one where that is enough for all."""
         if all(fix.point_by_point for fix, _ in self.by_stage[stage]):
@@ -277,7 +291,7 @@ def view_of(simulation: Any, fix: Any, *, then: bool) -> PointsView:
     """Show the points of a fix, or those of them that are at hand."""
     if fix.point_by_point:
         return PieceView(
-            simulation, list(simulation.points.rows_of(fix.group)), then, in_steps=True
+            simulation, list(simulation.points.rows_of(fix.group, fix.near)), then, in_steps=True
         )
     return PointsView(simulation, simulation.points.members(fix.group), then)
 

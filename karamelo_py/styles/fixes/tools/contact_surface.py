@@ -4,9 +4,11 @@ from typing import Annotated
 
 import numpy as np
 
+from karamelo_py.kernels.surfaces import near_points
 from karamelo_py.language.rules import known_failure
 from karamelo_py.language.signature import NonNegative
 from karamelo_py.output.point_table import PointTable
+from karamelo_py.points.kinematics import KINEMATICS
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.region import Region
@@ -96,6 +98,16 @@ class ContactSurface(ToolFix):
     def depth(self, x: np.ndarray) -> np.ndarray:
         """Depth (n,) of positions that move with the region, a cell at most."""
         return self.region.depth(x, self.hub.domain.h)
+
+    def near(self, x: np.ndarray) -> np.ndarray:
+        """Return the numbers of points at `x` (w, n) that are nearer to the region than a cell."""
+        d, h = self.hub.domain.dimension, self.hub.domain.h
+        way = self.now(*self.way) if self.way else np.zeros(d)
+        outline = None if self.region.exterior else self.region.outline()
+        if outline is None:
+            return np.flatnonzero(self.depth(x[:d].T - way) > -h)
+        rows = np.empty(x.shape[1], np.int64)
+        return rows[: near_points(KINEMATICS[d](), outline, x, way, h, rows)]
 
     def depth_of(self, points: PointTable) -> np.ndarray:
         """Depth (n,) of points in the region now."""

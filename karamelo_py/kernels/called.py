@@ -1,0 +1,63 @@
+"""Hooks in Python that compiled steps call: the loop does not come back for them.
+
+A step calls a function of Python by its address before it maps the points to the nodes. That
+function puts forces on points of the arrays that the step works on.
+"""
+
+from typing import NamedTuple
+
+from numba import types
+
+from karamelo_py.compiler.fields import field
+from karamelo_py.compiler.loops import caller_of, kernel
+from karamelo_py.kernels import arrays
+from karamelo_py.kernels.heat import at_heat_nodes, at_heated_points
+from karamelo_py.kernels.hook_loop import add_work, at_nodes, at_points, clear_forces
+from karamelo_py.kernels.p2g import Force
+
+CALL = types.int64(types.int64)
+
+_call = caller_of(CALL)
+
+
+class CalledHooks(NamedTuple):
+    """The compiled hooks of a scene, and what else acts at the start of each step."""
+
+    compiled: NamedTuple
+    address: int  # of the function ``(stage) -> 1``, or 0 where it has failed
+
+
+@kernel
+def _act(address, stage):
+    if _call(address, stage) == 0:
+        raise RuntimeError("a hook has failed")  # what it raised itself comes before this
+
+
+@at_points.on(CalledHooks)
+def _at_points_called(hooks, stage, then, s):
+    if stage == arrays.INITIAL_INTEGRATE:
+        for block in s.blocks:
+            clear_forces(s.kin, field(block.points.fields, Force), block.points.mass.size)
+    at_points(hooks.compiled, stage, then, s)
+    if stage == arrays.INITIAL_INTEGRATE:
+        _act(hooks.address, stage)
+
+
+@at_nodes.on(CalledHooks)
+def _at_nodes_called(hooks, stage, target, s):
+    at_nodes(hooks.compiled, stage, target, s)
+
+
+@add_work.on(CalledHooks)
+def _add_work_called(hooks, s):
+    add_work(hooks.compiled, s)
+
+
+@at_heat_nodes.on(CalledHooks)
+def _at_heat_nodes_called(hooks, stage, target, s):
+    at_heat_nodes(hooks.compiled, stage, target, s)
+
+
+@at_heated_points.on(CalledHooks)
+def _at_heated_points_called(hooks, s):
+    at_heated_points(hooks.compiled, s)
