@@ -202,3 +202,64 @@ def test_distances_are_those_of_the_nearest_triangle(seed):
                 if fit.x.sum() <= 1:  # of a face, within it
                     least = min(least, math.sqrt(2 * fit.cost))
         assert abs(depth) == pytest.approx(least, rel=1e-6)
+
+
+CUBE_OF_QUADS = """# a cube of six faces
+mtllib none.mtl
+o body
+v 0 0 0
+v 1 0 0
+v 1 1 0
+v 0 1 0
+v 0 0 1
+v 1 0 1
+v 1 1 1
+v 0 1 1
+vt 0 0
+vn 0 0 -1
+"""
+
+
+@pytest.mark.parametrize(
+    "faces",
+    [
+        "f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n",
+        "f 1/1 4/1 3/1 2/1\nf 5//1 6//1 7//1\nf 5/1/1 7/1/1 8/1/1\nf 1 2 6 \\\n5\nf 2 3 7 6\n"
+        "g side # the last two\nf 3 4 8 7\nf 4 1 5 8\n",
+        "f -8 -5 -6 -7\nf -4 -3 -2 -1\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n",
+    ],
+    ids=["quads", "textured", "counted from the end"],
+)
+def test_faces_of_obj_files(tmp_path, faces):
+    (tmp_path / "cube.obj").write_text(CUBE_OF_QUADS + faces)
+    region = STL(SmallHub(3, -1, 2, 0.25), tmp_path / "cube.obj")
+    assert region.skin.volume == pytest.approx(1)
+
+
+def test_polygons_of_obj_files_that_turn_inwards(tmp_path):
+    """A bar with an L for its ends, of area 3, and one of an arrowhead, of area 1."""
+    outlines = {3: [(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)],
+                1: [(0, 0), (2, 1), (0, 2), (1, 1)]}  # fmt: skip
+    for area, outline in outlines.items():
+        n = len(outline)
+        lines = [f"v {x} {y} {z}" for z in (0, 1) for x, y in outline]
+        lines += [
+            f"f {k + 1} {(k + 1) % n + 1} {(k + 1) % n + n + 1} {k + n + 1}" for k in range(n)
+        ]
+        lines += ["f " + " ".join(str(k) for k in range(n, 0, -1))]
+        lines += ["f " + " ".join(str(n + k) for k in range(1, n + 1))]
+        (tmp_path / "bar.obj").write_text("\n".join(lines))
+        region = STL(SmallHub(3, -1, 3, 0.25), tmp_path / "bar.obj")
+        assert region.skin.volume == pytest.approx(area)
+        # Nothing is near beyond the reentrant corner, 0.5 from both of its faces.
+        x = np.array([[1.5, 1.5, 1.0]]) if area == 3 else np.array([[0.25, 1.0, 1.0]])
+        assert -region.distance(x, 1.0)[0] == pytest.approx(0.5 if area == 3 else 0.53, abs=0.01)
+
+
+def test_a_wrong_line_of_an_obj_file_is_named(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for line, why in {"f 1 2 9": "a vertex that is not there", "f 1 2": "three corners or more",
+                      "v 1 2": "not enough values", "v 1 2 x": "could not convert"}.items():  # fmt: skip
+        (tmp_path / "cube.obj").write_text(CUBE_OF_QUADS + line + "\n")
+        said = message(SCENE + "region(r, stl, cube.obj)")
+        assert "cube.obj cannot be read as a mesh: line 14: " in said and why in said

@@ -11,7 +11,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
 from karamelo_py.scene.meshes.data import Mesh
 from karamelo_py.scene.meshes.elements import elements_of, measured
-from karamelo_py.scene.meshes.inside import Skin, flat_faces, outer_faces, skin_of
+from karamelo_py.scene.meshes.inside import Skin, flat_faces, outer_faces, skin_of, triangles_of
 from karamelo_py.scene.meshes.reading import MeshFile, read
 from karamelo_py.scene.placement import Placement
 from karamelo_py.scene.region import EXTERIOR, Region
@@ -123,8 +123,8 @@ class STL(Enclosed):
     Parameters
     ----------
     file
-        Name of a file with triangles: STL (text or binary), or any format that meshio reads. In
-        the lengths of the script: the file is not scaled.
+        Name of a file with triangles or quadrilaterals: STL (text or binary), OBJ, or any format
+        that region mesh reads. In the lengths of the script: the file is not scaled.
     exterior
         The word ``exterior`` makes the region all that is outside of the surface.
 
@@ -150,9 +150,7 @@ class STL(Enclosed):
                 hint="in 2D, region(ID, mesh, file) takes a mesh of triangles or quadrilaterals",
             )
         mesh = read(file, 2, hub.settings.trusts)
-        triangles = np.concatenate(
-            [np.empty((0, 3), int), *(c.nodes for c in mesh.cells if c.type == "triangle")]
-        )
+        triangles = triangles_of(mesh)
         if not len(triangles):
             raise ScriptError(
                 f"{file.name} has no triangles", argument="file", expected="a surface of triangles"

@@ -3,7 +3,7 @@
 import numpy as np
 
 from karamelo_py.kernels.surfaces import Surface, depths, distances, surface_of
-from karamelo_py.scene.meshes.data import FACES
+from karamelo_py.scene.meshes.data import FACES, Mesh
 from karamelo_py.scene.meshes.elements import MeshElements, measured
 from karamelo_py.script.errors import ScriptError
 
@@ -107,6 +107,21 @@ def _halves(rank: np.ndarray, corners: np.ndarray) -> list[np.ndarray]:
 
 
 # --- shells from files ------------------------------------------------------------------------
+
+
+def triangles_of(mesh: Mesh) -> np.ndarray:
+    """Triangles (m, 3) of the surface in a file; a quadrilateral becomes two, within its outline."""
+    found = [np.empty((0, 3), np.int64)]
+    for cells in mesh.cells:
+        nodes = cells.nodes
+        if cells.type == "triangle":
+            found.append(nodes)
+        elif cells.type == "quad":
+            a, b, c, d = (mesh.points[nodes[:, k]] for k in range(4))
+            sides = np.cross(b - a, c - a) * np.cross(c - a, d - a)
+            turned = np.where(sides.sum(axis=1)[:, None] < 0, np.roll(nodes, 1, axis=1), nodes)
+            found += [turned[:, [0, 1, 2]], turned[:, [0, 2, 3]]]
+    return np.concatenate(found)
 
 
 def skin_of(points: np.ndarray, triangles: np.ndarray, tolerance: float) -> Skin:

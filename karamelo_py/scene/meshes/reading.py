@@ -20,6 +20,7 @@ from karamelo_py.scene.meshes.abaqus import read_deck
 from karamelo_py.scene.meshes.by_gmsh import NoGmsh, mesh_geometry, read_by_gmsh
 from karamelo_py.scene.meshes.data import Cells, Mesh
 from karamelo_py.scene.meshes.geometry import refuse_commands
+from karamelo_py.scene.meshes.obj import read_obj
 from karamelo_py.script.errors import FAILURES, ScriptError
 
 GEOMETRIES = (".geo", ".geo_unrolled")
@@ -112,6 +113,8 @@ def _by_content(path: Path) -> Mesh:
         return read_deck(path)
     if ending == ".inp" and re.match(rb"\s*(#[^\n]*\n\s*)*\d+ +\d+ +\d+ +\d+ +\d+\s", begin):
         return _by_meshio(path, "avsucd")
+    if ending == ".obj":
+        return read_obj(path)
     if ending in (".bdf", ".nas"):
         _refuse_systems(path)
     why = None
