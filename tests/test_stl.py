@@ -258,8 +258,13 @@ def test_polygons_of_obj_files_that_turn_inwards(tmp_path):
 
 def test_a_wrong_line_of_an_obj_file_is_named(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    for line, why in {"f 1 2 9": "a vertex that is not there", "f 1 2": "three corners or more",
-                      "v 1 2": "not enough values", "v 1 2 x": "could not convert"}.items():  # fmt: skip
+    wrong = {
+        "f 1 2 9": "a vertex that is not there",
+        "f 1 2": "three corners or more",
+        "v 1 2": "not enough values",
+        "v 1 2 x": "could not convert",
+    }
+    for line, why in wrong.items():
         (tmp_path / "cube.obj").write_text(CUBE_OF_QUADS + line + "\n")
         said = message(SCENE + "region(r, stl, cube.obj)")
         assert "cube.obj cannot be read as a mesh: line 14: " in said and why in said

@@ -110,7 +110,7 @@ def _halves(rank: np.ndarray, corners: np.ndarray) -> list[np.ndarray]:
 
 
 def triangles_of(mesh: Mesh) -> np.ndarray:
-    """Triangles (m, 3) of the surface in a file; a quadrilateral becomes two, within its outline."""
+    """Triangles (m, 3) of a surface; a quadrilateral becomes two, within its outline."""
     found = [np.empty((0, 3), np.int64)]
     for cells in mesh.cells:
         nodes = cells.nodes
