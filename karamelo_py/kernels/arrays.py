@@ -267,6 +267,9 @@ CLOCK = np.dtype(
         ("last_dt", np.float64),  # of the last step; of the present one before there was any
         ("kick", np.float64),  # how long the forces act: between the middles of the two steps
         ("first_kick", np.float64),  # that of the first step, in steps
+        ("contact_dt", np.float64),  # the step that contact is as stiff as: see kernels.clock
+        ("contact_kick", np.float64),  # how long forces would act in such steps
+        ("last_contact_dt", np.float64),
         ("rate", np.float64),  # of the fastest point, c + max |v_i - common_i|
         ("common", np.float64, (1, 3)),  # velocity that speeds are measured from
         ("weight", np.float64),  # of what all drift by in that: 1, with which `common` is 0

@@ -48,6 +48,10 @@ def common_velocity(kin: Tag, clock: Any, like: Number) -> tuple:
 NEXT_TO_NOTHING = 1e-9  # of a step
 ROUNDING = 1e-6  # of a step: what additions of a million steps may be off
 
+# Contact is as stiff as a step allows. Where steps fall at once, as by set_dt, the step that it is
+# as stiff as falls by this share of the time: springs under load stiffen over several periods.
+FOLLOWING = 0.01
+
 # Points that cross cells add energy to a body, by so much per cell, and the more the longer
 # the step. Until they have gone so far, in cells, a scene takes the steps of bodies at rest.
 STILL = 0.25
@@ -61,7 +65,8 @@ def choose_dt(control: Control) -> None:
 
     The last two steps are shortened alike. Where velocities are mapped or prescribed, a step takes
     impulses that do not vanish with its length: in a last step that is a small part of the others,
-    forces (impulses over dt) would be many times what they are before.
+    forces (impulses over dt) would be many times what they are before. Contact with a stiffness of
+    m/dt^2 is that of a whole step: springs under load that became stiffer would throw bodies back.
     """
     clock = control.clock[0]
     if clock.weight > 1:
@@ -72,6 +77,7 @@ def choose_dt(control: Control) -> None:
     if clock.weight != 1 and clock.speed * dt > STRIDE:
         dt = STRIDE / clock.speed
     dt = clock.fixed_dt if clock.fixed_dt > 0 else dt
+    whole = dt
     limit = min(limit, clock.heat_limit)
     clock.limit = limit
     clock.over_limit = clock.over_limit + 1 if dt > limit else 0
@@ -85,9 +91,13 @@ def choose_dt(control: Control) -> None:
     control.values[DT] = dt
     if control.values[TIMESTEP] == 0:
         clock.last_dt = dt
+        clock.last_contact_dt = whole
     clock.kick = 0.5 * (clock.last_dt + dt)
+    clock.contact_dt = max(whole, clock.last_contact_dt - FOLLOWING * dt)
+    clock.contact_kick = 0.5 * (clock.last_contact_dt + clock.contact_dt)
     if control.values[TIMESTEP] == 0:
         clock.kick *= clock.first_kick
+        clock.contact_kick *= clock.first_kick
     if clock.kept_by_time > 0:
         clock.kept = clock.kept_by_time ** (dt / clock.limit)
 
@@ -99,6 +109,7 @@ def finish(control: Control) -> None:
     clock.now = 1 - clock.now
     dt = control.values[DT]
     clock.last_dt = dt
+    clock.last_contact_dt = clock.contact_dt
     time = control.values[TIME] + dt
     # Exactly the end, when this step was shortened to reach it.
     control.values[TIME] = clock.end_time if clock.end_time - control.values[TIME] == dt else time

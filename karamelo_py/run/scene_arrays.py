@@ -151,6 +151,7 @@ class SceneArrays:
             {type(one): one.array for one in self.setup.nodes.fields if fields.is_kept(type(one))},
             self.setup.contact,
             float(self.control.clock[0].last_dt),
+            float(self.control.clock[0].last_contact_dt),
             float(self.control.clock[0].path),
         )
 

@@ -77,6 +77,8 @@ class View:
     def _take_times(self, control: Any) -> None:
         self.dt = float(control.values[arrays.DT])
         self.kick = float(control.clock[0].kick)
+        self.contact_dt = float(control.clock[0].contact_dt)
+        self.contact_kick = float(control.clock[0].contact_kick)
         self.time = float(control.values[arrays.TIME])
 
     def write_back(self) -> None:
@@ -159,7 +161,7 @@ class NodesView(View):
     A hook writes ``nodes.force += nodes.mass[:, None] * self.gravity``.
     """
 
-    _fields = ("dt", "kick", "time", "index")
+    _fields = ("dt", "kick", "contact_dt", "contact_kick", "time", "index")
 
     def __init__(self, simulation: Any, s: Any, group: Any, stage: int, before_update: bool):
         super().__init__()
@@ -268,7 +270,7 @@ class NodesView(View):
 class PointsView(View):
     """The points of a group, at one stage of a step, in the order of their ids."""
 
-    _fields = ("dt", "kick", "time", "ids", "moved")
+    _fields = ("dt", "kick", "contact_dt", "contact_kick", "time", "ids", "moved")
     ids: np.ndarray
 
     def __init__(self, simulation: Any, ids: np.ndarray, then: bool):

@@ -30,7 +30,7 @@ from karamelo_py.run.checkpoint.parts import PartStates, parts_of
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
-FORMAT, VERSION = "karamelo-py restart", 9
+FORMAT, VERSION = "karamelo-py restart", 10
 OURS = "a file that restart or write_restart of karamelo-py has written"
 CONTENT = (
     "within", "statements", "values of statements", "presets", "variables", "runs", "scene",

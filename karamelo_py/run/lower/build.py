@@ -59,6 +59,7 @@ class State(NamedTuple):
     node_fields: dict[type, np.ndarray]  # the same of the nodes of these grids, (nodes, components)
     contact: NamedTuple  # how solids touch, with what it remembers
     last_dt: float  # the step that the velocities belong to the middle of
+    last_contact_dt: float
     path: float  # how far points have gone
 
 
@@ -165,7 +166,9 @@ def lower(
     firsts = [solid.first_id for solid in hub.solids.values()]
     control = arrays.new_control(hub.values.array, firsts, kin.dimension)
     clock = control.clock[0]
-    clock.last_dt, clock.path = (previous.last_dt, previous.path) if previous else (0.0, 0.0)
+    if previous is not None:
+        clock.last_dt, clock.path = previous.last_dt, previous.path
+        clock.last_contact_dt = previous.last_contact_dt
     clock.spacing = min(lattice.h for lattice in lattices)
     clock.heat_limit = clock.heat_reference = stable_conduction(hub)
     clock.kept = getattr(transfer, "alpha", 0)

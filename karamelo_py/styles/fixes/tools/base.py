@@ -97,11 +97,12 @@ def penalty(
     2021).
     """
     mass = points.mass.astype(float)
-    push = (mass * np.maximum(depth, 0) / (points.dt * points.kick))[:, None] * normal
+    stiffness = mass / (points.contact_dt * points.contact_kick)
+    push = (stiffness * np.maximum(depth, 0))[:, None] * normal
     slip = velocity - points.velocity.astype(float)
     slip = slip - (slip * normal).sum(axis=1, keepdims=True) * normal
     speed = np.linalg.norm(slip, axis=1)
-    rub = np.minimum(mu * np.linalg.norm(push, axis=1), mass * speed / points.kick)
+    rub = np.minimum(mu * np.linalg.norm(push, axis=1), mass * speed / points.contact_kick)
     return push + slip * np.divide(rub, speed, out=np.zeros_like(speed), where=speed > 0)[:, None]
 
 

@@ -39,6 +39,9 @@ class ContactMinimizePenetrationPlane(PlaneTool):
     free point out within one step. Friction is mu times that, against the slip, and at most stops
     it (de Vaucorbeil & Nguyen 2021). A moving plane does not drag.
 
+    dt is the step of the scene. A step that is shorter to end a run on time leaves it unchanged.
+    Where steps fall at once, as by set_dt, it falls by 1 % of the time.
+
     Publishes the force on the solid as ID_x, ID_y, ID_z.
 
     See Also

@@ -52,6 +52,9 @@ class ContactSurface(ToolFix):
     pulls. Friction is mu times this force, against the slip on the moving region, and at most what
     stops the slip.
 
+    dt is the step of the scene. A step that is shorter to end a run on time leaves it unchanged.
+    Where steps fall at once, as by set_dt, it falls by 1 % of the time.
+
     The force acts in the direction in which the depth falls fastest. A point deeper than a cell, or
     in the middle of a thin region, ends the run. A region does not turn.
 
@@ -141,7 +144,7 @@ class ContactSurface(ToolFix):
             )
         # A spring alone, which takes all penetration out within a step, throws bodies back.
         closing = ((velocity - points.velocity.astype(float)) * normal).sum(axis=1)
-        push = np.where(depth > 0, SOFT * depth + points.dt * closing, 0.0)
+        push = np.where(depth > 0, SOFT * depth + points.contact_dt * closing, 0.0)
         return penalty(points, push, normal, velocity, self.mu)
 
 

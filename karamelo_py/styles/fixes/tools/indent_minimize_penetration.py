@@ -34,6 +34,9 @@ class IndentMinimizePenetration(BallTool):
     p / dt^2. This takes a free point out within one step. Friction is mu times that, against the
     slip, and at most stops it (de Vaucorbeil & Nguyen 2021).
 
+    dt is the step of the scene. A step that is shorter to end a run on time leaves it unchanged.
+    Where steps fall at once, as by set_dt, it falls by 1 % of the time.
+
     Publishes the force on the points as ID_x, ID_y, ID_z and the area of contact as ID_s. Each
     touching point counts as one face of its cube.
 

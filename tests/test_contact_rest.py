@@ -1,0 +1,65 @@
+"""Bodies that rest on a contact stay at rest, however long a step is."""
+
+import numpy as np
+import pytest
+
+WEIGHT = 1000 * 0.2 * 0.2 * 10
+BASE = """
+    base = 0.2
+    method({method})
+    dimension(2, 0, 1, 0, 1, 0.1)
+    region(b, block, 0.4, 0.6, base, base + 0.2)
+    region(q, block, 0.3, 0.7, 0.1, base)
+    material(soft, linear, 1000, 1e5, 0.3)
+    material(stiff, linear, 1000, 4e5, 0.3)
+    solid(b, region, b, 2, soft, 0.1)
+    {more}
+    fix(weight, body_force, all, 0, -10*min(time/0.1, 1))
+    fix(w, {fix})
+    fix(calm, local_damping, all, 0.8*(time < 0.5))
+    compute(Ek, kinetic_energy, all)
+    set_output(1)
+    log_modify(custom, step, dt, time, w_x, w_y, Ek)
+"""
+HELD = "solid(q, region, q, 2, stiff, 0.1)\nregion(low, block, -INF, INF, -INF, 0.1)\n"
+HELD += "group(low, nodes, region, low, all)\nfix(hold, velocity_nodes, low, 0, 0)"
+TOTAL, UPDATED = "tlmpm, FLIP, linear, 0.99", "ulmpm, TPIC, quadratic-spline"
+KINDS = {
+    "surface": (TOTAL, "contact/surface, all, q, 0.3"),
+    "surface-updated": (UPDATED, "contact/surface, all, q"),
+    "plane": (TOTAL, "contact/minimize_penetration/plane, b, 0, base, 0, 0, 1, 0, 0.3"),
+    "ball": (TOTAL, "indent/minimize_penetration, all, sphere, 5, 0.5, -4.8, 0, 0, 0, 0, 0"),
+    "points": (TOTAL, "contact/minimize_penetration, b, q", HELD),
+}
+
+
+def scene(kind: str, *lines: str) -> str:
+    method, fix, *more = KINDS[kind]
+    return BASE.format(method=method, fix=fix, more="".join(more)) + "\n".join(lines)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_shortened_step_leaves_bodies_at_rest(run_interpreted, kind):
+    """A run that ends on time takes two shorter steps: the force stays the weight within 1 %.
+
+    Springs as stiff as these steps threw the block back, with up to twice its weight.
+    """
+    log = run_interpreted(scene(kind, "run_time(0.6)", *["run_time(0.0113)"] * 3)).log
+    short = log.dt < 0.97 * np.median(log.dt)
+    assert short[-8:].any()
+    before = (log.Time > 0.5) & (log.Time < log.Time[short & (log.Time > 0.5)][0])
+    after = log.Time >= log.Time[before][-1]
+    assert log.w_y[after] == pytest.approx(log.w_y[before][-1], rel=0.01)
+    assert log.w_y[after] == pytest.approx(WEIGHT, rel=0.02)
+    assert log.Ek[after].max() <= log.Ek[before].max()
+
+
+@pytest.mark.parametrize("kind", ["surface", "plane"])
+def test_a_smaller_step_leaves_bodies_at_rest(run_interpreted, kind):
+    """Half the step means contact four times as stiff, by degrees: at once, four times the force.
+
+    A tenth is what the block still moves by, whose period on the softest of them is 40 steps.
+    """
+    log = run_interpreted(scene(kind, "set_dt(0.004)", "run(150)", "set_dt(0.002)", "run(150)")).log
+    after = log.Step >= 150
+    assert log.w_y[after] == pytest.approx(WEIGHT, rel=0.1)
