@@ -204,7 +204,7 @@ def test_a_thin_part_that_leans_has_its_area(tmp_path, thickness, tolerance):
     plate = slanted(hub, tmp_path, 5, thickness)
     solid = hub.solid("s", plate, ppc=1, points="cut")
     assert solid.volume0.sum() == pytest.approx(5 * thickness, rel=tolerance)
-    assert not hub.warnings
+    assert not [said for said in hub.warnings if "thinner" in said]
 
 
 @pytest.mark.parametrize("style", [Union, Difference])

@@ -28,6 +28,7 @@ from karamelo_py.run.timestep import ruling_limit, stable_step, words_of_own_ste
 from karamelo_py.scene import boundary
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.plugins import attributed
+from karamelo_py.scene.solid import words_of_volumes
 from karamelo_py.script.errors import Pause, Quit, ScriptError, render_message
 
 PATIENCE = 0.3  # seconds between two looks, about: for Ctrl-C and the progress bar
@@ -347,6 +348,7 @@ class Runner:
             {
                 "method": hub.update.words,
                 "points": int(simulation.present.sum()),
+                **({"volumes": volumes} if (volumes := words_of_volumes(hub)) else {}),
                 "nodes": hub.fields.node_count,
                 "nodes per point": support(simulation.setup.basis, simulation.setup.kin),
                 "bytes per particle": bytes_per_point(simulation),

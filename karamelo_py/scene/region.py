@@ -74,6 +74,16 @@ class Region(Named):
         """True if it, or one of its parts, is made of lines or surfaces, which nothing is in."""
         return any(part.flat for part in self.parts)
 
+    @property
+    def from_file(self) -> bool:
+        """True if it, or one of its parts, has its shape from a file."""
+        return any(part.from_file for part in self.parts)
+
+    @property
+    def volume(self) -> float | None:
+        """Length, area or volume of what lies in the domain, None where that is not known."""
+        return None
+
     def contains(self, x: np.ndarray) -> np.ndarray:
         """Test which positions `x` (n, >= dimension) lie in the shape, faces included: (n,) bool.
 

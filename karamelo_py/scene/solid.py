@@ -39,6 +39,9 @@ class Solid(Named):
 
     catalogue = "solids"
     source = "region"  # the argument that says where the points are, for messages
+    # Of its points, and of the shape in a file that they fill; per radian and radius where the
+    # domain is axisymmetric.
+    volumes: tuple[float, float] | None = None
     warm = False  # its points are given temperatures of their own
 
     def __init__(
@@ -179,6 +182,13 @@ def solid_with(hub: Scene, number: int) -> Solid:
 def named(hub: Scene, number: int) -> str:
     """Return the name of a point for messages."""
     return f"point {number + 1} of solid '{solid_with(hub, number).id}'"
+
+
+def words_of_volumes(hub: Scene) -> str:
+    """Say how much of the shapes from files the points of solids fill; nothing without such."""
+    known = {s.id: s.volumes for s in hub.solids.values() if s.volumes}
+    words = [f"{name} {own:.6g} of {whole:.6g} in its file" for name, (own, whole) in known.items()]
+    return ", ".join(words[:4]) + (f" and {len(words) - 4} more solids" if len(words) > 4 else "")
 
 
 def own_grids(hub: Scene) -> bool:

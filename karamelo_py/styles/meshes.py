@@ -18,6 +18,16 @@ from karamelo_py.scene.region import EXTERIOR, Region
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import ScriptError
 
+# A shape of fewer cells, or so many times longer than the domain, may be in other units.
+CELLS, OUT = 3, 20
+UNITS = {
+    1e-3: "a file in millimetres, a script in metres",
+    1e3: "a file in metres, a script in millimetres",
+    0.0254: "a file in inches, a script in metres",
+    25.4: "a file in inches, a script in millimetres",
+    1 / 0.0254: "a file in metres, a script in inches",
+    1 / 25.4: "a file in millimetres, a script in inches",
+}
 CURVED = 0.01  # of the length of an edge: of a circle with 80 elements
 
 
@@ -30,10 +40,33 @@ def _tell_of_curved_edges(hub: Hub, file: MeshFile, bulge: float) -> None:
         )
 
 
+def _tell_of_units(hub: Hub, file: MeshFile, lo: np.ndarray, hi: np.ndarray) -> None:
+    """Warn of a shape that is much larger or smaller than the domain, as in other units."""
+    domain, used = require_domain(hub), slice(len(lo))
+    size, room = float((hi - lo).max()), float((domain.hi - domain.lo)[used].max())
+    if CELLS * (domain.h or 0.0) < size < OUT * room:
+        return
+    for factor, units in UNITS.items():
+        fits = domain.contains(np.array([lo, hi]) * factor).all()
+        if fits and size * factor > max(room / OUT, CELLS * (domain.h or 0.0)):
+            hub.warn(
+                f"{file.name} is {size:.4g} long, the domain {room:.4g}: with lengths times "
+                f"{factor:.4g} it would fit ({units})",
+                hint="one unit of length: scale the file, or write the script in its units",
+            )
+            return
+
+
 class Enclosed(Region):
     """Base of regions within a `skin`."""
 
     skin: Skin
+    from_file = True
+
+    @property
+    def volume(self) -> float | None:
+        whole = (self.lo == self.box_lo).all() and (self.hi == self.box_hi).all()
+        return self.skin.volume if whole else None
 
     @property
     def aligned(self) -> bool:
@@ -99,6 +132,7 @@ class MeshRegion(Enclosed):
         flat = parts[0].shape.dimension < dimension
         faces = flat_faces(parts) if flat else outer_faces(parts)
         lo, hi = faces.min(axis=(0, 1)), faces.max(axis=(0, 1))
+        _tell_of_units(hub, file, lo, hi)
         super().__init__(hub, lo, hi, exterior=exterior == EXTERIOR)
         # Meshes are written with fewer digits than numbers have.
         tolerance = max(self.tolerance, RELATIVE_TOLERANCE * float((hi - lo).max()))
@@ -158,6 +192,7 @@ class STL(Enclosed):
         points = np.asarray(mesh.points, float)
         used = points[np.unique(triangles)]
         lo, hi = used.min(axis=0), used.max(axis=0)
+        _tell_of_units(hub, file, lo, hi)
         super().__init__(hub, lo, hi, exterior=exterior == EXTERIOR)
         tolerance = max(self.tolerance, 2 * _SINGLE * float(np.abs(used).max()))
         self.skin = skin_of(points, triangles.astype(np.int64), tolerance)
@@ -225,6 +260,8 @@ class MeshSolid(Solid):
             [x.reshape(-1, domain.dimension) for x in corners if len(x)]
             or [part.corners[:, 0] for part, _, _ in found]
         )
+        _tell_of_units(hub, file, reach.min(axis=0), reach.max(axis=0))
+        self.volumes = float(volume[kept].sum()), float(volume.sum())
         mixed = len(found) > 1
         self.put(
             hub,

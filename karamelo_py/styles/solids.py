@@ -21,6 +21,7 @@ from karamelo_py.scene.solid import Solid, own_grids
 from karamelo_py.scene.tables import FileColumns
 from karamelo_py.script.errors import ScriptError
 
+MISSED = 0.01  # of the volume of a shape in a file
 MANY = 10  # points per cell and direction that nobody needs
 
 
@@ -40,9 +41,10 @@ class RegionSolid(Solid):
     points
         ``regular``: at equal distances. ``gauss``: at the Gauss points of the cell, with their
         weights as volumes. ``cut``: at equal distances, with boxes that the edge of the region
-        cuts. Left out: at equal distances, with two exceptions. With ``ppc`` 3 points stand at the
-        Gauss points with equal volumes, as in Karamelo, unless the basis has domains (ugimp,
-        cpgimp, cpdi). In ulmpm/contacts, regions with curved or leaning faces are cut.
+        cuts. Left out: at equal distances, with three exceptions. With ``ppc`` 3 points stand at
+        the Gauss points with equal volumes, as in Karamelo, unless the basis has domains (ugimp,
+        cpgimp, cpdi). Regions of files (mesh, stl) are cut, unless the basis has domains. In
+        ulmpm/contacts, regions with curved or leaning faces are cut.
 
     Example
     -------
@@ -87,9 +89,12 @@ class RegionSolid(Solid):
         self.region = region
         self.ppc = ppc
         corners = {"corners", "half_edges"} & {*getattr(hub.update.method.basis, "shape", ())}
-        # Contact feels the steps of whole boxes.
-        if points is None and hub.update.method.fields_per_solid:
-            points = None if corners or region.unknown or region.aligned else "cut"
+        method = hub.update.method
+        # Contact feels the steps of whole boxes; shapes from files have a mass that is known.
+        stepped = method.fields_per_solid and not region.aligned
+        drawn = region.from_file and not method.regular_points
+        if points is None and (stepped or drawn) and not (corners or region.unknown):
+            points = "cut"
         self.cut = points == "cut"
         lattice = lattice_of(region, domain, self.h, own=own_grids(hub))
         if points is None and hub.update.method.regular_points:
@@ -110,12 +115,28 @@ class RegionSolid(Solid):
         room = partial(room_for_points, hub, self.first_id, domain.dimension, state)
         placement = fill(region, domain, lattice, ppc, points, room)
         self.put(hub, placement, may_be_empty=region.unknown)
+        self.volumes = self._volumes(placement)
         if placement.missed:
             hub.warn(
                 f"parts of {self.described()} are thinner than points=cut sees, "
                 f"{placement.missed:.3g}: their mass may be wrong or missing",
                 hint="smaller cells, or more points per cell",
             )
+        elif self.volumes and abs(self.volumes[0] / self.volumes[1] - 1) > MISSED:
+            self._warn_of_volume(hub, *self.volumes)
+
+    def _volumes(self, placement: Placement) -> tuple[float, float] | None:
+        """Return the volume of the points, and of the shape in a file that they fill."""
+        whole = self.region.volume
+        own = float(np.sum(np.broadcast_to(placement.volume, self.count)))
+        return None if whole is None else (own, whole)
+
+    def _warn_of_volume(self, hub: Hub, own: float, whole: float) -> None:
+        hub.warn(
+            f"the points have {abs(own / whole - 1):.2%} {'more' if own > whole else 'less'} "
+            f"volume, and mass, than {self.described()}: {own:.4g} for {whole:.4g}",
+            hint="smaller cells" if self.cut else "points=cut, or smaller cells",
+        )
 
     def described(self) -> str:
         return f"region '{self.region.id}'"

@@ -21,6 +21,7 @@ from karamelo_py.run.timestep import ruling_limit, stable_step, words_of_own_ste
 from karamelo_py.scene import machine_memory
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
+from karamelo_py.scene.solid import words_of_volumes
 
 LOADED = 24 << 20  # bytes of compiled loops and of what steps and output import, as measured
 
@@ -39,6 +40,8 @@ def report(hub: Hub, end_time: float = inf) -> None:
     say(f"method         {hub.update.words}")
     say(f"precision      {hub.settings.precision}")
     say(f"points         {simulation.count} in {len(hub.solids)} solid(s)")
+    if volumes := words_of_volumes(hub):
+        say(f"volumes        {volumes}")
     lattices = hub.lattices
     shapes = ", ".join(" x ".join(map(str, lattice.shape)) for lattice in lattices[:8])
     more = ", ..." if len(lattices) > 8 else ""
