@@ -2,11 +2,12 @@
 const ORDER = [
   [/^howto\//, 8],
   [/^(choose|messages\/index)$/, 12],
-  [/^(getting-started|materials|units|versions|tutorial)$/, 4],
+  [/^limits$/, 10],
+  [/^(getting-started|materials|units|tutorial)$/, 4],
   [/^reference\/generated\/(command|fix|dump|material)\//, 4],
   [/^(messages|gallery)\/generated\//, -6],
   [/^(atlas|balance|comparison|defaults|verification|[\w-]+-measurements|study-verdicts)$/, -8],
-  [/^house/, -20],
+  [/^(house|versions)/, -20],
 ];
 
 var Scorer = {

@@ -25,7 +25,7 @@ WORDS = {
     "reference/generated/command/write_restart": "resume continue checkpoint save state",
     "reference/generated/command/dt_factor": "time step too large Courant CFL unstable smaller",
     "reference/generated/command/set_dt": "time step too large Courant CFL fixed constant timestep",
-    "reference/generated/command/boundary": "boundary condition edge of domain outflow periodic",
+    "reference/generated/command/boundary": "boundary condition edge of domain outflow",
     "reference/generated/command/units": "units SI mm unit system conversion",
     "reference/generated/command/anti_volumetric_locking": "B-bar F-bar locking incompressible",
     "reference/generated/command/dump": "output export save results VTK ParaView OVITO HDF5",
