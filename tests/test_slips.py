@@ -1,9 +1,11 @@
 """Slips in a script that runs as it stands: told before its first step."""
 
+import numpy as np
 import pytest
 from hubs import SmallHub
 from scenes import block
 
+from karamelo_py.scene import placement
 from karamelo_py.scene.lattice import Lattice
 from karamelo_py.scene.machine_memory import Room
 from karamelo_py.scene.placement import SAMPLE, fill
@@ -208,6 +210,20 @@ def test_points_without_memory_are_not_counted():
     with pytest.raises(ScriptError, match=rf"{said}; this machine has 3.73 GiB in all"):
         fill(disk, hub.domain, lattice, 2, room=lambda: room)
     assert sum(looked) == SAMPLE
+
+
+def test_many_points_a_cell_without_memory_are_refused_at_once(monkeypatch):
+    """A thin ring with 4000^2 points a cell: known before the pattern of a cell is made."""
+    monkeypatch.setattr(placement, "cell_pattern", None)
+    hub = SmallHub()
+    ring = hub.region("r", Cylinder, 0.1, 0, 0.2)
+    disk = ring.inside
+    ring.inside = lambda x: disk(x) & (np.hypot(x[:, 0] - 0.1, x[:, 1]) > 0.195)
+    lattice = Lattice(2, hub.domain.lo, hub.domain.hi, 0.05)
+    # pi (0.2^2 - 0.195^2) (4000/0.05)^2 = 4.0e7 points
+    room = Room(whole=3.6e9, of_one=100, already=0, single=False)
+    with pytest.raises(ScriptError, match=r"the scene has some 3.[6-9]\d*e\+07 points with these"):
+        fill(ring, hub.domain, lattice, 4000, room=lambda: room)
 
 
 def test_a_variable_wins_over_a_first_coordinate(run_interpreted):

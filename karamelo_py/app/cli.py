@@ -116,6 +116,8 @@ def _dispatch(arguments: list[str]) -> int:
     if arguments[0] in ("run", "check"):
         arguments = _one_file(arguments)
     parser, commands = _parser(arguments[0])
+    choice = commands.choices.get(arguments[0])
+    arguments = _values_below_zero(arguments, choice.options() if choice else [])
     try:
         options, surplus = parser.parse_known_args(arguments)
     except SystemExit:  # argparse has shown what was asked for
@@ -166,6 +168,21 @@ def _one_file(arguments: list[str]) -> list[str]:
         else:
             chosen.append(word)
     return chosen
+
+
+def _values_below_zero(arguments: list[str], options: list[str]) -> list[str]:
+    """Put a blank before values such as -1e6, and -E/2 of a variable: argparse sees options."""
+
+    def is_value(k: int) -> bool:
+        number = re.match(r"-\.?\d", arguments[k]) is not None
+        return number or (
+            k > 1
+            and arguments[k][:1] == "-"
+            and arguments[k - 2] in VARIABLE
+            and arguments[k].partition("=")[0] not in options
+        )
+
+    return [f" {word}" if is_value(k) else word for k, word in enumerate(arguments)]
 
 
 def _surplus(arguments: list[str], words: list[str], parser: CommandLine) -> ScriptError:

@@ -21,7 +21,7 @@ class _Variable(argparse.Action):
                     f"-var {name} is given twice, {value} and {values[1]}",
                     expected="each variable once",
                 )
-        setattr(namespace, self.dest, [*given, values])
+        setattr(namespace, self.dest, [*given, (values[0], values[1].strip())])
 
 
 def add_variables(parser: argparse.ArgumentParser, text: str) -> None:

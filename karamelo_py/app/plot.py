@@ -10,6 +10,7 @@ import numpy as np
 
 from karamelo_py.output.files import picture_format
 from karamelo_py.output.plots import PlottedCurve, draw
+from karamelo_py.script import reading
 from karamelo_py.script.errors import ScriptError, unknown
 from karamelo_py.script.terms import number_of
 
@@ -22,11 +23,11 @@ is explained by karamelo-py help command plot."""
 def read_text(path: Path, expected: str | None = None) -> str:
     """Read a file of an earlier run; nothing where it is no text."""
     try:
-        return path.read_text(encoding="utf-8-sig")
+        return reading.read_text(path, largest=None)
     except OSError as error:
         reason = error.strerror or error
         raise ScriptError(f"cannot read {path}: {reason}", expected=expected) from None
-    except UnicodeDecodeError:
+    except ValueError:
         return ""
 
 
@@ -38,7 +39,8 @@ def read_rows(path: Path) -> list[dict[str, float]]:
     """
     names: list[str] = []
     rows = []
-    lines = read_text(path).splitlines()
+    # What is not ended by a line end is cut: of 2.4e+10 there may be 2.4.
+    lines = read_text(path).rpartition("\n")[0].splitlines()
     for cells in filter(
         None, csv.reader(lines) if path.suffix == ".csv" else map(str.split, lines)
     ):

@@ -79,6 +79,8 @@ class InputFile:
         if cls.endings is not None:
             files = [p for p in files if p.suffix.lower() in cls.endings]
         what = "is a folder, not a file" if here.is_dir() else "does not exist"
+        if here.exists() and not here.is_dir():
+            what = "is a pipe or a device, not a file"
         expected = "a file in the current folder or beside the script"
         hint = meant(here.name, [p.name for p in files])
         message = f"the file {name} {what}"

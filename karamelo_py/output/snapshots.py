@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from karamelo_py.output.hdf5_file import reading
 from karamelo_py.output.units import LENGTHS, Units
 from karamelo_py.script.errors import ScriptError
 
@@ -28,13 +29,17 @@ class Snapshot(NamedTuple):
 def read(path: Path, first: int = 0) -> Iterator[Snapshot]:
     """Read the snapshots in a file, in their order from the `first`; an error if it is no dump."""
     reader = {".h5": _hdf5, ".hdf5": _hdf5, ".vtu": _vtu, ".pvd": _pvd}.get(path.suffix, _lammps)
+    if path.exists() and not path.is_file():
+        what = "a folder" if path.is_dir() else "a pipe or a device"
+        raise ScriptError(f"{path} is {what}", expected="a file of dump particle, hdf5 or vtk")
     try:
         yield from reader(path, first)
-    # meshio ends the program over a file that it cannot read.
-    except (OSError, ValueError, KeyError, ElementTree.ParseError, SystemExit) as error:
+    except Exception as error:  # readers have many names for a file that is damaged
         reason = getattr(error, "strerror", None)
         raise ScriptError(
-            f"{path} cannot be read: {reason}" if reason else f"{path} is not a dump of points",
+            f"{path} cannot be read: {reason}"
+            if reason
+            else f"{path} is not a dump of points, or it is damaged",
             expected="a file that dump particle, hdf5 or vtk has written",
         ) from error
 
@@ -72,10 +77,7 @@ def _lammps(path: Path, first: int) -> Iterator[Snapshot]:
 
 
 def _hdf5(path: Path, first: int) -> Iterator[Snapshot]:
-    import h5py
-
-    # Also one that a killed program has left, or a running one writes.
-    with h5py.File(path, "r", libver="latest", swmr=True, locking=False) as root:
+    with reading(path) as root:
         names = [name for name in root if root[name].ndim == 2]
         moments = zip(root["step"][first:], root["time"][first:], strict=True)
         units = {name: root[name].attrs.get("units", "") for name in (*names, "time")}
@@ -95,7 +97,7 @@ def _pvd(path: Path, first: int) -> Iterator[Snapshot]:
 def _vtu(path: Path, _: int, time: float = np.nan) -> Iterator[Snapshot]:
     import meshio
 
-    mesh = meshio.read(path)
+    mesh = meshio.vtu.read(path)  # meshio.read would end the program
     number = re.search(r"(\d+)\D*$", path.stem)
     columns = dict(zip("xyz", mesh.points.T, strict=True)) | mesh.point_data
     lo, hi = mesh.points.min(axis=0), mesh.points.max(axis=0)

@@ -1,6 +1,5 @@
 """Placement of points in a filled region: cell by cell, the same number in each."""
 
-import itertools
 import math
 from bisect import bisect_right
 from collections.abc import Callable
@@ -17,6 +16,7 @@ from karamelo_py.script.errors import ScriptError
 
 MAX_POINTS = 2**31 - 1
 SAMPLE = 4096  # places of a region that are looked at before all are
+LOOKS = 9  # twice as many each time: a million at last
 FEW = 1_000_000  # points that memory has room for everywhere, whatever their fields
 # Beyond this many candidates the points outside the domain are no longer counted, only mentioned.
 _MAX_COUNTED = 20_000_000
@@ -166,9 +166,9 @@ def cell_pattern(
 
 
 def _in_order(along: np.ndarray, dimension: int) -> np.ndarray:
-    if dimension == 3:
-        return np.array([(x, y, z) for z, x, y in itertools.product(along, repeat=3)])
-    return np.array(list(itertools.product(along, repeat=dimension)))
+    grid = np.stack(np.meshgrid(*[along] * dimension, indexing="ij"), axis=-1)
+    points = grid.reshape(-1, dimension)
+    return np.ascontiguousarray(points[:, [1, 2, 0]]) if dimension == 3 else points
 
 
 def fill(
@@ -228,18 +228,18 @@ def fill(
     open_lo = np.where(np.isinf(lo) | at_side[0], ends[0] - domain.tolerance, -np.inf)
     open_hi = np.where(np.isinf(hi) | at_side[1], ends[1] + domain.tolerance, np.inf)
 
+    there = room() if room is not None and inner > FEW else None
+    if there is not None:
+        least = _least(region, domain, h / ppc, there.most)
+        if least > there.most:
+            raise there.refused(least)
+        there.tell(least)
     places, sizes = (of_unit * h for of_unit in cell_pattern(ppc, dimension, rule))
     even = sizes.ndim == 1
     x0 = Filled([int(i) for i in first], [int(i) for i in last], corner, h, places)
     numbers: list[np.ndarray] = []  # which point of the pattern each one is
     left: list[tuple[np.ndarray, Pieces]] = []
     outside = 0.0
-    there = room() if room is not None and inner > FEW else None
-    if there is not None:
-        least = _least(region, domain, h / ppc)
-        if least > there.most:
-            raise there.refused(least)
-        there.tell(least)
     for begin, end in x0.chunks:
         x = x0.candidates(begin, end)
         if rule == "cut":
@@ -271,15 +271,25 @@ def fill(
     return placed._replace(volume=sizes.prod(axis=1), half_size=sizes / 2)
 
 
-def _least(region: Region, domain: Domain, spacing: float) -> float:
-    """Number of points of this spacing that a region has at least, by some of its places."""
+def _least(region: Region, domain: Domain, spacing: float, most: float) -> float:
+    """Count the points of this spacing that a region has at least, by some of its places.
+
+    More places are looked at until they tell whether there are more points than `most`.
+    """
     used = slice(0, domain.dimension)
     lo, size = region.lo[used], region.hi[used] - region.lo[used]
-    x = lo + size * np.random.default_rng(1).random((SAMPLE, domain.dimension))
-    share = float(np.mean(region.inside(x)))
-    # Four times what its mean is uncertain by.
-    least = share - 4 * math.sqrt(max(share * (1 - share), 1 / SAMPLE) / SAMPLE)
-    return least * math.prod((size / spacing).tolist())
+    places, inside, whole = 0, 0, math.prod((size / spacing).tolist())
+    random = np.random.default_rng(1)
+    for _ in range(LOOKS):
+        x = lo + size * random.random((max(SAMPLE, places), domain.dimension))
+        places, inside = places + len(x), inside + int(region.inside(x).sum())
+        share = inside / places
+        # Four times what its mean is uncertain by.
+        unsure = 4 * math.sqrt(max(share * (1 - share), 1 / places) / places)
+        least = (share - unsure) * whole
+        if least > most or (share + unsure) * whole <= most:
+            break
+    return least
 
 
 def _cut_off(

@@ -11,6 +11,7 @@ from karamelo_py.language.kinds import TableFile
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
 from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.reading import read_text
 from karamelo_py.script.terms import number_of
 
 
@@ -41,7 +42,12 @@ def read_table(path: Path) -> dict[str, np.ndarray]:
     Numbers are separated by commas, semicolons or blanks; a line that begins with # is a comment.
     """
     rows = []
-    for number, line in enumerate(path.read_text(encoding="utf-8-sig").splitlines(), 1):
+    try:
+        lines = read_text(path).splitlines()
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise ScriptError(f"{path} cannot be read: {reason}", argument="file") from None
+    for number, line in enumerate(lines, 1):
         if line.strip() and not line.lstrip().startswith("#"):
             cells = re.split(r"\s*[,;\t]\s*" if re.search("[,;\t]", line) else r"\s+", line.strip())
             rows.append((number, [cell.strip('" ') for cell in cells]))

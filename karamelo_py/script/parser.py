@@ -6,12 +6,11 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from karamelo_py.script import grammar, mistakes, syntax
+from karamelo_py.script import grammar, mistakes, reading, syntax
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.syntax import Mistake
 
 _SINGLE_QUOTED = re.compile(r"'([^'\"\n]*)'?")
-_LARGEST_SCRIPT = 100_000_000
 # What programs write beside scripts.
 _WRITTEN = (
     *(".png", ".pdf", ".svg", ".gif", ".mp4", ".gz", ".bin", ".h5", ".vtu", ".pvd", ".csv", ".txt"),
@@ -22,11 +21,9 @@ _WRITTEN = (
 def read_script(path: Path) -> str:
     """Read the text of a script file."""
     try:
-        if path.is_dir():
-            raise ScriptError(f"{path} is a folder", expected="the name of a script")
-        if path.stat().st_size > _LARGEST_SCRIPT:
-            raise ScriptError(f"{path} is too large for a script", expected="at most 100 MB")
-        data = path.read_bytes()
+        return reading.read_text(path)
+    except IsADirectoryError:
+        raise ScriptError(f"{path} is a folder", expected="the name of a script") from None
     except FileNotFoundError:
         parent = path.parent
         files = parent.iterdir() if parent.is_dir() else ()
@@ -40,16 +37,9 @@ def read_script(path: Path) -> str:
         ) from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise ScriptError(f"{path} cannot be read: {reason}") from None
-    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return data.decode("utf-16", errors="replace")
-    if b"\0" in data:
-        raise ScriptError(f"{path} is not a text file", expected="a script")
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        # Old editors write comments in Latin-1, where every byte is a character.
-        return data.decode("latin-1")
+        raise ScriptError(
+            f"{path} cannot be read: {reason}", expected="a script, which is a text file"
+        ) from None
 
 
 def parse(text: str, file: str = "<text>") -> list[syntax.Statement]:

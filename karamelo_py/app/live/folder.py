@@ -86,7 +86,7 @@ class FolderPage:
         """List the dumps of points of one name, but for numbers: of those with most columns."""
         kinds: dict[str, list[Path]] = {}
         for path in sorted(self.folder.iterdir()):
-            if path.suffix in WHOLE or _is_text_dump(path):
+            if path.is_file() and (path.suffix in WHOLE or _is_text_dump(path)):
                 kinds.setdefault(re.sub(r"\d+", "#", path.name), []).append(path)
         for kind, paths in kinds.items():
             if not self._widths.get(kind):

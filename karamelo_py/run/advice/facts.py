@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import cached_property
 from itertools import chain
 from math import isfinite, pi, sqrt
@@ -14,6 +15,8 @@ from karamelo_py.run import timestep
 from karamelo_py.run.body_motion import BodyMotion, Noise, drift_of, held, motions, turn_of
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.plugins import attributed, foreign_parts
+from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.parser import read_script
 
 TURN = 0.3  # angle, in radian, beyond which a scene is said to turn
 
@@ -237,7 +240,10 @@ class SceneFacts:
 def script_text(hub: Hub) -> str:
     """Read all files of the script, without comments."""
     files = dict.fromkeys(getattr(hub.interpreter, "files", []))
-    lines = [line for path in files for line in path.read_text("utf-8").splitlines()]
+    lines: list[str] = []
+    for path in files:
+        with suppress(ScriptError):  # the file may be gone by now
+            lines += read_script(path).splitlines()
     return "\n".join(line.partition("#")[0] for line in lines)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from karamelo_py.output.fields import PIECE
 from karamelo_py.output.files import whole
+from karamelo_py.output.hdf5_file import reading
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.dumps.base import OfNodes, OfPoints, TableDump, TableRows
 
@@ -85,20 +86,18 @@ class Hdf5Dump(TableDump):
         They are written once more, as they were the first time, so that the bytes are the same. A
         file that a killed program was writing can be read, not written to.
         """
-        import h5py
-
         path, count = self.path(), self._snapshots
         if count == 0 or self.one_file_per_step:
             return
         again = path.with_name(f"{path.name}.again")
         try:
-            with h5py.File(path, "r", libver="latest", swmr=True, locking=False) as old:
+            with reading(path) as old:
                 if len(old["step"]) < count:
                     raise OSError
                 for k in range(count):
                     self._add(again, k, self._past(old, k))
             os.replace(again, path)
-        except (OSError, KeyError, ScriptError):
+        except (OSError, RuntimeError, KeyError, ValueError, ScriptError):
             again.unlink(missing_ok=True)
             self.warn_of_absence()
             self._snapshots = 0

@@ -17,6 +17,7 @@ from karamelo_py.points.laws.strengths.hardening import flow_stress, radial_retu
 from karamelo_py.points.laws.temperatures import temperature_or
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
+from karamelo_py.script.reading import read_text
 
 
 class Tabulated(NamedTuple):
@@ -68,9 +69,9 @@ def _points(curve: tuple) -> np.ndarray:
     if len(curve) == 1 and isinstance(curve[0], Path):
         path = curve[0]
         try:
-            text = path.read_text(encoding="utf-8").replace(",", " ")
+            text = read_text(path).replace(",", " ")
             points = np.loadtxt(text.splitlines(), ndmin=2)
-        except ValueError as error:
+        except (OSError, ValueError) as error:
             raise ScriptError(f"{path}: {error}", argument="curve") from None
         if points.shape[1:] != (2,):
             raise ScriptError(f"{path} has no two numbers in a line", argument="curve")

@@ -1,0 +1,50 @@
+"""Text of files that people write: in any of the usual codes, and of no pipe that never ends."""
+
+import os
+import re
+import stat
+from pathlib import Path
+
+LARGEST = 100_000_000  # bytes of a script or a table
+_CODES = (
+    (b"\xff\xfe\0\0", "utf-32"), (b"\0\0\xfe\xff", "utf-32"), (b"\xff\xfe", "utf-16"),
+    (b"\xfe\xff", "utf-16"),
+)  # fmt: skip
+# What a shell puts in for <(command), and the end of a pipe: whoever names them waits for it.
+_PIPED = re.compile(r"/dev/(?:stdin|fd/\d+)|/proc/self/fd/\d+")
+
+
+def read_bytes(path: Path, largest: int | None = LARGEST) -> bytes:
+    """Read a regular file of at most `largest` bytes (None: of any size).
+
+    Raises OSError where that cannot be read, or is something else.
+    """
+    piped = _PIPED.fullmatch(str(path)) is not None
+    # A pipe that nobody writes to would be waited for.
+    flags = os.O_RDONLY | getattr(os, "O_BINARY", 0)
+    flags |= 0 if piped else getattr(os, "O_NONBLOCK", 0)
+    with open(os.open(path, flags), "rb") as file:
+        mode = os.fstat(file.fileno()).st_mode
+        if stat.S_ISDIR(mode):
+            raise IsADirectoryError(0, "it is a folder")
+        if not stat.S_ISREG(mode) and not (piped and stat.S_ISFIFO(mode)):
+            raise OSError(0, "it is a pipe or a device, not a file")
+        data = file.read() if largest is None else file.read(largest + 1)
+    if largest is not None and len(data) > largest:
+        raise OSError(0, f"it has more than {largest // 1_000_000} MB")
+    return data
+
+
+def read_text(path: Path, largest: int | None = LARGEST) -> str:
+    """Read a text; OSError as `read_bytes`, and ValueError where it is none."""
+    data = read_bytes(path, largest)
+    for mark, code in _CODES:
+        if data.startswith(mark):
+            return data.decode(code, errors="replace")
+    if b"\0" in data:
+        raise ValueError("it is not a text file")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        # Old editors write comments in Latin-1, where every byte is a character.
+        return data.decode("latin-1")

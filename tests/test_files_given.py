@@ -1,0 +1,131 @@
+"""Files that are damaged, are no files, or are written in another code: said, and never a hang."""
+
+import os
+import random
+import sys
+
+import h5py
+import numpy as np
+import pytest
+from scenes import block
+
+from karamelo_py.app.live.folder import FolderPage
+from karamelo_py.app.plot import read_log
+from karamelo_py.output.hdf5_file import reading
+from karamelo_py.output.snapshots import read
+from karamelo_py.script.errors import ScriptError
+from karamelo_py.styles.dumps.hdf5 import _opened_to_append
+
+RUN = block(2, "fix(v, initial_velocity_particles, all, 0.1, 0)", "set_dt(0.001)", "run(2)")
+DUMPS = RUN.replace(
+    "run(2)",
+    "dump(h, all, hdf5, 1, d.h5, x, y, seq)\ndump(v, all, vtk, 1, v.*.vtu, x, y, seq)\n"
+    "dump(t, all, particle, 1, t.*.gz, x, y, seq)\nrun(2)",
+)
+needs_pipes = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pipes in folders")
+
+
+@pytest.fixture
+def dumped(run_interpreted):
+    return run_interpreted(DUMPS).folder
+
+
+@pytest.mark.parametrize("closed", [True, False])
+@pytest.mark.parametrize("name", ["d.h5", "v.2.vtu", "v.pvd", "t.2.gz"])
+def test_a_dump_that_is_cut_or_damaged(dumped, name, closed):
+    """HDF5 reads a file that no program has closed again and again, if it makes no sense."""
+    path = dumped / name
+    if not closed and name == "d.h5":  # as a killed program leaves it
+        file = _opened_to_append(path)
+        content = path.read_bytes()
+        file.close()
+        assert content[11] & 4
+    else:
+        content = path.read_bytes()
+    places, random_ = range(1, len(content) - 1, len(content) // 9 + 1), random.Random(1)
+    for place in places:
+        path.write_bytes(content[:place])
+        with pytest.raises(ScriptError, match=r"is not a dump of points, or it is damaged|read"):
+            list(read(path))
+    for _ in range(40):  # a damaged number cannot be seen, all else is said
+        damaged = bytearray(content)
+        for _ in range(20):
+            damaged[random_.randrange(len(content))] = random_.randrange(256)
+        path.write_bytes(damaged)
+        try:
+            list(read(path))
+        except ScriptError as error:
+            assert error.expected
+
+
+def test_a_file_that_is_being_written(dumped):
+    """What a plain reader of HDF5 refuses, and its reader of running writers knows, is the same."""
+    path = dumped / "d.h5"
+    with _opened_to_append(path) as root:
+        root.flush()
+        left = path.with_name("left.h5")  # as a killed program leaves it
+        left.write_bytes(path.read_bytes())
+    with pytest.raises(OSError, match="already open for write"):
+        h5py.File(left, "r", locking=False)
+    with h5py.File(left, "r", libver="latest", swmr=True, locking=False) as other:
+        expected = other["seq"][()]
+    with reading(left) as found:
+        assert np.array_equal(found["seq"][()], expected)
+        assert len(expected) == 3
+
+
+@pytest.mark.parametrize("code", ["utf-8", "utf-8-sig", "utf-16", "utf-32", "latin-1"])
+def test_a_script_in_any_code(run_interpreted, tmp_path, code):
+    """Also where it is read again for advice, and where a table is meant."""
+    folder = tmp_path / "run"
+    folder.mkdir()
+    table = 'solid(g, points, "größe.csv", rubber, 0.1)\n'
+    (folder / "größe.csv").write_bytes("# Größe\nx, y, volume\n0.05, 0.05, 0.001\n".encode(code))
+    text = "# Größe\n" + RUN.replace("fix(v,", table + "fix(v,")
+    (folder / "in.code").write_bytes(text.encode(code))
+    assert run_interpreted(folder / "in.code").log.Step.tolist() == [0, 1, 2]
+
+
+@needs_pipes
+def test_a_pipe_or_a_device_in_place_of_a_file(run_interpreted, tmp_path):
+    folder = tmp_path / "run"
+    folder.mkdir()
+    os.mkfifo(folder / "pipe")
+    said = "is a pipe or a device, not a file"
+    for name in ("pipe", "/dev/zero"):
+        err = run_interpreted(f"include({name})\n", status=1).err
+        assert f"include: {name if name[0] == '/' else folder / name} cannot be read" in err or (
+            f"{name} cannot be read" in err
+        )
+        assert said in err and "in.script:1:9" in err
+    mesh = "region(r, stl, pipe)\n"
+    assert said in run_interpreted(RUN.replace("run(2)", mesh + "run(2)"), status=1).err
+    assert said in run_interpreted(folder / "pipe", status=1).err
+    with pytest.raises(ScriptError, match="is a pipe or a device"):
+        list(read(folder / "pipe"))
+
+
+@needs_pipes
+def test_a_page_of_a_folder_with_pipes(dumped):
+    for name in ("pipe", "more.h5", "more.gz"):
+        os.mkfifo(dumped / name)
+    page = FolderPage(dumped)
+    page.server.close()
+    assert len(page._states) == 3
+
+
+def test_a_last_row_that_is_cut(tmp_path):
+    """Of 2.4e+10 there may be 2.4: a row counts from its line end on."""
+    (tmp_path / "log.mpm").write_text("Step       E\n0          2.456933215e+10\n50         2.4")
+    assert read_log(tmp_path)["E"].tolist() == [2.456933215e10]
+    (tmp_path / "log.csv").write_text("Step,E\n0,1.5\n50,2.5\n100,3")
+    assert read_log(tmp_path, "log.csv")["E"].tolist() == [1.5, 2.5]
+
+
+@pytest.mark.parametrize("value", ["-1e6", "-.5", "-5", "-(2+3)", "-c/2"])
+def test_a_value_below_zero(run_interpreted, value):
+    """What begins with a sign is no option, unless there is such an option."""
+    out = run_interpreted("c = 4\nY0 = 1\nprint(Y0)\nquit\n", "-var", "Y0", value).out
+    assert out.splitlines()[0].startswith("Y0 = -")
+    err = run_interpreted("Y0 = 1\nquit\n", "-var", "Y0", "--quiet", status=1).err
+    assert "-var: expected 2 arguments" in err
