@@ -8,7 +8,7 @@ from math import inf, sqrt
 from typing import NamedTuple
 
 from karamelo_py.compiler.compile import Weighted, all_lanes, fma, point_function, real, where
-from karamelo_py.compiler.fields import field, forget, increase, load_vector, store, store_from
+from karamelo_py.compiler.fields import field, forget, increase, load, load_vector, store, store_from
 from karamelo_py.compiler.gpu import aligned_record
 from karamelo_py.compiler.loops import many_threads
 from karamelo_py.compiler.tuples import row
@@ -85,8 +85,8 @@ class SetMeanStress(Task):
     """Gather the averaged mean stress of F-bar."""
 
     says = "averaged mean stress"
-    reads = ("x",)
-    writes = ("averaged stress",)
+    reads = ("x", "state", "material")
+    writes = ("averaged stress", "pressure beside")
 
 
 class SeriesTerm(NamedTuple):
@@ -234,7 +234,10 @@ def _updated_strain(task, w, stencil, p, dt, total, totals, fastest):
     law, old, f = visit.deformed_state(w, p)
     growth = frames.spatial_increment(w.frame, w.kin, dl, f)
     load_step = isinstance(task, StrainOfLoadStep) and laws.by_rates(law)
-    state = laws.advance(law, w.kin, old, large(growth) if load_step else growth, dt)
+    if load_step:
+        growth = large(growth)
+    beside = load(field(w.points.fields, visit.PressureBeside), p, (dt,))
+    state = laws.advance_beside(law, w.kin, old, growth, dt, sum(beside))
     store(w.points.state, p, state)
     now = frames.strained(w.frame, w.kin, f, dl)
     store(field(w.points.fields, frames.DeformationGradient), p, now)
@@ -278,6 +281,11 @@ def increment(dt, grad_v):
 @updated.on(SetMeanStress)
 def _updated_average_stress(task, w, stencil, p, dt, total, totals, fastest):
     field(w.points.fields, visit.AveragedStress)[0, p] = total
+    beside = field(w.points.fields, visit.PressureBeside)
+    if beside is not None:
+        law, state = visit.law_and_state(w, p)
+        own = laws.cauchy_stress(law, w.kin, state).mean_of_stretching()
+        beside[0, p] = own - total
     return real(0, dt), fastest
 
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.compiler.compile import fma, index, point_function, prefetch, real
-from karamelo_py.compiler.fields import StepField, SummedField, field, load, load_vector, pair
+from karamelo_py.compiler.fields import Field, StepField, SummedField, field, load, load_vector, pair
 from karamelo_py.compiler.tuples import count_in, record, row
 from karamelo_py.kernels.arrays import Index, Nodes, Number, Places, Points, Tag
 from karamelo_py.points.basis import blank, entry, support
@@ -162,6 +162,10 @@ class AveragedStress(StepField):
     """Mean stress of a point and its surroundings."""
 
 
+class PressureBeside(Field):
+    """Pressure that the last forces had more than the point: averaged less own (F-bar)."""
+
+
 class NodalStress(SummedField):
     """Sum of weight, volume and mean stress, and of weight and volume; then the mean."""
 
@@ -185,6 +189,16 @@ class FBar(NamedTuple):
     in_lanes = True
     point_fields = (VolumeRatio, AveragedStress)
     node_fields = (NodalMean, NodalStress)
+
+
+class FBarOfSoil(FBar):
+    """The same, with laws whose yield surface takes a part of the averaged pressure.
+
+    If it took the point's pressure, soil that dilates less than friction asks for would lose
+    strength in stripes (:func:`~karamelo_py.points.laws.strengths.frictional.share_of_average`).
+    """
+
+    point_fields = (*FBar.point_fields, PressureBeside)
 
 
 def no_ratio(w, like):

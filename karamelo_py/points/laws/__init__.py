@@ -104,6 +104,12 @@ def advance(law, kin, state, dl, dt):
     """The state after the increment dl = dt grad v of a step dt."""
 
 
+@point_function(otherwise=True)
+def advance_beside(law, kin, state, dl, dt, beside):
+    """The same, where forces have `beside` more pressure than the point (F-bar)."""
+    return advance(law, kin, state, dl, dt)
+
+
 @point_function()
 def kirchhoff_stress(law, kin, state):
     """det F times the Cauchy stress, which times the reference volume makes the nodal forces."""

@@ -281,10 +281,15 @@ def _initial_state_eos_strength(law, kin, like):
 
 @laws.advance.on(EosStrength)
 def _advance_eos_strength(law, kin, state, dl, dt):
+    return laws.advance_beside(law, kin, state, dl, dt, 0)
+
+
+@laws.advance_beside.on(EosStrength)
+def _advance_beside_eos_strength(law, kin, state, dl, dt, beside):
     before, s, m = state
     J = before * det(I + dl)
     s, eps = carried_along(law, kin, s, dl)
-    s, memory, work = strengths.respond(law.strength, law, kin, s, eps, J, m, dt)
+    s, memory, work = strengths.respond(law.strength, law, kin, s, eps, J, m, dt, beside)
     work = J * work * borne_share(law, m.damage)
     viscous = viscous_after(law, J, m, tr(eps) / dt)
     viscous_work = sum(viscous) * (before - J)

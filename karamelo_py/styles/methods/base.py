@@ -5,11 +5,13 @@ from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from karamelo_py.kernels.visit import FBar, PointByPoint
+from karamelo_py.kernels.visit import FBar, FBarOfSoil, PointByPoint
 from karamelo_py.language import registry
 from karamelo_py.points.basis.cpdi import Element
 from karamelo_py.points.frames import Updated
 from karamelo_py.points.kinematics import KINEMATICS, Axisymmetric
+from karamelo_py.points.laws import can
+from karamelo_py.points.laws.strengths import share_beside
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import Lattice
 from karamelo_py.scene.solid import Solid
@@ -113,7 +115,10 @@ class Method:
 
     def averaging(self, hub: Hub) -> NamedTuple:
         """Return the tag of averaging: `FBar` where changes of volume are averaged."""
-        return FBar() if hub.update.anti_locking else PointByPoint()
+        if not hub.update.anti_locking:
+            return PointByPoint()
+        soil = any(can(material.law, share_beside) for material in hub.materials.values())
+        return FBarOfSoil() if soil else FBar()
 
     def places(self, kin: Any, solid: Solid, real: type) -> np.ndarray:
         """Positions and shapes of the domains of a solid's points before the first step, (n, w)."""

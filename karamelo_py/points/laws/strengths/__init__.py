@@ -69,11 +69,12 @@ def initial_memory(strength, like):
 
 
 @point_function(otherwise=True)
-def respond(strength, law, kin, s, strain, j, memories, dt):
+def respond(strength, law, kin, s, strain, j, memories, dt, beside):
     """Deviatoric stress, memory, and work per volume that is not stored, after a step dt.
 
     `s` is the old deviatoric stress, turned with the point already; `strain`, the increment, is not
-    deviatoric; `memories` are those of all parts of the `law`.
+    deviatoric; `memories` are those of all parts of the `law`. With averaged volumes forces have
+    `beside` more pressure than the point.
     """
     return shear_response(strength, kin, s, strain, memories.strength, memories.heat, dt)
 
@@ -88,6 +89,14 @@ def pressure_response(strength, kin, s, p, K, strain):
     """Deviatoric stress and pressure on or within the yield surface, from an elastic trial.
 
     `K` is the bulk modulus, `strain` the equivalent plastic strain.
+    """
+
+
+@point_function()
+def share_beside(strength, memory):
+    """The share of the averaged pressure that the yield surface takes, with averaged volumes.
+
+    Left out by strengths that do not depend on pressure.
     """
 
 

@@ -10,6 +10,7 @@ from karamelo_py.points.laws.strengths.frictional import (
     frictional,
     lowest_pressure,
     peak_and_residual,
+    sines,
     surface,
     tension_bound,
 )
@@ -109,6 +110,14 @@ frictional(DruckerPrager)
 @tension_bound.on(DruckerPrager)
 def _tension_bound_drucker_prager(strength, lowest):
     return max(lowest, -strength.tension)
+
+
+@sines.on(DruckerPrager)
+def _sines_drucker_prager(strength, friction, dilation):
+    # In plastic flow of plane strain s_zz = -2/3 dilation sqrt(J2), so that half the difference of
+    # the principal stresses in the plane is sqrt(J2) times:
+    share = sqrt(max(1 - dilation * dilation / 3, 1e-6))
+    return friction * share / max(1 - friction * dilation / 3, 1e-6), dilation / share
 
 
 @pressure_response.on(DruckerPrager)

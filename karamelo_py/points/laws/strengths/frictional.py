@@ -12,11 +12,17 @@ Trans. Graph. 36(4), section 4.3.4). What plastic flow by shear gains (dilatancy
 
 from math import inf, log, radians, sqrt
 
-from karamelo_py.compiler.compile import point_function
+from karamelo_py.compiler.compile import point_function, where
 from karamelo_py.language.rules import known_failure
 from karamelo_py.points.kinematics import inner
 from karamelo_py.points.laws.eos import bulk_modulus, pressure, ratio_at_pressure
-from karamelo_py.points.laws.strengths import elastic_ratio, pressure_response, remembers, respond
+from karamelo_py.points.laws.strengths import (
+    elastic_ratio,
+    pressure_response,
+    remembers,
+    respond,
+    share_beside,
+)
 from karamelo_py.points.laws.strengths.hardening import elastic_trial
 from karamelo_py.points.laws.temperatures import thermal_pressure
 from karamelo_py.script.errors import ScriptError
@@ -46,33 +52,60 @@ def tension_bound(strength, lowest):
     return lowest
 
 
+def share_of_average(strength, memory):
+    """Find the share b of the averaged pressure that the yield surface takes, with F-bar.
+
+    Strains and forces of a wave that averaging passes with the share a (1 for long waves, 0.1 to
+    0.5 for waves of two or three cells) have in plastic flow the stiffness
+
+        (a - f (1 - b + b a)) (a - d) times a positive number,
+
+    with f and d the sines of friction and dilatancy. Without b it is negative for a between d and
+    f: pressure grows in stripes, and strength falls. With b = (f - d)/(f (1 - d)) it is a square.
+    """
+    _, friction, dilation = surface(strength, memory.ep)
+    f, d = sines(strength, friction, dilation)
+    # The sine of a steep cone in plane strain may be above 1.
+    return where(f > d, min((f - d) / (where(f > d, f, 1) * max(1 - d, 1e-3)), 1), 0)
+
+
+@point_function(otherwise=True)
+def sines(strength, friction, dilation):
+    """Return the sines of friction and dilatancy in plane strain of a yield surface."""
+    return friction, dilation
+
+
 def elastic_part(strength, memory, j):
     """Find the part of the volume ratio j that is elastic."""
     return j / (memory.Jp * memory.Js)
 
 
-def respond_by_friction(strength, law, kin, s, strain, j, memories, dt):
+def respond_by_friction(strength, law, kin, s, strain, j, memories, dt, beside):
     """Return an elastic trial to the yield surface, and give the change of volume to the memory."""
     memory, heat = memories.strength, memories.heat
     trial = elastic_trial(strength.G, s, strain)
     elastic = elastic_part(strength, memory, j)
     warm = sum(thermal_pressure(law.temperature, heat))
     p = pressure(law.eos, elastic, memories.energy, heat) + warm
-    if memory.Js > 1 and p > 0:
+    beside = share_beside(strength, memory) * beside
+    if memory.Js > 1 and p + beside > 0:
         # What had come apart closes before it bears pressure.
-        apart = max(1, j / (memory.Jp * ratio_at_pressure(law.eos, -warm, heat)))
+        closed = ratio_at_pressure(law.eos, -warm - beside, heat)
+        apart = max(1, j / (memory.Jp * closed))
         memory = memory._replace(Js=apart)
         elastic = elastic_part(strength, memory, j)
         p = pressure(law.eos, elastic, memories.energy, heat) + warm
     K = bulk_modulus(law.eos, elastic, memories.energy, heat)
     lowest = lowest_pressure(strength, memory.ep)
+    own = p
+    p += beside
     new, reached = pressure_response(strength, kin, trial, p, K, memory.ep)
     plastic = 0.5 / strength.G * (trial - new)
     memory = memory._replace(ep=memory.ep + sqrt(2 / 3 * inner(plastic, plastic)))
     work = inner(new, plastic)
     if reached != p:
         # The volume that bears the new pressure is elastic; the rest is plastic.
-        after = ratio_at_pressure(law.eos, reached - warm, heat)
+        after = ratio_at_pressure(law.eos, own + (reached - p) - warm, heat)
         if p < lowest and reached - lowest <= 1e-6 * (lowest - p):
             memory = memory._replace(Js=j / (memory.Jp * after))
         else:
@@ -86,6 +119,7 @@ def frictional(strength: type) -> None:
     remembers(strength, ep=0.0, Jp=1.0, Js=1.0)
     elastic_ratio.on(strength)(elastic_part)
     respond.on(strength)(respond_by_friction)
+    share_beside.on(strength)(share_of_average)
     known_failure(
         strength,
         "locking",

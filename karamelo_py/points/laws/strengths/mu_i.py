@@ -8,7 +8,7 @@ from karamelo_py.language.rules import known_failure
 from karamelo_py.language.signature import Positive
 from karamelo_py.points.kinematics import inner
 from karamelo_py.points.laws.eos import pressure
-from karamelo_py.points.laws.strengths import elastic_ratio, remembers, respond
+from karamelo_py.points.laws.strengths import elastic_ratio, remembers, respond, share_beside
 from karamelo_py.points.laws.strengths.hardening import elastic_trial
 from karamelo_py.points.laws.temperatures import thermal_pressure
 from karamelo_py.script.errors import ScriptError
@@ -96,12 +96,16 @@ def _elastic_ratio_mu_i(strength, memory, j):
     return min(j, 1)  # grains that are apart are not stretched
 
 
+share_beside.on(MuI)(lambda strength, memory: 1)  # flow keeps the volume
+
+
 @respond.on(MuI)
-def _respond_mu_i(strength, law, kin, s, strain, j, memories, dt):
+def _respond_mu_i(strength, law, kin, s, strain, j, memories, dt, beside):
     memory = memories.strength
     elastic = elastic_ratio(strength, memory, j)
     p = pressure(law.eos, elastic, memories.energy, memories.heat)
     p += sum(thermal_pressure(law.temperature, memories.heat))
+    p += share_beside(strength, memory) * beside
     together = p > 0
     trial = elastic_trial(strength.G, s, strain)
     shear = sqrt(0.5 * inner(trial, trial))
