@@ -1,6 +1,6 @@
 """strength drucker-prager: cohesion and friction by a cone."""
 
-from math import cos, inf, sin, sqrt, tan
+from math import cos, inf, radians, sin, sqrt, tan
 from typing import Annotated, Literal, NamedTuple
 
 from karamelo_py.language.signature import NonNegative, Positive
@@ -16,11 +16,13 @@ from karamelo_py.points.laws.strengths.frictional import (
 )
 
 
-def cone(fit: str, c: float, phi: float) -> tuple[float, float]:
-    """xi c and eta for a friction angle in radians (see `DruckerPrager`)."""
+def cone(fit: str, c: float, phi: float, psi: float) -> tuple[float, float]:
+    """xi c and eta for angles of friction and dilatancy in radians (see `DruckerPrager`)."""
     if fit == "plane-strain":
-        root = sqrt(9 + 12 * tan(phi) ** 2)
-        return 3 / root * c, 3 * tan(phi) / root
+        t = tan(min(psi, phi))
+        dilation = 3 * t / sqrt(9 + 12 * t * t)
+        below = sqrt(1 - dilation**2 / 3) + dilation * sin(phi) / 3
+        return cos(phi) / below * c, sin(phi) / below
     sign = -1 if fit == "compression" else 1
     below = sqrt(3) * (3 + sign * sin(phi))
     return 6 * cos(phi) / below * c, 6 * sin(phi) / below
@@ -60,9 +62,11 @@ class DruckerPrager(NamedTuple):
     -----
     sqrt(s:s/2) <= xi c + eta p (Drucker & Prager 1952; de Souza Neto et al. 2008, section 6.4).
     With compression xi = 6 cos(phi)/(sqrt(3) (3 - sin(phi))) and eta = 6 sin(phi)/(sqrt(3) (3 -
-    sin(phi))). With extension 3 + sin(phi) replaces 3 - sin(phi). With plane-strain xi = 3/sqrt(9 +
-    12 tan(phi)^2) and eta = xi tan(phi). Dilatancy has the factor eta of psi. Tension beyond -p =
-    tension, or the apex, is cut off. The plastic change of volume is kept, and pressure follows
+    sin(phi))). With extension 3 + sin(phi) replaces 3 - sin(phi). With plane-strain xi = cos(phi)/b
+    and eta = sin(phi)/b, where b = sqrt(1 - d^2/3) + d sin(phi)/3 and d = 3 tan(psi)/sqrt(9 + 12
+    tan(psi)^2). At its limit s_zz is -2/3 d sqrt(s:s/2), so that mohr-coulomb's limit in the plane
+    is met for any psi. Dilatancy has the factor d, of the other fits eta of psi. Tension beyond -p
+    = tension, or the apex, is cut off. The plastic change of volume is kept, and pressure follows
     from the elastic part of J. While strength falls, a step uses that of its beginning. Where it
     falls, results depend on the size of the cells.
 
@@ -100,7 +104,7 @@ class DruckerPrager(NamedTuple):
     ):
         """The cone from cohesion and angles: sqrt(s:s / 2) <= cohesion + friction p."""
         of_soil = cohesion, phi, psi, residual_cohesion, residual_phi, softening
-        peak, left = peak_and_residual(lambda c, angle: cone(fit, c, angle), *of_soil)
+        peak, left = peak_and_residual(lambda c, phi: cone(fit, c, phi, radians(psi)), *of_soil)
         return cls(G, *peak, inf if tension is None else tension, *left)
 
 
