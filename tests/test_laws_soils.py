@@ -189,7 +189,7 @@ def test_plane_strain_cone(psi):
         full = stress(law, kin, state)
         ends.append(full[0, 0] - full[1, 1])
     limit = 2 * (COHESION * cos(radians(PHI)) + 2.0 * sin(radians(PHI)))
-    assert ends == pytest.approx([limit, limit], rel=1e-5)  # s_zz gets there by flow
+    assert ends == pytest.approx([limit, limit], rel=5e-5)  # s_zz gets there by flow
 
 
 def test_tension_ends_at_the_apex():
