@@ -223,6 +223,9 @@ SCENES = {
         "velocity_particles, tool, 0.2*time").replace("run_time(3)", "run(6)"),
     "flow": flowing("ulmpm, FLIP, linear, 1"),
     "flow in the total frame": flowing("tlmpm, APIC, linear"),
+    "flow with averaged volumes": flowing("ulmpm, FLIP, linear, 1").replace(
+        "dimension(", "scheme(usf)\nanti_volumetric_locking(true)\ndimension("
+    ),
     "rate of plastic strain": sheared(", epdot"),
     "step that varies": block(
         2, "fix(v, initial_velocity_particles, all, 5*sin(9*x0), 3)", "set_output(1)",

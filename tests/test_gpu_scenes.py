@@ -68,6 +68,13 @@ def pair(method, materials, *lines, d=2, begin=0.2, more="", T=""):
 SCENES = {
     "axis": bar("method(ulmpm, FLIP, linear, 0.99)"),
     "averaged volumes": bar("method(ulmpm, FLIP, linear, 0.99)\nanti_volumetric_locking(true)"),
+    "averaged pressure of soil": bar(
+        "method(ulmpm, FLIP, linear, 0.99)\nscheme(usavg)\nanti_volumetric_locking(true)"
+    ).replace(
+        "material(rubber, neo-hookean, 1000, 1000, 0.45)",
+        "eos(bulk, linear, 1000, 800)\nstrength(sand, drucker-prager, 400, 0.1, 30)\n"
+        "material(rubber, eos-strength, bulk, sand)",
+    ),
     "series": bar("method(ulmpm, XPIC, linear, 3)"),
     "loss": pair("method(ulmpm, TPIC, quadratic-spline)", GASES, d=1),
     "heat": pair(

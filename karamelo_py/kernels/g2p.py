@@ -8,7 +8,15 @@ from math import inf, sqrt
 from typing import NamedTuple
 
 from karamelo_py.compiler.compile import Weighted, all_lanes, fma, point_function, real, where
-from karamelo_py.compiler.fields import field, forget, increase, load, load_vector, store, store_from
+from karamelo_py.compiler.fields import (
+    field,
+    forget,
+    increase,
+    load,
+    load_vector,
+    store,
+    store_from,
+)
 from karamelo_py.compiler.gpu import aligned_record
 from karamelo_py.compiler.loops import many_threads
 from karamelo_py.compiler.tuples import row

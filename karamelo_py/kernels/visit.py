@@ -12,7 +12,15 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.compiler.compile import fma, index, point_function, prefetch, real
-from karamelo_py.compiler.fields import Field, StepField, SummedField, field, load, load_vector, pair
+from karamelo_py.compiler.fields import (
+    Field,
+    StepField,
+    SummedField,
+    field,
+    load,
+    load_vector,
+    pair,
+)
 from karamelo_py.compiler.tuples import count_in, record, row
 from karamelo_py.kernels.arrays import Index, Nodes, Number, Places, Points, Tag
 from karamelo_py.points.basis import blank, entry, support

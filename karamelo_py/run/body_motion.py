@@ -16,6 +16,7 @@ from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.strengths import shear_modulus
 from karamelo_py.points.noise import borne
 from karamelo_py.run.boxes import unique
+from karamelo_py.script.expressions import POINT_SEEDS
 
 
 class BodyMotion(NamedTuple):
@@ -219,6 +220,39 @@ def held(s: Any, one: BodyMotion) -> np.ndarray:
         near = ((x >= one.low - lattice.h) & (x <= one.high + lattice.h)).all(axis=1)
         found |= near.any() & np.array([formula is not None for formula in fix.formulas[: s.d]])
     return found
+
+
+def pressed_evenly(s: Any, one: BodyMotion) -> bool:
+    """Tell whether fixes hold a body by smooth plates on all sides but one: it deforms evenly.
+
+    It fills a box then. Each plate holds all nodes of one side in the direction across it.
+    """
+    lattices, solid = s.hub.lattices, list(s.hub.solids.values())[one.number]
+    lattice = lattices[s.method.lattice_of(s.hub, solid)]
+    box = (one.high - one.low + 2 * np.max(solid.half_size, axis=0)).prod()
+    if s.hub.domain.axisymmetric or np.sum(solid.volume0) < (1 - 1e-6) * box:
+        return False
+    sides = set()
+    for fix in s.hub.fixes.values():
+        if not fix.prescribes_velocity:
+            continue
+        nodes = fix.group.nodes
+        own = (nodes >= lattice.first) & (nodes < lattice.first + lattice.node_count)
+        x = lattice.positions(nodes[own])[:, : s.d]
+        x = x[((x >= one.low - lattice.h) & (x <= one.high + lattice.h)).all(axis=1)]
+        held = [k for k, formula in enumerate(fix.formulas[: s.d]) if formula is not None]
+        if not len(x):
+            continue
+        if len(held) > 1 or not fix.formulas[held[0]].names.isdisjoint(POINT_SEEDS):
+            return False
+        k, along = held[0], np.delete(np.arange(s.d), held)
+        ends = [x[:, k].max() < one.low[k] + lattice.h, x[:, k].min() > one.high[k] - lattice.h]
+        low, high = x[:, along].min(axis=0), x[:, along].max(axis=0)
+        whole = (low <= one.low[along]).all() and (high >= one.high[along]).all()
+        if not (any(ends) and whole):
+            return False
+        sides.add((k, ends[0]))
+    return len(sides) >= 2 * s.d - 1
 
 
 def _free_time(s: Any, one: BodyMotion) -> float:

@@ -12,7 +12,15 @@ import numpy as np
 
 from karamelo_py.language import registry, rules
 from karamelo_py.run import timestep
-from karamelo_py.run.body_motion import BodyMotion, Noise, drift_of, held, motions, turn_of
+from karamelo_py.run.body_motion import (
+    BodyMotion,
+    Noise,
+    drift_of,
+    held,
+    motions,
+    pressed_evenly,
+    turn_of,
+)
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.plugins import attributed, foreign_parts
 from karamelo_py.script.errors import ScriptError
@@ -116,10 +124,19 @@ class SceneFacts:
         return self.simulation.dt / self.simulation.limit
 
     @property
+    def hats(self) -> bool:
+        """Tell whether functions are hats, or hats over the domains of points."""
+        return self.linear or bool(getattr(self.basis, "shape", ()))
+
+    @property
     def locks(self) -> bool:
         """Tell whether hat functions are to keep the volume of several points per cell, each."""
-        hats = self.linear or bool(getattr(self.basis, "shape", ()))
-        return hats and self.d > 1 and not (self.sparse or self.hub.update.anti_locking)
+        return self.hats and self.d > 1 and not (self.sparse or self.hub.update.anti_locking)
+
+    @cached_property
+    def even(self) -> bool:
+        """Tell whether all bodies deform evenly, so that no cell has to keep its volume alone."""
+        return all(pressed_evenly(self, one) for one in self.motions)
 
     @property
     def turns(self) -> bool:
