@@ -45,10 +45,15 @@ def material(hub: Hub, ID: str, style: StyleOf("material"), *arguments: Argument
         arguments = (Argument(parse_text(style)[0], hub.interpreter), *arguments)
         style = "eos-strength"
     define(hub, hub.materials, ID, style, arguments)
-    try_law(hub, hub.materials[ID])
+    judge(hub, hub.materials[ID])
+
+
+def judge(hub: Hub, made: Material) -> None:
+    """Try the law of a plug-in, and warn of numbers that hardly any body has."""
+    try_law(hub, made)
     with attributed(hub):
-        for what, hint in doubts(hub.materials[ID].law):
-            hub.warn(f"material '{ID}': {what}", hint=hint)
+        for what, hint in doubts(made.law):
+            hub.warn(f"material '{made.id}': {what}", hint=hint)
 
 
 def _part(kind: str, summary: str, example: str, others: str) -> Callable:
@@ -116,8 +121,9 @@ def define(hub: Hub, catalogue: Catalogue, ID: str, style: str, arguments: Seque
     """File under `ID` what the style makes of the arguments; an ID in use is an error first."""
     kind = catalogue.kind
     catalogue.refuse(ID)
-    made = style_of(hub, kind, ID, style, arguments)
-    entry = (Material if kind == "material" else MaterialPart)(kind, style, made)
+    given: dict = {}
+    made = style_of(hub, kind, ID, style, arguments, given)
+    entry = (Material if kind == "material" else MaterialPart)(kind, style, made, given)
     check_columns(hub, f"{kind} {style}", entry.law)
     catalogue.add(ID, entry)
 

@@ -112,8 +112,10 @@ def _parameter(name: str, annotation: Any, default: Any, kind: Any = None) -> Pa
     )
 
 
-def call(target: Callable, hub: Any, arguments: Sequence[Argument], name: str) -> Any:
-    """Call a command or make a style with the hub and a script's arguments.
+def call(
+    target: Callable, hub: Any, arguments: Sequence[Argument], name: str, given: Any = None
+) -> Any:
+    """Call a command or make a style with the hub and a script's arguments; note them in `given`.
 
     The user calls it by `name`: ``run``, or ``fix body_force``. Whatever is wrong, with the count
     or kind of arguments or in the target itself, is a ScriptError with a place in the script.
@@ -138,6 +140,9 @@ def call(target: Callable, hub: Any, arguments: Sequence[Argument], name: str) -
                     named[parameter.name] = value
                 else:
                     values.append(value)
+                if given is not None:
+                    before = given.get(parameter.name, ())
+                    given[parameter.name] = (*before, value) if parameter.variadic else value
         try:
             return make(target, hub, name, *values, **named)
         except OSError as error:
@@ -156,9 +161,50 @@ def call(target: Callable, hub: Any, arguments: Sequence[Argument], name: str) -
         raise
 
 
-def style_of(hub: Any, family: str, ID: str, style: str, arguments: Sequence[Argument]) -> Any:
-    """Make what a style of a family, called `ID` by the script, makes of its arguments."""
-    return call(registry.called(family, ID, style), hub, arguments, f"{family} {style}")
+def style_of(
+    hub: Any, family: str, ID: str, style: str, arguments: Sequence[Argument], given: Any = None
+) -> Any:
+    """Make what a style of a family, called `ID` by the script, makes of its arguments.
+
+    Their values are noted in `given`, a dict, by name.
+    """
+    target = registry.called(family, ID, style)
+    return call(target, hub, arguments, f"{family} {style}", given)
+
+
+def remade(
+    hub: Any, family: str, ID: str, style: str, given: dict, arguments: Sequence[Argument]
+) -> tuple[Any, dict]:
+    """Make a law again from the values `given` to it, but for those of ``name=value`` arguments.
+
+    Returns what was made, and its values.
+    """
+    target, name = registry.called(family, ID, style), f"{family} {style}"
+    expected = {p.name: p for p in parameters(target)}
+    bound: dict[str, list[Argument]] = {}
+    try:
+        for argument in arguments:
+            word, value = argument.keyword() or ("", argument)
+            if word not in expected:
+                raise ScriptError(
+                    f"{name} has no '{word}'" if word else f"'{argument.text}' has no name",
+                    place=argument.place,
+                    expected=", ".join(f"{n}=..." for n in expected),
+                    hint=meant(word, expected),
+                )
+            bound[word] = [value]
+            given = given | {word: convert(hub, expected[word], value)}
+        several = next((p.name for p in expected.values() if p.variadic), None)
+        if several is None:
+            return make(target, hub, name, **given), given
+        names = [*expected]
+        first = [given[n] for n in names[: names.index(several)]]
+        last = {n: given[n] for n in names[names.index(several) + 1 :] if n in given}
+        return make(target, hub, name, *first, *given.get(several, ()), **last), given
+    except ScriptError as error:
+        error.place = error.place or _guilty(error, arguments, bound)
+        error.command = error.command or name
+        raise
 
 
 def make(target: Callable, hub: Any, name: str, *values: Any, **named: Any) -> Any:

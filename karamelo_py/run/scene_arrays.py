@@ -42,6 +42,7 @@ def scene_key(hub: Hub) -> tuple:
         hub.domain,
         hub.domain.h if hub.domain else None,
         tuple(hub.solids.values()),
+        tuple(solid.material for solid in hub.solids.values()),
         update.method,
         type(update.scheme),
         update.scheme,

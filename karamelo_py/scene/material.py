@@ -10,11 +10,19 @@ class MaterialPart(Named):
     """A part of a law, or a whole one, under a name: of a `kind`, such as ``eos``, and a `style`.
 
     `made` is what the style returned: the law, or `laws` by kind where it brings others with it.
+    `given` are the values of its arguments, by name.
     """
 
-    def __init__(self, kind: str, style: str, made: "NamedTuple | dict[str, NamedTuple]"):
+    def __init__(
+        self,
+        kind: str,
+        style: str,
+        made: "NamedTuple | dict[str, NamedTuple]",
+        given: dict | None = None,
+    ):
         self.kind = kind
         self.style = style
+        self.given = given or {}
         self.laws = made if isinstance(made, dict) else {kind: made}
 
     @property

@@ -134,9 +134,9 @@ def frictional(strength: type) -> None:
         reason="plastic flow of soil gives its cells a volume, and {scene.basis_name} functions "
         "without averaged volumes cannot follow: limit loads are a tenth to a third too high, "
         "and slopes stand that should slide (heaps that flow spread as far as they should)",
-        cure="quadratic-spline; or anti_volumetric_locking(true) in soil with cohesion, and method "
-        "tlmpm where soil with friction keeps its neighbours, as below a footing: points that "
-        "cross cells take a tenth of such loads",
+        cure="quadratic-spline; or anti_volumetric_locking(true), and method tlmpm where soil that "
+        "dilates keeps its neighbours, as below a footing: points that cross cells take a tenth of "
+        "such loads",
     )
     known_failure(
         strength,

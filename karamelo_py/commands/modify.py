@@ -1,0 +1,144 @@
+"""Command modify: numbers of materials that change between runs."""
+
+from typing import Any
+
+from karamelo_py.commands.materials import judge
+from karamelo_py.language import registry
+from karamelo_py.language.signature import Argument, parameters, remade
+from karamelo_py.points.kinematics import Space
+from karamelo_py.points.laws import initial_state, law_kind, specific_volume
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.material import Material, MaterialPart
+from karamelo_py.script.errors import ScriptError, unknown
+
+
+def modify(hub: Hub, kind: str, ID: str, *numbers: Argument) -> None:
+    """Change numbers of a material between runs; its points keep their state.
+
+    Parameters
+    ----------
+    kind
+        ``material``, ``eos``, ``strength``, ``damage`` or ``temperature``.
+    ID
+        Name of the material or of the part.
+    numbers
+        ``name=value`` for each number that changes, by the names on the page of the style. They are
+        checked together, as in the first definition.
+
+    Example
+    -------
+    eos(ground, linear, 2000, 1e8)
+    strength(soil, mohr-coulomb, 4e7, 10e3, 20)
+    material(soil, eos-strength, ground, soil)
+    modify(strength, soil, cohesion=8e3, phi=16)
+
+    Notes
+    -----
+    The next run computes with the new numbers, in the same compiled loops. Stresses stay as they
+    are; those beyond a new yield surface return to it in the first step. If an elastic modulus
+    changes, the stress of a law that adds up increments stays, and that of a law of the whole
+    deformation follows at once. The density cannot change, since points have their masses, nor can
+    a number from which the state of points began, such as pc of cam-clay.
+
+    ``kind`` material also finds numbers of the parts of eos-strength, where one part alone has the
+    name.
+
+    See Also
+    --------
+    material, strength, run
+    """
+    if kind not in ("material", *hub.parts):
+        raise unknown(f"unknown kind '{kind}'", kind, ("material", *hub.parts), argument="kind")
+    catalogue = hub.materials if kind == "material" else hub.parts[kind]
+    try:
+        entry = catalogue[ID]
+    except ScriptError as error:
+        error.argument = "ID"
+        raise
+    if not numbers:
+        raise ScriptError("no number changes", argument="ID", expected="name=value, ...")
+    if kind == "material":
+        entry = _owner(entry, numbers)
+    changed = {entry: _changed(hub, entry, entry.given, numbers)}
+    for material in hub.materials.values():
+        if entry in _parts(material):
+            given = {name: _now(value, changed) for name, value in material.given.items()}
+            changed[material] = _changed(hub, material, given, ())
+    for before, after in changed.items():
+        if isinstance(after, Material):
+            _check(hub, before, after, numbers)
+            judge(hub, after)
+    for after in changed.values():
+        place = hub.materials if isinstance(after, Material) else hub.parts[after.kind]
+        place[after.id] = after
+    for solid in hub.solids.values():
+        solid.material = changed.get(solid.material, solid.material)
+
+
+def _parts(material: Material) -> list[MaterialPart]:
+    """List the parts that a material was made of."""
+    found: list[Any] = []
+    for value in material.given.values():
+        found += value if isinstance(value, tuple) else [value]
+    return [part for part in found if isinstance(part, MaterialPart)]
+
+
+def _owner(material: Material, numbers: tuple[Argument, ...]) -> MaterialPart:
+    """Find the material, or the one part of it, that has all numbers."""
+    names = {(argument.keyword() or ("",))[0] for argument in numbers}
+    if names <= set(material.given):
+        return material
+    owners = [part for part in _parts(material) if names <= _names(part)]
+    if len(owners) > 1:
+        lines = " or ".join(f"modify({part.kind}, {part.id}, ...)" for part in owners)
+        raise ScriptError(
+            f"several parts of material '{material.id}' have "
+            + " and ".join(f"'{name}'" for name in sorted(names)),
+            argument="ID",
+            expected=lines,
+        )
+    return owners[0] if owners else material
+
+
+def _names(part: MaterialPart) -> set[str]:
+    return {p.name for p in parameters(registry.called(part.kind, part.id, part.style))}
+
+
+def _changed(hub: Hub, entry: MaterialPart, given: dict, numbers: tuple) -> MaterialPart:
+    made, given = remade(hub, entry.kind, entry.id, entry.style, given, numbers)
+    after = type(entry)(entry.kind, entry.style, made, given)
+    after.id, after.place = entry.id, entry.place
+    return after
+
+
+def _now(value: Any, changed: dict) -> Any:
+    """Return what a value, perhaps a part or several, has become."""
+    if isinstance(value, tuple):
+        return tuple(_now(one, changed) for one in value)
+    return changed.get(value, value) if isinstance(value, MaterialPart) else value
+
+
+def _check(hub: Hub, before: Material, after: Material, numbers: tuple[Argument, ...]) -> None:
+    """Refuse what points that exist cannot follow."""
+    if any(solid.material is before for solid in hub.solids.values()):
+        names = ", ".join((argument.keyword() or ("",))[0] for argument in numbers)
+        if specific_volume(after.law) != specific_volume(before.law):
+            raise ScriptError(
+                f"the density of material '{after.id}' cannot change: its points have their masses",
+                place=numbers[0].place,
+                expected="a density before the first solid of the material",
+            )
+        kin = Space()
+        if law_kind(after.law) != law_kind(before.law):
+            raise ScriptError(
+                f"{names} would give the points of material '{after.id}' another law",
+                place=numbers[0].place,
+                expected="numbers of the same law",
+            )
+        if initial_state(after.law, kin, 1.0) != initial_state(before.law, kin, 1.0):
+            raise ScriptError(
+                f"the state of the points of material '{after.id}' began from {names}, which "
+                "cannot change any more",
+                place=numbers[0].place,
+                expected="the number before the first solid of the material",
+            )
