@@ -72,6 +72,7 @@ CALLS = {
     "log_modify": (SCENE, "log_modify(custom, step, E)"),
     "material": (BARE, "material(gel, neo-hookean, 1000, 1e3, 0.3)"),
     "method": (BARE, "method(tlmpm, FLIP, linear, 1)"),
+    "modify": (SCENE, "modify(material, rubber, E=2e6)"),
     "plot": (SCENE, "plot(other, 1, time, E)"),
     "populate_cylindrical_coordinates": (
         SCENE.replace("group(top, particles, region, high, all)", ""),

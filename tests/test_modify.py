@@ -1,0 +1,137 @@
+"""Command modify: numbers of materials change between runs, and points keep their state."""
+
+import re
+import shutil
+
+import numpy as np
+import pytest
+from going_on import same_files
+
+# A block of clay between smooth plates: the limit load is 2 c times its width.
+BLOCK = """
+    method(ulmpm, FLIP, linear, 0.9)
+    dimension(2, 0, 1, 0, 1, 0.25)
+    region(b, block, 0, 0.5, 0, 0.5)
+    eos(e, linear, 1000, 1e6)
+    strength(s, mohr-coulomb, 5e5, 1e3, 0)
+    material(m, eos-strength, e, s)
+    solid(b, region, b, 2, m, 0.25, 0)
+    region(top, block, INF, INF, 0.5, INF)
+    region(base, block, INF, INF, INF, 0)
+    region(left, block, INF, 0, INF, INF)
+    group(top, nodes, region, top, all)
+    group(base, nodes, region, base, all)
+    group(left, nodes, region, left, all)
+    fix(p, velocity_nodes, top, NULL, -0.005)
+    fix(q, velocity_nodes, base, NULL, 0)
+    fix(r, velocity_nodes, left, 0, NULL)
+    log_modify(custom, step, time, p_y)
+    set_output(5)
+"""
+RUNS = BLOCK + (
+    "    run({0})\n    modify(strength, s, cohesion=2e3, phi=0)\n    run({0})\n"
+    "    modify(material, m, cohesion=500)\n    run({0})\n"
+)
+
+
+@pytest.mark.xdist_group("modify")
+def test_cohesion_changes_between_runs(run_script):
+    """The load follows 2 c b, and no loop is compiled anew."""
+    said = run_script(RUNS.format(400))
+    log = said.log
+    loads = [
+        -log.p_y[(log.Step > end - 100) & (log.Step <= end)].mean() for end in (400, 800, 1200)
+    ]
+    assert loads == pytest.approx([1000, 2000, 500], rel=0.03)  # sound dies out
+    assert (np.diff(log.Time) >= 0).all()
+    assert said.out.count("Compiling") <= 1
+
+
+@pytest.mark.parametrize("line", ["modify(strength, s, G=5e5, cohesion=500)", ""])
+def test_a_run_goes_on_behind_a_change(run_interpreted, line):
+    """From a file of the second run everything is the same."""
+    script = RUNS.format(6).replace("run(6)", "restart(4, r.*.h5)\n    run(6)", 1) + f"    {line}\n"
+    whole = run_interpreted(script, folder="whole").folder
+    again = whole.with_name("again")
+    shutil.copytree(whole, again)
+    assert (
+        "continued from step" in run_interpreted(script, "-restart", "r.8.h5", folder="again").out
+    )
+    same_files(whole, again)
+
+
+def test_stress_of_the_whole_deformation_follows_at_once(run_interpreted):
+    """Twice the modulus of a body that is held is twice its stress; that of rates stays."""
+    for law, factor in (("neo-hookean", 2), ("linear", 1)):
+        script = f"""
+            method(tlmpm, FLIP, linear, 1)
+            dimension(2, 0, 1, 0, 1, 0.5)
+            region(b, block, 0, 1, 0, 1)
+            material(m, {law}, 1000, 1e6, 0.3)
+            solid(b, region, b, 2, m, 0.5, 0)
+            region(every, block, INF, INF, INF, INF)
+            group(every, nodes, region, every, all)
+            fix(v, velocity_nodes, every, if(timestep < 4, x0, 0), 0)
+            compute(s, average_stress, all)
+            log_modify(custom, step, s_11)
+            set_output(1)
+            set_dt(1e-3)
+            run(8)
+            modify(material, m, E=2e6)
+            run(3)
+        """
+        log = run_interpreted(script).log
+        assert log.s_11[-1] / log.s_11[8] == pytest.approx(factor, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("line", "word", "said"),
+    [
+        ("modify(strength, s, cohesion=-1)", "-1", "'cohesion' must be a number of at least 0"),
+        ("modify(strength, s, cohesin=1)", "cohesin=1", "strength mohr-coulomb has no 'cohesin'"),
+        ("modify(strength, s, 1e3)", "1e3", "'1e3' has no name"),
+        ("modify(strength, s)", "s", "no number changes"),
+        ("modify(strength, q, phi=1)", "q", "unknown strength 'q'"),
+        ("modify(strenght, s, phi=1)", "strenght", "unknown kind 'strenght'"),
+        ("modify(strength, s, psi=30)", "30", "psi = 30 is impossible with phi = 0"),
+        ("modify(eos, e, rho0=1200)", "rho0=1200", "the density of material 'm' cannot change"),
+        ("modify(material, m, rho0=1200)", "rho0=1200", "the density of material 'm'"),
+        ("modify(material, m, strain=logarithmic)", "strain=logarithmic", "another law"),
+        ("modify(material, m, q=1)", "q=1", "material eos-strength has no 'q'"),
+    ],
+)
+@pytest.mark.parametrize("place", ["before", "behind"])
+def test_what_cannot_change_is_said(run_interpreted, line, word, said, place):
+    """Behind a run, too, where the rehearsal finds it before the run."""
+    done = run_interpreted(
+        BLOCK + ("    run(1)\n" if place == "behind" else "") + f"    {line}\n", status=1
+    )
+    assert done.err.count("error:") == 1 and said in done.err
+    marked = re.search(r"^ +\d+ \| (.*)\n +\| ( *)(\^+)$", done.err, re.M)
+    begin = len(marked[2])
+    assert marked[1][begin : begin + len(marked[3])] == word
+    assert "Step " not in done.out
+
+
+def test_numbers_from_which_points_began_cannot_change(run_interpreted):
+    script = BLOCK.replace(
+        "material(m, eos-strength, e, s)", "material(m, cam-clay, 1800, 4e6, 1.0, 0.1, 0.02, 1e5)"
+    )
+    said = run_interpreted(script + "    modify(material, m, pc=2e5)\n", status=1).err
+    assert "the state of the points of material 'm' began from pc" in said
+    run_interpreted(
+        script.replace("    solid", "    modify(material, m, pc=2e5)\n    solid") + "    run(1)\n"
+    )
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(("F", "stands"), [(1.35, True), (1.45, False)])
+def test_factor_of_safety(run_script, F, stands):
+    """The slope of docs/howto: 1.380 (Bishop & Morgenstern 1960), 1.4 (Griffiths & Lane 1999)."""
+    from test_howto import SCRIPTS
+
+    (script,) = (body for page, body in SCRIPTS if page.stem == "safety-factor")
+    log = run_script(script, "-var", "F", str(F), "-var", "N", "80").log
+    assert (log.Time[-1] == 15) == stands
+    if stands:
+        assert np.diff(log.sunk)[-1] < 0.01 * (log.sunk[-1] - log.sunk[5])
