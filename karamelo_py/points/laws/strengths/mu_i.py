@@ -96,7 +96,9 @@ def _elastic_ratio_mu_i(strength, memory, j):
     return min(j, 1)  # grains that are apart are not stretched
 
 
-share_beside.on(MuI)(lambda strength, memory: 1)  # flow keeps the volume
+@share_beside.on(MuI)
+def _share_beside_mu_i(strength, memory):
+    return 1  # flow keeps the volume
 
 
 @respond.on(MuI)
