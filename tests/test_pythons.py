@@ -31,6 +31,31 @@ run(8)
 """
 
 
+IMPORT_ALL = """
+import importlib, pkgutil, karamelo_py
+for one in pkgutil.walk_packages(karamelo_py.__path__, "karamelo_py."):
+    importlib.import_module(one.name)
+    print(one.name)
+"""
+
+
+def test_every_module_imports_without_a_warning():
+    """What the next Python or library takes away is announced as a warning by this one."""
+    command = [sys.executable, "-W", "error", "-c", IMPORT_ALL]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
+    assert done.returncode == 0, done.stderr
+    assert len(done.stdout.splitlines()) > 300
+
+
+def test_no_python_is_refused_for_being_new():
+    """README, the page of installing and the classifiers name the same versions."""
+    assert PROJECT["requires-python"] == f">={NUMBERS[0]}"
+    first, *_, last = NUMBERS
+    assert f"`python3` ({first} to {last})" in (ROOT / "README.md").read_text("utf-8")
+    start = (ROOT / "docs" / "getting-started.md").read_text("utf-8")
+    assert f"Python {', '.join(NUMBERS[:-1])} or {last}" in start
+
+
 def python_of(number: str) -> str | None:
     """Find a Python of this version on the path, or among those of pyenv."""
     pyenv = Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv")) / "versions"
