@@ -234,6 +234,7 @@ class Hooks(NamedTuple):
     scratch: np.ndarray  # (9 + depth, BLOCK): x y z x0 y0 z0, value, value before, stack, value 3
     held: np.ndarray  # (N, d) HELD, where hooks hold nodes in common; else (0, d)
     loads: np.ndarray  # (N, d) of this step, where hooks bring forces; else (0, d)
+    told: np.ndarray  # (F,) bool: fields of rigid solids, of F that each have N/F nodes; or (0,)
     mode: Tag  # one thread, or several
     apart: Apart
     whole: tuple  # tags of the hooks on whole points, made by `vector_hook`

@@ -31,7 +31,6 @@ from karamelo_py.kernels.arrays import (
     MASS,
     TIMESTEP,
     of_change,
-    of_force,
     of_momentum,
     vector_at,
 )
@@ -446,16 +445,13 @@ def touch_node(contact, kin, grids, nodes, control, n):
 
 
 @noinline
-def _keep_rigid(contact, kin, nodes, control, n):
-    """Keep the velocity of rigid bodies, whatever acts on the nodes; it does no work."""
+def _keep_rigid(contact, kin, nodes, n):
+    """Keep the velocity of rigid bodies, whatever acts on the nodes."""
     if contact.rigid[n // contact.stride] and nodes.sums[n, MASS] > 0:
         for k in range(kin.dimension):
             v = nodes.sums[n, of_momentum(kin) + k] / nodes.sums[n, MASS]
             nodes.update[n, k] = v
             nodes.update[n, of_change(kin) + k] = 0
-            if counts(control.ranks, n):
-                load = control.clock[0].kick * nodes.sums[n, of_force(kin) + k]
-                add_to(control.totals, WORK, float(-load * v))
 
 
 @kernel
@@ -481,7 +477,7 @@ def _publish_forces(s):
 # Contact acts in v* and the change of velocity of this step.
 SeparateFields.rows = (  # type: ignore[attr-defined]
     Once(_begin_forces),
-    each_node(lambda s, n: _keep_rigid(s.contact, s.kin, s.nodes, s.control, n)),
+    each_node(lambda s, n: _keep_rigid(s.contact, s.kin, s.nodes, n)),
     each_node(lambda s, n: touch_node(s.contact, s.kin, s.grids, s.nodes, s.control, n)),
     Once(_publish_forces),
 )

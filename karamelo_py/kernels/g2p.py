@@ -323,7 +323,7 @@ def _updated_move(task, w, stencil, p, dt, total, totals, fastest):
     step = vector(w.kin, dt * laws.constrained_velocity(law, v, displacing))
     y = x + step
     force = field(w.points.fields, Force)
-    if force is not None:
+    if force is not None and not laws.moves_as_told(w.laws):
         # With the mean velocity of the nodes in the step: stress and holders act at the same time.
         work = w.kick * dot(load_vector(w.kin, force, p), v_pic - 0.5 * dv)
         increase(field(w.points.fields, WorkOfForces), p, (work,))

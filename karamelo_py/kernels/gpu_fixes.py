@@ -21,7 +21,6 @@ from karamelo_py.kernels.clock import checked_move, kick, step_size
 from karamelo_py.kernels.contact import Scratch, SeparateFields
 from karamelo_py.kernels.gpu import MOVED, STATUS, goes_wrong, is_last
 from karamelo_py.kernels.heat import heat_of
-from karamelo_py.kernels.loss import FrictionalHeat
 from karamelo_py.kernels.p2g import Force, WorkOfForces
 from karamelo_py.kernels.step import GAINED
 from karamelo_py.points.kinematics import planar
@@ -100,9 +99,9 @@ def _share(hooks, h, heavy):
 
 
 def _planar_nodes(nodes):
-    """Return the nodes with what walls know of them."""
-    fields = tuple([one for one in nodes.fields if type(one) is FrictionalHeat])
-    return arrays.Nodes(nodes.sums, nodes.update, nodes.velocity, fields)
+    """Return the nodes with what hooks know of them."""
+    known = hook_loop.known_to_hooks(nodes)
+    return arrays.Nodes(nodes.sums, nodes.update, nodes.velocity, known)
 
 
 def on_node(target: int, task: int, values: int, of_heat: bool = False) -> Callable:

@@ -21,7 +21,7 @@ from karamelo_py.kernels import hooks as kinds
 from karamelo_py.kernels.arrays import first_from
 from karamelo_py.kernels.clock import kick, step_size
 from karamelo_py.kernels.loss import FrictionalHeat
-from karamelo_py.kernels.p2g import Force
+from karamelo_py.kernels.p2g import Force, RigidSums
 from karamelo_py.kernels.visit import state_at
 from karamelo_py.kernels.walls import FRICTION, rub, stick
 from karamelo_py.points.basis import placed
@@ -364,6 +364,18 @@ def _take_over(hooks, control, h, n, c, force):
 
 
 @noinline
+def _moves_as_told(hooks, n):
+    """Return True if a node is of the field of a rigid solid: nothing does work on it."""
+    told = hooks.told
+    return told.size > 0 and told[n // (hooks.loads.shape[0] // told.size)]
+
+
+def _is_taken(rigid, n):
+    """Return True if rigid points decide about the velocity of a node that others see, too."""
+    return rigid is not None and rigid[n, arrays.MASS] > 0
+
+
+@noinline
 def _change_nodes(what, hooks, control, dt, h, count, share):
     """Act on the chosen nodes; add to the totals, and to the work that is done."""
     target, kin, nodes, kept = what.target, what.kin, what.nodes, what.kept
@@ -374,6 +386,9 @@ def _change_nodes(what, hooks, control, dt, h, count, share):
     strains_first = target == arrays.ON_VELOCITY and stage == arrays.POST_UPDATE_GRID_STATE
     strains_first = strains_first and hooks.table[h].holds > 0
     given = BEFORE if strains_first and hooks.table[h].uses_before else VALUE
+    # Contact may take the velocity of a node that nothing holds, and a rigid body that of any.
+    late = stage == arrays.POST_UPDATE_GRID_STATE
+    yields, rigid = late and hooks.table[h].holds == 0, field(nodes.fields, RigidSums)
     for c in range(directions(hooks)):
         if hooks.programs[h, c].begin < 0:
             continue
@@ -414,7 +429,11 @@ def _change_nodes(what, hooks, control, dt, h, count, share):
                 moved = v + star
                 if hooks.table[h].uses_before and star == hooks.scratch[VALUE, q]:
                     moved = hooks.scratch[BEFORE, q] + star
-                work = 0.5 * mass * (star - old_star + kept * (old - v)) * moved
+                impulse = mass * (star - old_star + kept * (old - v))
+                if yields or (late and _is_taken(rigid, n)):
+                    hooks.loads[n, c] += impulse / dt  # see _work_at_nodes
+                elif not _moves_as_told(hooks, n):
+                    work = 0.5 * impulse * moved
                 clock = control.clock[0]
                 clock.set_low, clock.set_high = min(clock.set_low, star), max(clock.set_high, star)
                 nodes.update[n, c] = star
@@ -447,15 +466,15 @@ def _rub_at_nodes(what, hooks, control, dt, h, count):
     slot = hooks.table[h].slot
     for q in range(count):
         n, mu = hooks.chosen[q], hooks.scratch[VALUE, q]
-        rub(kin, nodes, programs, hooks.held, n, mu, dt, control, slot)
+        rub(kin, nodes, programs, hooks, n, mu, dt, control, slot)
 
 
 @noinline
 def _work_at_nodes(what, hooks, control, dt, count):
     """Add up what loads on the chosen nodes have done, and forget them; v* is that of the points.
 
-    Force times the mean of the velocities before and after the step: what stress and holders of a
-    node do to it in the same step counts, or the work would be of first order.
+    Force times the mean of the velocities before and after the step: what stress, holders and
+    contact of a node do to it in the same step counts, or the work would be of first order.
     """
     update, change = what.nodes.update, arrays.of_change(what.kin)
     terms = hooks.scratch[VALUE]
@@ -465,6 +484,7 @@ def _work_at_nodes(what, hooks, control, dt, count):
             load = hooks.loads[n, c]
             hooks.loads[n, c] = 0
             counts = load != 0 and totals.counts(control.ranks, n)
+            counts = counts and not _moves_as_told(hooks, n)
             terms[q] = dt * load * (update[n, c] - 0.5 * update[n, change + c]) if counts else 0.0
         totals.add_many(control.totals, totals.WORK, terms, count)
 
@@ -474,7 +494,7 @@ def _act_on_whole_nodes(what, task, hooks, control, dt, h, count, share):
     tag, nodes, kin = what.tag, what.nodes, what.kin
     if hooks.table[h].uses_place:
         locate_nodes(what.grids, hooks, count)
-    rows, first, change = (VALUE, BEFORE, THIRD), arrays.of_force(kin), arrays.of_change(kin)
+    rows, first = (VALUE, BEFORE, THIRD), arrays.of_force(kin)
     for c in range(len(tag.values)):
         evaluate(hooks, h, c, count, control, rows[c], 0.0)
     for q in range(count):
@@ -485,16 +505,11 @@ def _act_on_whole_nodes(what, task, hooks, control, dt, h, count, share):
         found = kinds.results(tag, what, kin, kin, n, values, dt)
         numbers = kinds.written(tag, what, n, found)
         own = totals.counts(control.ranks, n)
-        work = 0.0
         for c in range(kin.dimension):
-            if what.before_update:
-                hooks.loads[n, c] += nodes.sums[n, first + c] - force[c]  # see _work_at_nodes
-            else:
-                new = nodes.update[n, c]
-                half = 0.5 * nodes.sums[n, arrays.MASS] * (new - star[c])
-                work += float(half * (2 * new - nodes.update[n, change + c]))
-        if own:
-            totals.add_to(control.totals, totals.WORK, work)
+            load = nodes.sums[n, first + c] - force[c]
+            if not what.before_update:
+                load = nodes.sums[n, arrays.MASS] * (nodes.update[n, c] - star[c]) / dt
+            hooks.loads[n, c] += load  # see _work_at_nodes
         if own and hooks.table[h].slot >= 0:
             for c in range(len(numbers)):
                 totals.add_to(control.totals, hooks.table[h].slot + c, float(numbers[c]))
@@ -512,14 +527,18 @@ def without_whole(hooks):
     return arrays.with_items_of(hooks, _NoWhole(()))
 
 
+def known_to_hooks(nodes):
+    """Return the declared fields that the loop knows: others would have it compiled anew."""
+    return tuple([one for one in nodes.fields if type(one) in (FrictionalHeat, RigidSums)])
+
+
 def node_hooks(stage, target, kin, grids, nodes, ranges, hooks, control, dt, kept):
     """Call the node functions of `stage` on the members that have mass.
 
     `kept` is the share of its own velocity that a point keeps, and changes by what nodes change by.
     Of `LOADS` the work is added up: here, so that the way through the nodes is compiled once.
     """
-    # Of declared fields walls know one; others would have all this compiled anew.
-    fields = tuple([one for one in nodes.fields if type(one) is FrictionalHeat])
+    fields = known_to_hooks(nodes)
     early, flat = stage == arrays.POST_PARTICLES_TO_GRID, planar(kin)
     whole = tuple(
         [

@@ -245,7 +245,8 @@ def _load_of_internal_force(quantity, w, p, like):
     force = load(field(w.points.fields, Force), p, load_vector(w.kin, w.points.v, p))
     of_mean = isinstance(w.averaging, visit.FBar)
     mean = _mean_stress(w.kin, law, state, volume) if of_mean else ()
-    here = of_present(p, real(1, volume))
+    # Rigid points take no force: where they share nodes with others, it would push those.
+    here = of_present(p, real(0 if laws.moves_as_told(w.laws) else 1, volume))
     return stress, here * force if len(force) else (), mean
 
 

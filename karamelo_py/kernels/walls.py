@@ -11,7 +11,7 @@ from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.loops import noinline
 from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
 from karamelo_py.kernels.loss import FrictionalHeat, warm_node
-from karamelo_py.kernels.totals import WORK, add_to, counts
+from karamelo_py.kernels.totals import add_to, counts
 
 FRICTION = 3  # the program of the coefficient, behind those of the components
 
@@ -23,14 +23,14 @@ def _is_free(held, programs, n, c):
 
 
 @noinline
-def rub(kin, nodes, programs, held, n, mu, dt, control, slot):
+def rub(kin, nodes, programs, hooks, n, mu, dt, control, slot):
     """Give node `n` the friction of its wall; add the force to the totals from `slot` on.
 
     `programs` are those of the hook that has held the node: what it changed v* by is the impulse
-    across the wall. Where several fixes hold the node (`held`), each rubs for the directions in
-    which it decides.
+    across the wall. Where several fixes hold the node, each rubs for the directions in which it
+    decides.
     """
-    d = kin.dimension
+    d, held = kin.dimension, hooks.held
     mass = nodes.sums[n, MASS]
     across = 0.0
     along = 0.0
@@ -55,11 +55,10 @@ def rub(kin, nodes, programs, held, n, mu, dt, control, slot):
             work += taken * 0.5 * (first + nodes.update[n, c] - taken)
             nodes.update[n, c] -= taken
             nodes.update[n, of_change(kin) + c] -= taken
+            hooks.loads[n, c] -= mass * taken / dt
             if counts(control.ranks, n):
                 add_to(control.totals, slot + c, -mass * taken / dt)
     # With the mean of the speeds at the beginning and the end of the step; a wall takes no heat.
-    if counts(control.ranks, n):
-        add_to(control.totals, WORK, float(-mass * work))
     warm_node(field(nodes.fields, FrictionalHeat), n, work)
 
 

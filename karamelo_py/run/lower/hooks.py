@@ -17,6 +17,7 @@ from karamelo_py.kernels.hooks import STAGES, CompiledHook
 from karamelo_py.kernels.totals import LIMBS
 from karamelo_py.kernels.walls import FRICTION
 from karamelo_py.language.faults import as_script_error
+from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.run.boxes import unique
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.views import NodesView, PieceView, PointsView
@@ -50,6 +51,7 @@ def lower_hooks(
         scratch=np.zeros((STACK + ROWS + 1, BLOCK)),
         held=np.zeros((builder.shared_nodes(), dimension), arrays.HELD).view(np.recarray),
         loads=np.zeros((builder.loaded_nodes, dimension)),
+        told=builder.told,
         mode=mode or Serial(),
         # What threads have of their own, with space between the values of two.
         apart=arrays.Apart(
@@ -87,6 +89,9 @@ class _Builder:
         self.constants: list[np.ndarray] = []
         self.holding: list[Any] = []
         self.loaded_nodes = 0  # the number of nodes, where hooks bring forces
+        self.told = hub.update.method.rigid_fields(hub)
+        laws = (solid.material.law for solid in hub.solids.values())
+        self.rigid = any(can(law, constrained_velocity) for law in laws)
         self.whole: list[Any] = []  # tags of hooks on whole points
 
     def add(self, fix: Any, moment: str, hook: CompiledHook) -> None:
@@ -116,7 +121,10 @@ class _Builder:
         self.uses_first |= not hook.on_nodes and any(f.names & FIRST for f in formulas)
         if hook.holds and hook.on_nodes:
             self.holding.append(fix)
-        if STAGES[moment] == arrays.POST_PARTICLES_TO_GRID:
+        early = STAGES[moment] == arrays.POST_PARTICLES_TO_GRID
+        late = STAGES[moment] == arrays.POST_UPDATE_GRID_STATE
+        rubs = fix.wall_friction is not None
+        if early or (late and (not holds or rubs or self.rigid)):
             self.loaded_nodes = fix.group.total()
 
     def shared_nodes(self) -> int:

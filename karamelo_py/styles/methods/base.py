@@ -102,6 +102,10 @@ class Method:
         domain = hub.domain
         return [self._lattice(domain.dimension, domain.lo, domain.hi, domain.h)]
 
+    def rigid_fields(self, hub: Hub) -> np.ndarray:
+        """Return (F,) bool, whether each velocity field is of a rigid solid; (0,): none is."""
+        return np.zeros(0, bool)
+
     def lattice_of(self, hub: Hub, solid: Solid) -> int:
         """Return the number of the grid that the points of a solid see."""
         return 0

@@ -107,6 +107,15 @@ class ULMPMContacts(Method):
         box = domain.dimension, domain.lo, domain.hi, domain.h
         return numbered([self._lattice(*box) for _ in range(max(fields(hub), default=0) + 1)])
 
+    def rigid_fields(self, hub: Hub) -> np.ndarray:
+        rigid = {
+            field
+            for solid, field in zip(hub.solids.values(), fields(hub), strict=True)
+            if can(solid.material.law, constrained_velocity)
+        }
+        count = max(fields(hub), default=-1) + 1
+        return np.isin(np.arange(count if rigid else 0), list(rigid))
+
     def lattice_of(self, hub: Hub, solid: Solid) -> int:
         return fields(hub)[solid.index]
 
