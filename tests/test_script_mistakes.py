@@ -124,6 +124,20 @@ def test_a_mistake_in_an_included_script_says_who_includes_it(run_interpreted, t
             "damage(d, damage_johnson_cook, 1, 1, 1, 0, 0, 1, 0, 1)",
         ),
         ("fix(f, indent/pinball, all)", "indent/minimize_penetration"),
+        (
+            "fix(f, indent/pinball, all, sphere, K, R, x1, 0, 0, u, 0, 0)",
+            "fix(f, indent/minimize_penetration, all, sphere, R, x1, 0, 0, u, 0, 0, 0)",
+        ),
+        ("fix(f, indent, all, 0, 1, 0, R, 1e3)", "fix(f, indent, all, sphere, 1e3, R, 0, 1, 0)"),
+        (
+            "fix(f, body_force_current_config, all, 0, -9.81)",
+            "fix(f, body_force, all, 0, -9.81)",
+        ),
+        ("material(tool, rigid)", "material(tool, rigid, 1000)"),
+        (
+            "temperature(t, plastic_work, 0.9, 8960, 385)",
+            "temperature(t, plastic_work, 0.9, 385, 0, 0, T0, Tm)",
+        ),
         ("my speed = 3", "a name has no blanks: my_speed = ..."),
         ("x AND y", "write and"),
         ("w = sin(t)", "did you mean 'time'?"),
@@ -142,6 +156,56 @@ def test_lines_of_other_programs_say_what_to_write(run_interpreted, line, hint):
     (told,) = places(err)
     assert told[0] == 2
     assert hint in err.partition("hint: ")[2]
+
+
+def test_the_size_of_cells_is_found_where_solids_name_it(run_interpreted):
+    """As in Karamelo's vortex of 2019."""
+    script = "dimension(2, 0, 1, 0, 1)\ncell = 1/8\nregion(box, block, 0, 1, 0, 1)\nsolid(s, box, 2, mat, cell)\n"
+    err = run_interpreted(script, status=1).err
+    assert "hint: dimension(2, 0, 1, 0, 1, cell), behind line 2, which sets cell\n" in err
+    assert err.count("error") == 1
+
+
+OF_2020 = """
+method(tlmpm, FLIP, linear, 0.99)
+dimension(2, 0, 1, 0, 1, 0.5)
+region(box, {shape}, 0, 0.5, 0, 0.5)
+eos(bulk, {eos}, 7850, 1e9)
+strength(shear, linear, 1e9)
+material(mat, bulk, shear)
+solid(a, box, 1, mat, 0.5)
+solid(b, block, box, 1, mat, 0.5)
+run(1)
+"""
+
+
+@pytest.mark.parametrize(
+    ("given", "lines"),
+    [({"shape": "blok"}, [4]), ({"eos": "liner"}, [5]), ({"shape": "blok", "eos": "x"}, [4, 5])],
+)
+def test_what_only_follows_from_a_refused_region_or_eos_is_not_told(run_interpreted, given, lines):
+    """Forms of 2020 are right: material(ID, eos, strength) and solid(ID, box, region)."""
+    run_interpreted(OF_2020.format(shape="block", eos="linear"))
+    err = run_interpreted(
+        OF_2020.format(**{"shape": "block", "eos": "linear"} | given), status=1
+    ).err
+    assert [line for line, *_ in places(err)] == lines
+
+
+@pytest.mark.parametrize(
+    ("steps", "taken"), [("0.3/0.1", 3), ("0.201999999999999/0.001 + 1e-12", 202), ("3.001", None)]
+)
+def test_numbers_of_steps_may_be_rounded(run_interpreted, steps, taken):
+    """A quotient of decimal numbers is off by round-off, in every place of a whole number."""
+    script = OF_2020.format(shape="block", eos="linear").replace("run(1)", "")
+    script += (
+        f"set_output(0.6/0.2)\nset_dt(1e-7)\ndump(d, all, particle, 0.3/0.1, d.*, x)\nrun({steps})"
+    )
+    result = run_interpreted(script, status=int(taken is None))
+    if taken is None:
+        assert "must be a whole number of at least 0, not 3.001" in result.err
+    else:
+        assert f"\n  steps             {taken}\n" in result.out
 
 
 @pytest.mark.parametrize(

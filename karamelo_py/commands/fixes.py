@@ -108,7 +108,8 @@ def _define(
     """Make a fix or a compute, and publish its values."""
     kind = own.kind
     _refuse_wrong_order(kind, ID, style, arguments)
-    target = registry.called(kind, ID, style)
+    with signature.in_new_words(kind, ID, style, arguments):
+        target = registry.called(kind, ID, style)
     if ID in others and set(others[ID].published) & set(target.published):
         raise ScriptError(
             f"'{ID}' is a {others.kind} already (line {others[ID].place.line})",

@@ -11,7 +11,7 @@ from typing import Any
 
 from karamelo_py.language.arguments import with_gap
 from karamelo_py.language.scene import Scene
-from karamelo_py.language.unknown import words_of
+from karamelo_py.language.unknown import size_of_cells, words_of
 from karamelo_py.script.errors import ScriptError, meant, plural
 from karamelo_py.script.expressions import Expression
 
@@ -54,13 +54,13 @@ class Forms:
             raise ScriptError(f"there is no form for {dimension}D", expected=expected)
         names = self.names[dimension]
         if len(arguments) != len(names):
-            self._refuse_count(arguments, dimension)
+            self._refuse_count(hub, arguments, dimension)
         return {
             name: self._convert(hub, argument, name, dimension)
             for name, argument in zip(names, arguments, strict=True)
         }
 
-    def _refuse_count(self, arguments: Sequence[Any], dimension: int) -> None:
+    def _refuse_count(self, hub: Scene, arguments: Sequence[Any], dimension: int) -> None:
         names = self.names[dimension]
         got = len(arguments)
         missing = names[got:]
@@ -70,7 +70,7 @@ class Forms:
             message = f"{plural(got - len(names), 'argument')} too many in {dimension}D"
         gap = with_gap(arguments)
         fitting = [d for d, names in self.names.items() if len(names) == got and d != dimension]
-        hint = self._own_line(arguments, dimension) if got else None
+        hint = self._own_line(hub, arguments, dimension) if got else None
         if fitting and got:
             verb = "is" if got == 1 else "are"
             other = f"{plural(got, 'argument')} {verb} the form for {fitting[0]}D"
@@ -82,12 +82,16 @@ class Forms:
             hint=f"is a comma missing in '{gap.text}'?" if gap else hint,
         )
 
-    def _own_line(self, arguments: Sequence[Any], dimension: int) -> str:
+    def _own_line(self, hub: Scene, arguments: Sequence[Any], dimension: int) -> str:
         """Write the call in the words of the script, with what is missing by its name."""
         names = self.names[dimension]
         words = [argument.text for argument in arguments][: len(names)]
         line = re.sub(r"\[.*?\]", "", self.pattern)
-        line = line.format(dimension=dimension, names=", ".join([*words, *names[len(words) :]]))
+        further = list(names[len(words) :])
+        size, below = size_of_cells(hub.interpreter) if further == ["h"] else ("", None)
+        further = [size] if size else further
+        line = line.format(dimension=dimension, names=", ".join([*words, *further]))
+        line += f", behind line {below}, which sets {size}" if below else ""
         ID = (words_of(arguments[0].statement) or ["ID"])[0]
         return line.replace("(ID,", f"({ID},")
 

@@ -11,7 +11,7 @@ from itertools import takewhile
 from typing import Any
 
 from karamelo_py.language import registry
-from karamelo_py.language.unknown import unknown_call
+from karamelo_py.language.unknown import SHAPES, renamed, unknown_call, words_of
 from karamelo_py.script.errors import Quit, ScriptError, instead, nearest, plural
 from karamelo_py.script.functions import FUNCTIONS
 from karamelo_py.script.syntax import Assignment, CommandCall, Statement
@@ -125,7 +125,9 @@ def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
                 break
             except Exception:  # What is left of the scene is not whole.
                 passed_over += _rest_of(interpreter)
-    for error in misnamed(interpreter, passed_over):
+    for statement in passed_over:
+        dependents.note(statement)
+    for error in misnamed(interpreter, passed_over, dependents.names):
         tell(error)
     return sorted(found, key=_order)[:MOST]
 
@@ -147,8 +149,14 @@ def errors_of_text(interpreter: Any, first: ScriptError) -> list[ScriptError]:
     return [*found[:MOST_OF_TEXT], *besides]
 
 
-def misnamed(interpreter: Any, statements: Iterable[Statement]) -> list[ScriptError]:
-    """Find wrong names of commands and styles in statements."""
+def misnamed(
+    interpreter: Any, statements: Iterable[Statement], wanting: Iterable[str] = ()
+) -> list[ScriptError]:
+    """Find wrong names of commands and styles in statements.
+
+    Karamelo's forms without a style, material(ID, eos, strength) and solid(ID, box, region, ...),
+    are right, also where what would have one of the `wanting` names went wrong.
+    """
     statements = list(statements)
     variables = {s.name for s in statements if isinstance(s, Assignment)} | {*interpreter.variables}
     found = []
@@ -156,14 +164,16 @@ def misnamed(interpreter: Any, statements: Iterable[Statement]) -> list[ScriptEr
         if not isinstance(statement, CommandCall) or statement.name in variables:
             continue
         try:
-            _look_up(interpreter, statement, variables)
+            _look_up(interpreter, statement, variables, set(wanting))
         except ScriptError as error:
             error.place = error.place or statement.place
             found.append(error)
     return found
 
 
-def _look_up(interpreter: Any, statement: CommandCall, variables: set[str]) -> None:
+def _look_up(
+    interpreter: Any, statement: CommandCall, variables: set[str], wanting: set[str]
+) -> None:
     name, arguments = statement.name, statement.arguments
     if name not in FUNCTIONS and not registry.knows("command", name):
         raise unknown_call(interpreter, name, statement.place, statement=True)
@@ -171,11 +181,23 @@ def _look_up(interpreter: Any, statement: CommandCall, variables: set[str]) -> N
     if where >= len(arguments):
         return
     style = arguments[where].code.strip()
+    hub, behind = interpreter.hub, [argument.code.strip() for argument in arguments[where + 1 :]]
+    filled = wanting | {*hub.regions}
+    if not registry.knows(name, style) and (
+        (name == "material" and style in wanting | {*hub.parts["eos"]})
+        or (
+            name == "solid"
+            and (style in filled or (style in SHAPES and filled.intersection(behind[:1])))
+        )
+    ):
+        return
     if style not in variables and re.fullmatch(r"[a-zA-Z][\w/-]*", style):
         try:
             registry.find(name, style)
         except ScriptError as error:
             error.command, error.place = name, arguments[where].place
+            ID, *words = words_of(statement)
+            error.hint = renamed(name, style, ID, words[where:]) or error.hint
             raise
 
 

@@ -22,6 +22,12 @@ from karamelo_py.script.terms import number_text
 # Beyond it a number cannot tell one integer from the next.
 _LARGEST_INTEGER = 2**53
 
+
+def _rounding(value: float) -> float:
+    """Return how far a result such as 0.3/0.1 may be from a whole number."""
+    return min(1e-9 * max(abs(value), 1), 1e-3)
+
+
 # ---- constraints and files ----------------------------------------------------------------------
 
 
@@ -202,11 +208,11 @@ def _to_integer(hub: Any, argument: Argument) -> int:
     value = _to_number(hub, argument)
     if math.isnan(value):
         return 1  # A result that a rehearsal does not have; 1 passes every check.
-    if math.isinf(value) or value != math.floor(value):
+    if math.isinf(value) or abs(value - round(value)) > _rounding(value):
         raise Unfit(number_text(value))
     if abs(value) > _LARGEST_INTEGER:
         raise Unfit(f"{number_text(value)}, which is too large")
-    return int(value)
+    return round(value)
 
 
 def _to_text(hub: Any, argument: Argument) -> str:

@@ -15,7 +15,8 @@ are added with Annotated. ``*args`` take any number, keyword-only parameters are
 
 import inspect
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, Literal, get_type_hints
@@ -37,7 +38,7 @@ from karamelo_py.language.kinds import (
     is_raw,
     kind_of,
 )
-from karamelo_py.language.unknown import longer
+from karamelo_py.language.unknown import longer, renamed
 from karamelo_py.script.errors import Place, ScriptError, meant, nearest, table
 
 __all__ = [
@@ -168,8 +169,9 @@ def style_of(
 
     Their values are noted in `given`, a dict, by name.
     """
-    target = registry.called(family, ID, style)
-    return call(target, hub, arguments, f"{family} {style}", given)
+    with in_new_words(family, ID, style, arguments):
+        target = registry.called(family, ID, style)
+        return call(target, hub, arguments, f"{family} {style}", given)
 
 
 def remade(
@@ -204,6 +206,18 @@ def remade(
     except ScriptError as error:
         error.place = error.place or _guilty(error, arguments, bound)
         error.command = error.command or name
+        raise
+
+
+@contextmanager
+def in_new_words(family: str, ID: str, style: str, arguments: Sequence[Argument]) -> Iterator[None]:
+    """Let an error about a line of a former Karamelo end in the line to write."""
+    try:
+        yield
+    except ScriptError as error:
+        if not arguments or not registry.knows(family, style):
+            words = [argument.text for argument in arguments]
+            error.hint = renamed(family, style, ID, words) or error.hint
         raise
 
 

@@ -233,6 +233,8 @@ SHAPES = dict.fromkeys(("block", "box", "rectangle"), "block") | {
     "sphere": "sphere",
 }
 FLIPS = ("FLIP", "AFLIP", "ASFLIP")
+# What scripts of Karamelo call the temperatures of rest and of melting.
+OWN_NAMES = {"T0": ("T0", "Tr", "Troom"), "Tm": ("Tm", "Tmelt", "Tmelting")}
 
 
 def words_of(statement: Any) -> list[str]:
@@ -274,12 +276,33 @@ def filled(statement: Any) -> str | None:
 
 
 def longer(name: str, given: Sequence[Any]) -> str | None:
-    """Write the line of a law (`name`: ``eos shock``) that was `given` fewer arguments."""
+    """Write the line of a style (`name`: ``eos shock``) that was `given` fewer arguments."""
     forms = table()["shorter"].get(name)
     if forms is None or not given:
         return None
     family, style = name.split()
-    says, line = forms.get(str(len(given)), forms["else"])
+    count = str(len(given))
+    if count not in forms and "else" not in forms:
+        return None
+    says, line = forms.get(count) or forms["else"]
     ID = words_of(given[0].statement)[:1] or ["ID"]
-    words = line.format(*(argument.text for argument in given))
+    script = given[0]._interpreter
+    known = {name: next(filter(script.knows, own), name) for name, own in OWN_NAMES.items()}
+    words = line.format(*(argument.text for argument in given), **known)
     return f"{says}{family}({ID[0]}, {style}, {words})"
+
+
+def renamed(family: str, style: str, ID: str, words: Sequence[str]) -> str | None:
+    """Write a line of Karamelo that has a former style, or no argument behind it."""
+    form = table()["renamed"].get(f"{family} {style}")
+    try:
+        return form and f"{family}({form.format(*words, ID=ID, all=', '.join(words))})"
+    except IndexError:
+        return None
+
+
+def size_of_cells(script: Any) -> tuple[str, int | None]:
+    """Find the size of cells that a solid further down is given, and the line that sets it."""
+    solids = (words_of(s) for s, kind, *_ in _ahead(script) if kind == "solid")
+    size = next((words[5 if len(words) == 7 else -1] for words in solids if len(words) > 4), "h")
+    return size, line_below(script, "", size)
