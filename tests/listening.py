@@ -23,8 +23,5 @@ class Compiled:
 def listening() -> Iterator[list[str]]:
     """The names of what is compiled meanwhile."""
     listener = Compiled()
-    compilation.listeners.append(listener)
-    try:
+    with compilation.told_to(listener):
         yield listener.names
-    finally:
-        compilation.listeners.remove(listener)

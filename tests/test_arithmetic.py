@@ -1,5 +1,6 @@
 """Operations of kernels on numbers of every type give what Python gives."""
 
+import ctypes
 import math
 import operator
 from itertools import product
@@ -8,7 +9,7 @@ import numpy as np
 import pytest
 from numba import config
 
-from karamelo_py.compiler.failing import noting, raise_noted
+from karamelo_py.compiler.failing import Failure, noting
 from karamelo_py.compiler.loops import kernel
 
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
@@ -88,7 +89,8 @@ def test_what_kernels_call_raises_behind_them():
     def interrupted(number):
         raise KeyboardInterrupt
 
-    assert noting(interrupted)(1) == 0
+    failure = Failure()
+    assert noting(interrupted)(1, ctypes.addressof(failure)) == 0
     with pytest.raises(KeyboardInterrupt):
-        raise_noted()
-    raise_noted()  # nothing more
+        failure.raise_first()
+    failure.raise_first()  # nothing more

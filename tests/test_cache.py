@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from listening import listening
 from numba import config
 
 from karamelo_py.compiler import cache, choices, fingerprint, machine
@@ -24,6 +25,7 @@ from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.lowering import FunctionType
 from karamelo_py.compiler.threads import Threaded, shared_out
 from karamelo_py.kernels.step import step
+from karamelo_py.kernels.table import each_node
 from karamelo_py.output.console import Console
 from karamelo_py.run.runner import Timings
 from karamelo_py.scene.hub import Hub
@@ -138,9 +140,9 @@ FILES = {
                     self.names.append(type(shape).__name__)
             def on_end(self): ...
 
-        compilation.listeners.append(Compiled())
         values = []
-        with warnings.catch_warnings(record=True) as told:
+        listening = compilation.told_to(Compiled())
+        with listening, warnings.catch_warnings(record=True) as told:
             warnings.simplefilter("default")
             for shape in (Disk(1.0), Square(2.0), Strip(3.0)):
                 values.append(total(shape, Pair(1.0, 2.0), 3))
@@ -487,6 +489,65 @@ def test_what_threads_do_is_followed(tmp_path, monkeypatch):
     name = f"{__name__}:answer"
     assert choices.Choice(name, (f"{__name__}:Tag",)) in chosen
     assert forty_two.__code__ in codes
+
+
+class Cells(NamedTuple):
+    spans: np.ndarray
+    a: np.ndarray
+
+
+def _add_1(s, n):
+    s.a[n] += 1.0
+
+
+def _add_2(s, n):
+    s.a[n] += 2.0
+
+
+def _add_3(s, n):
+    s.a[n] += 3.0
+
+
+def _add_4(s, n):
+    s.a[n] += 4.0
+
+
+def _add_5(s, n):
+    s.a[n] += 5.0
+
+
+def test_loops_that_one_function_makes_are_kept_side_by_side(tmp_path, monkeypatch):
+    """Those over nodes are all of one name: each was compiled anew where there are five."""
+    monkeypatch.setenv("KARAMELO_PY_CACHE", str(tmp_path))
+    cells = Cells(np.array([[1, 0], [0, 4]], np.int64), np.zeros(4))
+    functions = (_add_1, _add_2, _add_3, _add_4, _add_5)
+    for expected in (5, 0):
+        with listening() as names:
+            for function in functions:
+                each_node(function).loop(cells)
+        assert len(names) == expected
+    assert cells.a.tolist() == [30.0] * 4
+
+
+class Changing(NamedTuple):
+    """A tag whose implementation is made anew, as in a notebook."""
+
+
+@kernel
+def _answered(tag, a):
+    a[0] = answer(tag)
+
+
+def test_a_new_implementation_reaches_compiled_kernels():
+    a = np.zeros(1)
+    for number in (1.0, 2.0):
+
+        @answer.on(Changing)
+        def _(tag, number=number):
+            return number
+
+        _answered(Changing(), a)
+        assert a[0] == number == answer(Changing())
 
 
 def test_code_that_nothing_leads_to_is_not_kept():

@@ -16,9 +16,9 @@ from karamelo_py.compiler.threads import (
     Threaded,
     by_team,
     new_team,
-    set_threads,
     shared_out,
 )
+from karamelo_py.compiler.trace import CannotCompile
 
 
 class Pair(NamedTuple):
@@ -197,7 +197,6 @@ def _count_all(mode, out, factor):
 @pytest.mark.parametrize("mode", [Serial(), Threaded()], ids=["serial", "threaded"])
 def test_each_number_is_done_once(mode):
     """By one thread or by several, with the same arguments."""
-    set_threads(min(2, config.NUMBA_NUM_THREADS))
     out = Pair(np.zeros(1000), np.zeros(1))
     _count_all(mode, out, 2.0)
     assert out.a.tolist() == [2.0 * k for k in range(1000)]
@@ -224,7 +223,6 @@ def _often_from_python(mode, out, factor, times):
 @pytest.mark.parametrize("threads", [1, 2, 5])
 def test_a_team_does_each_number_of_each_loop_once(threads):
     """Also where a thread of the team never begins, since there are fewer than it has."""
-    set_threads(min(2, config.NUMBA_NUM_THREADS))
     team = new_team(threads)
     for mode in (Threaded(team.ctypes.data), Threaded(), Serial()):
         out = Pair(np.zeros(500), np.zeros(1))
@@ -232,6 +230,25 @@ def test_a_team_does_each_number_of_each_loop_once(threads):
             assert _often_from_python(mode, out, 2.0, 300) == 300
         more = [sum(k < n % 7 for n in range(300)) for k in range(500)]
         assert out.a.tolist() == [2 * (300 + more[k]) * 2.0 * k for k in range(500)]
+
+
+@kernel
+def _put(a):
+    a[0] = 7.0
+
+
+@pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
+def test_an_array_that_was_made_read_only_is_not_written():
+    a = np.zeros(3)
+    _put(a)
+    a[0] = 0.0
+    a.flags.writeable = False
+    with pytest.raises(CannotCompile, match="an array that must not be changed"):
+        _put(a)
+    assert a[0] == 0
+    a.flags.writeable = True
+    _put(a)
+    assert a[0] == 7
 
 
 @pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")

@@ -15,7 +15,8 @@ from karamelo_py.compiler.compile import fma, implements, point_function, real, 
 from karamelo_py.compiler.held import hold
 from karamelo_py.compiler.loops import address_of, kernel, written
 from karamelo_py.compiler.lowering import Lowering
-from karamelo_py.compiler.trace import CannotCompile, forget, in_one
+from karamelo_py.compiler.trace import CannotCompile, forget
+from karamelo_py.compiler.values import in_one
 from karamelo_py.language.faults import cause_of, place_in
 
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")

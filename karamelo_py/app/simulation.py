@@ -8,6 +8,7 @@ import itertools
 import os
 import re
 import sys
+import threading
 import warnings
 from argparse import ArgumentTypeError
 from collections.abc import Callable, Iterator, Mapping, MutableMapping
@@ -228,7 +229,11 @@ class Simulation:
     are what they are; ``sim.fix(ID, "python", group, function)`` takes a function,
     ``sim.solid(ID, "points", columns, ...)`` arrays by name, or a DataFrame.
 
-    Several simulations may live side by side and take turns; they do not run at the same time.
+    Commands that give a value, such as ``sim.value("Ek")`` and ``sim.xcm("all", "x")``, return the
+    present one.
+
+    Simulations may run at the same time, each in a thread of Python. One takes one call at a time:
+    a second thread gets a SimulationError.
 
     Examples
     --------
@@ -257,6 +262,7 @@ class Simulation:
         hub.output.log.rows = []
         hub.output.writes = out is not None
         self._numbers = itertools.count(1)
+        self._at_work = threading.RLock()  # by this thread
         self._name = "a scene"
         with _as_simulation_error():
             hub.settings.threads = _threads_of(threads)
@@ -325,21 +331,38 @@ class Simulation:
     @contextmanager
     def _carried_out(self) -> Iterator[None]:
         """Make runs at once, and end them as the user wants."""
-        pausing, self.hub.pausing = self.hub.pausing, False
+        with self._in_one_thread():
+            pausing, self.hub.pausing = self.hub.pausing, False
+            try:
+                with _as_simulation_error():
+                    yield
+            except Quit:
+                pass
+            except Interrupted:
+                raise KeyboardInterrupt from None
+            finally:
+                self.hub.pausing = pausing
+
+    @contextmanager
+    def _in_one_thread(self) -> Iterator[None]:
+        """Refuse what a second thread wants meanwhile."""
+        if not self._at_work.acquire(blocking=False):
+            raise SimulationError(
+                "this simulation is at work in another thread",
+                hint="wait for that, or one Simulation for each thread",
+            )
         try:
-            with _as_simulation_error():
-                yield
-        except Quit:
-            pass
-        except Interrupted:
-            raise KeyboardInterrupt from None
+            yield
         finally:
-            self.hub.pausing = pausing
+            self._at_work.release()
 
     def evaluate(self, expression: str) -> float | str:
         """Compute the present value of an expression of the language."""
-        with _as_simulation_error():
-            raw, node = parse_text(expression, "evaluate")
+        return self._evaluated(expression, "evaluate")
+
+    def _evaluated(self, expression: str, name: str) -> float | str:
+        with self._in_one_thread(), _as_simulation_error():
+            raw, node = parse_text(expression, name)
             found = self._interpreter.evaluate(node, raw)
             if isinstance(found, Expression):
                 self.hub.refresh_values()
@@ -353,11 +376,18 @@ class Simulation:
             hint = f"; did you mean '{close}'?" if close else f"; {other}" if other else ""
             raise AttributeError(f"there is no command '{name}'{hint}")
 
-        def call(*arguments: Any, **named: Any) -> None:
-            self._do(f"{name}({self._words(*arguments, **named)})", f"Simulation.{name}")
+        command = registry.find("command", name)
+        gives = getattr(command, "__annotations__", {}).get("return") not in (None, "None")
+
+        def call(*arguments: Any, **named: Any) -> Any:
+            line = f"{name}({self._words(*arguments, **named)})"
+            if gives:
+                return self._evaluated(line, f"Simulation.{name}")
+            self._do(line, f"Simulation.{name}")
+            return None
 
         call.__name__ = name
-        call.__doc__ = registry.find("command", name).__doc__
+        call.__doc__ = command.__doc__
         return call
 
     def __dir__(self) -> list[str]:

@@ -6,6 +6,7 @@ Python writes the arguments into memory as kernels hold them
 
 import ctypes
 import functools
+import itertools
 import struct
 import weakref
 from collections.abc import Callable, Iterator
@@ -24,35 +25,43 @@ class _Array(NamedTuple):
 
     alive: weakref.ref  # another array may get the number of one that is gone
     shape: tuple[int, ...]
+    writeable: bool
     kind: int  # the same for arrays of one type
     words: tuple[int, ...]  # as kernels have them
 
 
 _arrays: dict[int, _Array] = {}
 _kinds: dict[tuple, int] = {}
+_numbers = itertools.count()  # of these: another thread may look at an array meanwhile
 
 
 def _array(array: np.ndarray) -> _Array:
     number = id(array)
     known = _arrays.get(number)
-    if known is None or known.alive() is not array or known.shape != array.shape:
+    if (
+        known is None
+        or known.alive() is not array
+        or known.shape != array.shape
+        or known.writeable is not array.flags.writeable
+    ):
         flags = array.flags
         kind = (
             array.dtype, array.ndim, flags.c_contiguous, flags.f_contiguous, flags.aligned,
             flags.writeable,
         )  # fmt: skip
         words = (array.ctypes.data, *array.shape, *array.strides)
-        kept = _kinds.setdefault(kind, len(_kinds))
+        kept = _kinds[kind] if kind in _kinds else _kinds.setdefault(kind, next(_numbers))
         alive = weakref.ref(array, functools.partial(_drop, number))
-        known = _Array(alive, array.shape, kept, words)
+        known = _Array(alive, array.shape, flags.writeable, kept, words)
         _arrays[number] = known
     return known
 
 
 def _drop(number: int, alive: weakref.ref) -> None:
     """Forget an array that is gone, unless another one has its number."""
-    if number in _arrays and _arrays[number].alive is alive:
-        del _arrays[number]
+    known = _arrays.get(number)
+    if known is not None and known.alive is alive:
+        _arrays.pop(number, None)
 
 
 def forget(array: np.ndarray) -> None:

@@ -417,13 +417,17 @@ def _gamma_of_python(x: float) -> float:
 
 
 _OF_DOUBLE = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)
-machine.publish_python("karamelo_gamma", _OF_DOUBLE, failing.noting(_gamma_of_python))
+machine.publish_python("karamelo_gamma", _OF_DOUBLE, failing.never_raising(_gamma_of_python))
+_TOLD = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double, ctypes.c_int64)
+machine.publish_python("karamelo_told_gamma", _TOLD, failing.noting(_gamma_of_python))
 
 
 def _gamma(builder: Any, kind: types.Type, x: Any) -> Any:
     """Python's function, whose bits do not depend on the library of C."""
     double = code.cast(builder, x, kind, types.float64)
-    found = _call(builder, "karamelo_gamma", double.type, [double])
+    given = failing.passed_to(builder, builder.function)
+    name = "karamelo_told_gamma" if given else "karamelo_gamma"  # Ctrl-C may come within
+    found = _call(builder, name, double.type, [double, *given])
     return code.cast(builder, found, types.float64, kind)
 
 
@@ -439,7 +443,7 @@ for _name, (_real, _ending) in product(
 ):  # what this library of C lacks
     if not machine.is_known(_name + _ending):
         _kind = ctypes.CFUNCTYPE(_real, _real)
-        machine.publish_python(_name + _ending, _kind, failing.noting(getattr(math, _name)))
+        machine.publish_python(_name + _ending, _kind, failing.never_raising(getattr(math, _name)))
 
 OPERATIONS: dict[Any, Callable] = {
     operator.add: _sum("fadd", "add"),

@@ -8,6 +8,7 @@ it were not there, and the user told once.
 """
 
 import contextlib
+import contextvars
 import errno
 import hashlib
 import os
@@ -86,7 +87,11 @@ def _warn(text: str) -> None:
     warnings.warn(text, RuntimeWarning, stacklevel=1)  # once for a text, wherever it comes from
 
 
-_tell: Callable[[str], None] = _warn
+_told = contextvars.ContextVar[Callable[[str], None]]("told", default=_warn)
+
+
+def _tell(text: str) -> None:
+    _told.get()(text)
 
 
 def _trouble(error: OSError) -> None:
@@ -96,26 +101,26 @@ def _trouble(error: OSError) -> None:
 @contextlib.contextmanager
 def telling(tell: Callable[[str], None]) -> Iterator[None]:
     """Tell by `tell` what is wrong with the folder meanwhile, once."""
-    global _tell
-    before, told = _tell, []
+    told: list[str] = []
 
     def tell_once(text: str) -> None:
         if not told:
             told.append(text)
             tell(text)
 
-    _tell = tell_once
+    before = _told.get()
+    _told.set(tell_once)
     try:
         yield
     finally:
-        _tell = before
+        _told.set(before)
 
 
 class KernelFiles:
     """Keep the kernels of one function in files; what `load` cannot bring into memory is none.
 
-    `about` tells apart functions of one name, such as those that a function makes; `beside` are
-    others that its kernels may call.
+    `about` tells apart functions of one name, and so do the names of functions that they close over
+    (a function may make several); `beside` are others that its kernels may call.
     """
 
     def __init__(
@@ -189,7 +194,7 @@ class KernelFiles:
 
     def _key(self, kinds: tuple, result: Any) -> str:
         """Give the name of the function with a hash of the types and of the machine."""
-        words = [name_of(self._function), *map(describe, kinds)]
+        words = [name_of(self._function), *_closed_over(self._function), *map(describe, kinds)]
         words += [describe(result) if result is not None else "", repr(machine.describe())]
         words.append(self._about)
         digest = hashlib.sha256("|".join([*words, _SETTING]).encode()).hexdigest()
@@ -223,6 +228,14 @@ class KernelFiles:
                 old.add(path)
         for path in old:
             path.unlink(missing_ok=True)
+
+
+def _closed_over(function: Callable) -> Iterator[str]:
+    """Yield the names of the functions in the closure of a function."""
+    for cell in getattr(function, "__closure__", None) or ():
+        with contextlib.suppress(ValueError):  # it is empty as yet
+            if hasattr(cell.cell_contents, "__qualname__"):
+                yield name_of(cell.cell_contents)
 
 
 _VERSIONS = platform.python_version(), numba.__version__, llvmlite.__version__, np.__version__

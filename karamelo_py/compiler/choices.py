@@ -1,5 +1,6 @@
 """Choices by type that compiled code has made: the key of a kernel has these, and no others."""
 
+import contextvars
 import functools
 import itertools
 import sys
@@ -46,24 +47,25 @@ def name_of(thing: Any) -> str:
 
 # What was asked of a point function, code of a function that was run, or a class that it names.
 Part: TypeAlias = "tuple[Callable, tuple] | Choice | python.CodeType | type"
-_noted: list[set[Part]] = []  # of the functions that are made, innermost last
+# Of the functions that are made, innermost last; in each thread of Python its own.
+_noted: contextvars.ContextVar[tuple[set[Part], ...]] = contextvars.ContextVar("noted", default=())
 
 
 def note(parts: Iterable[Part]) -> None:
     """Note what the function that is compiled now consists of."""
-    if _noted:
-        _noted[-1].update(parts)
+    if noted := _noted.get():
+        noted[-1].update(parts)
 
 
 @contextmanager
 def parts_noted() -> Iterator[set[Part]]:
     """Collect what is noted meanwhile."""
-    before = len(_noted)
-    _noted.append(set())
+    before, parts = _noted.get(), set()
+    _noted.set((*before, parts))
     try:
-        yield _noted[-1]
+        yield parts
     finally:
-        del _noted[before:]
+        _noted.set(before)
 
 
 def tag_class(numba_type: Any) -> Any:

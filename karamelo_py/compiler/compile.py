@@ -15,7 +15,13 @@ from numba import types
 from karamelo_py.compiler import arithmetic, choices, code
 from karamelo_py.compiler.arithmetic import common
 from karamelo_py.compiler.code import I64, Lanes, lane, scalar_of
-from karamelo_py.compiler.trace import INSTEAD, Undefined, forget, run_for_kernel
+from karamelo_py.compiler.trace import (
+    INSTEAD,
+    Undefined,
+    forget,
+    outdate_kernels,
+    run_for_kernel,
+)
 from karamelo_py.compiler.values import (
     OF_REALS,
     Untraceable,
@@ -40,6 +46,9 @@ def implements(function: Callable, *numbers: type, by_type: bool = False) -> Cal
 
     def register(made: Callable) -> Callable:
         known = choices.choosers.setdefault(function, [])
+        of_numbers = any(function in getattr(one, "implements", ()) for one in numbers)
+        if of_numbers or (known and not numbers):
+            outdate_kernels()
         for one in numbers:
             if "implements" not in vars(one):
                 one.implements = {}
@@ -79,15 +88,17 @@ def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Calla
         nearest: dict[tuple[type, ...], Callable | None] = {}
 
         def find(classes: tuple) -> Callable | None:
-            if classes not in nearest:
+            known = nearest  # another thread of Python may add implementations meanwhile
+            if classes not in known:
                 ways = product(*(getattr(one, "__mro__", (one,)) for one in classes))
-                nearest[classes] = next((table[way] for way in ways if way in table), fallback)
-            return nearest[classes]
+                known[classes] = next((table[way] for way in ways if way in table), fallback)
+            return known[classes]
 
         def plain(*arguments: Any) -> Any:
             first = arguments[0].__class__
             classes = (first,) if tags == 1 else tuple([a.__class__ for a in arguments[:tags]])
-            chosen = nearest[classes] if classes in nearest else find(classes)
+            known = nearest
+            chosen = known[classes] if classes in known else find(classes)
             if chosen is None:
                 raise Undefined(stub.__name__, classes)
             return chosen(*arguments)
@@ -111,9 +122,12 @@ def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Calla
 
         def on(*classes: type) -> Callable[[Callable], Callable]:
             def register(implementation: Callable) -> Callable:
+                nonlocal nearest
                 table[classes] = implementation
-                nearest.clear()
+                before, nearest = nearest, {}
                 forget()
+                if any(find(asked) is not found for asked, found in before.items()):
+                    outdate_kernels()
                 return implementation
 
             return register

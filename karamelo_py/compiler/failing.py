@@ -1,8 +1,14 @@
-"""Exceptions in kernels: noted where they are raised, and raised by Python behind the kernel."""
+"""Exceptions in kernels: noted where they are raised, and raised by Python behind the kernel.
+
+Each call of a kernel by Python has a `Failure` of its own. The functions of LLVM that it consists
+of hand on its address as their last argument, to other threads too (`told`).
+"""
 
 import ctypes
 import functools
+import math
 import pickle
+import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -10,27 +16,61 @@ from llvmlite import ir
 
 from karamelo_py.compiler import code, machine
 
-_failed = ctypes.c_int64(0)  # whether something was raised
-_noted: list[BaseException] = []
-_NOTE = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64)
+
+class Failure(ctypes.Structure):
+    """Hold the first exception of one call of a kernel; kernels read the first word alone."""
+
+    _fields_ = (("failed", ctypes.c_int64), ("first", ctypes.py_object))
+
+    def raise_first(self) -> None:
+        """Raise what was noted first, if anything was."""
+        if self.failed:
+            error = self.first
+            ctypes.pythonapi.Py_DecRef(ctypes.py_object(error))
+            self.failed = 0
+            raise error
 
 
-def note(error: BaseException) -> None:
-    """Have an exception raised behind the kernel that is at work."""
-    _noted.append(error)
-    _failed.value = 1
+_noting = threading.Lock()
+
+
+def note(error: BaseException, at: int) -> None:
+    """Have an exception raised behind the kernel whose `Failure` lies at an address."""
+    failure = Failure.from_address(at)
+    with _noting:
+        if not failure.failed:
+            failure.first = error
+            ctypes.pythonapi.Py_IncRef(ctypes.py_object(error))  # `failure` here does not stay
+            failure.failed = 1
 
 
 def noting(function: Callable) -> Callable:
-    """Note what a function that kernels call raises, Ctrl-C too: Python drops it there."""
+    """Note what a function that kernels call raises, Ctrl-C too: Python drops it there.
+
+    Behind its arguments it is given the address of the `Failure`.
+    """
+
+    @functools.wraps(function)
+    def call(*arguments: Any) -> Any:
+        *given, at = arguments
+        try:
+            return function(*given)
+        except BaseException as error:
+            note(error, at)
+            return 0
+
+    return call
+
+
+def never_raising(function: Callable) -> Callable:
+    """Let a function of numbers that a kernel calls like one of C give NaN where it would raise."""
 
     @functools.wraps(function)
     def call(*arguments: Any) -> Any:
         try:
             return function(*arguments)
-        except BaseException as error:
-            note(error)
-            return 0
+        except BaseException:  # Python would drop it, and say so
+            return math.nan
 
     return call
 
@@ -38,20 +78,27 @@ def noting(function: Callable) -> Callable:
 @noting
 def _note(text: int, size: int) -> None:
     kind, arguments = pickle.loads(ctypes.string_at(text, size))
-    note(kind(*arguments))
+    raise kind(*arguments)
 
 
-machine.publish("karamelo_failed", ctypes.addressof(_failed))
-machine.publish_python("karamelo_fail", _NOTE, _note)
+machine.publish_python("karamelo_fail", ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 3), _note)
 
 
-def raise_noted() -> None:
-    """Raise what a kernel has noted first, if it did."""
-    if _failed.value:
-        first = _noted[0]
-        _noted.clear()
-        _failed.value = 0
-        raise first
+def told(function: ir.Function) -> ir.Function:
+    """Mark a function whose last argument is the address of the `Failure`."""
+    function.told = True
+    return function
+
+
+def failure_at(builder: ir.IRBuilder) -> Any:
+    """Give the address of the `Failure` in the function that is written; 0 where there is none."""
+    own = builder.function
+    return own.args[-1] if hasattr(own, "told") else code.I64(0)
+
+
+def passed_to(builder: ir.IRBuilder, called: Any) -> list:
+    """List what a function is given behind its arguments."""
+    return [failure_at(builder)] if hasattr(called, "told") else []
 
 
 def _return(builder: ir.IRBuilder) -> None:
@@ -67,8 +114,9 @@ def fail(builder: ir.IRBuilder, kind: Callable, arguments: tuple) -> None:
     text = pickle.dumps((kind, arguments))
     constant = ir.Constant(ir.ArrayType(code.I8, len(text)), bytearray(text))
     place = code.in_module(builder, constant, "exception")
-    function = code.external(builder, "karamelo_fail", ir.VoidType(), [code.I64] * 2)
-    builder.call(function, [builder.ptrtoint(place, code.I64), code.I64(len(text))])
+    function = code.external(builder, "karamelo_fail", ir.VoidType(), [code.I64] * 3)
+    at = builder.ptrtoint(place, code.I64)
+    builder.call(function, [at, code.I64(len(text)), failure_at(builder)])
     builder.function.raises = True
     _return(builder)
 
@@ -83,9 +131,7 @@ def go_on(builder: ir.IRBuilder, called: Any, regardless: bool) -> None:
     builder.function.raises = True
     if regardless:
         return
-    flag = builder.module.globals.get("karamelo_failed")
-    if flag is None:
-        flag = ir.GlobalVariable(builder.module, code.I64, "karamelo_failed")
+    flag = builder.inttoptr(failure_at(builder), code.I64.as_pointer())
     raised = builder.icmp_signed("!=", builder.load(flag), code.I64(0))
     with builder.if_then(raised, likely=False):
         _return(builder)

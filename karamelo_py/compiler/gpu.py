@@ -19,7 +19,7 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 
-from karamelo_py.compiler import code, machine
+from karamelo_py.compiler import code, machine, trace
 from karamelo_py.compiler.argument_buffer import ArgumentBuffer, plan_for
 from karamelo_py.compiler.cache import KernelFiles
 from karamelo_py.compiler.choices import INTERPRETED, Unknown, contents, parts_noted
@@ -27,8 +27,8 @@ from karamelo_py.compiler.code import I32, I64
 from karamelo_py.compiler.compile import implements
 from karamelo_py.compiler.fingerprint import fingerprint
 from karamelo_py.compiler.loops import ENTRY, NAME, compilation, items_at, written
-from karamelo_py.compiler.trace import formula, in_one
-from karamelo_py.compiler.values import intrinsic
+from karamelo_py.compiler.trace import formula
+from karamelo_py.compiler.values import in_one, intrinsic
 
 THREADS = 128  # of a block
 USUAL = Path("/usr/local/cuda/nvvm/libdevice/libdevice.10.bc")  # of NVIDIA's own installer
@@ -183,7 +183,7 @@ def text_of(
 ) -> tuple[str, str]:
     """Write a function of a thread for the rest of its arguments; name and text of the module.
 
-    `called` as in `trace.in_one`.
+    `called` as in `values.in_one`.
     """
     with in_one(called or {}):
         entry = _as_threads if on_card else _as_loop
@@ -247,7 +247,7 @@ class _Coded:
     def compiled(self, function: Callable, kinds: tuple, called: dict | None = None) -> Any:
         """Make the function ready to be launched for arguments of these types."""
         called = called or {}
-        key = function, kinds, *called.values()
+        key = function, kinds, trace.changes, *called.values()
         if key not in self._known:
             code = self._found(function, kinds, called)
             if code.name not in self._entries:

@@ -5,12 +5,13 @@ hash of its text is in it. Python writes the arguments into memory (`argument_bu
 entry with their address; kernels that call it refer to its name, and do not contain it.
 """
 
+import contextvars
 import ctypes
 import functools
 import gc
 import hashlib
+import itertools
 import re
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, NamedTuple
@@ -22,13 +23,20 @@ from karamelo_py.compiler import cache, choices, code, compile_lock, machine, tr
 from karamelo_py.compiler.argument_buffer import ArgumentBuffer, plan_for, reader
 from karamelo_py.compiler.choices import Choice
 from karamelo_py.compiler.compile import shared
-from karamelo_py.compiler.failing import noting, raise_noted
+from karamelo_py.compiler.failing import Failure, failure_at, noting
 from karamelo_py.compiler.held import HeldTuple, hold, item_of
-from karamelo_py.compiler.lowering import function_type
-from karamelo_py.compiler.trace import alone, formula, write_into
-from karamelo_py.compiler.values import Untraceable, builtin, in_kernels, intrinsic
+from karamelo_py.compiler.lowering import function_type, new_function
+from karamelo_py.compiler.trace import alone, formula, one_at_a_time, write_into
+from karamelo_py.compiler.values import (
+    Untraceable,
+    builtin,
+    called_in_one,
+    in_kernels,
+    in_one_module,
+    intrinsic,
+)
 
-_CALL = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64)  # free of the interpreter lock
+_CALL = ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 3)  # free of the interpreter lock
 NAME, ENTRY = "$kernel", ".entry"  # what functions of a module are called until it has a name
 
 
@@ -44,12 +52,11 @@ class Unit(NamedTuple):
 
 
 _loaded: dict[str, list[int]] = {}
-_alone = threading.RLock()  # one of the threads of Python compiles and loads at a time
 
 
 def load(unit: Unit) -> list[int]:
     """Give the addresses of a unit's function and of its entry, in memory from then on."""
-    with _alone:
+    with one_at_a_time:
         if unit.name not in _loaded:
             for needed in unit.needs:
                 load(needed)
@@ -60,20 +67,31 @@ def load(unit: Unit) -> list[int]:
 
 
 class Compilation:
-    """Tell of compilation: `listeners` have ``on_start(name)`` and ``on_end()``."""
+    """Tell of compilation by this thread of Python, or that it waits for another process."""
 
     def __init__(self) -> None:
-        self.listeners: list = []
+        self._listeners = contextvars.ContextVar[tuple]("listeners", default=())
+
+    @contextmanager
+    def told_to(self, listener: Any) -> Iterator[None]:
+        """Call ``on_start(name)`` and ``on_end()`` of a listener meanwhile."""
+        before = self._listeners.get()
+        self._listeners.set((*before, listener))
+        try:
+            yield
+        finally:
+            self._listeners.set(before)
 
     @contextmanager
     def __call__(self, name: str = "") -> Iterator[None]:
         """Tell that a kernel is compiled meanwhile, or that another process does it."""
-        for listener in self.listeners:
+        listeners = self._listeners.get()
+        for listener in listeners:
             listener.on_start(name)
         try:
             yield
         finally:
-            for listener in self.listeners:
+            for listener in listeners:
                 listener.on_end()
 
 
@@ -94,13 +112,13 @@ def _no_collections() -> Iterator[None]:
 
 
 def many_threads() -> bool:
-    """Tell whether thousands of others may write to one number meanwhile: see `trace.in_one`."""
+    """Tell whether thousands of others may write to one number meanwhile: see `values.in_one`."""
     return False
 
 
 @builtin(many_threads)
 def _many_threads(lowering: Any) -> bool:
-    return trace.in_one_module()
+    return in_one_module()
 
 
 def written(
@@ -114,21 +132,22 @@ def written(
     Attributes of the module are `needs`, the units that it calls, and `raises`, as in `Unit`.
     ``entry(module, main, kinds, result)`` writes what it is called by, if not by Python.
     """
-    found = formula(function, kinds)
-    result = found.result if result is None else result
-    module = ir.Module(NAME)
-    module.needs = {}
-    main = ir.Function(module, function_type(kinds, result), NAME)
-    main.attributes.add("noinline")
-    main.attributes.add("nounwind")
-    lowering = write_into(ir.IRBuilder(main.append_basic_block("entry")))
-    try:
-        lowering.give_back(found.run, kinds, main.args, result)
-    except Untraceable as why:
-        raise trace.CannotCompile(str(why), function) from why
-    (entry or _write_entry)(module, main, kinds, result)
-    module.raises = hasattr(main, "raises")
-    return module, result
+    with one_at_a_time:
+        found = formula(function, kinds)
+        result = found.result if result is None else result
+        module = ir.Module(NAME)
+        module.needs = {}
+        main = new_function(module, kinds, result, NAME)
+        main.attributes.add("noinline")
+        main.attributes.add("nounwind")
+        lowering = write_into(ir.IRBuilder(main.append_basic_block("entry")))
+        try:
+            lowering.give_back(found.run, kinds, main.args, result)
+        except Untraceable as why:
+            raise trace.CannotCompile(str(why), function) from why
+        (entry or _write_entry)(module, main, kinds, result)
+        module.raises = hasattr(main, "raises")
+        return module, result
 
 
 def _compiled(function: Callable, kinds: tuple, result: types.Type | None) -> tuple[Unit, Any]:
@@ -156,10 +175,13 @@ def items_at(builder: ir.IRBuilder, kinds: tuple, address: Any) -> list:
 
 
 def _write_entry(module: ir.Module, main: ir.Function, kinds: tuple, result: types.Type) -> None:
-    """Write what calls a function with arguments in memory, and puts there what it gives."""
-    entry = ir.Function(module, ir.FunctionType(ir.VoidType(), [code.I64] * 2), NAME + ENTRY)
+    """Write what calls a function with arguments in memory, and puts there what it gives.
+
+    It is called with the addresses of these, and of a `Failure`.
+    """
+    entry = ir.Function(module, ir.FunctionType(ir.VoidType(), [code.I64] * 3), NAME + ENTRY)
     builder = ir.IRBuilder(entry.append_basic_block("entry"))
-    given = builder.call(main, items_at(builder, kinds, entry.args[0]))
+    given = builder.call(main, [*items_at(builder, kinds, entry.args[0]), entry.args[2]])
     if not code.is_empty(result):
         room = builder.inttoptr(entry.args[1], code.memory_type(result).as_pointer())
         code.put(builder, result, given, room, 1)
@@ -178,6 +200,7 @@ class Kernel:
         self.files = cache.KernelFiles(function, load)
         self.units: dict[tuple, Unit] = {}
         self._plans: dict[tuple, tuple] = {}
+        self._changes = trace.changes
         builtin(self)(self.in_kernel)
 
     @property
@@ -187,22 +210,31 @@ class Kernel:
 
     def unit(self, kinds: tuple, result: types.Type | None = None) -> Unit:
         """Give the machine code for arguments of these types."""
-        with _alone:
+        with one_at_a_time:
+            if self._changes != trace.changes:
+                self._find_anew()
             if kinds not in self.units:
                 self.units[kinds] = self.files.kernel(
                     kinds, result, lambda: _compiled(self.function, kinds, result)
                 )
             return self.units[kinds]
 
+    def _find_anew(self) -> None:
+        """Forget what was compiled: implementations have changed."""
+        with one_at_a_time:
+            self._changes = trace.changes
+            self.units, self._plans = {}, {}
+
     def __call__(self, *arguments: Any) -> Any:
         written = ArgumentBuffer(arguments)
         plan, entry, size, read = self._planned(written, arguments)
         _memory, address = written.in_memory(plan)
-        result = bytearray(size)
+        result, failure = bytearray(size), Failure()
+        at = ctypes.addressof(ctypes.c_char.from_buffer(result))
         try:
-            entry(address, ctypes.addressof(ctypes.c_char.from_buffer(result)))
+            entry(address, at, ctypes.addressof(failure))
         finally:  # also where Ctrl-C comes at the end of what has failed
-            raise_noted()
+            failure.raise_first()
         return read(result)
 
     def compile(self, *arguments: Any) -> None:
@@ -212,17 +244,20 @@ class Kernel:
     def _planned(self, written: ArgumentBuffer, arguments: tuple) -> tuple:
         """Say how arguments are passed, the entry, and the size and the reader of the result."""
         kinds = tuple(written.kinds)
-        if kinds not in self._plans:
+        if self._changes != trace.changes:
+            self._find_anew()
+        plans = self._plans
+        if kinds not in plans:
             plan = plan_for(arguments)
             unit = self.unit(plan.types)
-            self._plans[kinds] = plan, _CALL(load(unit)[1]), *reader(unit.result)
-        return self._plans[kinds]
+            plans[kinds] = plan, _CALL(load(unit)[1]), *reader(unit.result)
+        return plans[kinds]
 
     def in_kernel(self, lowering: Any, *arguments: Any) -> Any:
         """Write a call from another kernel."""
         held = [lowering.call(hold, (argument,)) for argument in arguments]
         kinds = tuple(types.unliteral(lowering.kind_of(one)) for one in held)
-        if trace.in_one_module():
+        if in_one_module():
             own = formula(self.function, kinds)
             return lowering.call_own(own.name, own.run, kinds, own.result, held)
         unit = self.unit(kinds)
@@ -233,7 +268,7 @@ class Kernel:
         module = lowering.builder.module
         module.needs[unit.name] = unit
         known = module.globals.get(unit.name)
-        called = known or ir.Function(module, function_type(kinds, unit.result), unit.name)
+        called = known or new_function(module, kinds, unit.result, unit.name)
         if unit.raises:
             called.raises = True
         return lowering.call_function(called, kinds, unit.result, held)
@@ -258,8 +293,9 @@ def noinline(function: Callable) -> Callable:
 
 # --- functions that kernels call by their address, and do not contain -----------------------------
 
-_uncompiled: list[Callable] = []
-_addresses: dict[tuple[Callable, types.Type], int] = {}
+_uncompiled: dict[int, Callable] = {}
+_numbers = itertools.count()  # of these
+_addresses: dict[tuple[Callable, types.Type, int], int] = {}
 _keep_alive: list = []
 
 
@@ -269,7 +305,7 @@ def address_of(function: Callable, signature: types.Type) -> int:
     Whoever calls by address does not contain the function: it need not be compiled anew for
     another one, and the function is compiled once for all its callers.
     """
-    key = function, signature
+    key = function, signature, trace.changes
     if key not in _addresses:
         if choices.INTERPRETED:
             _addresses[key] = address_of_python(function, signature)
@@ -284,11 +320,11 @@ def address_of_python(function: Callable, signature: types.Type) -> int:
     What is raised in it is raised again behind the kernel.
     """
     if choices.INTERPRETED:
-        _uncompiled.append(function)
-        return len(_uncompiled) - 1
-    made = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * len(signature.args))(
-        noting(function)
-    )
+        number = next(_numbers)
+        _uncompiled[number] = function
+        return number
+    count = len(signature.args) + 1  # the last one is for what it raises
+    made = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * count)(noting(function))
     _keep_alive.append(made)
     return ctypes.cast(made, ctypes.c_void_p).value
 
@@ -303,14 +339,15 @@ def caller_of(signature: Any) -> Callable:
     @intrinsic
     def by_address(address, *arguments):
         def codegen(builder, place, *values):
-            kind = function_type(parameters, result)
-            return builder.call(builder.inttoptr(place, kind.as_pointer()), values)
+            kind = function_type(parameters, result, code.I64)
+            pointer = builder.inttoptr(place, kind.as_pointer())
+            return builder.call(pointer, [*values, failure_at(builder)])
 
         return result(types.int64, *parameters), codegen
 
     @in_kernels
     def call(lowering, address, *arguments):
-        own = trace.called_in_one(signature)
+        own = called_in_one(signature)
         if not own:
             return lowering.call(by_address, (address, *arguments))
         pairs = zip(arguments, parameters, strict=True)

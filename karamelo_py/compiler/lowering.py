@@ -198,7 +198,7 @@ class Lowering:
         module = self.builder.module
         own = vars(module).setdefault("own", {})
         if (run, kinds) not in own:
-            made = ir.Function(module, function_type(kinds, result), f"{name}.{len(own)}")
+            made = new_function(module, kinds, result, f"{name}.{len(own)}")
             made.linkage = "internal"
             made.attributes.add("nounwind")
             own[run, kinds] = made
@@ -233,15 +233,23 @@ class Lowering:
         """Call a function of LLVM's."""
         pairs = zip(arguments, kinds, strict=True)
         values = [self.lowered(a, k) for a, k in pairs if not code.is_empty(k)]
-        made = self.builder.call(function, values)
+        made = self.builder.call(function, values + failing.passed_to(self.builder, function))
         failing.go_on(self.builder, function, self.regardless)
         return self.wrapped(result, None if code.is_empty(result) else made)
 
 
-def function_type(kinds: tuple, result: types.Type) -> ir.FunctionType:
+def function_type(kinds: tuple, result: types.Type, *more: ir.Type) -> ir.FunctionType:
     """Give LLVM's type of a function of values of these types; empty ones are not passed."""
     gives = ir.VoidType() if code.is_empty(result) else code.register_type(result)
-    return ir.FunctionType(gives, [code.register_type(k) for k in kinds if not code.is_empty(k)])
+    given = [code.register_type(k) for k in kinds if not code.is_empty(k)]
+    return ir.FunctionType(gives, [*given, *more])
+
+
+def new_function(module: ir.Module, kinds: tuple, result: types.Type, name: str) -> ir.Function:
+    """Begin a function of LLVM's in a module; but on a card it is told where it may fail."""
+    if traced.in_one_module():
+        return ir.Function(module, function_type(kinds, result), name)
+    return failing.told(ir.Function(module, function_type(kinds, result, code.I64), name))
 
 
 _OF_ITEMS = {operator.getitem, operator.setitem}

@@ -16,6 +16,7 @@ import inspect
 import os
 import platform
 import sys
+import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
@@ -29,7 +30,7 @@ from karamelo_py.compiler import code, machine
 from karamelo_py.compiler.choices import INTERPRETED
 from karamelo_py.compiler.code import I32, I64
 from karamelo_py.compiler.compile import implements, shared
-from karamelo_py.compiler.failing import note, noting
+from karamelo_py.compiler.failing import failure_at, note
 from karamelo_py.compiler.held import HeldTuple, held_as, held_type
 from karamelo_py.compiler.loops import kernel, noinline
 from karamelo_py.compiler.trace import formula
@@ -133,50 +134,52 @@ def _add_among(array, i, j, value):
 
 # --- threads ----------------------------------------------------------------------------------
 
-_TASK = ir.FunctionType(ir.VoidType(), [I64, I64])  # where its arguments are, and a number
-_PART = ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 4)
-_threads = config.NUMBA_NUM_THREADS
+# Where its arguments are, a number, and where it may fail.
+_TASK = ir.FunctionType(ir.VoidType(), [I64] * 3)
+_PART = ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 5)
+_SHARE_OUT = [ctypes.c_int64] * 6
 
 
-def set_threads(count: int) -> None:
-    """Let loops take so many threads from now on."""
-    global _threads
-    _threads = count
+class _Pools(threading.local):
+    """Hold the threads that serve a thread of Python, by their number."""
+
+    def __init__(self) -> None:
+        self.of = functools.cache(ThreadPoolExecutor)
 
 
-@functools.cache
-def _pool(count: int) -> ThreadPoolExecutor:
-    """Start so many threads, beside the one at work."""
-    return ThreadPoolExecutor(count)
-
-
+_pools = _Pools()
 if hasattr(os, "register_at_fork"):
     # A process that another one made by copying itself has none of its threads.
-    os.register_at_fork(after_in_child=_pool.cache_clear)
+    os.register_at_fork(after_in_child=lambda: _pools.of.cache_clear())
 
 
-def _share_out(count: int, part: int, task: int, arguments: int) -> None:
-    """Do a task for each number below `count`, by `part`, a function of a range of these."""
-    do = _PART(part)
-    size = min(count, _threads)
+def _share_out(
+    count: int, part: int, task: int, arguments: int, threads: int, failure: int
+) -> None:
+    """Do a task for each number below `count`, by `part`, a function of a range of these.
+
+    By so many threads, or all if 0.
+    """
+    do, threads = _PART(part), threads or config.NUMBA_NUM_THREADS
+    size = min(count, threads)
     ends = [count * k // size for k in range(size + 1)] if size else [0, 0]
     pairs = pairwise(ends[1:])
     others: list = []
     try:
         for pair in pairs:
-            others.append(_pool(_threads - 1).submit(do, task, arguments, *pair))
-        do(task, arguments, *ends[:2])
+            others.append(_pools.of(threads - 1).submit(do, task, arguments, *pair, failure))
+        do(task, arguments, *ends[:2], failure)
     except BaseException as error:  # such as Ctrl-C; the others still work on these arguments
-        note(error)
+        note(error, failure)
     while others:
         try:
             others[-1].result()
         except BaseException as error:
-            note(error)
+            note(error, failure)
         others = [other for other in others if not other.done()]
 
 
-machine.publish_python("karamelo_share_out", _PART, noting(_share_out))
+machine.publish_python("karamelo_share_out", ctypes.CFUNCTYPE(None, *_SHARE_OUT), _share_out)
 
 
 class _Task(NamedTuple):
@@ -216,7 +219,8 @@ def _call(task, arguments, number):
     """Call the task at an address."""
 
     def codegen(builder, task, *numbers):
-        builder.call(builder.inttoptr(task, _TASK.as_pointer()), numbers)
+        pointer = builder.inttoptr(task, _TASK.as_pointer())
+        builder.call(pointer, [*numbers, failure_at(builder)])
 
     return types.none(types.intp, types.intp, types.intp), codegen
 
@@ -237,14 +241,16 @@ def _do_part(task, arguments, begin, end):
 
 
 @in_kernels
-def _in_parallel(lowering: Any, count: Any, task: Value, arguments: Value) -> None:
+def _in_parallel(lowering: Any, count: Any, task: Value, arguments: Value, threads: Any) -> None:
     """Do a task for each number below `count`, by threads that begin for it (`_share_out`)."""
     found = formula(_do_part, (types.intp,) * 4)
     if lowering.builder:
+        builder, kinds = lowering.builder, [I64] * len(_SHARE_OUT)
         part = _address(lowering, found.name, found.run, 4)
-        numbers = [lowering.lowered(n, types.intp) for n in (count, part, task, arguments)]
-        function = code.external(lowering.builder, "karamelo_share_out", ir.VoidType(), [I64] * 4)
-        lowering.builder.call(function, numbers)
+        given = (count, part, task, arguments, threads)
+        numbers = [lowering.lowered(number, types.intp) for number in given]
+        function = code.external(builder, "karamelo_share_out", ir.VoidType(), kinds)
+        builder.call(function, [*numbers, failure_at(builder)])
 
 
 # --- teams ------------------------------------------------------------------------------------
@@ -346,8 +352,10 @@ def _serve(team, k):
 @noinline
 def _distribute(team, count, task, arguments):
     """Do a loop: by the team that is at work, if one is, else by threads that begin for it."""
-    if team == 0 or read(team + _STATE) != _LEADS:
-        _in_parallel(count, task, arguments)
+    if team == 0:
+        _in_parallel(count, task, arguments, 0)
+    elif read(team + _STATE) != _LEADS:
+        _in_parallel(count, task, arguments, read(team + _SIZE))
     elif count > 1:
         _share(team, count, task, arguments)
     elif count == 1:
@@ -410,7 +418,8 @@ def by_team(function: Callable) -> Callable:
         if team == 0:
             return inner(mode, *arguments)
         write(team + _STATE, _WAITS)
-        _in_parallel(read(team + _SIZE), *_task(member, (mode, *arguments)))
+        size = read(team + _SIZE)
+        _in_parallel(size, *_task(member, (mode, *arguments)), size)
         return read(team + _RESULT)
 
     return run

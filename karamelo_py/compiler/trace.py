@@ -14,10 +14,10 @@ come by another way than a global name or a closure, as methods do, are refused.
 import dis
 import functools
 import itertools
+import threading
 import types as python
 from collections import namedtuple
 from collections.abc import Callable, Hashable, Iterable, Iterator
-from contextlib import contextmanager
 from traceback import walk_tb
 from typing import Any, NamedTuple
 
@@ -238,32 +238,8 @@ class _Formula(NamedTuple):
 _formulas: dict[tuple, _Formula | None] = {}
 MOST_FORMULAS = 4000  # that are kept: some 12 kB each, 800 for a scene with contact
 _own: set[Callable] = set()  # functions that are not written into what calls them
-_called: tuple | None = None  # where a module has all that it calls: see `in_one`
-
-
-@contextmanager
-def in_one(called: dict[Any, Callable]) -> Iterator[None]:
-    """Write modules of threads of a GPU meanwhile, which have all that they call.
-
-    Kernels are written into what calls them, and so is what is else called by its address:
-    `called` has the function for each signature.
-    """
-    global _called
-    before, _called = _called, tuple(called.items())
-    try:
-        yield
-    finally:
-        _called = before
-
-
-def in_one_module() -> bool:
-    """Tell whether a module has all that it calls."""
-    return _called is not None
-
-
-def called_in_one(signature: Any) -> Callable | None:
-    """Give what is written in the place of a call by address; None if nothing is."""
-    return dict(_called or ()).get(signature)
+# One of the threads of Python writes functions down at a time: they share what is known of these.
+one_at_a_time = threading.RLock()
 
 
 def _is_plain(thing: Any) -> bool:
@@ -301,10 +277,17 @@ def _written(key: tuple, dispatch: Callable, kinds: tuple) -> _Formula | None:
 
 def formula(dispatch: Callable, kinds: tuple) -> _Formula | None:
     """Find what to run for arguments of these types; None if nothing is chosen."""
-    key = dispatch, numbers_of(kinds), _called
-    if len(_formulas) > MOST_FORMULAS and not values.at_work():
-        forget()
-    known = bool(values.branching) and not values.at_work()
+    if values.at_work():
+        return _formula(dispatch, kinds, known=False)
+    with one_at_a_time:
+        if _outdated.is_set() or len(_formulas) > MOST_FORMULAS:
+            _forget_all()
+        return _formula(dispatch, kinds, known=bool(values.branching))
+
+
+def _formula(dispatch: Callable, kinds: tuple, *, known: bool) -> _Formula | None:
+    """Find it; `known` tells if functions are known to branch that perhaps do no longer."""
+    key = dispatch, numbers_of(kinds), values.all_called_in_one()
     while key not in _formulas:
         if values.is_begun(key):
             raise CannotCompile("it calls itself", dispatch)
@@ -318,20 +301,35 @@ def formula(dispatch: Callable, kinds: tuple) -> _Formula | None:
             if not known:
                 raise
             known = False
-            forget()
+            _forget_all()
     found = _formulas[key]
     if found is not None:
         note(found.parts)
     return found
 
 
+_outdated = threading.Event()  # of what is known of functions
+changes = 0  # of implementations that compiled kernels may have
+
+
 def forget() -> None:
     """Find anew what is run: a point function has another implementation than was known."""
-    _formulas.clear()
-    if not values.at_work():
-        _copies.clear()
-        _modules.clear()
-        values.branching.clear()
+    if values.at_work():
+        _formulas.clear()
+    else:  # another thread of Python may write a function down now
+        _outdated.set()
+
+
+def _forget_all() -> None:
+    _outdated.clear()
+    for known in (_formulas, _copies, _modules, values.branching):
+        known.clear()
+
+
+def outdate_kernels() -> None:
+    """Have kernels found anew: what some of them have is another function now."""
+    global changes
+    changes += 1
 
 
 def _number_types(kinds: Iterable[types.Type]) -> Iterator[type]:

@@ -5,6 +5,7 @@ meets one becomes code of the function that is compiled.
 """
 
 import builtins
+import contextvars
 import functools
 import math
 import operator
@@ -93,33 +94,34 @@ def _only_at_run_time(use: str) -> Callable:
 
 # --- where code goes to -------------------------------------------------------------------------
 
-_lowerings: list = []  # at work, innermost last
+# At work, innermost last; in each thread of Python its own.
+_lowerings: contextvars.ContextVar[tuple] = contextvars.ContextVar("lowerings", default=())
 
 
 def now() -> Any:
     """Return what writes code now (:mod:`karamelo_py.compiler.lowering`)."""
-    return _lowerings[-1]
+    return _lowerings.get()[-1]
 
 
 @contextmanager
 def writing(lowering: Any) -> Iterator[None]:
     """Let operations become code of `lowering` meanwhile."""
-    before = len(_lowerings)
-    _lowerings.append(lowering)
+    before = _lowerings.get()
+    _lowerings.set((*before, lowering))
     try:
         yield
     finally:
-        del _lowerings[before:]  # Ctrl-C may have come just before an inner one was taken off
+        _lowerings.set(before)
 
 
 def at_work() -> bool:
-    """Tell whether functions are run for a kernel now."""
-    return bool(_lowerings)
+    """Tell whether functions are run for a kernel now, by this thread of Python."""
+    return bool(_lowerings.get())
 
 
 def is_begun(key: tuple) -> bool:
     """Tell whether the types of a formula are asked for now."""
-    return any(lowering.key == key for lowering in _lowerings)
+    return any(lowering.key == key for lowering in _lowerings.get())
 
 
 def _real_kind(thing: Any) -> Any:
@@ -151,6 +153,39 @@ def _in_type_of(like: Any, kind: Any, thing: Any) -> Any:
     if isinstance(own, types.Integer) and not isinstance(own, types.Boolean):
         return now().in_type_of(thing, like)
     return thing
+
+
+# Where a module has all that it calls: see `in_one`.
+_called: contextvars.ContextVar[tuple | None] = contextvars.ContextVar("called", default=None)
+
+
+@contextmanager
+def in_one(called: dict[Any, Callable]) -> Iterator[None]:
+    """Write modules of threads of a GPU meanwhile, which have all that they call.
+
+    Kernels are written into what calls them, and so is what is else called by its address:
+    `called` has the function for each signature.
+    """
+    before = _called.set(tuple(called.items()))
+    try:
+        yield
+    finally:
+        _called.reset(before)
+
+
+def in_one_module() -> bool:
+    """Tell whether a module has all that it calls."""
+    return _called.get() is not None
+
+
+def all_called_in_one() -> tuple | None:
+    """List signatures and functions as of `in_one`; None where a module calls others."""
+    return _called.get()
+
+
+def called_in_one(signature: Any) -> Callable | None:
+    """Give what is written in the place of a call by address; None if nothing is."""
+    return dict(_called.get() or ()).get(signature)
 
 
 def emit(function: Callable, *arguments: Any) -> Any:

@@ -194,10 +194,10 @@ class Interpreter:
         try:
             self._execute_recorded(statement)
         except Pause:
-            del self.record.statements[done:]
+            self.record.forget_from(done)
             raise
         except ScriptError as error:
-            del self.record.statements[done:]
+            self.record.forget_from(done)
             error.place = error.place or (None if error.complete else statement.place)
             self.presets.blame(statement, error)
             for wrong in (error, *error.others):

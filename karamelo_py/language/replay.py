@@ -38,6 +38,11 @@ class Record:
         """Note that a call of value(...) in the last statement gave `value`."""
         self.values.setdefault(len(self.statements) - 1, []).append(value)
 
+    def forget_from(self, number: int) -> None:
+        """Forget the statements from `number` on, which have not been done, and their values."""
+        del self.statements[number:]
+        self.values = {k: given for k, given in self.values.items() if k < number}
+
 
 class Replay:
     """Compares a script that is gone through once more with the record of the first time.

@@ -64,12 +64,9 @@ class Timings:
     def telling_of_compilation(self) -> Iterator[None]:
         """Say so when kernels are compiled, and count the time."""
         self._told = False
-        try:
-            compilation.listeners.append(self)
-            with cache.telling(partial(self.hub.warn, hint=ANOTHER_FOLDER)):
-                yield
-        finally:
-            compilation.listeners.remove(self)
+        telling = cache.telling(partial(self.hub.warn, hint=ANOTHER_FOLDER))
+        with compilation.told_to(self), telling:
+            yield
 
     def on_start(self, _: str) -> None:
         """Note that a kernel is compiled, or another process does, and this one waits for it."""

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numba import config
 
-from karamelo_py.compiler.threads import set_threads
 from karamelo_py.kernels.arrays import DT, TIME, Hooks, NoHooks, Setup
 from karamelo_py.kernels.clock import STILL, choose_dt
 from karamelo_py.kernels.hooks import POINT_STAGES
@@ -322,9 +321,7 @@ class Simulation(SceneArrays):
         self.comm.in_turn(lambda: advance.compile(*arguments))
 
     def _make_ready(self) -> None:
-        """Prepare threads, the hooks of the fixes, and contact for a run."""
-        if self.threads > 1:
-            set_threads(self.threads)
+        """Prepare the hooks of the fixes, and contact, for a run."""
         # Fixes act once before the first step, in it, or in every step.
         fixes = sorted(self.hub.fixes.values(), key=lambda fix: fix.acts_last)
         lasting = [fix for fix in fixes if not fix.first_step_only]

@@ -182,13 +182,7 @@ def main() -> int:
 
 def _measure(part: Measurement, comm: MpiComm | None = None) -> int:
     """Measure, and write what is found, if this is the first process."""
-    if part.scaling:
-        found = _share(part, comm)
-    else:
-        from karamelo_py.compiler.threads import set_threads
-
-        set_threads(part.threads)
-        found = measured(part)._asdict()
+    found = _share(part, comm) if part.scaling else measured(part)._asdict()
     if comm is None or comm.leads:
         Path(part.file).write_text(json.dumps(found), encoding="utf-8")
     return 0

@@ -83,11 +83,8 @@ def run(options: Namespace) -> int:
         return _on_card(options, chosen, known, out, earlier)
     from numba import config
 
-    from karamelo_py.compiler.threads import set_threads
-
     available = config.NUMBA_NUM_THREADS
     threads = min(options.threads or available, available)
-    set_threads(threads)
     triad = measure.bandwidth(threads)
     print(f"threads {threads}, triad bandwidth {triad / 1e9:.1f} GB/s (256 MiB arrays)")
     about = {"commit": commit(), "threads": threads, "triad": triad, "seconds": options.seconds}

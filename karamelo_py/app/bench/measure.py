@@ -15,7 +15,7 @@ from numba import config
 from karamelo_py.app.launch import share
 from karamelo_py.compiler.compile import index
 from karamelo_py.compiler.loops import kernel
-from karamelo_py.compiler.threads import Serial, Threaded, shared_out
+from karamelo_py.compiler.threads import Serial, Threaded, new_team, shared_out
 from karamelo_py.kernels.clock import finish
 from karamelo_py.kernels.p2g import columns_of
 from karamelo_py.kernels.step import DONE, Fused, begin, step
@@ -415,7 +415,8 @@ def bandwidth(threads: int, size: float = ARRAYS) -> float:
     """Measure bytes/s of a[i] = b[i] + factor c[i] over three arrays of `size` bytes together."""
     n = max(1000, int(size / 24))
     a, b, c = np.zeros(n), np.ones(n), np.ones(n)
-    mode = Serial() if threads == 1 else Threaded()
+    team = new_team(threads)
+    mode = Serial() if threads == 1 else Threaded(team.ctypes.data)
     calls, times = (5, 1) if size >= ARRAYS else (20, 100)
     return 24 * n * times / _fastest(calls, _triad, mode, a, b, c, 0.5, threads, times)
 
