@@ -31,7 +31,8 @@ def dimension(hub: Hub, dimensions: Argument, *bounds: Argument) -> None:
 
     The domain is a box that holds everything. A point that leaves it ends the run, unless boundary
     says otherwise. Strain is uniaxial in 1D, and plane (unit thickness) in 2D. The grid starts at
-    the lower corner and covers the whole domain. Its sides need not be multiples of the cell size.
+    the lower corner and covers the whole domain. Where a side is no multiple of the cell size, no
+    node lies at its upper end, so that a wall there would be too far out.
 
     Parameters
     ----------

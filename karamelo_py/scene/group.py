@@ -202,6 +202,25 @@ class NodeGroup(AnyGroup):
         self._found = None
         return len(self._find(region, solids))
 
+    def warn_past_domain(self) -> None:
+        """Warn where the group is a wall at an upper edge that has no nodes: they lie past it."""
+        domain, method = self.hub.domain, self.hub.update.method
+        if self.all or method is None or method.own_grids or not len(self.nodes):
+            return
+        lattice = self.hub.lattices[0]
+        first = lattice.first + (self.nodes - lattice.first) % lattice.node_count
+        nearest = lattice.positions(first).min(axis=0)
+        for k, end in enumerate(domain.hi[: domain.dimension]):
+            if nearest[k] > end + domain.tolerance:
+                low, h = domain.lo[k], domain.h
+                cells = int((end - low) / h)
+                self.hub.warn(
+                    f"the nodes of group '{self.id}' lie at {'xyz'[k]} = {nearest[k]:g}, past the "
+                    f"end of the domain at {end:g}: its side is no multiple of the cells ({h:g}), "
+                    "and what is held there is held too far out",
+                    hint=f"end the domain at {low + max(cells, 1) * h:g} or {nearest[k]:g}",
+                )
+
     def _find(self, region: Region, solids: Sequence[Solid] | None) -> np.ndarray:
         """Nodes in `region`; where solids have nodes of their own, those of `solids`."""
         if region.unknown:

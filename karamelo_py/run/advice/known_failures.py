@@ -295,7 +295,11 @@ def _gone(hub: Hub, simulation: Simulation) -> float:
 
 
 def _warn_about_precision(s: SceneFacts) -> None:
-    """Say so when single precision cannot hold what a step adds to a position."""
+    """Say so when single precision cannot hold what a step adds to a position.
+
+    Where nothing moves yet, by the size of cells: a block that falls at 50 000 cells from the
+    origin is wrong by 3.5 % of its way, and at 200 000 it stands still.
+    """
     if s.hub.settings.precision != "single":
         return
     x = max((max(-one.low.min(), one.high.max()) for one in s.motions), default=0.0)
@@ -304,6 +308,13 @@ def _warn_about_precision(s: SceneFacts) -> None:
         s.hub.warn(
             f"a step moves points by {step:.2g} at most, and in single precision positions have "
             f"a spacing of {spacing:.2g}: motion will be lost to rounding",
+            hint="precision(double), or a domain around the origin",
+        )
+    elif spacing > 1e-3 * s.hub.domain.h:
+        far = x / s.hub.domain.h
+        s.hub.warn(
+            f"points lie up to {far:.3g} cells from the origin, where positions in single precision "
+            f"have a spacing of {spacing / s.hub.domain.h:.2g} cells: slow motion will be lost",
             hint="precision(double), or a domain around the origin",
         )
 

@@ -90,6 +90,11 @@ class TemperatureNodes(HeatFix):
         super().__init__(hub, group, T)
         self._compare(T)
 
+    def defined(self) -> None:
+        """Warn of walls past the domain."""
+        if self.hub.domain.h is not None:
+            self.group.warn_past_domain()
+
 
 def hold_point(capacity, T, face, supply, value, other, dt):
     """The point has the value, whatever flows to it."""

@@ -173,8 +173,11 @@ class VelocityNodes(Fix):
         return next(iter(bounds), "")
 
     def defined(self) -> None:
-        """Warn where another fix gives the same nodes another velocity."""
-        if self.bound or self.hub.domain.h is None:
+        """Warn of walls past the domain, and where another fix gives nodes another velocity."""
+        if self.hub.domain.h is None:
+            return
+        self.group.warn_past_domain()
+        if self.bound:
             return
         for other in self.hub.fixes.values():
             if other is self or not isinstance(other, VelocityNodes) or other.bound:
