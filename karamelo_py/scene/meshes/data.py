@@ -64,8 +64,10 @@ class Mesh(NamedTuple):
         name = group if group in known else alike[0] if len(alike) == 1 else None
         message = f"the mesh has no physical group '{group}' with elements"
         if name is None:
-            # Groups of Gmsh have a number as well; those with a name are named.
-            named = [name for name in known if not name.isdigit()] or known
+            # Groups of Gmsh have a number as well; those with a name are named. Numbers of one kind
+            # need no kind in front of them.
+            once = [name for name in known if name.rpartition(":")[2] not in {*known} - {name}]
+            named = [name for name in once if not name.isdigit()] or once
             raise unknown(message, group, named, argument="group")
         held = self.sets.get(name) or [self.node_sets[name]]
         if not any(mask.any() for mask in held):
