@@ -595,3 +595,20 @@ def test_a_large_step_of_a_later_run_is_told_before_the_first(
     assert (TOO_LARGE in result.err) == told
     # The line that asks for the step is marked.
     assert ("| set_dt(0.1)" in result.err) == told
+
+
+@pytest.mark.parametrize(("origin", "warns"), [(0, False), (800, False), (20000, True)])
+def test_single_precision_far_from_the_origin_is_told(run_interpreted, origin, warns):
+    """A block at rest in map coordinates: in single precision at 2e5 cells it never moves."""
+    script = f"""
+    precision(single)
+    method(ulmpm, FLIP, linear, 1)
+    dimension(2, {origin}, {origin} + 1, 0, 1, 0.1)
+    region(b, block, {origin} + 0.2, {origin} + 0.6, 0, 0.4)
+    material(m, neo-hookean, 1000, 1e5, 0.3)
+    solid(s, region, b, 1, m, 0.1)
+    fix(g, body_force, all, 0, -9.81)
+    run(1)
+    """
+    err = run_interpreted(script, command="check").err
+    assert ("cells from the origin, where positions in single precision" in err) == warns

@@ -146,3 +146,29 @@ def test_points_of_flip_learn_the_speed_of_a_wall(run_interpreted, kind, walls, 
     assert log.err[-1] < 0.1
     assert abs(log.low[-1]) == pytest.approx(0.2 * 1e-5, rel=2e-3)
     assert log.high[-1] == pytest.approx(-log.low[-1], rel=2e-3)
+
+
+@pytest.mark.parametrize(("end", "warns"), [(1.0, False), (1.03, True), (1.1, False), (0.95, True)])
+@pytest.mark.parametrize("d", [1, 2, 3])
+@pytest.mark.parametrize("kind", ["ulmpm", "ulmpm/contacts"])
+def test_a_wall_past_the_end_of_the_domain_is_told(run_interpreted, kind, d, end, warns):
+    """Where the last axis is no multiple of the cells, no node lies at its upper end."""
+    script = f"""
+    method({kind}, FLIP, linear, 1)
+    dimension({d}, {"0, 0.5, " * (d - 1)}0, {end}, 0.1)
+    region(w, block, {"0, 0.3, " * (d - 1)}0.1, 0.5)
+    material(m, linear, 1000, 1e6, 0)
+    solid(w, region, w, 1, m, 0.1)
+    region(top, block, {"-INF, INF, " * (d - 1)}{end}, INF)
+    region(low, block, {"-INF, INF, " * (d - 1)}-INF, 0)
+    group(top, nodes, region, top, all)
+    group(low, nodes, region, low, all)
+    fix(top, velocity_nodes, top{", NULL" * (d - 1)}, leq0)
+    fix(low, velocity_nodes, low{", NULL" * (d - 1)}, 0)
+    run(1)
+    """
+    err = run_interpreted(script, command="check").err
+    assert ("past the end of the domain" in err) == warns
+    if warns:
+        assert f"{'xyz'[d - 1]} = {1.1 if end > 1 else 1:g}," in err
+        assert f"end the domain at {1 if end > 1 else 0.9:g} or {1.1 if end > 1 else 1:g}" in err
