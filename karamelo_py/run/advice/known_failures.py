@@ -311,10 +311,10 @@ def _warn_about_precision(s: SceneFacts) -> None:
             hint="precision(double), or a domain around the origin",
         )
     elif spacing > 1e-3 * s.hub.domain.h:
-        far = x / s.hub.domain.h
+        far, apart = x / s.hub.domain.h, spacing / s.hub.domain.h
         s.hub.warn(
             f"points lie up to {far:.3g} cells from the origin, where positions in single "
-            f"precision have a spacing of {spacing / s.hub.domain.h:.2g} cells: slow motion will be lost",
+            f"precision have a spacing of {apart:.2g} cells: slow motion will be lost",
             hint="precision(double), or a domain around the origin",
         )
 
