@@ -1,5 +1,6 @@
 """The energy table: words for logs, and the one command that makes it, reduced."""
 
+import json
 import re
 from pathlib import Path
 
@@ -27,30 +28,32 @@ def test_what_is_not_a_number_is_not_kept():
     assert judge(np.arange(10.0), np.full(10, np.nan))[0] == "gains"
 
 
-def log_of(folder, values, err=""):
+def log_of(folder, values, notes=()):
     lines = [f"{k} {value}" for k, value in enumerate(values)]
     (folder / "log.mpm").write_text("\n".join(["Time E", *lines]) + "\n", encoding="utf-8")
-    (folder / "err.txt").write_text(err, encoding="utf-8")
+    record = {"runs": [], "messages": list(notes)}
+    (folder / "run.json").write_text(json.dumps(record), encoding="utf-8")
 
 
-GROWN = "in.x:1:1: warning: step 9: energy comes from nowhere. Known to do that here: a cause\n"
+GROWN = {"kind": "warning", "text": "step 9: energy comes from nowhere", "cause": "a cause"}
+LOST = {"kind": "error", "text": "point 1"}
 
 
 @pytest.mark.parametrize(
-    ("values", "status", "err", "word", "silent"),
+    ("values", "status", "notes", "word", "silent"),
     [
-        ([1, 1, 1, 1, 1, 2], "done", GROWN, "gains", False),
-        ([1, 1, 1, 1, 1, 2], "done", "", "gains", True),
-        ([1, 1, 1], "failed", GROWN + "in.x:9:1: error: point 1\n", "breaks", False),
-        ([1, 1, 1], "failed", "in.x:9:1: error: point 1\n", "breaks", True),
-        ([1, 1, 1], "too long", "", "unknown", False),
+        ([1, 1, 1, 1, 1, 2], "done", [GROWN], "gains", False),
+        ([1, 1, 1, 1, 1, 2], "done", [], "gains", True),
+        ([1, 1, 1], "failed", [GROWN, LOST], "breaks", False),
+        ([1, 1, 1], "failed", [LOST], "breaks", True),
+        ([1, 1, 1], "too long", [], "unknown", False),
     ],
 )
-def test_what_goes_wrong_in_silence_is_named(tmp_path, values, status, err, word, silent):
-    log_of(tmp_path, values, err)
+def test_what_goes_wrong_in_silence_is_named(tmp_path, values, status, notes, word, silent):
+    log_of(tmp_path, values, notes)
     kept = look_at({"folder": ".", "status": status}, tmp_path, "Time", "E", 0.1)
     assert (kept.word, kept.silent) == (word, silent)
-    if GROWN in err:
+    if GROWN in notes:
         assert kept.said[0] == "a cause"
 
 

@@ -313,27 +313,13 @@ def test_a_narrow_table_cuts_no_value_off(width):
 
 
 def test_facts_and_logs_of_several_runs(tmp_path):
-    said = """Run
-  method     ulmpm
-  points     1 234
-  dt         0.01
-  stable dt  0.02
-Run finished
-  wall time         0.7 s
-  steps             252
-  particle-steps/s  2e+05
-  processor time    0.4 s in steps, of all threads
-    steps           0.5 s       7 %
-Run
-  points     1 300
-Run finished
-  steps             100
-  path              0.0125 cells at most
-  processor time    0.2 s in steps, of all threads
-    steps           0.25 s       7 %
-"""
-    facts = case.read_facts(said)
-    assert facts["points"] == 1234 and facts["stable_dt"] == 0.02
+    """Steps and seconds are sums; what a scene is like is taken from its first run."""
+    ended = {"processor_s_in_steps": 0.4, "path_cells": None, "steps": 252}
+    first = {"points": 1234, "nodes_per_point": 4, "stable_dt": 0.02, "own_dt": None}
+    second = {"points": 1300, "steps": 100, "path_cells": 0.0125, "processor_s_in_steps": 0.2}
+    runs = [first | ended | {"seconds": {"steps": 0.5}}, second | {"seconds": {"steps": 0.25}}]
+    facts = case.facts_of({"runs": runs})
+    assert facts["points"] == 1234 and facts["stable_dt"] == 0.02 and "own_dt" not in facts
     assert facts["path"] == 0.0125
     assert facts["steps"] == 352 and facts["seconds"] == 0.75
     assert facts["particle_steps"] == 352 * 1234
@@ -435,13 +421,13 @@ def test_functions_in_python_find_nothing_of_another_run(folder):
 
 
 @pytest.mark.parametrize(
-    ("reason", "again"),
-    [("internal error: ImportError: x", True), ("point 1 leaves the domain", False)],
+    ("code", "again"), [("internal", True), ("busy", True), ("left-domain", False)]
 )
-def test_what_was_not_the_fault_of_a_run_is_tried_again(folder, reason, again):
+def test_what_was_not_the_fault_of_a_run_is_tried_again(folder, code, again):
     launch = case.Launch(folder / "in.flight")
     values, place = {"speed": "3"}, folder / "run"
     place.mkdir()
-    known = {"key": launch.key(values), "status": "failed", "reason": reason, "facts": {}}
+    known = {"key": launch.key(values), "status": "failed", "reason": "x", "code": code}
+    known["facts"] = {}
     (place / case.KEPT).write_text(json.dumps(known), encoding="utf-8")
     assert (launch.kept(values, place) is None) == again

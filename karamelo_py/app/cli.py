@@ -25,6 +25,7 @@ from karamelo_py.app.options import (
     positive,
     threads_option,
 )
+from karamelo_py.output import record
 from karamelo_py.run.mpi.comm import ENDING, MpiComm, handled_signals, launched
 from karamelo_py.script.errors import ScriptError, meant, nearest, render_message, table
 
@@ -44,7 +45,7 @@ karamelo-py help WORD            find a style by a word: karamelo-py help contac
 karamelo-py styles [FAMILY]      list commands and styles"""
 USAGE = """\
 karamelo-py SCRIPT [-var NAME VALUE] [--threads N] [--ranks N] [--gpu]
-                          [-log FILE] [-out FOLDER] [-restart FILE] [--live]
+                          [-log FILE] [-record FILE] [-out FOLDER] [-restart FILE] [--live]
                           [--trust-geometries] [--quiet] [--debug]
        karamelo-py COMMAND ..."""
 RESTART = ("-restart", "--restart")
@@ -291,6 +292,10 @@ def _parser(command: str) -> tuple[CommandLine, Any]:
             help="file of the log (default: log.mpm); .csv separates columns by commas",
         )  # fmt: skip
         script.add_argument(
+            "-record", "--record", type=Path, metavar="FILE",
+            help="file of the facts of the runs (default: run.json)",
+        )  # fmt: skip
+        script.add_argument(
             "-out", "--out", type=Path, metavar="FOLDER",
             help="folder of all files, made if it is missing (default: the current one)",
         )  # fmt: skip
@@ -384,12 +389,18 @@ def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = 
             hub.console.say(f"{', '.join(taken)} taken from {hub.restart.path}, as -var had it")
     interpreter, restart, finished = Interpreter(hub, presets=presets), hub.restart, False
     interpreter.replay = restart and restart.replay()
+    hub.record.of_script(script, presets)
     try:
         interpreter.run_file(script)
         finished = True
+        hub.record.end("finished")
     except Interrupted as signal:
+        hub.record.end("interrupted")
         _complain("interrupted: the log and the dumps are complete up to here")
         return SIGNALLED + signal.args[0]
+    except Exception as error:
+        hub.record.end("failed", error)
+        raise
     finally:
         hub.output.log.close()
         if page is not None:
@@ -409,6 +420,12 @@ def _direct(hub: Hub, options: argparse.Namespace) -> None:
         if not hub.checking:
             make_folder(options.out, "-out {}")
         hub.folder = options.out.absolute()
+    if options.record is not None:
+        hub.record.path = hub.folder / options.record
+        hub.record.is_asked_for = True
+    elif not hub.checking:
+        of = f"{options.log.stem}." if options.log else ""
+        hub.record.path = hub.folder / f"{of}{record.NAME}"
     if options.log is not None:
         hub.output.log.file = options.log
         hub.output.log.is_asked_for = True

@@ -23,6 +23,7 @@ import numpy as np
 from karamelo_py.app.options import make_folder, threads_option
 from karamelo_py.language import registry, signature
 from karamelo_py.language.interpreter import Interpreter
+from karamelo_py.output import record
 from karamelo_py.output.console import Console
 from karamelo_py.output.fields import unknown_column
 from karamelo_py.run.lower.card import take_card, use_card
@@ -270,6 +271,7 @@ class Simulation:
                 use_card(hub)
             if out is not None:
                 hub.folder = self._claimed(out)
+                hub.record.path = hub.folder / record.NAME
             presets = {name: _as_script_text(value) for name, value in variables.items()}
             self._interpreter = Interpreter(hub, presets)
             if script is not None:

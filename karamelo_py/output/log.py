@@ -128,6 +128,7 @@ class Log(Rhythmic):
                     f"another run is writing to {path}",
                     expected="a folder of its own for each run",
                     hint="-out FOLDER sends all files there",
+                    code="busy",
                 )
             self._file.truncate(end)
 

@@ -93,11 +93,11 @@ class RollBack:
             return False
         found = None if simulation.told_of_growth else energy.words_of_growth(hub, simulation)
         if found is not None:
-            if self.returns < RETURNS and self._halve_step(found[0]):
+            if self.returns < RETURNS and self._halve_step(found):
                 self.returns += 1
                 energy.forget_growth(simulation)
                 return False
-            hub.warn(found[0], hint=found[1])
+            hub.warn(found.message, hint=found.hint, code=found.code, cause=found.cause)
             simulation.told_of_growth = True
         self.tell_of_loss(WITHIN)
         if (
@@ -120,21 +120,23 @@ class RollBack:
         hub, simulation = self.hub, self.simulation
         lost = None if simulation.told_of_loss else energy.words_of_loss(hub, simulation, within)
         if lost is not None:
-            hub.warn(lost[0], hint=lost[1])
+            hub.warn(lost.message, hint=lost.hint, code=lost.code, cause=lost.cause)
             simulation.told_of_loss = True
 
     def _keep(self) -> None:
         self.point.keep(self.simulation)
         self.returns = 0
 
-    def _halve_step(self, message: str = "", status: int = DONE) -> bool:
+    def _halve_step(
+        self, found: explain.Trouble | energy.Imbalance | None = None, status: int = DONE
+    ) -> bool:
         """Go back to the last good state with half the step, where the script asks for that."""
         hub, simulation = self.hub, self.simulation
         if not self.halve or self.halvings == HALVINGS:
             return False
         if status == STOPPED and self._points_only_leave():
             return False
-        message = message or explain.trouble(hub, simulation, status)[0]
+        found = found or explain.trouble(hub, simulation, status)
         self.halvings += 1
         # Rows of log and dumps that have been written since go with what they show.
         self.point.return_to(simulation, cut=True)
@@ -145,9 +147,11 @@ class RollBack:
             self.halvings += 1
             simulation.halve_step(self.halvings)
         hub.warn(
-            f"{message}. Back to step {simulation.step}, time {simulation.time:.6g}, with "
+            f"{found.message}. Back to step {simulation.step}, time {simulation.time:.6g}, with "
             f"1/{2**self.halvings} of the step",
             place=self.place,
+            code=found.code,
+            cause=found.cause,
         )
         return True
 
@@ -174,13 +178,14 @@ class RollBack:
         start on it is the state of the start: nothing behind that is a good one.
         """
         too_large = self.smaller and not self.simulation.control.clock[0].watch_limit
-        message, hint, at_fault = explain.trouble(self.hub, self.simulation, status)
-        kind = ScriptError
+        found = explain.trouble(self.hub, self.simulation, status)
+        hint, kind = found.hint, ScriptError
         with suppress(OthersWait):
             hint += self._keep_start(status) if too_large else self._keep_good(status)
             kind = Stopped
-        error = kind(message, place=at_fault or self.place, hint=hint)
-        error.complete = at_fault is not None
+        error = kind(found.message, place=found.place or self.place, hint=hint)
+        error.code, error.cause = found.code, found.cause
+        error.complete = found.place is not None
         raise error
 
     def _keep_start(self, status: int) -> str:

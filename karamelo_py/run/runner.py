@@ -24,7 +24,13 @@ from karamelo_py.run.mpi.comm import check_same_run, handled_signals
 from karamelo_py.run.recovery import RollBack, Stopped
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.tiles import DIRECT_UP_TO
-from karamelo_py.run.timestep import ruling_limit, stable_step, words_of_own_step, words_of_share
+from karamelo_py.run.timestep import (
+    own_step_instead_of,
+    ruling_limit,
+    stable_step,
+    words_of_own_step,
+    words_of_share,
+)
 from karamelo_py.scene import boundary
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.plugins import attributed
@@ -330,34 +336,52 @@ class Runner:
             self.hub.console.leave()
 
     def _banner(self, simulation: Simulation, going_on: bool) -> None:
+        """Begin the record of this run, and print it."""
         hub, why = self.hub, energy.unknown_work(self.hub)
-        own = words_of_own_step(hub, simulation)
-        of_waves = {
-            "stable dt": stable_step(hub, simulation, simulation.limit),
-            **({"own dt": own} if own else {}),
-            "limited by": f"{ruling_limit(simulation)}; {words_of_share(hub)}",
+        facts: dict[str, Any] = {
+            "method": hub.update.words,
+            "points": int(simulation.present.sum()),
+            "nodes": hub.fields.node_count,
+            "nodes_per_point": support(simulation.setup.basis, simulation.setup.kin),
+            "bytes_per_point": bytes_per_point(simulation),
+            "dt": simulation.dt,
+            "first_step": simulation.step,
+            "first_time": simulation.time,
+            "processes": simulation.comm.size,
+            "threads": simulation.threads,
+            "precision": hub.settings.precision,
         }
-        of_energy = {"energy": energy.not_watched(why)} if why and simulation.moves else {}
+        if not simulation.implicit:
+            facts["stable_dt"] = stable_step(hub, simulation, simulation.limit)
+            facts["own_dt"] = own_step_instead_of(hub, simulation)
+            facts["limited_by"] = ruling_limit(simulation)
+        if why and simulation.moves:
+            facts["energy_unwatched"] = why
+        hub.record.begin(facts)
+        own = words_of_own_step(hub, simulation)
         alone = f", one has all points: up to {DIRECT_UP_TO} are not shared out"
-        processes = f"{simulation.comm.size}{alone if simulation.tiles.direct else ''}"
+        shown = {
+            "method": facts["method"],
+            "points": facts["points"],
+            "volumes": words_of_volumes(hub),
+            "nodes": facts["nodes"],
+            "nodes per point": facts["nodes_per_point"],
+            "bytes per particle": facts["bytes_per_point"],
+            "dt": facts["dt"],
+            "stable dt": facts.get("stable_dt"),
+            "own dt": None if simulation.implicit else own,
+            "limited by": "limited_by" in facts and f"{facts['limited_by']}; {words_of_share(hub)}",
+            "energy": "energy_unwatched" in facts and energy.not_watched(why),
+            "processes": facts["processes"] > 1
+            and f"{facts['processes']}{alone if simulation.tiles.direct else ''}",
+            "gpu": hub.settings.card and hub.settings.card.name,
+            "threads": facts["threads"],
+            "precision": facts["precision"],
+            "units": hub.output.units and str(hub.output.units),
+        }
         hub.console.banner(
             f"Run, continued from step {simulation.step}" if going_on else "Run",
-            {
-                "method": hub.update.words,
-                "points": int(simulation.present.sum()),
-                **({"volumes": volumes} if (volumes := words_of_volumes(hub)) else {}),
-                "nodes": hub.fields.node_count,
-                "nodes per point": support(simulation.setup.basis, simulation.setup.kin),
-                "bytes per particle": bytes_per_point(simulation),
-                "dt": simulation.dt,
-                **({} if simulation.implicit else of_waves),
-                **of_energy,
-                **({"processes": processes} if simulation.comm.size > 1 else {}),
-                **({"gpu": hub.settings.card.name} if hub.settings.card else {}),
-                "threads": simulation.threads,
-                "precision": hub.settings.precision,
-                **({"units": str(hub.output.units)} if hub.output.units else {}),
-            },
+            {name: of for name, of in shown.items() if of or (of == 0 and of is not False)},
         )
 
     def _summary(self, simulation: Simulation, first_step: int, wall: float) -> None:
@@ -365,16 +389,28 @@ class Runner:
         stages = [(name, float(passed)) for name, (passed, _) in self.timings.on.items()]
         stages.append(("rest", max(wall - sum(seconds for _, seconds in stages), 0.0)))
         in_steps, worked = self.timings.on["steps"]
-        rate = steps * simulation.count / in_steps if in_steps > 0 else 0.0
-        path = inf if simulation.implicit else float(simulation.control.clock[0].path)
+        facts: dict[str, Any] = {
+            "wall_s": wall,
+            "steps": steps,
+            "time": simulation.time,
+            "energy_change_percent": energy.change_of_energy(simulation),
+            "path_cells": inf if simulation.implicit else float(simulation.control.clock[0].path),
+            "point_steps_per_s": steps * simulation.count / in_steps if in_steps > 0 else 0.0,
+            "processor_s_in_steps": float(worked),
+            "seconds": dict(stages),
+            "interrupted": bool(self.interrupted),
+        }
+        self.hub.record.finish(facts)
+        change, path = facts["energy_change_percent"], facts["path_cells"]
+        of_energy = {} if change is None else {"energy": energy.words_of_change(self.hub, change)}
         self.hub.console.summary(
             {
                 "wall time": f"{wall:.3g} s",
                 "steps": steps,
                 "time": simulation.time,
-                **energy.change_of_energy(self.hub, simulation),
+                **of_energy,
                 **({"path": f"{path:.3g} cells at most"} if path < inf else {}),
-                "particle-steps/s": f"{rate:.3g}",
+                "particle-steps/s": f"{facts['point_steps_per_s']:.3g}",
                 "processor time": f"{worked:.3g} s in steps, of all threads",
                 **boundary.counted(self.hub, simulation),
             },

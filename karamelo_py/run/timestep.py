@@ -228,12 +228,20 @@ def what_follows(hub: Hub, simulation: Any, step: float) -> str:
     return ": the run will most likely blow up, and be stopped then"
 
 
-def words_of_own_step(hub: Hub, simulation: Any) -> str:
-    """Tell the step that the program would take of itself and how long; empty where it does."""
+def own_step_instead_of(hub: Hub, simulation: Any) -> float | None:
+    """Find the step that the program would take itself; None where it does."""
     if hub.update.dt_factor is None and hub.update.fixed_dt is None:
-        return ""
+        return None
     still = simulation.control.clock[0].path <= STILL
-    step, after = (own_step(hub, simulation, still=s) for s in (still, False))
+    return own_step(hub, simulation, still=still)
+
+
+def words_of_own_step(hub: Hub, simulation: Any) -> str:
+    """Tell the step that the program would take itself and how long; empty where it does."""
+    step = own_step_instead_of(hub, simulation)
+    if step is None:
+        return ""
+    after = own_step(hub, simulation, still=False)
     far = f", {after:.6g} once points have gone a quarter of a cell"
     return f"{step:.6g}" + (far if after < step else "")
 

@@ -12,6 +12,7 @@ from karamelo_py.language.faults import as_script_error
 from karamelo_py.language.unknown import line_below
 from karamelo_py.output.console import Console
 from karamelo_py.output.fields import Fields
+from karamelo_py.output.record import RunRecord
 from karamelo_py.output.schedule import Output
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.lattice import Lattice
@@ -214,6 +215,7 @@ class Hub:
         self.functions: dict[str, Any] = {}  # in Python, that a program has given
         self.running: Any = None  # the run in progress
         self.runs: list[dict[str, float]] = []  # published values at the end of each so far
+        self.record = RunRecord()
         self.warned: list[tuple[float, str]] = []  # times and messages, for those who watch
         self.later: list[Any] = []  # `known_failures.Step` of runs that a rehearsal came to
         self._simulation: Any = None
@@ -283,9 +285,16 @@ class Hub:
         place: Place | None = None,
         hint: str | None = None,
         expected: str | None = None,
+        *,
+        code: str = "",
+        cause: str = "",
     ) -> None:
-        """Tell the user of something that may not be meant; not during a rehearsal."""
+        """Tell the user of something that may not be meant; not during a rehearsal.
+
+        The `code` names the kind of a trouble for programs, `cause` what is known to lead to it.
+        """
         if not self.rehearsing:
+            self.record.warn(message, hint, place or self.place, code, cause)
             text = render_message("warning", message, place or self.place, expected, hint)
             self.warned.append((self.update.time, text))
             self.console.warn(text)

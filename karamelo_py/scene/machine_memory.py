@@ -154,6 +154,7 @@ class Room(NamedTuple):
             f"than {need} of memory; this machine has {in_words(self.whole)} in all",
             hint="larger cells, or fewer points per cell"
             + ("" if self.single else "; precision(single) before this line takes half of it"),
+            code="memory",
         )
 
 

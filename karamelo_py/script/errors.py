@@ -81,10 +81,20 @@ class ScriptError(Exception):
     statements: list = field(default_factory=list)
     # The name in a formula, or the column, that nothing answers to.
     unknown: str | None = None
+    # The kind of a trouble of a run, for programs, and what is known to lead to it.
+    code: str = ""
+    cause: str = ""
     # Whether the statement it belongs to is known: nothing outside of it may add to it.
     complete: bool = False
 
     def __str__(self) -> str:
+        return self.message
+
+    @property
+    def sentence(self) -> str:
+        """The message, after the command or style that complains."""
+        if self.command and not self.message.startswith(self.command):
+            return f"{self.command}: {self.message}"
         return self.message
 
     def render(self) -> str:
@@ -92,10 +102,7 @@ class ScriptError(Exception):
 
         Further mistakes of the script follow.
         """
-        message = self.message
-        if self.command and not message.startswith(self.command):
-            message = f"{self.command}: {message}"
-        text = render_message("error", message, self.place, self.expected, self.hint)
+        text = render_message("error", self.sentence, self.place, self.expected, self.hint)
         for place in self.included:
             text += f"\n{place.file}:{place.line}: the script above is included here"
         return "\n\n".join([text, *(error.render() for error in self.others)])

@@ -18,10 +18,10 @@ from karamelo_py.app.bench import apart, measure, on_card
 from karamelo_py.app.bench.measure import WORKLOADS
 from karamelo_py.app.options import above_zero, add_variables, threads_option
 from karamelo_py.app.plot import read_text
-from karamelo_py.app.studies.records import surroundings
 from karamelo_py.app.studies.variables import out_file
 from karamelo_py.compiler.gpu import NoCard, bandwidth, card
 from karamelo_py.output.files import write_whole
+from karamelo_py.output.record import surroundings
 from karamelo_py.script.errors import ScriptError, unknown
 
 ELSEWHERE = "published, one core of another machine, a small AMD EPYC"

@@ -1,12 +1,12 @@
 """karamelo-py advise: the cheapest variant of a script that is accurate enough."""
 
-import re
 import subprocess
 from argparse import ArgumentParser
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf, prod
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -16,9 +16,8 @@ from karamelo_py.app.studies import look, records, variables
 from karamelo_py.app.studies.case import (
     PROGRAM,
     environment,
-    messages_in,
     options_of,
-    said_in,
+    record_of,
     worded,
 )
 from karamelo_py.app.studies.curves import (
@@ -35,6 +34,7 @@ from karamelo_py.app.studies.curves import (
 )
 from karamelo_py.app.studies.study import Study, live_page, plain_table, shown, terminal
 from karamelo_py.kernels.clock import STILL
+from karamelo_py.output.files import read_json
 from karamelo_py.script.errors import ScriptError, plural
 from karamelo_py.script.terms import number_of
 
@@ -156,10 +156,10 @@ class ChoiceRuns:
     def look(self, folder: Path) -> None:
         """Read what its finest run has said."""
         place = folder / self.rows[-1]["folder"]
-        method = re.search(r"^  method +(.*)$", said_in(place / "out.txt"), re.M)
-        self.words = frozenset(method[1].split()) if method else frozenset()
-        said = messages_in(said_in(place / "err.txt"))
-        self.warnings = tuple(text for kind, text in said if kind == "warning")
+        record = record_of(place)
+        self.words = frozenset(record["runs"][0]["method"].split() if record.get("runs") else ())
+        said = record.get("messages", [])
+        self.warnings = tuple(note["text"] for note in said if note["kind"] == "warning")
 
 
 @dataclass
@@ -411,14 +411,15 @@ def coarse_first(
     ordered = sorted(values, key=float)
     work = []
     for value in (ordered[0], ordered[-1]):
-        command = [*PROGRAM, "check", str(script), "--threads", "1"]
-        said = subprocess.run(
-            [*command, *options_of({name: value, **others})],
-            capture_output=True, text=True, encoding="utf-8", env=environment(),
-        ).stdout  # fmt: skip
-        points = re.search(r"^points +(\d+)", said, re.M)
-        dt = re.search(r"^first dt +([-+.\deE]+)", said, re.M)
-        work.append(float(points[1]) / float(dt[1]) if points and dt else None)
+        with TemporaryDirectory() as folder:
+            file = Path(folder) / "check.json"
+            command = [*PROGRAM, "check", str(script), "--threads", "1", "-record", str(file)]
+            subprocess.run(
+                [*command, *options_of({name: value, **others})],
+                capture_output=True, env=environment(),
+            )  # fmt: skip
+            runs = read_json(file).get("runs")
+        work.append(runs[0]["points"] / runs[0]["dt"] if runs else None)
     if None not in work and work[0] > work[1]:
         ordered.reverse()
     return ordered

@@ -21,6 +21,7 @@ from karamelo_py.app.studies.case import PROGRAM, environment
 from karamelo_py.app.studies.variables import names
 from karamelo_py.output.console import duration
 from karamelo_py.output.files import read_json, write_whole
+from karamelo_py.output.record import surroundings
 from karamelo_py.script.errors import ScriptError, plural, unknown
 
 DESCRIPTION = """\
@@ -187,7 +188,7 @@ def make(entry: Entry, place: Path, inputs: Path, *, small: bool, again: bool) -
         if done.returncode:
             print(done.stdout, end="")
             return "failed"
-    made = {"key": key, "commands": lines, **records.surroundings()}
+    made = {"key": key, "commands": lines, **surroundings()}
     write_whole(record, json.dumps(made, indent=1))
     return "done"
 

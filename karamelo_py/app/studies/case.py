@@ -19,23 +19,17 @@ from typing import Any
 import karamelo_py
 from karamelo_py.app.studies.warm import WarmProcesses
 from karamelo_py.output.files import read_json, write_whole
+from karamelo_py.output.record import NAME
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.terms import number_of
 
 KEPT = "case.json"
 WAIT4 = hasattr(os, "wait4")
 PROGRAM = [sys.executable, "-m", "karamelo_py.app.cli"]
-# Facts are indented by 2, the parts of the time by 4.
-_FACT = re.compile(
-    r"^( {2}| {4})(\S.*?) {2,}([-+]?\d(?:[\d ]*\d)?(?:\.\d+)?(?:[eE][-+]?\d+)?)", re.MULTILINE
-)
-# Of a script's first run.
-_FIRST = "points", "nodes", "nodes per point", "bytes per particle", "dt", "stable dt", "own dt"
-_MESSAGE = re.compile(r"(?:^|: )(warning|error): (.*)")
-_MEANT = re.compile(r"error: .*\n(?:.+\n)*?hint: (did you mean .*)")
-_NOT_ITS_OWN = re.compile(r"internal error|another run is writing")
-# Before the first step as well, and no mistake of a script: larger scenes, longer steps.
-_TOO_MUCH = re.compile(r"memory|times the stable one")
+# Before the first step as well, and no mistake of a script: larger scenes, longer steps, a fault of
+# the program, another run in the folder.
+_NOT_OF_SCRIPT = ("memory", "step-above-limit")
+_NOT_ITS_OWN = ("internal", "busy")
 
 
 @dataclass
@@ -50,6 +44,7 @@ class CaseOutcome:
     reason: str = ""  # of what did not end well: the message of the program
     facts: dict[str, float] = field(default_factory=dict)  # numbers of the run, see `COLUMNS`
     folder: Path = Path()
+    code: str = ""  # of the error that ended it
 
     @property
     def complaint(self) -> str:
@@ -100,7 +95,7 @@ class Refused(ScriptError):
     def __init__(self, case: Mapping[str, str], outcome: CaseOutcome):
         super().__init__(outcome.reason)
         lines = outcome.complaint.rstrip().splitlines()
-        first = next((k for k, line in enumerate(lines) if errors_in(line)), 0)
+        first = next((k for k, line in enumerate(lines) if outcome.reason in line), 0)
         self._whole = "\n".join([*lines[first:], f"this is the script with {worded(case)}"])
 
     def render(self) -> str:
@@ -136,12 +131,14 @@ class Launch:
         if found.get("key") != self.key(case):
             return None
         # Somebody else's doing, which the next time may not come, or a file that was missing.
-        if found["status"] in ("killed", "refused") or _NOT_ITS_OWN.search(found["reason"]):
+        if found["status"] in ("killed", "refused") or found.get("code") in _NOT_ITS_OWN:
             return None
         # A run that was given up is tried again when it may take longer.
         if found["status"] == "too long" and (self.limit or 1e300) > found["facts"]["wall_s"]:
             return None
-        return CaseOutcome(found["status"], found["reason"], found["facts"], folder)
+        return CaseOutcome(
+            found["status"], found["reason"], found["facts"], folder, found.get("code", "")
+        )
 
     def run(self, case: Mapping[str, str], folder: Path) -> CaseOutcome:
         """Run a case and keep what became of it."""
@@ -161,14 +158,16 @@ class Launch:
                 facts["seconds_spread"] = max(seconds) - min(seconds)
         if "particle_steps" in facts and facts["seconds"] > 0:
             facts["particle_steps_per_s"] = facts["particle_steps"] / facts["seconds"]
-        kept = {"status": outcome.status, "reason": outcome.reason, "facts": facts}
-        record = {"key": self.key(case), "variables": dict(case), **kept}
+        kept = {"status": outcome.status, "reason": outcome.reason, "code": outcome.code}
+        record = {"key": self.key(case), "variables": dict(case), **kept, "facts": facts}
         write_whole(folder / KEPT, json.dumps(record, indent=1))
         return outcome
 
     def _once(self, case: Mapping[str, str], folder: Path) -> CaseOutcome:
         words = [str(self.script.resolve()), *options_of(case), "--threads", str(self.threads)]
-        (folder / "log.mpm").unlink(missing_ok=True)
+        words += ["-record", NAME]
+        for name in ("log.mpm", NAME):
+            (folder / name).unlink(missing_ok=True)
         begun = time.perf_counter()
         with (folder / "out.txt").open("wb") as out, (folder / "err.txt").open("wb") as err:
             pid = self.warm.start(kind_of(case.values()), words, folder, out, err)
@@ -179,7 +178,8 @@ class Launch:
                     stderr=err, env=environment(), start_new_session=os.name == "posix",
                 )  # fmt: skip
             memory, overdue = self._wait(process, begun)
-        facts = read_facts(said_in(folder / "out.txt"))
+        record = record_of(folder)
+        facts = facts_of(record)
         facts["wall_s"] = time.perf_counter() - begun
         if memory:
             facts["peak_memory_mib"] = memory
@@ -189,11 +189,14 @@ class Launch:
             return CaseOutcome("killed", f"ended by signal {-process.returncode}", facts, folder)
         outcome = CaseOutcome("done", "", facts, folder)
         if process.returncode:
-            outcome.status, outcome.reason = "failed", reason_in(outcome.complaint)
-            others = _NOT_ITS_OWN, _TOO_MUCH
-            if "points" not in facts and not any(each.search(outcome.reason) for each in others):
+            error = error_of(record)
+            last = outcome.complaint.rstrip().splitlines()[-1:]
+            outcome.status, outcome.code = "failed", error.get("code", "")
+            outcome.reason = error.get("text") or [*last, "ended without a message"][0].strip()
+            if "points" not in facts and outcome.code not in _NOT_ITS_OWN + _NOT_OF_SCRIPT:
                 outcome.status = "refused"
-                outcome.reason += "; ".join(["", *_MEANT.findall(outcome.complaint)[:1]])
+                hint = error.get("hint", "")
+                outcome.reason += f"; {hint}" * hint.startswith("did you mean")
         return outcome
 
     def _wait(self, process: Any, begun: float) -> tuple[float | None, bool]:
@@ -236,47 +239,40 @@ def environment() -> dict[str, str]:
     return {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, paths))}
 
 
-def read_facts(said: str) -> dict[str, float]:
-    """Read the numbers in what the program says at the beginning and the end of each run."""
-    facts: dict[str, float] = {}
-    seconds = cpu = steps = 0.0
-    for indent, name, number in _FACT.findall(said):
-        value = float(number.replace(" ", ""))
-        if name in _FIRST:
-            facts.setdefault(name.replace(" ", "_"), value)
-        elif name == "steps" and len(indent) == 4:
-            seconds += value
-        elif name == "steps":
-            steps += value
-        elif name == "processor time":
-            cpu += value
-        elif name == "path":
-            facts[name] = value
+def record_of(folder: Path) -> dict[str, Any]:
+    """Read the record of the runs in a folder; nothing where it was not written."""
+    return read_json(folder / NAME)
+
+
+def facts_of(record: Mapping[str, Any]) -> dict[str, float]:
+    """Find the numbers of the runs of a script: of all runs, or of the first, see `COLUMNS`."""
+    runs = record.get("runs", [])
+    first = runs[0] if runs else {}
+    names = {"points": "points", "nodes": "nodes", "nodes_per_point": "nodes_per_point",
+             "bytes_per_particle": "bytes_per_point", "dt": "dt", "stable_dt": "stable_dt",
+             "own_dt": "own_dt"}  # fmt: skip
+    facts = {
+        ours: float(first[name]) for ours, name in names.items() if first.get(name) is not None
+    }
+    ended = [run for run in runs if "steps" in run]
+    if ended and ended[-1]["path_cells"] is not None:
+        facts["path"] = ended[-1]["path_cells"]
+    steps = float(sum(run["steps"] for run in ended))
     if steps:
-        facts.update(steps=steps, seconds=seconds, cpu_seconds=cpu)
-        if "points" in facts:
-            facts["particle_steps"] = steps * facts["points"]
-            if "nodes_per_point" in facts:
-                facts["node_visits"] = facts["particle_steps"] * facts["nodes_per_point"]
-            if seconds > 0:
-                facts["particle_steps_per_s"] = facts["particle_steps"] / seconds
+        seconds = sum(run["seconds"]["steps"] for run in ended)
+        facts.update(steps=steps, seconds=seconds)
+        facts["cpu_seconds"] = sum(run["processor_s_in_steps"] for run in ended)
+        facts["particle_steps"] = steps * facts["points"]
+        facts["node_visits"] = facts["particle_steps"] * facts["nodes_per_point"]
+        if seconds > 0:
+            facts["particle_steps_per_s"] = facts["particle_steps"] / seconds
     return facts
 
 
-def messages_in(complaint: str) -> list[tuple[str, str]]:
-    """Find warnings and errors, by these words, without their places and their remedies."""
-    return [m.groups() for m in map(_MESSAGE.search, complaint.splitlines()) if m]
-
-
-def errors_in(complaint: str) -> list[str]:
-    """Find the messages of errors."""
-    return [text for kind, text in messages_in(complaint) if kind == "error"]
-
-
-def reason_in(complaint: str) -> str:
-    """Find the message of an error, or what was said last."""
-    last = complaint.rstrip().splitlines()[-1:]
-    return [*errors_in(complaint), *last, "ended without a message"][0].strip()
+def error_of(record: Mapping[str, Any]) -> dict[str, Any]:
+    """Find the error that ended a script; nothing where none did."""
+    errors = [note for note in record.get("messages", []) if note["kind"] == "error"]
+    return errors[-1] if errors else {}
 
 
 def folder_name(case: Mapping[str, Any]) -> str:

@@ -8,14 +8,13 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.app.plot import read_log
-from karamelo_py.app.studies.case import messages_in, said_in, worded
+from karamelo_py.app.studies.case import record_of, worded
 from karamelo_py.app.studies.curves import Table, missing
 from karamelo_py.kernels.watch import WITHIN, growth
 
 SHARE = 0.2  # of the run: means over its first and its last part are compared
 WRONG = ("gains", "breaks")
 OF_PARTS = {"gains": "grows", "damps": "falls"}
-_CAUSE = re.compile(r"Known to do that here: (.*)|(numerical fracture)")
 _OWN = re.compile(r"^(\w+: )?step \d+, time [^:]*: | at \([^)]*\)| \(through[^)]*\)")
 _POINT = re.compile(r"point \d+ of solid '[^']*'")
 
@@ -60,9 +59,9 @@ def look_at(
 ) -> Kept:  # fmt: skip
     """Judge a column in a run; a value of one of the computes `parts` is no whole."""
     place = folder / row["folder"]
-    said = messages_in(said_in(place / "err.txt"))
-    causes = tuple(dict.fromkeys(_general(text) for _, text in said))
-    warned = any(kind == "warning" for kind, _ in said)
+    said = record_of(place).get("messages", [])
+    causes = tuple(dict.fromkeys(_general(note) for note in said))
+    warned = any(note["kind"] == "warning" for note in said)
     log = read_log(place)
     if not log or row["status"] in ("too long", "killed"):
         word = "refused" if row["status"] in ("refused", "failed") else "unknown"
@@ -72,7 +71,7 @@ def look_at(
             raise missing("-keeps" if name == column else "-x", name, list(log), "the log")
     if row["status"] == "failed":
         word, number = "breaks", float(log[over][-1])
-        warned = warned or any(_CAUSE.search(text) for _, text in said)
+        warned = warned or any("cause" in note for note in said)
     else:
         word, number = judge(log[over], log[column], within)
         if column in parts or column.rpartition("_")[0] in parts:
@@ -80,12 +79,9 @@ def look_at(
     return Kept(word, number, causes, warned)
 
 
-def _general(text: str) -> str:
+def _general(note: Mapping[str, str]) -> str:
     """The known cause in a warning or an error; without one its text, without what is its own."""
-    cause = _CAUSE.search(text)
-    if cause:
-        return cause[1] or "a point has come loose from its solid (numerical fracture)"
-    return _POINT.sub("a point", _OWN.sub("", text))
+    return note.get("cause") or _POINT.sub("a point", _OWN.sub("", note["text"]))
 
 
 def verdicts(table: Table, kept: Sequence[Kept], by: Sequence[str]) -> tuple[str, list[str]]:

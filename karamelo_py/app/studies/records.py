@@ -4,18 +4,14 @@ import csv
 import io
 import itertools
 import os
-import platform
 import re
 from collections.abc import Container, Mapping, Sequence
 from contextlib import suppress
-from datetime import datetime
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-import karamelo_py
 from karamelo_py.app.plot import read_log, read_text
 from karamelo_py.app.studies.case import COLUMNS, CaseOutcome
 from karamelo_py.app.studies.variables import NamesOfCase, ScriptFiles
@@ -219,27 +215,3 @@ def value(each: Mapping[str, Any], name: str) -> float | None:
     if cell is None or isinstance(cell, float):
         return cell
     return number_of(str(cell))
-
-
-def surroundings() -> dict[str, Any]:
-    """Date, machine and versions, for what is measured here and now."""
-    versions = {"python": platform.python_version(), "karamelo-py": karamelo_py.__version__}
-    versions |= {name: version(name) for name in ("numpy", "numba", "llvmlite")}
-    return {
-        "date": datetime.now().astimezone().isoformat(timespec="seconds"),
-        "processor": processor(),
-        "cores": os.cpu_count(),
-        "system": f"{platform.system()} {platform.release()}",
-        "versions": versions,
-    }
-
-
-def processor() -> str:
-    """Find the name of the processor."""
-    try:
-        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
-            if line.lower().startswith("model name"):
-                return line.partition(":")[2].strip()
-    except OSError:
-        pass
-    return platform.processor() or platform.machine()

@@ -15,12 +15,13 @@ import numpy as np
 from karamelo_py.app.options import above_zero, positive
 from karamelo_py.app.plot import read_log
 from karamelo_py.app.studies import look, records, variables
-from karamelo_py.app.studies.case import said_in
+from karamelo_py.app.studies.case import error_of, record_of
 from karamelo_py.app.studies.curves import usable
 from karamelo_py.app.studies.study import Study, live_page
 from karamelo_py.kernels import watch
 from karamelo_py.output.files import savefig
 from karamelo_py.output.plots import blank_figure, tick_texts
+from karamelo_py.run.diagnosis.energy import not_watched
 from karamelo_py.script.errors import ScriptError, plural
 from karamelo_py.script.terms import number_of
 
@@ -55,18 +56,18 @@ COLOURS = {
     "stable": "#d9ecf7", "damped": "#c3dfb5", "growing": "#f0a53c", "left": "#9b9b9b",
     "short": "#e4e4e4", "failed": "#7d2a3a",
 }  # fmt: skip
-LEFT = re.compile("leaves the domain|left the domain")  # and was not thrown out of it
-# What the program says of failures, in short.
+# Kinds of failures, in short.
 REASONS = {
-    r"det F": "det F <= 0",
-    r"not a number|NaN": "NaN",
-    r"thrown out|leaves the domain|left the domain": "point lost",
-    r"cells in one step": "point moves more than a cell",
-    r"stable step has fallen": "stable step collapsed",
-    r"stable limit, which has fallen": "step above the limit",
-    r"tangled": "domain of a point tangled",
-    r"has come from nowhere": "energy from nowhere",
-    r"temperature": "temperature out of bounds",
+    "inside-out": "det F <= 0",
+    "not-a-number": "NaN",
+    "point-lost": "point lost",
+    "left-domain": "point lost",
+    "moves-too-far": "point moves more than a cell",
+    "step-collapsed": "stable step collapsed",
+    "step-above-limit": "step above the limit",
+    "tangled": "domain of a point tangled",
+    "energy-gain": "energy from nowhere",
+    "temperature": "temperature out of bounds",
 }
 
 
@@ -167,13 +168,12 @@ def remains(energy: np.ndarray) -> float:
     return last / first if first > 0 else 1.0
 
 
-def in_short(row: Mapping[str, Any]) -> str:
-    """Give the reason of a failure in a few words."""
+def in_short(row: Mapping[str, Any], code: str) -> str:
+    """Give the reason of a failure in a few words, by the code of its error."""
     if row["status"] == "too long":
         return "too long"
-    for pattern, words in REASONS.items():
-        if re.search(pattern, row["reason"]):
-            return words
+    if code in REASONS:
+        return REASONS[code]
     cause = re.sub(r"^(run\w*: )?step \d+, time [^:]+: ", "", str(row["reason"]))
     return textwrap.shorten(cause, 60, placeholder=" …")
 
@@ -238,11 +238,13 @@ class Map:
     def judged(self, row: Mapping[str, Any]) -> dict[str, Any]:
         """Add to the row of a run its class, and why it is of that one."""
         place = self.study.out.parent / row["folder"]
-        said, complaint = said_in(place / "out.txt"), said_in(place / "err.txt")
-        limit = re.search(r"^  limited by +(\w+);", said, re.M)
+        record = record_of(place)
+        runs, code = record.get("runs", []), error_of(record).get("code", "")
+        codes = {note.get("code") for note in record.get("messages", [])}
         found = {"class": "stable", "why": "", "growth": None, "limit": "", "unwatched": ""}
-        if limit and limit[1] not in ("set_dt", "end"):  # where the script says the step
-            found["limit"] = limit[1]
+        limit = runs[0].get("limited_by") if runs else None
+        if limit not in (None, "set_dt", "end"):  # where the script says the step
+            found["limit"] = limit
         done = row["status"] == "done"
         if self.energy:
             log = read_log(place)
@@ -256,17 +258,18 @@ class Map:
             share = remains(energy)
             falls = f"{self.energy} falls to {share:.3g}" if share < 1 / self.bound else ""
         else:
-            changes = re.findall(r"^  energy +([-+][.\d]+) %", said, re.M)
-            found["growth"] = max((1 + float(each) / 100 for each in changes), default=None)
-            if unwatched := re.search(r"^  energy +is (not watched: .*)", said, re.M):
-                found["unwatched"] = unwatched[1]
+            changes = [run.get("energy_change_percent") for run in runs]
+            changes = [change for change in changes if change is not None]
+            found["growth"] = max((1 + change / 100 for change in changes), default=None)
+            if runs and "energy_unwatched" in runs[0]:
+                found["unwatched"] = not_watched(runs[0]["energy_unwatched"]).removeprefix("is ")
             change = (found["growth"] or 1.0) - 1
-            grows = FROM_NOWHERE if FROM_NOWHERE in complaint or change > watch.WITHIN else ""
-            falls = LOST if LOST in complaint or change < -watch.WITHIN else ""
+            grows = FROM_NOWHERE if "energy-gain" in codes or change > watch.WITHIN else ""
+            falls = LOST if "energy-loss" in codes or change < -watch.WITHIN else ""
         if not done:
             # A domain that is too small tells nothing of the step.
-            left = LEFT.search(row["reason"]) and FROM_NOWHERE not in complaint
-            found |= {"class": "left" if left else "failed", "why": in_short(row)}
+            left = code == "left-domain" and "energy-gain" not in codes
+            found |= {"class": "left" if left else "failed", "why": in_short(row, code)}
         elif not (self.energy or changes) and row["steps"] < FEWEST:
             found |= {"class": "short", "why": f"{row['steps']:.0f} steps"}
         elif grows:

@@ -18,8 +18,9 @@ import numpy as np
 from karamelo_py.app.options import positive
 from karamelo_py.app.studies import variables
 from karamelo_py.app.studies.case import CaseOutcome, Launch, Refused, folder_name, kind_of
-from karamelo_py.app.studies.records import Recorded, recorded, row, surroundings, write
+from karamelo_py.app.studies.records import Recorded, recorded, row, write
 from karamelo_py.output.console import duration
+from karamelo_py.output.record import surroundings
 from karamelo_py.script.errors import ScriptError, plural
 from karamelo_py.script.terms import number_of
 

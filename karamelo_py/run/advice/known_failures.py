@@ -148,7 +148,7 @@ def warn_about_steps(
             words += f"{asked / of_heat:.3g} times the stable one of conduction: "
             words += "temperatures would swing"
             if step is present:
-                raise ScriptError(words, place=step.place, hint=hint)
+                raise ScriptError(words, place=step.place, hint=hint, code="step-above-limit")
         elif limit == of_heat:
             words += f"above the stable limit {limit:.4g} of conduction; "
             words += f"beyond {BORNE:g} times that temperatures swing"
@@ -273,7 +273,7 @@ def refuse_endless_speeds(hub: Hub, simulation: Simulation) -> None:
         what = f"points have a velocity that is not a number at time {simulation.time:.6g}"
         hint = "look for a formula that gives NaN or infinity, such as a division by zero"
         found = no_number(hub, simulation, what, hint)
-        raise ScriptError(found.message, place=found.place, hint=found.hint)
+        raise ScriptError(found.message, place=found.place, hint=found.hint, code=found.code)
 
 
 def _duration_of_later(hub: Hub, simulation: Simulation) -> float:

@@ -42,6 +42,7 @@ def report(hub: Hub, end_time: float = inf) -> None:
     say(f"points         {simulation.count} in {len(hub.solids)} solid(s)")
     if volumes := words_of_volumes(hub):
         say(f"volumes        {volumes}")
+    hub.record.begin({"points": simulation.count, "dt": simulation.dt})
     lattices = hub.lattices
     shapes = ", ".join(" x ".join(map(str, lattice.shape)) for lattice in lattices[:8])
     more = ", ..." if len(lattices) > 8 else ""

@@ -1,6 +1,6 @@
 """The watch over a scene's energy: what it cannot see, and where a gain comes from."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -142,7 +142,16 @@ def has_grown(simulation: Any) -> bool:
     return bool(clock.watch_energy and (clock.windows >= TOLD or clock.grown > WITHIN))
 
 
-def words_of_growth(hub: Hub, simulation: Any) -> tuple[str, str] | None:
+class Imbalance(NamedTuple):
+    """A gain or loss of energy that nothing explains: what to say, and its likely cause."""
+
+    message: str
+    hint: str
+    code: str
+    cause: str
+
+
+def words_of_growth(hub: Hub, simulation: Any) -> Imbalance | None:
     """Describe a gain of energy from nowhere, with its cure; None where there is none."""
     clock = simulation.control.clock[0]
     if not has_grown(simulation):
@@ -157,7 +166,7 @@ def words_of_growth(hub: Hub, simulation: Any) -> tuple[str, str] | None:
         f"step {simulation.step}, time {simulation.time:.6g}: energy comes from nowhere, "
         f"{much} (kinetic + stored + dissipated - work). Known to do that here: {cause}"
     )
-    return message, cure
+    return Imbalance(message, cure, "energy-gain", cause)
 
 
 def blends(transfer: Any) -> bool:
@@ -183,7 +192,7 @@ def share_lost(simulation: Any) -> float:
     return -growth(clock.first_balance, mean, max(clock.largest_energy, clock.energy_floor))
 
 
-def words_of_loss(hub: Hub, simulation: Any, within: float) -> tuple[str, str] | None:
+def words_of_loss(hub: Hub, simulation: Any, within: float) -> Imbalance | None:
     """Describe a loss above `within` that nothing chosen explains, with its cure; else None."""
     clock = simulation.control.clock[0]
     if not clock.watch_energy or clock.looks <= LOOKS:
@@ -197,7 +206,7 @@ def words_of_loss(hub: Hub, simulation: Any, within: float) -> tuple[str, str] |
         f"of the largest so far since the first step (kinetic + stored + dissipated - work). Known "
         f"to do that here: {cause}"
     )
-    return message, cure
+    return Imbalance(message, cure, "energy-loss", cause)
 
 
 def cause_of_loss(hub: Hub) -> tuple[str, str]:
@@ -262,13 +271,18 @@ def growth_since(simulation: Any, before: float) -> float:
     return growth(before, simulation.energy(), unit)
 
 
-def change_of_energy(hub: Hub, simulation: Any) -> dict[str, str]:
-    """Describe the change of energy for the end of a run; columns of a log have it at two times."""
+def change_of_energy(simulation: Any) -> float | None:
+    """Find the change of energy since the first step, in % of the largest; None where unknown."""
     clock = simulation.control.clock[0]
     if not clock.watch_energy or clock.looks <= FEW:
-        return {}
+        return None
     # Since the first balance, not `first_few`, which `forget_growth` changes.
-    share, takers, by = -100 * share_lost(simulation), taken_by(hub), ""
+    return -100 * share_lost(simulation)
+
+
+def words_of_change(hub: Hub, share: float) -> str:
+    """Describe a change of energy in % for the end of a run, and what takes some."""
+    takers, by = taken_by(hub), ""
     words = "of the largest since the first step (kinetic + stored + dissipated - work)"
     if takers and share < -1:
         transfer = hub.update.transfer
@@ -277,7 +291,7 @@ def change_of_energy(hub: Hub, simulation: Any) -> dict[str, str]:
             takers.append("collisions")
         by = f"; {' and '.join(takers)} {'takes' if len(takers) == 1 else 'take'} some"
         by += ", the transfer more with shorter steps" * often
-    return {"energy": f"{share:+.2f} % {words}{by}"}
+    return f"{share:+.2f} % {words}{by}"
 
 
 def forget_growth(simulation: Any) -> None:

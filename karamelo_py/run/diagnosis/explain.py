@@ -25,34 +25,46 @@ APART = "no other point of it within a cell"
 
 
 class Trouble(NamedTuple):
-    """Trouble of a run, what can be done, and the line of the script at fault, if known."""
+    """Trouble of a run, what can be done, and the line of the script at fault, if known.
+
+    Its `code` is the kind for programs; `cause` is what is known to lead to it.
+    """
 
     message: str
     hint: str
     place: Place | None = None
+    code: str = ""
+    cause: str = ""
 
 
 def trouble(hub: Hub, simulation: Any, status: int) -> Trouble:
     """Find what went wrong in a step, and what can be done."""
     if status == ABOVE_LIMIT:
-        return Trouble(*_above_limit(hub, simulation), hub.update.dt_place)
+        return Trouble(*_above_limit(hub, simulation), hub.update.dt_place, "step-above-limit")
     if status == SHRUNK:
-        return Trouble(*_shrunk(hub, simulation))
+        return Trouble(*_shrunk(hub, simulation), code="step-collapsed")
     too_large = not simulation.control.clock[0].watch_limit and not simulation.implicit
     if status in (GAINED, HEATED):
-        message, hint = (_gained if status == GAINED else _heated)(hub, simulation)
-        return Trouble(message, _smaller_step(hub, simulation) if too_large else hint)
+        found = (_gained if status == GAINED else _heated)(hub, simulation)
+        return found._replace(hint=_smaller_step(hub, simulation)) if too_large else found
     if simulation.implicit and simulation.load_steps.failure:
         message = simulation.load_steps.failure
         hint = "smaller load steps; beyond the load that a body bears there is no equilibrium"
-        return Trouble(f"step {simulation.step + 1}, time {simulation.time:.6g}: {message}", hint)
-    message, hint, place = Trouble(*_wrong_point(hub, simulation))
-    message = f"step {simulation.step + 1}, time {simulation.time:.6g}: {message}"
-    if place is None and energy.has_grown(simulation):
+        when = f"step {simulation.step + 1}, time {simulation.time:.6g}"
+        return Trouble(f"{when}: {message}", hint, code="no-equilibrium")
+    found = _wrong_point(hub, simulation)
+    found = found._replace(
+        message=f"step {simulation.step + 1}, time {simulation.time:.6g}: {found.message}"
+    )
+    if found.place is None and energy.has_grown(simulation):
         cause, cure = energy.cause_of_gain(hub, simulation)
-        message += f", after energy had come from nowhere. Known to do that here: {cause}"
-        hint = _smaller_step(hub, simulation) if too_large else cure
-    return Trouble(message, hint, place)
+        message = f"{found.message}, after energy had come from nowhere. "
+        return found._replace(
+            message=f"{message}Known to do that here: {cause}",
+            hint=_smaller_step(hub, simulation) if too_large else cure,
+            cause=cause,
+        )
+    return found
 
 
 def _when(simulation: Any) -> str:
@@ -72,7 +84,7 @@ def _speeds(points: PointTable) -> np.ndarray:
     return np.abs(points.velocity).max(axis=1, initial=0.0)
 
 
-def _gained(hub: Hub, simulation: Any) -> tuple[str, str]:
+def _gained(hub: Hub, simulation: Any) -> Trouble:
     clock, when = simulation.control.clock[0], _when(simulation)
     if not np.isfinite(clock.balance):
         _, first = simulation.points.largest(
@@ -80,7 +92,8 @@ def _gained(hub: Hub, simulation: Any) -> tuple[str, str]:
         )
         message = f"{when}: energy is no number any more; "
         message += f"the first point whose state is none is {named(hub, first)}"
-        return message, "look at the parameters of its material, and at what acts on it from Python"
+        hint = "look at the parameters of its material, and at what acts on it from Python"
+        return Trouble(message, hint, code="not-a-number")
     given = abs(clock.first_balance) + clock.supplied
     cause, cure = energy.cause_of_gain(hub, simulation)
     times = (clock.balance - clock.first_balance) / given if given > 0 else np.inf
@@ -89,10 +102,10 @@ def _gained(hub: Hub, simulation: Any) -> tuple[str, str]:
         "brought has come from nowhere (kinetic + stored + dissipated - work). Known to do that "
         f"here: {cause}"
     )
-    return message, cure
+    return Trouble(message, cure, code="energy-gain", cause=cause)
 
 
-def _heated(hub: Hub, simulation: Any) -> tuple[str, str]:
+def _heated(hub: Hub, simulation: Any) -> Trouble:
     clock = simulation.control.clock[0]
     share = clock.last_dt / clock.heat_limit
     message = f"{_when(simulation)}: "
@@ -103,7 +116,8 @@ def _heated(hub: Hub, simulation: Any) -> tuple[str, str]:
         f"initial state, fixes and sources allow {clock.coldest:.6g} to "
         f"{clock.hottest + clock.own_heat:.6g}"
     )
-    return message, own_step_instead(hub) if share > 1 else _smaller_step(hub, simulation)
+    hint = own_step_instead(hub) if share > 1 else _smaller_step(hub, simulation)
+    return Trouble(message, hint, code="temperature")
 
 
 def _shrunk(hub: Hub, simulation: Any) -> tuple[str, str]:
@@ -132,7 +146,7 @@ def _first_wrong(simulation: Any) -> tuple | None:
     return number, old, new, points.v[:, p], int(points.grid[p])
 
 
-def _wrong_point(hub: Hub, simulation: Any) -> tuple:
+def _wrong_point(hub: Hub, simulation: Any) -> Trouble:
     """Find what is wrong with the first point that went wrong, and what can be done."""
     wrong = [one for one in simulation.points.seen(_first_wrong) if one is not None]
     if not wrong and hub.update.thermal:
@@ -141,7 +155,7 @@ def _wrong_point(hub: Hub, simulation: Any) -> tuple:
         )
         return no_number(hub, simulation, "the temperature of a point is not a number", hint)
     if not wrong:
-        return "a point went wrong", "use a smaller step"
+        return Trouble("a point went wrong", "use a smaller step", code="point")
     number, old, place, v, grid = min(wrong, key=lambda one: one[0])
     d, h, name = hub.domain.dimension, hub.lattices[grid].h, named(hub, number)
     old, new = old[:d], place[:d]
@@ -163,34 +177,40 @@ def _wrong_point(hub: Hub, simulation: Any) -> tuple:
             what = (
                 f"{name} at {_place(old)} moves by {move:.3g} cells in one step, out of the domain"
             )
-            return what, unstable
+            return Trouble(what, unstable, code="point-lost")
         side = next(k for k in range(d) if new[k] < lo[k] or new[k] > hi[k])
         if simulation.above_limit():
-            return f"{name} at {_place(old)} is thrown out of the domain", smaller
+            what = f"{name} at {_place(old)} is thrown out of the domain"
+            return Trouble(what, smaller, code="point-lost")
         loose = _loose(simulation, number, old, LOOSE * h)
         why = f", come loose from its solid ({APART}: numerical fracture)," if loose else ""
         keep = f"; against fracture, {energy.WHOLE}" if loose else ""
-        return (
+        return Trouble(
             f"{name}{why} leaves the domain at {_place(new)} (through {'xyz'[side]} = "
             f"{lo[side] if new[side] < lo[side] else hi[side]:g})",
             "make the domain larger, hold the point back with fix velocity_nodes at the wall, let "
             f"it go with boundary(delete), or, if it should not have got there, {smaller}{keep}",
+            code="left-domain",
+            cause="a point has come loose from its solid (numerical fracture)" if loose else "",
         )
     if move > 1:
-        return f"{name} at {_place(old)} moves by {move:.3g} cells in one step", unstable
+        what = f"{name} at {_place(old)} moves by {move:.3g} cells in one step"
+        return Trouble(what, unstable, code="moves-too-far")
     if any(simulation.points.seen(_is_tangled, place, grid)):
         tangled, plain = type(hub.update.method.basis).__name__, "R4" if d == 2 else "R8"
         instead = f", {plain} in the place of {tangled}" if tangled in ("Q4", "H8") else ""
-        return (
+        return Trouble(
             f"the domain of {name} at {_place(old)} is tangled: one of its corners folds over",
             f"finer points, so that the corners of a domain move more alike{instead}, or method "
             f"tlcpdi, whose domains keep their shape; or {smaller}",
+            code="tangled",
         )
     law = solid_with(hub, number).material.law
     other = ", or a law that resists the compression (neo-hookean)" if by_rates(law) else ""
-    return (
+    return Trouble(
         f"{name} at {_place(old)} is turned inside out (det F <= 0)",
         f"{smaller}, or a finer grid{other}",
+        code="inside-out",
     )
 
 
@@ -295,7 +315,7 @@ def no_number(hub: Hub, simulation: Any, message: str, hint: str) -> Trouble:
     """Tell the trouble with what is NaN, and the first fix whose formula gives NaN or infinity."""
     found = [one for one in simulation.points.seen(_first_bad) if one is not None]
     if not found:
-        return Trouble(message, hint)
+        return Trouble(message, hint, code="not-a-number")
     (which, k, _), value, x = min(found, key=lambda one: one[0])
     fix = list(hub.fixes.values())[which]
     formula = list(formulas_of(tuple(vars(fix).values())))[k]
@@ -306,6 +326,7 @@ def no_number(hub: Hub, simulation: Any, message: str, hint: str) -> Trouble:
         "a formula that is a number at all times and places of the run, such as by max(a, b) or "
         "if(condition, a, b)",
         fix.place,
+        "not-a-number",
     )
 
 

@@ -331,8 +331,8 @@ class LoadSteps:
         """Refuse what a fix gets from a formula that gives NaN or infinity."""
         if not np.all(np.isfinite(numbers)):
             hint = "look for a formula that gives NaN, such as a division by zero"
-            message, hint, place = no_number(self.simulation.hub, self.simulation, message, hint)
-            raise self._error(message, hint, place)
+            found = no_number(self.simulation.hub, self.simulation, message, hint)
+            raise self._error(found.message, found.hint, found.place)
 
     def _publish(self, found: "Equilibrium", hooks: Any, dt: float) -> None:
         """Let those that hold nodes publish the forces that they do it with; velocities at nodes.

@@ -132,7 +132,8 @@ def check_room(hub: Hub, *, copied: bool) -> None:
         hub.warn(message, place=place, hint=_ways(hub, need, there.free, copied))
         return
     hint = _ways(hub, need, there.whole, copied)
-    error = ScriptError(f"{message}{in_words(there.whole)} in all", place=place, hint=hint)
+    said = f"{message}{in_words(there.whole)} in all"
+    error = ScriptError(said, place=place, hint=hint, code="memory")
     error.command = "solid"
     raise error
 
@@ -187,6 +188,7 @@ def no_room(hub: Hub, error: MemoryError) -> ScriptError:
         f"memory: {str(error) or 'the system gives no more'}",
         place=hub.domain.place if of_grid else largest(hub).place,
         hint="larger cells, or a smaller domain" if of_grid else "larger cells, or fewer points",
+        code="memory",
     )
     found.command = "dimension" if of_grid else "solid"
     return found

@@ -1,0 +1,134 @@
+"""The record of a script's runs, as data: run.json beside the log.
+
+The banner and the closing table of a run are printed from it, and studies read it. Its fields are
+listed in docs/run-record.md. Numbers that are not finite are null.
+"""
+
+import hashlib
+import json
+import math
+import os
+import platform
+import time
+from collections.abc import Mapping
+from contextlib import suppress
+from datetime import datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import karamelo_py
+from karamelo_py.output.files import folder_of_discarded, write_whole
+from karamelo_py.script.errors import Place, ScriptError
+
+SCHEMA = 1
+NAME = "run.json"
+
+
+def surroundings() -> dict[str, Any]:
+    """Date, machine and versions, for what is measured here and now."""
+    versions = {"python": platform.python_version(), "karamelo-py": karamelo_py.__version__}
+    versions |= {name: version(name) for name in ("numpy", "numba", "llvmlite")}
+    return {
+        "date": datetime.now().astimezone().isoformat(timespec="seconds"),
+        "processor": processor(),
+        "cores": os.cpu_count(),
+        "system": f"{platform.system()} {platform.release()}",
+        "versions": versions,
+    }
+
+
+def processor() -> str:
+    """Find the name of the processor."""
+    try:
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
+            if line.lower().startswith("model name"):
+                return line.partition(":")[2].strip()
+    except OSError:
+        pass
+    return platform.processor() or platform.machine()
+
+
+class RunRecord:
+    """Facts of all runs of a script, and its messages.
+
+    It is written when a run begins and ends, and by `end`; to nowhere without a `path`.
+    """
+
+    def __init__(self) -> None:
+        self.path: Path | None = None
+        self.is_asked_for = False  # also of a script that ends before its first run
+        self.content: dict[str, Any] = {"schema": SCHEMA, "status": "running"}
+        self.runs: list[dict[str, Any]] = []
+        self.messages: list[dict[str, Any]] = []
+        self._begun = time.perf_counter()
+
+    def of_script(self, file: str | Path, variables: Mapping[str, str]) -> None:
+        """Note which script this is, and the values that its variables were given."""
+        content = b""
+        with suppress(OSError):
+            content = Path(file).read_bytes()
+        self.content["script"] = {
+            "file": str(file),
+            "sha256": hashlib.sha256(content).hexdigest(),
+            "variables": dict(variables),
+        }
+
+    def begin(self, facts: Mapping[str, Any]) -> None:
+        """Begin a run with what is known of it before its first step."""
+        self.runs.append(dict(facts))
+        self._write()
+
+    def finish(self, facts: Mapping[str, Any]) -> None:
+        """Add what is known of the present run at its end."""
+        self.runs[-1].update(facts)
+        self._write()
+
+    def warn(
+        self, text: str, hint: str | None, place: Place | None, code: str = "", cause: str = ""
+    ) -> None:
+        """Note a warning: `code` names its kind, and `cause` what is known to lead to it."""
+        self._note("warning", text, hint, place, code, cause)
+
+    def end(self, status: str, error: BaseException | None = None) -> None:
+        """Note how the script ended: finished, interrupted or failed, with the error."""
+        self.content["status"] = status
+        if isinstance(error, ScriptError):
+            self._note("error", error.sentence, error.hint, error.place, error.code, error.cause)
+        elif error is not None:
+            self._note("error", f"{type(error).__name__}: {error}", None, None, "internal", "")
+        if self.runs or self.is_asked_for:
+            self._write()
+
+    def _note(
+        self, kind: str, text: str, hint: str | None, place: Place | None, code: str, cause: str
+    ) -> None:
+        note: dict[str, Any] = {"kind": kind, "text": text}
+        if place is not None:
+            note["place"] = {"file": place.file, "line": place.line, "column": place.column}
+        optional = {"hint": hint, "code": code, "cause": cause}
+        self.messages.append(note | {name: of for name, of in optional.items() if of})
+
+    def _write(self) -> None:
+        if self.path is None or folder_of_discarded() is not None:
+            return
+        whole = {
+            **self.content,
+            "wall_s": time.perf_counter() - self._begun,
+            "runs": self.runs,
+            "messages": self.messages,
+            **surroundings(),
+        }
+        with suppress(ScriptError):  # a full disk is told by whatever else is written
+            write_whole(self.path, json.dumps(_finite(whole), indent=1, ensure_ascii=False) + "\n")
+
+
+def _finite(value: Any) -> Any:
+    """Turn numbers of NumPy into Python's, and what is not finite into None."""
+    if isinstance(value, dict):
+        return {name: _finite(of) for name, of in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(of) for of in value]
+    if hasattr(value, "item"):
+        value = value.item()
+    return value if not isinstance(value, float) or math.isfinite(value) else None
