@@ -11,7 +11,7 @@ from karamelo_py.points.basis.cpdi import Element
 from karamelo_py.points.frames import Updated
 from karamelo_py.points.kinematics import KINEMATICS, Axisymmetric
 from karamelo_py.points.laws import can
-from karamelo_py.points.laws.strengths import share_beside
+from karamelo_py.points.laws.strengths import initial_memory, share_beside
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import Lattice
 from karamelo_py.scene.solid import Solid
@@ -30,6 +30,13 @@ def publish_loads(hub: Hub, solid: Solid) -> None:
 def slots_of_loads(hub: Hub, solid: Solid) -> list[int]:
     """Find where the force on a solid and its torque are published."""
     return [hub.values.slot(f"{load}_{solid.id}_x") for load in LOADS]
+
+
+def takes_average(law: Any) -> bool:
+    """Tell whether the yield surface of a law takes a part of the averaged pressure (F-bar)."""
+    if not can(law, share_beside):
+        return False
+    return bool(share_beside(law.strength, initial_memory(law.strength, 1.0)) > 0)
 
 
 class NoContact(NamedTuple):
@@ -121,8 +128,9 @@ class Method:
         """Return the tag of averaging: `FBar` where changes of volume are averaged."""
         if not hub.update.anti_locking:
             return PointByPoint()
-        soil = any(can(material.law, share_beside) for material in hub.materials.values())
-        return FBarOfSoil() if soil else FBar()
+        laws = [solid.material.law for solid in hub.solids.values()]
+        steps = not getattr(hub.update.scheme, "implicit", False)
+        return FBarOfSoil() if steps and any(map(takes_average, laws)) else FBar()
 
     def places(self, kin: Any, solid: Solid, real: type) -> np.ndarray:
         """Positions and shapes of the domains of a solid's points before the first step, (n, w)."""
