@@ -199,7 +199,7 @@ def _advance_in_lanes(law, kin, state, dl, dt, n):
         _advance(law, kin, state, dl, dt, group(FourLanes(), q, min(4, n - q)))
 
 
-COPPER = Shock(1 / 8940, 1.38e11, 1.5, 0.0, 298.0)
+COPPER = Shock(1 / 8940, 1.38e11, 1.5, 0.0, 298.0, tension=1e9)
 COOK = JohnsonCook.given(43.9e9, 65e6, 356e6, 0.37, 1.0, 0.02, 1.1, 298.0, 1356.0)
 WEAR = JohnsonCookDamage(0.002, 0.1, -3.0, 0.014, 1.12, 1.0, 298.0, 1356.0)
 LAWS = [

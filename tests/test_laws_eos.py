@@ -93,6 +93,21 @@ def test_modulus_and_energy_are_derivative_and_integral(eos):
         assert compression_energy(eos, j, ()) == pytest.approx(weights @ p, rel=1e-7)
 
 
+def test_tension_that_copper_bears():
+    """The pressure stays there; the energy is its integral, exactly; heat lowers the volume."""
+    bears = COPPER._replace(tension=0.1 * COPPER.modulus)
+    torn = 1 / 0.9  # rho0 c0^2 (1/J - 1) is the tension
+    for j in (0.8, 1.0, 1.05, torn):
+        assert pressure(bears, j, (), ()) == pressure(COPPER, j, (), ())
+        assert compression_energy(bears, j, ()) == compression_energy(COPPER, j, ())
+    before = compression_energy(COPPER, torn, ())
+    for j in (1.2, 3.0):
+        assert pressure(bears, j, (), Warm(TR)) == -bears.tension
+        further = bears.tension * (j - torn)
+        assert compression_energy(bears, j, ()) == pytest.approx(before + further, rel=1e-12)
+    assert ratio_at_pressure(bears, -0.5 * COPPER.modulus, ()) == pytest.approx(torn, rel=1e-12)
+
+
 @every_curve
 def test_volume_at_a_pressure(eos):
     for j in (0.3, 0.5, 0.8, 0.999999, 1.0, 1.0001, 1.3):

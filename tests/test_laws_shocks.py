@@ -75,3 +75,48 @@ def test_speed_of_a_strong_shock(run_script, method, least, most):
     front = points.x[order][np.flatnonzero(~moving).max()]
     exact = (3940 + 0.489 * 4000) * time
     assert least <= abs(front / exact - 1) < most
+
+
+# A plate of copper hits one that is twice as thick. In it the waves that come back from both free
+# surfaces meet, and it spalls.
+PLATES = """
+    H = 1e-3
+    h = H/40
+    method(ulmpm, FLIP, quadratic-spline, 0.99)
+    dimension(1, -0.5*H, 4*H, h)
+    region(flyer, block, 0, H)
+    region(target, block, H, 3*H)
+    region(skin, block, 3*H - h/2, 3*H)
+    eos(copper, shock, 8940, 138e9, 3933, 1.5, 0, 385, 300, 1.5, 0.3{tension})
+    strength(none, fluid, 0)
+    material(copper, eos-strength, copper, none)
+    solid(flyer, region, flyer, 2, copper, h)
+    solid(target, region, target, 2, copper, h)
+    group(flyer, particles, region, flyer, solid, flyer)
+    group(skin, particles, region, skin, solid, target)
+    fix(v, initial_velocity_particles, flyer, 200)
+    compute(u, average_velocity, skin)
+    set_output(time(5e-9))
+    log_modify(custom, step, time, u_x)
+    run_time(1.2e-6)
+"""
+
+
+@pytest.mark.xdist_group("plates that spall")
+@pytest.mark.parametrize("tension", [0.5e9, 1.5e9, None])
+def test_spall_by_tension(run_script, tension):
+    """Velocity of the free surface: it drops by du = 2 tension/(rho0 c0) (acoustic approximation).
+
+    Antoun et al. 2003, Spall Fracture, section 4.2. Means between the arrivals of waves, half a
+    microsecond and two thicknesses apart. What bears any tension comes to rest.
+    """
+    log = run_script(PLATES.format(tension=f", tension={tension}" if tension else "")).log
+    fast, slow = (
+        log.u_x[(log.Time > begin) & (log.Time < begin + 0.15e-6)].mean()
+        for begin in (0.65e-6, 1.05e-6)
+    )
+    assert fast == pytest.approx(200, rel=0.01)
+    if tension:
+        assert (fast - slow) * 8940 * 3933 / 2 == pytest.approx(tension, rel=0.02)
+    else:
+        assert slow == pytest.approx(0, abs=4)  # 2 % of 200

@@ -191,6 +191,13 @@ class ColumnFormula:
         self.hub, self.text = hub, argument.text
         self.formula = Expression(argument.value_with(known))
         self.columns = sorted(self.formula.names & set(known))
+        for name in self.columns:
+            if name in hub.interpreter.variables:
+                hub.warn(
+                    f"'{name}' is the column here, not the variable of the script",
+                    place=argument.part(name).place,
+                    hint=f"another name for the variable, such as {name}_0, if it is meant",
+                )
         if not self.columns or len(self.columns) > self.MOST:
             many = "no column" if not self.columns else f"{len(self.columns)} columns"
             raise ScriptError(

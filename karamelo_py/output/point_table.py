@@ -345,6 +345,10 @@ def _of_vector(attribute: str, axis: int, table: PointTable) -> np.ndarray:
     return _column(getattr(table, attribute), axis)
 
 
+def _volume(table: PointTable) -> np.ndarray:
+    return table.reference_volume * table._exported[:, export.JACOBIAN]
+
+
 def _exported(k: int, table: PointTable) -> np.ndarray:
     return table._exported[:, k].copy()
 
@@ -358,7 +362,9 @@ COLUMNS: dict[str, Callable[[PointTable], np.ndarray] | None] = {
     **{f"s{name}": partial(_exported, k) for k, name in enumerate(COMPONENTS)},
     **{f"e{name}": partial(_exported, export.STRAIN + k) for k, name in enumerate(COMPONENTS)},
     "seq": lambda table: _von_mises(table._exported[:, : export.STRAIN]),
-    "volume": lambda table: table.reference_volume * table._exported[:, export.JACOBIAN],
+    "p": lambda table: -table._exported[:, :3].sum(axis=1) / 3,
+    "rho": lambda table: table.mass / _volume(table),
+    "volume": _volume,
     "mass": lambda table: table.mass.astype(float),
     **dict.fromkeys(("damage", "damage_init", "bx", "by", "bz", "ep", "epdot", "T")),
     "ienergy": partial(_exported, export.ENERGY),

@@ -35,9 +35,10 @@ NAMED = {FORCE: "N", STRESS: "Pa", ENERGY: "J", Powers(2, 1, -3): "W"}
 COLUMNS = {
     r"[xyz]0?": Powers(1),
     r"v[xyz](_update)?": VELOCITY,
-    r"s[123]{2}|seq": STRESS,
+    r"s[123]{2}|seq|p": STRESS,
     r"[fb][xyz]": FORCE,
     r"volume": Powers(3),
+    r"rho": DENSITY,
     r"mass": Powers(0, 1),
     r"ienergy": ENERGY,
     r"epdot": Powers(0, 0, -1),

@@ -149,7 +149,7 @@ class OfPoints:
     columns
         What to write of each point: x y z (position), x0 y0 z0 (first position), vx vy vz
         (velocity), s11 s22 s33 s12 s13 s23 (Cauchy stress), e11 ... e23 (strain), seq (von Mises
-        stress), volume, mass and so on. ``x, y, z`` by default.
+        stress), p (pressure), rho (density), volume, mass and so on. ``x, y, z`` by default.
     """
 
     rows_are = "points"

@@ -1,6 +1,6 @@
 """eos shock: Mie-Grueneisen equation of state."""
 
-from math import sqrt
+from math import inf, sqrt
 from typing import Annotated, NamedTuple
 
 from karamelo_py.compiler.compile import where
@@ -41,10 +41,14 @@ class Shock(NamedTuple):
         Temperature above which heat adds to the pressure.
     Q1, Q2
         Coefficients of artificial viscosity, quadratic and linear; 0 and 0 for none.
+    tension
+        Tension that the material bears before it spalls (0: none); by default what the formula
+        gives.
 
     Example
     -------
     eos(copper, shock, 8940, 110e9, 3933, 1.5, 1.99, 385, 294, 1.5, 0.06)
+    eos(spalling, shock, 8940, 110e9, 3933, 1.5, 1.99, 385, 294, 1.5, 0.06, tension=1.2e9)
 
     Notes
     -----
@@ -53,6 +57,12 @@ class Shock(NamedTuple):
     plastic work. Materials without a temperature have no such heat. In tension the first part is
     rho0 c0^2 mu. The curve has a pole at (S - 1) mu = 1. Beyond S (1 - rho0/rho) = 0.9 the pressure
     follows the tangent.
+
+    The pressure is never below -tension: material spalls, its voids open at constant tension, and
+    they close before it bears pressure again. The velocity of a free surface drops by du = 2
+    tension/(rho0 c0) then, in the acoustic approximation (Antoun et al. 2003, Spall Fracture,
+    section 4.2). As the tension goes on acting, the layer that spalls is slowed down further; a
+    damage lets it go.
 
     Where the volume shrinks at a rate d < 0, the viscous pressure rho h (Q1 h d^2 - Q2 c d) is
     added (von Neumann & Richtmyer 1950; Landshoff 1955). h is the cell size and c the speed of
@@ -71,6 +81,7 @@ class Shock(NamedTuple):
     S: float
     thermal: float  # Gamma rho0 cv, pressure per kelvin above Tr
     Tr: float
+    tension: float = inf  # that the material bears
 
     @classmethod
     def given(
@@ -84,9 +95,11 @@ class Shock(NamedTuple):
         Tr: float,
         Q1: Annotated[float, NonNegative],
         Q2: Annotated[float, NonNegative],
+        *,
+        tension: Annotated[float, NonNegative] = inf,
     ):
         """The equation of state and its artificial viscosity."""
-        eos = cls(1 / rho0, rho0 * c0**2, S, Gamma * rho0 * cv, Tr)
+        eos = cls(1 / rho0, rho0 * c0**2, S, Gamma * rho0 * cv, Tr, tension)
         return {"eos": eos, **artificial_viscosity(Q1, Q2)}
 
 
@@ -134,7 +147,7 @@ def with_heat(heat, p, Tr, factor):
 
 @pressure.on(Shock)
 def _pressure_shock(eos, j, memory, heat):
-    return with_heat(heat, cold_pressure(eos, j), eos.Tr, eos.thermal)
+    return max(with_heat(heat, cold_pressure(eos, j), eos.Tr, eos.thermal), -eos.tension)
 
 
 @bulk_modulus.on(Shock)
@@ -149,6 +162,12 @@ def _bulk_modulus_shock(eos, j, memory, heat):
 
 @compression_energy.on(Shock)
 def _compression_energy_shock(eos, j, memory):
+    # Beyond the volume ratio at which cold material has its tension, that is constant.
+    most = min(eos.tension, eos.modulus)
+    bounded = most < eos.modulus
+    whole = where(bounded, eos.modulus / where(bounded, eos.modulus - most, 1), inf)
+    gaping = max(j - whole, 0)
+    j = min(j, whole)
     closed = 1 - j
     inside = min(closed, tangent_from(eos, j))
     y = eos.S * inside
@@ -162,12 +181,12 @@ def _compression_energy_shock(eos, j, memory):
     slope = (1 + y) / (flat * flat * flat)
     further = closed - inside
     line = further * (inside / (flat * flat) + 0.5 * slope * further)
-    return eos.modulus * where(in_tension, -(closed + log_of), energy + line)
+    return eos.modulus * where(in_tension, -(closed + log_of), energy + line) + most * gaping
 
 
 @ratio_at_pressure.on(Shock)
 def _ratio_at_pressure_shock(eos, p, heat):
-    cold = (p - with_heat(heat, 0, eos.Tr, eos.thermal)) / eos.modulus
+    cold = (max(p, -eos.tension) - with_heat(heat, 0, eos.Tr, eos.thermal)) / eos.modulus
     if cold < 0:
         return 1 / max(1 + cold, 1e-6)
     inside = tangent_from(eos, cold)
