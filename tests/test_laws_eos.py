@@ -97,7 +97,7 @@ def test_tension_that_copper_bears():
     """The pressure stays there; the energy is its integral, exactly; heat lowers the volume."""
     bears = COPPER._replace(tension=0.1 * COPPER.modulus)
     torn = 1 / 0.9  # rho0 c0^2 (1/J - 1) is the tension
-    for j in (0.8, 1.0, 1.05, torn):
+    for j in (0.8, 1.0, 1.05, 1.11):
         assert pressure(bears, j, (), ()) == pressure(COPPER, j, (), ())
         assert compression_energy(bears, j, ()) == compression_energy(COPPER, j, ())
     before = compression_energy(COPPER, torn, ())
