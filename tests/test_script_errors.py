@@ -171,7 +171,7 @@ COMMANDS = [
     ("compute(Ek, kinetic_energy, all)\nlog_modify(custom, kinetic_energy)", 20, "mean 'Ek'?"),
     ("compute(Ek, kinetic_energy, all)\na = kinetic + 1", 5, "mean 'Ek'?"),
     ("compute(v, average_velocity, all)\na = w_x", 5, "a compute (v_x, v_y, v_z)"),
-    ("dump(d, all, particle, 1, d.*, x, sigma)", 35, "mean s11, s22, s33, s12, s13, s23, seq?"),
+    ("dump(d, all, particle, 1, d.*, x, sigma)", 35, "mean s11, s22, s33, s12, s13, s23, seq, p?"),
     ("compute(v, average_velocity, all)\nlog_modify(custom, c_v)", 20, "write v_x or v_y or v_z"),
     ("compute(e, probe, all, strain)", 24, "mean e11, e22, e33, e12, e13, e23?"),
     ("dump(d, all, particle, 1, d.*, vel)", 32, "did you mean vx, vy, vz?"),

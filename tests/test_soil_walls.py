@@ -103,3 +103,29 @@ def test_averaged_volumes_keep_the_strength_of_sand(run_script, numbers, away):
 def test_what_sand_cannot_do_is_said(run_interpreted, name, numbers, told):
     numbers = {"run": "set_dt(0.001)\n    run(1)", **numbers}
     assert (f"warning: {name}: " in run_interpreted(wall(**numbers), command="check").err) == told
+
+
+@pytest.mark.parametrize(
+    ("strength", "told"),
+    [
+        ("mohr-coulomb, 385, 0, 30", True),
+        ("drucker-prager, 385, 0.1, 30", True),
+        ("mu-i, 385, 0.38, 0.64, 0.28, 1e-3, 2", True),
+        ("mohr-coulomb, 385, 100, 30", False),  # cohesion bears it
+        ("plastic, 385, 100", False),
+    ],
+)
+@pytest.mark.parametrize("scheme", ["musl", "quasi-static"])
+def test_initial_tension_that_soil_does_not_bear(run_interpreted, strength, told, scheme):
+    """The stress of a weight with the wrong sign; the hint is the line with the right one."""
+    if scheme == "quasi-static" and "mu-i" in strength:
+        pytest.skip("flows alone")
+    text = wall(scheme, run="set_dt(0.001)\n    run(1)").replace("v = y0 - 1", "v = 1 - y0")
+    text = text.replace("law, E/(2*(1 + nu)), 0, 30, psi", strength)
+    said = run_interpreted(text, command="check").err
+    assert ("warning: initial tension: fix k0 pulls 100% of the points" in said) == told, said
+    if told:
+        line = "fix(k0, initial_stress, all, -(0.5*(1 - y0)), -(1 - y0), -(0.5*(1 - y0)), 0, 0, 0)"
+        assert line in said
+        right = text.replace("fix(k0, initial_stress, all, 0.5*v, v, 0.5*v, 0, 0, 0)", line)
+        assert "initial tension" not in run_interpreted(right, command="check").err

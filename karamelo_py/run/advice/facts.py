@@ -78,10 +78,10 @@ class SceneFacts:
         yield from ((field, None) for field in dict.fromkeys(chain(*fields)))
 
     def advice(self, kind: str, *, of_laws: bool = False) -> Iterator[rules.Advice]:
-        """Tell what the rules of the parts say, of one kind, or of laws alone."""
+        """Tell what the rules of the parts say, of one kind, or of laws and first states alone."""
         foreign = {part.kind: part for part in foreign_parts(self.hub)}
         for part, owner in self.parts():
-            if of_laws and owner is None:
+            if of_laws and owner is None and not getattr(part, "first_step_only", False):
                 continue
             with attributed(self.hub, foreign.get(type(part))):
                 said = list(rules.advice(kind, part, owner, self))

@@ -1,13 +1,22 @@
 """Fixes of forces on nodes and points, and of the stress of points at first."""
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
-from karamelo_py.kernels.laws import elastic_law
+from karamelo_py.kernels.laws import elastic_law, law_on
 from karamelo_py.kernels.p2g import Force, WorkOfForces
+from karamelo_py.language.rules import known_failure
 from karamelo_py.language.signature import In
-from karamelo_py.points.laws import can, constrained_velocity, with_stress
+from karamelo_py.points.kinematics import Space, nothing, tr, zero
+from karamelo_py.points.laws import (
+    advance,
+    can,
+    cauchy_stress,
+    constrained_velocity,
+    initial_state,
+    with_stress,
+)
 from karamelo_py.scene.group import NodeGroup, ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix, PointsView, node_hook
@@ -245,12 +254,15 @@ class InitialStress(Fix):
 
     Example
     -------
-    fix(geostatic, initial_stress, soil, 0.4*2000*9.81*y0, 2000*9.81*y0, 0.4*2000*9.81*y0, 0, 0, 0)
+    top = 10
+    weight = -2000*9.81*(top - y0)
+    fix(geostatic, initial_stress, soil, 0.4*weight, weight, 0.4*weight, 0, 0, 0)
 
     Notes
     -----
     The stress of a hyperelastic material (neo-hookean) follows from its deformation and cannot be
-    set.
+    set. Compression is negative. A warning names tension that a material does not bear, such as
+    that of soil without cohesion.
     """
 
     published = ()
@@ -278,3 +290,51 @@ class InitialStress(Fix):
         named = zip(NAMES, self.formulas, strict=True)
         values = self.hub.values
         points.set_stress({n: f.evaluate_points(values, x, x0) for n, f in named if f is not None})
+
+
+def _is_borne(law: Any, mean: float) -> bool:
+    """Tell whether a law bears half of a mean stress in all directions."""
+    kin = Space()
+    stress = tuple(nothing(kin))
+    state = with_stress(law, kin, initial_state(law, kin, 1.0), (*3 * (mean,), *stress[3:]))
+    after = advance(law, kin, state, zero(kin, 1.0), 1.0)
+    return bool(tr(cauchy_stress(law, kin, after)) > 1.5 * mean)
+
+
+def _unborne_tension(fix: InitialStress, scene: Any) -> list[dict]:
+    """Find the bodies that get a tension which they do not bear, in a tenth of their points."""
+    found = []
+    normal = fix.formulas[:3]
+    for solid in scene.hub.solids.values():
+        law = elastic_law(law_on(solid.material.law, solid.h, solid.T0))
+        ids = np.arange(solid.first_id, solid.first_id + solid.count)
+        x = solid.x0[fix.group.has(ids)]
+        if not len(x) or not can(law, with_stress):
+            continue
+        given = [f.evaluate_points(scene.hub.values, x, x) for f in normal if f is not None]
+        mean = np.sum(given, axis=0) / 3 if given else np.zeros(1)
+        pulled = np.count_nonzero(mean > 0.01 * np.abs(mean).max())
+        most = float(mean.max())
+        if pulled < 0.1 * len(x) or _is_borne(law, most):
+            continue
+        turned = ", ".join("NULL" if f is None else f"-({f.text})" for f in normal)
+        shear = ", ".join("NULL" if f is None else f.text for f in fix.formulas[3:])
+        found.append(
+            {
+                "solid": solid.id,
+                "most": most,
+                "pulled": pulled / len(x),
+                "line": f"fix({fix.id}, initial_stress, {fix.group.id}, {turned}, {shear})",
+            }
+        )
+    return found
+
+
+known_failure(
+    InitialStress,
+    "initial tension",
+    when=_unborne_tension,
+    reason="fix {part.id} pulls {pulled:.0%} of the points of solid '{solid}' with a mean stress "
+    "of up to {most:.3g}, which its material does not bear: they come apart in the first step",
+    cure="compression is negative: {line}",
+)
