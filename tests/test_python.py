@@ -1,5 +1,6 @@
 """Scenes made in Python: the same numbers, messages and files as those of the command line."""
 
+import json
 import os
 import re
 import subprocess
@@ -105,6 +106,10 @@ def test_commands_as_methods(interpreted, run_interpreted, tmp_path):
     text += "run(4)\nfix(g, body_force, all, NULL, -9.81)\nrun_time(0.01)\n"
     by_hand = run_interpreted(text, folder="run").folder
     files = {path.name: path.read_bytes() for path in by_hand.iterdir() if path.suffix != ".script"}
+    record = json.loads(files.pop("run.json"))
+    assert [run["steps"] for run in record["runs"]] == [
+        run["steps"] for run in json.loads((tmp_path / "files" / "run.json").read_text())["runs"]
+    ]
     assert len(files) > 3
     for name, content in files.items():
         assert (tmp_path / "files" / name).read_bytes() == content

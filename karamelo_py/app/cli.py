@@ -175,11 +175,13 @@ def _values_below_zero(arguments: list[str], options: list[str]) -> list[str]:
     """Put a blank before values such as -1e6, and -E/2 of a variable: argparse sees options."""
 
     def is_value(k: int) -> bool:
-        number = re.match(r"-\.?\d", arguments[k]) is not None
-        return number or (
+        if re.match(r"-\.?\d", arguments[k]):
+            return not re.fullmatch(r"-\d+|-\d*\.\d+", arguments[k])  # which argparse knows
+        return (
             k > 1
-            and arguments[k][:1] == "-"
+            and arguments[k][:1] == "-" != arguments[k][1:2]
             and arguments[k - 2] in VARIABLE
+            and "=" not in arguments[k - 1]
             and arguments[k].partition("=")[0] not in options
         )
 

@@ -338,10 +338,15 @@ class Simulation:
             try:
                 with _as_simulation_error():
                     yield
+                self.hub.record.end("finished")
             except Quit:
-                pass
+                self.hub.record.end("finished")
             except Interrupted:
+                self.hub.record.end("interrupted")
                 raise KeyboardInterrupt from None
+            except SimulationError as error:
+                self.hub.record.end("failed", error)
+                raise
             finally:
                 self.hub.pausing = pausing
 
