@@ -141,6 +141,7 @@ SMOOTH = {"method": "ulmpm, FLIP, quadratic-spline, 1"}
 STRONG = GAS | SMOOTH | {"more": PRESSED.format(50)}
 USAVG = {"more": STRONG["more"] + "\n    scheme(usavg)"}
 SOIL = {"law": "soil", "method": "ulmpm, FLIP, linear, 1"}
+GRAINS = WATER | {"law": "grains", "method": "ulmpm, FLIP, quadratic-spline, 0.99", "steps": 1}
 AVERAGED = {"more": "anti_volumetric_locking(true)"}
 
 
@@ -179,6 +180,11 @@ AVERAGED = {"more": "anti_volumetric_locking(true)"}
         ("shocks in a gas", STRONG | USAVG, False),
         ("pressure of grains", SOIL | {"law": "grains"}, True),
         ("pressure of grains", SOIL | SMOOTH | {"law": "grains"}, False),
+        ("slow grains", GRAINS, True),
+        ("slow grains", GRAINS | {"method": "ulmpm, FLIP, quadratic-spline, 1"}, False),
+        ("slow grains", GRAINS | {"method": "ulmpm, APIC, quadratic-spline"}, False),
+        ("slow grains", GRAINS | {"method": "tlmpm, FLIP, linear, 0.99"}, False),
+        ("slow grains", GRAINS | {"more": ""}, False),
         ("locking", SOIL, True),
         # A dry slope of 40 degrees stands with boxes at a friction of 30, and slides with splines.
         ("locking", SOIL | {"method": "ulmpm, FLIP, ugimp, 1"}, True),

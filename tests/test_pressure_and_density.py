@@ -76,3 +76,8 @@ def test_a_variable_with_the_name_of_a_column(run_interpreted):
     script = square(f"rho = 7\n    {LAWS['linear'][0]}")
     err = run_interpreted(script).err
     assert err.count("'rho' is the column here, not the variable of the script") == 2
+
+
+def test_pressure_in_words(run_interpreted):
+    script = square(LAWS["linear"][0]).replace("txt, p, rho", "txt, pressure")
+    assert "hint: did you mean p?" in run_interpreted(script, status=1).err
