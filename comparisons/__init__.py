@@ -9,6 +9,6 @@ has
 - ``compare(run, axes, full)``, which calls ``run(**variables)`` (a `Result`) once or more often. It
   draws its result beside the reference on Matplotlib axes, and yields a `Row` for each number.
 
-``python -m comparisons`` runs them all at full size, and writes the table and the pictures of the
-documentation. The tests run them small and ask each row whether it agrees.
+``python -m comparisons`` runs them all at full size; with ``--write`` it writes the table and the
+pictures of the documentation. The tests run them small and ask each row whether it agrees.
 """

@@ -1,7 +1,8 @@
-"""python -m comparisons [SCENE ...] [--small]: run scenes, write docs/comparison.md and pictures.
+"""python -m comparisons [SCENE ...] [--small]: run scenes, compare them, draw pictures.
 
-Scenes that are not named keep what the table said about them before. Runs work in a temporary
-folder, or below ``--folder``, where their logs and dumps stay.
+Pictures, logs and dumps go to ``--folder``, else to a new temporary folder. With ``--write`` the
+pictures and the table go to docs/comparison.md, for the authors of the program; scenes that are not
+named keep what the table said about them before.
 """
 
 import argparse
@@ -79,7 +80,7 @@ def runner(name: str, folder: Path, size: dict[str, Any]) -> Callable[..., Resul
     return run
 
 
-def compare(name: str, folder: Path, full: bool) -> list[Row]:
+def compare(name: str, folder: Path, pictures: Path, full: bool) -> list[Row]:
     """Run a scene, save its picture, return its rows."""
     module = scene(name)
     run = runner(name, folder, {} if full else module.SMALL or {})
@@ -87,16 +88,16 @@ def compare(name: str, folder: Path, full: bool) -> list[Row]:
         figure, axes = plt.subplots(figsize=(6, 4), layout="constrained")
         rows = list(module.compare(run, axes, full))
         finish(axes, module.__doc__)
-        figure.savefig((PICTURES if full else folder) / f"{name}.png", dpi=110, bbox_inches="tight")
+        figure.savefig(pictures / f"{name}.png", dpi=110, bbox_inches="tight")
     plt.close(figure)
     return rows
 
 
 HEAD = """# Comparison with published results
 
-Written by `python -m comparisons`, which runs every scene at its published size and draws the
-pictures; `python -m comparisons SCENE ...` does some of them again. Differences are relative to the
-published number, or to the nearer end of a range.
+Written by `python -m comparisons --write`, which runs every scene at its published size and draws
+the pictures. `python -m comparisons SCENE ...` runs some of them and changes no file. Differences
+are relative to the published number, or to the nearer end of a range.
 """
 
 
@@ -132,28 +133,28 @@ def main() -> None:
     parser.add_argument(
         "--small", action="store_true", help="at the size of the tests; writes no page"
     )
-    parser.add_argument("--folder", type=Path, help="where logs and dumps stay")
+    parser.add_argument("--write", action="store_true", help="write docs/comparison.md, pictures")
+    parser.add_argument("--folder", type=Path, help="of pictures, logs and dumps")
     options = parser.parse_args()
     if unknown := set(options.scenes) - set(scenes()):
         parser.error(f"unknown scene '{unknown.pop()}'; there are {', '.join(scenes())}")
     page = DOCS / "comparison.md"
     found = sections(page.read_text(encoding="utf-8")) if page.exists() else {}
-    with tempfile.TemporaryDirectory() as temporary:
-        folder = (options.folder or Path(temporary)).resolve()
-        for name in options.scenes or scenes():
-            print(f"in.{name}", flush=True)
-            print("  quantity: published | computed")
-            rows = compare(name, folder, not options.small)
-            for row in rows:
-                mark = "ok" if row.agrees else f"NOT within {row.within:g}"
-                print(
-                    f"  {row.quantity}: {published(row)} | {row.computed:.4g}  {mark}", flush=True
-                )
-            if options.small:
-                continue
+    writes = options.write and not options.small
+    folder = (options.folder or Path(tempfile.mkdtemp(prefix="comparisons-"))).resolve()
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in options.scenes or scenes():
+        print(f"in.{name}", flush=True)
+        print("  quantity: published | computed")
+        rows = compare(name, folder, PICTURES if writes else folder, not options.small)
+        for row in rows:
+            mark = "ok" if row.agrees else f"NOT within {row.within:g}"
+            print(f"  {row.quantity}: {published(row)} | {row.computed:.4g}  {mark}", flush=True)
+        if writes:
             found[name] = section(name, rows)
             text = "\n".join([HEAD, *(found[key] for key in sorted(found))])
             page.write_text(text, encoding="utf-8")
+    print(f"pictures, logs and dumps: {folder}")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """Every scene that has a published number meets it, at a small size (``-m full``: at its own)."""
 
 import re
+import sys
 import tomllib
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import pytest
 from charts import contrast, faults
 from verification import run_scene
 
+from comparisons import __main__
 from comparisons.__main__ import scene, scenes
 from comparisons.pictures import STYLE, finish
 from comparisons.row import Row
@@ -30,6 +32,27 @@ def found(run_script, name: str, full: bool) -> list[Row]:
     plt.close(figure)
     assert wrong == []
     return rows
+
+
+def test_the_checkout_is_written_to_when_it_is_asked_for(monkeypatch, tmp_path, capsys):
+    """README's `python -m comparisons sod` leaves page and pictures alone."""
+    docs = tmp_path / "docs"
+    (docs / "_static" / "comparison").mkdir(parents=True)
+    monkeypatch.setattr(__main__, "DOCS", docs)
+    monkeypatch.setattr(__main__, "PICTURES", docs / "_static" / "comparison")
+
+    def compare(name, folder, pictures, full):
+        (pictures / f"{name}.png").write_bytes(b"")
+        return [Row("speed", 1.0, 1.01, 0.02, "a paper")]
+
+    monkeypatch.setattr(__main__, "compare", compare)
+    for more, files in (([], 0), (["--small", "--write"], 0), (["--write"], 2)):
+        out = tmp_path / f"out{len(more)}{files}"
+        monkeypatch.setattr(sys, "argv", ["comparisons", "sod", "--folder", str(out), *more])
+        __main__.main()
+        assert f"pictures, logs and dumps: {out}" in capsys.readouterr().out
+        assert sum(path.is_file() for path in docs.rglob("*")) == files
+        assert (out / "sod.png").exists() == (files == 0)
 
 
 # Scenes that share compiled loops with each other or with other tests.

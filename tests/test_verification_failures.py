@@ -39,6 +39,8 @@ def test_every_row_has_a_script_and_a_part_of_the_page():
     """20 rows; each script says failure, cure and reference, and has a part of the page."""
     page = (INPUTS.parent / "docs" / "failures.md").read_text(encoding="utf-8")
     assert len(SCRIPTS) == 20
+    verification = (INPUTS.parent / "docs" / "verification.md").read_text(encoding="utf-8")
+    assert f"each of {len(SCRIPTS)} failures" in verification
     for name in SCRIPTS:
         text = (FAILURES / f"in.{name}").read_text(encoding="utf-8")
         for word in ("# Failure", "# Cure", "# Reference", "\ncure "):

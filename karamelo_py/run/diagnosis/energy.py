@@ -283,7 +283,7 @@ def change_of_energy(simulation: Any) -> float | None:
 def words_of_change(hub: Hub, share: float) -> str:
     """Describe a change of energy in % for the end of a run, and what takes some."""
     takers, by = taken_by(hub), ""
-    words = "of the largest since the first step (kinetic + stored + dissipated - work)"
+    words = "the largest since the first step (kinetic + stored + dissipated - work)"
     if takers and share < -1:
         transfer = hub.update.transfer
         often = blends(transfer) and not getattr(transfer, "per_time", False)
@@ -291,7 +291,9 @@ def words_of_change(hub: Hub, share: float) -> str:
             takers.append("collisions")
         by = f"; {' and '.join(takers)} {'takes' if len(takers) == 1 else 'take'} some"
         by += ", the transfer more with shorter steps" * often
-    return f"{share:+.2f} % {words}{by}"
+    # Losses add up, and may come to more than there ever was at a time.
+    much = f"{share:+.2f} % of" if share > -100 else f"{share / 100:+.2f} times"
+    return f"{much} {words}{by}"
 
 
 def forget_growth(simulation: Any) -> None:
