@@ -115,12 +115,31 @@ def test_help_finds_styles_by_a_word(capsys, word, listed):
 
 
 @pytest.mark.parametrize(
+    ("words", "listed"),
+    [
+        (["rigid", "body"], "material rigid"),
+        (["reaction", "force"], "compute reaction"),
+        (["moving", "wall"], "fix contact/surface"),
+        (["time", "step"], "command set_dt"),
+        (["retaining", "wall", "force"], "fix velocity_nodes"),
+        (["strength", "reduction"], "command modify"),
+    ],
+)
+def test_several_words_need_no_quotes(capsys, words, listed):
+    """The first is no family, or has no such style: all are looked for."""
+    status, out, _ = call(capsys, "help", *words)
+    assert status == 0
+    assert listed in [" ".join(row.split()[:2]) for row in out.splitlines()]
+
+
+@pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (["help", "bodyforce"], "did you mean 'body_force'?"),
         (["help", "fix", "body_forc"], "did you mean 'body_force'?"),
         (["help", "fixx", "body_force"], "did you mean 'fix'?"),
-        (["help", "a", "b", "c"], "too many arguments"),
+        (["help", "qqq", "qqqq", "qqqqq"], "karamelo-py styles lists them all"),
+        (["help", "fix", "qqqqq"], "karamelo-py styles fix lists all"),
         (["help", "qqqqq"], "karamelo-py styles lists them all"),
         (["styles", "comput"], "did you mean 'compute'?"),
         (["styles", "fix", "compute"], "too many arguments"),

@@ -299,6 +299,30 @@ def test_an_input_file_of_abaqus_is_told_in_one_message(before, tmp_path):
     assert said.count("error: ") == 1 and "hint: docs/howto/from-abaqus.md" in said
 
 
+@pytest.mark.parametrize("before", ["", "$ LS-DYNA keyword deck\n$\n"])
+def test_an_input_file_of_ls_dyna_is_told_in_one_message(before, tmp_path):
+    with pytest.raises(ScriptError) as caught:
+        run(before + "*KEYWORD\n*TITLE\nTaylor bar\n*NODE\n1,0,0,0\n*END", tmp_path)
+    said = caught.value.render()
+    assert "error: this is an input file of LS-DYNA" in said and "| *KEYWORD\n" in said
+    assert said.count("error: ") == 1
+
+
+@pytest.mark.parametrize("named", ["al, al", "al"])
+def test_one_id_for_damage_and_temperature_is_told(named, tmp_path):
+    with pytest.raises(ScriptError) as caught:
+        run(
+            "eos(al, linear, 2700, 70e9)\nstrength(al, linear, 26e9)\n"
+            "damage(al, damage_johnson_cook, 1, 1, 1, 0, 0, 1, 0, 1)\n"
+            "temperature(al, plastic_work, 0.9, 900, 0, 0, 300, 900)\n"
+            f"material(al, eos-strength, al, al, {named})\n",
+            tmp_path,
+        )
+    said = caught.value.render()
+    assert "'al' is the ID of a damage and of a temperature" in said
+    assert "hint: damage(al_damage, ...) and temperature(al_temperature, ...)" in said
+
+
 @pytest.mark.parametrize(("text", "column", "part"), [*NAMES, *VALUES])
 def test_names_and_values(text, column, part, tmp_path):
     check("# nothing\n" + text, 1, column, part, tmp_path)

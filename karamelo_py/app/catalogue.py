@@ -74,13 +74,15 @@ def print_styles(given: Sequence[str]) -> int:
     return 0
 
 
-def print_help(given: Sequence[str], commands: Iterable[str] = ()) -> int:
+def print_help(given: list[str], commands: Iterable[str] = ()) -> int:
     """Explain what a name means, or a family and a name; returns the exit status."""
-    if len(given) > 2:
-        raise ScriptError(f"too many arguments: {' '.join(given)}", expected=HELP_USAGE)
-    if len(given) == 2:
-        return _explain(_family(given[0]), given[1])
-    (name,) = given
+    if len(given) == 2 and (family := _singular(given[0])) in families():
+        try:
+            return _explain(family, given[1])
+        except ScriptError as error:
+            if error.hint or not _about(" ".join(given)):
+                raise
+    name = " ".join(given)
     homes = [family for family in families() if registry.knows(family, name)]
     if COMMAND in homes or len(homes) == 1:
         return _explain(homes[0], name)
@@ -91,15 +93,20 @@ def print_help(given: Sequence[str], commands: Iterable[str] = ()) -> int:
         )
     if _singular(name) in families():
         return print_styles([name])
-    found, related = _arguments(name), _about(name)
+    # Of three words, and more, one may be too many.
+    fewer = [" ".join(given[:k] + given[k + 1 :]) for k in range(len(given) * (len(given) > 2))]
+    said = next(filter(_about, [name, *fewer]), name)
+    found, related = _arguments(name), _about(said)
     if found:
         _explain_argument(name, found)
     if related:
         page = _Page()
-        page.say("\nSee also" if found else f"Commands and styles about {name}", "bold")
+        page.say("\nSee also" if found else f"Commands and styles about {said}", "bold")
         page.rows([(f"{family} {style}", family, style) for family, style in related])
     if found or related:
         return 0
+    if len(given) > 1 and meant(given[0], families()):
+        raise _unknown("family", given[0], families())
     names = {n for f in families() for n in registry.names(f)}
     raise _unknown("command or style", name, names.union(commands))
 

@@ -21,14 +21,21 @@ _PUNCTUATION = re.compile(
 _SLASHES = re.compile(r"(?:^|[ \t)])//[^\n]*\Z", re.MULTILINE)
 # Empty lines and comments of Abaqus, and a keyword: no script begins with one.
 _KEYWORD = re.compile(r"(?:\s|\*\*.*\n)*(\*[A-Za-z]+)")
+_DYNA = re.compile(r"(?:\s|\$.*\n)*(\*KEYWORD)", re.IGNORECASE)
 
 
 def check_characters(text: str) -> None:
-    """Refuse files of Abaqus, and what no script may contain outside quotes and comments."""
+    """Refuse files of Abaqus and LS-DYNA, and what no script may contain outside of quotes."""
     first = _KEYWORD.match(text)
     if first and first[1].lower() in table()["abaqus"].split():
         hint = "docs/howto/from-abaqus.md says it in this language; solid mesh reads its mesh"
         raise Mistake("this is an input file of Abaqus", *first.span(1), "a script", hint)
+    if first := _DYNA.match(text):
+        hint = (
+            "write the scene anew, as docs/getting-started.md says; solid mesh reads its mesh once "
+            "it is saved as .inp (Abaqus), .bdf (Nastran), .stl or .vtk"
+        )
+        raise Mistake("this is an input file of LS-DYNA", *first.span(1), "a script", hint)
     if text.isascii() and text.isprintable():
         return
     for match in _PUNCTUATION.finditer(text):

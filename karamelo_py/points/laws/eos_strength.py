@@ -70,6 +70,14 @@ class Option:
             kind: named for kind, named in hub.parts.items() if kind not in ("eos", "strength")
         }
         known = {ID: part for named in optional.values() for ID, part in named.items()}
+        several = [kind for kind, named in optional.items() if word in named]
+        if len(several) > 1:
+            raise ScriptError(
+                f"'{word}' is the ID of {' and of '.join(f'a {kind}' for kind in several)}",
+                place=argument.place,
+                expected="an ID that only one of them has",
+                hint=" and ".join(f"{kind}({word}_{kind}, ...)" for kind in several),
+            )
         if word in known:
             return known[word]
         said = f"unknown {' or '.join(optional)} '{argument.text}'"
