@@ -502,3 +502,12 @@ def test_the_name_of_a_style_wins_over_a_variable(run_interpreted):
 def test_a_compute_does_not_hide_the_time(run_interpreted):
     said = run_interpreted(block(1, "compute(time, kinetic_energy, all)", "run(1)"), status=1).err
     assert "would publish its value as 'time', which is the time of the run" in said
+
+
+def test_swapped_modulus_and_speed_of_a_shock_are_told(tmp_path):
+    """Copper: K = 137 GPa, c0 = 3940 m/s, rho = 8930 kg/m^3 (Meyers 1994)."""
+    line = "eos(cu, shock, 8930, {}, {}, 1.49, 1.96, 385, 294, 1.5, 0.06)"
+    run(line.format("137e9", 3940), tmp_path)
+    with pytest.raises(ScriptError, match=r"K = 3940 and c0 = 1.37e\+11 are swapped") as caught:
+        run(line.format(3940, "137e9"), tmp_path)
+    assert "eos(ID, shock, 8930, 1.37e+11, 3940, ...)" in caught.value.render()

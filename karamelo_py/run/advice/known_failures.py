@@ -20,7 +20,7 @@ from karamelo_py.output.units import DENSITY, STRESS, VELOCITY
 from karamelo_py.points.laws import can, constrained_velocity, law_kind, specific_volume
 from karamelo_py.run import timestep
 from karamelo_py.run.advice.facts import SceneFacts, is_zero
-from karamelo_py.run.diagnosis.explain import formulas_of, no_number
+from karamelo_py.run.diagnosis.explain import DOUBTED_UNITS, formulas_of, no_number
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.group import NOTHING_THERE, NodeGroup
 from karamelo_py.scene.hub import Hub
@@ -168,7 +168,7 @@ def _impossible_speeds(s: SceneFacts) -> Iterator[Advice]:
     solid = any(not any(getattr(k, "any_speed", False) for k in law_kind(law)) for law in laws)
     if solid and s.speed > IMPOSSIBLE:
         yield Advice(
-            "units of velocities",
+            f"{DOUBTED_UNITS}velocities",
             f"points move at {s.fastest:.3g}, {s.speed:.3g} times the speed of waves "
             f"({s.waves:.3g}), which no solid bears when it meets another or a wall. The units of "
             "velocities, densities and moduli may be mixed",
@@ -191,7 +191,7 @@ def _other_units(s: SceneFacts) -> Iterator[Advice]:
             odd.append(f"speed of waves is {speed:.3g} m/s")
         if odd:
             yield Advice(
-                f"units of material '{solid.material.id}'",
+                f"{DOUBTED_UNITS}material '{solid.material.id}'",
                 f"with units({', '.join(units[:3])}) its {' and its '.join(odd)}, such as no real "
                 "material has",
                 f"in {units.name(DENSITY)} water has the density {1e3 / units.si(DENSITY):.3g}; "

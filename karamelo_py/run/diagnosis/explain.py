@@ -19,6 +19,7 @@ from karamelo_py.scene.solid import named, solid_with
 from karamelo_py.script.errors import Place
 from karamelo_py.script.expressions import POINT_SEEDS, Expression
 
+DOUBTED_UNITS = "units of "  # begins the names of warnings that doubt them
 ABSURD = 10.0  # cells in one step: no smaller one mends that
 LOOSE = 1.5  # cells: points of an unstrained solid are at most one apart
 APART = "no other point of it within a cell"
@@ -244,7 +245,12 @@ def _step_was_told(hub: Hub) -> bool:
 
 
 def _smaller_step(hub: Hub, simulation: Any) -> str:
-    """Say how to take a smaller step, and that the present one is too large where it is."""
+    """Say how to take a smaller step, and that the present one is too large where it is.
+
+    Where units are doubted they come first: what follows from them no step mends.
+    """
+    if doubted := [name for name in hub.update.warned_of if name.startswith(DOUBTED_UNITS)]:
+        return f"look at the {doubted[0]}, as the warning says"
     if simulation.implicit:
         inertia = simulation.hub.update.scheme.inertia
         return "use a smaller step (set_dt)" if inertia else "use more load steps, smaller ones"

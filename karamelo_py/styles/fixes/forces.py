@@ -1,5 +1,6 @@
 """Fixes of forces on nodes and points, and of the stress of points at first."""
 
+import re
 from typing import Annotated, Any
 
 import numpy as np
@@ -8,6 +9,7 @@ from karamelo_py.kernels.laws import elastic_law, law_on
 from karamelo_py.kernels.p2g import Force, WorkOfForces
 from karamelo_py.language.rules import known_failure
 from karamelo_py.language.signature import In
+from karamelo_py.output.units import Powers
 from karamelo_py.points.kinematics import Space, nothing, tr, zero
 from karamelo_py.points.laws import (
     advance,
@@ -15,6 +17,7 @@ from karamelo_py.points.laws import (
     cauchy_stress,
     constrained_velocity,
     initial_state,
+    specific_volume,
     with_stress,
 )
 from karamelo_py.scene.group import NodeGroup, ParticleGroup
@@ -23,6 +26,9 @@ from karamelo_py.scene.modify import Fix, PointsView, node_hook
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.formulas import per_direction, vector
+
+ACCELERATION = Powers(1, 0, -2)
+TONNES = 1e-10, 1e-6  # densities in t/mm^3, from foam to beyond osmium: no others are so small
 
 
 def accelerate(mass, v, v_star, force, value, before, dt, share):
@@ -62,6 +68,32 @@ class BodyForce(Fix):
     def __init__(self, hub: Hub, group: NodeGroup, *acceleration: Expression | None):
         super().__init__(hub, group)
         self.formulas = per_direction(hub, "b", acceleration)
+
+    def defined(self) -> None:
+        """Warn of a gravity in m/s^2 where the other numbers have other units."""
+        if not any(formula is not None and _is_gravity(formula) for formula in self.formulas):
+            return
+        hub = self.hub
+        units = hub.output.units
+        densities = [1 / float(specific_volume(s.material.law)) for s in hub.solids.values()]
+        if units and abs(units.si(ACCELERATION) - 1) > 1e-6:
+            given = f"units({', '.join(units[:3])})"
+            told, right = given, 9.81 / units.si(ACCELERATION)
+        elif not units and densities and TONNES[0] < max(densities) < TONNES[1]:
+            told, right = f"a density of {max(densities):.3g}, as in mm, t, s,", 9810.0
+        else:
+            return
+        hub.warn(
+            f"with {told} an acceleration of 9.81 is {9.81 / right:.3g} of gravity",
+            hint=f"gravity is {right:.6g} there",
+        )
+
+
+def _is_gravity(formula: Expression) -> bool:
+    """Tell if a formula is the acceleration of gravity in m/s^2, or has it as a number."""
+    if formula.is_constant:
+        return 9.7 < abs(formula.constant) < 9.9
+    return re.search(r"(?<![\d.])9\.8\d*(?![\d.eE])", formula.text) is not None
 
 
 def share_out(mass, v, v_star, force, value, before, dt, share):

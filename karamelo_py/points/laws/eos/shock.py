@@ -14,6 +14,7 @@ from karamelo_py.points.laws.eos import (
     ratio_at_pressure,
 )
 from karamelo_py.points.laws.viscosity import artificial_viscosity
+from karamelo_py.script.errors import ScriptError
 
 # S (1 - J) from where on the pressure goes on along its tangent: at 1 the Hugoniot has a pole.
 _STEEPEST = 0.9
@@ -99,6 +100,14 @@ class Shock(NamedTuple):
         tension: Annotated[float, NonNegative] = inf,
     ):
         """The equation of state and its artificial viscosity."""
+        # K, which is rho0 c0^2, is not used; in the place of c0 it would be.
+        if 0.5 < rho0 * K**2 / c0 < 2 and not 0.5 < rho0 * c0**2 / K < 2:
+            raise ScriptError(
+                f"K = {K:g} and c0 = {c0:g} are swapped: c0 is a speed, and K is near rho0 c0^2",
+                argument="K",
+                expected="the bulk modulus K, then the speed of sound c0",
+                hint=f"eos(ID, shock, {rho0:g}, {c0:g}, {K:g}, ...)",
+            )
         eos = cls(1 / rho0, rho0 * c0**2, S, Gamma * rho0 * cv, Tr, tension)
         return {"eos": eos, **artificial_viscosity(Q1, Q2)}
 
