@@ -60,6 +60,13 @@ def test_a_run_goes_on_behind_a_change(run_interpreted, line):
     same_files(whole, again)
 
 
+def test_the_same_on_a_card(run_interpreted):
+    """Emulated: the arrays of the card have the new numbers."""
+    here = run_interpreted(RUNS.format(6), folder="here")
+    there = run_interpreted(RUNS.format(6), "--gpu", folder="there")
+    assert there.log.p_y == pytest.approx(here.log.p_y, rel=1e-9)
+
+
 def test_stress_of_the_whole_deformation_follows_at_once(run_interpreted):
     """Twice the modulus of a body that is held is twice its stress; that of rates stays."""
     for law, factor in (("neo-hookean", 2), ("linear", 1)):

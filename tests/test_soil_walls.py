@@ -82,6 +82,22 @@ def test_averaged_volumes_keep_the_strength_of_sand(run_script, numbers, away):
     assert log.pressure[-8:].mean() == pytest.approx(exact, rel=0.03 if away else 0.06)
 
 
+@pytest.mark.full
+@pytest.mark.xdist_group("walls of sand")
+@pytest.mark.parametrize("away", [1, 0])
+def test_averaged_volumes_about_an_axis(run_script, away):
+    """A cylinder of sand in a tube: the radial pressure is that of Rankine, too."""
+    text = wall(away=away).replace("dimension(2, -4*h, 1.5,", "dimension(2, 0, 1.5 + 4*h,")
+    text = text.replace("h)\n    anti", "h)\n    axisymmetric(true)\n    anti")
+    text = text.replace("block, -INF, 1e-6, -INF, INF", "block, OUTER, INF, -INF, INF")
+    text = text.replace("block, 1.5 - 1e-6, INF, -INF, INF", "block, -INF, 1e-6, -INF, INF")
+    text = text.replace("OUTER", "1.5 - 1e-6").replace("if(away > 0, -0.0", "-if(away > 0, -0.0")
+    text = text.replace("pressure = wall_x/0.5", "pressure = -wall_x/0.75")  # per radian
+    log = run_script(text).log
+    exact = (1 - SIN) / (1 + SIN) if away else (1 + SIN) / (1 - SIN)
+    assert log.pressure[-8:].mean() == pytest.approx(exact, rel=0.03 if away else 0.06)
+
+
 @pytest.mark.parametrize(
     ("name", "numbers", "told"),
     [

@@ -204,6 +204,11 @@ def anti_volumetric_locking(hub: Hub, active: bool) -> None:
     -----
     One more visit of the points for each update of the stress, and one for the forces.
 
+    Yield surfaces of mohr-coulomb, drucker-prager and mu-i take a part of the averaged pressure:
+    (sin(phi) - sin(psi))/(sin(phi) (1 - sin(psi))) of the difference to that of the point. With the
+    pressure of the point alone, sand that does not dilate would lose half of its strength. Load
+    steps take that of the point: leave averages out there in such sand.
+
     See Also
     --------
     method
