@@ -141,6 +141,8 @@ FACE = """
     fix(hold, temperature_particles, face, 301 + time)
     fix(lamp, heat_flux_particles, other, 7*time)
     fix(air, convection_particles, other, 0.01, 200)
+    fix(sun, edge_heat_flux, all, slab, 3*time)
+    fix(wind, edge_convection, all, slab, 0.02, 200)
 """
 FLUIDS = """
 method(ulmpm, TFLIP, quadratic-spline, 0.98)

@@ -130,7 +130,7 @@ def test_fixes(monkeypatch, own_cache, method):
     assert method != "ulmpm" or hub.values.get("base_y") > 100  # it bears the column by now
     clocks = one.control.clock[0], other.control.clock[0]
     assert clocks[0].looks == clocks[1].looks == 5
-    for name in ("kinetic", "stored", "work", "balance", "of_drift"):
+    for name in ("kinetic", "stored", "work", "balance", "of_drift", "elastic", "lost", "crossed"):
         assert clocks[0][name] == pytest.approx(clocks[1][name], rel=1e-9, abs=1e-12), name
 
 

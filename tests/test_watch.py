@@ -598,3 +598,34 @@ def test_losses_of_more_than_there_ever_was_are_no_per_cent(run_interpreted):
     out = run_interpreted(script).out
     (told,) = re.findall(r"^  energy +(\S+) times the largest since the first step", out, re.M)
     assert -1.4 < float(told) < -1.1
+
+
+FLYER = (INPUTS / "defaults" / "in.plates").read_text("utf-8")
+
+
+@pytest.mark.xdist_group("plates")
+def test_stress_that_matter_loses_on_its_way_is_told_after_the_run(run_script):
+    """One solid, so that nothing is known before the run; the watch sees what moves in it.
+
+    Behind the shock matter moves at v/2: what was struck first through 3.5 cells, in the mean half.
+    """
+    text = re.sub(r"^solid\(flyer.*\n", "", FLYER, flags=re.M)
+    text = text.replace("region, target, 2, copper", "region, both, 2, copper")
+    text = text.replace("eos(bulk", "region(both, union, flyer, target)\neos(bulk")
+    text = text.replace("region, flyer, solid, flyer", "region, flyer, all")
+    result = run_script(text)
+    told = re.search(r"stress lost across cells: matter has moved through (\S+) cells", result.err)
+    assert float(told[1]) == pytest.approx(3.5 / 2, rel=0.15)
+    assert result.log.ratio[-1] < 0.7
+    assert re.search(r"^  stress +matter moved through", result.out, re.M)
+    right = run_script(text, "-var", "basis", "cpgimp", folder="right")
+    assert "stress" not in right.err and "matter moved" not in right.out
+    assert right.log.ratio[-10:].mean() == pytest.approx(1, abs=0.01)  # Rankine & Hugoniot
+
+
+@pytest.mark.xdist_group("plates")
+def test_stress_that_loads_hold_is_not_lost(run_script):
+    """A column that sinks under its weight by two cells: what moves there gains stress."""
+    text = (INPUTS / "in.column").read_text("utf-8")
+    result = run_script(re.sub(r"^(dump|plot|save_plot)\(.*\n", "", text, flags=re.M))
+    assert "matter moved through" not in result.out

@@ -129,9 +129,10 @@ class Tiling(NamedTuple):
     #                   boxes are not looked at so closely
     buffer: np.ndarray  # (T + 1, 5) int64: its records in the buffers begin and end; Grid.first,
     #                     step_x and step_y of the numbers that its nodes have there
-    report: np.ndarray  # (T + 1, 10): largest move, largest rate, offending point + 1 of each tile;
+    report: np.ndarray  # (T + 1, 14): largest move, largest rate, offending point + 1 of each tile;
     #                     when its points were looked at, their kinetic and stored energy, the
-    #                     number of their solid (-1: of several), their mass and momentum
+    #                     number of their solid (-1: of several), their mass and momentum,
+    #                     their elastic energy and that times velocity
 
 
 CLEAR, TAKE, ADD = range(3)  # last column of Buffers.parts
@@ -319,6 +320,12 @@ CLOCK = np.dtype(
         ("largest_energy", np.float64),  # of kinetic, stored and work
         ("largest_own", np.float64),  # the same, without what bodies have that only drift
         ("of_drift", np.float64),  # kinetic energy of the centres of mass
+        ("elastic", np.float64),  # elastic energy at the last look
+        ("carried", np.float64, (1, 3)),  # it times the cells that it has been carried through
+        ("to_and_fro", np.float64),  # time in which waves go through all bodies and back
+        ("time_of_look", np.float64),
+        ("lost", np.float64),  # energy that it has lost by that, of the unit, at most
+        ("crossed", np.float64),  # cells that stressed matter has moved through, at most
         ("supplied", np.float64),  # largest work so far, of either sign
         ("energy_floor", np.float64),  # round-off of energies
         ("windows", np.int64),  # in which the balance has grown, one after another
@@ -346,7 +353,8 @@ class Control(NamedTuple):
     values: np.ndarray  # published values: TIME, TIMESTEP, DT come first
     clock: np.ndarray  # (1,) CLOCK
     totals: np.ndarray  # sums, LIMBS numbers each, see kernels.totals: of the published values,
-    #                     and behind them mass and momentum of each solid, 1 + d
+    #                     and behind them mass and momentum of each solid, 1 + d, and elastic
+    #                     energy and that times velocity
     digits: np.ndarray  # (LIMBS,) scratch
     answer: np.ndarray  # rounded totals, and what processes agree on
     firsts: np.ndarray  # (S + 1,) int64: id of the first point of each solid; LAST
@@ -357,7 +365,7 @@ def new_control(values: np.ndarray, firsts: Sequence[int] = (), d: int = 0) -> C
     """Make a control of these published values, its clock at zero, of solids in `d` dimensions."""
     clock = np.zeros(1, CLOCK).view(np.recarray)
     clock[0].weight = clock[0].stride = 1.0
-    more = (1 + d) * len(firsts)
+    more = (1 + d) * (len(firsts) + 1)
     totals = np.zeros((len(values) + more, LIMBS), np.int64)
     digits, answer = np.zeros(LIMBS, np.int64), np.zeros(max(16, more))
     ids = np.array([*firsts, LAST], np.int64)

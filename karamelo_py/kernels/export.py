@@ -1,5 +1,7 @@
 """Output quantities from the state of the points: stress, strain, volume, stored energy."""
 
+from typing import Any
+
 from karamelo_py.compiler.compile import index
 from karamelo_py.compiler.fields import load, store
 from karamelo_py.compiler.held import at_hand
@@ -121,6 +123,6 @@ def move_moments(frame, kin, points, laws, moments):
     flat = planar(kin)
     for p in range(points.mass.size):
         law, state = state_at(kin, points, laws, p)
-        f = deformation_of(frame, kin, law, state, points, p).planar()
+        f: Any = deformation_of(frame, kin, law, state, points, p)
         moment = load(moments, p, zero(flat, points.mass[p]))
-        store(moments, p, moment @ f.transposed())
+        store(moments, p, moment @ f.planar().transposed())

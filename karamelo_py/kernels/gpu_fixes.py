@@ -315,9 +315,9 @@ def add_energies(i, fate, s, block, copies, threads):
     firsts, first_row = s.control.firsts, s.control.values.size
     kinetic = stored = 0.0
     solid, begin, behind = -1, 0, 0
-    total = (0.0,) * (1 + kin.dimension)
+    total, of_all = (0.0,) * (1 + kin.dimension), (0.0,) * (1 + kin.dimension)
     for p in range(i, points.mass.size, threads):
-        mass, v, of_motion, of_strain = watch.energies_of(kin, points, laws, index(p))
+        mass, v, of_motion, elastic, of_strain = watch.energies_of(kin, points, laws, index(p))
         kinetic += of_motion
         stored += of_strain
         if not begin <= points.id[p] < behind:
@@ -327,9 +327,12 @@ def add_energies(i, fate, s, block, copies, threads):
             begin, behind = firsts[solid], firsts[solid + 1]
         more = zip(total, (mass, *[mass * x for x in v]), strict=True)
         total = tuple([part + x for part, x in more])
+        more = zip(of_all, (elastic, *[elastic * x for x in v]), strict=True)
+        of_all = tuple([part + x for part, x in more])
     totals.add_to(own, totals.KINETIC, kinetic)
     totals.add_to(own, totals.STORED, stored)
     _add_all(own, first_row, solid, total)
+    _add_all(own, first_row, firsts.size - 1, of_all)
 
 
 def _add_all(own, first_row, solid, total):

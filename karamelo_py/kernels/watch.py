@@ -8,9 +8,13 @@ their tiles, the same on any number of threads.
 Growth (`karamelo_py.kernels.watch`) is measured by the energy that bodies have besides their
 drift, the motion of their centres of mass: large as that may be, from the start or by loads, it
 cannot hide what vibrates.
+
+The same looks measure how many cells matter moves through while it is stressed, weighed by the
+elastic energy of points (`karamelo_py.kernels.watch.note_crossing`): linear basis functions in the
+updated frame lose stress by that.
 """
 
-from math import inf
+from math import exp, inf, sqrt
 
 from karamelo_py.compiler.compile import added, all_lanes, of_present, real
 from karamelo_py.compiler.fields import field, load_vector
@@ -19,10 +23,11 @@ from karamelo_py.compiler.loops import kernel, noinline
 from karamelo_py.compiler.threads import shared_out
 from karamelo_py.compiler.tuples import put_at
 from karamelo_py.kernels import totals
-from karamelo_py.kernels.arrays import TIMESTEP, first_from, known_to_laws
+from karamelo_py.kernels.arrays import TIME, TIMESTEP, first_from, known_to_laws
 from karamelo_py.kernels.lanes import lanes_with, points_from
 from karamelo_py.kernels.p2g import WorkOfForces
 from karamelo_py.kernels.visit import state_at
+from karamelo_py.points.basis.linear import PER_CELL
 from karamelo_py.points.kinematics import dot, free_from
 from karamelo_py.points.laws import (
     dissipated_energy,
@@ -56,13 +61,14 @@ def solid_of(firsts, number):
 
 
 def energies_of(kin, points, laws, p):
-    """Find mass and velocity of a point; its energies, kinetic, and stored plus dissipated."""
+    """Find mass and velocity of a point, its energies: kinetic, elastic, elastic and dissipated."""
     law, state = state_at(kin, points, laws, p)
     mass = real(of_present(p, points.mass[p]), 0.0)
     v = tuple([real(x, 0.0) for x in load_vector(kin, points.v, p)])
-    energy = energy_density(law, kin, state) + dissipated_energy(law, kin, state)
-    stored = mass * real(specific_volume(law), 0.0) * real(energy, 0.0)
-    return mass, v, 0.5 * mass * dot(v, v), stored
+    elastic = energy_density(law, kin, state)
+    energy = elastic + dissipated_energy(law, kin, state)
+    volume = mass * real(specific_volume(law), 0.0)
+    return mass, v, 0.5 * mass * dot(v, v), volume * real(elastic, 0.0), volume * real(energy, 0.0)
 
 
 @shared_out
@@ -76,12 +82,13 @@ def _look_at_shares(kin, points, laws, tiling, firsts, k):
         solid = solid_of(firsts, points.id[start])
         begin, behind = firsts[solid], firsts[solid + 1]
         kinetic = stored = 0.0
-        total = (0.0,) * (1 + kin.dimension)
+        total = (0.0,) * (2 + 2 * kin.dimension)
         for q in range(start, end, lanes.width):
             p = points_from(lanes, q, end)
-            mass, v, of_motion, of_strain = energies_of(kin, points, laws, p)
+            mass, v, of_motion, elastic, of_strain = energies_of(kin, points, laws, p)
             kinetic, stored = added(kinetic, of_motion), added(stored, of_strain)
-            more = zip(total, (mass, *[mass * x for x in v]), strict=True)
+            weighed = (mass, *[mass * x for x in v], elastic, *[elastic * x for x in v])
+            more = zip(total, weighed, strict=True)
             total = tuple([added(part, x) for part, x in more])
             if not all_lanes((points.id[p] >= begin) & (points.id[p] < behind)):
                 solid = -1
@@ -132,9 +139,15 @@ def take_energies(s):
 
 @kernel
 def _add_momenta(d, ids, masses, v, tiling, control):
-    """Add mass and momentum of each solid, 1 + d, to totals behind those of published values."""
+    """Add mass and momentum of each solid, 1 + d, to totals behind those of published values.
+
+    Elastic energy, and this times velocity, of all points follow.
+    """
     firsts, sums = control.firsts, control.answer
+    last = control.values.size + (firsts.size - 1) * (1 + d)
     for t in range(tiling.count[0]):
+        for k in range(1 + d):
+            totals.add_to(control.totals, last + k, tiling.report[t, OF_SOLID + 2 + d + k])
         solid = int(tiling.report[t, OF_SOLID])
         if solid >= 0:
             for k in range(1 + d):
@@ -185,6 +198,35 @@ def take_drift(s):
             momentum = control.answer[k * (1 + d) + 1 + i]
             energy += 0.5 * momentum * momentum / mass if mass > 0 else 0.0
     control.clock[0].of_drift = energy
+    note_crossing(control, d)
+
+
+def note_crossing(control, d):
+    """Add up the cells that elastic energy has been carried through since the last look.
+
+    Of energy that goes, its way goes, too; what comes has none. Vibrations renew it in the time in
+    which waves go there and back. So waves that come and go count by what they move while they
+    last.
+    """
+    clock, row = control.clock[0], (control.firsts.size - 1) * (1 + d)
+    now, before = control.answer[row], clock.elastic
+    lasting = control.values[TIME] - clock.time_of_look
+    clock.time_of_look = control.values[TIME]
+    clock.elastic = max(now, 0.0)
+    if not now > 0:
+        return
+    moved = 0.0
+    for i in range(d):
+        moved += (control.answer[row + 1 + i] / now) ** 2
+    cells = lasting / clock.spacing
+    renewed = (
+        min(max((clock.kinetic - clock.of_drift) / now, 0.0), 1.0) * lasting / clock.to_and_fro
+    )
+    # What linear basis functions lose of it on the way is no energy that goes.
+    stays = max(1 - 2 * PER_CELL * sqrt(moved) * cells, 0.0)
+    stays = exp(-renewed) * min(stays, now / before if before > 0 else 0.0)
+    for i in range(d):
+        clock.carried[0, i] = stays * clock.carried[0, i] + control.answer[row + 1 + i] * cells
 
 
 def _sum_before(s, mode, step):
@@ -237,6 +279,15 @@ def judge(control):
     )
     own = max(abs(clock.stored), clock.kinetic - clock.of_drift)
     clock.largest_own = max(clock.largest_own, own)
+    way = 0.0
+    for i in range(3):
+        way += clock.carried[0, i] * clock.carried[0, i]
+    if clock.elastic > 0:
+        way = sqrt(way) / clock.elastic
+        part = clock.elastic * (exp(2 * PER_CELL * way) - 1) / unit_of(clock)
+        if part > clock.lost:
+            clock.lost = part
+            clock.crossed = way
     # Means: a single look shows the shortest waves, too.
     unit = unit_of(clock)
     if clock.looks == FEW:
@@ -312,6 +363,7 @@ def begin_to_look(s, mode, level, anew):
         clock.windows = 0
         clock.growth = clock.grown = clock.supplied = 0.0
         clock.sum_of_balance = clock.largest_energy = clock.largest_own = 0.0
+        clock.time_of_look = s.control.values[TIME]
     step = int(s.control.values[TIMESTEP])
     if step % LOOK == 0 and (anew or clock.stored_at != step):
         _sum_before(s, mode, step)

@@ -14,7 +14,9 @@ import numpy as np
 from karamelo_py.compiler import cache
 from karamelo_py.compiler.loops import compilation
 from karamelo_py.points.basis import support
+from karamelo_py.run import crossing
 from karamelo_py.run.advice import known_failures
+from karamelo_py.run.advice.facts import SceneFacts
 from karamelo_py.run.advice.report import report
 from karamelo_py.run.diagnosis import energy
 from karamelo_py.run.lower.build import check_scene
@@ -409,6 +411,7 @@ class Runner:
                 "steps": steps,
                 "time": simulation.time,
                 **of_energy,
+                **crossing.words_at_end(SceneFacts(self.hub, simulation, simulation.time)),
                 **({"path": f"{path:.3g} cells at most"} if path < inf else {}),
                 "particle-steps/s": f"{facts['point_steps_per_s']:.3g}",
                 "processor time": f"{worked:.3g} s in steps, of all threads",

@@ -214,11 +214,26 @@ class Simulation(SceneArrays):
             max(ROUND_OFF, strain**2) * self.points.total("mass") * float(clock.rate) ** 2
         )
         clock.born_with = self.points.total("born with")
+        if anew:
+            clock.to_and_fro = 2 * self._length() / max(float(clock.wave or clock.rate), 1e-300)
         # Energies are summed by tile.
         if self._outside_tiles():
             self.sort()
             self.mapped = False
         begin_to_look(self.setup, self.mode, level, anew)
+
+    def _length(self) -> float:
+        """Find the longest side of the box around all points."""
+        d = self.kin.dimension
+        ends = np.full(2 * d, -np.inf)
+        for block in self.setup.blocks:
+            x = block.points.x[self.now][:d]
+            own = np.concatenate(
+                [x.max(axis=1, initial=-np.inf), (-x).max(axis=1, initial=-np.inf)]
+            )
+            ends = np.maximum(ends, own)
+        ends = self.comm.allreduce_max(ends)
+        return float((ends[:d] + ends[d:]).max())
 
     def _outside_tiles(self) -> int:
         """Count the blocks that have points which were not sorted yet."""

@@ -21,6 +21,7 @@ from karamelo_py.run.body_motion import (
     pressed_evenly,
     turn_of,
 )
+from karamelo_py.run.crossing import Crossing, expected
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.plugins import attributed, foreign_parts
 from karamelo_py.script.errors import ScriptError
@@ -117,6 +118,11 @@ class SceneFacts:
         if self.d == 1 or self.hub.domain.axisymmetric:
             return 0.0
         return max((one.spin for one in self.motions), default=0.0) * self.duration
+
+    @cached_property
+    def crossing(self) -> Crossing:
+        """Estimate how far stressed matter will move through the grid."""
+        return expected(self)
 
     @property
     def share(self) -> float:

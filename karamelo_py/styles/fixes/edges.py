@@ -7,10 +7,10 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from karamelo_py.output.point_table import from_solids, places_before
-from karamelo_py.scene.clipping import surface
+from karamelo_py.scene.clipping import EDGE, surface
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.modify import PointsView
+from karamelo_py.scene.modify import Fix, PointsView
 from karamelo_py.scene.region import Region
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.expressions import Expression
@@ -62,32 +62,39 @@ def faces_on(hub: Hub, region: Region, ids: np.ndarray) -> Faces:
     return Faces(*(np.concatenate(columns) for columns in zip(*found, strict=True)))
 
 
-def faces_cut(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
-    """The surface of a region at the points `ids` of a solid whose boxes were cut.
+class EdgePieces(NamedTuple):
+    """Pieces of the surface of a region, and the points that they belong to."""
+
+    point: np.ndarray  # (m,) numbers of the points
+    area: np.ndarray  # (m, d) times the normal out of the region
+    length: np.ndarray  # (m,) area of a piece, with both sides of an edge
+    middle: np.ndarray  # (m, d)
+
+
+def surface_at(solid: Solid, region: Region, ids: np.ndarray) -> EdgePieces:
+    """Measure the surface of a region at the points `ids` of a solid that fills it.
 
     What of the surface is in a part of a box belongs to the nearest of the points inside that are
-    in this box or beside it. Its projections across the axes are the faces: of an edge within a
-    part, where opposite ones meet, only their difference.
+    in this box or beside it.
     """
     size, boxes, d = solid.h / solid.ppc, solid.places, solid.domain.dimension
     x0 = solid.x0_of(ids - solid.first_id)
     inside = region.inside(x0)
     ids, x0 = ids[inside], x0[inside]
-    none = np.empty(0, np.int64)
-    found = [Faces(none, none, none, np.empty(0), np.empty((0, d)))]
+    none = np.empty((0, d))
+    found = [EdgePieces(np.empty(0, np.int64), none, np.empty(0), none)]
     if not len(ids):
         return found[0]
-    corner = x0.min(axis=0) - 2 * size
-    shape = tuple(((x0.max(axis=0) - corner) / size + 4).astype(np.int64))
+    corner = x0.min(axis=0) - 2.5 * size  # so that points of whole boxes are in the middle
+    shape = tuple(((x0.max(axis=0) - corner) / size + 5).astype(np.int64))
     cells = np.ravel_multi_index(tuple(((x0 - corner) / size).astype(np.int64).T), shape)
     order = np.argsort(cells, kind="stable")
     cells = cells[order]
-    places = (np.array(list(itertools.product(range(PARTS), repeat=d))) + 0.5) / PARTS - 0.5
     for begin, end in boxes.chunks:
         x = boxes.candidates(begin, end)
         near = np.abs(region.depth(x, 2 * size)) < size * np.sqrt(d)
         near &= ((x > corner + size) & (x < corner + (np.array(shape) - 1) * size)).all(axis=1)
-        x = (x[near][:, None, :] + size * places).reshape(-1, d)
+        x = in_parts(x[near], size)
         x = x[solid.domain.contains(x)]
         area, middle = surface(region, x, size / PARTS)
         at = ((x - corner) / size).astype(np.int64)
@@ -99,18 +106,64 @@ def faces_cut(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
                 apart = np.linalg.norm(x0[order[row]] - middle, axis=1)
                 nearer = (cells[row] == number) & (apart < nearest * (1 - 1e-9))
                 nearest[nearer], taker[nearer] = apart[nearer], order[row[nearer]]
-        for axis in range(d):
-            some = np.flatnonzero((taker >= 0) & (np.abs(area[:, axis]) > 1e-9 * size ** (d - 1)))
-            of_axis, place = area[some, axis], middle[some]
-            radius = place[:, 0] if solid.domain.axisymmetric else 1.0
-            signs = np.sign(of_axis).astype(np.int64)
-            axes = np.full(len(some), axis)
-            found.append(Faces(ids[taker[some]], axes, signs, np.abs(of_axis) * radius, place))
+        kept = taker >= 0
+        lengths = _lengths(region, x[kept], size / PARTS, area[kept])
+        found.append(EdgePieces(ids[taker[kept]], area[kept], lengths, middle[kept]))
+    return EdgePieces(*(np.concatenate(columns) for columns in zip(*found, strict=True)))
+
+
+def in_parts(x: np.ndarray, size: float) -> np.ndarray:
+    """Return the middles (n PARTS^d, d) of the parts of boxes of edge length `size` around `x`."""
+    d = x.shape[1]
+    places = (np.array(list(itertools.product(range(PARTS), repeat=d))) + 0.5) / PARTS - 0.5
+    return (x[:, None, :] + size * places).reshape(-1, d)
+
+
+def _lengths(region: Region, x: np.ndarray, size: float, area: np.ndarray) -> np.ndarray:
+    """Measure the area (n,) of the surface in boxes around `x`: by parts where it has an edge."""
+    found, d = np.linalg.norm(area, axis=1), x.shape[1]
+    corners = np.array(list(itertools.product((-0.5, 0.5), repeat=d)))
+    depth = region.depth((x[:, None, :] + size * corners).reshape(-1, d), 2 * size)
+    depth = depth.reshape(-1, len(corners))
+    slopes = depth @ corners / 2 ** (d - 2)
+    mean = depth.mean(axis=1, keepdims=True)
+    edge = np.abs(depth - mean - slopes @ corners.T).max(axis=1) > EDGE * size
+    if edge.any():
+        parts = in_parts(x[edge], size)
+        of_parts = np.linalg.norm(surface(region, parts, size / PARTS)[0], axis=1)
+        found[edge] = of_parts.reshape(-1, PARTS**d).sum(axis=1)
+    return found
+
+
+def faces_cut(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
+    """Find the faces at the points `ids` of a solid whose boxes were cut: see `surface_at`.
+
+    They are the projections of the surface across the axes: of an edge within a part of a box,
+    where opposite ones meet, only their difference.
+    """
+    d, least = solid.domain.dimension, 1e-9 * (solid.h / solid.ppc) ** (solid.domain.dimension - 1)
+    pieces = surface_at(solid, region, ids)
+    none = np.empty(0, np.int64)
+    found = [Faces(none, none, none, np.empty(0), np.empty((0, d)))]
+    for axis in range(d):
+        some = np.flatnonzero(np.abs(pieces.area[:, axis]) > least)
+        of_axis, place = pieces.area[some, axis], pieces.middle[some]
+        radius = place[:, 0] if solid.domain.axisymmetric else 1.0
+        signs, axes = np.sign(of_axis).astype(np.int64), np.full(len(some), axis)
+        found.append(Faces(pieces.point[some], axes, signs, np.abs(of_axis) * radius, place))
     return Faces(*(np.concatenate(columns) for columns in zip(*found, strict=True)))
 
 
-class EdgeFix(PointForces):
-    """Base of fixes that load the edge of a region.
+def whole_faces(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
+    """Find the surface of a region at the points `ids` of a solid, whatever way it looks."""
+    pieces = surface_at(solid, region, ids)
+    radius = pieces.middle[:, 0] if solid.domain.axisymmetric else 1.0
+    none = np.zeros(len(pieces.point), np.int64)
+    return Faces(pieces.point, none, none, pieces.length * radius, pieces.middle)
+
+
+class OnEdge(Fix):
+    """Base of fixes that act on the edge of a region, by the faces that points show there.
 
     Parameters
     ----------
@@ -118,16 +171,14 @@ class EdgeFix(PointForces):
         ID of a region: that of a solid, or one that ends where the solid does.
     """
 
+    group: ParticleGroup
+    region: Region
     side: int | None = None  # of `SIDES`, or all of them
-
-    def __init__(self, hub: Hub, group: ParticleGroup, region: Region):
-        super().__init__(hub, group)
-        self.region = region
-        # The points that were seen last, and their faces, by their rows there.
-        self._seen: tuple[np.ndarray, Faces] | None = None
+    # The points that were seen last, and their faces, by their rows there.
+    _seen: tuple[np.ndarray, Faces] | None = None
 
     def defined(self) -> None:
-        """Warn where there is nothing to load."""
+        """Warn where there is nothing to act on."""
         if not self.hub.rehearsing and not self.region.unknown:
             pieces = self.group.pieces()
             if len(self.group) and not any(len(self._find(ids).point) for ids in pieces):
@@ -136,17 +187,7 @@ class EdgeFix(PointForces):
                     hint="the region that the solid fills: its points lie inside, at the edge",
                 )
 
-    def loads(self, faces: Faces) -> np.ndarray:
-        """The force (m, d) on each face."""
-        raise NotImplementedError
-
-    def forces(self, points: PointsView) -> np.ndarray:
-        faces = self._faces_of(points.ids - 1)
-        force = np.zeros(points.position.shape)
-        np.add.at(force, faces.point, self.loads(faces))
-        return force
-
-    def _faces_of(self, ids: np.ndarray) -> Faces:
+    def faces_of(self, ids: np.ndarray) -> Faces:
         """The faces of the points in a view, by their rows there; what was found stays known."""
         before, faces = self._seen or (ids[:0], self._find(ids[:0]))
         if self._seen is None or not np.array_equal(before, ids):
@@ -161,14 +202,19 @@ class EdgeFix(PointForces):
             self._seen = ids.copy(), found._replace(point=rows)
         return self._seen[1]
 
+    def cut_faces(self, solid: Solid, ids: np.ndarray) -> Faces | None:
+        """Find the faces of points of a solid by the surface of the region; None by their boxes."""
+        return faces_cut(solid, self.region, ids) if getattr(solid, "cut", False) else None
+
     @cached_property
     def _cut(self) -> dict[str, tuple[Solid, Faces]]:
-        """The solids whose boxes a region has cut, with the faces of all their points."""
+        """The solids whose faces follow from the surface, with those of all their points."""
         members = np.concatenate([*self.group.pieces(), np.empty(0, np.int64)])
         found = {}
         for solid in self.hub.solids.values():
-            if getattr(solid, "cut", False):
-                found[solid.id] = solid, faces_cut(solid, self.region, members[_of(solid, members)])
+            faces = self.cut_faces(solid, members[_of(solid, members)])
+            if faces is not None:
+                found[solid.id] = solid, faces
         return found
 
     def _find(self, ids: np.ndarray) -> Faces:
@@ -182,6 +228,24 @@ class EdgeFix(PointForces):
         if self.side is not None:
             loaded &= 2 * joined.axis + (joined.sign > 0) == self.side
         return joined.some(loaded)
+
+
+class EdgeFix(OnEdge, PointForces):
+    """Base of fixes that load the edge of a region with forces."""
+
+    def __init__(self, hub: Hub, group: ParticleGroup, region: Region):
+        super().__init__(hub, group)
+        self.region = region
+
+    def loads(self, faces: Faces) -> np.ndarray:
+        """The force (m, d) on each face."""
+        raise NotImplementedError
+
+    def forces(self, points: PointsView) -> np.ndarray:
+        faces = self.faces_of(points.ids - 1)
+        force = np.zeros(points.position.shape)
+        np.add.at(force, faces.point, self.loads(faces))
+        return force
 
 
 def _of(solid: Solid, ids: np.ndarray) -> np.ndarray:

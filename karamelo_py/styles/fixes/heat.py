@@ -5,11 +5,12 @@ from typing import Any
 
 import numpy as np
 
+from karamelo_py.output.point_table import places_before, volumes_before
 from karamelo_py.scene.group import NodeGroup, ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix, heat_hook, node_hook
 from karamelo_py.scene.solid import COLD, WARM
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.errors import ScriptError, render_message
 from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.velocity_nodes import prescribe_mapped
 
@@ -49,6 +50,16 @@ class HeatFix(Fix):
                     f"all points of solid '{solid.id}' get heat as if each had a face outside",
                     hint="a group of one layer of points along the surface",
                 )
+
+
+def check_coefficient(h: Expression) -> None:
+    """Refuse a heat transfer coefficient below 0."""
+    if h.is_constant and not h.constant >= 0:
+        raise ScriptError(
+            f"the heat transfer coefficient is {h.constant:g}",
+            argument="h",
+            expected="a number of at least 0; whether it heats or cools follows from T_inf",
+        )
 
 
 MANY = 1_000_000  # points of a solid, which are not looked at
@@ -135,7 +146,30 @@ def heat(capacity, T, face, supply, value, other, dt):
     return 1.0, supply + face * value, T
 
 
-class HeatFluxParticles(HeatFix):
+class FacesOfPoints(HeatFix):
+    """A fix that acts through one face of each point."""
+
+    def defined(self) -> None:
+        """Tell the area that the group covers, which no region gives."""
+        hub, d = self.hub, self.hub.domain.dimension
+        if hub.rehearsing or d == 1 or not len(self.group):
+            return
+        self._look_inside()
+        area = 0.0
+        for ids in self.group.pieces():
+            volume, x = volumes_before(hub, ids), places_before(hub, ids)
+            round_ = hub.domain.axisymmetric
+            area += float((np.sqrt(volume * x[:, 0]) if round_ else volume ** (1 - 1 / d)).sum())
+        per = {2: " per thickness", 3: ""}[d]
+        words = (
+            f"fix {self.style} '{self.id}': {len(self.group)} points cover an area of {area:.4g}"
+            f"{' per radian' if hub.domain.axisymmetric else per}"
+        )
+        hint = f"fix {self.on_edge} takes the area of the surface of a region"
+        hub.console.say(render_message("note", words, hint=hint))
+
+
+class HeatFluxParticles(FacesOfPoints):
     """Let heat flow into points at the surface of a body: lasers, flames, friction.
 
     Parameters
@@ -154,20 +188,22 @@ class HeatFluxParticles(HeatFix):
     -----
     A point has one face to the outside, the side of a cube of its volume. In one dimension that is
     the whole section. A point at an edge of the body has two faces outside and needs two fixes. In
-    axisymmetric scenes the face is at the radius of the point, somewhat inside the surface.
+    axisymmetric scenes the face is at the radius of the point, somewhat inside the surface. The
+    program prints the area that the group covers: on curved surfaces it depends on the layer that
+    the group takes (0.66 to 1.44 of the surface). edge_heat_flux takes the area of the surface.
     Publishes the heat per time (in two dimensions per thickness, per radian where axisymmetric) as
     ID_s.
 
     See Also
     --------
-    convection_particles, temperature_nodes, temperature_particles, method
+    edge_heat_flux, convection_particles, temperature_nodes, temperature_particles, method
     """
 
+    on_edge = "edge_heat_flux"
     supply_heat = heat_hook(heat)
 
     def __init__(self, hub: Hub, group: ParticleGroup, q: Expression):
         super().__init__(hub, group, q)
-        self._look_inside()
 
 
 def exchange(capacity, T, face, supply, value, other, dt):
@@ -181,7 +217,7 @@ def exchange(capacity, T, face, supply, value, other, dt):
     return 1.0, supply + rate * (other - T) / (1 + rate * dt / capacity), T
 
 
-class ConvectionParticles(HeatFix):
+class ConvectionParticles(FacesOfPoints):
     """Cool or heat points at the surface of a body by a fluid around it: q = h (T_inf - T).
 
     Parameters
@@ -205,19 +241,14 @@ class ConvectionParticles(HeatFix):
 
     See Also
     --------
-    heat_flux_particles, temperature_nodes, temperature_particles, method
+    edge_convection, heat_flux_particles, temperature_nodes, temperature_particles, method
     """
 
+    on_edge = "edge_convection"
     acts_last = True  # what others supply bounds the temperatures that the watch allows
     supply_heat = heat_hook(exchange, holds=True)
 
     def __init__(self, hub: Hub, group: ParticleGroup, h: Expression, T_inf: Expression):
         super().__init__(hub, group, h, T_inf)
         self._compare(T_inf)
-        self._look_inside()
-        if h.is_constant and not h.constant >= 0:
-            raise ScriptError(
-                f"the heat transfer coefficient is {h.constant:g}",
-                argument="h",
-                expected="a number of at least 0; whether it heats or cools follows from T_inf",
-            )
+        check_coefficient(h)
