@@ -47,6 +47,32 @@ def interpreted(tmp_path, starts_are_cheap):
     return run
 
 
+def test_pandas_takes_columns_as_they_are(interpreted):
+    """Of a log, points and nodes; they are no dict that could be changed."""
+    pytest.importorskip("pandas")
+    interpreted("""
+        import numpy as np, pandas
+        sim = Simulation(SCENE + "run(3)\\n")
+        sim.run()
+        for columns in (sim.log, sim.points, sim.nodes):
+            frame = pandas.DataFrame(columns)
+            assert list(frame) == list(columns) == list(dict(columns)) == list({**columns})
+            assert len(frame) > 3 and len(frame.columns) == len(columns)
+            assert all(np.array_equal(frame[n], columns[n], equal_nan=True) for n in columns)
+            some = pandas.DataFrame(columns, columns=list(columns)[:2])
+            assert list(some) == list(columns)[:2] and len(some) == len(frame)
+            changes = columns.clear, columns.popitem, lambda c=columns: c.update(new=1)
+            for change in (*changes, lambda c=columns: c.__delitem__("x")):
+                try:
+                    change()
+                except TypeError as error:
+                    assert "none is added or taken out" in str(error)
+                else:
+                    raise AssertionError(change)
+        assert pandas.Series(sim.values)["Ek"] == sim.values["Ek"]
+    """)
+
+
 def test_it_waits_in_front_of_a_run(interpreted, run_interpreted, tmp_path):
     """In pieces, by the rest of the script, and two at the same time: the same bits."""
     said = interpreted("""

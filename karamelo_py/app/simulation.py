@@ -66,8 +66,11 @@ class Quiet(Console):
         warnings.warn(text, KarameloWarning, stacklevel=2)
 
 
-class Columns(Mapping):
-    """Columns by name: arrays of numbers, which cannot be written to."""
+class Columns(Mapping, dict):  # type: ignore[metaclass]
+    """Columns by name: arrays of numbers, which cannot be written to.
+
+    A dict, so that ``pandas.DataFrame(sim.log)`` takes its columns; it holds nothing itself.
+    """
 
     def __init__(self, names: Callable[[], list[str]], column: Callable[[str], np.ndarray]):
         self._names = names
@@ -95,11 +98,21 @@ class Columns(Mapping):
     def __repr__(self) -> str:
         return f"<columns {', '.join(self)}>"
 
+    def _refuse(self, *arguments: Any, **named: Any) -> Any:
+        raise TypeError("these columns are those of the simulation: none is added or taken out")
+
+    __setitem__ = __delitem__ = __ior__ = _refuse
+    update = pop = popitem = setdefault = clear = _refuse
+
+    def copy(self) -> dict[str, np.ndarray]:
+        """Give the present columns."""
+        return dict(self)
+
     def to_pandas(self) -> Any:
         """Give the columns as a DataFrame."""
         import pandas
 
-        return pandas.DataFrame(dict(self))
+        return pandas.DataFrame(self)
 
 
 class LivePage:
