@@ -51,6 +51,21 @@ def folder(tmp_path, monkeypatch):
 
 
 @pytest.mark.usefixtures("starts_are_cheap")
+@pytest.mark.parametrize("name", ["s0/settled.h5", "s0/settled.*.h5"])
+def test_a_sweep_reads_a_state_that_lies_beside_its_script(folder, name):
+    """Each run has its folder; the state has flown for 4 steps of 0.01 at a speed of 3."""
+    (folder / "s0").mkdir()
+    state = name.replace("*", "4")
+    (folder / "in.first").write_text(SCRIPT + f"write_restart({state})\n", "utf-8")
+    assert main(["in.first"]) == 0
+    text = SCRIPT.replace("run(steps)", f"read_restart({name})\nrun(steps)")
+    (folder / "in.flight").write_text(text, "utf-8")
+    assert main(["sweep", "in.flight", "-var", "steps=1,6", "-record", "c_x"]) == 0
+    table = pandas.read_csv(folder / "sweep.csv")
+    assert list(table["c_x"]) == pytest.approx([1.5 + 3 * 0.05, 1.5 + 3 * 0.1])
+
+
+@pytest.mark.usefixtures("starts_are_cheap")
 def test_a_sweep_is_a_table_that_pandas_reads(folder, capsys):
     words = ["-var", "N=2,4", "-var", "kind=linear,cubic", "-var", "speed=3", "-jobs", "2"]
     recorded = "v_x,mean:c_x,min:c_x,max:Step,when:c_x:1.575,way=max(max:c_x - first:c_x, 0)/N"

@@ -300,8 +300,8 @@ def read_restart(hub: Hub, file: str) -> None:
     Parameters
     ----------
     file
-        Name of a file that restart or write_restart has written. With a ``*`` it is the one with
-        the largest number in its place.
+        Name of a file that restart or write_restart has written, in the current folder or beside
+        the script. With a ``*`` it is the one with the largest number in its place.
 
     Notes
     -----
@@ -327,7 +327,10 @@ def read_restart(hub: Hub, file: str) -> None:
         raise ScriptError(
             "there is no scene yet", expected="domain, method and solids before read_restart"
         )
-    restart_file.Restart(Path(file).expanduser()).take(hub, outputs=False)
+    path = Path(file).expanduser()
+    ways = (path, hub.folder / path, hub.interpreter.folder / path)
+    found = next((way for way in ways if any(way.parent.glob(way.name))), path)
+    restart_file.Restart(found).take(hub, outputs=False)
 
 
 for _command in (set_dt, dt_factor, restart):
