@@ -11,6 +11,7 @@ WALL = """
     kind = "ulmpm"
     basis = "linear"
     away = 1
+    phi = 30
     psi = 0
     nu = 0.3
     averaged = "true"
@@ -23,7 +24,7 @@ WALL = """
     anti_volumetric_locking(averaged)
     region(b, block, 0, 1.5, 0, 1)
     eos(e, linear, 1, E/(3*(1 - 2*nu)))
-    strength(s, law, E/(2*(1 + nu)), 0, 30, psi{more})
+    strength(s, law, E/(2*(1 + nu)), 0, phi, psi{more})
     material(m, eos-strength, e, s)
     solid(b, region, b, 2, m, h)
     region(wall, block, -INF, 1e-6, -INF, INF)
@@ -106,6 +107,11 @@ def test_averaged_volumes_about_an_axis(run_script, away):
         ("soil that vibrates", {"nu": 0.45}, True),
         ("soil that vibrates", {"nu": 0.45, "averaged": "false"}, True),
         ("soil that vibrates", {"nu": 0.3}, False),
+        ("soil that vibrates", {"nu": 0.45, "phi": 20}, True),
+        ("soil that vibrates", {"nu": 0.4, "phi": 20}, False),
+        ("soil that vibrates", {"nu": 0.45, "phi": 25, "averaged": "false"}, False),
+        ("soil that vibrates", {"nu": 0.3, "phi": 40, "averaged": "false"}, True),
+        ("soil that vibrates", {"nu": 0.25, "phi": 40, "averaged": "false"}, False),
         ("soil that vibrates", {"nu": 0.45, "psi": 10}, False),
         ("soil that vibrates", {"nu": 0.45, "scheme": "quasi-static"}, False),
         ("averaged volumes in load steps", {"scheme": "quasi-static"}, True),
@@ -137,7 +143,7 @@ def test_initial_tension_that_soil_does_not_bear(run_interpreted, strength, told
     if scheme == "quasi-static" and "mu-i" in strength:
         pytest.skip("flows alone")
     text = wall(scheme, run="set_dt(0.001)\n    run(1)").replace("v = y0 - 1", "v = 1 - y0")
-    text = text.replace("law, E/(2*(1 + nu)), 0, 30, psi", strength)
+    text = text.replace("law, E/(2*(1 + nu)), 0, phi, psi", strength)
     said = run_interpreted(text, command="check").err
     assert ("warning: initial tension: fix k0 pulls 100% of the points" in said) == told, said
     if told:
