@@ -38,15 +38,15 @@ def steps_of(text):
 
 
 def test_text_is_lammps_format(plane):
-    """Compared with the format of the reference, line by line."""
+    """Compared with the format of LAMMPS, line by line: it reads the time before the step."""
     plane.update.step, plane.update.time = 7, 0.7
     Particle(plane, 1, "p.*.LAMMPS", "x", "y", "z", "vx").write()
     lines = (plane.folder / "p.7.LAMMPS").read_text().splitlines()
     assert lines[:10] == [
-        "ITEM: TIMESTEP",
-        "7",
         "ITEM: TIME",
         "0.7",
+        "ITEM: TIMESTEP",
+        "7",
         "ITEM: NUMBER OF ATOMS",
         "40",
         "ITEM: BOX BOUNDS sm sm sm",

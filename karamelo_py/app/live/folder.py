@@ -159,7 +159,7 @@ def _is_text_dump(path: Path) -> bool:
         return True
     try:
         with path.open("rb") as file:
-            return file.read(14) == b"ITEM: TIMESTEP"
+            return file.read(6) == b"ITEM: "
     except OSError:
         return False
 

@@ -95,10 +95,10 @@ class LammpsDump(TableDump):
         update, units = self.hub.update, self.hub.output.units
         lines = [
             *(["ITEM: UNITS", str(units)] if units else []),
+            "ITEM: TIME",  # read_dump of LAMMPS wants it first
+            f"{update.time:.16g}",
             "ITEM: TIMESTEP",
             str(update.step),
-            "ITEM: TIME",
-            f"{update.time:.16g}",
             "ITEM: NUMBER OF ATOMS",
             str(self.extent()[0]),
             "ITEM: BOX BOUNDS sm sm sm",
