@@ -53,6 +53,64 @@ def table(tmp_path, monkeypatch):
     return tmp_path
 
 
+RESULTS = """a,mu,runout,seconds,status,reason,folder
+2,0.1,2.5,1,done,,f
+0.5,0.1,0.6,1,done,,f
+1,0.1,-1.18,1,done,,f
+1,0.3,1.0,1,done,,f
+2,0.3,,1,failed,x,f
+"""
+
+
+@pytest.fixture
+def results(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "r.csv").write_text(RESULTS, encoding="utf-8")
+    made = {"script": "in.x", "variables": {"a": [], "mu": []}}
+    (tmp_path / "r.json").write_text(json.dumps(made), encoding="utf-8")
+    (tmp_path / "seen.csv").write_text("runout,other,a\n0.58,7,0.5\n1.75,7,1.5\n", encoding="utf-8")
+    return tmp_path
+
+
+def test_a_result_over_a_variable(results, monkeypatch, capsys):
+    """Of any sign, in order of the variable, with a law and measured points; what failed is out."""
+    drawn = []
+    monkeypatch.setattr("karamelo_py.app.studies.results.savefig", lambda f, p: drawn.append(f))
+    words = ["-y", "runout", "-x", "a", "-law", "1.2*a", "-data", "seen.csv", "-o", "r.png"]
+    assert main(["chart", "r.csv", *words]) == 0
+    (figure,) = drawn
+    axes = figure.axes[0]
+    assert (axes.get_xscale(), axes.get_yscale()) == ("linear", "linear")
+    found = [line.get_xydata().tolist() for line in axes.lines if line.get_marker() == "o"]
+    assert found == [[[0.5, 0.6], [1, -1.18], [2, 2.5]], [[1, 1.0]]]
+    (law,) = (line for line in axes.lines if line.get_linewidth() == 4)
+    assert np.allclose(law.get_ydata(), 1.2 * law.get_xdata()) and law.get_xdata()[-1] == 2
+    (seen,) = (line for line in axes.lines if line.get_marker() == "+")
+    assert seen.get_xydata().tolist() == [[0.5, 0.58], [1.5, 1.75]]
+    assert {"mu = 0.1", "mu = 0.3", "1.2*a", "seen.csv"} <= {t.get_text() for t in axes.texts}
+    out = capsys.readouterr().out
+    assert re.search(r"^  2 +2.5 +2.4 +\+4.2$", out, re.M)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("-y nope -x a", "the table has no 'nope'"),
+        ("-y runout", "-y without -x"),
+        ("-y runout -x nope", "the table has no 'nope'"),
+        ("-y runout -x a -law 1.2*b", "unknown name 'b'"),
+        ("-y runout -x a -law (", "is not closed"),
+        ("-y runout -x a -data nofile.csv", "nofile.csv cannot be read"),
+        ("-y reason -x a", "no run has numbers"),
+        ("-accuracy runout -law 2*a", "-law and -data are drawn with -y"),
+    ],
+)
+def test_results_that_cannot_be_drawn(results, capsys, words, said):
+    assert main(["chart", "r.csv", *words.split()]) == 1
+    err = capsys.readouterr().err
+    assert said in err and err.count("error") == 1
+
+
 def test_the_order_of_a_power_law():
     found = order([10, 20, 40], [3 * n**-2.0 for n in (10, 20, 40)])
     assert (found.exponent, found.lowest, found.highest) == pytest.approx((-2, -2, -2))
@@ -188,7 +246,7 @@ def test_words_along_the_axes(table, capsys):
     text = (table / "chart.svg").read_text(encoding="utf-8")
     assert "relative error (1)" in text and " over " in text
     assert main(["chart", "sweep.csv", "-accuracy", "err", "-axes", "N,err"]) == 1
-    assert capsys.readouterr().err.count("expected: -curve, or -accuracy with -o") == 1
+    assert capsys.readouterr().err.count("expected: -curve, or -accuracy or -y with -o") == 1
     assert main([*draw, "N"]) == 1
     assert "two, such as -axes" in capsys.readouterr().err
 

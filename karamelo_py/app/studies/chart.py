@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.app.live.server import require_plotly
-from karamelo_py.app.studies import keeping, look, pictures, records
+from karamelo_py.app.studies import keeping, look, pictures, records, results
 from karamelo_py.app.studies.case import options_of, worded
 from karamelo_py.app.studies.curves import Family, Table, column, order, require, sizes
 from karamelo_py.app.studies.study import plain_table, shown, terminal
@@ -30,10 +30,11 @@ Pareto front (runs that none beats in both). Prints the same as a table, with fi
   karamelo-py chart sweep.csv -accuracy err -x N -o orders.svg       errors over a variable
   karamelo-py chart sweep.csv -accuracy err -heat N,ppc -o heat.pdf  over two variables
   karamelo-py chart sweep.csv -accuracy err -o chart.html            a page of runs
+  karamelo-py chart sweep.csv -y runout -x a -law "1.2*a" -data seen.csv -o runout.png   a result
   karamelo-py chart sweep.csv -curve Ek -x Time -o curves.png        columns of the logs
   karamelo-py chart sweep.csv -keeps E -by basis,transfer -o E.md    does an energy stay?
   karamelo-py chart a.csv b.csv -accuracy err -versus digits -o d.png  two values, scene by scene"""
-SUFFIXES = (".png", ".svg", ".pdf", ".html")
+SUFFIXES = (*pictures.SUFFIXES, ".html")
 
 
 def add_options(parser: ArgumentParser) -> None:
@@ -46,6 +47,9 @@ def add_options(parser: ArgumentParser) -> None:
     wanted.add_argument("-accuracy", metavar="COLUMN", help="column of the error")
     wanted.add_argument(
         "-curve", metavar="COLUMN", help="draw a log column of each run over -x (Time)"
+    )
+    wanted.add_argument(
+        "-y", metavar="A,B", help="draw results over the variable -x, a line per value of -by"
     )
     wanted.add_argument(
         "-keeps", metavar="COLUMN",
@@ -62,6 +66,8 @@ def add_options(parser: ArgumentParser) -> None:
     kinds.add_argument(
         "-versus", metavar="NAME", help="compare its two values in each of the tables"
     )
+    parser.add_argument("-law", metavar="FORMULA", help="a formula of -x, drawn with -y")
+    parser.add_argument("-data", type=Path, metavar="FILE", help="measured points, drawn with -y")
     parser.add_argument("-exact", metavar="COLUMN", help="log column of the exact -curve")
     parser.add_argument("-names", default="", metavar="A,B", help="names of the runs of -curve")
     add_axes(parser)
@@ -76,10 +82,13 @@ def run(options: Any) -> int:
     costs = bool(options.cost) or not options.x
     options.cost = options.cost or "seconds"
     if options.axes and (options.keeps or not (options.o or options.curve)):
-        raise ScriptError("-axes", expected="-curve, or -accuracy with -o")
-    if not (options.accuracy or options.curve or options.keeps):
+        raise ScriptError("-axes", expected="-curve, or -accuracy or -y with -o")
+    if not (options.accuracy or options.curve or options.keeps or options.y):
         hint = f"karamelo-py chart {options.tables[0]} -accuracy error -o chart.png"
-        raise ScriptError("no column is named", expected="-accuracy, -curve or -keeps", hint=hint)
+        expected = "-accuracy of an error, -y of a result, -curve or -keeps"
+        raise ScriptError("no column is named", expected=expected, hint=hint)
+    if (options.law or options.data) and not options.y:
+        raise ScriptError("-law and -data are drawn with -y", expected="-y COLUMN -x NAME")
     if options.versus:
         return side_by_side(options)
     if len(options.tables) > 1:
@@ -90,6 +99,8 @@ def run(options: Any) -> int:
         return keeps(options, table, by or table.variables)
     if options.curve:
         return curves(options, table, by or table.variables)
+    if options.y:
+        return results.draw(options, table, by)
     family = Family(table, options.accuracy, options.cost, by, options.x)
     if len(family.without) == len(table.rows):
         raise ScriptError(f"no run has a value of '{options.accuracy}' above 0")
@@ -143,7 +154,7 @@ def side_by_side(options: Any) -> int:
     """Draw two values of a variable beside each other, for the scenes of all tables."""
     if not options.accuracy:
         raise ScriptError(f"-versus {options.versus}", expected="-accuracy COLUMN with it")
-    out = out_file(options.o, *SUFFIXES[:-1]) if options.o else None
+    out = out_file(options.o, *pictures.SUFFIXES) if options.o else None
     found, known = [], []
     for path in options.tables:
         table = read(path, options.where)
@@ -167,7 +178,7 @@ def side_by_side(options: Any) -> int:
 
 def curves(options: Any, table: Table, by: list[str]) -> int:
     """Draw a column of the logs, a curve for each run."""
-    out = out_file(options.o or Path("curves.png"), *SUFFIXES[:-1])
+    out = out_file(options.o or Path("curves.png"), *pictures.SUFFIXES)
     differing = [name for name in by if len({row[name] for row in table.rows}) > 1]
     over = options.x or "Time"
 

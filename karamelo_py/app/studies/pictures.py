@@ -26,6 +26,7 @@ from karamelo_py.output.plots import blank_figure, tick_texts, tidy
 from karamelo_py.script.errors import ScriptError, plural, unknown
 from karamelo_py.script.terms import number_of
 
+SUFFIXES = (".png", ".svg", ".pdf")
 DECADES = 1e4  # curves that reach over more are drawn on a logarithmic axis
 
 
