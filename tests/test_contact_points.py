@@ -61,14 +61,15 @@ def test_no_pair_is_missed(d, overlap):
     r1, r2 = (spacing * (0.2 + 0.4 * rng.random(k)) for k in (n, m))
     bound = TwoBodies(
         x=np.concatenate([x1, x2]), v=np.zeros((n + m, d)), mass=np.ones(n + m),
-        radius=np.concatenate([r1, r2]), force=np.zeros((n + m, d)), first2=n,
+        radius=np.concatenate([r1, r2]), force=np.zeros((n + m, d)), grip=np.zeros((n + m, 0)),
+        first2=n,
     )  # fmt: skip
     cells = cells_for(n + m)._replace(start=np.zeros(100, np.int64))
     total = np.zeros(3)
     for reach in (spacing, 0.5 * spacing):
         bound.force[:] = 0
         law, kin = MinimizePenetration(0.0), KINEMATICS[d]()
-        found = push_apart(law, kin, bound, cells, reach, 0.1, 0.1, total)
+        found = push_apart(law, kin, bound, cells, reach, 0.1, 0.1, 0.1, total)
         f1, f2, count = by_hand(d, x1, x2, r1, r2, reach, 0.1)
         assert found == count > 0
         assert bound.force == pytest.approx(np.concatenate([f1, f2]), rel=1e-10, abs=1e-10)

@@ -14,7 +14,7 @@ from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import kernel, noinline
 from karamelo_py.kernels.arrays import vector_at
 from karamelo_py.kernels.visit import state_at
-from karamelo_py.points.bodies import force_between, radius
+from karamelo_py.points.bodies import NEW, MinimizePenetration, along, force_between, radius, rub
 from karamelo_py.points.kinematics import zero_vector
 from karamelo_py.points.laws import jacobian, specific_volume
 
@@ -27,6 +27,7 @@ class TwoBodies(NamedTuple):
     mass: np.ndarray  # (n,)
     radius: np.ndarray  # (n,)
     force: np.ndarray  # (n, d)
+    grip: np.ndarray  # (n, d + 2), of the first body: see `points.bodies.rub`; (n, 0) without mu
     first2: int
 
 
@@ -39,6 +40,7 @@ class Cells(NamedTuple):
     corner: np.ndarray  # (3,) float64: lower corner of the cells
     length: np.ndarray  # (3,) float64: lengths of the region that they cover
     count: np.ndarray  # (3,) int64: cells along each direction
+    contact: np.ndarray  # (7,) what touches a point
 
 
 def cells_for(points: int) -> Cells:
@@ -46,7 +48,7 @@ def cells_for(points: int) -> Cells:
     return Cells(
         start=np.zeros(2 * points + 65, np.int64), cell=np.zeros(points, np.int64),
         order=np.zeros(points, np.int64), corner=np.zeros(3), length=np.zeros(3),
-        count=np.ones(3, np.int64),
+        count=np.ones(3, np.int64), contact=np.zeros(7),
     )  # fmt: skip
 
 
@@ -186,42 +188,96 @@ def _find_cells(d, bodies, cells, width):
 
 
 @noinline
-def _touch(law, kin, bodies, reach, dt, kick, i, j, total):
-    """Add the force between two points, if they touch; tell whether they do."""
-    x, f = bodies.x, bodies.force
-    none = zero_vector(kin, 0.0)
+def _push_between(law, kin, bodies, reach, dt, kick, i, j):
+    """Return the force across the surface on point `i` from point `j`, 0 if they do not touch."""
+    x, none = bodies.x, zero_vector(kin, 0.0)
     dx = vector_at(kin, x, j, 0, none) - vector_at(kin, x, i, 0, none)
-    squared = 0.0
+    squared, near = 0.0, True
     for k in range(kin.dimension):
-        if not abs(dx[k]) < reach:
-            return 0
+        near = near and abs(dx[k]) < reach
         squared += dx[k] * dx[k]
     both = bodies.radius[i] + bodies.radius[j]
-    if not 0 < squared < both * both:
-        return 0
-    dv = vector_at(kin, bodies.v, j, 0, none) - vector_at(kin, bodies.v, i, 0, none)
-    force = force_between(
+    if not (near and 0 < squared < both * both):
+        return none
+    return force_between(
         law, kin, dx, sqrt(squared), bodies.radius[i], bodies.radius[j],
-        bodies.mass[i], bodies.mass[j], dv, dt, kick,
+        bodies.mass[i], bodies.mass[j], dt, kick,
     )  # fmt: skip
+
+
+@noinline
+def _add(kin, bodies, i, j, force, total):
     for k in range(kin.dimension):
-        f[i, k] += force[k]
-        f[j, k] -= force[k]
+        bodies.force[i, k] += force[k]
+        bodies.force[j, k] -= force[k]
         total[k] += force[k]
+
+
+@noinline
+def _touch(law, kin, bodies, reach, dt, kick, i, j, total, contact):
+    """Add the force across the surface between two points, if they touch; tell whether they do.
+
+    `contact` takes up what friction on point `i` asks for: the load, the force across the surface,
+    the stiffness of each partner times its velocity along the surface.
+    """
+    force, d = _push_between(law, kin, bodies, reach, dt, kick, i, j), kin.dimension
+    square = force.squared()
+    if not square > 0:
+        return 0
+    _add(kin, bodies, i, j, force, total)
+    none, mass = zero_vector(kin, 0.0), bodies.mass
+    dv = vector_at(kin, bodies.v, j, 0, none) - vector_at(kin, bodies.v, i, 0, none)
+    reduced = mass[i] * mass[j] / (mass[i] + mass[j])
+    slide = reduced / (dt * kick) * along(dv, force)
+    contact[0] += sqrt(square)
+    for k in range(d):
+        contact[1 + k] += force[k]
+        contact[1 + d + k] += slide[k]
     return 1
 
 
+@noinline
+def _rub(law, kin, bodies, step, dt, i, contact):
+    """Find the friction on point `i`, in the place of the velocity in `contact`."""
+    grip, none, d = bodies.grip, zero_vector(kin, 0.0), kin.dimension
+    normal = kin.Vector._make([contact[1 + k] for k in range(d)])
+    slide = kin.Vector._make([contact[1 + d + k] for k in range(d)])
+    slid = step if grip[i, d] > 0 else 0.0  # the way so far: none where it did not touch
+    hold = along(vector_at(kin, grip, i, 0, none) + slid * slide, normal)
+    force, hold, mean, unused = rub(
+        law.friction, hold, contact[0], grip[i, d], grip[i, d + 1], dt * slide
+    )
+    for k in range(d):
+        grip[i, k] = hold[k]
+        contact[1 + d + k] = force[k]
+    grip[i, d], grip[i, d + 1] = mean, unused
+
+
+@noinline
+def _pass_on(law, kin, bodies, reach, dt, kick, i, j, total, contact):
+    """Let a partner of point `i` take its part of the friction: that of the load."""
+    d = kin.dimension
+    square = _push_between(law, kin, bodies, reach, dt, kick, i, j).squared()
+    if square > 0:
+        part = sqrt(square) / contact[0]
+        force = kin.Vector._make([part * contact[1 + d + k] for k in range(d)])
+        _add(kin, bodies, i, j, force, total)
+
+
 @kernel
-def push_apart(law, kin, bodies, cells, reach, dt, kick, total):
+def push_apart(law, kin, bodies, cells, reach, step, dt, kick, total):
     """Add the forces of all pairs that touch; returns their number.
 
     Two points touch when they are closer than the sum of their radii, and closer than `reach` in
-    every direction. `total` (3,) takes the force on the first body.
+    every direction. `total` (3,) takes the force on the first body. Points have moved
+    for the time `step`; `dt` and `kick` are those of the stiffness.
     """
     bodies, cells = at_hand(bodies), at_hand(cells)
     d = kin.dimension
     total[:] = 0.0
     touching = 0
+    rubs = isinstance(law, MinimizePenetration) and bodies.grip.shape[1] > 0
+    contact = cells.contact
     width = _lay_cells(d, bodies, cells, reach)
     if not width > 0:
         return touching
@@ -232,12 +288,26 @@ def push_apart(law, kin, bodies, cells, reach, dt, kick, total):
         if c < 0:
             continue
         cx, cy, cz = c // (ny * nz), c // nz % ny, c % nz
-        for a in range(max(cx - 1, 0), min(cx + 2, nx)):
-            for b in range(max(cy - 1, 0), min(cy + 2, ny)):
-                # Cells along the last direction follow each other, and so do their points.
-                first = (a * ny + b) * nz + max(cz - 1, 0)
-                last = (a * ny + b) * nz + min(cz + 1, nz - 1)
-                begin = cells.start[first - 1] if first > 0 else 0
-                for q in range(begin, cells.start[last]):
-                    touching += _touch(law, kin, bodies, reach, dt, kick, i, cells.order[q], total)
+        contact[:] = 0.0
+        for turn in range(2 if rubs else 1):
+            if turn == 1:
+                if not contact[0] > 0:  # a point that bounces forgets by degrees
+                    for k in range(d + 2):
+                        bodies.grip[i, k] *= 1 - NEW
+                    break
+                _rub(law, kin, bodies, step, dt, i, contact)
+            for a in range(max(cx - 1, 0), min(cx + 2, nx)):
+                for b in range(max(cy - 1, 0), min(cy + 2, ny)):
+                    # Cells along the last direction follow each other, and so do their points.
+                    first = (a * ny + b) * nz + max(cz - 1, 0)
+                    last = (a * ny + b) * nz + min(cz + 1, nz - 1)
+                    begin = cells.start[first - 1] if first > 0 else 0
+                    for q in range(begin, cells.start[last]):
+                        j = cells.order[q]
+                        if turn == 0:
+                            touching += _touch(
+                                law, kin, bodies, reach, dt, kick, i, j, total, contact
+                            )
+                        else:
+                            _pass_on(law, kin, bodies, reach, dt, kick, i, j, total, contact)
     return touching

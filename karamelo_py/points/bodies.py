@@ -7,6 +7,8 @@ from karamelo_py.compiler.compile import point_function
 from karamelo_py.compiler.powers import power
 from karamelo_py.points.kinematics import Axisymmetric, dot
 
+NEW = 0.05  # share of the load of a step in the mean load
+
 
 class Hertz(NamedTuple):
     """Spheres (in the plane, disks) that are pressed together elastically."""
@@ -15,7 +17,7 @@ class Hertz(NamedTuple):
 
 
 class MinimizePenetration(NamedTuple):
-    """The force that undoes the penetration of two free points within a step, with friction."""
+    """The force that undoes the penetration of two free points within a step; and rubs."""
 
     friction: float  # coefficient of Coulomb friction
 
@@ -43,12 +45,15 @@ def radius(kin, volume, x):
 
 
 @point_function()
-def force_between(law, kin, dx, r, radius1, radius2, mass1, mass2, dv, dt, kick):
-    """Force on point 1 from point 2, at dx = x2 - x1 with |dx| = r below the sum of the radii."""
+def force_between(law, kin, dx, r, radius1, radius2, mass1, mass2, dt, kick):
+    """Force across the surface on point 1 from point 2, at dx = x2 - x1.
+
+    |dx| = r is below the sum of the radii.
+    """
 
 
 @force_between.on(Hertz)
-def _force_between_hertz(law, kin, dx, r, radius1, radius2, mass1, mass2, dv, dt, kick):
+def _force_between_hertz(law, kin, dx, r, radius1, radius2, mass1, mass2, dt, kick):
     p = radius1 + radius2 - r
     round_ = radius1 * radius2 / (radius1 + radius2)
     stiffness = 4.0 / 3.0 if kin.dimension == 3 else pi / 4.0
@@ -56,19 +61,38 @@ def _force_between_hertz(law, kin, dx, r, radius1, radius2, mass1, mass2, dv, dt
 
 
 @force_between.on(MinimizePenetration)
-def _force_between_minimize_penetration(
-    law, kin, dx, r, radius1, radius2, mass1, mass2, dv, dt, kick
-):
+def _force_between_minimize_penetration(law, kin, dx, r, radius1, radius2, mass1, mass2, dt, kick):
     reduced = mass1 * mass2 / (mass1 + mass2)
     p = radius1 + radius2 - r
-    push = reduced * p / (dt * kick)
-    force = -push / r * dx
-    if law.friction > 0:
-        along = dot(dv, dx)
-        slide = dv + -along / (r * r) * dx
-        slip = sqrt(slide.squared())
-        if slip > 0:
-            # Friction stops the slip of two free points at most: it does not turn it around.
-            rub = min(law.friction * push, reduced * slip / kick)
-            force = force + rub / slip * slide
-    return force
+    return -reduced * p / (dt * kick) / r * dx
+
+
+def rub(mu, hold, load, mean, unused, stop):
+    """Coulomb friction that remembers what it holds: its force, and the memory after the step.
+
+    A point that nothing else holds is stopped by m v/dt, the force `stop`. One that others lean on
+    carries their load in each step, and would creep. Therefore a spring along the surface, as stiff
+    as the contact across it, is stretched by all that the point slides. Its force `hold` returns to
+    the cone of friction (Wriggers 2006, "Computational Contact Mechanics", chapter 5).
+
+    The load of a point comes in pulses, since it bounces on a stiff contact: a step may use what
+    friction left `unused` in the last steps, up to mu times their `mean` load. A point that slides
+    all the time has mu times the load of each step.
+    """
+    mean = mean + NEW * (load - mean)
+    unused = (1 - NEW) * unused + mu * load
+    bound = mu * max(mean, load)
+    force = _shortened(hold + stop, min(bound, unused))
+    return force, _shortened(hold, bound), mean, unused - sqrt(force.squared())
+
+
+def along(v, normal):
+    """Return the part of a vector along a surface; all of it where the normal is 0."""
+    square = normal.squared()
+    return v + -(dot(v, normal) / square if square > 0 else 0.0) * normal
+
+
+def _shortened(v, most):
+    """Return a vector, shortened to a length."""
+    size = sqrt(v.squared())
+    return (most / size if size > most else 1.0) * v

@@ -21,6 +21,7 @@ from karamelo_py.scene.solid import Solid
 from karamelo_py.scene.views import PointsView
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.fixes.formulas import judge_friction
+from karamelo_py.styles.fixes.grip import Grip, grip_for
 
 SENT = 350  # bytes that the process that looks for pairs needs of each point
 
@@ -47,6 +48,9 @@ class PairContact(Fix):
     point_fields = (Force, WorkOfForces)
     point_by_point = True
     conserves = True  # but for the work of the forces, which steps add up
+    remembers = ("has_touched",)
+    has_touched = False  # else what grips hold is that of a fix before
+    grip: type[Grip] | None = None
 
     def __init__(self, hub: Hub, solid1: Solid, solid2: Solid):
         super().__init__(hub, ParticleGroup(hub, everything=True))
@@ -73,13 +77,25 @@ class PairContact(Fix):
         simulation, total = self.hub.simulation, np.zeros(3)
         kin, blocks = simulation.kin, simulation.setup.blocks
         rows = self._near(simulation)
+        d, grips = kin.dimension, [field(block.points.fields, self.grip) for block in blocks]
+        if self.grip is not None and not self.has_touched:
+            for grip in grips:
+                grip[:] = 0
+        self.has_touched = True
         if rows is not None:
-            own = [self._known(simulation, *one) for one in zip(blocks, rows, strict=True)]
-            push = partial(self._push, kin, points.contact_dt, points.contact_kick)
-            force, total = simulation.comm.at_first(push, np.concatenate(own))
-            for block, some in zip(blocks, rows, strict=True):
-                field(block.points.fields, Force)[: kin.dimension, some] += force[: len(some)].T
-                force = force[len(some) :]
+            own = [self._known(simulation, *one) for one in zip(blocks, rows, grips, strict=True)]
+            last = float(simulation.control.clock[0].last_dt)
+            push = partial(self._push, kin, last, points.contact_dt, points.contact_kick)
+            found, total = simulation.comm.at_first(push, np.concatenate(own))
+        for block, grip, k in zip(blocks, grips, range(len(blocks)), strict=True):
+            if grip is not None:
+                grip[:] = 0
+            if rows is not None:
+                some = rows[k]
+                field(block.points.fields, Force)[:d, some] += found[: len(some), :d].T
+                if grip is not None:
+                    grip[:, some] = found[: len(some), d:].T
+                found = found[len(some) :]
         self.publish_components(total)
 
     def sent(self, simulation: Any) -> int:
@@ -109,26 +125,30 @@ class PairContact(Fix):
         return found
 
     @staticmethod
-    def _known(simulation: Any, block: Block, rows: np.ndarray) -> np.ndarray:
-        """Numbers, masses, radii, positions and velocities of some points."""
+    def _known(simulation: Any, block: Block, rows: np.ndarray, grip: Any) -> np.ndarray:
+        """Numbers, masses, radii, positions and velocities of some points, and their grip."""
         kin, x = simulation.kin, block.points.x[simulation.now]
         found = np.empty((len(rows), 3 + 2 * kin.dimension))
         pairs.collect(kin, x, block.points, block.laws, rows, found)
-        return found
+        return found if grip is None else np.concatenate([found, grip[:, rows].T], axis=1)
 
-    def _push(self, kin: Any, dt: float, kick: float, found: list[np.ndarray]) -> list[tuple]:
-        """Forces on the points that each process has found, and the sum of those on the first."""
+    def _push(
+        self, kin: Any, step: float, dt: float, kick: float, found: list[np.ndarray]
+    ) -> list[tuple]:
+        """Forces and grips of the points of each process, and the sum of forces on the first."""
         of_all, d = np.concatenate(found), kin.dimension
         begin, end = self._ranges[:2]
         second = (of_all[:, 0] < begin) | (of_all[:, 0] >= end)
         order = np.lexsort((of_all[:, 0], second))
         n, total = len(order), np.zeros(3)
-        _, mass, radius, *both = np.ascontiguousarray(of_all[order].T)
-        x, v = (np.stack(part, axis=1) for part in (both[:d], both[d:]))
-        bodies = pairs.TwoBodies(x, v, mass, radius, np.zeros((n, d)), n - int(second.sum()))
-        pairs.push_apart(self.law, kin, bodies, pairs.cells_for(n), self._reach, dt, kick, total)
-        force = np.empty((n, d))
-        force[order] = bodies.force
+        of_all = of_all[order]
+        _, mass, radius = np.ascontiguousarray(of_all[:, :3].T)
+        x, v, grip = map(np.ascontiguousarray, np.split(of_all[:, 3:], [d, 2 * d], axis=1))
+        bodies = pairs.TwoBodies(x, v, mass, radius, np.zeros((n, d)), grip, n - int(second.sum()))
+        times, cells = (step, dt, kick), pairs.cells_for(n)
+        pairs.push_apart(self.law, kin, bodies, cells, self._reach, *times, total)
+        force = np.empty((n, d + grip.shape[1]))
+        force[order] = np.concatenate([bodies.force, bodies.grip], axis=1)
         ends = np.cumsum([len(one) for one in found])[:-1]
         return [(own, total) for own in np.split(force, ends)]
 
@@ -194,6 +214,9 @@ class ContactMinimizePenetration(PairContact):
         super().__init__(hub, solid1, solid2)
         self.law = MinimizePenetration(float(mu or 0.0))
         judge_friction(hub, self.law.friction)
+        if self.law.friction > 0:
+            self.grip = grip_for(hub, Grip)
+            self.point_fields = (*self.point_fields, self.grip)
         if mu is not None and hub.domain.dimension > 1:
             hub.warn(
                 f"bodies that slide do not feel the friction {mu:g}: their surfaces are made of "

@@ -87,25 +87,6 @@ def unit(vector: np.ndarray) -> np.ndarray:
     return vector / length
 
 
-def penalty(
-    points: PointsView, depth: np.ndarray, normal: np.ndarray, velocity: Any, mu: float
-) -> np.ndarray:
-    """Forces (n, d) that undo penetrations of `depth` (n,) along `normal` within one step.
-
-    m p / dt^2, for a point that nothing else holds. Friction by a tool of this `velocity` is mu
-    times that, along the slip, and at most what stops it within the step (de Vaucorbeil & Nguyen
-    2021).
-    """
-    mass = points.mass.astype(float)
-    stiffness = mass / (points.contact_dt * points.contact_kick)
-    push = (stiffness * np.maximum(depth, 0))[:, None] * normal
-    slip = velocity - points.velocity.astype(float)
-    slip = slip - (slip * normal).sum(axis=1, keepdims=True) * normal
-    speed = np.linalg.norm(slip, axis=1)
-    rub = np.minimum(mu * np.linalg.norm(push, axis=1), mass * speed / points.contact_kick)
-    return push + slip * np.divide(rub, speed, out=np.zeros_like(speed), where=speed > 0)[:, None]
-
-
 def begin_behind(plane: Any, scene: Any) -> Any:
     """Count the points that are behind a surface before the first step, for words."""
     if scene.simulation.step > 0:

@@ -10,11 +10,11 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import Solid
 from karamelo_py.scene.views import PointsView
 from karamelo_py.script.expressions import Expression
-from karamelo_py.styles.fixes.formulas import judge_friction
-from karamelo_py.styles.fixes.tools.base import PlaneTool, penalty
+from karamelo_py.styles.fixes.tools.base import PlaneTool
+from karamelo_py.styles.fixes.tools.stiff import CLOSE, StiffTool
 
 
-class ContactMinimizePenetrationPlane(PlaneTool):
+class ContactMinimizePenetrationPlane(StiffTool, PlaneTool):
     """Let a solid touch a fixed plane, as stiffly as the step allows, with friction.
 
     Parameters
@@ -49,17 +49,18 @@ class ContactMinimizePenetrationPlane(PlaneTool):
     impenetrablesurface, contact/minimize_penetration, indent/minimize_penetration
     """
 
-    impulsive = True
-
     def __init__(
         self, hub: Hub, solid: Solid, x: Expression, y: Expression, z: Expression,
         nx: Expression, ny: Expression, nz: Expression, mu: Annotated[float, NonNegative],
     ):  # fmt: skip
         super().__init__(hub, ParticleGroup.of(hub, solid))
-        self.mu = mu
-        judge_friction(hub, mu)
+        self.rubs(hub, mu)
         self.lay((x, y, z), (nx, ny, nz))
 
     def forces(self, points: PointsView) -> np.ndarray:
         depth, normal = self.depth(points)
-        return penalty(points, self.side(points) / 2 + depth, normal, 0.0, self.mu)
+        radius = self.side(points) / 2
+        depth = depth + radius
+        normals = np.broadcast_to(normal, (len(depth), len(normal)))
+        x = points.position.astype(float)
+        return self.press(points, depth, depth > -CLOSE * radius, normals, 0.0, x)

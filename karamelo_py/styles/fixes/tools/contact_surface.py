@@ -16,13 +16,13 @@ from karamelo_py.scene.solid import named
 from karamelo_py.scene.views import PointsView
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
-from karamelo_py.styles.fixes.formulas import judge_friction
-from karamelo_py.styles.fixes.tools.base import ToolFix, begin_behind, penalty
+from karamelo_py.styles.fixes.tools.base import begin_behind
+from karamelo_py.styles.fixes.tools.stiff import StiffTool
 
 SOFT = 0.1  # share of a penetration that a step undoes where it stops the approach, too
 
 
-class ContactSurface(ToolFix):
+class ContactSurface(StiffTool):
     """Let points touch the surface of a region, which may move, with friction.
 
     Parameters
@@ -68,7 +68,6 @@ class ContactSurface(ToolFix):
     """
 
     syntax = "group, region[, mu[, ux[, uy[, uz]]]]"
-    impulsive = True
 
     def __init__(
         self,
@@ -86,8 +85,8 @@ class ContactSurface(ToolFix):
                 expected="a region with an inside: a mesh of elements of volume (in 2D of area), "
                 "a closed STL surface, a block, ...",
             )
-        self.region, self.mu = region, mu
-        judge_friction(hub, mu)
+        self.region = region
+        self.rubs(hub, mu)
         self.way = self.of_time("u", way) if way else ()
 
     def moved(self, dt: float) -> tuple[np.ndarray, np.ndarray]:
@@ -145,7 +144,7 @@ class ContactSurface(ToolFix):
         # A spring alone, which takes all penetration out within a step, throws bodies back.
         closing = ((velocity - points.velocity.astype(float)) * normal).sum(axis=1)
         push = np.where(depth > 0, SOFT * depth + points.contact_dt * closing, 0.0)
-        return penalty(points, push, normal, velocity, self.mu)
+        return self.press(points, push, depth > 0, normal, velocity, x, share=SOFT)
 
 
 known_failure(

@@ -9,11 +9,11 @@ from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.views import PointsView
 from karamelo_py.script.expressions import Expression
-from karamelo_py.styles.fixes.formulas import judge_friction
-from karamelo_py.styles.fixes.tools.base import BallTool, penalty
+from karamelo_py.styles.fixes.tools.base import BallTool
+from karamelo_py.styles.fixes.tools.stiff import CLOSE, StiffTool
 
 
-class IndentMinimizePenetration(BallTool):
+class IndentMinimizePenetration(StiffTool, BallTool):
     """Press a rigid ball (in the plane a disk) into points, as stiffly as the step allows.
 
     Parameters
@@ -45,16 +45,14 @@ class IndentMinimizePenetration(BallTool):
     indent, contact/minimize_penetration/plane, contact/minimize_penetration
     """
 
-    impulsive = True
-
     def __init__(
         self, hub: Hub, group: ParticleGroup, kind: Literal["sphere"],
         R: Annotated[Expression, NonNegative], x: Expression, y: Expression, z: Expression,
         vx: Expression, vy: Expression, vz: Expression, mu: Annotated[float, NonNegative],
     ):  # fmt: skip
         super().__init__(hub, group)
-        self.R, self.mu = R, mu
-        judge_friction(hub, mu)
+        self.R = R
+        self.rubs(hub, mu)
         self.centre = self.of_time("", (x, y, z))
         self.velocity = self.of_time("v", (vx, vy, vz))
 
@@ -62,6 +60,9 @@ class IndentMinimizePenetration(BallTool):
         away = self.from_place(points, self.centre)
         r = np.linalg.norm(away, axis=1, keepdims=True)
         normal = np.divide(away, r, out=np.zeros_like(away), where=r > 0)
-        depth = self.now(self.R) + self.side(points) / 2 - r[:, 0]
+        radius = self.side(points) / 2
+        depth = self.now(self.R) + radius - r[:, 0]
         self.publish("s", points.total(self.face(points) * (depth > 0)))
-        return penalty(points, depth, normal, self.now(*self.velocity), self.mu)
+        velocity, x = self.now(*self.velocity), points.position.astype(float)
+        led = velocity * points.dt
+        return self.press(points, depth, depth > -CLOSE * radius, normal, velocity, x, led)

@@ -1,0 +1,29 @@
+"""Friction of points on tools, one after another. It takes double precision throughout."""
+
+from karamelo_py.compiler.loops import kernel
+from karamelo_py.kernels.arrays import vector_at
+from karamelo_py.points.bodies import along, rub
+from karamelo_py.points.kinematics import zero_vector
+
+
+@kernel
+def rub_points(kin, mu, normal, load, pull, stop, grip, force):
+    """Add the friction of n points to their forces (n, d), and keep their `grip` (n, d + 2).
+
+    Parameters
+    ----------
+    normal, load
+        (n, d) and (n,) of the contact: unit vectors, forces.
+    pull, stop
+        (n, d) what the springs are stretched by in the step, and what stops the slip: forces.
+    """
+    d, none = kin.dimension, zero_vector(kin, 0.0)
+    for i in range(load.size):
+        n = vector_at(kin, normal, i, 0, none)
+        hold = along(vector_at(kin, grip, i, 0, none) + vector_at(kin, pull, i, 0, none), n)
+        stopping = along(vector_at(kin, stop, i, 0, none), n)
+        found, hold, mean, unused = rub(mu, hold, load[i], grip[i, d], grip[i, d + 1], stopping)
+        for k in range(d):
+            force[i, k] += found[k]
+            grip[i, k] = hold[k]
+        grip[i, d], grip[i, d + 1] = mean, unused
