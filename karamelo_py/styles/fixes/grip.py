@@ -1,6 +1,4 @@
-"""What fixes remember of the points that friction holds: see `points.bodies.rub`."""
-
-from math import nan
+"""Memory of fixes for the points that friction holds: see `points.bodies.rub`."""
 
 from karamelo_py.compiler.fields import Field
 from karamelo_py.scene.hub import Hub
@@ -13,10 +11,9 @@ class Grip(Field):
 
 
 class GripOfTool(Grip):
-    """The same, and the place (d) where a tool has seen the point last: NaN, it did not touch."""
+    """The same, and the place (d) where a tool has seen the point last."""
 
     shape = staticmethod(lambda kin: 2 * kin.dimension + 2)
-    start = staticmethod(lambda kin: [0.0] * (kin.dimension + 2) + [nan] * kin.dimension)
 
 
 def grip_for(hub: Hub, kind: type[Grip]) -> type[Grip]:

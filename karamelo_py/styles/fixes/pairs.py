@@ -181,9 +181,10 @@ class ContactMinimizePenetration(PairContact):
 
     Points are balls. Their radius R is half the side of a cube of their present volume (in the
     plane a square). Their penetration is p = R1 + R2 - |x2 - x1|. Two points with p > 0 get the
-    force m1 m2 / (m1 + m2) p / dt^2. It separates two free points within one step. Friction is mu
-    times this force, against the slip. It never reverses the slip of two free points (de Vaucorbeil
-    & Nguyen 2021, "Modelling contacts with a total Lagrangian material point method").
+    force m1 m2 / (m1 + m2) p / dt^2. It separates two free points within one step. Friction is at
+    most mu times this force, against the slip (de Vaucorbeil & Nguyen 2021, "Modelling contacts
+    with a total Lagrangian material point method"). It stops and undoes the slip: what it can hold
+    rests, and gives way by mu p before it slides.
 
     dt is the step of the scene. A step that is shorter to end a run on time leaves it unchanged.
     Where steps fall at once, as by set_dt, it falls by 1 % of the time.

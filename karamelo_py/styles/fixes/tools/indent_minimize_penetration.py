@@ -31,8 +31,9 @@ class IndentMinimizePenetration(StiffTool, BallTool):
     -----
     Points are balls, too, with the radius rp of half the side of a cube of their present volume.
     One at the distance r from the centre overlaps by p = R + rp - r. With p > 0 it gets the force m
-    p / dt^2. This takes a free point out within one step. Friction is mu times that, against the
-    slip, and at most stops it (de Vaucorbeil & Nguyen 2021).
+    p / dt^2. This takes a free point out within one step. Friction is at most mu times that,
+    against the slip (de Vaucorbeil & Nguyen 2021). It stops and undoes the slip: what it can hold
+    rests, and gives way by mu p before it slides.
 
     dt is the step of the scene. A step that is shorter to end a run on time leaves it unchanged.
     Where steps fall at once, as by set_dt, it falls by 1 % of the time.

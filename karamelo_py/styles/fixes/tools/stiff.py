@@ -1,6 +1,5 @@
 """Tools that are as stiff as a step allows, with friction that remembers what it holds."""
 
-from math import nan
 from typing import Any
 
 import numpy as np
@@ -56,19 +55,20 @@ class StiffTool(ToolFix):
         if self.grip is not None:
             grip, d = points[self.grip], normal.shape[1]
             if not self.has_touched:
-                grip[:, : d + 2], grip[:, d + 2 :] = 0.0, nan
+                grip[:] = 0
                 self.has_touched = True
             near = np.flatnonzero(touching)
             before, one = grip[near].astype(float), stiffness[near, None]
-            way = led - (seen[near] - before[:, d + 2 :])  # NaN where they did not touch
-            pull = share * one * np.nan_to_num(way)
+            touched = before[:, d, None] > 0
+            way = np.where(touched, led - (seen[near] - before[:, d + 2 :]), 0.0)
+            pull = share * one * way
             # Velocities of points have noise, by which they do not move.
             slip = way / (2 * points.kick - points.dt)
-            slip = np.where(np.isfinite(way), slip, velocity - points.velocity[near].astype(float))
+            slip = np.where(touched, slip, velocity - points.velocity[near].astype(float))
             stop = points.contact_dt * one * slip
             hold, rubbed = before[:, : d + 2].copy(), force[near]
             rub_points(KINEMATICS[d](), self.mu, normal[near], load[near], pull, stop, hold, rubbed)
             force[near] = rubbed
-            grip[:, : d + 2], grip[:, d + 2 :] = 0.0, nan
+            grip[:] = 0
             grip[near, : d + 2], grip[near, d + 2 :] = hold, seen[near]
         return force
