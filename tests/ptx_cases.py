@@ -123,7 +123,7 @@ def test_transfers(kinematics, transfer):
 def test_schemes(kinematics, name):
     """Fused and staged."""
     script = scene(kinematics, "ulmpm", "linear", "", "FLIP", name)
-    if getattr(registry.find("scheme", name), "implicit", False):
+    if registry.find("scheme", name).traits.implicit:
         pytest.skip("solves equations")
     threads_stay_in_registers(script)
     threads_stay_in_registers(script + "\npull = internal_force(all, x)")

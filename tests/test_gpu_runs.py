@@ -207,7 +207,7 @@ fix(air, convection_particles, a, 2, 293)
 EXPLICIT = [
     scheme
     for scheme in registry.names("scheme")
-    if not getattr(registry.find("scheme", scheme), "implicit", False)
+    if not registry.find("scheme", scheme).traits.implicit
 ]
 
 

@@ -296,7 +296,8 @@ def test_a_signal_amid_the_first_picture(tmp_path, words):
     _out, err = process.communicate(timeout=60)
     assert process.returncode == 128 + signal.SIGTERM
     assert err.count("interrupted: the log and the dumps are complete") == 1
-    assert sorted(path.name for path in (tmp_path / "run").iterdir()) == ["d.0.png", "log.mpm"]
+    names = sorted(path.name for path in (tmp_path / "run").iterdir())
+    assert names == ["d.0.png", "log.mpm", "run.json"]
 
 
 @pytest.mark.full

@@ -134,7 +134,7 @@ def scheme(
         for name in PUBLISHED:  # who asks for these is not at fault
             hub.values.publish(name)
         raise
-    if start == "half" and getattr(chosen, "implicit", False):
+    if start == "half" and chosen.traits.implicit:
         raise ScriptError(
             "implicit steps take velocities at their ends",
             argument="start",

@@ -70,7 +70,7 @@ def turns(transfer: type) -> None:
 def _drift(transfer: Any, scene: Any) -> dict[str, Any] | None:
     if scene.drift is None:
         return None
-    averages = getattr(scene.scheme, "bears_drift", False)
+    averages = scene.scheme.traits.bears_drift
     gains = "if it vibrates, that gains a tenth to several times its energy"
     cure = "scheme(usavg), with which it grows ten times less, or not"
     if borne(scene.basis).damps and scene.d == 3:

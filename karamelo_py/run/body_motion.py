@@ -150,7 +150,7 @@ def drift_of(s: Any) -> Noise | None:
     if not (hasattr(s.scheme, "keeping") and s.moves and s.kept > 0.9) or _thrown(s):
         return None
     known, spacing = borne(s.basis), float(s.simulation.control.clock[0].spacing)
-    averages = getattr(s.scheme, "bears_drift", False)
+    averages = s.scheme.traits.bears_drift
     bound = (known.averaged if averages else known.drift)[s.sparse]
     bound /= known.line if s.d == 1 else 1
     speed = cells = 0.0
@@ -192,7 +192,7 @@ def turn_of(s: Any) -> Noise | None:
         return None
     known, spacing = borne(s.basis), float(s.simulation.control.clock[0].spacing)
     dt, one_point, most = s.simulation.dt, s.sparse, None
-    averages = getattr(s.scheme, "bears_drift", False)
+    averages = s.scheme.traits.bears_drift
     bound = (known.rim_averaged if averages else known.rim)[one_point]
     for one, _ in _bodies(s):
         speed, angle = one.spin * one.reach / s.waves, one.spin * s.duration

@@ -108,7 +108,7 @@ def carry_out(hub: Hub, **length: Any) -> None:
         if hub.settings.card:
             refuse(hub)
         span = runner.end_time - hub.update.time, inf if runner.steps is None else runner.steps
-        if not getattr(hub.update.scheme, "implicit", False):
+        if not hub.update.scheme.traits.implicit:
             hub.later.append(known_failures.step_of(hub, runner.rollback.halve, span))
         hub.in_runs += hub.lasting()
         return

@@ -198,7 +198,7 @@ class Simulation(SceneArrays):
             self.told_of_growth = self.told_of_loss = False
         if clock.watch_energy:
             # Velocities belong to half a step before, stresses to the share strained before.
-            level = 0.25 + 0.5 * getattr(self.hub.update.scheme, "strained_before", 0.0)
+            level = 0.25 + 0.5 * self.hub.update.scheme.traits.strained_before
             self._begin_to_look(level, anew)
         clock.watch_heat = int(self.hub.update.thermal and not unknown_heat(self.hub))
         if clock.watch_heat and anew:
@@ -310,12 +310,12 @@ class Simulation(SceneArrays):
     @property
     def implicit(self) -> bool:
         """Tell whether the scheme solves equations."""
-        return getattr(self.hub.update.scheme, "implicit", False)
+        return self.hub.update.scheme.traits.implicit
 
     @property
     def moves(self) -> bool:
         """Tell whether there is inertia: without it nobody watches the energy."""
-        return getattr(self.hub.update.scheme, "inertia", True)
+        return self.hub.update.scheme.traits.inertia
 
     @cached_property
     def load_steps(self) -> Any:

@@ -21,8 +21,8 @@ from karamelo_py.points.laws.strengths import shear_modulus
 from karamelo_py.points.transfers import Moment
 from karamelo_py.run.body_motion import motions
 from karamelo_py.scene.hub import Hub
+from karamelo_py.schemes.traits import USUAL
 
-USUAL = 0.9
 BOXES = 6.0  # weight of a common drift in the steps of boxes
 LOST = 2.05  # times the stable step, beyond which everything is lost that was tried
 NO_LIMITS = ("set_dt", "end")  # of stability
@@ -53,7 +53,7 @@ def keeping_share(hub: Hub) -> float:
         return USUAL
     basis = update.method.basis
     kind = getattr(basis, "gradient_jumps", False) * basis.nodes_per_cell
-    keeping = getattr(update.scheme, "keeping", ((USUAL, USUAL),) * 3)
+    keeping = update.scheme.traits.keeping
     share = keeping[kind][sparse(hub)]
     if alpha > 0.99:
         return share
@@ -72,7 +72,7 @@ def _keeps_velocities(hub: Hub) -> bool:
         update.method.frame.moves
         and getattr(update.transfer, "alpha", 0.0) > 0.9
         and not keeps_moments(hub)
-        and min(getattr(update.scheme, "courant", (1.0,))) >= 1
+        and min(update.scheme.traits.courant) >= 1
     )
 
 
@@ -121,7 +121,7 @@ def bears_drift(hub: Hub) -> bool:
         and len(laws) == 1  # one solid, of an elastic law or a metal
         and not _flows(laws[0])
         and not getattr(basis, "gradient_jumps", False)
-        and (getattr(basis, "bears_drift", False) or getattr(scheme, "bears_drift", False))
+        and (getattr(basis, "bears_drift", False) or scheme.traits.bears_drift)
         and keeping_share(hub) == USUAL
     )
 
@@ -137,7 +137,7 @@ def own_weight_of_drift(hub: Hub) -> float:
         return 0.0
     basis = hub.update.method.basis
     boxes = getattr(basis, "steep_edge", False) and basis.cells > 1
-    fed = boxes and _keeps_velocities(hub) and not getattr(hub.update.scheme, "bears_drift", False)
+    fed = boxes and _keeps_velocities(hub) and not hub.update.scheme.traits.bears_drift
     return BOXES if fed and hub.update.transfer.alpha > 0.99 and not sparse(hub) else 1.0
 
 
@@ -154,7 +154,7 @@ def common_velocity(simulation: Any, weight: float) -> np.ndarray:
 def courant_number(hub: Hub, *, longer: bool) -> float:
     """Return the stable step over h/c; `longer` is that of points which stay where they are."""
     scheme, method = hub.update.scheme, hub.update.method
-    two, one = getattr(scheme, "courant", (1.0, 1.0))  # a plug-in may have nothing to say of it
+    two, one = scheme.traits.courant
     if min(two, one) < 1:
         # Nodes between the corners of cells make the highest frequency higher.
         nodes = 0.7 if method.basis.nodes_per_cell > 1 else 1
@@ -164,7 +164,7 @@ def courant_number(hub: Hub, *, longer: bool) -> float:
     if not longer:
         return 1.0
     still = getattr(method.basis, "courant_still", 1.0)
-    if getattr(scheme, "strained_before", 0.0) == 1:
+    if scheme.traits.strained_before == 1:
         return min(still, getattr(method.basis, "courant_strained_first", inf))
     return still
 

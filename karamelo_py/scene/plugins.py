@@ -35,6 +35,7 @@ from karamelo_py.points import laws
 from karamelo_py.points.kinematics import KINEMATICS
 from karamelo_py.points.transfers import updated_velocity
 from karamelo_py.scene.modify import Fix
+from karamelo_py.schemes.traits import SchemeTraits
 from karamelo_py.script.errors import FAILURES
 from karamelo_py.script.values import in_a_row
 
@@ -42,7 +43,7 @@ from karamelo_py.script.values import in_a_row
 SAID = {
     "basis": ("cells", "nodes_per_cell", "least_nodes", "steady_moment", "steep_edge"),
     "transfer": ("inverts_spread",),
-    "scheme": ("rows",),
+    "scheme": ("rows", "traits"),
 }
 ROWS = (
     table.AtPoints, table.AtNodes, table.Gather, table.Scatter, table.NodeTask, table.SceneTask,
@@ -204,8 +205,13 @@ def check_part(hub: Scene, name: str, part: Any) -> None:
     if family == "transfer" and not updated_velocity.defined(kind):
         what = what or f"updated_velocity is not defined for {kind.__name__}"
     if family == "scheme" and not what:
+        loose = [name for name in SchemeTraits._fields if hasattr(kind, name)]
         strange = [row for row in kind.rows if not isinstance(row, ROWS)]
-        if strange:
+        if not isinstance(kind.traits, SchemeTraits):
+            what = f"its traits are {kind.traits!r}, and no SchemeTraits(...)"
+        elif loose:
+            what = f"{loose[0]} is one of its traits: traits = SchemeTraits({loose[0]}=...)"
+        elif strange:
             what = f"{strange[0]!r} in its rows is not a row of a scheme"
         elif not any(isinstance(row, table.Scatter) for row in kind.rows):
             what = "none of its rows is a Scatter: nothing reaches the grid"

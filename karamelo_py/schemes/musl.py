@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 from karamelo_py.kernels import table
 from karamelo_py.kernels.g2p import Strain
+from karamelo_py.schemes.traits import SchemeTraits
 
 
 class MUSL(NamedTuple):
@@ -17,11 +18,10 @@ class MUSL(NamedTuple):
     scheme(musl)
     """
 
-    maps_velocity_again = True
-    courant = (1.0, 1.0)
-    # Shares of the stable step that a drifting body keeps its energy with, 2 and 1 points per cell,
-    # with smooth gradients, with those that jump, and with nodes within the cells (docs/energy.md).
-    keeping = ((0.9, 0.9), (0.4, 0.2), (0.2, 0.2))
+    traits = SchemeTraits(
+        maps_velocity_again=True,
+        keeping=((0.9, 0.9), (0.4, 0.2), (0.2, 0.2)),  # docs/energy.md
+    )
     rows = (
         table.BEGIN,
         table.SUMS,

@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 from karamelo_py.compiler.fields import Field, vector
 from karamelo_py.language.signature import In, NonNegative, Positive
 from karamelo_py.schemes.quasi_static import BEGIN, CLOSE, HOLD, PUBLISHED, Tolerance
+from karamelo_py.schemes.traits import SchemeTraits
 from karamelo_py.script.errors import ScriptError
 
 
@@ -12,6 +13,15 @@ class Surplus(Field):
     """Acceleration of generalized-alpha over that of the forces, at the end of a step."""
 
     shape = vector
+
+
+def _damping(scheme: "Newmark") -> str:
+    """Name what takes energy from vibrations; empty where nothing does."""
+    if scheme.rule == "euler":
+        return "rule=euler"
+    if scheme.rho < 1:
+        return f"rho {scheme.rho:g}"
+    return f"gamma {scheme.gamma:g}" if scheme.gamma > 0.5 else ""
 
 
 class Newmark(NamedTuple):
@@ -48,9 +58,8 @@ class Newmark(NamedTuple):
     quasi-static, set_dt
     """
 
-    implicit = True
     limit = "error"
-    inertia = True
+    traits = SchemeTraits(implicit=True, damping=_damping)
     begin = BEGIN
     hold = HOLD
     close = CLOSE
@@ -71,15 +80,6 @@ class Newmark(NamedTuple):
         """Shares of the beginning of a step in its accelerations and its forces."""
         # With a radius of 1 both are halves, which is balance at the end after balance before.
         return _alphas(self.rho) if self.rho < 1 else (0.0, 0.0)
-
-    @property
-    def damping(self) -> str:
-        """Name what takes energy from vibrations; empty where nothing does."""
-        if self.rule == "euler":
-            return "rule=euler"
-        if self.rho < 1:
-            return f"rho {self.rho:g}"
-        return f"gamma {self.gamma:g}" if self.gamma > 0.5 else ""
 
     @property
     def point_fields(self) -> tuple[type, ...]:

@@ -5,6 +5,7 @@ from typing import Annotated, Literal, NamedTuple
 from karamelo_py.kernels import arrays, table
 from karamelo_py.kernels.g2p import StrainOfLoadStep
 from karamelo_py.language.signature import Constraint, NonNegative, Positive
+from karamelo_py.schemes.traits import SchemeTraits
 
 # What acts on the nodes in a step, by present stress; who holds them; and how points follow.
 BEGIN = (
@@ -71,8 +72,7 @@ class QuasiStatic(NamedTuple):
     that move otherwise, or held nodes without points.
     """
 
-    implicit = True
-    inertia = False
+    traits = SchemeTraits(implicit=True, inertia=False)
     begin = BEGIN
     hold = HOLD
     close = CLOSE

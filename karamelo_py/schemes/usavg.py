@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 from karamelo_py.kernels import table
 from karamelo_py.kernels.g2p import SecondStrain, Strain
+from karamelo_py.schemes.traits import SchemeTraits
 
 
 class USAVG(NamedTuple):
@@ -17,10 +18,11 @@ class USAVG(NamedTuple):
     scheme(usavg)
     """
 
-    courant = (1.0, 1.0)
-    keeping = ((0.9, 0.9), (0.9, 0.5), (0.45, 0.45))  # as in musl
-    bears_drift = True
-    strained_before = 0.5
+    traits = SchemeTraits(
+        strained_before=0.5,
+        bears_drift=True,
+        keeping=((0.9, 0.9), (0.9, 0.5), (0.45, 0.45)),  # docs/energy.md
+    )
     rows = (
         table.BEGIN,
         *table.VELOCITY_BEFORE,

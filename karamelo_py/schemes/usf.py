@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 from karamelo_py.kernels import table
 from karamelo_py.kernels.g2p import Strain
+from karamelo_py.schemes.traits import SchemeTraits
 
 
 class USF(NamedTuple):
@@ -22,9 +23,10 @@ class USF(NamedTuple):
     scheme(usf)
     """
 
-    courant = (1.0, 1.0)
-    keeping = ((0.9, 0.6), (0.4, 0.2), (0.2, 0.2))  # as in musl
-    strained_before = 1.0
+    traits = SchemeTraits(
+        strained_before=1.0,
+        keeping=((0.9, 0.6), (0.4, 0.2), (0.2, 0.2)),  # docs/energy.md
+    )
     rows = (
         table.BEGIN,
         *table.VELOCITY_BEFORE,

@@ -10,6 +10,7 @@ from karamelo_py.kernels.p2g import SquaredMass
 from karamelo_py.kernels.table import NodeTask, light_node
 from karamelo_py.language.rules import known_failure
 from karamelo_py.points.transfers import gradient_weight
+from karamelo_py.schemes.traits import SchemeTraits
 
 
 class USL(NamedTuple):
@@ -30,8 +31,7 @@ class USL(NamedTuple):
     scheme(usl)
     """
 
-    courant = (0.65, 0.4)
-    damps = True  # what vibrates, with two points per cell and direction
+    traits = SchemeTraits(courant=(0.65, 0.4), damps=True)
     node_fields = (SquaredMass,)
     rows = (
         table.BEGIN,
@@ -81,7 +81,7 @@ class USLUnlimited(NamedTuple):
     scheme(usl/unlimited)
     """
 
-    courant = USL.courant
+    traits = SchemeTraits(courant=USL.traits.courant)
     rows = tuple(
         table.NodeTask(any_node) if row == NodeTask(light_node) else row for row in USL.rows
     )

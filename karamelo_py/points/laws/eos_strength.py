@@ -232,7 +232,7 @@ known_failure(
 
 def _locks(law, scene):
     """Tell whether a body flows without a change of volume in load steps, which cells cannot."""
-    slow = not getattr(scene.scheme, "inertia", True) and not scene.hub.domain.axisymmetric
+    slow = not scene.scheme.traits.inertia and not scene.hub.domain.axisymmetric
     flows = strengths.equivalent_plastic_strain.defined(type(law.strength))
     by_shear = flows and not strengths.pressure_response.defined(type(law.strength))
     return scene.locks and slow and by_shear and {"place": scene.method.place}

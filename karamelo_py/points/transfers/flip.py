@@ -116,7 +116,7 @@ def swings(transfer: type) -> None:
             scene.moves
             and transfer.alpha > 0.9
             and scene.elastic
-            and not (getattr(scene.scheme, "damps", False) and not scene.sparse)
+            and not (scene.scheme.traits.damps and not scene.sparse)
             and scene.vibration.strain > SWING
             and scene.vibration.periods > 2
         ),

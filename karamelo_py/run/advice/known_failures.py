@@ -236,7 +236,7 @@ def warn_about_loads(hub: Hub, steps: float) -> None:
     acting = [fix for fix in hub.fixes.values() if fix.hooks() and not fix.first_step_only]
     given = {fix: list(formulas_of(tuple(vars(fix).values()))) for fix in acting}
     change = any(not formula.is_constant for formulas in given.values() for formula in formulas)
-    if hub.update.scheme.inertia or hub.update.thermal or steps < 2 or change:
+    if hub.update.scheme.traits.inertia or hub.update.thermal or steps < 2 or change:
         return
     loads, moves = [], False
     for fix, formulas in given.items():

@@ -30,7 +30,7 @@ def unknown_work(hub: Hub) -> str:
     Compiled hooks on nodes and points have their work added up by the loops. Fixes in Python say
     by `Fix.conserves` that they bring none.
     """
-    method, implicit = hub.update.method, getattr(hub.update.scheme, "implicit", False)
+    method, implicit = hub.update.method, hub.update.scheme.traits.implicit
     apart = method.own_grids or (implicit and method.fields_per_solid)
     for fix in hub.fixes.values():
         acts = any(not isinstance(hook, CompiledHook) for hook in fix.hooks().values())
@@ -177,8 +177,8 @@ def blends(transfer: Any) -> bool:
 def taken_by(hub: Hub) -> list[str]:
     """Name what a script has chosen that takes energy without an account of it."""
     found, transfer, scheme = [], hub.update.transfer, hub.update.scheme
-    if getattr(scheme, "damping", ""):
-        found.append(f"scheme {registry.name_of('scheme', type(scheme))} with {scheme.damping}")
+    if damping := scheme.traits.damping(scheme):
+        found.append(f"scheme {registry.name_of('scheme', type(scheme))} with {damping}")
     if blends(transfer):
         share = f" {transfer.alpha:g}" if hasattr(transfer, "alpha") else ""
         found.append(f"transfer {registry.name_of('transfer', type(transfer))}{share}")
@@ -211,7 +211,7 @@ def words_of_loss(hub: Hub, simulation: Any, within: float) -> Imbalance | None:
 
 def cause_of_loss(hub: Hub) -> tuple[str, str]:
     update, method = hub.update, hub.update.method
-    if getattr(update.scheme, "damps", False):
+    if update.scheme.traits.damps:
         name = registry.name_of("scheme", type(update.scheme))
         return f"scheme {name}, which damps what vibrates", "scheme(musl)"
     if found := collides(hub):
@@ -222,7 +222,7 @@ def cause_of_loss(hub: Hub) -> tuple[str, str]:
             "functions jump, and velocity differences within a cell",
             "quadratic-spline, or method tlmpm for a solid",
         )
-    if getattr(update.scheme, "implicit", False):
+    if update.scheme.traits.implicit:
         return (
             "vibrations and turns that cells and steps do not resolve",
             "finer cells, smaller steps",

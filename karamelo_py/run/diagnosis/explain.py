@@ -252,7 +252,7 @@ def _smaller_step(hub: Hub, simulation: Any) -> str:
     if doubted := [name for name in hub.update.warned_of if name.startswith(DOUBTED_UNITS)]:
         return f"look at the {doubted[0]}, as the warning says"
     if simulation.implicit:
-        inertia = simulation.hub.update.scheme.inertia
+        inertia = simulation.hub.update.scheme.traits.inertia
         return "use a smaller step (set_dt)" if inertia else "use more load steps, smaller ones"
     if not simulation.control.clock[0].watch_limit:
         return "the step is too large" + ", as the warning says" * _step_was_told(hub)

@@ -63,7 +63,7 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
                 solid.place,
             )
             continue
-        if not bears and not update.scheme.inertia:
+        if not bears and not update.scheme.traits.inertia:
             yield (
                 f"finds no equilibrium of '{solid.id}', which bears no shear: a gas or fluid",
                 f"scheme(newmark), or {_EXPLICIT}",
@@ -95,7 +95,7 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
                 fix.place,
             )
         elif (
-            not update.scheme.inertia
+            not update.scheme.traits.inertia
             and fix.style.startswith("initial_velocity")
             and not _of_rigid_points(hub, fix)
         ):
@@ -171,7 +171,7 @@ def check(hub: Hub) -> None:
         )
     for reason, instead, place in _reasons(hub):
         raise ScriptError(f"{name} {reason}", place=place or update.scheme_place, expected=instead)
-    if update.scheme.inertia and not update.fixed_dt:
+    if update.scheme.traits.inertia and not update.fixed_dt:
         raise ScriptError(
             f"{name} has no step of its own",
             place=update.scheme_place,

@@ -46,7 +46,7 @@ class LoadSteps:
     def __init__(self, simulation: Any):
         self.simulation = simulation
         self.scheme = simulation.hub.update.scheme
-        self.dynamic = self.scheme.inertia
+        self.dynamic = self.scheme.traits.inertia
         self.moduli: Moduli | None = None
         self.known: dict[str, Any] = {}  # of the last equations
         self.parts = 0  # of the present step that have been done

@@ -89,7 +89,7 @@ def check_scene(hub: Hub) -> None:
             error.place, error.command = method.place, "method"
         raise
     boundary.check(hub)
-    if getattr(hub.update.scheme, "implicit", False):
+    if hub.update.scheme.traits.implicit:
         implicit.check(hub)
     # Points of rigid bodies would have domains that deform.
     basis = type(method.basis)

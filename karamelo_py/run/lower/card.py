@@ -87,7 +87,7 @@ def refusals(hub: Hub, setup: Any = None) -> Iterator[ScriptError]:
     Before there are arrays (`setup`), what depends on them is not looked at.
     """
     scheme = hub.update.scheme
-    if getattr(scheme, "implicit", False):
+    if scheme.traits.implicit:
         name = registry.name_of("scheme", type(scheme))
         yield ScriptError(
             f"a GPU takes no steps of scheme {name}, which solves equations",

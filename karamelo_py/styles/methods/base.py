@@ -129,7 +129,7 @@ class Method:
         if not hub.update.anti_locking:
             return PointByPoint()
         laws = [solid.material.law for solid in hub.solids.values()]
-        steps = not getattr(hub.update.scheme, "implicit", False)
+        steps = not hub.update.scheme.traits.implicit
         return FBarOfSoil() if steps and any(map(takes_average, laws)) else FBar()
 
     def places(self, kin: Any, solid: Solid, real: type) -> np.ndarray:
@@ -163,10 +163,10 @@ class Method:
     def check(self, hub: Hub) -> None:
         """Refuse what does not go together; called before every run."""
         transfer, basis, scheme = hub.update.transfer, self.basis, hub.update.scheme
-        if getattr(scheme, "implicit", False):
+        if scheme.traits.implicit:
             return  # which has no part for these transfers
         unsteady = transfer.inverts_spread and not basis.steady_moment and self.frame.moves
-        if unsteady and not getattr(scheme, "maps_velocity_again", False):
+        if unsteady and not scheme.traits.maps_velocity_again:
             raise ScriptError(
                 f"{registry.name_of('transfer', type(transfer))} with {self.basis_name} functions "
                 f"and {registry.name_of('scheme', type(scheme))} is unstable: D of the affine "

@@ -76,7 +76,7 @@ class TLMPM(Method):
                 "fix(ID, contact/minimize_penetration, solid1, solid2, mu) for those that may "
                 "meet, or method ulmpm"
             )
-            if getattr(hub.update.scheme, "implicit", False):
+            if hub.update.scheme.traits.implicit:
                 hint = "method(ulmpm/contacts, ...) where they may meet"
             hub.warn(
                 f"solids with grids of their own pass through each other: {', '.join(alone)}",

@@ -216,7 +216,7 @@ def _shocks(eos, scene):
         what = (
             f"{scene.transfer_name} with linear functions loses a third of the pressure, and more"
         )
-    elif ratio < STRONG or getattr(scene.scheme, "bears_drift", False):
+    elif ratio < STRONG or scene.scheme.traits.bears_drift:
         return None
     else:
         what = "this scheme, whose work is not the energy in its front, loses 3 to 15 % of it"

@@ -7,6 +7,7 @@ from karamelo_py.kernels.arrays import FINAL_INTEGRATE, INITIAL_INTEGRATE, MASS
 from karamelo_py.kernels.g2p import Strain
 from karamelo_py.kernels.nodes import UpdateToVelocity
 from karamelo_py.kernels.table import ACCELERATE, MOVE, SERIES, SUMS, AtPoints, Gather, NodeTask
+from karamelo_py.schemes.traits import SchemeTraits
 
 
 @shared
@@ -26,7 +27,7 @@ class PlainUSL(NamedTuple):
     scheme(plain-usl)
     """
 
-    courant = (0.65, 0.4)  # the stable step over h/c, and with one point per cell
+    traits = SchemeTraits(courant=(0.65, 0.4))
     rows = (
         AtPoints(INITIAL_INTEGRATE, 0),
         SUMS,  # mass, momentum and force to the nodes

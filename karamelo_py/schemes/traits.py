@@ -1,0 +1,33 @@
+"""What a scheme says of itself: each has one `traits`, and nothing else is asked for."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+USUAL = 0.9  # of the stable step, which the program takes where nothing asks for less
+
+
+def _none(scheme: Any) -> str:
+    return ""
+
+
+class SchemeTraits(NamedTuple):
+    """Traits of a scheme; a plug-in gives those in which it differs from these defaults."""
+
+    # Steps are equilibria or balances that Newton's method finds, with or without inertia.
+    implicit: bool = False
+    inertia: bool = True
+    # Stable step in h/c with two points per cell and direction, and with one.
+    courant: tuple[float, float] = (1.0, 1.0)
+    # Fractions of the stable step with which a drifting body conserves its energy, with 2 and 1
+    # points per cell: smooth gradients, gradients that jump, nodes within the cells.
+    keeping: tuple[tuple[float, float], ...] = ((USUAL, USUAL),) * 3
+    # Fraction of a step's strain that comes before the forces.
+    strained_before: float = 0.0
+    # The velocity of the moved points is mapped to the nodes once more.
+    maps_velocity_again: bool = False
+    # Bodies that drift through the grid gain no energy.
+    bears_drift: bool = False
+    # Vibrations are damped, with two points per cell and direction.
+    damps: bool = False
+    # What takes energy from vibrations by the scheme's own numbers; empty where nothing does.
+    damping: Callable[[Any], str] = _none
