@@ -93,3 +93,15 @@ def test_scripts_as_others_write_them(run_script, karamelo, name, kinetic):
     if name == "2020":
         assert len(list(result.folder.glob("dump.*.png"))) == 15
         assert (result.folder / "plot.png").exists()
+
+
+@pytest.mark.xdist_group("disks")
+def test_energy_that_is_missing_while_disks_are_pressed_together(run_script):
+    """As docs/energy.md says: at the collision, not at the end."""
+    log = run_script(INPUTS / "in.two_disks").log
+    lowest = log.Etot.argmin()
+    page = (INPUTS.parent / "docs" / "energy.md").read_text(encoding="utf-8")
+    missing, time = 100 * (1 - log.Etot[lowest] / 2.6), log.Time[lowest]
+    said = f"{missing:.1f} % lower ({log.Etot[lowest]:.3f} of 2.6, at time {time:g})"
+    assert said in " ".join(page.split())
+    assert abs(log.Etot[-1] / 2.6 - 1) < 0.002
