@@ -190,7 +190,7 @@ class ContactMinimizePenetration(PairContact):
     Where steps fall at once, as by set_dt, it falls by 1 % of the time.
 
     A surface of balls is rough and brakes sliding. The force on a block (two points per cell and
-    direction) is 0.19, 0.49, 0.53 and 0.46 of its weight with mu = 0, 0.3, 0.5 and 1. Faces that
+    direction) is 0.19, 0.47, 0.57 and 0.52 of its weight with mu = 0, 0.3, 0.5 and 1. Faces that
     lean to the grid hook each other. On a slope of 20 degrees with mu = 0 a block sticks, and with
     points=cut it accelerates by 2.8 instead of 3.4. The program therefore warns of a coefficient.
     Method ulmpm/contacts gives the right friction.

@@ -59,7 +59,7 @@ class ContactSurface(StiffTool):
     The force acts in the direction in which the depth falls fastest. A point deeper than a cell, or
     in the middle of a thin region, ends the run. A region does not turn.
 
-    A block on a slope of 20 degrees with mu = 0.2 has the acceleration 1.54 in tlmpm and 1.56 in
+    A block on a slope of 20 degrees with mu = 0.2 has the acceleration 1.56 in tlmpm and 1.57 in
     ulmpm (exact 1.541; points=cut). Its energy is balanced to 0.3 %. It sinks in by ten times the
     force on a point over m / dt^2, here a twentieth of a cell. A belt over half a bollard with mu =
     0.3 is drawn slowly with 2.50 times its load (exact 2.57 for a thin belt, 2.45 for one whose
