@@ -286,9 +286,7 @@ class InitialStress(Fix):
 
     Example
     -------
-    top = 10
-    weight = -2000*9.81*(top - y0)
-    fix(geostatic, initial_stress, soil, 0.4*weight, weight, 0.4*weight, 0, 0, 0)
+    fix(k0, initial_stress, soil, 8000*(y0 - 10), 20000*(y0 - 10), 8000*(y0 - 10), 0, 0, 0)
 
     Notes
     -----
