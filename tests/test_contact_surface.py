@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from scenes import block
 
+from karamelo_py.scene.region import Region
+
 pytestmark = pytest.mark.xdist_group("surface")
 SLOPE = """
     method({method}, FLIP, linear, 1)
@@ -171,3 +173,31 @@ def test_motions_are_formulas_of_time(run_interpreted, fix, told):
 def test_friction_is_not_below_0(run_interpreted):
     lines = "region(die, block, 0, 0.9, 0, 0.2)", "fix(F, contact/surface, all, die, -0.1)"
     assert "at least 0" in run_interpreted(block(2, *lines), status=1).err
+
+
+def test_a_point_too_deep_ends_a_compiled_run(run_script):
+    """Whichever thread finds it: one message, and nothing of the compiler."""
+    lines = "region(die, block, 0, 0.9, 0, 0.9)", "fix(F, contact/surface, all, die)"
+    text = block(2, *lines, "set_dt(1e-9)", "run(1)")
+    for threads in (1, 2):
+        said = run_script(text, "--threads", str(threads), status=1).err
+        assert "point 1 of solid 'body' is so deep in region 'die' of fix 'F'" in said
+        assert "fix(F, contact/surface" in said and "Error" not in said
+
+
+def test_a_region_that_kernels_do_not_know_pushes_with_the_same_force(run_script, monkeypatch):
+    """As one of a plug-in, which has no outline: by depths that Python finds; with friction."""
+    lines = (
+        "fix(F, contact/surface, all, die, 0.3, 0.2*time, 0)",
+        "log_modify(custom, step, F_x, F_y)",
+    )
+    text = block(
+        2, "region(die, cylinder, 0.4, -4, 4.31)", *lines, "set_dt(0.001)", "set_output(1)",
+        "run(5)",
+    )  # fmt: skip
+    known = run_script(text, folder="known").log
+    monkeypatch.setattr(Region, "outline", lambda region: None)
+    told = run_script(text, folder="unknown").log
+    assert max(known["F_y"]) > 0 and max(known["F_x"]) > 0
+    for name in ("F_x", "F_y"):
+        assert told[name] == pytest.approx(known[name], rel=1e-9, abs=1e-9)

@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 from meshed import grid_mesh, sphere_surface, write
 
 from karamelo_py.commands import domain as commands
+from karamelo_py.kernels import surfaces
+from karamelo_py.points.kinematics import KINEMATICS
 from karamelo_py.scene.domain import Domain
 from karamelo_py.scene.lattice import Lattice
 from karamelo_py.script.errors import ScriptError
@@ -383,6 +385,10 @@ def test_distances_tell_inside_from_outside_and_are_none_too_long(dimension, ext
         depth, beside = region.depth(x, 0.3), region.depth(y, 0.3)
         np.testing.assert_array_equal(depth > 0, region.inside(x))
         assert (np.abs(depth - beside) <= np.linalg.norm(x - y, axis=1) * (1 + 1e-9)).all()
+        # Kernels, which look at one place at a time, know the same, as far as they look.
+        outline, kin = region.outline(), KINEMATICS[dimension]()
+        known = [surfaces.depth(outline, kin, kin.Vector(*place), 0.3) for place in x[:40]]
+        np.testing.assert_allclose(np.minimum(known, 0.3), np.minimum(depth[:40], 0.3), atol=1e-12)
 
 
 def test_a_plane_has_two_sides():

@@ -9,6 +9,8 @@ from hubs import SmallHub
 from meshed import cube_surface, enclosed_volume, sphere_surface, write
 from test_scene_script import message
 
+from karamelo_py.kernels import surfaces
+from karamelo_py.points.kinematics import KINEMATICS
 from karamelo_py.scene.meshes.inside import skin_of
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.meshes import STL
@@ -310,3 +312,20 @@ def test_other_units_are_named(tmp_path, length, told):
     hub = SmallHub(3, -1, 1, 0.1)
     STL(hub, box(tmp_path, length, length / 2, length / 2, corner=length / 100))
     assert told in "".join(hub.warnings) and bool(told) == bool(hub.warnings)
+
+
+def test_the_way_out_of_a_surface_is_that_to_the_nearest_face():
+    """Of a cube, out of its faces and away from its edges; nowhere deeper than it is known."""
+    points, triangles = cube_surface(0, 1)
+    surface, kin = skin_of(points, triangles, 1e-9).surfaces[0], KINEMATICS[3]()
+    slanted = np.array([1.0, 2.0, 2.0]) / 3
+    ways = {
+        (0.5, 0.4, 1.1): (0, 0, 1), (0.5, 0.4, 0.9): (0, 0, 1), (0.5, 0.4, 0.999): (0, 0, 1),
+        (0.5, 1.1, 1.1): (0, 0.5**0.5, 0.5**0.5), tuple(1 + 0.1 * slanted): slanted,
+        (0.5, 0.5, 0.5): (0, 0, 0),
+    }  # fmt: skip
+    for place, wanted in ways.items():
+        x, reach = kin.Vector(*place), 0.3
+        within = surfaces.depth(surface, kin, x, reach)
+        found = surfaces.slopes(surface, kin, x, reach, within, 0.01)
+        assert np.array(found) / 0.02 == pytest.approx(np.array(wanted), abs=1e-9), place

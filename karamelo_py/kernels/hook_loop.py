@@ -163,6 +163,7 @@ def _act_on_parts(what, task, hooks, control, dt, h, share, k):
         own.values[i] = control.values[i]
     clock, there = control.clock[0], own.clock[0]
     there.last_dt, there.kick = clock.last_dt, clock.kick
+    there.contact_dt, there.contact_kick = clock.contact_dt, clock.contact_kick
     there.set_low, there.set_high = clock.set_low, clock.set_high
     there.rise, there.fall = clock.rise, clock.fall
     there.coldest, there.hottest = clock.coldest, clock.hottest
@@ -697,16 +698,33 @@ def _act_on_warmth(what, task, hooks, control, dt, h, count, share):
     return 0
 
 
+def _of_time(tag, kin, hooks, control, dt, h):
+    """Give formulas of time now and at the end of the step, 0 without; and the times of contact."""
+    found = []
+    for shift in (0.0, dt):
+        for c in range(kin.dimension):
+            if c < len(tag.values):
+                evaluate(hooks, h, c, 1, control, VALUE, shift)
+                found.append(hooks.scratch[VALUE, 0])
+            else:
+                found.append(0.0)
+    clock = control.clock[0]
+    return (*found, clock.contact_dt, clock.contact_kick, clock.kick)
+
+
 @act.on(WholePoints)
 def _act_on_whole_points(what, task, hooks, control, dt, h, count, share):
     tag, points, kin = what.tag, what.points, what.kin
     rows = (VALUE, BEFORE, THIRD)
-    for c in range(len(tag.values)):
+    led = _of_time(tag, kin, hooks, control, dt, h) if tag.of_time else ()
+    for c in range(0 if tag.of_time else len(tag.values)):
         evaluate(hooks, h, c, count, control, rows[c], 0.0)
     for q in range(count):
         p = hooks.chosen[q]
         law, state = state_at(kin, points, what.laws, p)
-        values = tuple([hooks.scratch[rows[c], q] for c in range(len(tag.values))])
+        values = led
+        if not tag.of_time:
+            values = tuple([hooks.scratch[rows[c], q] for c in range(len(tag.values))])
         old = load_vector(kin, points.v, p)
         found = kinds.results(tag, what, law, state, p, values, dt)
         numbers = kinds.written(tag, what, p, found)

@@ -74,9 +74,10 @@ class CompiledHook(NamedTuple):
     uses_before: bool  # needs the formulas one step earlier as well
     uses_share: bool  # needs one over the number of members with mass
     holds: bool  # sets v_star, or bounds it: one of several decides; leads a temperature
-    tag: type | None = None  # of whole points: the class that stands for the function
+    tag: Callable | None = None  # of whole points: makes what stands for the function
     reads: tuple = ()
     writes: tuple = ()
+    internal: bool = False  # its arguments are no plug-in's, and cards do not know it
 
     @property
     def on_nodes(self) -> bool:
@@ -252,7 +253,7 @@ def vector_hook(
     setattr(module, name, made)
     reader, writer = (_node_reader, _node_writer) if nodes else (_reader, _writer)
     readers, writers = tuple(map(reader, reads)), tuple(map(writer, writes))
-    made.of_nodes = nodes  # type: ignore[attr-defined]
+    made.of_nodes, made.of_time = nodes, False  # type: ignore[attr-defined]
     alone = len(writes) + publishes == 1
 
     def results_of(tag, what, law, state, p, values, dt):

@@ -15,7 +15,7 @@ import numpy as np
 
 from karamelo_py.compiler.compile import point_function
 from karamelo_py.compiler.held import at_hand
-from karamelo_py.compiler.loops import kernel, noinline
+from karamelo_py.compiler.loops import noinline
 from karamelo_py.compiler.threads import Serial, by_threads
 from karamelo_py.points.kinematics import KINEMATICS
 
@@ -34,7 +34,7 @@ class Surface(NamedTuple):
 
 
 class Convex(NamedTuple):
-    """What lies below planes and in a ball, or in a cylinder, of a size that may be infinite."""
+    """The part of space below planes and in a ball, or a cylinder, which may be infinite."""
 
     planes: np.ndarray  # (k, d + 1): normals into it, and their products with a place
     across: np.ndarray  # (d,) 1 along the axes across which it is round, else 0
@@ -99,6 +99,14 @@ def _cross(a, b):
     )
 
 
+def _is_above(a, b, c, normal, size, x):
+    """Tell whether `x` is above or below a triangle."""
+    above = size > TINY
+    above = above and _dot(_cross(b - a, x - a), normal) >= 0
+    above = above and _dot(_cross(c - b, x - b), normal) >= 0
+    return above and _dot(_cross(a - c, x - c), normal) >= 0
+
+
 @point_function()
 def _squared(kin, surface, i, x):
     """Square of the distance of `x` from face `i`."""
@@ -119,11 +127,7 @@ def _from_triangle(kin, surface, i, x):
     a, b, c = (_corner(kin, surface, i, k) for k in range(3))
     normal = _cross(b - a, c - a)
     size = normal.squared()
-    above = size > TINY
-    above = above and _dot(_cross(b - a, x - a), normal) >= 0
-    above = above and _dot(_cross(c - b, x - b), normal) >= 0
-    above = above and _dot(_cross(a - c, x - c), normal) >= 0
-    if above:
+    if _is_above(a, b, c, normal, size, x):
         height = _dot(x - a, normal)
         return height * height / size
     return min(min(_from_line(a, b, x), _from_line(b, c, x)), _from_line(c, a, x))
@@ -169,6 +173,62 @@ def distance(kin, surface, x, reach):
                 best = _nearer(kin, surface, k, x, best)
             k = _behind(k)
     return sqrt(best)
+
+
+def _on_line(a, b, x):
+    """Return the place on a segment that is nearest to `x`."""
+    way = b - a
+    return a + min(max(_dot(way, x - a) / max(way.squared(), TINY), 0.0), 1.0) * way
+
+
+@point_function()
+def _place_on(kin, surface, i, x):
+    """Return the place on face `i` that is nearest to `x`."""
+
+
+@_place_on.on(KINEMATICS[1])
+def _place_of_point(kin, surface, i, x):
+    return _corner(kin, surface, i, 0)
+
+
+@_place_on.on(KINEMATICS[2])
+def _place_on_segment(kin, surface, i, x):
+    return _on_line(_corner(kin, surface, i, 0), _corner(kin, surface, i, 1), x)
+
+
+@_place_on.on(KINEMATICS[3])
+def _place_on_triangle(kin, surface, i, x):
+    a, b, c = (_corner(kin, surface, i, k) for k in range(3))
+    normal = _cross(b - a, c - a)
+    size = normal.squared()
+    if _is_above(a, b, c, normal, size, x):
+        return x - _dot(x - a, normal) / size * normal
+    found, best = _on_line(a, b, x), _from_line(a, b, x)
+    if _from_line(b, c, x) < best:
+        found, best = _on_line(b, c, x), _from_line(b, c, x)
+    if _from_line(c, a, x) < best:
+        found = _on_line(c, a, x)
+    return found
+
+
+@noinline
+def nearest(kin, surface, x, reach):
+    """Return the place on the nearest face, which is nearer to `x` than `reach`."""
+    leaves = surface.low.shape[0] // 2
+    best, face = reach * reach, 0
+    k = 1
+    while k > 0:
+        near = _from_box(kin, surface, k, x) < best
+        if near and k < leaves:
+            k = 2 * k
+        else:
+            first = LEAF * (k - leaves) if near else 0
+            for i in range(first, min(first + LEAF, surface.faces.shape[0]) if near else 0):
+                square = _squared(kin, surface, i, x)
+                if square < best:
+                    best, face = square, i
+            k = _behind(k)
+    return _place_on(kin, surface, face, x)
 
 
 @noinline
@@ -241,12 +301,12 @@ def _place(kin, x, p):
     return kin.Vector._make([x[p, c] for c in range(kin.dimension)])
 
 
-def _depths_of_some(kin, surface, x, reach, depth, n):
+def _depths_of_some(kin, surface, x, reach, out, n):
     surface = at_hand(surface)
     for p in range(n * CHUNK, min((n + 1) * CHUNK, x.shape[0])):
         place = _place(kin, x, p)
         found = distance(kin, surface, place, reach)
-        depth[p] = found if encloses(kin, surface, place) else -found
+        out[p] = found if encloses(kin, surface, place) else -found
 
 
 _depths = by_threads(_depths_of_some)
@@ -281,43 +341,109 @@ def _of(kernel: Any, surface: Surface, x: np.ndarray, *more: Any) -> np.ndarray:
     return found
 
 
+# --- shapes: what regions are for kernels -------------------------------------------------------
+
+
+class HalfSpace(NamedTuple):
+    """One side of a plane, however deep."""
+
+    normal: np.ndarray  # (d,) into it
+    offset: float  # its product with a place on the plane
+
+
+class Joined(NamedTuple):
+    """The union of some shapes."""
+
+    parts: tuple
+
+
+class Common(NamedTuple):
+    """The intersection of some shapes."""
+
+    parts: tuple
+
+
+class Outside(NamedTuple):
+    """All outside of a shape."""
+
+    part: NamedTuple
+
+
 @point_function()
-def reaches(shape, kin, x, reach):
-    """Tell whether `x` is in a shape, or nearer to it than `reach`."""
+def depth(shape, kin, x, reach):
+    """Return how deep `x` lies in a shape, below 0 outside: right as far as it is below `reach`."""
 
 
-@reaches.on(Surface)
-def _surface_reaches(shape, kin, x, reach):
-    if _from_box(kin, shape, 1, x) >= reach * reach:
-        return False
-    return distance(kin, shape, x, reach) < reach or encloses(kin, shape, x)
+@point_function(otherwise=True)
+def slopes(shape, kin, x, reach, within, step):
+    """Return how the depth falls from a step before `x`, at the depth `within`, to one behind."""
+    return _slopes_across(shape, kin, x, reach, step)
 
 
-@reaches.on(Convex)
-def _convex_reaches(shape, kin, x, reach):
-    for i in range(shape.planes.shape[0]):
-        depth = -shape.planes[i, kin.dimension]
-        for c in range(kin.dimension):
-            depth += shape.planes[i, c] * x[c]
-        if depth <= -reach:
-            return False
+@slopes.on(Surface)
+def _slopes_at_surface(shape, kin, x, reach, within, step):
+    near = abs(within)
+    if near <= step:
+        return _slopes_across(shape, kin, x, min(near + 1.01 * step, reach), step)
+    if near >= reach:
+        return x - x
+    away = x - nearest(kin, shape, x, 1.001 * near)
+    return 2 * step / near * (away if within < 0 else -away)
+
+
+@noinline
+def _slopes_across(shape, kin, x, reach, step):
+    found = []
+    for k in range(kin.dimension):
+        aside = kin.Vector._make([step if c == k else 0.0 for c in range(kin.dimension)])
+        found.append(depth(shape, kin, x - aside, reach) - depth(shape, kin, x + aside, reach))
+    return kin.Vector._make(found)
+
+
+@depth.on(Surface)
+def _depth_in_surface(shape, kin, x, reach):
+    found = distance(kin, shape, x, reach)
+    return found if encloses(kin, shape, x) else -found
+
+
+@depth.on(HalfSpace)
+def _depth_in_half_space(shape, kin, x, reach):
+    found = -shape.offset
+    for c in range(kin.dimension):
+        found += shape.normal[c] * x[c]
+    return found
+
+
+@depth.on(Convex)
+def _depth_in_convex(shape, kin, x, reach):
     square = 0.0
     for c in range(kin.dimension):
         square += shape.across[c] * (x[c] - shape.centre[c]) ** 2
-    return sqrt(square) < shape.radius + reach
+    found = min(shape.radius - sqrt(square), reach)
+    for i in range(shape.planes.shape[0]):
+        below = -shape.planes[i, kin.dimension]
+        for c in range(kin.dimension):
+            below += shape.planes[i, c] * x[c]
+        found = min(found, below)
+    return found
 
 
-@kernel
-def near_points(kin, shape, x, way, reach, rows):
-    """Find the points at `x` (w, n) that a shape reaches, `way` (d,) further on; how many.
+@depth.on(Joined)
+def _depth_in_joined(shape, kin, x, reach):
+    found = depth(shape.parts[0], kin, x, reach)
+    for part in shape.parts[1:]:
+        found = max(found, depth(part, kin, x, reach))
+    return found
 
-    Their numbers go to `rows` (n,).
-    """
-    shape = at_hand(shape)
-    count = 0
-    for p in range(x.shape[1]):
-        place = kin.Vector._make([float(x[c, p]) - way[c] for c in range(kin.dimension)])
-        if reaches(shape, kin, place, reach):
-            rows[count] = p
-            count += 1
-    return count
+
+@depth.on(Common)
+def _depth_in_common(shape, kin, x, reach):
+    found = depth(shape.parts[0], kin, x, reach)
+    for part in shape.parts[1:]:
+        found = min(found, depth(part, kin, x, reach))
+    return found
+
+
+@depth.on(Outside)
+def _depth_outside(shape, kin, x, reach):
+    return -depth(shape.part, kin, x, reach)

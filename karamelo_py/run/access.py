@@ -64,21 +64,12 @@ class PointsById:
                 add_all(limbs, 0, values)
         return rounded(self.comm.allreduce(limbs)[0])
 
-    def rows_of(
-        self, group: Any, near: Callable | None = None
-    ) -> Iterator[tuple[Block, np.ndarray]]:
-        """Yield the points of a group at hand, so many at a time: a block, and rows of it.
-
-        ``near(x)`` may say which rows it is about, of points at `x` (w, n).
-        """
+    def rows_of(self, group: Any) -> Iterator[tuple[Block, np.ndarray]]:
+        """Yield the points of a group at hand, so many at a time: a block, and rows of it."""
         for block in self.setup.blocks:
             ids = block.points.id
-            chosen = near(block.points.x[self.simulation.now]) if near else None
-            for first in range(0, len(ids) if chosen is None else len(chosen), PIECE):
-                if chosen is None:
-                    rows = np.arange(first, min(first + PIECE, len(ids)))
-                else:
-                    rows = chosen[first : first + PIECE]
+            for first in range(0, len(ids), PIECE):
+                rows = np.arange(first, min(first + PIECE, len(ids)))
                 if not (group is None or group.all):
                     rows = rows[group.has(ids[rows])]
                 if len(rows):

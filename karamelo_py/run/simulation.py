@@ -299,7 +299,7 @@ class Simulation(SceneArrays):
 
     @property
     def _acting(self) -> Any:
-        """What acts in a step: compiled hooks, with calls of Python, or Python between its rows."""
+        """Return what acts in a step: compiled hooks, or Python between its rows."""
         return self._called or (self.python if self.python.by_stage else self.hooks)
 
     @property

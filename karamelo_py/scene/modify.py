@@ -39,6 +39,9 @@ __all__ = [
 ]
 
 
+FROM_PYTHON = 3e-4  # seconds of a core, of a hook without what it does
+
+
 class Publisher:
     """Base of fixes and computes: publishes values under its ID."""
 
@@ -125,12 +128,10 @@ class Fix(Publisher):
     def defined(self) -> None:
         """Called when the fix has its ID and belongs to the scene."""
 
-    def near(self, x: np.ndarray) -> np.ndarray | None:
-        """Return the numbers of those points at `x` (w, n) that it may act on; None: all of them.
-
-        For fixes with ``point_by_point``: their hooks see no other points.
-        """
-        return None
+    def seconds(self) -> float:
+        """Estimate the seconds of a core that it adds to a step, for words of ``check``."""
+        from_python = any(not isinstance(hook, CompiledHook) for hook in self.hooks().values())
+        return FROM_PYTHON if from_python and not self.first_step_only else 0.0
 
     def hooks(self) -> dict[str, Any]:
         """The hooks this fix overrides: name to method or compiled hook."""

@@ -103,9 +103,10 @@ def _wrong_hooks(fix: Fix) -> Iterator[str]:
             f"{next(iter(hooks))} acts on a group, and the fix has none: its __init__ has to call "
             f"super().__init__(hub, group){faults.place_of(type(fix).__init__)}"
         )
-    compiled = {m: hook for m, hook in hooks.items() if isinstance(hook, CompiledHook)}
+    compiled = {m: h for m, h in hooks.items() if isinstance(h, CompiledHook)}
+    compiled = {m: hook for m, hook in compiled.items() if not hook.internal}
     for moment, hook in hooks.items():
-        if moment in compiled:
+        if isinstance(hook, CompiledHook):
             continue
         if not callable(hook):
             yield f"{moment} is neither a method nor a compiled hook"

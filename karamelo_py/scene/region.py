@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from karamelo_py.kernels.surfaces import Outside
 from karamelo_py.language.arguments import Named
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
@@ -117,12 +118,17 @@ class Region(Named):
             near[other, k] = high
         return np.where(inside, 1, -1) * near.min(axis=1) / math.sqrt(d)
 
-    def outline(self) -> Any:
-        """Return what kernels know the shape by (`kernels.surfaces.reaches`), None if they do not.
+    def shape(self) -> Any:
+        """Return what kernels know `distance` by (`kernels.surfaces.depth`), None if they do not.
 
         `exterior` plays no part here.
         """
         return None
+
+    def outline(self) -> Any:
+        """Return what kernels know `depth` by, None if they do not."""
+        shape = self.shape()
+        return Outside(shape) if self.exterior and shape is not None else shape
 
     def depth(self, x: np.ndarray, reach: float) -> np.ndarray:
         """Return the depth of positions in the region, see `distance`: (n,)."""

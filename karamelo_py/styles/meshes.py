@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from karamelo_py.kernels.surfaces import Surface
+from karamelo_py.kernels.surfaces import Joined, Surface
 from karamelo_py.language.signature import Positive
 from karamelo_py.scene.domain import RELATIVE_TOLERANCE, require_domain
 from karamelo_py.scene.hub import Hub
@@ -78,8 +78,9 @@ class Enclosed(Region):
     def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
         return self.skin.depth(x, reach)
 
-    def outline(self) -> Surface | None:
-        return self.skin.surfaces[0] if len(self.skin.surfaces) == 1 and not self.flat else None
+    def shape(self) -> Surface | Joined | None:
+        first, *others = self.skin.surfaces
+        return None if self.flat else Joined((first, *others)) if others else first
 
 
 class MeshRegion(Enclosed):

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from karamelo_py.kernels.surfaces import Convex
+from karamelo_py.kernels.surfaces import Common, Convex, HalfSpace, Joined, Outside
 from karamelo_py.language.by_dimension import Forms
 from karamelo_py.language.signature import Argument
 from karamelo_py.scene import region
@@ -40,7 +40,7 @@ class Primitive(region.Region):
             np.minimum(depth, hi - x[:, axis], out=depth)
         return depth
 
-    def outline(self) -> Convex:
+    def shape(self) -> Convex | HalfSpace:
         d = self.dimension
         planes = [plane for slab in self.slabs for plane in _between(d, *slab)]
         across, centre = np.zeros((2, d))
@@ -237,10 +237,8 @@ class Plane(Primitive):
             depth += along * (x[:, k] - middle)
         return depth
 
-    def outline(self) -> Convex:
-        d = self.dimension
-        plane = np.append(self.normal, self.normal @ self.middle)
-        return Convex(plane[None], np.zeros(d), np.zeros(d), math.inf)
+    def shape(self) -> HalfSpace:
+        return HalfSpace(self.normal, float(self.normal @ self.middle))
 
 
 class Union(region.Region):
@@ -264,6 +262,7 @@ class Union(region.Region):
 
     # How the insides and the corners of the boxes of the parts are put together.
     joined, low, high = np.logical_or, np.minimum, np.maximum
+    kind: type = Joined
 
     def __init__(self, hub: Hub, first: region.Region, second: region.Region, *more: region.Region):
         parts = (first, second, *more)
@@ -281,6 +280,10 @@ class Union(region.Region):
     def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
         return self.high.reduce([part.depth(x, reach) for part in self.parts])
 
+    def shape(self) -> Joined | Common | None:
+        parts = outlines(self.parts)
+        return None if parts is None else self.kind(parts)
+
 
 class Intersection(Union):
     """All that lies in each of two or more regions.
@@ -297,6 +300,7 @@ class Intersection(Union):
     """
 
     joined, low, high = np.logical_and, np.maximum, np.minimum
+    kind = Common
 
 
 class Difference(region.Region):
@@ -331,3 +335,13 @@ class Difference(region.Region):
     def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
         first, *others = (part.depth(x, reach) for part in self.parts)
         return np.minimum(first, -np.maximum.reduce(others))
+
+    def shape(self) -> Common | None:
+        parts = outlines(self.parts)
+        return None if parts is None else Common((parts[0], *map(Outside, parts[1:])))
+
+
+def outlines(parts: Sequence[region.Region]) -> tuple | None:
+    """Return what kernels know some regions by; None where there is one that they do not know."""
+    found = [part.outline() for part in parts]
+    return None if any(one is None for one in found) else tuple(found)

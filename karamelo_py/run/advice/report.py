@@ -11,7 +11,7 @@ from karamelo_py.points.basis import support
 from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.further import without_rate
 from karamelo_py.run.advice.known_failures import refuse_endless_speeds
-from karamelo_py.run.advice.suggestions import POINT, suggestions
+from karamelo_py.run.advice.suggestions import seconds_of_step, suggestions
 from karamelo_py.run.diagnosis.energy import not_watched, unknown_work
 from karamelo_py.run.lower.card import memory_there, refusals
 from karamelo_py.run.lower.memory import known, memory_of, node_fields, nodes_in_use, point_fields
@@ -60,7 +60,11 @@ def report(hub: Hub, end_time: float = inf) -> None:
             say(f"own dt         {step}")
         say(f"limited by     {ruling_limit(simulation)}")
         if (n := (end_time - simulation.time) / simulation.dt) < inf:
-            say(f"steps          about {n:.0f}, {POINT * n * simulation.count:.1g} s or more")
+            one = seconds_of_step(hub, simulation.count)
+            say(f"steps          about {n:.0f}, {n * one:.1g} s or more")
+            most = max(hub.fixes.values(), key=lambda fix: fix.seconds(), default=None)
+            if most is not None and 2 * most.seconds() > one:
+                say(f"               most of it for fix {most.style} '{most.id}'")
     if simulation.moves:
         why = unknown_work(hub)
         say(f"energy         {not_watched(why) if why else 'is watched'}")

@@ -26,6 +26,11 @@ POINT, LINE, PICTURE, DRAWING, FILE, NUMBER = 1e-7, 5e-4, 0.02, 0.5, 3e-4, 3e-7
 LONG = 0.5  # seconds of output that count
 
 
+def seconds_of_step(hub: Hub, count: int) -> float:
+    """Estimate the seconds of a core that a step takes at least."""
+    return POINT * count + sum(fix.seconds() for fix in hub.fixes.values())
+
+
 def suggestions(hub: Hub, simulation: Any) -> list[Advice]:
     """Find all that is known to be paid for without need, before anything has run."""
     rules = (
@@ -320,7 +325,7 @@ def _output(hub: Hub, simulation: Any) -> Words:
     pictures = sum(map(times, drawn)) + (hub.output.plots.file is not None)
     output = LINE * times(hub.output.log) + PICTURE * pictures + DRAWING * (pictures > 0)
     output += sum(times(dump) * (FILE + NUMBER * count * len(dump.columns)) for dump in files)
-    stepping = POINT * steps * count
+    stepping = steps * seconds_of_step(hub, count)
     if output > max(LONG, stepping):
         lines, tables = round(times(hub.output.log)), round(sum(map(times, files)))
         yield (

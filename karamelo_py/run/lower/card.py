@@ -98,10 +98,11 @@ def refusals(hub: Hub, setup: Any = None) -> Iterator[ScriptError]:
     for fix in hub.fixes.values():
         hooks = fix.hooks().items() if not fix.first_step_only else ()
         for name, hook in hooks:
-            if not isinstance(hook, CompiledHook):
+            from_python = not isinstance(hook, CompiledHook)
+            if from_python or hook.internal:
+                why = "acts from Python in each step" if from_python else "is for processors"
                 yield ScriptError(
-                    f"fix {fix.style} '{fix.id}' acts from Python in each step ({name}): a GPU "
-                    "would wait for it",
+                    f"fix {fix.style} '{fix.id}' {why} ({name}): a GPU would wait for it",
                     place=fix.place,
                     hint=f"a fix whose hooks are compiled, or {WITHOUT}",
                 )

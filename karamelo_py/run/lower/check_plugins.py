@@ -48,7 +48,7 @@ def try_parts(hub: Hub, setup: Any) -> None:
             _numbers(part, "updated_velocity", found, v[0])
     for fix in hub.fixes.values():
         for moment, hook in fix.hooks().items():
-            if isinstance(hook, CompiledHook) and hook.tag is not None:
+            if isinstance(hook, CompiledHook) and hook.tag is not None and not hook.internal:
                 _try_hook(setup, fix, moment, hook)
 
 

@@ -299,7 +299,7 @@ def view_of(simulation: Any, fix: Any, *, then: bool) -> PointsView:
     """Show the points of a fix, or those of them that are at hand."""
     if fix.point_by_point:
         return PieceView(
-            simulation, list(simulation.points.rows_of(fix.group, fix.near)), then, in_steps=True
+            simulation, list(simulation.points.rows_of(fix.group)), then, in_steps=True
         )
     return PointsView(simulation, simulation.points.members(fix.group), then)
 

@@ -1,14 +1,23 @@
 """Contact of points with the surface of a region."""
 
+from functools import cached_property
 from typing import Annotated
 
 import numpy as np
 
-from karamelo_py.kernels.surfaces import near_points
+from karamelo_py.compiler.loops import address_of_python
+from karamelo_py.kernels.touching import (
+    ASIDE,
+    CALL,
+    LEVEL,
+    SOFT,
+    Touch,
+    touch_hook,
+    touch_kind,
+)
 from karamelo_py.language.rules import known_failure
 from karamelo_py.language.signature import NonNegative
 from karamelo_py.output.point_table import PointTable
-from karamelo_py.points.kinematics import KINEMATICS
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.region import Region
@@ -19,7 +28,8 @@ from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.tools.base import begin_behind
 from karamelo_py.styles.fixes.tools.stiff import StiffTool
 
-SOFT = 0.1  # share of a penetration that a step undoes where it stops the approach, too
+# Seconds of a core for a point near a surface of some thousand faces, and one near a plain shape.
+OF_FACES, OF_SHAPE = 1.5e-6, 5e-8
 
 
 class ContactSurface(StiffTool):
@@ -91,6 +101,9 @@ class ContactSurface(StiffTool):
         self.region = region
         self.rubs(hub, mu)
         self.way = self.of_time("u", way) if way else ()
+        if region.outline() is not None:
+            self.formulas, self.published = self.way, tuple("xyz"[: hub.domain.dimension])
+            self.initial_integrate = touch_hook(self._touch)
 
     def moved(self, dt: float) -> tuple[np.ndarray, np.ndarray]:
         """Find the way (d,) of the region so far, and its mean velocity (d,) in the next step."""
@@ -104,16 +117,6 @@ class ContactSurface(StiffTool):
         """Depth (n,) of positions that move with the region, a cell at most."""
         return self.region.depth(x, self.hub.domain.h)
 
-    def near(self, x: np.ndarray) -> np.ndarray:
-        """Return the numbers of points at `x` (w, n) that are nearer to the region than a cell."""
-        d, h = self.hub.domain.dimension, self.hub.domain.h
-        way = self.now(*self.way) if self.way else np.zeros(d)
-        outline = None if self.region.exterior else self.region.outline()
-        if outline is None:
-            return np.flatnonzero(self.depth(x[:d].T - way) > -h)
-        rows = np.empty(x.shape[1], np.int64)
-        return rows[: near_points(KINEMATICS[d](), outline, x, way, h, rows)]
-
     def depth_of(self, points: PointTable) -> np.ndarray:
         """Depth (n,) of points in the region now."""
         return self.depth(points.position.astype(float) - self.moved(1.0)[0])
@@ -123,28 +126,44 @@ class ContactSurface(StiffTool):
         skin = getattr(self.region, "skin", None)
         return None if skin is None else skin.faces + self.moved(1.0)[0]
 
+    def _touch(self, row: int, values: tuple) -> Touch:
+        """Make what stands for this fix in kernels."""
+        self.begin_to_touch()
+        shape, h = self.region.outline(), float(self.hub.domain.h)
+        return touch_kind(self.grip)(row, values, shape, float(self.mu), h, self._address)
+
+    def seconds(self) -> float:
+        one = OF_FACES if self.region.from_file else OF_SHAPE
+        return super().seconds() + one * len(self.group)
+
+    @cached_property
+    def _address(self) -> int:
+        return address_of_python(self._refuse, CALL)
+
+    def _refuse(self, number: int) -> int:
+        """Refuse a point, by its number from 0, that has no way out."""
+        raise ScriptError(
+            f"{named(self.hub, number)} is so deep in region '{self.region.id}' of fix "
+            f"'{self.id}' that no way out of it is the shortest",
+            place=self.place,
+            expected="points that come less than a cell below the surface",
+            hint="smaller steps (dt_factor), a stiffer body, or a region that moves more "
+            "slowly, or is thicker",
+        )
+
     def forces(self, points: PointsView) -> np.ndarray:
+        """The forces (n, d) of a region that kernels do not know."""
         way, velocity = self.moved(points.dt)
         x = points.position.astype(float) - way
-        within = self.depth(x)
+        within, aside = self.depth(x), ASIDE * self.hub.domain.h
         depth = within + self.side(points) / 2
-        normal, near = np.zeros_like(x), np.flatnonzero(depth > 0)
-        aside = 0.05 * self.hub.domain.h
-        for k, step in enumerate(aside * np.eye(x.shape[1])):
-            normal[near, k] = self.depth(x[near] - step) - self.depth(x[near] + step)
+        falls = [self.depth(x - k) - self.depth(x + k) for k in aside * np.eye(x.shape[1])]
+        normal = np.stack(falls, axis=1)
         size = np.linalg.norm(normal, axis=1, keepdims=True)
-        normal = np.divide(normal, size, out=np.zeros_like(x), where=size > 1e-3 * aside)
-        lost = np.flatnonzero((within > 0) & (size[:, 0] <= 1e-3 * aside))
+        normal = np.divide(normal, size, out=np.zeros_like(x), where=size > LEVEL * aside)
+        lost = np.flatnonzero((within > 0) & (size[:, 0] <= LEVEL * aside))
         if len(lost):
-            raise ScriptError(
-                f"{named(self.hub, int(points.ids[lost[0]]) - 1)} is so deep in region "
-                f"'{self.region.id}' of fix '{self.id}' that no way out of it is the shortest",
-                place=self.place,
-                expected="points that come less than a cell below the surface",
-                hint="smaller steps (dt_factor), a stiffer body, or a region that moves more "
-                "slowly, or is thicker",
-            )
-        # A spring alone, which takes all penetration out within a step, throws bodies back.
+            self._refuse(int(points.ids[lost[0]]) - 1)
         closing = ((velocity - points.velocity.astype(float)) * normal).sum(axis=1)
         push = np.where(depth > 0, SOFT * depth + points.contact_dt * closing, 0.0)
         return self.press(points, push, depth > 0, normal, velocity, x, share=SOFT)

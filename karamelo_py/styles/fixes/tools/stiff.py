@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from karamelo_py.compiler.fields import field
 from karamelo_py.kernels.rubbing import rub_points
 from karamelo_py.points.kinematics import KINEMATICS
 from karamelo_py.scene.hub import Hub
@@ -32,6 +33,14 @@ class StiffTool(ToolFix):
             self.grip = grip_for(hub, GripOfTool)
             self.point_fields = (*self.point_fields, self.grip)
 
+    def begin_to_touch(self) -> None:
+        """Forget what grips hold of a tool before."""
+        if self.grip is not None and not self.has_touched:
+            for block in self.hub.simulation.setup.blocks:
+                if (grip := field(block.points.fields, self.grip)) is not None:
+                    grip[:] = 0
+            self.has_touched = True
+
     def press(
         self,
         points: PointsView,
@@ -53,10 +62,8 @@ class StiffTool(ToolFix):
         load = stiffness * np.maximum(push, 0)
         force = load[:, None] * normal
         if self.grip is not None:
+            self.begin_to_touch()
             grip, d = points[self.grip], normal.shape[1]
-            if not self.has_touched:
-                grip[:] = 0
-                self.has_touched = True
             near = np.flatnonzero(touching)
             before, one = grip[near].astype(float), stiffness[near, None]
             touched = before[:, d, None] > 0

@@ -1,0 +1,135 @@
+"""Contact of points with the surface of a shape, which may move, in the loop over the points.
+
+A point is a ball. Its force is along the direction in which its depth falls fastest.
+"""
+
+from collections.abc import Callable
+from math import sqrt
+from typing import NamedTuple
+
+from numba import types
+
+from karamelo_py.compiler.compile import point_function
+from karamelo_py.compiler.fields import field, load_vector, store
+from karamelo_py.compiler.loops import caller_of, noinline
+from karamelo_py.kernels import hooks
+from karamelo_py.kernels.p2g import Force
+from karamelo_py.kernels.surfaces import depth, slopes
+from karamelo_py.points.bodies import along, radius, rub
+from karamelo_py.points.kinematics import dot, zero_vector
+from karamelo_py.points.laws import jacobian, specific_volume
+
+SOFT = 0.1  # share of a penetration that a step undoes where it stops the approach, too
+ASIDE = 0.05  # of the reach: where depths are compared
+LEVEL = 1e-3  # of that: a depth that changes by less falls nowhere
+CALL = types.int64(types.int64)
+
+_call = caller_of(CALL)
+
+
+class Touch(NamedTuple):
+    """A shape that pushes points out, for a hook on whole points (`kernels.hooks`)."""
+
+    row: int
+    values: tuple
+    shape: NamedTuple
+    mu: float
+    reach: float  # from where on a depth is not known
+    lost: int  # address of the function that is told the number of a point without a way out
+
+    of_nodes = False
+    of_time = True  # its formulas are that, and it sees them at the end of the step, too
+
+
+def direction_of(falls, step):
+    """Return the direction in which a depth falls that differs by `falls` over two steps."""
+    size = sqrt(falls.squared())
+    return (1 / size if size > LEVEL * step else 0.0) * falls
+
+
+@point_function()
+def grip_of(tag, what):
+    """Return the array of what friction remembers; None of a touch without."""
+
+
+@grip_of.on(Touch)
+def _grip_of_none(tag, what):
+    return None
+
+
+@noinline
+def force_of(tag, what, volume, p, values, dt):
+    """Return the force (d,) of a shape on point `p`."""
+    kin, d = what.kin, what.kin.dimension
+    none = zero_vector(kin, 0.0)
+    way = none._make(values[:d])
+    place = none._make([float(x) for x in load_vector(kin, what.x, p)])
+    ball = radius(kin, float(volume), place)
+    x = place - way
+    grip = grip_of(tag, what)
+    # Most points are far away: a short look is cheap.
+    within = depth(tag.shape, kin, x, 1.001 * ball)
+    if within <= -ball:
+        if grip is not None and grip[d, p] != 0:
+            store(grip, p, (0.0,) * (2 * d + 2))
+        return none
+    if within > ball:
+        within = depth(tag.shape, kin, x, tag.reach)
+    step = ASIDE * tag.reach
+    normal = direction_of(slopes(tag.shape, kin, x, tag.reach, within, step), step)
+    if normal.squared() == 0:
+        if within > 0 and _call(tag.lost, what.ids[p]) == 0:
+            raise RuntimeError("a point has no way out")
+        return none
+    velocity = (1 / dt) * (none._make(values[d : 2 * d]) - way)
+    slip = velocity - none._make([float(v) for v in load_vector(kin, what.points.v, p)])
+    contact_dt, contact_kick, kick = values[2 * d :]
+    stiffness = float(what.points.mass[p]) / (contact_dt * contact_kick)
+    # A spring alone, which takes all penetration out within a step, throws bodies back.
+    push = SOFT * (within + ball) + contact_dt * dot(slip, normal)
+    load = stiffness * max(push, 0.0)
+    if grip is None:
+        return load * normal
+    hold = none._make([float(grip[k, p]) for k in range(d)])
+    mean, unused = float(grip[d, p]), float(grip[d + 1, p])
+    slid = none
+    if mean > 0:  # velocities of points have noise, by which they do not move
+        slid = none._make([float(grip[d + 2 + k, p]) for k in range(d)]) - x
+        slip = 1 / (2 * kick - dt) * slid
+    hold = along(hold + SOFT * stiffness * slid, normal)
+    stop = along(contact_dt * stiffness * slip, normal)
+    rubbed, hold, mean, unused = rub(tag.mu, hold, load, mean, unused, stop)
+    store(grip, p, (*hold, mean, unused, *x))
+    return load * normal + rubbed
+
+
+def touch_kind(grip: type | None) -> type[Touch]:
+    """Return the class of a touch with such a grip."""
+    if grip is None:
+        return Touch
+    name = f"Touch{grip.__name__}"
+    if name not in globals():  # where kernels, which are cached, find it
+        globals()[name] = type(name, (Touch,), {"__module__": __name__})
+        grip_of.on(globals()[name])(lambda tag, what: field(what.points.fields, grip))
+    return globals()[name]
+
+
+def touch_hook(tag: Callable) -> hooks.CompiledHook:
+    """Make the hook of a fix, of which ``tag(row, values)`` makes a `Touch`."""
+    return hooks.CompiledHook(
+        force_of, hooks.WHOLE_POINTS, True, False, False, False, tag, internal=True
+    )
+
+
+@hooks.results.on(Touch)
+def _results_of_touch(tag, what, law, state, p, values, dt):
+    volume = what.points.mass[p] * specific_volume(law) * jacobian(law, what.kin, state)
+    return force_of(tag, what, volume, p, values, dt)
+
+
+@hooks.written.on(Touch)
+def _written_of_touch(tag, what, p, found):
+    force = field(what.points.fields, Force)
+    for c in range(what.kin.dimension):
+        force[c, p] += found[c]
+    return found
