@@ -30,17 +30,17 @@ def read_dump(path: Path) -> list[Table]:
     opener = gzip.open if path.suffix == ".gz" else open
     with opener(path, "rt", encoding="utf-8") as file:
         lines = file.read().splitlines()
-    snapshots = []
+    snapshots, time = [], 0.0
     k = 0
     while k < len(lines):
         assert lines[k].startswith("ITEM: "), lines[k]
         item = lines[k][len("ITEM: ") :]
         if item == "TIMESTEP":
-            snapshot = Table(TIMESTEP=int(lines[k + 1]))
+            snapshot = Table(TIMESTEP=int(lines[k + 1]), TIME=time)
             snapshots.append(snapshot)
             k += 2
         elif item == "TIME":
-            snapshot["TIME"] = float(lines[k + 1])
+            time = float(lines[k + 1])  # it stands before the step
             k += 2
         elif item.startswith("NUMBER OF ATOMS"):
             count = int(lines[k + 1])
