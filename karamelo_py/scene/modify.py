@@ -105,6 +105,7 @@ class Fix(Publisher):
     depth_of: Any = None  # of points in a tool: (n,), which pictures outline
     faces_of: Any = None  # of a tool that is made of them: (m, d, d), by their corners now
     accelerates = False  # its formulas are forces per mass, as of weight
+    brakes = False  # takes energy, as much as it is told
     acts_last = False  # after all others at each moment, wherever the script has it
     # Its hooks in Python bring no energy: what they do to points and nodes stores it, passes it on
     # or takes it away. Otherwise the energy of the scene is not watched.

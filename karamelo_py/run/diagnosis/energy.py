@@ -182,6 +182,11 @@ def taken_by(hub: Hub) -> list[str]:
     if blends(transfer):
         share = f" {transfer.alpha:g}" if hasattr(transfer, "alpha") else ""
         found.append(f"transfer {registry.name_of('transfer', type(transfer))}{share}")
+    if hub.update.method.fields_per_solid:
+        # Contact turns round what they have braked, within the step: nodes chatter, and the points
+        # see less of that than the nodes.
+        braking = dict.fromkeys(fix.style for fix in hub.fixes.values() if fix.brakes)
+        found += [f"fix {style}" for style in braking]
     return found
 
 

@@ -254,6 +254,7 @@ class LocalDamping(Fix):
     """
 
     published = ("x", "y", "z")
+    brakes = True
     acts_last = True
 
     post_update_grid_state = node_hook(brake)
