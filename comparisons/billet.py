@@ -1,4 +1,4 @@
-"""Billet pressed flat between platens that hold it, in space: load and shape beside axisymmetry."""
+"""Billet pressed flat between platens that hold it, in 3D: load and shape beside axisymmetry."""
 
 import numpy as np
 
@@ -48,7 +48,7 @@ def compare(run, axes, full):
     yield Row("the same, axisymmetric", 1.0, energy(flat, 2 * np.pi), 0.03, "balance")
     press = np.linspace(0, 0.6)
     axes.plot(flat.press, flat.load, lw=0.8, label="axisymmetric")
-    axes.plot(space.press, space.load, lw=0.8, label="in space")
+    axes.plot(space.press, space.load, lw=0.8, label="in 3D")
     axes.plot(press, uniform(press), "k--", lw=0.8, label="a cylinder")
     axes.plot(press, uniform(press) * sticking(press), "k:", lw=0.8, label="bound, ends stick")
     axes.set(xlabel="compression / height (1)", ylabel="load (kN)", ylim=(0, 1200))

@@ -1,4 +1,4 @@
-"""Copper ball on copper at 500 m/s, a quarter in space: strain and heat beside axisymmetry."""
+"""Copper ball on copper at 500 m/s, a quarter in 3D: strain and heat beside axisymmetry."""
 
 import numpy as np
 
@@ -46,7 +46,7 @@ def compare(run, axes, full):
     yield Row("largest rise of temperature (K)", rise, solid.flat_Tmax[-1] - 298, 0.1, SOURCE)
     yield Row("top above the block (um)", flat.height[-1], solid.height[-1], 0.05, SOURCE)
     yield Row("plastic work (nJ)", flat.spent[-1], solid.spent[-1], 0.05, SOURCE)
-    for log, what in ((flat, "axisymmetric"), (solid, "in space")):
+    for log, what in ((flat, "axisymmetric"), (solid, "in 3D")):
         # The transfer loses a hundredth of what differs between points and grid in each step.
         total = (log.kinetic[-1] + log.spent[-1] + log.stored[-1]) / ENERGY
         yield Row(f"energy at the end over that at first, {what}", (0.85, 1), total, 0.0, "balance")
@@ -54,6 +54,6 @@ def compare(run, axes, full):
     x, y = np.append(a.x, -b.x[cut]), np.append(a.y, b.z[cut])
     heat = np.append(a["T"], b["T"][cut])
     coloured(axes, 1e6 * x, 1e6 * y, heat, "temperature (K)", limits=(298, 500))
-    for at, what in ((-28, "in space"), (28, "axisymmetric")):
+    for at, what in ((-28, "in 3D"), (28, "axisymmetric")):
         axes.text(at, 33, what, ha="center", fontsize=8)
     axes.set(xlabel="radius (um)", ylabel="height (um)", aspect="equal")

@@ -15,7 +15,7 @@ def error(result):
 
 
 def compare(run, axes, full):
-    """Splines and averaged volumes in load steps; the same in time."""
+    """Splines and F-bar in load steps; the same in time."""
     refine = (0.5, 1) if full else (1,)
     averaged = {"basis": "linear", "bar": "true", "v": 0.04}
     runs = {

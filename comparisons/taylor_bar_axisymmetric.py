@@ -12,7 +12,7 @@ SMALL = {"refine": 1 / 3}
 
 
 def compare(run, axes, full):
-    """Final shape by ulmpm; in full by tlmpm, too, with averaged volumes and without."""
+    """Final shape by ulmpm; in full by tlmpm, too, with F-bar and without."""
     found = []
     ways = {"ulmpm": {} if full else {"ppc": 3}}
     if full:
