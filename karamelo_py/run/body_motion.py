@@ -207,6 +207,43 @@ def turn_of(s: Any) -> Noise | None:
     return most
 
 
+# Squared distance over h^2 of a point from the nodes it sees, their mean by weights, per direction:
+# two points per cell of linear functions, and functions of second order.
+SPREAD, SPREAD_OF_OTHERS = 3 / 16, 1 / 4
+
+
+class Lag(NamedTuple):
+    """A free rotation that points follow too slowly."""
+
+    share: float = 0.0  # of the angular velocity
+    turns: float = 0.0
+
+    @property
+    def percent(self) -> float:
+        return 100 * self.share
+
+
+def lag_of(s: Any) -> Lag:
+    """Estimate how much a free body lags behind its rotation in the total frame.
+
+    The grid has the angular momentum of the places of points. It lacks the part within their
+    surroundings, sum m tr D, of sum m r^2.
+    """
+    most = Lag()
+    if s.moves or s.d == 1 or s.hub.domain.axisymmetric:
+        return most
+    h = float(s.simulation.control.clock[0].spacing)
+    for one in s.motions:
+        if one.spin * s.duration > most.turns * 2 * np.pi and not held(s, one).any():
+            axis = one.turning / (one.spin or 1.0)
+            spread = np.zeros((3, 3))
+            spread[: s.d, : s.d] = one.spread
+            squared = (np.trace(spread) - axis @ spread @ axis) / one.mass
+            away = 2 * (SPREAD if s.linear else SPREAD_OF_OTHERS) * h * h
+            most = Lag(min(away / squared, 1.0), one.spin * s.duration / (2 * np.pi))
+    return most
+
+
 def held(s: Any, one: BodyMotion) -> np.ndarray:
     """Find the directions (d,) in which fixes hold nodes at a body: it goes nowhere."""
     found, lattices = np.zeros(s.d, np.bool_), s.hub.lattices

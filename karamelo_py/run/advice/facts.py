@@ -14,9 +14,11 @@ from karamelo_py.language import registry, rules
 from karamelo_py.run import timestep
 from karamelo_py.run.body_motion import (
     BodyMotion,
+    Lag,
     Noise,
     drift_of,
     held,
+    lag_of,
     motions,
     pressed_evenly,
     turn_of,
@@ -118,6 +120,11 @@ class SceneFacts:
         if self.d == 1 or self.hub.domain.axisymmetric:
             return 0.0
         return max((one.spin for one in self.motions), default=0.0) * self.duration
+
+    @cached_property
+    def lag(self) -> Lag:
+        """Estimate the lag of the body that turns most and is held nowhere."""
+        return lag_of(self)
 
     @cached_property
     def crossing(self) -> Crossing:
