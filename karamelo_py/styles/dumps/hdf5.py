@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.output.fields import PIECE
-from karamelo_py.output.files import whole
+from karamelo_py.output.files import reported, whole
 from karamelo_py.output.hdf5_file import reading
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.dumps.base import OfNodes, OfPoints, TableDump, TableRows
@@ -18,6 +18,7 @@ from karamelo_py.styles.dumps.base import OfNodes, OfPoints, TableDump, TableRow
 # per cent.
 STORED = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
 CHUNK = 1 << 16
+OF_A_COLUMN = 1 << 14  # bytes that HDF5 may need to find the chunks of a column
 
 
 class SnapshotRows(NamedTuple):
@@ -67,6 +68,7 @@ class Hdf5Dump(TableDump):
 
     def _go_on(self, path: Path, k: int, snapshot: SnapshotRows) -> None:
         """Write snapshot `k` into a file, after those before it."""
+        self._reserve(path, snapshot.last)
         try:
             with _opened_to_append(path) as root:
                 try:
@@ -79,6 +81,24 @@ class Hdf5Dump(TableDump):
             reason = re.search("error message = '([^']*)'", str(error))
             what = reason[1] if reason else str(error).splitlines()[0]
             raise ScriptError(f"cannot write {path}: {what}") from error
+
+    def _reserve(self, path: Path, last: int) -> None:
+        """See that the disk has room for a snapshot of any content.
+
+        HDF5 writes when it thinks fit, and may neither report nor survive that it cannot.
+        """
+        if not hasattr(os, "posix_fallocate"):
+            return
+        rows = max(last, 1)
+        chunk = min(rows, CHUNK)
+        each = 8 * chunk * (rows // chunk + 1)
+        room = (each + OF_A_COLUMN) * (len(self.columns) + 2) + OF_A_COLUMN
+        with reported(path), path.open("r+b") as file:
+            size = file.seek(0, os.SEEK_END)
+            try:
+                os.posix_fallocate(file.fileno(), size, room)
+            finally:
+                file.truncate(size)
 
     def resumed(self) -> None:
         """Go on in the file of an earlier run, with the snapshots that it had then.
@@ -164,8 +184,10 @@ class Hdf5Dump(TableDump):
         for name, number in (("time", snapshot.time), ("step", snapshot.step)):
             root[name].resize((k + 1,))
             root[name][k] = number
+        # An array that is not held writes its chunks when it is forgotten, and no error is seen.
+        arrays = {name: root[name] for name in ("id", "type", *self.columns)}
         for name in self.columns:
-            root[name].resize((k + 1, count))
+            arrays[name].resize((k + 1, count))
         for table in snapshot.tables:
             at = table.ids - first
             # Always the same pieces, so that a file has the same bytes however its rows come.
@@ -177,14 +199,17 @@ class Hdf5Dump(TableDump):
                 if here.start == here.stop:
                     continue
                 rows = at[here] - begin
-                known = root["type"][own]
+                known = arrays["type"][own]
                 if (known[rows] != table.types[here]).any():
                     known[rows] = table.types[here]
-                    root["type"][own] = known
+                    arrays["type"][own] = known
                 row = np.full(len(known), np.nan)
                 for name, column in zip(self.columns, table.columns, strict=True):
                     row[rows] = column[here]
-                    root[name][k, own] = row
+                    arrays[name][k, own] = row
+        for array in arrays.values():
+            array.flush()
+        root.flush()
 
 
 def _opened_to_append(path: Path) -> Any:
