@@ -96,6 +96,12 @@ COMMANDS = ("run", "check", "styles", "help", *ELSEWHERE)
 
 
 def _dispatch(arguments: list[str]) -> int:
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        raise ScriptError(
+            "the current folder is not there any more", hint="cd into a folder that is there"
+        ) from None
     arguments = arguments or ["-h"]
     first = arguments[0]
     if first not in (*COMMANDS, "-h", "--help", "--version"):

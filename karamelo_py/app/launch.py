@@ -5,6 +5,7 @@ first gets the terminal, or whatever output and errors go to, and the signals th
 say what they know that it does not. What mpiexec says is shown only where no process was started.
 """
 
+import errno
 import json
 import os
 import select
@@ -31,6 +32,13 @@ if TYPE_CHECKING:
     from karamelo_py.scene.hub import Hub
 
 ERROR = 1
+# What the system says of disks and rights, wherever that comes up: no fault of the program.
+OF_THE_SYSTEM = tuple(
+    getattr(errno, name)
+    for name in ("ENOSPC", "EDQUOT", "EROFS", "EFBIG", "EIO", "EACCES", "EPERM", "EMFILE", "ENFILE",
+                 "ESTALE")
+    if hasattr(errno, name)
+)  # fmt: skip
 # Where the launcher of this program waits for the processes to report.
 SOCKET = "KARAMELO_PY_LAUNCHER"
 # What Open MPI is told: more processes than cores are the user's choice, each has threads of its
@@ -80,6 +88,9 @@ def rendered(error: BaseException) -> str:
     """Write an exception for the user: no traceback, also where the fault is not the user's."""
     if isinstance(error, ScriptError):
         return error.render()
+    if isinstance(error, OSError) and error.errno in OF_THE_SYSTEM:
+        place = f"{error.filename}: " if error.filename else ""
+        return render_message("error", f"{place}{error.strerror}")
     if isinstance(error, MemoryError):
         message = "the scene does not fit into memory"
         hint = "a coarser grid, fewer points per cell, or precision(single)"

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TextIO
 
 from karamelo_py.language.scene import Scene
+from karamelo_py.output.claims import Claim, claim
 from karamelo_py.output.files import reported
 from karamelo_py.output.quantity import LIMIT, Quantity
 from karamelo_py.output.rhythm import ByTime, Rhythmic
@@ -40,6 +41,8 @@ class Log(Rhythmic):
         self.columns: list[Quantity] = []  # empty: step, dt and time
         self.last_step: int | None = None
         self._file: TextIO | None = None
+        self._claim: Claim | None = None  # on the folder of all files
+        self._is_kept = True
         # Names and numbers of the lines, where a program wants to have them.
         self.rows: list[tuple[list[str], list[float]]] | None = None
         self._header: str | None = None
@@ -85,14 +88,14 @@ class Log(Rhythmic):
 
     def resumed(self) -> None:
         """Drop rows behind those that are remembered, where the file is open."""
-        if self._file is not None:
+        if self._file is not None and self._is_kept:
             self._file.truncate(self._end)
 
     def close(self) -> None:
         """Close the file; a later `begin` would start a new one."""
         if self._file is not None:
             self._file.close()
-            self._file = None
+            self._file = self._claim = None
 
     def _go_on(self) -> None:
         """Go on in the file of an earlier run, behind the line that was its last then."""
@@ -123,14 +126,18 @@ class Log(Rhythmic):
             # Line buffering: each line is in the file at once, also when the run is killed.
             self._file = path.open("a", buffering=1, encoding="utf-8", newline="\n")
             weakref.finalize(self, self._file.close)
-            if not _claimed(self._file):
+            self._is_kept = path.is_file()  # else it goes to no disk: /dev/null
+            self._claim = claim(self.hub.folder)
+            if self._claim is None or (self._is_kept and not _claimed(self._file)):
+                where = self.hub.folder.resolve() if self._claim is None else path
                 raise ScriptError(
-                    f"another run is writing to {path}",
+                    f"another run is writing to {where}",
                     expected="a folder of its own for each run",
                     hint="-out FOLDER sends all files there",
                     code="busy",
                 )
-            self._file.truncate(end)
+            if self._is_kept:
+                self._file.truncate(end)
 
     def _put(self, cells: list[str]) -> None:
         if not self.hub.output.writes:

@@ -13,7 +13,7 @@ import numpy as np
 from karamelo_py.app.live.frames import plain
 from karamelo_py.app.live.server import Server
 from karamelo_py.app.plot import read_log
-from karamelo_py.app.studies.case import COLUMNS, options_of, said_in, worded
+from karamelo_py.app.studies.case import COLUMNS, command_of, said_in, worded
 
 MOST = 400  # rows of a log that a page draws
 LINES = 12  # of what a run has said
@@ -118,7 +118,7 @@ class StudyPage:
             for name, values in read_log(folder).items()
             if np.issubdtype(values.dtype, np.number)
         }
-        command = f"karamelo-py {self._script} {' '.join(options_of(self._cases[words['title']]))}"
+        command = command_of(self._script, self._cases[words["title"]])
         return {"said": said[-LINES:], "columns": columns, "command": command}
 
 

@@ -15,6 +15,7 @@ from karamelo_py.app.options import above_zero, positive
 from karamelo_py.app.studies import look, records, variables
 from karamelo_py.app.studies.case import (
     PROGRAM,
+    command_of,
     environment,
     options_of,
     record_of,
@@ -451,8 +452,7 @@ def advise(adviser: Adviser, best: Candidate, script: Path) -> None:
     print(f"\nfor {adviser.accuracy} <= {adviser.target:g} at the least {adviser.cost}:")
     for name, value in values.items():
         print(f"  {name} = {value}" if number_of(value) is not None else f'  {name} = "{value}"')
-    words = " ".join(f"-var {name} {value}" for name, value in values.items())
-    print(f"or: karamelo-py {script} {words}")
+    print(f"or: {command_of(script, values)}")
     print(sureness(adviser, best))
     lucky = adviser.lucky()
     if lucky is not None and lucky.chance and lucky.cost < best.cost:

@@ -20,7 +20,7 @@ from karamelo_py.app.studies import records
 from karamelo_py.app.studies.case import PROGRAM, environment
 from karamelo_py.app.studies.variables import names
 from karamelo_py.output.console import duration
-from karamelo_py.output.files import read_json, write_whole
+from karamelo_py.output.files import read_json, reported, write_whole
 from karamelo_py.output.record import surroundings
 from karamelo_py.script.errors import ScriptError, plural, unknown
 
@@ -171,7 +171,8 @@ def make(entry: Entry, place: Path, inputs: Path, *, small: bool, again: bool) -
     record = place / KEPT
     if not again and read_json(record).get("key") == key:
         return "known"
-    place.mkdir(parents=True, exist_ok=True)
+    with reported(place):
+        place.mkdir(parents=True, exist_ok=True)
     record.unlink(missing_ok=True)
     for path in [*place.glob("*.png"), *place.glob("*.svg")]:
         path.unlink()  # of other commands, maybe
@@ -184,7 +185,7 @@ def make(entry: Entry, place: Path, inputs: Path, *, small: bool, again: bool) -
             stdout=subprocess.PIPE, text=True, encoding="utf-8", check=False,
         )  # fmt: skip
         told.append(f"$ karamelo-py {line}\n{done.stdout}")
-        (place / SAID).write_text("\n".join(told), encoding="utf-8")
+        write_whole(place / SAID, "\n".join(told))
         if done.returncode:
             print(done.stdout, end="")
             return "failed"
@@ -224,7 +225,7 @@ def write_page(page: Path, entries: list[Entry], folder: Path, inputs: Path) -> 
             group = entry.group
             parts.append(f"## {group.replace('_', ' ').capitalize()}")
         parts.append(f"### {part}")
-    page.write_text("\n\n".join(parts) + "\n", encoding="utf-8")
+    write_whole(page, "\n\n".join(parts) + "\n")
     print(f"written: {page}; pictures are in {shown}")
 
 

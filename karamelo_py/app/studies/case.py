@@ -4,6 +4,7 @@ import hashlib
 import json
 import os
 import re
+import shlex
 import signal
 import statistics
 import subprocess
@@ -17,8 +18,9 @@ from types import SimpleNamespace
 from typing import Any
 
 import karamelo_py
+from karamelo_py.app.leaving import STUDY
 from karamelo_py.app.studies.warm import WarmProcesses
-from karamelo_py.output.files import read_json, write_whole
+from karamelo_py.output.files import read_json, reported, write_whole
 from karamelo_py.output.record import NAME
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.terms import number_of
@@ -142,8 +144,9 @@ class Launch:
 
     def run(self, case: Mapping[str, str], folder: Path) -> CaseOutcome:
         """Run a case and keep what became of it."""
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / KEPT).unlink(missing_ok=True)
+        with reported(folder):
+            folder.mkdir(parents=True, exist_ok=True)
+            (folder / KEPT).unlink(missing_ok=True)
         outcomes = []
         for _ in range(self.repeat):
             outcomes.append(self._once(case, folder))
@@ -233,10 +236,16 @@ def options_of(case: Mapping[str, str]) -> list[str]:
     return [word for name, value in case.items() for word in ("-var", name, value)]
 
 
+def command_of(script: Any, case: Mapping[str, str]) -> str:
+    """Write the command of a case for a shell, such that each value stays one word."""
+    return shlex.join(["karamelo-py", str(script), *options_of(case)])
+
+
 def environment() -> dict[str, str]:
     """Give the environment of a run: it runs this very program, wherever it starts."""
     paths = [str(Path(karamelo_py.__file__).parent.parent), os.environ.get("PYTHONPATH")]
-    return {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, paths))}
+    path = os.pathsep.join(filter(None, paths))
+    return {**os.environ, STUDY: str(os.getpid()), "PYTHONPATH": path}
 
 
 def record_of(folder: Path) -> dict[str, Any]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from karamelo_py.app.live.server import require_plotly
 from karamelo_py.app.studies import keeping, look, pictures, records, results
-from karamelo_py.app.studies.case import options_of, worded
+from karamelo_py.app.studies.case import command_of, worded
 from karamelo_py.app.studies.curves import Family, Table, column, order, require, sizes
 from karamelo_py.app.studies.study import plain_table, shown, terminal
 from karamelo_py.app.studies.variables import add_axes, along, holds, names, out_file
@@ -207,7 +207,7 @@ def keeps(options: Any, table: Table, by: list[str]) -> int:
     kept = [keeping.look_at(row, table.path.parent, *what) for row in table.rows]
     text, silent = keeping.verdicts(table, kept, by)
     if out:
-        out.write_text(text, encoding="utf-8")
+        write_whole(out, text)
     print(text)
     for word in dict.fromkeys(one.word for one in kept):
         print(f"{word}: {sum(one.word == word for one in kept)} of {len(kept)}")
@@ -320,7 +320,7 @@ def write_page(family: Family, path: Path, words: tuple[str, str], title: str) -
     if family.words:
         figure.update_xaxes(tickvals=[*range(len(family.words))], ticktext=family.words)
     runs = [_about(row, family, family.table.path.parent, k) for k, row in enumerate(rows)]
-    text = json.dumps(runs).replace("</", "<\\/")
+    text = json.dumps(runs).replace("<", "\\u003c")
     first = number_of[id(front[-1])] if front else 0
     chart = plotly_io.to_html(
         figure, include_plotlyjs=True, full_html=False, div_id="chart",
@@ -357,7 +357,7 @@ def _about(row: Mapping[str, str], family: Family, folder: Path, k: int) -> dict
     skipped = {*values, "status", "reason", "folder"}
     return {
         "title": worded(values),
-        "command": f"karamelo-py {script} {' '.join(options_of(values))}",
+        "command": command_of(script, values),
         "status": row.get("status", ""),
         "reason": row.get("reason", ""),
         "numbers": [[n, v] for n, v in row.items() if n not in skipped and v],

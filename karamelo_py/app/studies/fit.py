@@ -10,7 +10,7 @@ import numpy as np
 from karamelo_py.app.options import positive
 from karamelo_py.app.plot import read_log
 from karamelo_py.app.studies import variables
-from karamelo_py.app.studies.case import folder_name, worded
+from karamelo_py.app.studies.case import command_of, folder_name, worded
 from karamelo_py.app.studies.records import recorded
 from karamelo_py.app.studies.study import Study, live_page, plain_table, shown, terminal
 from karamelo_py.scene.tables import read_table
@@ -159,8 +159,7 @@ def run(options: Any) -> int:
     earlier = len(study.rows) - study.ran
     before = f", and {earlier} of an earlier study (-again repeats them)" if earlier else ""
     print(f"what remains is {left} in the mean, after {plural(study.ran, 'run')}{before}")
-    words = " ".join(f"-var {name} {value}" for name, value in search.case(best.x).items())
-    print(f"karamelo-py {options.script} {words}")
+    print(command_of(options.script, search.case(best.x)))
     return 0
 
 

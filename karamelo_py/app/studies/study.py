@@ -19,7 +19,9 @@ from karamelo_py.app.options import positive
 from karamelo_py.app.studies import variables
 from karamelo_py.app.studies.case import CaseOutcome, Launch, Refused, folder_name, kind_of
 from karamelo_py.app.studies.records import Recorded, recorded, row, write
+from karamelo_py.output.claims import Claim, claim
 from karamelo_py.output.console import duration
+from karamelo_py.output.files import reported, write_whole
 from karamelo_py.output.record import surroundings
 from karamelo_py.script.errors import ScriptError, plural
 from karamelo_py.script.terms import number_of
@@ -54,6 +56,7 @@ class Study:
     page: Any = None  # a `StudyPage`, where somebody wants to watch
     # Of finished runs, by the values of the case.
     rows: dict[tuple[str, ...], dict[str, Any]] = field(default_factory=dict)
+    claim: Claim | None = None  # of the folder
     ran: int = 0  # not taken from an earlier study
     begun: float = field(default_factory=time.perf_counter)
 
@@ -69,7 +72,23 @@ class Study:
         """Write beside the table what it is made with."""
         how = {"threads": self.launch.threads, "jobs": self.jobs, **surroundings()}
         text = json.dumps({"script": str(self.launch.script), **said, **how}, indent=1) + "\n"
-        self.out.with_suffix(".json").write_text(text, encoding="utf-8")
+        self.claim_folder()
+        write_whole(self.out.with_suffix(".json"), text)
+
+    def claim_folder(self) -> None:
+        """Keep another study from the folder of the runs; ScriptError where one is at work."""
+        if self.folder.exists() and not self.folder.is_dir():
+            expected = "a free name for the folder of the runs"
+            raise ScriptError(f"{self.folder} is a file", expected=expected)
+        with reported(self.folder):
+            self.folder.mkdir(parents=True, exist_ok=True)
+        self.claim = claim(self.folder)
+        if self.claim is None:
+            raise ScriptError(
+                f"another study is at work in {self.folder}",
+                expected="the end of that one, or another name for the table",
+                hint=f"-o {self.out.stem}-2{self.out.suffix}",
+            )
 
     def write(self) -> None:
         """Write the table of what is known."""
@@ -360,9 +379,6 @@ def run(options: Any) -> int:
     items = recorded(",".join(options.record), script, values)
     study = Study(launch, out, list(values), items, jobs, options.again, str(options.script))
     study.page = live_page(options, study)
-    if study.folder.exists() and not study.folder.is_dir():
-        expected = "a free name for the folder of the runs"
-        raise ScriptError(f"{study.folder} is a file", expected=expected)
     record, computes = [item.text for item in items], script.computes()
     study.describe(
         variables=values, record=record, computes=computes, timed=options.time, repeat=repeat

@@ -24,6 +24,8 @@ from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import Any, BinaryIO, NoReturn
 
+from karamelo_py.app.leaving import STUDY
+
 MOST = 8  # kinds whose kernels are held
 TRIES = 3  # to start the first
 PATIENCE = 20.0  # seconds for an answer: a start takes some hundredths, the import two or so
@@ -192,6 +194,11 @@ def _run(said: list[str], out: int, err: int, stays: int | None = None) -> NoRet
     from karamelo_py.app.start import main
 
     folder, *sys.argv[1:] = said
+    study = os.environ.get(STUDY, "")
+    for _ in range(1000):  # until the study has adopted it, after some thousandths of a second
+        if str(os.getppid()) == study:
+            break
+        time.sleep(0.002)
     os.setsid()  # Ctrl-C is of the study alone
     os.chdir(folder)
     for file, at in ((out, 1), (err, 2)):
@@ -206,6 +213,7 @@ def _run(said: list[str], out: int, err: int, stays: int | None = None) -> NoRet
         status = 1
     sys.stdout.flush()
     if stays is not None and status == 0 and _is_clean():
+        os.environ[STUDY] = study
         with socket.socket(fileno=stays) as link:
             pid = os.fork()
             if not pid:
