@@ -3,6 +3,7 @@
 import itertools
 import json
 import re
+import shlex
 import subprocess
 import sys
 from itertools import combinations
@@ -109,6 +110,18 @@ def test_results_that_cannot_be_drawn(results, capsys, words, said):
     assert main(["chart", "r.csv", *words.split()]) == 1
     err = capsys.readouterr().err
     assert said in err and err.count("error") == 1
+
+
+def test_what_a_page_shows_and_offers_is_no_code():
+    """A browser takes <!--<script> for its own, a shell what is in $( )."""
+    from karamelo_py.app.studies.case import command_of
+
+    command = command_of("in x", {"tag": '"a $(touch HACKED)"', "E": "4000*(1+1)"})
+    assert shlex.split(command) == [
+        "karamelo-py", "in x", "-var", "tag", '"a $(touch HACKED)"', "-var", "E", "4000*(1+1)",
+    ]  # fmt: skip
+    done = subprocess.run(["sh", "-c", f"printf '%s|' {command}"], capture_output=True, text=True)
+    assert done.stdout.split("|")[:-1] == shlex.split(command)
 
 
 def test_the_order_of_a_power_law():

@@ -4,11 +4,13 @@ import json
 import os
 import re
 import shutil
+import socket
 import subprocess
 import threading
+import time
 import urllib.error
 import urllib.request
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -20,6 +22,7 @@ from karamelo_py.app.cli import main
 from karamelo_py.app.live import folder as folder_pages
 from karamelo_py.app.live import frames
 from karamelo_py.app.live import run as run_pages
+from karamelo_py.app.live import server as servers
 from karamelo_py.app.live.folder import FolderPage
 from karamelo_py.app.live.frames import Frame, KeptFrames
 from karamelo_py.app.live.server import Server
@@ -108,6 +111,105 @@ def test_a_page_answers_only_behind_its_secret_word(simulation):
     page.close()
     with pytest.raises(urllib.error.URLError):
         get(page.address)
+
+
+def ask(page, text):
+    """What the server answers to some bytes, until it closes or has no more to say."""
+    port, path = re.match(r"http://127\.0\.0\.1:(\d+)(/\S+/)", page.address).groups()
+    with socket.create_connection(("127.0.0.1", int(port)), timeout=1) as link:
+        link.sendall(text.replace("PAGE", path).replace("PORT", port).encode())
+        found = b""
+        with suppress(TimeoutError):
+            while part := link.recv(1 << 16):
+                found += part
+    return found.decode("latin-1")
+
+
+def test_what_other_sites_ask_is_refused(simulation):
+    """A site that has its name stand for this machine, or sends a form here, knows no more."""
+    page = simulation.live()
+    get_page, post_go = "GET PAGE HTTP/1.1\r\nHost: {}\r\n{}\r\n", "POST PAGEgo HTTP/1.1\r\n"
+    for host in ("127.0.0.1:PORT", "localhost:8888", "[::1]:1"):
+        assert ask(page, get_page.format(host, "")).startswith("HTTP/1.1 200")
+    for host in ("evil.example", "127.0.0.1.evil.example", "[::1"):
+        assert ask(page, get_page.format(host, "")).startswith("HTTP/1.1 403")
+    for origin, status in (
+        ("http://localhost:1", 200),
+        ("http://evil.example", 403),
+        ("null", 403),
+    ):
+        said = ask(page, f"{post_go}Host: localhost:1\r\nOrigin: {origin}\r\n\r\n")
+        assert said.startswith(f"HTTP/1.1 {status}")
+    body = "GET /x HTTP/1.1\r\nHost: localhost\r\n\r\n"
+    for length in (len(body), 10**12):  # what follows is no further request
+        said = ask(page, f"{post_go}Host: localhost\r\nContent-Length: {length}\r\n\r\n{body}")
+        assert said.count("HTTP/1.1 ") == 1
+    long = f"GET PAGEframe?k={'9' * 4400} HTTP/1.1\r\nHost: localhost\r\n\r\n"
+    assert ask(page, long).startswith("HTTP/1.1 404")
+
+
+def test_what_a_page_may_load(simulation):
+    """Nothing from elsewhere; a notebook alone may show it within a page of its own."""
+    page = simulation.live()
+    for framed in (True, False):
+        page._page.server.framed = framed
+        head = ask(page, "GET PAGE HTTP/1.1\r\nHost: localhost\r\n\r\n").partition("\r\n\r\n")[0]
+        assert "default-src 'none'" in head and "connect-src 'self'" in head
+        assert ("frame-ancestors 'none'" in head) == ("X-Frame-Options: DENY" in head) != framed
+        assert "X-Content-Type-Options: nosniff" in head and "Referrer-Policy" in head
+        assert "Python" not in head
+
+
+def test_connections_are_few_and_end(simulation, monkeypatch):
+    """What the run opens is not taken by connections that say nothing; nor are pages, for ever."""
+    monkeypatch.setattr(servers, "MOST", 4)
+    page = simulation.live()
+    port = page._page.server._http.server_address[1]
+    held = [socket.create_connection(("127.0.0.1", port), timeout=30) for _ in range(12)]
+    for link in held[4:]:
+        with suppress(ConnectionResetError):
+            assert link.recv(1) == b""
+    assert len(page._page.server._http._open) == 4
+    for link in held:
+        link.close()
+
+
+def test_a_page_that_takes_nothing_is_closed(simulation, monkeypatch):
+    """A laptop that sleeps behind ssh -L must not hold a job that is over."""
+    monkeypatch.setattr(servers, "STUCK", 0.5)
+    page = simulation.live()
+    server = page._page.server
+    port, path = re.match(r"http://127\.0\.0\.1:(\d+)(/\S+/)", page.address).groups()
+    server.news = lambda seen: (1, {"much": "x" * 10_000_000})
+    with socket.socket() as link:
+        link.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
+        link.connect(("127.0.0.1", int(port)))
+        link.sendall(f"GET {path}events HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
+        end = time.monotonic() + 20
+        while not server._http._open and time.monotonic() < end:
+            time.sleep(0.01)
+        while server._http._open:
+            assert time.monotonic() < end
+            time.sleep(0.05)
+    assert not server.watched
+
+
+def test_pages_end_with_their_simulation(tmp_path):
+    before = threading.active_count()
+    for _ in range(3):
+        with Simulation(BAR, out=tmp_path) as made:
+            page = made.live()
+        page.close()  # once more
+    assert threading.active_count() == before
+
+
+def test_a_long_run_is_shown_by_some_of_its_rows(simulation, monkeypatch):
+    """A page that opens late gets so many rows, the first and the last among them."""
+    monkeypatch.setattr(run_pages, "WINDOW", 5)
+    page = simulation.live()
+    simulation.run(40)
+    told = Events(page.address).next()
+    assert [row["step"] for row in told["rows"]] == [0, 10, 20, 30, 40]
 
 
 def test_all_that_pages_load_is_there_and_can_be_read(simulation, tmp_path):
@@ -242,6 +344,7 @@ def test_an_error_that_ends_a_run_is_a_flag(simulation, kind):
             page._page.end()
     told = page._page._news(0)[1]
     assert told["over"] and "water runs out" in told["flags"][0]["text"]
+    assert told["ended"] == "failed" and "water runs out" in told["failed"]
 
 
 @pytest.mark.parametrize(
@@ -273,11 +376,19 @@ def test_a_script_is_run_with_a_page_that_stops_it(tmp_path, monkeypatch, capsys
             stopped.at = page.hub.update.step
             post(page.server.address, "stop")
 
+    ended = []
     monkeypatch.setattr(RunPage, "write", stopping)
+    end = RunPage.end
+    monkeypatch.setattr(
+        RunPage, "end", lambda page, **how: (end(page, **how), ended.append(page._ended))
+    )
     assert main(["in.bar", "--live", "--threads", "1"]) == 130
     said = capsys.readouterr()
     assert "live: http://127.0.0.1" in said.out
     assert "interrupted: the log and the dumps are complete" in said.err
+    (tmp_path / "in.end").write_text(BAR + "run(2)\n", encoding="utf-8")
+    assert main(["in.end", "--live"]) == 0
+    assert ended == ["stopped", "finished"]
     assert main(["in.bar", "--live", "--ranks", "2"]) == 1
     assert "a live page shows a run of one process" in capsys.readouterr().err
 

@@ -412,7 +412,7 @@ def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = 
     finally:
         hub.output.log.close()
         if page is not None:
-            page.end(waits=finished)
+            page.end(waits=finished, stopped=not finished)
     if not hub.rehearsed:
         _tell_of_no_run(hub, script)
     elif restart is not None and restart.is_over(hub):

@@ -120,6 +120,7 @@ class LivePage:
 
     def __init__(self, page: Any):
         self._page = page
+        page.server.framed = True
         self.address = page.server.address
 
     def _repr_html_(self) -> str:
@@ -542,7 +543,7 @@ class Simulation:
         """Open a page in a browser that follows the runs to come; a notebook shows it.
 
         Points in colour, curves of the log, what limits the step; pause, step, stop. Close it with
-        ``.close()``. Needs the package plotly.
+        ``.close()``, or that of the simulation. Needs the package plotly.
         """
         from karamelo_py.app.live.run import RunPage
 
@@ -550,7 +551,9 @@ class Simulation:
             return LivePage(RunPage(self.hub, self._name))
 
     def close(self) -> None:
-        """Close its files; a further run would begin the log anew."""
+        """Close its files and pages; a further run would begin the log anew."""
+        for page in [*self.hub.output.pages]:
+            page.detach()
         self.hub.output.log.close()
         _folders.pop(self.hub.folder, None)
 

@@ -99,7 +99,7 @@ class KeptFrames:
 def number_in(words: Mapping[str, str]) -> int:
     """Read the number of a frame; -1 where there is none."""
     text = words.get("k", "")
-    return int(text) if text.isdecimal() else -1
+    return int(text) if text.isdecimal() and len(text) < 19 else -1
 
 
 def plain(value: Any) -> Any:

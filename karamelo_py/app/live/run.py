@@ -10,6 +10,8 @@ from collections.abc import Mapping
 from contextlib import suppress
 from typing import NamedTuple
 
+import numpy as np
+
 from karamelo_py.app.launch import rendered
 from karamelo_py.app.live import frames
 from karamelo_py.app.live.frames import Frame, KeptFrames, plain
@@ -20,6 +22,7 @@ from karamelo_py.run.timestep import ruling_limit
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import FAILURES
 
+WINDOW = 2000  # rows of the log that a page gets when it opens
 GRACE = 10.0  # seconds that a run is held while no page is open, which may be loaded anew
 
 
@@ -56,6 +59,7 @@ class RunPage(Rhythmic):
         self._rows: list[Row] = []
         self._paused = self._once = self._over = False
         self._column, self._unwatched = "seq", ""
+        self._ended, self._failed = "", ""  # how it did, and the message of an error
         self.server = Server(
             frames.PAGE, self._news, {"frame": self.frames.answer},
             {"pause": self._pause, "go": self._go, "step": self._step, "stop": self._stop,
@@ -82,15 +86,18 @@ class RunPage(Rhythmic):
         self.server.changed()
         self._wait()
 
-    def end(self, *, waits: bool = False) -> None:
+    def end(self, *, waits: bool = False, stopped: bool = False) -> None:
         """Bring the last news to open pages, an error that ends the run among them.
 
         They are answered until they are closed. At a terminal a page that nobody has opened `waits`
         for that, if it is to.
         """
         server = self.server
-        if isinstance(error := sys.exception(), FAILURES):
-            self.hub.warned.append((self.hub.update.time, rendered(error)))
+        error = sys.exception()
+        self._ended = "stopped" if stopped or error is not None else "finished"
+        if isinstance(error, FAILURES):
+            self._ended, self._failed = "failed", rendered(error)
+            self.hub.warned.append((self.hub.update.time, self._failed))
         self._over = True
         server.changed()
         server.flush()
@@ -105,6 +112,8 @@ class RunPage(Rhythmic):
 
     def detach(self) -> None:
         """End the page; the run goes on without."""
+        if self not in self.hub.output.pages:
+            return
         self.hub.output.pages.remove(self)
         self._paused = False
         self.server.close()
@@ -136,7 +145,9 @@ class RunPage(Rhythmic):
     # ---- in threads of the server ---------------------------------------------------------------
 
     def _news(self, seen: int) -> tuple[int, dict]:
-        rows = self._rows[seen:]
+        rows = new = self._rows[seen:]
+        if len(rows) > WINDOW:  # of a page that opens: a curve needs no more
+            rows = [rows[k] for k in np.linspace(0, len(rows) - 1, WINDOW).astype(int)]
         told = {
             "rows": [
                 {**row._asdict(), "log": {k: plain(float(v)) for k, v in row.log.items()}}
@@ -147,6 +158,8 @@ class RunPage(Rhythmic):
             "paused": self._paused,
             "unwatched": self._unwatched,
             "over": self._over,
+            "ended": self._ended,
+            "failed": self._failed,
         }
         if not seen and self.hub.domain is not None:
             told["about"] = {
@@ -158,7 +171,7 @@ class RunPage(Rhythmic):
                 "bounds": [-100 * energy.LOSS, 100 * energy.WITHIN],
                 "steers": True,
             }
-        return seen + len(rows), told
+        return seen + len(new), told
 
     def _choose(self, words: Mapping[str, str]) -> None:
         if words.get("name") in self.hub.fields.particle_names():

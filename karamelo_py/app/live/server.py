@@ -17,6 +17,24 @@ from karamelo_py.script.errors import ScriptError
 
 PATIENCE = 1.0  # seconds that the last news may take to a page, when all is over
 BEAT = 2.0  # seconds after which something is said, so that a closed page is noticed
+STUCK = 30.0  # seconds after which a page that takes nothing counts as closed
+UNKNOWN = 5.0  # seconds that a connection has for a request with the secret word
+MOST = 64  # connections at once: files that the run needs are not theirs
+LARGEST = 1 << 16  # bytes behind a request, which nobody needs
+# Names that this machine has for itself; another one is a site that has made its own stand for it.
+HERE = ("127.0.0.1", "localhost", "::1")
+# Plotly makes styles and functions as it draws.
+POLICY = (
+    "default-src 'none'; script-src 'self' 'unsafe-inline' 'unsafe-eval'; "
+    "style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; connect-src 'self'; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors"
+)
+NOTEBOOKS = "http://127.0.0.1:* http://localhost:* vscode-webview:"
+HEADERS = {
+    "Cache-Control": "no-store",
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+}
 
 Answer = Callable[[Mapping[str, str]], "bytes | dict | None"]
 
@@ -58,6 +76,7 @@ class Server:
         self._changed = threading.Condition()
         self._shown: dict[int, int] = {}  # the version that each open page has
         self.opened = False  # by any page so far
+        self.framed = False  # shown within a notebook
         self.token = secrets.token_urlsafe(16)
         self._http = _Quiet(("127.0.0.1", 0), _handler(self))
         self.address = f"http://127.0.0.1:{self._http.server_address[1]}/{self.token}/"
@@ -123,9 +142,23 @@ def require_plotly() -> None:
 
 
 class _Quiet(ThreadingHTTPServer):
-    """Says nothing of pages that are closed while they load."""
+    """Says nothing of pages that are closed while they load; takes so many connections at most."""
 
     daemon_threads = True
+
+    def __init__(self, *given: Any):
+        self._open: set[Any] = set()
+        super().__init__(*given)
+
+    def verify_request(self, request: Any, client: Any) -> bool:
+        if len(self._open) >= MOST:
+            return False
+        self._open.add(request)
+        return True
+
+    def shutdown_request(self, request: Any) -> None:
+        self._open.discard(request)
+        super().shutdown_request(request)
 
     def handle_error(self, *_: Any) -> None:
         """The terminal is that of the run."""
@@ -144,13 +177,17 @@ def _points(_: Mapping[str, str]) -> bytes:
 def _handler(server: Server) -> type[BaseHTTPRequestHandler]:
     class Handler(BaseHTTPRequestHandler):
         protocol_version = "HTTP/1.1"
+        timeout = UNKNOWN
+        server_version, sys_version = "karamelo-py", ""
 
         def log_message(self, *_: Any) -> None:
             """Say nothing: the terminal is that of the study."""
 
         def do_GET(self) -> None:
             name, words = self._asked()
-            if name == "":
+            if not self._is_from_here():
+                self._give(b"not from here", "text/plain", 403)
+            elif name == "":
                 self._give(server.page.read_bytes(), "text/html; charset=utf-8")
             elif name == "events":
                 self._open("text/event-stream")
@@ -171,23 +208,46 @@ def _handler(server: Server) -> type[BaseHTTPRequestHandler]:
 
         def do_POST(self) -> None:
             name, words = self._asked()
-            if name not in server.actions:
+            length = self.headers.get("Content-Length", "0")
+            if length.isdecimal() and len(length) < 9 and int(length) <= LARGEST:
+                self.rfile.read(int(length))  # else it would count as the next request
+            else:
+                self.close_connection = True
+            if not self._is_from_here():
+                self._give(b"not from here", "text/plain", 403)
+            elif name not in server.actions:
                 self._nothing()
-                return
-            server.actions[name](words)
-            self._give(b"{}", "application/json")
+            else:
+                server.actions[name](words)
+                self._give(b"{}", "application/json")
+
+        def _is_from_here(self) -> bool:
+            """Tell whether a page of this server asks, as far as browsers say."""
+            host, origin = self.headers.get("Host", ""), self.headers.get("Origin")
+            try:
+                here = urlsplit(f"//{host}").hostname in HERE
+                return here and (origin is None or urlsplit(origin).netloc == host)
+            except ValueError:
+                return False
 
         def _asked(self) -> tuple[str | None, dict[str, str]]:
             """Read which address is asked for; None without the secret word."""
             asked = urlsplit(self.path)
             before, _, name = asked.path.lstrip("/").partition("/")
             right = secrets.compare_digest(before.encode(), server.token.encode())
+            if right:
+                self.connection.settimeout(STUCK)
             return (name if right else None), dict(parse_qsl(asked.query))
 
         def _open(self, kind: str, status: int = 200) -> None:
             self.send_response(status)
             self.send_header("Content-Type", kind)
-            self.send_header("Cache-Control", "no-store")
+            within = NOTEBOOKS if server.framed else "'none'"
+            self.send_header("Content-Security-Policy", f"{POLICY} {within}")
+            for header, value in HEADERS.items():
+                self.send_header(header, value)
+            if not server.framed:
+                self.send_header("X-Frame-Options", "DENY")
 
         def _give(self, content: bytes, kind: str, status: int = 200) -> None:
             self._open(kind, status)

@@ -63,7 +63,9 @@ class StudyPage:
         atexit.register(self._end)
 
     def _end(self) -> None:
-        self._running, self._progress = [], {**self._progress, "over": True}
+        whole = len(self._rows) >= self._progress.get("of", 0) or self._progress.get("most")
+        ended = "been stopped" if self.stopped.is_set() else "finished" if whole else "ended early"
+        self._running, self._progress = [], {**self._progress, "over": True, "ended": ended}
         self.server.changed()
         self.server.close()
 
