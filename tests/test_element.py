@@ -214,7 +214,7 @@ def test_a_stress_beyond_yield_is_not_found(run_script):
             "load_path(a, 2, turn=1)\nelement(b, steel, a, kinematics=1D)",
             "1D cannot turn",
         ),
-        ("load_path(a, 2, exx=0)\nelement(b/c, steel, a)", "cannot be part of a file name"),
+        ("load_path(a, 2, exx=0)\nelement(b/c, steel, a)", "formulas could not name the values"),
         ("load_path(a, 2)", "no strain and no stress is prescribed"),
         ("load_path(a, 2, syx=0)", "did you mean 'sxy'?"),
         (

@@ -174,6 +174,48 @@ def against_a_wall(v: float, dt: float) -> str:
     return block(1, *lines, law="neo-hookean").replace("0, 1.2", "0, 2.4")
 
 
+COUNTING = """
+remembers = ("n",)
+n = 0
+def count(points):
+    global n
+    n += 1
+    return n
+"""
+
+
+@pytest.mark.parametrize("every, rows", [(1000, [0, 1]), (1, [0, 1])])
+def test_parts_count_once_where_the_step_was_too_large_from_the_start(
+    run_interpreted, tmp_path, every, rows
+):
+    """The last rows show steps that are taken once more."""
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run/counting.py").write_text(COUNTING)
+    script = f"""
+method(ulmpm, FLIP, linear, 1)
+dimension(2, 0, 4, 0, 4, 0.5)
+region(b, block, 1, 2, 1, 2)
+material(m, neo-hookean, 1, 1, 0.3)
+solid(s, region, b, 2, m, 0.5, 0)
+fix(v, initial_velocity_particles, all, 0.3*sin(7*x0), 0.3*cos(5*y0))
+fix(k, python, all, counting.count)
+log_modify(custom, step, k)
+set_output({every})
+set_dt(1.2)
+run(1000)
+"""
+    log = run_interpreted(script, status=1).log
+    assert log.Step.tolist() == log.k.tolist() == rows
+
+
+def test_initial_velocities_that_are_no_numbers(run_interpreted):
+    """All of them: nothing then limits the step, and that is not the reason."""
+    script = block(2, "fix(v, initial_velocity_particles, all, sqrt(x - 10), 0)", "run(3)")
+    said = run_interpreted(script, status=1).err
+    assert "points have a velocity that is not a number at time 0: fix v gets NaN" in said
+    assert "rigid" not in said
+
+
 def test_the_last_rows_of_a_long_run_are_not_computed_twice(run_interpreted):
     """A step 1.3 times the stable one meets a wall after a hundred steps that strained nothing."""
     result = run_interpreted(against_a_wall(0.3, 0.016), status=1)

@@ -304,6 +304,19 @@ def test_what_is_measured_and_shown_nowhere(advice):
     assert "name Ek in log_modify" in said and "Es" not in said
 
 
+def test_what_an_included_script_shows_or_uses(advice, tmp_path):
+    """Also one that stands behind the run that is looked at."""
+    (tmp_path / "rest.in").write_text(
+        "compute(c, center_of_mass, top)\nlog_modify(custom, step, Ek, c_x)\n"
+    )
+    groups = [f"group({name}, particles, region, box, all)" for name in ("top", "end")]
+    text = plane(more="\n".join(["compute(Ek, kinetic_energy, all)", *groups]))
+    assert "Ek" in advice(text) and "top" in advice(text)
+    said = advice(text + "include(rest.in)\nrun(1)\n")
+    assert "Ek" not in said and "top" not in said
+    assert "group end is used by nothing" in said
+
+
 def test_groups_that_nothing_uses(advice):
     """The name stands in no other command, and in no text."""
     made = [f"group({name}, particles, region, box, all)" for name in ("top", "end", "far")]
@@ -329,6 +342,22 @@ material(metal, eos-strength, bulk, hard{parts})
          "strength(..., plastic, 50, 3)"),
         ("johnson_cook, 50, 3, 1, 0.3, 1, 0, 1, 0, 100", "", "", ""),
         ("plastic, 50, 3", "temperature(warm, plastic_work, 0.9, 2, 0, 0, 5, 100)", ", warm",
+         "leave the temperature out"),
+        # Damage by temperature, and flow stresses by it that have no softening as a part.
+        ("plastic, 50, 3", "damage(old, damage_johnson_cook, 1, 1, -1, 0, 0, 1, 5, 100)\n"
+         "temperature(warm, plastic_work, 0.9, 2, 0, 0, 5, 100)", ", old, warm",
+         "leave the temperature out"),
+        ("plastic, 50, 3", "damage(old, damage_johnson_cook, 1, 1, -1, 0, 5, 1, 5, 100)\n"
+         "temperature(warm, plastic_work, 0.9, 2, 0, 0, 5, 100)", ", old, warm", ""),
+        ("zerilli-armstrong, 50, 3, 1, 0, 1e-3, 0, 0, 1",
+         "temperature(warm, plastic_work, 0.9, 2, 0, 0, 5, 100)", ", warm", ""),
+        ("zerilli-armstrong, 50, 3, 0, 0, 1e-3, 0, 1, 1",
+         "temperature(warm, plastic_work, 0.9, 2, 0, 0, 5, 100)", ", warm",
+         "leave the temperature out"),
+        ("formula, 50, 3 + ep - 0.01*T",
+         "temperature(warm, plastic_work, 0.9, 2, 0, 0, 5, 100)", ", warm", ""),
+        ("formula, 50, 3 + ep",
+         "temperature(warm, plastic_work, 0.9, 2, 0, 0, 5, 100)", ", warm",
          "leave the temperature out"),
         ("johnson_cook, 50, 3, 1, 0.3, 1, 0, 1, 0, 100",
          "temperature(warm, plastic_work, 0.9, 2, 0, 0, 5, 100)", ", warm", ""),
@@ -494,6 +523,24 @@ def test_a_scene_with_two_equal_sides(advice):
     assert said.startswith("the scene is the same on both sides of x = 4: twice the points")
     assert said.endswith("half of it, and the nodes at x = 4 held in x")
     assert "y = 4" in advice(plane(more=PULLED.replace("0, -1", "-1, 0")))
+
+
+@pytest.mark.parametrize(("hi", "mirrored"), [("INF", True), ("3", False)])
+def test_a_box_with_two_equal_sides(advice, hi, mirrored):
+    """A floor below all of it, or below its left half."""
+    text = f"""
+method(ulmpm, FLIP, linear, 1)
+dimension(3, 0, 6, 0, 6, 0, 6, 1)
+region(b, block, 1, 5, 1, 4, 0, 3)
+material(m, neo-hookean, 1, 1000, 0.3)
+solid(s, region, b, 1, m, 1, 0)
+region(f, block, -INF, {hi}, -INF, INF, 0, 0)
+group(floor, nodes, region, f, all)
+fix(h, velocity_nodes, floor, 0, 0, 0)
+fix(g, body_force, all, 0, 0, -0.1)
+run(1)
+"""
+    assert ("on both sides of x = 3" in advice(text)) == mirrored
 
 
 @pytest.mark.parametrize(

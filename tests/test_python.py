@@ -141,6 +141,49 @@ def test_commands_as_methods(interpreted, run_interpreted, tmp_path):
         assert (tmp_path / "files" / name).read_bytes() == content
 
 
+def test_commands_that_give_a_value(interpreted):
+    """As in a script, where `value` and `xcm` stand in expressions."""
+    interpreted("""
+        sim = Simulation(SCENE)
+        assert sim.value("1 + 1") == 2.0
+        assert sim.xcm("all", "x") == sim.evaluate("xcm(all, x)") > 0.4
+        sim.run(3)
+        assert sim.value("2*Ek") == 2 * sim.values["Ek"] > 0
+        assert sim.external_force("all", "x") == sim.internal_force("all", "y") * 0
+        assert sim.set_output(5) is None
+        try:
+            sim.xcm("nobody", "x")
+        except SimulationError as error:
+            assert "Simulation.xcm:1:5: error: xcm: unknown group 'nobody'" in str(error)
+        else:
+            assert False
+    """)
+
+
+def test_values_of_a_statement_that_waited_are_forgotten(interpreted):
+    """They would be given to another statement, where a script goes on from a file."""
+    interpreted("""
+        sim = Simulation(SCENE + "run(value(N + timestep) + 1)")
+        kept = sim._interpreter.record
+        assert kept.values == {}
+        sim.run(2)
+        sim.run()
+        assert list(kept.values.values()) == [[6.0]]
+        assert [kept.statements[k] for k in kept.values] == ["run(value(N+timestep)+1)"]
+    """)
+
+
+def test_a_run_does_not_end_by_what_went_wrong_in_one_before(interpreted):
+    """Where Ctrl-C came before the run went back to its last good state."""
+    interpreted("""
+        sim = Simulation(SCENE)
+        sim.run(1)
+        sim.hub.simulation.control.clock[0].wrong = 1
+        sim.run(2)
+        assert sim.step == 3
+    """)
+
+
 def test_what_is_assigned_is_done_or_refused(interpreted, tmp_path):
     """Variables and columns of points; nothing is passed over in silence."""
     interpreted("""

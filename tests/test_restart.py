@@ -592,6 +592,12 @@ def test_what_a_halved_step_takes_back_is_written_once(run_script):
     assert steps == list(range(0, 61, 5))
 
 
+def test_no_more_files_by_a_variable(run_interpreted):
+    lines = ["restart(2, r.*.h5)", "run(4)", "n = 0", "restart(n)", "run(4)"]
+    folder = run_interpreted(block(2, *lines, size=(0.2, 0.2))).folder
+    assert sorted(path.name for path in folder.glob("*.h5")) == ["r.2.h5", "r.4.h5"]
+
+
 def test_what_was_foreseen_is_not_told_again(run_interpreted):
     lines = ["restart(3, r.*.h5)", "run(6)"]
     script = block(2, *lines, size=(0.2, 0.2), transfer="TPIC")

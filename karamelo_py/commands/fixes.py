@@ -5,7 +5,7 @@ from typing import Any, Literal
 from karamelo_py.language import registry, signature
 from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument
-from karamelo_py.language.unknown import MEANINGS
+from karamelo_py.language.unknown import MEANINGS, check_ID
 from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.group import AnyGroup, ParticleGroup
 from karamelo_py.scene.hub import Catalogue, Hub
@@ -116,6 +116,7 @@ def _define(
             argument="ID",
             expected=f"another ID: {ID}_x and the like would mean two things",
         )
+    check_ID(kind, ID)
     _check_names(hub, kind, ID, target)
     new = signature.call(target, hub, list(arguments), f"{kind} {style}")
     new.style = style

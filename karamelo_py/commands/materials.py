@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from karamelo_py.language import registry
 from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument, Positive, style_of
-from karamelo_py.language.unknown import longer
+from karamelo_py.language.unknown import check_ID, longer
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
 from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.points.laws.doubts import doubts
@@ -273,12 +273,7 @@ def element(
     --------
     load_path, material
     """
-    if not ID.isidentifier():
-        raise ScriptError(
-            f"'{ID}' cannot be part of a file name and of names of values",
-            argument="ID",
-            expected="letters, digits and _, beginning with a letter",
-        )
+    check_ID("element", ID)
     if can(material.law, constrained_velocity):
         raise ScriptError(
             f"material '{material.id}' is rigid: it has no strain and no stress",

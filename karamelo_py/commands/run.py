@@ -4,6 +4,7 @@ from math import isnan
 from pathlib import Path
 from typing import Annotated, Literal
 
+from karamelo_py.language.kinds import kind_of
 from karamelo_py.language.signature import Argument, NonNegative, OutputFile, Positive
 from karamelo_py.output.rhythm import ByTime, Every
 from karamelo_py.output.schedule import RESTART
@@ -14,6 +15,7 @@ from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import POINT_SEEDS, Expression
 
 OnTrouble = Literal["stop", "halve"]
+_STEPS_OR_NEVER = kind_of(Annotated[int, NonNegative])
 
 
 def set_dt(hub: Hub, dt: Annotated[float, Positive]) -> None:
@@ -200,7 +202,9 @@ class EveryOrNever(Every):
 
     @classmethod
     def from_script(cls, hub: Hub, argument: Argument) -> int | ByTime:
-        return 0 if argument.text == "0" else super().from_script(hub, argument)
+        if argument.text.startswith("time"):
+            return super().from_script(hub, argument)
+        return _STEPS_OR_NEVER.convert(hub, argument)
 
 
 def restart(hub: Hub, every: EveryOrNever, file: OutputFile | None = None) -> None:

@@ -59,7 +59,7 @@ class Dependents:
                 for value in getattr(registry.find("scheme", style), "published", ())
             }
         if name in _SCENE | _NAMED and statement.arguments:
-            self.names.add(statement.arguments[0].code.strip())
+            self.names.update(re.findall(r"\w+", statement.arguments[0].code))
         return True
 
     def _meant(self, name: str, statement: CommandCall) -> str:

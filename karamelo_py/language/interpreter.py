@@ -34,6 +34,7 @@ class Interpreter:
         self.variables: dict[str, Value] = {}
         hub.interpreter = self
         self.files: list[Path] = []  # that were read
+        self.files_ahead: list[Path] = []  # and those that a rehearsal has read
         self.frames: list[_Frame] = []
         self.statement: syntax.Statement | None = None  # the last that was begun
         self.record = Record()  # of what was done so far, for files to go on from
@@ -104,6 +105,8 @@ class Interpreter:
         except ScriptError as error:
             error.others = further_errors(other, error)
             raise
+        finally:
+            self.files_ahead = other.files
 
     def _copy(self, hub: Any) -> "Interpreter":
         """Copy the place in the script, on another hub."""

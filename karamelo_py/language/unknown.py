@@ -220,6 +220,20 @@ def check_name(name: str) -> None:
     )
 
 
+def check_ID(kind: str, ID: str) -> None:
+    """Refuse an ID whose values no formula could name."""
+    if ID.isidentifier() and ID not in ("and", "or", "not"):
+        return
+    better = re.sub(r"\W", "_", ID)
+    better = better if better.isidentifier() and better != ID else f"{kind[0]}{better}"
+    raise ScriptError(
+        f"formulas could not name the values of {kind} '{ID}'",
+        argument="ID",
+        expected="letters, digits and _, beginning with a letter",
+        hint=f"such as {better}",
+    )
+
+
 def listed(names: Iterable[str]) -> str:
     text = ", ".join(names) or "none so far"
     return text if len(text) < 200 else text[:200].rsplit(",", 1)[0] + ", ..."

@@ -191,15 +191,15 @@ class RollBack:
     def _keep_start(self, status: int) -> str:
         """Write the state that the run began with, end the outputs, and say how to begin anew."""
         simulation, good = self.simulation, self.point
-        step, path = simulation.step, None
-        simulation.restore(good.arrays)
+        step, present, path = simulation.step, PartStates.of(self.hub, OUTPUTS), None
+        good.return_to(simulation)
         if good.step == self.begun_at:
-            with good.remembered():
-                path = self._write_last_good()
+            path = self._write_last_good()
+        present.give(self.hub)  # their files stay as they are
         back = step - simulation.step - (status in (GAINED, HEATED))
         if back <= FAR:
             if back > 0:
-                simulation.advance(back)
+                good.again(simulation.advance, simulation.step + back)
             self._end_outputs()
         words = f". Begin anew with {self.smaller}"
         if path is None:

@@ -17,6 +17,7 @@ from karamelo_py.kernels.totals import agree_on_heat
 from karamelo_py.kernels.watch import COARSE, ROUND_OFF, begin_to_look, measure_heat, sum_energies
 from karamelo_py.run import timestep
 from karamelo_py.run.diagnosis.energy import unknown_heat, unknown_work
+from karamelo_py.run.diagnosis.explain import refuse_endless_speeds
 from karamelo_py.run.lower.hooks import PythonHooks, sets_initial_state, views_of
 from karamelo_py.run.mpi.whole import PointsMoved, Whole
 from karamelo_py.run.scene_arrays import SceneArrays
@@ -70,6 +71,7 @@ class Simulation(SceneArrays):
                 self._ask_for_steps(0)
         self._choose_dt()
         if not np.isfinite(self.dt):
+            refuse_endless_speeds(self.hub, self)
             raise ScriptError(
                 "nothing limits the time step: all that there is is rigid and at rest",
                 hint="set_dt(...), or a velocity from fix initial_velocity_particles",
@@ -255,6 +257,7 @@ class Simulation(SceneArrays):
 
     def advance(self, count: int) -> int:
         """Take up to `count` steps (to the end time at most); DONE, or why it stopped."""
+        self.control.clock[0].wrong = 0  # of steps before, that nobody has gone back from
         with self.comm.joint():
             if self.subdomain is None:
                 return self._advance_to(self.step + count)

@@ -8,7 +8,7 @@ remembers (`Memory`), and the dissipated energy where there is any. Parts of oth
 a plug-in's, are chained (`karamelo_py.points.laws.further`).
 """
 
-from math import inf, isinf, log, sqrt
+from math import log, sqrt
 from typing import Any, ClassVar, Literal, NamedTuple
 
 from karamelo_py.compiler.compile import where
@@ -26,6 +26,7 @@ from karamelo_py.points.laws.further import (
     initial_further,
 )
 from karamelo_py.points.laws.logarithmic import Logarithmic, elastic_trial
+from karamelo_py.points.laws.strengths.hardening import flow_stress, precompute
 from karamelo_py.points.laws.temperatures import (
     at_temperature,
     heated,
@@ -34,6 +35,8 @@ from karamelo_py.points.laws.temperatures import (
 )
 from karamelo_py.points.laws.viscosity import damped, viscous_pressure, viscous_speed
 from karamelo_py.script.errors import ScriptError, unknown
+
+WARMER = 1.0, 100.0, 1000.0  # than a point that is tried
 
 # --- the parts, as a script names them --------------------------------------------------------
 
@@ -175,13 +178,25 @@ def _idle_damage(law, scene):
 
 def _idle_heat(law, scene):
     """Tell that strength, pressure and damage depend on no temperature, and no one reads it."""
-    softening = getattr(law.strength, "softening", Absent())
-    softens = not isinstance(softening, Absent) or not isinf(getattr(law.strength, "Tm", inf))
     pressures = getattr(law.eos, "thermal", 0), getattr(law.temperature, "alpha", 1)
     presses = any(number != 0 for number in pressures)
-    wears = getattr(law.damage, "D5", 0) != 0
-    acts = isinstance(law.temperature, Absent) or softens or presses or wears
-    return not (acts or scene.reads_temperature)
+    heat = initial_heat(law.temperature, 1.0)
+    if presses or not heat or scene.reads_temperature:
+        return False
+    present = _strained(law, heat)
+    return all(_strained(law, heat._replace(T=heat.T + more)) == present for more in WARMER)
+
+
+def _strained(law, heat):
+    """Give flow stress and damage of a point after a plastic strain, at a temperature."""
+    strength, damage, strain, found = law.strength, law.damage, 0.1, []
+    if damage_after.defined(type(damage)):
+        found.append(damage_after(damage, initial_damage(damage, 1.0), strain, 1.0, heat, 1.0))
+    if flow_stress.defined(type(strength)):
+        memory = strengths.initial_memory(strength, 1.0)
+        known = precompute(strength, memory, heat)
+        found.append(flow_stress(strength, memory, known, strain, heat, 1.0))
+    return found
 
 
 suggestion(

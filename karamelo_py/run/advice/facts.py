@@ -268,8 +268,8 @@ class SceneFacts:
 
 
 def script_text(hub: Hub) -> str:
-    """Read all files of the script, without comments."""
-    files = dict.fromkeys(getattr(hub.interpreter, "files", []))
+    """Read all files of the script, included ones too, without comments."""
+    files = dict.fromkeys([*hub.interpreter.files, *hub.interpreter.files_ahead])
     lines: list[str] = []
     for path in files:
         with suppress(ScriptError):  # the file may be gone by now

@@ -20,7 +20,7 @@ from karamelo_py.output.units import DENSITY, STRESS, VELOCITY
 from karamelo_py.points.laws import can, constrained_velocity, law_kind, specific_volume
 from karamelo_py.run import timestep
 from karamelo_py.run.advice.facts import SceneFacts, is_zero
-from karamelo_py.run.diagnosis.explain import DOUBTED_UNITS, formulas_of, no_number
+from karamelo_py.run.diagnosis.explain import DOUBTED_UNITS, formulas_of, refuse_endless_speeds
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.group import NOTHING_THERE, NodeGroup
 from karamelo_py.scene.hub import Hub
@@ -265,15 +265,6 @@ def _tell(hub: Hub, said: Iterable[Advice]) -> None:
         if hub.update.first_time(one.name):
             place = one.place or hub.update.method.place
             hub.warn(f"{one.name}: {one.reason}", place=place, hint=one.cure)
-
-
-def refuse_endless_speeds(hub: Hub, simulation: Simulation) -> None:
-    """Refuse velocities of points that are no numbers, with the formula that they come from."""
-    if not isfinite(simulation.fastest()):
-        what = f"points have a velocity that is not a number at time {simulation.time:.6g}"
-        hint = "look for a formula that gives NaN or infinity, such as a division by zero"
-        found = no_number(hub, simulation, what, hint)
-        raise ScriptError(found.message, place=found.place, hint=found.hint, code=found.code)
 
 
 def _duration_of_later(hub: Hub, simulation: Simulation) -> float:

@@ -10,9 +10,9 @@ from karamelo_py.kernels.table import one_by_one, says
 from karamelo_py.points.basis import support
 from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.further import without_rate
-from karamelo_py.run.advice.known_failures import refuse_endless_speeds
 from karamelo_py.run.advice.suggestions import seconds_of_step, suggestions
 from karamelo_py.run.diagnosis.energy import not_watched, unknown_work
+from karamelo_py.run.diagnosis.explain import refuse_endless_speeds
 from karamelo_py.run.lower.card import memory_there, refusals
 from karamelo_py.run.lower.memory import known, memory_of, node_fields, nodes_in_use, point_fields
 from karamelo_py.run.mpi.plan import report_lines

@@ -65,8 +65,6 @@ def _unread(hub: Hub, simulation: Any) -> Words:
 def _unused(hub: Hub, simulation: Any) -> Words:
     """Find groups whose names stand nowhere but where they are made."""
     text = script_text(hub)
-    if re.search(r"\binclude\s*\(", text):
-        return  # who knows what stands there
     for ID in hub.groups:
         made = len(re.findall(rf"\bgroup\s*\(\s*{re.escape(ID)}\s*,", text))
         if 0 < len(re.findall(rf"(?<!\w){re.escape(ID)}(?!\w)", text)) <= made:
@@ -121,8 +119,7 @@ def _alike(hub: Hub, fix: Any, key: Callable[[np.ndarray], np.ndarray]) -> bool:
         members = group.members
     for first, x in whole:
         places = np.rint(key(x) * (1e6 / hub.domain.h)).astype(np.int64)
-        rows = places @ (1 << 32 * np.arange(places.shape[1]))  # sorted faster as one number
-        _, which = np.unique(rows, return_inverse=True)
+        _, which = np.unique(places, axis=0, return_inverse=True)
         found = np.bincount(which, np.isin(first + np.arange(len(x)), members))
         if ((found > 0) & (found < np.bincount(which))).any():
             return False

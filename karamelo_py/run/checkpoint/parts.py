@@ -18,7 +18,6 @@ from __future__ import annotations
 import copy
 import functools
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -260,16 +259,6 @@ class RollbackPoint:
         """Go back there; with `cut` outputs go on from there in their files."""
         simulation.restore(self.arrays)
         self.parts.give(self.hub, cut=cut)
-
-    @contextmanager
-    def remembered(self) -> Iterator[None]:
-        """Let parts remember, within this, what they did there."""
-        now = PartStates.of(self.hub)
-        self.parts.give(self.hub)
-        try:
-            yield
-        finally:
-            now.give(self.hub)
 
     def again(self, advance: Callable[[int], int], end: int) -> int:
         """Take the steps up to `end` once more, parts remembering it; how that ended."""

@@ -16,7 +16,7 @@ from karamelo_py.run.timestep import own_step_instead, step_by_script
 from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import named, solid_with
-from karamelo_py.script.errors import Place
+from karamelo_py.script.errors import Place, ScriptError
 from karamelo_py.script.expressions import POINT_SEEDS, Expression
 
 DOUBTED_UNITS = "units of "  # begins the names of warnings that doubt them
@@ -334,6 +334,15 @@ def no_number(hub: Hub, simulation: Any, message: str, hint: str) -> Trouble:
         fix.place,
         "not-a-number",
     )
+
+
+def refuse_endless_speeds(hub: Hub, simulation: Any) -> None:
+    """Refuse velocities of points that are no numbers, with the formula that they come from."""
+    if not np.isfinite(simulation.fastest()):
+        what = f"points have a velocity that is not a number at time {simulation.time:.6g}"
+        hint = "look for a formula that gives NaN or infinity, such as a division by zero"
+        found = no_number(hub, simulation, what, hint)
+        raise ScriptError(found.message, place=found.place, hint=found.hint, code=found.code)
 
 
 def _place(x: np.ndarray) -> str:
