@@ -41,7 +41,7 @@ def loses(scene: Any) -> bool:
     """Tell whether stress is lost in the scene: not that of gases and liquids, which have rules."""
     laws = [solid.material.law for solid in scene.hub.solids.values()]
     flows = (any(getattr(kind, "any_speed", False) for kind in law_kind(law)) for law in laws)
-    explicit = not getattr(scene.scheme, "implicit", False)
+    explicit = not scene.scheme.traits.implicit
     return explicit and scene.moves and scene.linear and not any(flows)
 
 
