@@ -109,7 +109,7 @@ ONLY_BEFORE_RUNS = {
     *("translate_particles", "populate_cylindrical_coordinates", "precision", "set_output"),
 }
 # What belongs to the rehearsal, and who tells.
-NOT_OF_THE_SCENE = {"rehearsed", "later", "warned", "interpreter", "console"}
+NOT_OF_THE_SCENE = {"rehearsed", "later", "warned", "record", "interpreter", "console"}
 
 
 def described(thing, seen):
