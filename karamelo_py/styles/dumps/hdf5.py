@@ -243,8 +243,8 @@ class Hdf5(OfPoints, Hdf5Dump):
         points.seq.sel(time=0.5, method="nearest").max()
         h5py.File("points.h5")["seq"][-1]
 
-    A file that a program was writing when it was killed, or when the disk was full, is opened with
-    ``h5py.File(name, swmr=True)``.
+    A file that a program was writing when it was killed is opened with
+    ``h5py.File(name, swmr=True)``. On a full disk the file has the snapshots that were complete.
 
     Example
     -------
