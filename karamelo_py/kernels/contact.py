@@ -16,6 +16,12 @@ the gap between the surfaces is measured, from the mean places of the points of 
 node sees (`karamelo_py.points.basis.surface`). Bodies may approach until the gap is closed, and are
 stopped where it would be less than nothing at the end of the step. Convex bodies are apart if they
 are along one direction: the axes of the grid are tried, too, since normals lean where faces end.
+
+A mean place says little of the lowest point of a liquid or of grains: each time that it seems to
+leave a gap, points would sink into a wall a little, and for good. So where contact with a body
+whose velocity is prescribed acted in the last step, others may leave it, and not approach. Such a
+wall may be one cell thick, and may have corners that others fill: of its faces those count that
+face the other body, and in a hollow corner none of them may be entered.
 """
 
 from math import sqrt
@@ -45,6 +51,7 @@ from karamelo_py.points.kinematics import Axisymmetric, dot, vector, zero_vector
 # Squared sines of angles about the mean direction out of a body:
 SCATTER = 0.003  # to which that of a plane face is known
 EDGE = 0.03  # beyond which a face ends, or is round
+FACING = 0.3  # cosine of an angle, from which on two faces look at each other
 REPEATS = 16  # at most, where more than two fields meet; what remains falls by a half or more
 
 
@@ -87,11 +94,12 @@ class Scratch(NamedTuple):
 
 
 class Where(NamedTuple):
-    """A place where fields meet, and the length of the step."""
+    """A place where fields meet, and the step."""
 
     x: tuple  # position of the node
     h: float
     dt: float
+    step: int  # its number, from 1
 
 
 class Touched(NamedTuple):
@@ -111,6 +119,8 @@ class NodePair(NamedTuple):
     scatter: float  # the lesser of the two directions out of the bodies
     yielding: tuple  # change of the relative velocity with an impulse along each direction
     relative: tuple  # velocity of the first body as the second one sees it
+    wall: bool  # whether the velocity of one of them, and no more, is prescribed
+    hollow: bool  # and it has a corner there which the other one fills
 
 
 @noinline
@@ -145,34 +155,53 @@ def _kept(contact, n, k):
 
 
 @noinline
-def _normal(contact, kin, nodes, n):
+def _beside(contact, kin, n, which):
+    """Return one of the 3^d nodes around `n`, and whether there is one."""
+    beside, inside = n, True
+    for k in range(kin.dimension):
+        way = which // 3**k % 3 - 1
+        beside += way * contact.beside[k, 0]
+        inside = inside and 0 <= _place(contact, n, k) + way < contact.beside[k, 1]
+    return beside, inside
+
+
+@noinline
+def _face(contact, kin, nodes, n):
+    """Return the sum of m grad N of a node, which points out of the body that ends there."""
+    gradient = vector_at(kin, field(nodes.fields, Normal), n, 0, zero_vector(kin, 0.0))
+    return vector(kin, [_kept(contact, n, k) * of_axis for k, of_axis in enumerate(gradient)])
+
+
+def _cosine_above(a, b, least):
+    """Return True if the angle between two vectors has a cosine of more than `least`."""
+    return dot(a, b) > least * sqrt(dot(a, a) * dot(b, b))
+
+
+@noinline
+def _normal(contact, kin, nodes, n, other):
     """Return the direction out of a body, and the squared sine of the angle by which it scatters.
 
     It is the mean of the sums of m grad N, which point out of a body, of nodes around `n`. Those of
     one node turn by tens of degrees as points that lean to the grid pass it. With the weights 1/4,
-    1/2, 1/4 along each axis a plane face keeps its direction to two degrees.
+    1/2, 1/4 along each axis a plane face keeps its direction to two degrees. Those are left out
+    that look the same way as `other`, the direction out of the other body: of a thin wall both
+    faces are near, and one of them faces that body.
 
     Its length is its weight beside the direction out of another body. It grows with the surface
     that the nodes see, and falls where their directions differ, as at edges and corners. (Lemiale,
     Nairn & Hurmane 2010 take the larger sum of m grad N: at the edge of a block on a base of its
     density both are as large, and that of the block leans by 15 degrees.)
     """
-    gradients, like = field(nodes.fields, Normal), zero_vector(kin, 0.0)
-    total, lengths = like, 0.0
+    total, lengths = zero_vector(kin, 0.0), 0.0
     for which in range(3**kin.dimension):
-        beside, weight, left = n, contact.per_mass[n // contact.stride], which
-        for k in range(kin.dimension):
-            way = left % 3 - 1
-            left //= 3
-            beside += way * contact.beside[k, 0]
-            within = 0 <= _place(contact, n, k) + way < contact.beside[k, 1]
-            weight *= (0.5 if way == 0 else 0.25) if within else 0.0
-        if weight > 0:
-            gradient = vector_at(kin, gradients, beside, 0, like)
-            kept = [_kept(contact, beside, k) * of_axis for k, of_axis in enumerate(gradient)]
-            part = weight * vector(kin, kept)
-            total = total + part
-            lengths += sqrt(dot(part, part))
+        beside, inside = _beside(contact, kin, n, which)
+        if inside:
+            part = contact.per_mass[n // contact.stride] * _face(contact, kin, nodes, beside)
+            for k in range(kin.dimension):
+                part = (0.5 if which // 3**k % 3 == 1 else 0.25) * part
+            if not _cosine_above(part, other, FACING):
+                total = total + part
+                lengths += sqrt(dot(part, part))
     square, scatter = dot(total, total), 1.0
     if square > 0:
         scatter = max(1.0 - square / (lengths * lengths), 0.0) + SCATTER
@@ -183,23 +212,83 @@ def _normal(contact, kin, nodes, n):
 
 
 @noinline
-def _pair_of(contact, kin, nodes, records, n, m):
-    """Pair the bodies with nodes `n` and `m`; velocities are the first components of `records`."""
+def _is_hollow(contact, kin, nodes, n, normal, other):
+    """Return True if faces around a node, of those that face another body, look at each other.
+
+    They do where, along the surface, they turn against the way that leads to them.
+    """
+    turn, square = 0.0, dot(normal, normal)
+    for which in range(3**kin.dimension):
+        beside, inside = _beside(contact, kin, n, which)
+        face = _face(contact, kin, nodes, beside if inside else n)
+        if inside and square > 0 and _cosine_above(face, -1.0 * other, FACING):
+            way = vector(kin, [float(which // 3**k % 3 - 1) for k in range(kin.dimension)])
+            turn += dot(face, way) - dot(face, normal) * dot(way, normal) / square
+    return turn < 0
+
+
+@noinline
+def _entering(contact, kin, nodes, n, other, velocity):
+    """Return the part of a velocity by which it enters that face around a node that it enters most.
+
+    Of the faces that face the `other` body.
+    """
+    most, part = 0.0, zero_vector(kin, 0.0)
+    for which in range(3**kin.dimension):
+        beside, inside = _beside(contact, kin, n, which)
+        face = _face(contact, kin, nodes, beside if inside else n)
+        speed, square = -dot(face, velocity), dot(face, face)
+        if inside and speed > most * sqrt(square) and _cosine_above(face, -1.0 * other, FACING):
+            most = speed / sqrt(square)
+            part = (-speed / square) * face
+    return part
+
+
+@noinline
+def _entering_corner(contact, kin, nodes, n, other, velocity):
+    """Return the part of a velocity without which it enters no face of a hollow corner."""
+    left = velocity
+    for _ in range(2 * kin.dimension):
+        left = left - _entering(contact, kin, nodes, n, other, left)
+    return velocity - left
+
+
+@noinline
+def _pair_of(contact, kin, nodes, records, n, m, known):
+    """Pair the bodies with nodes `n` and `m`; velocities are the first components of `records`.
+
+    If they are `known`: while they are sought, they say nothing of the faces that they enter.
+    """
     per_n, per_m = 1.0 / nodes.sums[n, MASS], 1.0 / nodes.sums[m, MASS]
-    # Opposite faces that end beside each other lean to opposite sides: the difference does not.
-    of_n, scatter_n = _normal(contact, kin, nodes, n)
-    of_m, scatter_m = _normal(contact, kin, nodes, m)
-    led_n, led_m = _led(contact, kin, n), _led(contact, kin, m)
-    if led_n and not led_m and scatter_n < EDGE:
-        of_m = 0.0 * of_m
-    elif led_m and not led_n and scatter_m < EDGE:
-        of_n = 0.0 * of_n
-    axes = range(kin.dimension)
-    yielding = [_yielding(contact, n, k, per_n) + _yielding(contact, m, k, per_m) for k in axes]
     like = zero_vector(kin, 0.0)
     relative = vector_at(kin, records, n, 0, like) - vector_at(kin, records, m, 0, like)
+    # Opposite faces that end beside each other lean to opposite sides: the difference does not.
+    of_n, scatter_n = _normal(contact, kin, nodes, n, like)
+    of_m, scatter_m = _normal(contact, kin, nodes, m, like)
+    led_n, led_m = _led(contact, kin, n), _led(contact, kin, m)
+    hollow = False
+    if led_n and not led_m:
+        of_n, scatter_n = _normal(contact, kin, nodes, n, of_m)
+        hollow = known and scatter_n >= EDGE and _is_hollow(contact, kin, nodes, n, of_n, of_m)
+        if hollow:
+            into = _entering_corner(contact, kin, nodes, n, of_m, -1.0 * relative)
+            of_n = -1.0 * into if dot(into, into) > 0 else of_n
+        if hollow or scatter_n < EDGE:
+            of_m = 0.0 * of_m
+    elif led_m and not led_n:
+        of_m, scatter_m = _normal(contact, kin, nodes, m, of_n)
+        hollow = known and scatter_m >= EDGE and _is_hollow(contact, kin, nodes, m, of_m, of_n)
+        if hollow:
+            into = _entering_corner(contact, kin, nodes, m, of_n, relative)
+            of_m = -1.0 * into if dot(into, into) > 0 else of_m
+        if hollow or scatter_m < EDGE:
+            of_n = 0.0 * of_n
+    axes = range(kin.dimension)
+    yielding = [_yielding(contact, n, k, per_n) + _yielding(contact, m, k, per_m) for k in axes]
     scatter = min(scatter_n, scatter_m)
-    return NodePair(n, m, per_n, per_m, of_n - of_m, scatter, vector(kin, yielding), relative)
+    outward = of_n - of_m
+    wall, yields = led_n != led_m, vector(kin, yielding)
+    return NodePair(n, m, per_n, per_m, outward, scatter, yields, relative, wall, hollow)
 
 
 def _left(pair, push):
@@ -266,6 +355,9 @@ def _excess_of(contact, kin, nodes, pair, where):
             gap = _gap(contact, nodes, direction, pair.n, pair.m, where)
             if gap > 0 and dot(direction, pair.relative) * where.dt <= gap * length:
                 return 0.0
+    last = abs(contact.touched[pair.n, pair.m // contact.stride])
+    if pair.wall and last > 0 and last == where.step - 1:
+        return approach / size
     gap = _gap(contact, nodes, pair.outward, pair.n, pair.m, where)
     return approach / size - max(gap, 0.0) / where.dt
 
@@ -325,7 +417,7 @@ def _count_partners(which, contact, kin, nodes, place, count):
                 belongs = abs(contact.touched[n, contact.meeting[j]]) == which.step
             else:
                 m = _node(contact, place, j)
-                pair = _pair_of(contact, kin, nodes, nodes.update, n, m)
+                pair = _pair_of(contact, kin, nodes, nodes.update, n, m, True)
                 belongs = _excess_of(contact, kin, nodes, pair, which) > 0
             if belongs:
                 contact.partners[i] += 1
@@ -369,7 +461,7 @@ def _touch_pair(contact, kin, nodes, control, i, j, place, share, where):
     """Give `share` of the impulse between the `i`-th and the `j`-th of the fields that meet."""
     a, b = contact.meeting[i], contact.meeting[j]
     n, m = _node(contact, place, i), _node(contact, place, j)
-    pair = _pair_of(contact, kin, nodes, nodes.update, n, m)
+    pair = _pair_of(contact, kin, nodes, nodes.update, n, m, True)
     excess = _excess_of(contact, kin, nodes, pair, where)
     if not excess > 0:
         return
@@ -385,8 +477,7 @@ def _touch_pair(contact, kin, nodes, control, i, j, place, share, where):
     rub, sticks = 0.0, False
     if contact.friction[a, b] > 0:
         rub, sticks = _friction_of(pair, contact.friction[a, b], push, slide, share)
-    step = int(control.values[TIMESTEP]) + 1
-    contact.touched[n, b] = -step if sticks else step
+    contact.touched[n, b] = -where.step if sticks else where.step
     heat = 0.0
     if rub > 0:
         # The energy that friction dissipates: impulse times the mean of the sliding speeds at the
@@ -440,7 +531,8 @@ def touch_node(contact, kin, grids, nodes, control, n):
     count = _meet(contact, nodes, n)
     if count > 1:
         grid = record(grids, n // contact.stride)
-        where = Where(node_position(grid, n), grid.h, control.values[DT])
+        step = int(control.values[TIMESTEP]) + 1
+        where = Where(node_position(grid, n), grid.h, control.values[DT], step)
         _touch_place(contact, kin, nodes, control, n % contact.stride, count, where)
 
 
@@ -496,11 +588,11 @@ def list_pairs(contact, kin, grids, nodes, spans, pairs, normals, gaps):
             count = _meet(contact, nodes, first)
             place = first % contact.stride
             grid = record(grids, first // contact.stride)
-            where = Where(node_position(grid, first), grid.h, 1.0)
+            where = Where(node_position(grid, first), grid.h, 1.0, 0)
             for i in range(count if count > 1 else 0):
                 for j in range(i + 1, count):
                     n, m = _node(contact, place, i), _node(contact, place, j)
-                    pair = _pair_of(contact, kin, nodes, nodes.update, n, m)
+                    pair = _pair_of(contact, kin, nodes, nodes.update, n, m, False)
                     size = sqrt(dot(pair.outward, pair.outward))
                     if size > 0:
                         pairs[found, 0], pairs[found, 1] = n, m
@@ -519,14 +611,26 @@ def list_pairs(contact, kin, grids, nodes, spans, pairs, normals, gaps):
 
 
 @noinline
-def _stay_pair(contact, i, j, pair, share, sticks):
-    """Take `share` of the relative velocity across the surface, or of all where the pair sticks."""
+def _stay_pair(contact, kin, nodes, i, j, pair, share, sticks):
+    """Take `share` of the relative velocity across the surface, or of all where the pair sticks.
+
+    In a hollow corner, of all but what v* has left free: along one face, or along none.
+    """
+    taken = pair.relative
+    if pair.hollow:
+        like = zero_vector(kin, 0.0)
+        free = vector_at(kin, nodes.update, pair.n, 0, like)
+        free = free - vector_at(kin, nodes.update, pair.m, 0, like)
+        if dot(free, free) > 0:
+            taken = taken - dot(taken, free) / dot(free, free) * free
     across = dot(pair.outward, pair.relative)
     compliance = dot(pair.outward, pair.outward, pair.yielding)
     push = share * across / compliance if compliance > 0 else 0.0
     for k, yielding in enumerate(pair.yielding):
         if yielding > 0:
-            impulse = share * pair.relative[k] / yielding if sticks else push * pair.outward[k]
+            impulse = push * pair.outward[k]
+            if sticks or pair.hollow:
+                impulse = share * taken[k] / yielding
             if not _immovable(contact, pair.n, k):
                 contact.change[i, k] -= impulse * pair.per_n
             if not _immovable(contact, pair.m, k):
@@ -545,8 +649,9 @@ def _stay_place(contact, kin, nodes, place, count, step):
                 touched = contact.touched[n, contact.meeting[j]]
                 if abs(touched) == step:
                     m = _node(contact, place, j)
-                    pair = _pair_of(contact, kin, nodes, nodes.velocity, n, m)
-                    _stay_pair(contact, i, j, pair, _share(contact, i, j), touched < 0)
+                    pair = _pair_of(contact, kin, nodes, nodes.velocity, n, m, True)
+                    share, sticks = _share(contact, i, j), touched < 0
+                    _stay_pair(contact, kin, nodes, i, j, pair, share, sticks)
         for i in range(count):
             n = _node(contact, place, i)
             for k in range(kin.dimension):
