@@ -110,7 +110,11 @@ def touch_kind(grip: type | None) -> type[Touch]:
     name = f"Touch{grip.__name__}"
     if name not in globals():  # where kernels, which are cached, find it
         globals()[name] = type(name, (Touch,), {"__module__": __name__})
-        grip_of.on(globals()[name])(lambda tag, what: field(what.points.fields, grip))
+
+        @grip_of.on(globals()[name])
+        def _grip_of(tag, what):
+            return field(what.points.fields, grip)
+
     return globals()[name]
 
 
