@@ -224,7 +224,7 @@ def test_all_published_values_are_those_of_the_processor(run_interpreted, scheme
     other = run_interpreted(script, "--gpu", folder="there").log
     assert len(one.weight_x) == 6
     for name, column in one.items():
-        assert np.abs(column).max() > 0, name
+        assert np.abs(column).max() > 0 or name == "rough_x", name  # nothing may slide there
         np.testing.assert_allclose(other[name], column, rtol=1e-8, atol=1e-12, err_msg=name)
 
 
