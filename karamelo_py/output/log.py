@@ -94,8 +94,9 @@ class Log(Rhythmic):
     def close(self) -> None:
         """Close the file; a later `begin` would start a new one."""
         if self._file is not None:
-            self._file.close()
-            self._file = self._claim = None
+            file, self._file, self._claim = self._file, None, None
+            with reported(self.path, "the log file "):  # a line that was not written is tried again
+                file.close()
 
     def _go_on(self) -> None:
         """Go on in the file of an earlier run, behind the line that was its last then."""
