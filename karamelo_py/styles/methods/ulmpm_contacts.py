@@ -80,8 +80,8 @@ class ULMPMContacts(Method):
     its group must contain all corners of the cells of the base. With splines a base should be three
     cells thick. The surface of a thinner one seems higher by up to a quarter of a cell.
 
-    Walls of one cell hold liquids and grains, also in their corners: water at rest in a rigid box
-    sinks into its walls by at most a quarter of a cell in 2 s (linear, FLIP 0.99: 0.1).
+    Walls of one cell hold liquids and grains, also in their corners. Water at rest in a rigid box
+    still sinks into its floor slowly: a third of a cell in 2 s (linear, FLIP 0.99).
 
     Both solids at a node have one normal, so that their impulses are opposite and momentum is kept.
     It comes from the sums of m grad N of both, averaged over the neighbouring nodes with the
