@@ -201,3 +201,11 @@ def test_a_region_that_kernels_do_not_know_pushes_with_the_same_force(run_script
     assert max(known["F_y"]) > 0 and max(known["F_x"]) > 0
     for name in ("F_x", "F_y"):
         assert told[name] == pytest.approx(known[name], rel=1e-9, abs=1e-9)
+
+
+def test_check_counts_what_contact_with_faces_costs(run_interpreted, tmp_path):
+    corners = np.array([[0.0, 0.0], [0.9, 0.0], [0.9, 0.31], [0.0, 0.31]])
+    meshio.Mesh(corners, {"triangle": [[0, 1, 2], [0, 2, 3]]}).write(tmp_path / "die.vtk")
+    lines = f"region(die, mesh, {tmp_path}/die.vtk)", "fix(F, contact/surface, all, die)"
+    said = run_interpreted(block(2, *lines, "run_time(1)"), command="check").out
+    assert "s or more\n               most of it for fix contact/surface 'F'\n" in said
