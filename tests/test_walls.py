@@ -112,8 +112,8 @@ run_time(1)
 HELD = """
 group(low, nodes, region, low, all)
 group(high, nodes, region, high, all)
-fix(low, velocity_nodes, low, 0, NULL)
-fix(high, velocity_nodes, high, 1e-5, NULL)
+fix(low, velocity_nodes, low, 0, 0)
+fix(high, velocity_nodes, high, 1e-5, 0)
 low = low_x
 high = high_x
 """

@@ -455,7 +455,7 @@ def _change_nodes(what, hooks, control, dt, h, count, share):
 @noinline
 def _rub_at_nodes(what, hooks, control, dt, h, count):
     """Rub the chosen nodes along their wall."""
-    target, kin, nodes = what.target, what.kin, what.nodes
+    target, kin, nodes, kept = what.target, what.kin, what.nodes, what.kept
     programs = hooks.programs[h]
     if target == arrays.ON_VELOCITY:
         # Else v* is that of the step before.
@@ -467,7 +467,7 @@ def _rub_at_nodes(what, hooks, control, dt, h, count):
     slot = hooks.table[h].slot
     for q in range(count):
         n, mu = hooks.chosen[q], hooks.scratch[VALUE, q]
-        rub(kin, nodes, programs, hooks, n, mu, dt, control, slot)
+        rub(kin, nodes, programs, hooks, n, mu, dt, kept, control, slot)
 
 
 @noinline

@@ -23,7 +23,7 @@ def _is_free(held, programs, n, c):
 
 
 @noinline
-def rub(kin, nodes, programs, hooks, n, mu, dt, control, slot):
+def rub(kin, nodes, programs, hooks, n, mu, dt, kept, control, slot):
     """Give node `n` the friction of its wall; add the force to the totals from `slot` on.
 
     `programs` are those of the hook that has held the node: what it changed v* by is the impulse
@@ -42,7 +42,9 @@ def rub(kin, nodes, programs, hooks, n, mu, dt, control, slot):
             continue
         v = nodes.sums[n, of_momentum(kin) + c] / mass
         free = v + dt * nodes.sums[n, of_force(kin) + c] / mass
-        across += (star - free) * (star - free)
+        now = star - nodes.update[n, of_change(kin) + c]
+        impulse = star - free + kept * (v - now)
+        across += impulse * impulse
     if not along > 0:
         return
     speed = sqrt(along)

@@ -170,6 +170,8 @@ def _lags(transfer, scene):
 def _brakes(transfer, scene):
     """Find the energy that a free rotation loses: (1 - alpha) of the lag in each step, twice."""
     lag, simulation = scene.lag, scene.simulation
+    if not lag.share > 0:
+        return None
     step = simulation.limit if getattr(transfer, "per_time", False) else simulation.dt
     gone = 1 - exp(-2 * (1 - transfer.alpha) * lag.share * scene.duration / step)
     return {"gone": 100 * gone} if gone > BRAKED else None

@@ -15,7 +15,18 @@ from karamelo_py.styles.fixes.formulas import AXES, judge_friction, per_directio
 
 
 def prescribe(mass, v, v_star, force, value, before, dt, share):
-    """v* is the value now; the total is the reaction."""
+    """v* is the value now, v the value one step earlier, as at a plane of symmetry.
+
+    The total is the reaction.
+    """
+    return before, value, force, mass * (value - v_star) / dt
+
+
+def prescribe_motion(mass, v, v_star, force, value, before, dt, share):
+    """v* is the value now, and v what it was: points that keep their own velocity learn the value.
+
+    The total is the reaction.
+    """
     return v, value, force, mass * (value - v_star) / dt
 
 
@@ -56,6 +67,7 @@ HOOKS = {
     bound: (node_hook(update, uses_before=True, holds=True), node_hook(mapped, publishes=False))
     for bound, update, mapped in (
         ("", prescribe, prescribe_mapped),
+        ("moves", prescribe_motion, prescribe_mapped),
         ("leq", prescribe_at_most, prescribe_mapped_at_most),
         ("geq", prescribe_at_least, prescribe_mapped_at_least),
     )
@@ -143,7 +155,13 @@ class VelocityNodes(Fix):
                 expected="NULL for the directions along the wall, or no mu",
             )
         self.bound = self._one_bound()
-        self.post_update_grid_state, self.post_velocities_to_grid = HOOKS[self.bound]
+        # A wall that moves in all of its directions drags matter along; one at rest, or one that
+        # leaves a direction free, is a clamp, a roller or a plane of symmetry.
+        rest = all(v is None or (v.is_constant and v.constant == 0) for v in self.formulas)
+        drags = not self.bound and None not in self.formulas and not rest
+        drags = drags and hub.domain.dimension > 1
+        hooks = HOOKS["moves" if drags else self.bound]
+        self.post_update_grid_state, self.post_velocities_to_grid = hooks
         # Contact may move nodes that are held only as far as they come.
         self.prescribes_velocity = not self.bound
 
