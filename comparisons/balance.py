@@ -36,7 +36,7 @@ steps, and fewer for more than 700 points. With `--full` it takes the whole run.
 | momentum | change of the momentum of points that are not rigid, less the impulses on them |
 | why | the cause of an energy that changes by more than 1 %, as the program names it |
 
-Energy is a share of the largest energy ([the watch](energy.md#energy-monitor)). Momentum is a share of
+Energy is relative to the largest energy ([monitor](energy.md#energy-monitor)). Momentum is relative to
 the largest impulse or of sqrt(2 m E), with the largest kinetic energy E. In axisymmetric scenes it
 is the momentum along the axis. Implicit steps have no momentum, since they show forces at the end
 of a step. The impulses are those of fixes and rigid solids.
