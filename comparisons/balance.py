@@ -37,7 +37,7 @@ steps, and fewer for more than 700 points. With `--full` it takes the whole run.
 | why | the cause of an energy that changes by more than 1 %, as the program names it |
 
 Energy is relative to the largest energy ([monitor](energy.md#energy-monitor)). Momentum is relative to
-the largest impulse or of sqrt(2 m E), with the largest kinetic energy E. In axisymmetric scenes it
+the largest impulse or to sqrt(2 m E), with the largest kinetic energy E. In axisymmetric scenes it
 is the momentum along the axis. Implicit steps have no momentum, since they show forces at the end
 of a step. The impulses are those of fixes and rigid solids.
 
