@@ -36,10 +36,10 @@ steps, and fewer for more than 700 points. With `--full` it takes the whole run.
 | momentum | change of the momentum of points that are not rigid, less the impulses on them |
 | why | the cause of an energy that changes by more than 1 %, as the program names it |
 
-Energy is relative to the largest energy ([monitor](energy.md#energy-monitor)). Momentum is relative to
-the largest impulse or to sqrt(2 m E), with the largest kinetic energy E. In axisymmetric scenes it
-is the momentum along the axis. Implicit steps have no momentum, since they show forces at the end
-of a step. The impulses are those of fixes and rigid solids.
+Energy is relative to the largest energy ([monitor](energy.md#energy-monitor)). Momentum is relative
+to the largest impulse or to sqrt(2 m E), with the largest kinetic energy E. In axisymmetric scenes
+it is the momentum along the axis. Implicit steps have no momentum, since they show forces at the
+end of a step. Impulses are from fixes and rigid solids.
 
 | scene | steps | energy | momentum | why |
 |---|---|---|---|---|
