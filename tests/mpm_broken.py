@@ -29,6 +29,7 @@ from karamelo_py.points.laws.strengths.hardening import flow_stress, radial_retu
 from karamelo_py.points.transfers import updated_velocity
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.modify import Compute, Fix, heat_hook, node_hook, point_hook, vector_hook
+from karamelo_py.schemes.traits import SchemeTraits
 from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.dumps.base import Dump
 
@@ -489,10 +490,12 @@ class Rowless(NamedTuple): ...
 
 
 class Wrong(NamedTuple):
+    traits = SchemeTraits()
     rows = (SUMS, "twice")
 
 
 class Grounded(NamedTuple):
+    traits = SchemeTraits()
     rows = ACCELERATE
 
 

@@ -242,10 +242,9 @@ def _updated_strain(task, w, stencil, p, dt, total, totals, fastest):
     law, old, f = visit.deformed_state(w, p)
     growth = frames.spatial_increment(w.frame, w.kin, dl, f)
     load_step = isinstance(task, StrainOfLoadStep) and laws.by_rates(law)
-    if load_step:
-        growth = large(growth)
+    strained = large(growth) if load_step else growth  # domains grow by the whole of it
     beside = load(field(w.points.fields, visit.PressureBeside), p, (dt,))
-    state = laws.advance_beside(law, w.kin, old, growth, dt, sum(beside))
+    state = laws.advance_beside(law, w.kin, old, strained, dt, sum(beside))
     store(w.points.state, p, state)
     now = frames.strained(w.frame, w.kin, f, dl)
     store(field(w.points.fields, frames.DeformationGradient), p, now)

@@ -147,7 +147,7 @@ def _bodies(s: Any) -> list[tuple[BodyMotion, Any]]:
 
 def drift_of(s: Any) -> Noise | None:
     """Measure what the drift in the scene `s` (SceneFacts) feeds, also where that is borne."""
-    if not (hasattr(s.scheme, "keeping") and s.moves and s.kept > 0.9) or _thrown(s):
+    if not (s.scheme.traits.keeping and s.moves and s.kept > 0.9) or _thrown(s):
         return None
     known, spacing = borne(s.basis), float(s.simulation.control.clock[0].spacing)
     averages = s.scheme.traits.bears_drift
@@ -188,7 +188,7 @@ def _is_constant(formula: Any) -> bool:
 def turn_of(s: Any) -> Noise | None:
     """Measure what the turn in the scene `s` feeds, also where that is borne."""
     turns = s.moments or (s.moves and s.kept > 0.9)
-    if not (hasattr(s.scheme, "keeping") and turns and s.d > 1) or s.hub.domain.axisymmetric:
+    if not (s.scheme.traits.keeping and turns and s.d > 1) or s.hub.domain.axisymmetric:
         return None
     known, spacing = borne(s.basis), float(s.simulation.control.clock[0].spacing)
     dt, one_point, most = s.simulation.dt, s.sparse, None

@@ -53,7 +53,7 @@ def keeping_share(hub: Hub) -> float:
         return USUAL
     basis = update.method.basis
     kind = getattr(basis, "gradient_jumps", False) * basis.nodes_per_cell
-    keeping = update.scheme.traits.keeping
+    keeping = update.scheme.traits.keeping or ((USUAL, USUAL),) * 3
     share = keeping[kind][sparse(hub)]
     if alpha > 0.99:
         return share

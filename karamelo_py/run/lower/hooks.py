@@ -89,7 +89,8 @@ class _Builder:
         self.constants: list[np.ndarray] = []
         self.holding: list[Any] = []
         self.loaded_nodes = 0  # the number of nodes, where hooks bring forces
-        self.told = hub.update.method.rigid_fields(hub)
+        method = hub.update.method
+        self.told = method.rigid_fields(hub) if method is not None else np.zeros(0, bool)
         laws = (solid.material.law for solid in hub.solids.values())
         self.rigid = any(can(law, constrained_velocity) for law in laws)
         self.whole: list[Any] = []  # tags of hooks on whole points
